@@ -1,0 +1,148 @@
+"""Baselines to hold learned policies against: exact bounds, and two policies without learning."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+
+from taichi_ants.analysis.dynamic_programming import Outcome, exact_bounds
+from taichi_ants.analysis.statistics import bootstrap_interval
+from taichi_ants.errors import AntsError
+from taichi_ants.policies import random_policy, trail_follower
+from taichi_ants.worlds.world import World
+
+BASELINE_COLUMNS: tuple[str, ...] = (
+    "baseline",
+    "setting",
+    "discount",
+    "return_mean",
+    "return_ci_low",
+    "return_ci_high",
+    "steps_mean",
+    "deliveries_mean",
+    "note",
+)
+TRAINING_SETTING = "training, no evaporation"
+GREEDY_SETTING = "greedy, evaporation"
+
+# One row of baselines.csv; None for an empty field.
+Row = dict[str, Any]
+
+
+class Rollouts(Protocol):
+    """What an evaluation returns: arrays of shape (seeds, rollouts)."""
+
+    @property
+    def returns(self) -> np.ndarray: ...
+    @property
+    def steps(self) -> np.ndarray: ...
+    @property
+    def deliveries(self) -> np.ndarray: ...
+
+
+# Called as evaluate(world, q_values, rollouts=, epsilon=, max_steps=, evaporation=, seeds=), with
+# one table for each seed: q_values (seeds, 128, 5).
+Evaluate = Callable[..., Rollouts]
+
+
+def baseline_rows(
+    world: World,
+    evaluate: Evaluate,
+    seeds: Sequence[int],
+    rollouts: int = 50,
+    discounts: Sequence[float] = (0.9, 0.99),
+    max_steps: int = 600,
+) -> list[Row]:
+    """All baselines of a world, as rows with the columns BASELINE_COLUMNS.
+
+    Args:
+        world: The world.
+        evaluate: What rolls out policies, such as `taichi_ants.engines.evaluate`.
+        seeds: The seeds of the rollouts; figures are means over them, with 95 % intervals.
+        rollouts: Rollouts for each seed.
+        discounts: Discount factors whose optimal policies are wanted.
+        max_steps: The step limit of an episode.
+
+    Returns:
+        The rows of `bound_rows`, or if the world is too large for them one row whose note says so;
+        then those of `policy_rows`.
+    """
+    try:
+        bounds = bound_rows(world, discounts, max_steps)
+    except AntsError as error:
+        bounds = [_row("exact bounds", TRAINING_SETTING, note=str(error))]
+    return bounds + policy_rows(world, evaluate, seeds, rollouts, max_steps)
+
+
+def bound_rows(world: World, discounts: Sequence[float], max_steps: int) -> list[Row]:
+    """The exact bounds of `dynamic_programming.exact_bounds` as rows.
+
+    A discount of 1 has no row: the return of an episode without end may grow without bound.
+
+    Raises:
+        AntsError: As `exact_bounds` does, above all if the world is too large.
+    """
+    bounds = exact_bounds(world, [discount for discount in discounts if discount < 1], max_steps)
+    if bounds.shortest is None:
+        shortest = _row("shortest delivery", TRAINING_SETTING, note="no delivery is possible")
+    else:
+        note = "exact: fewest steps to a delivery, then largest return, whatever the step limit"
+        shortest = _outcome_row("shortest delivery", bounds.shortest, note)
+    note = f"exact: largest undiscounted return within {max_steps} steps, then fewest steps"
+    rows = [shortest, _outcome_row("largest return", bounds.largest, note)]
+    for optimal in bounds.optimal:
+        note = (
+            f"exact: optimal for an episode without step limit (discounted return "
+            f"{optimal.value:.6g}), followed for at most {max_steps} steps"
+        )
+        row = _outcome_row("optimal policy", optimal.outcome, note)
+        rows.append({**row, "discount": optimal.discount})
+    return rows
+
+
+def policy_rows(
+    world: World, evaluate: Evaluate, seeds: Sequence[int], rollouts: int, max_steps: int
+) -> list[Row]:
+    """The random policy and the trail follower, without and with evaporation, as rows."""
+    note = f"mean over {len(seeds)} seeds of {rollouts} rollouts, 95 % interval over seeds (BCa)"
+    rows = []
+    for name, policy in (("random policy", random_policy()), ("trail follower", trail_follower())):
+        for setting, evaporation in ((TRAINING_SETTING, False), (GREEDY_SETTING, True)):
+            outcome = evaluate(
+                world,
+                np.repeat(policy[None], len(seeds), axis=0),
+                rollouts=rollouts,
+                epsilon=0.0,
+                max_steps=max_steps,
+                evaporation=evaporation,
+                seeds=list(seeds),
+            )
+            returns = np.asarray(outcome.returns, float).mean(axis=1)
+            low, high = bootstrap_interval(returns[None])
+            figures = {
+                "return_mean": float(returns.mean()),
+                # One seed has no interval.
+                "return_ci_low": None if np.isnan(low[0]) else float(low[0]),
+                "return_ci_high": None if np.isnan(high[0]) else float(high[0]),
+                "steps_mean": float(np.mean(outcome.steps)),
+                "deliveries_mean": float(np.mean(outcome.deliveries)),
+            }
+            rows.append(_row(name, setting, note=note, **figures))
+    return rows
+
+
+def _outcome_row(baseline: str, outcome: Outcome, note: str) -> Row:
+    return _row(
+        baseline,
+        TRAINING_SETTING,
+        note=note,
+        return_mean=outcome.total_reward,
+        steps_mean=outcome.steps,
+        deliveries_mean=outcome.deliveries,
+    )
+
+
+def _row(baseline: str, setting: str, **figures: Any) -> Row:
+    return {**dict.fromkeys(BASELINE_COLUMNS), "baseline": baseline, "setting": setting, **figures}

@@ -1,0 +1,126 @@
+"""Findings as rows of claims.csv and as Markdown."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+
+from taichi_ants.analysis.claims.assess import SIMULTANEOUS_LEVEL
+from taichi_ants.analysis.claims.model import Finding, Verdict
+from taichi_ants.analysis.markdown import interval, number, table
+
+
+def claims_rows(findings: Sequence[Finding]) -> list[dict]:
+    """The rows of claims.csv; effect, ends of the interval and level are nan if not tested."""
+    return [
+        {
+            "claim": finding.claim.id,
+            "section": finding.claim.section,
+            "statement": finding.claim.statement,
+            "quantity": finding.claim.quantity,
+            "criterion": finding.claim.criterion.words,
+            "unit": finding.claim.unit,
+            "delivery": finding.delivery,
+            "contrast": finding.contrast,
+            "effect": finding.effect,
+            "ci_low": finding.low,
+            "ci_high": finding.high,
+            "level": finding.level,
+            "simultaneous_level": SIMULTANEOUS_LEVEL,
+            "verdict": finding.verdict.value,
+            "note": finding.note,
+            "seeds": finding.seeds,
+            "configurations": finding.configurations,
+        }
+        for finding in findings
+    ]
+
+
+def by_claim(findings: Sequence[Finding]) -> list[list[Finding]]:
+    """Findings on one claim together, one for each delivery setting, in the order of claims."""
+    grouped: dict[str, list[Finding]] = {}
+    for finding in findings:
+        grouped.setdefault(finding.claim.id, []).append(finding)
+    return list(grouped.values())
+
+
+def effect_text(finding: Finding) -> str:
+    """The effect with its interval, "-" if not tested."""
+    digits = 2 if finding.claim.unit.startswith(("share", "deliveries", "correlation")) else 1
+    if finding.verdict is Verdict.NOT_TESTED:
+        return number(math.nan)
+    return f"{number(finding.effect, digits)} {interval(finding.low, finding.high, digits)}"
+
+
+def verdict_text(finding: Finding) -> str:
+    """The verdict, with its note in brackets."""
+    return finding.verdict.value + (f" ({finding.note})" if finding.note else "")
+
+
+def tally(findings: Sequence[Finding]) -> str:
+    """How many findings of each verdict there are, as a phrase."""
+    counts = Counter(finding.verdict for finding in findings)
+    order = (
+        Verdict.SUPPORTED,
+        Verdict.CONTRADICTED,
+        Verdict.UNDISTINGUISHED,
+        Verdict.NOT_TESTED,
+    )
+    return ", ".join(f"{counts[verdict]} {verdict.value}" for verdict in order if counts[verdict])
+
+
+def claims_markdown(findings: Sequence[Finding]) -> str:
+    """A table of all verdicts, then every claim made precise."""
+    settings = list(dict.fromkeys(finding.delivery for finding in findings))
+    parts = [
+        f"{setting}: {tally([f for f in findings if f.delivery == setting])}."
+        for setting in settings
+    ]
+    return "\n".join(
+        (
+            "\n".join(f"- {part}" for part in parts) + "\n",
+            _explanation(findings),
+            _verdict_table(findings),
+            "What each claim was tested on:\n",
+            *(_precise(group[0]) for group in by_claim(findings)),
+        )
+    )
+
+
+def _explanation(findings: Sequence[Finding]) -> str:
+    level = max((f.level for f in findings if not math.isnan(f.level)), default=math.nan)
+    return (
+        "Effects are means over seeds, paired by seed, with an interval at "
+        f"{number(100 * level, 3)} % each, so that all hold at once with "
+        f"{number(100 * SIMULTANEOUS_LEVEL, 0)} %. Of claims with several contrasts the weakest "
+        "is shown. A claim 'above 0' is supported if its interval lies above 0 and reaches past "
+        "the margin, contradicted if it lies below 0 and reaches past the negative margin; a "
+        "claim of a range is supported if the interval lies inside it, contradicted if it lies "
+        "outside.\n"
+    )
+
+
+def _verdict_table(findings: Sequence[Finding]) -> str:
+    lines = [
+        [
+            finding.claim.id,
+            finding.claim.section,
+            finding.claim.statement,
+            finding.delivery,
+            f"{effect_text(finding)} {finding.claim.unit}",
+            verdict_text(finding),
+        ]
+        for finding in findings
+    ]
+    headers = ["Claim", "Section", "The paper, in our words", "Delivery", "Effect", "Verdict"]
+    return table(headers, lines, text_columns=len(headers))
+
+
+def _precise(finding: Finding) -> str:
+    claim = finding.claim
+    contrasts = "; ".join(contrast.label for contrast in claim.contrasts)
+    return (
+        f"- **{claim.id}**: {claim.quantity}. Contrasts: {contrasts}. "
+        f"Criterion: {claim.criterion.words} {claim.unit}."
+    )

@@ -1,0 +1,57 @@
+"""The numbers that the rules of the world fix, shared by every part of the package.
+
+They stand here once so that kernels, reference, analysis and documentation cannot drift apart.
+"""
+
+from __future__ import annotations
+
+# The six headings, clockwise, as steps in cube coordinates; heading 0 points up.
+HEADING_STEPS: tuple[tuple[int, int, int], ...] = (
+    (1, 0, 0),
+    (1, 1, 0),
+    (0, 1, 0),
+    (0, 1, 1),
+    (0, 0, 1),
+    (1, 0, 1),
+)
+N_HEADINGS = 6
+
+# What an ant sees in a cell (two bits each in a state's index).
+SEES_EMPTY = 0  # E
+SEES_OBSTACLE = 1  # O
+SEES_LURE = 2  # T without food (a trail), S with food (nearer to the queen)
+SEES_GOAL = 3  # F without food, Q with food
+
+# What a cell holds (unsigned 8-bit arrays), written as how it looks: the lower two bits to an ant
+# without food, the next two to an ant with food. Cells outside the world are OBSTACLE.
+EMPTY = SEES_EMPTY | SEES_EMPTY << 2
+OBSTACLE = SEES_OBSTACLE | SEES_OBSTACLE << 2
+FOOD = SEES_GOAL | SEES_OBSTACLE << 2
+QUEEN = SEES_OBSTACLE | SEES_GOAL << 2
+
+# Actions. The first three are moves, relative to the heading.
+LEFT, FORWARD, RIGHT, PICK_UP, GIVE = 0, 1, 2, 3, 4
+ACTION_NAMES: tuple[str, ...] = ("left", "forward", "right", "pick up", "give")
+N_ACTIONS = 5
+
+# State = (carries, left, forward, right); index = 64 * carries + 16 * left + 4 * forward + right.
+N_STATES = 128
+
+# Rewards.
+REWARD_LURE = 1  # a move onto a cell seen as T or S
+REWARD_EMPTY = 0  # a move onto a cell seen as E
+REWARD_PICK_UP = 3
+REWARD_GIVE = 10
+REWARD_FAILED = -1  # a blocked move, a pick-up or give that cannot be done
+
+# The trail level that a carrying ant sets.
+DEPOSIT_LEVEL = 250
+# Levels and steps share 32-bit integers (a trail stores the tick at which it has evaporated).
+MAX_TRAIL_LEVEL = 1_000_000_000
+MAX_STEPS = 10_000_000
+
+# What the random streams of a seed are for. Streams of different purposes never meet.
+STREAM_ANT = 0  # number: the ant
+STREAM_ROLLOUT = 1  # number: the greedy rollout
+STREAM_START_CELL = 2  # number: the cell, in lexicographic order of (x, y, z)
+STREAM_START_HEADING = 3  # number: the ant

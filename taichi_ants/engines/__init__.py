@@ -1,0 +1,1 @@
+"""The engines: they allocate memory, hold the kernels and turn rules into runs."""

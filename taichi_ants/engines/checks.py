@@ -1,0 +1,107 @@
+"""Checks of what callers pass to the engines; kernels assume valid input."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from taichi_ants import learners
+from taichi_ants.config import TrainingConfig
+from taichi_ants.constants import MAX_STEPS, N_ACTIONS, N_STATES
+from taichi_ants.errors import AntsError
+from taichi_ants.worlds.world import World
+
+
+def checked_world(world: World) -> World:
+    """The world, if it is one."""
+    if not isinstance(world, World):
+        raise AntsError(f"world is {world!r}; it must be a World, for example worlds.paper().")
+    return world
+
+
+def checked_configs(configs: TrainingConfig | Sequence[TrainingConfig]) -> tuple:
+    """One configuration or several as a tuple; their learners exist and plan as they say."""
+    several = (configs,) if isinstance(configs, TrainingConfig) else tuple(configs)
+    if not several:
+        raise AntsError("configs is empty; give at least one TrainingConfig.")
+    for config in several:
+        if not isinstance(config, TrainingConfig):
+            raise AntsError(f"configs holds {config!r}; it must hold TrainingConfig objects only.")
+        plans = learners.get(config.learner).plans
+        if plans and config.planning_steps == 0:
+            raise AntsError(
+                f"planning_steps is 0, but learner {config.learner!r} plans; give 1 or more."
+            )
+        if not plans and config.planning_steps != 0:
+            raise AntsError(
+                f"planning_steps is {config.planning_steps}, but learner {config.learner!r} "
+                "does not plan; leave it at 0."
+            )
+    return several
+
+
+def checked_seeds(seeds: int | Sequence[int]) -> tuple[int, ...]:
+    """One seed or several different ones as a tuple."""
+    several = tuple(np.atleast_1d(np.asarray(seeds, dtype=object)).ravel().tolist())
+    if not several:
+        raise AntsError("seeds is empty; give at least one whole number.")
+    for seed in several:
+        if isinstance(seed, bool) or not hasattr(seed, "__index__"):
+            raise AntsError(f"seeds holds {seed!r}; it must hold whole numbers only.")
+        if not -(2**63) <= seed < 2**64:
+            raise AntsError(f"seeds holds {seed}; a seed must fit into 64 bits.")
+    whole = tuple(int(seed) for seed in several)
+    if len(set(whole)) < len(whole):
+        twice = next(seed for seed in whole if whole.count(seed) > 1)
+        raise AntsError(f"seeds holds {twice} more than once; each seed must differ.")
+    return whole
+
+
+def checked_seeds_for(seeds: int | Sequence[int], shape: tuple[int, ...]) -> np.ndarray:
+    """A seed for each table of the given leading shape, as flat Python integers (object array)."""
+    several = checked_seeds(seeds)
+    if len(several) != 1 and (not shape or shape[-1] != len(several)):
+        raise AntsError(
+            f"there are {len(several)} seeds for tables of leading shape {shape}; give one seed, "
+            "or as many as the last leading axis is long."
+        )
+    return np.broadcast_to(np.array(several, dtype=object), shape or (1,)).ravel()
+
+
+def checked_count(name: str, value: int, most: int = 2**31 - 1) -> int:
+    """A whole number from 1 to `most`."""
+    if isinstance(value, bool) or not hasattr(value, "__index__"):
+        raise AntsError(f"{name} is {value!r}; it must be a whole number.")
+    if not 1 <= value <= most:
+        raise AntsError(f"{name} is {value}; it must lie between 1 and {most}.")
+    return int(value)
+
+
+def checked_max_steps(value: int) -> int:
+    """The step limit of an episode."""
+    return checked_count("max_steps", value, MAX_STEPS)
+
+
+def checked_share(name: str, value: float) -> float:
+    """A number from 0 to 1."""
+    if isinstance(value, (bool, str)) or not 0 <= value <= 1:
+        raise AntsError(f"{name} is {value!r}; it must be a number between 0 and 1.")
+    return float(value)
+
+
+def checked_q_values(q_values: np.ndarray) -> np.ndarray:
+    """Action values as float32 (..., 128, 5), finite."""
+    try:
+        tables = np.asarray(q_values, dtype=np.float32)
+    except (TypeError, ValueError):
+        raise AntsError(
+            "q_values is not an array of numbers; give a float (..., 128, 5) array."
+        ) from None
+    if tables.shape[-2:] != (N_STATES, N_ACTIONS) or tables.size == 0:
+        raise AntsError(
+            f"q_values has shape {tables.shape}; it must end in ({N_STATES}, {N_ACTIONS})."
+        )
+    if not np.isfinite(tables).all():
+        raise AntsError("q_values holds numbers that are not finite; action values must be finite.")
+    return tables

@@ -1,0 +1,31 @@
+"""How the engine of independent runs lays a world out in memory.
+
+A cell is one i32: the stored trail (0 or more) if it is empty, else its ground less 16, which is
+negative and still shows in its lower four bits how the cell looks. One load tells all that an ant
+can see of a cell.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from taichi_ants.constants import EMPTY, N_HEADINGS
+from taichi_ants.hexgrid import AxialGrid
+from taichi_ants.worlds.world import World
+
+_OCCUPIED = 16
+
+
+def pack_cells(world: World) -> np.ndarray:
+    """The cells of a world at the start of an episode, i32 (grid.size,)."""
+    ground = world.ground()
+    packed = np.where(ground == EMPTY, world.trail_levels(), ground.astype(np.int32) - _OCCUPIED)
+    return np.ascontiguousarray(packed, dtype=np.int32)
+
+
+def compass_of(grid: AxialGrid) -> np.ndarray:
+    """Index steps and turns by heading, i32 (20,); its layout is that of `rules.actions`."""
+    headings = np.arange(N_HEADINGS)
+    steps = grid.offsets[(np.arange(N_HEADINGS + 2) - 1) % N_HEADINGS]
+    turns = np.concatenate([(headings - 1) % N_HEADINGS, (headings + 1) % N_HEADINGS])
+    return np.concatenate([steps, turns]).astype(np.int32)

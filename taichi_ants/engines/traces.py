@@ -1,0 +1,159 @@
+"""Step-by-step traces of the engine of independent runs, for pictures, teaching and tests.
+
+The kernel is the one that trains and evaluates, compiled once more so that it records.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from taichi_ants import learners, runtime
+from taichi_ants.config import TrainingConfig
+from taichi_ants.constants import N_ACTIONS, N_STATES
+from taichi_ants.engines import checks
+from taichi_ants.engines.results import RunState
+from taichi_ants.engines.run_engine import RunEngine
+from taichi_ants.engines.runs import fixed_policy_state, fresh_state, rates_of, rollout_streams
+from taichi_ants.errors import AntsError
+from taichi_ants.learners.registry import Learner
+from taichi_ants.worlds.world import World
+
+MAX_ROLLOUT_STEPS = 1_000_000
+MAX_TRAINING_STEPS = 100_000  # each keeps a Q-table of 4 KiB
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What happened in each of n steps; position, heading and state are those before the action.
+
+    Attributes:
+        episodes: int32 (n,), number of the episode, from 0.
+        steps: int32 (n,), number of the step in its episode, from 0.
+        cells: int32 (n, 3), cube coordinates in normal form.
+        headings: int32 (n,), 0 to 5.
+        states: int32 (n,), state indices, see `taichi_ants.states`.
+        actions: int32 (n,), 0 to 4.
+        rewards: int32 (n,).
+        next_states: int32 (n,), what the ant sees after the step.
+        terminated: bool (n,), whether the learner took the next state as terminal.
+        delivered: bool (n,), whether the food was given to the queen.
+        q_values: float32 (n, 5), the action values of the state when the action was chosen.
+        td_errors: float32 (n,), of the update after the step; None without learning.
+        tables: float32 (n, 128, 5), the Q-table after the step; None without learning.
+    """
+
+    episodes: np.ndarray
+    steps: np.ndarray
+    cells: np.ndarray
+    headings: np.ndarray
+    states: np.ndarray
+    actions: np.ndarray
+    rewards: np.ndarray
+    next_states: np.ndarray
+    terminated: np.ndarray
+    delivered: np.ndarray
+    q_values: np.ndarray
+    td_errors: np.ndarray | None = None
+    tables: np.ndarray | None = None
+
+    def __len__(self) -> int:
+        return len(self.steps)
+
+
+def rollout(
+    world: World,
+    q_values: np.ndarray,
+    seed: int = 0,
+    number: int = 0,
+    max_steps: int = 600,
+    evaporation: bool = True,
+    epsilon: float = 0.0,
+) -> Trace:
+    """One episode with a fixed policy: rollout `number` of the seed, as `evaluate` does it.
+
+    Args:
+        world: The world.
+        q_values: float (128, 5), action values; the best action is taken, ties at random.
+        seed: The seed.
+        number: Which of the seed's rollouts, from 0.
+        max_steps: Steps after which the episode is truncated.
+        evaporation: Whether trails fall by 1 with each step.
+        epsilon: Probability of a random action.
+
+    Raises:
+        AntsError: An argument is not allowed; the message names it.
+    """
+    tables = checks.checked_q_values(q_values)
+    if tables.ndim != 2:
+        raise AntsError(f"q_values has shape {tables.shape}; a rollout follows one (128, 5) table.")
+    seeds = checks.checked_seeds_for(seed, ())
+    numbers = np.array([checks.checked_count("number", number + 1) - 1])
+    state = fixed_policy_state(tables[None], checks.checked_share("epsilon", epsilon))
+    streams = rollout_streams(seeds, numbers)
+    rates = np.zeros((1, 2), dtype=np.float32)
+    return _trace(world, None, seeds, rates, state, 1, max_steps, evaporation, streams)
+
+
+def trace_training(
+    world: World,
+    config: TrainingConfig,
+    seed: int = 0,
+    episodes: int = 1,
+    max_steps: int = 600,
+    evaporation: bool = False,
+) -> Trace:
+    """The first episodes of one training run, step by step, with the Q-table after each step.
+
+    Args and errors as in `train`; episodes * max_steps may not exceed 100 000.
+    """
+    (config,) = checks.checked_configs(config)
+    seeds = checks.checked_seeds_for(seed, ())
+    state = fresh_state((config,), seeds.tolist()).take(0)
+    episodes = checks.checked_count("episodes", episodes)
+    learner = learners.get(config.learner)
+    rates = rates_of((config,), 1)
+    return _trace(world, learner, seeds, rates, state, episodes, max_steps, evaporation)
+
+
+def _trace(
+    world: World,
+    learner: Learner | None,
+    seeds: np.ndarray,
+    rates: np.ndarray,
+    state: RunState,
+    episodes: int,
+    max_steps: int,
+    evaporation: bool,
+    streams: np.ndarray | None = None,
+) -> Trace:
+    capacity = episodes * checks.checked_max_steps(max_steps)
+    most = MAX_ROLLOUT_STEPS if learner is None else MAX_TRAINING_STEPS
+    if capacity > most:
+        raise AntsError(
+            f"episodes * max_steps is {capacity}; at most {most} steps can be traced, so lower one."
+        )
+    engine = RunEngine(checks.checked_world(world), max_steps, bool(evaporation), runtime.start())
+    before = state.q[0].copy()
+    integers, errors, tables = engine.trace(learner, seeds, rates, state, episodes, streams)
+    (episode, step, cell, heading, states, action, reward, seen, ended, delivered) = integers.T
+    rows = np.arange(len(states))
+    chosen_from = np.broadcast_to(before, (len(states), N_STATES, before.shape[-1]))
+    if learner is not None:
+        chosen_from = np.concatenate([before[None], tables[:-1]])
+    return Trace(
+        episodes=episode,
+        steps=step,
+        cells=world.grid.cells(cell),
+        headings=heading,
+        states=states,
+        actions=action,
+        rewards=reward,
+        next_states=seen,
+        terminated=ended.astype(bool),
+        delivered=delivered.astype(bool),
+        q_values=chosen_from[rows, states, :N_ACTIONS].copy(),
+        td_errors=None if learner is None else errors,
+        tables=None if learner is None else tables[:, :, :N_ACTIONS],
+    )

@@ -1,0 +1,21 @@
+"""SARSA (Rummery and Niranjan 1994): on-policy, bootstraps from the action taken next."""
+
+import taichi as ti
+
+from taichi_ants.constants import N_ACTIONS
+from taichi_ants.learners.registry import Learner
+
+
+@ti.func
+def td_error(value, reward, discount, next_values, next_action, epsilon):
+    """reward + discount * Q(s', a') - Q(s, a); the discount is 0 where no a' was drawn."""
+    next_value = next_values[0]
+    for a in ti.static(range(1, N_ACTIONS)):
+        if next_action == a:
+            next_value = next_values[a]
+    return reward + discount * next_value - value
+
+
+SARSA = Learner(
+    "sarsa", td_error, draws_next_action=True, summary="on-policy, towards the action taken next"
+)

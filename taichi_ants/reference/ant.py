@@ -1,0 +1,162 @@
+"""One ant: what it sees, and what its actions do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from taichi_ants.constants import (
+    EMPTY,
+    FOOD,
+    GIVE,
+    N_ACTIONS,
+    N_HEADINGS,
+    PICK_UP,
+    QUEEN,
+    REWARD_EMPTY,
+    REWARD_FAILED,
+    REWARD_GIVE,
+    REWARD_LURE,
+    REWARD_PICK_UP,
+    SEES_EMPTY,
+    SEES_GOAL,
+    SEES_LURE,
+    SEES_OBSTACLE,
+)
+from taichi_ants.reference.geometry import Cell, distance, neighbour
+from taichi_ants.reference.random_stream import RandomStream, pick
+from taichi_ants.reference.world_state import WorldState
+
+
+@dataclass(slots=True)
+class Ant:
+    """An ant's cell (normal form), heading (0..5), and whether it carries food."""
+
+    cell: Cell
+    heading: int
+    carries: bool = False
+
+
+class Event(Enum):
+    """What came of an action."""
+
+    MOVED = "moved"
+    BLOCKED = "blocked"  # a move that only turned the ant
+    PICKED_UP = "picked up"
+    DELIVERED = "delivered"
+    FAILED = "failed"  # a pick-up or give that could not be done
+
+
+def cells_in_view(ant: Ant) -> tuple[Cell, Cell, Cell]:
+    """Return the cells to the left of the heading, ahead, and to the right, in this order."""
+    return (
+        neighbour(ant.cell, ant.heading - 1),
+        neighbour(ant.cell, ant.heading),
+        neighbour(ant.cell, ant.heading + 1),
+    )
+
+
+def observe(world: WorldState, ant: Ant) -> int:
+    """Return the index (0..127) of the state that the ant sees."""
+    cells = cells_in_view(ant)
+    sees = _sees_with_food if ant.carries else _sees_without_food
+    left, forward, right = sees(world, ant, cells)
+    return 64 * ant.carries + 16 * left + 4 * forward + right
+
+
+def _sees_without_food(world: WorldState, ant: Ant, cells: tuple[Cell, ...]) -> list[int]:
+    contents = [world.content(cell) for cell in cells]
+    # A trail on food, or on the queen's cell, is not seen and does not count for the strongest.
+    levels = [
+        world.level(cell) if content == EMPTY else 0
+        for cell, content in zip(cells, contents, strict=True)
+    ]
+    strongest = max(levels)
+    codes = []
+    for content, level in zip(contents, levels, strict=True):
+        if content == FOOD:
+            codes.append(SEES_GOAL)
+        elif content != EMPTY:  # the queen too
+            codes.append(SEES_OBSTACLE)
+        elif level >= 1 and 2 * level >= strongest:
+            codes.append(SEES_LURE)
+        else:
+            codes.append(SEES_EMPTY)
+    return codes
+
+
+def _sees_with_food(world: WorldState, ant: Ant, cells: tuple[Cell, ...]) -> list[int]:
+    own_distance = distance(ant.cell, world.queen)
+    codes = []
+    for cell in cells:
+        content = world.content(cell)
+        if content == QUEEN:
+            codes.append(SEES_GOAL)
+        elif content != EMPTY:  # food too
+            codes.append(SEES_OBSTACLE)
+        elif distance(cell, world.queen) < own_distance:
+            codes.append(SEES_LURE)
+        else:
+            codes.append(SEES_EMPTY)
+    return codes
+
+
+def act(
+    world: WorldState, ant: Ant, state: int, action: int, stream: RandomStream
+) -> tuple[int, Event]:
+    """Let the ant do `action` in the world; return the reward and what came of it.
+
+    Args:
+        world: Changed by a pick-up and by the deposits of a carrying ant. Its clock stands still.
+        ant: Changed: its cell, its heading, whether it carries.
+        state: What the ant saw, the index that `observe` returned for this tick.
+        action: 0..4.
+        stream: Drawn from only where a pick-up has several foods to choose from.
+    """
+    if not 0 <= action < N_ACTIONS:
+        raise AssertionError(f"there is no action {action}")
+    codes = (state >> 4 & 3, state >> 2 & 3, state & 3)
+    if action == PICK_UP:
+        return _pick_up(world, ant, codes, stream)
+    if action == GIVE:
+        return _give(ant, codes)
+    return _move(world, ant, codes, action)
+
+
+def _move(world: WorldState, ant: Ant, codes: tuple[int, ...], action: int) -> tuple[int, Event]:
+    target = cells_in_view(ant)[action]
+    # The turn is made even if the way is blocked: so an ant gets out of a dead end.
+    ant.heading = (ant.heading + action - 1) % N_HEADINGS
+    if world.content(target) != EMPTY:
+        return REWARD_FAILED, Event.BLOCKED
+    ant.cell = target
+    if ant.carries:
+        world.deposit(target)
+    return (REWARD_LURE if codes[action] == SEES_LURE else REWARD_EMPTY), Event.MOVED
+
+
+def _pick_up(
+    world: WorldState, ant: Ant, codes: tuple[int, ...], stream: RandomStream
+) -> tuple[int, Event]:
+    foods = [
+        cell for cell, code in zip(cells_in_view(ant), codes, strict=True) if code == SEES_GOAL
+    ]
+    if ant.carries or not foods:
+        return REWARD_FAILED, Event.FAILED
+    chosen = foods[0]
+    if len(foods) > 1:
+        high, _ = stream.draw()
+        chosen = foods[pick(high, len(foods))]
+    world.take_food(chosen)
+    world.deposit(chosen)
+    world.deposit(ant.cell)
+    ant.carries = True
+    ant.heading = (ant.heading + 3) % N_HEADINGS
+    return REWARD_PICK_UP, Event.PICKED_UP
+
+
+def _give(ant: Ant, codes: tuple[int, ...]) -> tuple[int, Event]:
+    if not ant.carries or SEES_GOAL not in codes:
+        return REWARD_FAILED, Event.FAILED
+    ant.carries = False
+    return REWARD_GIVE, Event.DELIVERED

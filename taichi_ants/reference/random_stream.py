@@ -1,0 +1,51 @@
+"""Random streams: splitmix64 in Python's integers.
+
+A stream depends on (seed, purpose, number) alone, so no run disturbs the draws of another.
+"""
+
+from __future__ import annotations
+
+_MASK_64 = 0xFFFFFFFFFFFFFFFF
+_MASK_32 = 0xFFFFFFFF
+_GAMMA = 0x9E3779B97F4A7C15
+
+
+def _mix(z: int) -> int:
+    z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) & _MASK_64
+    z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & _MASK_64
+    return z ^ (z >> 31)
+
+
+def stream_state(seed: int, purpose: int, number: int) -> int:
+    """Return the first state of a stream, in 0 .. 2**64 - 1.
+
+    Args:
+        seed: The seed of the run, any integer, taken modulo 2**64.
+        purpose: What the stream is for, one of the constants STREAM_*.
+        number: Which of the streams of that purpose, for example the number of the ant.
+    """
+    state = _mix((seed + _GAMMA) & _MASK_64)
+    state = _mix(((state ^ purpose) + _GAMMA) & _MASK_64)
+    return _mix(((state ^ number) + _GAMMA) & _MASK_64)
+
+
+class RandomStream:
+    """A stream of draws, each of two independent 32-bit words.
+
+    Attributes:
+        state: All that the stream is, in 0 .. 2**64 - 1; a stream made from it goes on from here.
+    """
+
+    def __init__(self, state: int) -> None:
+        self.state = state
+
+    def draw(self) -> tuple[int, int]:
+        """Return the high and the low word of the next draw, each in 0 .. 2**32 - 1."""
+        self.state = (self.state + _GAMMA) & _MASK_64
+        bits = _mix(self.state)
+        return bits >> 32, bits & _MASK_32
+
+
+def pick(word: int, n: int) -> int:
+    """Turn a random 32-bit word into a choice among 0 .. n - 1."""
+    return (word * n) >> 32

@@ -1,0 +1,212 @@
+"""Files of results: written whole or not at all, read with errors that name the file."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import os
+import secrets
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import numpy.typing as npt
+
+from taichi_ants.errors import AntsError
+
+PathLike = str | os.PathLike[str]
+
+
+def write_atomically(path: PathLike, writer: Callable[[BinaryIO], None]) -> None:
+    """Write a file so that readers see the old content or all of the new one, never a part.
+
+    Args:
+        path: The file. One that exists is replaced; a symbolic link is followed.
+        writer: Called once with a binary file to write to. It lies in the same folder until it is
+            complete and is removed if the writer raises.
+
+    Raises:
+        AntsError: The file cannot be written. Other exceptions of the writer pass through.
+    """
+    name = os.fspath(path)
+    if "\0" in name:
+        raise AntsError(f"{name!r} contains a null character; name a file to write to.")
+    temporary: Path | None = None
+    try:
+        target = Path(os.path.realpath(name))
+        # Replacing a device, a pipe or a folder would destroy it or fail.
+        if target.exists() and not target.is_file():
+            raise AntsError(f"{name!r} is not a regular file; name a file to write to.")
+        # Not derived from the file's name: it fits even if that one has the greatest length.
+        temporary = target.parent / f".{secrets.token_hex(8)}.tmp"
+        with open(temporary, "xb") as file:
+            writer(file)
+        os.replace(temporary, target)
+    except (OSError, UnicodeError) as error:
+        raise AntsError(
+            f"cannot write {name!r}: {_reason(error)}; choose another place."
+        ) from error
+    finally:
+        if temporary is not None:
+            with suppress(OSError):
+                temporary.unlink()
+
+
+def write_text(path: PathLike, text: str) -> None:
+    """Write text as UTF-8 with the line ends that it has; raises as `write_atomically` does."""
+
+    def write_content(file: BinaryIO) -> None:
+        file.write(text.encode("utf-8"))
+
+    write_atomically(path, write_content)
+
+
+def write_json(path: PathLike, value: Any) -> None:
+    """Write a value as indented JSON; raises as `write_atomically` does.
+
+    NumPy scalars and arrays become numbers and lists, tuples lists, paths text. JSON knows no
+    infinite number and no NaN, they become null.
+    """
+    write_text(path, to_json(value, indent=2) + "\n")
+
+
+def to_json(value: Any, indent: int | None = None) -> str:
+    """The JSON text of a value, converted as `write_json` says; TypeError for other types."""
+    return json.dumps(_plain(value), indent=indent, ensure_ascii=False, allow_nan=False)
+
+
+def write_csv(path: PathLike, rows: Iterable[Mapping[str, Any]], columns: Sequence[str]) -> None:
+    """Write rows as comma-separated values with a header; raises as `write_atomically` does.
+
+    Args:
+        path: The file.
+        rows: Any values that have a text; floats are written so that they read back exactly.
+            None and missing keys become an empty field, a key that is no column is a ValueError.
+        columns: The keys to write, in this order.
+    """
+    text = io.StringIO()
+    table = csv.DictWriter(text, fieldnames=columns, restval="", lineterminator="\n")
+    table.writeheader()
+    for row in rows:
+        table.writerow({key: _plain_scalar(value) for key, value in row.items()})
+    write_text(path, text.getvalue())
+
+
+def write_npz(path: PathLike, arrays: Mapping[str, npt.ArrayLike]) -> None:
+    """Write named arrays as a compressed .npz; raises as `write_atomically` does.
+
+    Equal arrays give equal bytes. ValueError if one holds Python objects, which a reader that is
+    careful refuses to load.
+    """
+    converted = {name: np.asarray(array) for name, array in arrays.items()}
+    for name, array in converted.items():
+        if array.dtype.hasobject:
+            raise ValueError(f"array {name!r} holds Python objects")
+    write_atomically(path, lambda file: np.savez_compressed(file, **converted))
+
+
+def read_npz(path: PathLike) -> dict[str, np.ndarray]:
+    """Read all arrays of an .npz file into memory, without executing anything that it holds.
+
+    Raises:
+        AntsError: The file is missing, unreadable, damaged, or no .npz of plain arrays.
+    """
+    try:
+        with open(path, "rb") as file:
+            archive = np.load(file, allow_pickle=False)
+            if not isinstance(archive, np.lib.npyio.NpzFile):
+                raise ValueError("it holds a single array")
+            with archive:
+                arrays = {name: archive[name] for name in archive.files}
+    except OSError as error:
+        raise AntsError(f"cannot read {str(path)!r}: {_reason(error)}.") from error
+    # A damaged archive fails in many ways (zipfile, zlib, struct, tokenize, memory ...).
+    except Exception as error:
+        raise AntsError(
+            f"{str(path)!r} is damaged or not an .npz file; write it again or name another file."
+        ) from error
+    if not all(isinstance(array, np.ndarray) for array in arrays.values()):
+        raise AntsError(f"{str(path)!r} holds more than arrays; name an .npz file.")
+    return arrays
+
+
+def check_writable_folder(path: PathLike) -> Path:
+    """Make sure that a folder exists and that files can be written to it, creating it if needed.
+
+    It writes and removes a small file, since permission bits alone do not tell (root passes them,
+    a read-only mount does not). If the check fails, folders that it created are removed.
+
+    Returns:
+        The folder.
+
+    Raises:
+        AntsError: The folder cannot be created or written to.
+    """
+    folder = Path(path)
+    created: list[Path] = []
+    try:
+        _create_folders(folder, created)
+        probe = folder / f".{secrets.token_hex(8)}.tmp"
+        with open(probe, "xb"):
+            pass
+        probe.unlink()
+    except (OSError, ValueError) as error:
+        with suppress(OSError):
+            for made in reversed(created):
+                made.rmdir()
+        raise AntsError(
+            f"cannot write to the folder {str(path)!r}: {_reason(error)}; choose another folder."
+        ) from error
+    return folder
+
+
+def _create_folders(folder: Path, created: list[Path]) -> None:
+    """Create a folder and its missing parents, noting each one as soon as it is made."""
+    missing = []
+    for part in (folder, *folder.parents):
+        if part.is_dir():
+            break
+        missing.append(part)
+    for part in reversed(missing):
+        _create_folder(part, created)
+
+
+def _create_folder(folder: Path, created: list[Path]) -> None:
+    try:
+        folder.mkdir()
+    except FileExistsError:
+        # Another process may have made it in the meantime; anything else is in the way.
+        if not folder.is_dir():
+            raise
+    else:
+        created.append(folder)
+
+
+def _reason(error: Exception) -> str:
+    """A short reason in lower case, without the path and the number that OSError adds."""
+    text = getattr(error, "strerror", None) or str(error) or type(error).__name__
+    return text[:1].lower() + text[1:]
+
+
+def _plain_scalar(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _plain(value: Any) -> Any:
+    """Convert to what JSON knows; other types are left to json to refuse."""
+    value = _plain_scalar(value)
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    return value

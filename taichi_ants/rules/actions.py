@@ -1,0 +1,49 @@
+"""What the five actions do and what they are worth."""
+
+import taichi as ti
+
+from taichi_ants.constants import LEFT, REWARD_FAILED, RIGHT
+
+# A compass is an i32 array of 20: the index steps to the left, forward and right cell of heading h
+# at h, h + 1 and h + 2, then the headings after a turn left and after a turn right.
+_TURN_LEFT_AT, _TURN_RIGHT_AT = 8, 14
+COMPASS_SIZE = 20
+
+
+@ti.func
+def step_towards(compass: ti.template(), heading, position):
+    """The index step to the cell in view at position 0 (left), 1 (forward) or 2 (right)."""
+    return compass[heading + position]
+
+
+@ti.func
+def turn(compass: ti.template(), heading, move):
+    """The heading after a move (LEFT, FORWARD or RIGHT).
+
+    A branch with a look-up, not arithmetic: then the processor goes on with the predicted action,
+    which a learned policy repeats, instead of waiting for the comparison of the action values.
+    """
+    turned = heading
+    if move == LEFT:
+        turned = compass[_TURN_LEFT_AT + heading]
+    elif move == RIGHT:
+        turned = compass[_TURN_RIGHT_AT + heading]
+    return turned
+
+
+@ti.func
+def turn_round(heading):
+    """The opposite heading."""
+    return ti.select(heading < 3, heading + 3, heading - 3)
+
+
+@ti.func
+def is_open(code):
+    """Whether a cell that looks like this can be entered: E, T and S can."""
+    return code & 1 == 0
+
+
+@ti.func
+def move_reward(code):
+    """The reward of a move to a cell that looks like this: +1 for T and S, 0 for E, else -1."""
+    return ti.select(is_open(code), code >> 1, REWARD_FAILED)

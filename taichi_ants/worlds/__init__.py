@@ -1,0 +1,22 @@
+"""Worlds and where they come from: the paper, chance, a drawing, or a name for any of these."""
+
+from taichi_ants.worlds.open_world import open_world
+from taichi_ants.worlds.paper import paper
+from taichi_ants.worlds.registry import build, names, register
+from taichi_ants.worlds.text_map import from_text, load_map, to_text
+from taichi_ants.worlds.world import World
+
+__all__ = [
+    "World",
+    "build",
+    "from_text",
+    "load_map",
+    "names",
+    "open_world",
+    "paper",
+    "register",
+    "to_text",
+]
+
+register("paper", lambda seed: paper())
+register("open", open_world)

@@ -1,0 +1,181 @@
+"""Open worlds: rocks, scattered food and three piles of it, drawn at random."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from taichi_ants.errors import AntsError
+from taichi_ants.hexgrid import AxialGrid, axial, cube
+from taichi_ants.randomness import Stream, choose
+from taichi_ants.worlds.validation import parse_ranges
+from taichi_ants.worlds.world import World
+
+SMALLEST_RANGE, LARGEST_RANGE = 10, 100  # of ranges that are drawn
+CLEARING_RADIUS = 3
+MAX_SHARE = 0.9  # of the cells, rocks and single foods together
+MAX_DRAWS = 100
+
+_QUEEN = (0, 0, 0)
+# Purposes of the streams that draw a world: text, so that they stay clear of the small numbers of
+# the purposes in `constants`. One stream each: another share of food leaves the rocks alone.
+_STREAM_RANGES = int.from_bytes(b"ranges", "big")
+_STREAM_ROCKS = int.from_bytes(b"rocks", "big")
+_STREAM_FOOD = int.from_bytes(b"food", "big")
+_BATCH_CELLS = 1 << 22  # covered by the hexagons that are placed at once; bounds the memory
+
+
+def open_world(
+    seed: int = 0,
+    ranges: Sequence[int] | None = None,
+    rock_share: float = 0.15,
+    food_share: float = 0.03,
+) -> World:
+    """A random world: the queen at the origin, rocks, single foods and three piles of food.
+
+    Rocks are hexagons of a radius from 0 to max(1, min(X, Y, Z) // 20), placed until their share of
+    the cells is reached. Piles are hexagons of radius max(1, n // 16), three quarters along each
+    range n; they replace rocks. Everything within distance 3 of the queen is free.
+    No trail, no listed ants.
+
+    Args:
+        seed: Any whole number; the same arguments give the same world.
+        ranges: (X, Y, Z); drawn from 10 to 100 each if None.
+        rock_share: Share of the cells that rocks cover before the clearing and the piles.
+        food_share: Number of single foods as a share of all cells (piles come on top); where fewer
+            cells are free, these.
+
+    Raises:
+        AntsError: A share is not a number, below 0 or both above 0.9 together; the ranges are not
+            allowed; or no food could be reached from the queen in 100 worlds drawn.
+    """
+    rock_share = _share("rock_share", rock_share)
+    food_share = _share("food_share", food_share)
+    if rock_share + food_share > MAX_SHARE:
+        raise AntsError(
+            f"rock_share {rock_share} and food_share {food_share} add up to more than {MAX_SHARE}; "
+            "choose smaller shares, so that ants have room to walk."
+        )
+    given = None if ranges is None else parse_ranges(ranges)
+    for attempt in range(MAX_DRAWS):
+        world_ranges = given or _draw_ranges(Stream(seed, _STREAM_RANGES, attempt))
+        world = _draw(world_ranges, rock_share, food_share, seed, attempt)
+        if world.reachable_foods().any():
+            return world
+    raise AntsError(
+        f"in {MAX_DRAWS} open worlds of ranges {given or 'drawn at random'}, rock_share "
+        f"{rock_share} and food_share {food_share}, no food could be reached from the queen; "
+        "choose larger ranges or other shares."
+    )
+
+
+def _share(name: str, value: object) -> float:
+    try:
+        share = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        share = np.nan
+    if isinstance(value, (bool, str)) or not 0 <= share <= MAX_SHARE:
+        raise AntsError(f"{name} is {value!r}; it must be a number between 0 and {MAX_SHARE}.")
+    return share
+
+
+def _draw_ranges(stream: Stream) -> tuple[int, int, int]:
+    drawn = SMALLEST_RANGE + stream.below(LARGEST_RANGE - SMALLEST_RANGE + 1, 3)
+    return tuple(drawn.tolist())
+
+
+def _draw(
+    ranges: tuple[int, int, int], rock_share: float, food_share: float, seed: int, attempt: int
+) -> World:
+    """One world, whether or not its food can be reached."""
+    grid = AxialGrid(ranges)
+    rocks = scatter_rocks(grid, rock_share, Stream(seed, _STREAM_ROCKS, attempt))
+    food = np.zeros(grid.size, dtype=bool)
+    food[_pile_cells(grid)] = True
+    rocks &= ~food
+    _, clearing = _hexagons(grid, np.array([_QUEEN]), np.array([CLEARING_RADIUS]))
+    rocks[clearing] = False
+    food[clearing] = False
+
+    free = grid.exists & ~rocks & ~food
+    free[clearing] = False
+    places = np.flatnonzero(free)
+    singles = min(round(food_share * grid.count), len(places))
+    # The places with the smallest of as many random words are a sample without replacement.
+    if singles:
+        words = Stream(seed, _STREAM_FOOD, attempt).bits(len(places))
+        food[places[np.argpartition(words, singles - 1)[:singles]]] = True
+    return World(
+        ranges,
+        _QUEEN,
+        foods=grid.cells(np.flatnonzero(food)),
+        obstacles=grid.cells(np.flatnonzero(rocks)),
+    )
+
+
+def scatter_rocks(grid: AxialGrid, share: float, stream: Stream) -> np.ndarray:
+    """bool (grid.size,): cells under random hexagons, placed one by one until `share` is covered.
+
+    Each hexagon takes one draw: the high word chooses its centre among the cells, the low word its
+    radius. Placing them in batches changes nothing, whatever the batches are.
+    """
+    max_radius = max(1, min(grid.ranges) // 20)
+    largest = 1 + 3 * max_radius * (max_radius + 1)
+    existing = np.flatnonzero(grid.exists).astype(np.int32)
+    covered = np.zeros(grid.size, dtype=bool)
+    n_covered, target = 0, share * grid.count
+    while n_covered < target:
+        wanted = int(2 * (target - n_covered) / largest) + 1
+        words = stream.bits(min(wanted, max(1, _BATCH_CELLS // largest)))
+        centres = existing[choose(words >> np.uint64(32), len(existing))]
+        radii = choose(words & np.uint64(0xFFFF_FFFF), max_radius + 1)
+        rock, cell = _hexagons(grid, grid.cells(centres), radii)
+        # A cell counts for the first rock that covers it; the rock that reaches the target is last.
+        distinct, first = np.unique(cell, return_index=True)
+        gains = np.bincount(rock[first[~covered[distinct]]], minlength=len(words))
+        totals = n_covered + np.cumsum(gains)
+        last = min(int(np.searchsorted(totals, target)), len(words) - 1)
+        covered[cell[rock <= last]] = True
+        n_covered = int(totals[last])
+    return covered
+
+
+def _pile_cells(grid: AxialGrid) -> np.ndarray:
+    """Flat indices of the three piles' cells."""
+    ranges = np.array(grid.ranges)
+    _, cell = _hexagons(grid, np.diag(3 * ranges // 4), np.maximum(1, ranges // 16))
+    return cell
+
+
+def _hexagons(
+    grid: AxialGrid, centres: np.ndarray, radii: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The existing cells of hexagons.
+
+    Args:
+        grid: The world's grid.
+        centres: Cells (n, 3) in any form.
+        radii: int64 (n,), in steps.
+
+    Returns:
+        (hexagon, cell): for each covered cell the hexagon's place in `centres`, ascending, and the
+        cell's flat index; cells outside the world are left out.
+    """
+    disc = _disc(int(radii.max()))
+    sizes = 1 + 3 * radii * (radii + 1)
+    hexagon = np.repeat(np.arange(len(radii)), sizes)
+    # `disc` is sorted by distance: a smaller hexagon is the beginning of a larger one.
+    place = np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+    cells = cube(axial(centres)[hexagon] + disc[place])
+    inside = (cells < np.array(grid.ranges)).all(axis=1)
+    return hexagon[inside], grid.index(cells[inside])
+
+
+def _disc(radius: int) -> np.ndarray:
+    """Axial steps int64 (n, 2) to all cells within `radius`, by ascending distance."""
+    q, r = np.meshgrid(*[np.arange(-radius, radius + 1)] * 2, indexing="ij")
+    steps = np.stack([q.reshape(-1), r.reshape(-1)], axis=1)
+    far = cube(steps).max(axis=1)
+    order = np.argsort(far, kind="stable")
+    return steps[order[: 1 + 3 * radius * (radius + 1)]]

@@ -1,0 +1,78 @@
+"""The worlds that have a name."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from taichi_ants.errors import AntsError
+from taichi_ants.randomness import whole
+from taichi_ants.worlds.text_map import load_map
+from taichi_ants.worlds.world import World
+
+Builder = Callable[[int], World]
+
+_BUILDERS: dict[str, Builder] = {}
+
+
+def register(name: str, builder: Builder) -> None:
+    """Gives a world a name, under which `build` and the command lines find it.
+
+    Args:
+        name: A new name.
+        builder: Called with a seed (int), returns a `World`; the same seed must give the same.
+
+    Raises:
+        AntsError: The name is taken or no name, or the builder cannot be called.
+    """
+    if not isinstance(name, str) or not name.strip():
+        raise AntsError(f"the world name {name!r} is not allowed; it must be text.")
+    if name in _BUILDERS:
+        raise AntsError(f"a world named {name!r} is already registered; choose another name.")
+    if not callable(builder):
+        raise AntsError(f"the builder of {name!r} is {builder!r}; it must be a function of a seed.")
+    _BUILDERS[name] = builder
+
+
+def names() -> tuple[str, ...]:
+    """The registered names, sorted."""
+    return tuple(sorted(_BUILDERS))
+
+
+def build(name_or_path: str | os.PathLike[str], seed: int = 0) -> World:
+    """The world of a registered name, or of the text map in a file.
+
+    Args:
+        name_or_path: A registered name (it goes before a file of that name) or a path.
+        seed: Any whole number; what it changes is up to the builder, a file ignores it.
+
+    Raises:
+        AntsError: There is neither such a name nor such a file, or building fails.
+    """
+    seed = whole("seed", seed)
+    if isinstance(name_or_path, str) and name_or_path in _BUILDERS:
+        world = _BUILDERS[name_or_path](seed)
+        if not isinstance(world, World):
+            raise AntsError(
+                f"the builder of {name_or_path!r} returned a {type(world).__name__}; "
+                "it must return a World."
+            )
+        return world
+    if not isinstance(name_or_path, (str, os.PathLike)):
+        raise AntsError(f"the world is {name_or_path!r}; {_known()}")
+    if isinstance(name_or_path, str) and not _looks_like_a_path(name_or_path):
+        raise AntsError(f"there is no world named {name_or_path!r}; {_known()}")
+    return load_map(name_or_path)
+
+
+def _known() -> str:
+    return f"choose one of {', '.join(names())}, or give the path of a map file."
+
+
+def _looks_like_a_path(text: str) -> bool:
+    """Whether a file, rather than a registered name, was probably meant."""
+    try:
+        return Path(text).exists() or len(Path(text).parts) > 1 or bool(Path(text).suffix)
+    except (OSError, ValueError):
+        return False

@@ -1,0 +1,49 @@
+"""Where the ants of a world start."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from taichi_ants.constants import EMPTY, N_HEADINGS, STREAM_START_CELL, STREAM_START_HEADING
+from taichi_ants.errors import AntsError
+from taichi_ants.randomness import choose, stream_state, whole
+
+if TYPE_CHECKING:
+    from taichi_ants.worlds.world import World
+
+
+def place(world: World, seed: int, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Flat indices and headings, both int32 (n,), see `World.start`."""
+    seed, n = whole("seed", seed), whole("n", n)
+    if n < 1:
+        raise AntsError(f"n is {n}; there must be at least 1 ant.")
+    listed = world.grid.index(world.ants[:n, :3])
+    headings = world.ants[:n, 3]
+    wanted = n - len(listed)
+    if wanted:
+        placed = _nearest_free_cells(world, seed, wanted, listed)
+        numbers = np.arange(len(listed), n)
+        words = stream_state(seed, STREAM_START_HEADING, numbers) >> np.uint64(32)
+        listed = np.concatenate([listed, placed])
+        headings = np.concatenate([headings, choose(words, N_HEADINGS)])
+    return listed.astype(np.int32), headings.astype(np.int32)
+
+
+def _nearest_free_cells(world: World, seed: int, n: int, taken: np.ndarray) -> np.ndarray:
+    """The n free cells nearest to the queen, flat indices; ties in the order of a hash."""
+    free = world.ground() == EMPTY
+    free[taken] = False
+    index = np.flatnonzero(free)
+    if n > len(index):
+        raise AntsError(
+            f"{n + len(taken)} ants are asked for; this world has room for "
+            f"{len(index) + len(taken)}, so ask for fewer ants or choose a larger world."
+        )
+    distance = world.distances()[index]
+    # Only the cells up to the distance at which n are complete need a hash and an order.
+    last = np.searchsorted(np.cumsum(np.bincount(distance)), n)
+    index, distance = index[distance <= last], distance[distance <= last]
+    ties = stream_state(seed, STREAM_START_CELL, world.grid.number(world.grid.cells(index)))
+    return index[np.lexsort((ties, distance))[:n]]

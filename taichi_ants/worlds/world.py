@@ -1,0 +1,132 @@
+"""What a world is: its cells and what stands on them when an episode starts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from taichi_ants.constants import EMPTY, FOOD, OBSTACLE, QUEEN
+from taichi_ants.hexgrid import AxialGrid
+from taichi_ants.worlds import geometry, starts, validation
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class World:
+    """A world of hexagonal cells, as it is when an episode starts.
+
+    Cells may be given in any form of cube coordinates, negative ones too; they are stored in normal
+    form. The arrays are read-only copies. Foods, obstacles and trails are sets: they are stored in
+    lexicographic order, so two worlds with the same contents are equal. Ants keep their order, an
+    ant's place is its number.
+
+    Attributes:
+        ranges: (X, Y, Z), the numbers of values of each coordinate, in cells, each at least 1.
+        queen: (x, y, z), the queen's cell.
+        foods: Cells with food, int32 (F, 3); given as a sequence of (x, y, z) or such an array.
+        obstacles: Cells that cannot be entered, int32 (O, 3); given likewise.
+        trails: int32 (T, 4) = x, y, z, trail level (ticks until it has evaporated); given as a
+            sequence of ((x, y, z), level) or such an array. Entries of level 0 are left out.
+        ants: int32 (A, 4) = x, y, z, heading; given as a sequence of ((x, y, z), heading) or such
+            an array. More ants than these are placed by `start`.
+
+    Raises:
+        AntsError: A value has the wrong form, lies outside the world, is listed twice, or stands
+            where something else stands. Trails may lie under the queen, foods and ants.
+    """
+
+    ranges: tuple[int, int, int]
+    queen: tuple[int, int, int]
+    foods: np.ndarray = ()  # type: ignore[assignment]
+    obstacles: np.ndarray = ()  # type: ignore[assignment]
+    trails: np.ndarray = ()  # type: ignore[assignment]
+    ants: np.ndarray = ()  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        ranges = validation.parse_ranges(self.ranges)
+        grid = AxialGrid(ranges)
+        contents = validation.parse_contents(
+            grid, self.queen, self.foods, self.obstacles, self.trails, self.ants
+        )
+        # The dataclass is frozen; this is the one place that writes its fields.
+        object.__setattr__(self, "ranges", ranges)
+        for name, value in contents.items():
+            object.__setattr__(self, name, value)
+
+    @cached_property
+    def grid(self) -> AxialGrid:
+        """How the cells lie in flat arrays; `grid.size` is the length of all arrays below."""
+        return AxialGrid(self.ranges)
+
+    def ground(self) -> np.ndarray:
+        """uint8 (grid.size,): EMPTY, OBSTACLE, FOOD or QUEEN; outside the world OBSTACLE."""
+        ground = np.where(self.grid.exists, np.uint8(EMPTY), np.uint8(OBSTACLE))
+        ground[self.grid.index(self.obstacles)] = OBSTACLE
+        ground[self.grid.index(self.foods)] = FOOD
+        ground[self.grid.index(self.queen)] = QUEEN
+        return ground
+
+    def trail_levels(self) -> np.ndarray:
+        """int32 (grid.size,): the trail level of each cell."""
+        levels = np.zeros(self.grid.size, dtype=np.int32)
+        levels[self.grid.index(self.trails[:, :3])] = self.trails[:, 3]
+        return levels
+
+    def distances(self) -> np.ndarray:
+        """int32 (grid.size,): steps from each cell to the queen, obstacles ignored; 0 outside."""
+        return geometry.distances(self.grid, self.queen)
+
+    def closer(self) -> np.ndarray:
+        """uint8 (grid.size,): bit h is set if the neighbour at heading h is nearer to the queen.
+
+        Pure geometry: the neighbour may be an obstacle or lie outside. 0 for cells outside.
+        """
+        return geometry.closer(self.grid, self.queen)
+
+    def reachable_foods(self) -> np.ndarray:
+        """bool (F,): whether an ant that starts beside the queen can come to stand beside a food.
+
+        Ants walk over empty cells; obstacles and other foods block.
+        """
+        return geometry.reachable(self.grid, self.ground(), self.queen, self.foods)
+
+    def start(self, seed: int, n: int = 1) -> tuple[np.ndarray, np.ndarray]:
+        """Where n ants start: the listed ants first, then free cells nearest to the queen.
+
+        Args:
+            seed: Any whole number; decides ties of distance, and the headings of placed ants.
+            n: Number of ants, at least 1. If fewer than the listed ants, the first of these.
+
+        Returns:
+            Flat indices int32 (n,) and headings int32 (n,), in the order of the ant numbers.
+
+        Raises:
+            AntsError: n or seed is not whole, n is below 1, or too few cells are free.
+        """
+        return starts.place(self, seed, n)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, World):
+            return NotImplemented
+        return self._key == other._key
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+    @cached_property
+    def _key(self) -> tuple:
+        arrays = (self.foods, self.obstacles, self.trails, self.ants)
+        return (self.ranges, self.queen, *(array.tobytes() for array in arrays))
+
+    def __reduce__(self) -> tuple:
+        # Copies and pickles are built anew, so that their arrays are read-only as well.
+        contents = (self.foods, self.obstacles, self.trails, self.ants)
+        return World, (self.ranges, self.queen, *contents)
+
+    def __repr__(self) -> str:
+        return (
+            f"World(ranges={self.ranges}, queen={self.queen}, {len(self.foods)} foods, "
+            f"{len(self.obstacles)} obstacles, {len(self.trails)} trail cells, "
+            f"{len(self.ants)} ants)"
+        )
