@@ -96,8 +96,8 @@ def write_csv(path: PathLike, rows: Iterable[Mapping[str, Any]], columns: Sequen
     write_text(path, text.getvalue())
 
 
-def write_npz(path: PathLike, arrays: Mapping[str, npt.ArrayLike]) -> None:
-    """Write named arrays as a compressed .npz; raises as `write_atomically` does.
+def write_npz(path: PathLike, arrays: Mapping[str, npt.ArrayLike], compress: bool = True) -> None:
+    """Write named arrays as an .npz; raises as `write_atomically` does.
 
     Equal arrays give equal bytes. ValueError if one holds Python objects, which a reader that is
     careful refuses to load.
@@ -106,7 +106,14 @@ def write_npz(path: PathLike, arrays: Mapping[str, npt.ArrayLike]) -> None:
     for name, array in converted.items():
         if array.dtype.hasobject:
             raise ValueError(f"array {name!r} holds Python objects")
-    write_atomically(path, lambda file: np.savez_compressed(file, **converted))
+    save = np.savez_compressed if compress else np.savez
+    write_atomically(path, lambda file: save(file, **converted))
+
+
+def smallest(array: np.ndarray) -> np.ndarray:
+    """The same integers in the smallest type that holds them."""
+    low, high = int(array.min(initial=0)), int(array.max(initial=0))
+    return array.astype(np.promote_types(np.min_scalar_type(low), np.min_scalar_type(high)))
 
 
 def read_npz(path: PathLike) -> dict[str, np.ndarray]:

@@ -28,7 +28,7 @@ TRAINING_SETTING = "training, no evaporation"
 GREEDY_SETTING = "greedy, evaporation"
 
 # One row of baselines.csv; None for an empty field.
-Row = dict[str, Any]
+BaselineRow = dict[str, Any]
 
 
 class Rollouts(Protocol):
@@ -54,7 +54,7 @@ def baseline_rows(
     rollouts: int = 50,
     discounts: Sequence[float] = (0.9, 0.99),
     max_steps: int = 600,
-) -> list[Row]:
+) -> list[BaselineRow]:
     """All baselines of a world, as rows with the columns BASELINE_COLUMNS.
 
     Args:
@@ -76,7 +76,7 @@ def baseline_rows(
     return bounds + policy_rows(world, evaluate, seeds, rollouts, max_steps)
 
 
-def bound_rows(world: World, discounts: Sequence[float], max_steps: int) -> list[Row]:
+def bound_rows(world: World, discounts: Sequence[float], max_steps: int) -> list[BaselineRow]:
     """The exact bounds of `dynamic_programming.exact_bounds` as rows.
 
     A discount of 1 has no row: the return of an episode without end may grow without bound.
@@ -104,7 +104,7 @@ def bound_rows(world: World, discounts: Sequence[float], max_steps: int) -> list
 
 def policy_rows(
     world: World, evaluate: Evaluate, seeds: Sequence[int], rollouts: int, max_steps: int
-) -> list[Row]:
+) -> list[BaselineRow]:
     """The random policy and the trail follower, without and with evaporation, as rows."""
     note = f"mean over {len(seeds)} seeds of {rollouts} rollouts, 95 % interval over seeds (BCa)"
     rows = []
@@ -133,16 +133,16 @@ def policy_rows(
     return rows
 
 
-def _outcome_row(baseline: str, outcome: Outcome, note: str) -> Row:
+def _outcome_row(baseline: str, outcome: Outcome, note: str) -> BaselineRow:
     return _row(
         baseline,
         TRAINING_SETTING,
         note=note,
-        return_mean=outcome.total_reward,
+        return_mean=outcome.episode_return,
         steps_mean=outcome.steps,
         deliveries_mean=outcome.deliveries,
     )
 
 
-def _row(baseline: str, setting: str, **figures: Any) -> Row:
+def _row(baseline: str, setting: str, **figures: Any) -> BaselineRow:
     return {**dict.fromkeys(BASELINE_COLUMNS), "baseline": baseline, "setting": setting, **figures}

@@ -19,7 +19,12 @@ from taichi_ants.errors import AntsError
 # The order in which the delivery settings are reported; others follow in order of appearance.
 DELIVERY_ORDER: tuple[str, ...] = ("continuing", "absorbing")
 
-_NAMES = {"q_learning": "Q-learning", "sarsa": "SARSA", "dyna_q": "Dyna-Q"}
+_NAMES = {
+    "q_learning": "Q-learning",
+    "sarsa": "SARSA",
+    "expected_sarsa": "Expected SARSA",
+    "dyna_q": "Dyna-Q",
+}
 _PER_EPISODE = ("returns", "steps", "deliveries")
 _PER_ROLLOUT = ("greedy_returns", "greedy_steps", "greedy_deliveries")
 

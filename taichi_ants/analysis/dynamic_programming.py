@@ -20,7 +20,7 @@ from taichi_ants.constants import FORWARD, LEFT, MAX_STEPS, N_HEADINGS, RIGHT
 from taichi_ants.errors import AntsError
 from taichi_ants.worlds.world import World
 
-# Limits on the memory and the time (about a minute on one core) that the bounds of a world may take.
+# Limits on the memory and the time that the bounds of a world may take, about a minute on one core.
 MAX_STATES = 5_000_000
 MAX_BACKUPS = 600 * MAX_STATES
 # What a backup of all states costs besides, in backups of one state.
@@ -37,12 +37,12 @@ class Outcome:
     """What an episode yields; means where a pick-up chooses among several foods.
 
     Attributes:
-        total_reward: Undiscounted sum of rewards, the episode's return.
+        episode_return: Undiscounted sum of rewards, the episode's return.
         steps: Length of the episode, in steps.
         deliveries: 1 if it ends with a delivery, 0 if at the step limit.
     """
 
-    total_reward: float
+    episode_return: float
     steps: float
     deliveries: float
 
@@ -98,7 +98,7 @@ def exact_bounds(world: World, discounts: Sequence[float], max_steps: int = 600)
                 f"the discount is {discount!r}; for a return without end it must be at least 0 "
                 "and below 1."
             )
-    if max_steps not in range(1, MAX_STEPS + 1):
+    if not hasattr(max_steps, "__index__") or not 1 <= max_steps <= MAX_STEPS:
         raise AntsError(
             f"max_steps is {max_steps!r}; it must be a whole number from 1 to {MAX_STEPS}."
         )
@@ -157,10 +157,10 @@ def _largest(transitions: Transitions, max_steps: int) -> Outcome:
     score = 0
     for values in _within_limit(transitions.foraging.scored(_UNIT, -2), best_after):
         score = int(values[transitions.start])
-    total_reward = -(-score // _UNIT)
-    below_units = total_reward * _UNIT - score
+    episode_return = -(-score // _UNIT)
+    below_units = episode_return * _UNIT - score
     steps = (below_units + 1) // 2
-    return Outcome(float(total_reward), float(steps), float(2 * steps - below_units))
+    return Outcome(float(episode_return), float(steps), float(2 * steps - below_units))
 
 
 def _backup(phase: Phase, values: np.ndarray, end_values: np.ndarray) -> np.ndarray:

@@ -27,3 +27,8 @@ def table(headers: Sequence[str], lines: Sequence[Sequence[str]], text_columns: 
     """A Markdown table; the first `text_columns` columns to the left, the others to the right."""
     rule = ["---" if column < text_columns else "---:" for column in range(len(headers))]
     return "\n".join(f"| {' | '.join(cells)} |" for cells in (headers, rule, *lines)) + "\n"
+
+
+def count(number_of: int, noun: str) -> str:
+    """How many of something: "1 seed", "2 seeds"."""
+    return f"{number_of} {noun}" + ("" if number_of == 1 else "s")

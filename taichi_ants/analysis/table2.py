@@ -120,10 +120,10 @@ def _paper_figures(variant: Variant) -> list[tuple[str, float]]:
 def table2_markdown(lines: list[dict]) -> str:
     """The list of `table2` as Markdown: three tables, each with a sentence that explains it."""
     seeds = max((line["seeds"] for line in lines), default=0)
+    ours = f"means over {seeds} seeds with 95 % intervals" if seeds else "not in this comparison"
     return "\n".join(
         (
-            "The paper's configurations. Its figures are single runs; ours are means over "
-            f"{seeds} seeds with 95 % intervals.\n",
+            f"The paper's configurations. Its figures are single runs; ours are {ours}.\n",
             _same_table(lines),
             "Training each configuration once and reporting the best by return, repeated with "
             "independent random seeds: median and 95 % range of the reported figures. In "

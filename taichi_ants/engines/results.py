@@ -33,6 +33,10 @@ class LearnerCost:
         """CPU time of one environment step with its learning, in nanoseconds."""
         return self.seconds * 1e9 / self.steps if self.steps else float("nan")
 
+    def as_row(self) -> dict[str, object]:
+        """For tables and manifests."""
+        return {**vars(self), "nanoseconds_per_step": self.nanoseconds_per_step}
+
 
 @dataclass(frozen=True)
 class RunState:

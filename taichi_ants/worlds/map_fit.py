@@ -23,8 +23,8 @@ def smallest_world(axials: np.ndarray) -> tuple[tuple[int, int, int], tuple[int,
         axials: int64 (n, 2) = (q, r), n >= 1.
 
     Returns:
-        (ranges, (q0, r0)). Of equally small worlds the first in the order of a, b, c; of its
-        origins the first in the order of q, r.
+        (ranges, (q0, r0)). Of equally small worlds the one of the largest X, then the largest Y; of
+        its origins the one of the smallest q, then the smallest r.
     """
     q, r = axials[:, 0], axials[:, 1]
     q_min, q_max = int(q.min()), int(q.max())
@@ -35,7 +35,7 @@ def smallest_world(axials: np.ndarray) -> tuple[tuple[int, int, int], tuple[int,
     total = max(q_max - r_min - d_min, d_max - q_min + r_max)
     caps = (total - r_width, total - q_width, total - d_width)
     fits = (_filled(total, caps, order) for order in permutations(range(3)))
-    a, b, c = min(fits, key=lambda fit: (-sum(n * n for n in fit), fit))
+    a, b, c = max(fits, key=lambda fit: (sum(n * n for n in fit), fit))
 
     q_origin = max(q_max - a, d_max - a + r_max - b)
     r_origin = max(r_max - b, q_origin - d_min - b)

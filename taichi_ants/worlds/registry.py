@@ -73,6 +73,7 @@ def _known() -> str:
 def _looks_like_a_path(text: str) -> bool:
     """Whether a file, rather than a registered name, was probably meant."""
     try:
-        return Path(text).exists() or len(Path(text).parts) > 1 or bool(Path(text).suffix)
+        path = Path(text)
+        return bool(text) and (path.exists() or len(path.parts) > 1 or bool(path.suffix))
     except (OSError, ValueError):
         return False

@@ -19,7 +19,7 @@ class World:
     Cells may be given in any form of cube coordinates, negative ones too; they are stored in normal
     form. The arrays are read-only copies. Foods, obstacles and trails are sets: they are stored in
     lexicographic order, so two worlds with the same contents are equal. Ants keep their order, an
-    ant's place is its number.
+    ant's place is its number. Methods that return arrays return new ones, which may be written.
 
     Attributes:
         ranges: (X, Y, Z), the numbers of values of each coordinate, in cells, each at least 1.
@@ -126,7 +126,7 @@ class World:
 
     def __repr__(self) -> str:
         return (
-            f"World(ranges={self.ranges}, queen={self.queen}, {len(self.foods)} foods, "
-            f"{len(self.obstacles)} obstacles, {len(self.trails)} trail cells, "
-            f"{len(self.ants)} ants)"
+            f"World(ranges={self.ranges}, queen={self.queen}, foods: {len(self.foods)}, "
+            f"obstacles: {len(self.obstacles)}, trails: {len(self.trails)}, "
+            f"ants: {len(self.ants)})"
         )

@@ -109,4 +109,6 @@ def test_pixels_run_clockwise_from_the_top(cell: tuple, heading: int) -> None:
     dx, dy = hexgrid.centre_of(hexgrid.step(cell, heading), 1.0) - centre
     # Clockwise on a screen whose y grows downwards: a mirrored or transposed mapping fails here.
     clockwise = np.degrees(np.arctan2(dx, -dy)) % 360
-    assert np.isclose(clockwise, 60 * heading, atol=1e-6) or np.isclose(clockwise, 360 + 60 * heading)
+    assert np.isclose(clockwise, 60 * heading, atol=1e-6) or np.isclose(
+        clockwise, 360 + 60 * heading
+    )

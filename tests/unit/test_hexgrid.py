@@ -82,7 +82,7 @@ def test_existing_cells_are_those_of_the_definition() -> None:
     assert set(map(tuple, found.tolist())) == expected
     assert len(found) == len(expected)
     assert grid.contains(sorted(expected)).all()
-    assert not grid.contains([(3, 0, 0), (0, 2, 0), (0, 0, 4), (-3, 0, 0)][:3]).any()
+    assert not grid.contains([(3, 0, 0), (0, 2, 0), (0, 0, 4), (-4, 0, 0)]).any()
 
 
 def test_flat_index_by_hand() -> None:

@@ -81,7 +81,7 @@ def claims_markdown(findings: Sequence[Finding]) -> str:
         (
             "\n".join(f"- {part}" for part in parts) + "\n",
             _explanation(findings),
-            _verdict_table(findings),
+            _verdict_table(findings, settings),
             "What each claim was tested on:\n",
             *(_precise(group[0]) for group in by_claim(findings)),
         )
@@ -101,20 +101,22 @@ def _explanation(findings: Sequence[Finding]) -> str:
     )
 
 
-def _verdict_table(findings: Sequence[Finding]) -> str:
-    lines = [
-        [
-            finding.claim.id,
-            finding.claim.section,
-            finding.claim.statement,
-            finding.delivery,
-            f"{effect_text(finding)} {finding.claim.unit}",
-            verdict_text(finding),
-        ]
-        for finding in findings
-    ]
-    headers = ["Claim", "Section", "The paper, in our words", "Delivery", "Effect", "Verdict"]
+def _verdict_table(findings: Sequence[Finding], settings: Sequence[str]) -> str:
+    lines = []
+    for group in by_claim(findings):
+        claim = group[0].claim
+        cells = {finding.delivery: _cell(finding) for finding in group}
+        criterion = f"{claim.criterion.words} {claim.unit}"
+        lines.append([claim.id, claim.section, claim.statement, criterion])
+        lines[-1] += [cells[setting] for setting in settings]
+    headers = ["Claim", "Section", "The paper, in our words", "Criterion", *settings]
     return table(headers, lines, text_columns=len(headers))
+
+
+def _cell(finding: Finding) -> str:
+    if finding.verdict is Verdict.NOT_TESTED:
+        return verdict_text(finding)
+    return f"**{verdict_text(finding)}** {effect_text(finding)}, {finding.contrast}"
 
 
 def _precise(finding: Finding) -> str:

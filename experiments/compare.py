@@ -1,0 +1,283 @@
+"""The paper's comparison of Q-learning, SARSA and Dyna-Q, over many seeds, with honest statistics.
+
+Trains every configuration with every seed, follows the final policies greedily, holds the outcome
+against the paper and against exact bounds, and writes tables, figures and policies to a folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from taichi_ants.command_line import (
+    ListAction,
+    Parser,
+    load_plugin,
+    number,
+    progress_bar,
+    run_command,
+    whole_number,
+)
+
+if TYPE_CHECKING:
+    from taichi_ants.analysis.comparison import Comparison
+    from taichi_ants.config import TrainingConfig
+    from taichi_ants.sweeps import Sweep, SweepResult
+
+DELIVERIES = ("continuing", "absorbing")
+ROLLOUTS = 50
+QUICK_SEEDS = 10
+REPORT = "report.txt"
+
+
+def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
+    """The settings of the command line; the defaults are the paper's."""
+    parser = Parser(__doc__.split("\n", 1)[0])
+    add = parser.add_argument
+    add("--seeds", type=whole_number(1), default=100, help="how many seeds")
+    add("--seed", type=whole_number(), default=0, metavar="BASE", help="the first of them")
+    add("--episodes", type=whole_number(1), default=500, help="training episodes of a run")
+    add("--max-steps", type=whole_number(1), default=600, help="step limit of an episode")
+    add("--delivery", choices=(*DELIVERIES, "both"), default="both", help="what delivery means")
+    names = ("q_learning", "sarsa", "dyna_q")
+    add("--learners", action=ListAction, default=names, help="names of learners")
+    lists = {
+        "--learning-rates": (0.001, 0.01),
+        "--discounts": (0.9, 0.99),
+        "--epsilons": (0.3, 0.5),
+        "--epsilon-decays": (0.99, 0.995),
+    }
+    for flag, values in lists.items():
+        add(flag, action=ListAction, item=number, default=values, metavar="X", help="one or more")
+    add(
+        "--planning-steps",
+        action=ListAction,
+        item=whole_number(1),
+        default=(3, 5),
+        metavar="N",
+        help="one or more, for learners that plan",
+    )
+    add("--world", default="paper", help="paper, open, or the path of a map file")
+    add("--world-seed", type=whole_number(), default=0, help="seed of a world drawn at random")
+    add("--plugin", metavar="FILE", help="a Python file that registers learners or worlds")
+    add("--threads", type=whole_number(1, 1024), help="CPU threads, by default all")
+    add("--arch", choices=("cpu", "cuda"), default="cpu", help="where kernels run")
+    add("--out", type=Path, default=Path("results/compare"), help="folder of the results")
+    add("--quick", action="store_true", help=f"{QUICK_SEEDS} seeds, into OUT-quick by default")
+    add("--force", action="store_true", help="replace what OUT holds")
+    add("--no-figures", action="store_true", help="draw no figures")
+    settings = parser.parse_args(arguments)
+    if settings.quick:
+        settings.seeds = min(settings.seeds, QUICK_SEEDS)
+        if settings.out == parser.get_default("out"):
+            settings.out = Path("results/compare-quick")
+    return settings
+
+
+def configurations(settings: argparse.Namespace) -> tuple[TrainingConfig, ...]:
+    """The grid: learners and planning steps, times rates, discounts and exploration."""
+    from taichi_ants import TrainingConfig, learners
+
+    deliveries = DELIVERIES if settings.delivery == "both" else (settings.delivery,)
+    variants = [
+        (name, planning_steps)
+        for name in settings.learners
+        for planning_steps in (settings.planning_steps if learners.get(name).plans else (0,))
+    ]
+    grid = itertools.product(
+        settings.learning_rates, settings.discounts, settings.epsilons, settings.epsilon_decays
+    )
+    return tuple(
+        TrainingConfig(name, *values, planning_steps=planning_steps, delivery=delivery)
+        for delivery, (name, planning_steps), values in itertools.product(
+            deliveries, variants, tuple(grid)
+        )
+    )
+
+
+def build_sweep(settings: argparse.Namespace) -> Sweep:
+    """The work, checked as a whole before any of it is done."""
+    from taichi_ants import AntsError, worlds
+    from taichi_ants.sweeps import Sweep
+
+    if settings.plugin:
+        load_plugin(settings.plugin)
+    configs = configurations(settings)
+    world = worlds.build(settings.world, settings.world_seed)
+    if not world.reachable_foods().any():
+        raise AntsError(
+            f"no food of the world {settings.world!r} can be reached from the queen; "
+            "open a way or choose another world."
+        )
+    seeds = tuple(range(settings.seed, settings.seed + settings.seeds))
+    return Sweep(world, configs, seeds, settings.episodes, settings.max_steps, ROLLOUTS)
+
+
+def to_comparison(sweep: Sweep, result: SweepResult) -> Comparison:
+    """What the analysis reads."""
+    from taichi_ants.analysis.comparison import Comparison, Row
+
+    return Comparison(
+        rows=tuple(Row.of(config) for config in sweep.configs),
+        seeds=sweep.seeds,
+        returns=result.returns,
+        steps=result.steps,
+        deliveries=result.deliveries,
+        greedy_returns=result.greedy_returns,
+        greedy_steps=result.greedy_steps,
+        greedy_deliveries=result.greedy_deliveries,
+        max_steps=sweep.max_steps,
+    )
+
+
+def write_tables(
+    folder: Path, comparison: Comparison, baselines: list[dict[str, Any]], costs: list[dict]
+) -> str:
+    """Write all tables; the summary for the terminal."""
+    from taichi_ants import results
+    from taichi_ants.analysis import report, summary, table2
+    from taichi_ants.analysis.baselines import BASELINE_COLUMNS
+    from taichi_ants.analysis.claims import assess, claims_markdown, claims_rows
+
+    lines = summary.summarise(comparison)
+    results.write_csv(folder / "summary.csv", lines, summary.SUMMARY_COLUMNS)
+    results.write_csv(folder / "baselines.csv", baselines, BASELINE_COLUMNS)
+    table = table2.table2(comparison)
+    results.write_csv(folder / "table2.csv", table, list(table[0]))
+    results.write_text(folder / "table2.md", table2.table2_markdown(table))
+    findings = assess(comparison)
+    rows = claims_rows(findings)
+    results.write_csv(folder / "claims.csv", rows, list(rows[0]))
+    results.write_text(folder / "claims.md", claims_markdown(findings))
+    return report.render(comparison, table, findings, baselines, costs)
+
+
+def write_episodes(folder: Path, comparison: Comparison) -> None:
+    """Write what each episode and rollout gave, in the order of summary.csv."""
+    from taichi_ants import results
+
+    names = ("returns", "steps", "deliveries", "greedy_returns", "greedy_steps")
+    arrays = {name: getattr(comparison, name) for name in (*names, "greedy_deliveries")}
+    results.write_npz(
+        folder / "episodes.npz", {name: results.smallest(array) for name, array in arrays.items()}
+    )
+
+
+def write_policies(folder: Path, sweep: Sweep, comparison: Comparison, tables: Any) -> None:
+    """Write the final Q-table of a median run per learner, in the first delivery setting."""
+    from dataclasses import asdict
+
+    import numpy as np
+
+    from taichi_ants import save_policy
+    from taichi_ants.analysis.paper import TABLE_2
+
+    setting = comparison.delivery_settings[0]
+    returns = comparison.measure("return_last50")
+    for variant in comparison.variants:
+        row = None
+        if variant in TABLE_2:
+            row = comparison.position(setting, variant, TABLE_2[variant].hyperparameters)
+        if row is None:  # not of the paper: its best configuration here
+            rows = comparison.positions(setting, variant)
+            row = max(rows, key=lambda position: returns[position].mean())
+        run = int(np.argsort(returns[row], kind="stable")[(len(sweep.seeds) - 1) // 2])
+        metadata = {
+            "config": asdict(sweep.configs[row]),
+            "seed": sweep.seeds[run],
+            "episodes": sweep.episodes,
+            "max_steps": sweep.max_steps,
+            "return_last50": returns[row, run],
+        }
+        depth = f"_p{variant.planning_steps}" if variant.planning_steps else ""
+        save_policy(folder / f"{variant.learner}{depth}.npz", tables[row, run], metadata)
+
+
+def compare(settings: argparse.Namespace) -> None:
+    """Run the comparison, or show the finished one."""
+    from taichi_ants.provenance import provenance, sweep_settings
+    from taichi_ants.result_folder import ResultFolder
+
+    sweep = build_sweep(settings)
+    folder = ResultFolder(settings.out, {**sweep_settings(sweep), "arch": settings.arch})
+    if folder.is_finished() and not settings.force:
+        show_finished(settings, sweep)
+        return
+    began = time.perf_counter()
+    with folder.work(settings.force) as (blocks, ready):
+        manifest = do_comparison(settings, sweep, blocks, ready)
+        manifest["seconds"]["total"] = time.perf_counter() - began
+        folder.publish({**provenance(sys.argv), **manifest})
+    print((settings.out / REPORT).read_text("utf-8"))
+    print(f"{manifest['seconds']['total']:.1f} s; everything is in {settings.out}/")
+
+
+def do_comparison(
+    settings: argparse.Namespace, sweep: Sweep, blocks: Path, ready: Path
+) -> dict[str, Any]:
+    """All the work; what the manifest says of it."""
+    from functools import partial
+
+    from taichi_ants import results
+    from taichi_ants.analysis.baselines import baseline_rows
+    from taichi_ants.engines.runs import evaluate
+    from taichi_ants.sweeps import run_sweep
+
+    laps = {"start": time.perf_counter()}
+    with progress_bar("training") as report_progress:
+        result = run_sweep(sweep, blocks, settings.threads, settings.arch, report_progress)
+    laps["training and evaluation"] = time.perf_counter()
+    comparison = to_comparison(sweep, result)
+    baselines = baseline_rows(
+        sweep.world,
+        partial(evaluate, threads=settings.threads, arch=settings.arch),
+        sweep.seeds,
+        ROLLOUTS,
+        settings.discounts,
+        sweep.max_steps,
+    )
+    laps["baselines"] = time.perf_counter()
+    costs = [cost.as_row() for cost in result.costs]
+    text = write_tables(ready, comparison, baselines, costs)
+    results.write_text(ready / REPORT, text)
+    write_episodes(ready, comparison)
+    write_policies(
+        results.check_writable_folder(ready / "policies"), sweep, comparison, result.q_values
+    )
+    laps["tables"] = time.perf_counter()
+    if not settings.no_figures:
+        draw_figures(comparison, baselines, ready)
+    laps["figures"] = time.perf_counter()
+    marks = list(laps.items())
+    seconds = {name: end - marks[i][1] for i, (name, end) in enumerate(marks[1:])}
+    return {"cost_per_step": costs, "seconds": seconds}
+
+
+def draw_figures(comparison: Comparison, baselines: list[dict[str, Any]], folder: Path) -> None:
+    """Draw the figures into the folder `figures`."""
+    from taichi_ants import results
+    from taichi_ants.analysis.figures import save_all
+
+    with progress_bar("figures"):
+        save_all(comparison, baselines, results.check_writable_folder(folder / "figures"))
+
+
+def show_finished(settings: argparse.Namespace, sweep: Sweep) -> None:
+    """Print the summary of a finished comparison; draw figures that were left out."""
+    print((settings.out / REPORT).read_text("utf-8"))
+    print(f"{settings.out}/ holds this comparison already; --force runs it again.")
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """The command line."""
+    settings = parse_arguments(arguments)
+    again = "Stopped; finished runs are kept, and the same command goes on from there."
+    run_command(lambda: compare(settings), again)
+
+
+if __name__ == "__main__":
+    main()

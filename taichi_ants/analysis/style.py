@@ -1,0 +1,142 @@
+"""How the figures look: colours, markers, fonts, and how a figure is made and saved."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from taichi_ants.analysis.comparison import Variant
+from taichi_ants.analysis.paper import DYNA_P3, DYNA_P5, Q_LEARNING, SARSA
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# 9 inches are about 900 pixels where a README shows the figure; twice that for sharp screens.
+WIDTH = 9.0
+DPI = 180
+
+# Okabe and Ito's palette, which stays distinct for the colour-blind; yellow is too pale for lines.
+_BLUE, _ORANGE, _GREEN, _VERMILION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
+_PURPLE, _SKY = "#CC79A7", "#56B4E9"
+INK, GREY, PALE = "#222222", "#767676", "#E4E4E4"
+
+_COLOURS = {Q_LEARNING: _BLUE, SARSA: _ORANGE, DYNA_P3: _GREEN, DYNA_P5: _VERMILION}
+_MARKERS = {Q_LEARNING: "o", SARSA: "s", DYNA_P3: "^", DYNA_P5: "D"}
+_MORE_COLOURS = (_PURPLE, _SKY, INK, GREY)
+_MORE_MARKERS = ("v", "P", "X", "h")
+
+_SETTINGS = {
+    "font.size": 9,
+    "axes.titlesize": 10,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9,
+    "axes.edgecolor": GREY,
+    "axes.labelcolor": INK,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "axes.grid": True,
+    "grid.color": PALE,
+    "grid.linewidth": 0.7,
+    "text.color": INK,
+    "xtick.color": GREY,
+    "ytick.color": GREY,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "legend.fontsize": 9,
+    "legend.frameon": False,
+    "lines.linewidth": 1.5,
+    "lines.solid_capstyle": "round",
+    "figure.constrained_layout.use": True,
+}
+
+
+def looks(variants: Sequence[Variant]) -> dict[Variant, tuple[str, str]]:
+    """Colour and marker of each learner; the paper's have their own, others take turns."""
+    others = [variant for variant in variants if variant not in _COLOURS]
+    chosen = {}
+    for variant in variants:
+        if variant in _COLOURS:
+            chosen[variant] = _COLOURS[variant], _MARKERS[variant]
+        else:
+            turn = others.index(variant)
+            chosen[variant] = (
+                _MORE_COLOURS[turn % len(_MORE_COLOURS)],
+                _MORE_MARKERS[(turn + turn // len(_MORE_COLOURS)) % len(_MORE_MARKERS)],
+            )
+    return chosen
+
+
+def styled() -> AbstractContextManager:
+    """The context in which figures are made and saved."""
+    from matplotlib import rc_context
+
+    return rc_context(_SETTINGS)
+
+
+def new_figure(height: float) -> Figure:
+    """An empty figure of full width and the height in inches, outside of any global state."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
+    figure.get_layout_engine().set(w_pad=0.06, h_pad=0.05, wspace=0.03, hspace=0.03)
+    return figure
+
+
+def frame(figure: Figure, title: str, caption: str, entries: Mapping[str, Artist]) -> None:
+    """Title and legend above everything else, the caption below.
+
+    Args:
+        figure: The figure.
+        title: One line.
+        caption: Lines of at most about 120 characters.
+        entries: The legend, label -> what to show beside it.
+    """
+    # The title is the legend's: the layout engine would put a title of the figure on top of it.
+    figure.legend(
+        entries.values(),
+        entries.keys(),
+        loc="outside upper left",
+        ncols=4,
+        columnspacing=1.6,
+        borderpad=0.2,
+        title=title,
+        title_fontproperties={"size": 12, "weight": "bold"},
+        alignment="left",
+    )
+    figure.supxlabel(caption, x=0.008, ha="left", fontsize=8, color=GREY)
+
+
+def legend_entries(axes: Iterable[Axes]) -> dict[str, Artist]:
+    """What is labelled in any of the panels, each label once."""
+    entries: dict[str, Artist] = {}
+    for axis in axes:
+        for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
+            entries.setdefault(label, handle)
+    return entries
+
+
+def over_seeds(seeds: int, spread: str) -> str:
+    """What marks and bars are, for a caption: one seed has no spread."""
+    return f"mean of {seeds} seeds with {spread}" if seeds > 1 else "one seed"
+
+
+def message(text: str) -> Figure:
+    """A figure that says why there is nothing to draw."""
+    figure = new_figure(1.2)
+    figure.text(0.5, 0.5, text, ha="center", va="center", color=GREY)
+    return figure
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Writes a PNG."""
+    with styled():
+        figure.savefig(path, dpi=DPI, facecolor="white")

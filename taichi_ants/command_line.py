@@ -1,0 +1,157 @@
+"""What the command lines of the experiments share: arguments, errors, interruption, progress."""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import NoReturn
+
+from taichi_ants.errors import AntsError
+
+EXIT_BAD_INPUT = 2
+EXIT_INTERRUPTED = 130
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose errors are one sentence on standard error."""
+
+    def __init__(self, description: str, **settings: object) -> None:
+        super().__init__(
+            description=description,
+            formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+            allow_abbrev=False,
+            **settings,
+        )
+
+    def error(self, message: str) -> NoReturn:
+        text = message.removeprefix("argument ").rstrip(".")
+        self.exit(EXIT_BAD_INPUT, f"error: {text}; see --help.\n")
+
+
+def whole_number(least: int | None = None, most: int | None = None) -> Callable[[str], int]:
+    """An argument type: a whole number within bounds."""
+
+    def parse(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
+        if (least is not None and value < least) or (most is not None and value > most):
+            bounds = f"at least {least}" if most is None else f"from {least} to {most}"
+            raise argparse.ArgumentTypeError(f"{value} is not allowed, it must be {bounds}")
+        return value
+
+    return parse
+
+
+def number(text: str) -> float:
+    """An argument type: a number."""
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+
+
+class ListAction(argparse.Action):
+    """Collects values that are separated by blanks or commas: `--x 1 2` and `--x 1,2` alike."""
+
+    def __init__(self, *args: object, item: Callable[[str], object] = str, **settings: object):
+        super().__init__(*args, nargs="+", **settings)
+        self.item = item
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: str | Sequence[str] | None,
+        option_string: str | None = None,
+    ) -> None:
+        items = [part for value in values or () for part in value.split(",") if part]
+        try:
+            parsed = tuple(dict.fromkeys(self.item(part) for part in items))
+        except argparse.ArgumentTypeError as error:
+            raise argparse.ArgumentError(self, str(error)) from None
+        if not parsed:
+            raise argparse.ArgumentError(self, "the list is empty, give at least one value")
+        setattr(namespace, self.dest, parsed)
+
+
+def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> NoReturn:
+    """Run a command line to its exit: mistakes end in one sentence, never in a traceback.
+
+    Args:
+        command: The work.
+        interrupted: What Ctrl-C says.
+    """
+    try:
+        command()
+        sys.stdout.flush()
+        status = 0
+    except AntsError as error:
+        _complain(f"error: {error}")
+        status = EXIT_BAD_INPUT
+    except MemoryError:
+        _complain("error: this needs more memory than there is; ask for less at once.")
+        status = EXIT_BAD_INPUT
+    except KeyboardInterrupt:
+        _complain(interrupted)
+        status = EXIT_INTERRUPTED
+    except BrokenPipeError:  # the reader of our output has gone, for example `| head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        status = 0
+    sys.exit(status)
+
+
+def load_plugin(path: str) -> None:
+    """Execute a Python file of the user's, which registers learners or worlds.
+
+    Raises:
+        AntsError: The file cannot be read, or raises.
+    """
+    spec = importlib.util.spec_from_file_location(f"plugin_{Path(path).stem}", path)
+    if spec is None or spec.loader is None or not Path(path).is_file():
+        raise AntsError(f"cannot read the plugin {path!r}; name a Python file (.py).")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # Taichi reads the source of functions by their module
+    try:
+        spec.loader.exec_module(module)
+    except AntsError:
+        raise
+    except Exception as error:
+        raise AntsError(
+            f"the plugin {path!r} failed with {type(error).__name__}: {error}; mend the file."
+        ) from error
+
+
+@contextmanager
+def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
+    """A progress bar with the time left on standard error; nothing where that is no terminal.
+
+    Yields:
+        To be called with the share of the work that is done, 0 to 1.
+    """
+    if not sys.stderr.isatty():
+        yield lambda share: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (
+        TextColumn(title),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeRemainingColumn(compact=True, elapsed_when_finished=True),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(title, total=1.0)
+        yield lambda share: bar.update(task, completed=share)
+
+
+def _complain(text: str) -> None:
+    with suppress(OSError):
+        print(text, file=sys.stderr)

@@ -1,0 +1,56 @@
+"""The colours of the pictures, as 0xRRGGBB.
+
+Chosen so that people with any of the common colour deficiencies can tell them apart, on a light
+page, in print and on a projector.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+PAGE = 0xFFFFFF  # also what lies outside the world, and the lines between cells
+CELL_EMPTY = 0xE9ECEF
+CELL_OBSTACLE = 0x5D6673
+CELL_FOOD = 0xD55E00
+CELL_QUEEN = 0xAA2E7E
+# Under the drawings of food and queen, where cells are large enough for them.
+FLOOR_FOOD = 0xFBE6D4
+FLOOR_QUEEN = 0xF4DCEA
+ANT = 0x14171C
+INK = 0x1F2429  # text
+FAINT_INK = 0x6B737C
+RULE = 0xC9CED4  # thin lines, and bars that are not chosen
+
+# Samples of matplotlib's perceptually uniform map "viridis", from its light end (1.0) down to 0.28,
+# evenly spaced. Below that it would be too dark for an ant to stand out.
+_TRAIL_SAMPLES = (
+    "fde725 ece51b d8e219 c2df23 b0dd2f 9bd93c 86d549 "
+    "75d054 63cb5f 52c569 44bf70 37b878 2cb17e 25ab82 "
+    "20a386 1e9c89 1f958b 218e8d 24868e 27808e 2a788e "
+    "2d718e 306a8e 33628d 375a8c"
+)
+
+
+def channels(colours: int | np.ndarray) -> np.ndarray:
+    """Red, green and blue, uint8 (..., 3), of colours 0xRRGGBB (...)."""
+    words = np.asarray(colours, dtype=np.uint32)
+    return np.stack([words >> 16 & 255, words >> 8 & 255, words & 255], axis=-1).astype(np.uint8)
+
+
+def pack(rgb: np.ndarray) -> np.ndarray:
+    """Colours 0xRRGGBB, uint32 (...), of red, green and blue (..., 3) from 0 to 255."""
+    red, green, blue = np.moveaxis(np.asarray(rgb).astype(np.uint32), -1, 0)
+    return red << 16 | green << 8 | blue
+
+
+def _ramp() -> np.ndarray:
+    samples = channels(np.array([int(word, 16) for word in _TRAIL_SAMPLES.split()]))
+    places = np.linspace(0, len(samples) - 1, 256)
+    steps = [np.interp(places, np.arange(len(samples)), channel) for channel in samples.T]
+    table = pack(np.rint(np.stack(steps, axis=-1)))
+    table.setflags(write=False)
+    return table
+
+
+# uint32 (256,): the trail from just above 0 to the strongest that is shown.
+TRAIL_RAMP = _ramp()

@@ -1,0 +1,76 @@
+"""Where the cells of a world lie in a picture, and which cell a pixel shows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from taichi_ants import hexgrid
+from taichi_ants.hexgrid import AxialGrid
+
+_SQRT_3 = math.sqrt(3.0)
+
+
+@dataclass(frozen=True)
+class Viewport:
+    """A rectangle of a picture that shows a world.
+
+    Pixel coordinates are of the whole picture, x to the right and y downwards; the pixel in column
+    i and row j has its centre at (i + 0.5, j + 0.5).
+
+    Attributes:
+        left, top, width, height: The rectangle, in pixels.
+        hexagon: Pixels from a hexagon's centre to its corners.
+        origin: Pixel coordinates of the centre of the cell (0, 0, 0).
+    """
+
+    left: int
+    top: int
+    width: int
+    height: int
+    hexagon: float
+    origin: tuple[float, float]
+
+    @classmethod
+    def fit(
+        cls, grid: AxialGrid, left: int, top: int, width: int, height: int, margin: float = 0.0
+    ) -> Viewport:
+        """The viewport that shows the world whole, centred, and as large as possible.
+
+        Args:
+            grid: The world's grid.
+            left, top, width, height: The rectangle, in pixels.
+            margin: Pixels to leave free at each side.
+        """
+        x_range, y_range, z_range = grid.ranges
+        # Bounds in units of the hexagon's size, see `hexgrid.centre_of`: x grows with y and falls
+        # with z, y falls with x.
+        low = np.array([-1.5 * (z_range - 1) - 1, -_SQRT_3 * (x_range - 0.5)])
+        high = np.array([1.5 * (y_range - 1) + 1, _SQRT_3 * (y_range + z_range - 1) / 2])
+        room = np.array([max(width - 2 * margin, 1.0), max(height - 2 * margin, 1.0)])
+        hexagon = float((room / (high - low)).min())
+        middle = np.array([left + width / 2, top + height / 2])
+        x, y = (middle - hexagon * (low + high) / 2).tolist()
+        return cls(left, top, width, height, hexagon, (x, y))
+
+    def centres(self, cells: object) -> np.ndarray:
+        """Pixel coordinates, float64 (..., 2), of the centres of cells (..., 3) in any form."""
+        return hexgrid.centre_of(cells, self.hexagon) + np.array(self.origin)
+
+    def cell_at(self, pixels: object) -> np.ndarray:
+        """The cells, normal forms int64 (..., 3), at pixel coordinates (..., 2).
+
+        They may lie outside the world; see `AxialGrid.contains`.
+        """
+        return hexgrid.cell_at(np.asarray(pixels) - np.array(self.origin), self.hexagon)
+
+    def index_at(self, grid: AxialGrid, pixels: object) -> np.ndarray:
+        """Flat indices, int32 (...), of the world's cells at pixel coordinates (..., 2).
+
+        -1 where there is no cell.
+        """
+        cells = self.cell_at(pixels)
+        inside = grid.contains(cells)
+        return np.where(inside, grid.index(np.where(inside[..., None], cells, 0)), np.int32(-1))

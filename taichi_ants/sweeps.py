@@ -1,0 +1,172 @@
+"""Many configurations over many seeds, trained and evaluated, kept on disk as they finish.
+
+The work is cut into blocks (one configuration, some seeds). Each finished block is a file, so that
+a sweep that was stopped goes on where it was. Since a run depends only on its world, configuration
+and seed, blocks can be done in any order without changing anything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from taichi_ants import results
+from taichi_ants.config import TrainingConfig
+from taichi_ants.engines.results import LearnerCost
+from taichi_ants.errors import AntsError
+from taichi_ants.worlds.world import World
+
+_STEPS_OF_A_BLOCK = 300_000_000  # at most, if every episode used all its steps
+_ARRAYS = ("returns", "steps", "deliveries")
+_GREEDY = tuple(f"greedy_{name}" for name in _ARRAYS)
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """What to do.
+
+    Attributes:
+        world: The world of all runs.
+        configs: C configurations.
+        seeds: S seeds.
+        episodes: Training episodes of each run, without evaporation.
+        max_steps: Step limit of episodes and rollouts.
+        rollouts: Greedy rollouts of each final policy, with evaporation.
+    """
+
+    world: World
+    configs: tuple[TrainingConfig, ...]
+    seeds: tuple[int, ...]
+    episodes: int = 500
+    max_steps: int = 600
+    rollouts: int = 50
+
+    def blocks(self) -> Iterator[tuple[int, slice]]:
+        """The configuration and the range of seeds of each block."""
+        size = max(1, _STEPS_OF_A_BLOCK // (self.episodes * self.max_steps))
+        for c in range(len(self.configs)):
+            for first in range(0, len(self.seeds), size):
+                yield c, slice(first, min(first + size, len(self.seeds)))
+
+
+@dataclass(frozen=True)
+class SweepResult:
+    """What came of it.
+
+    Attributes:
+        returns, steps, deliveries: integer (C, S, episodes), of training.
+        greedy_returns, greedy_steps, greedy_deliveries: integer (C, S, rollouts).
+        q_values: float32 (C, S, 128, 5), the final policies.
+        costs: What each learner's training took, over all its blocks.
+    """
+
+    returns: np.ndarray
+    steps: np.ndarray
+    deliveries: np.ndarray
+    greedy_returns: np.ndarray
+    greedy_steps: np.ndarray
+    greedy_deliveries: np.ndarray
+    q_values: np.ndarray
+    costs: tuple[LearnerCost, ...]
+
+
+def run_sweep(
+    sweep: Sweep,
+    folder: Path,
+    threads: int | None = None,
+    arch: str | None = None,
+    progress: Callable[[float], None] = lambda share: None,
+) -> SweepResult:
+    """Do the blocks that the folder does not hold yet, and join all.
+
+    Args:
+        sweep: What to do.
+        folder: Where finished blocks are kept; it must belong to this sweep alone.
+        threads, arch: As in `train`.
+        progress: Called after each block with the share of the work that is done.
+
+    Raises:
+        AntsError: A block cannot be written, or an argument is not allowed.
+    """
+    blocks = list(sweep.blocks())
+    weights = [_weight(sweep, c, seeds) for c, seeds in blocks]
+    total, done = sum(weights), 0.0
+    joined = _empty_result(sweep)
+    costs: dict[tuple[str, int], LearnerCost] = {}
+    for (c, seeds), weight in zip(blocks, weights, strict=True):
+        path = folder / f"block-{c:04d}-{seeds.start:06d}.npz"
+        block = _read_block(path, sweep, seeds)
+        if block is None:
+            block = _do_block(sweep, c, seeds, threads, arch)
+            results.write_npz(path, block, compress=False)
+        for name, array in joined.items():
+            array[c, seeds] = block[name][0]
+        _add_cost(costs, sweep.configs[c], block)
+        done += weight
+        progress(done / total)
+    return SweepResult(**joined, costs=tuple(costs.values()))
+
+
+def _do_block(
+    sweep: Sweep, c: int, seeds: slice, threads: int | None, arch: str | None
+) -> dict[str, np.ndarray]:
+    from taichi_ants.engines.runs import evaluate, train
+
+    chosen = sweep.seeds[seeds]
+    trained = train(
+        sweep.world,
+        sweep.configs[c],
+        chosen,
+        sweep.episodes,
+        sweep.max_steps,
+        threads=threads,
+        arch=arch,
+    )
+    tables = trained.q_values
+    greedy = evaluate(
+        sweep.world, tables, sweep.rollouts, chosen, sweep.max_steps, threads=threads, arch=arch
+    )
+    block = {name: results.smallest(getattr(trained, name)) for name in _ARRAYS}
+    block |= {f"greedy_{name}": results.smallest(getattr(greedy, name)) for name in _ARRAYS}
+    (cost,) = trained.costs
+    return block | {"q_values": tables, "cost": np.array([cost.steps, cost.seconds])}
+
+
+def _read_block(path: Path, sweep: Sweep, seeds: slice) -> dict[str, np.ndarray] | None:
+    """A finished block, None if there is none or it is damaged."""
+    if not path.exists():
+        return None
+    with suppress(AntsError, KeyError):
+        block = results.read_npz(path)
+        n = seeds.stop - seeds.start
+        fits = all(block[name].shape == (1, n, sweep.episodes) for name in _ARRAYS)
+        fits = fits and all(block[name].shape == (1, n, sweep.rollouts) for name in _GREEDY)
+        if fits and block["q_values"].shape[:2] == (1, n) and block["cost"].shape == (2,):
+            return block
+    return None
+
+
+def _empty_result(sweep: Sweep) -> dict[str, np.ndarray]:
+    runs = (len(sweep.configs), len(sweep.seeds))
+    arrays = {name: np.zeros((*runs, sweep.episodes), dtype=np.int32) for name in _ARRAYS}
+    arrays |= {name: np.zeros((*runs, sweep.rollouts), dtype=np.int32) for name in _GREEDY}
+    return arrays | {"q_values": np.zeros((*runs, 128, 5), dtype=np.float32)}
+
+
+def _add_cost(
+    costs: dict[tuple[str, int], LearnerCost],
+    config: TrainingConfig,
+    block: dict[str, np.ndarray],
+) -> None:
+    key = (config.learner, config.planning_steps)
+    known = costs.get(key, LearnerCost(*key, steps=0, seconds=0.0))
+    steps, seconds = block["cost"].tolist()
+    costs[key] = LearnerCost(*key, known.steps + int(steps), known.seconds + seconds)
+
+
+def _weight(sweep: Sweep, c: int, seeds: slice) -> float:
+    return (4 + sweep.configs[c].planning_steps) * (seeds.stop - seeds.start)

@@ -1,0 +1,198 @@
+"""Every way to misdescribe a world is refused with a sentence that names the value."""
+
+import re
+
+import numpy as np
+import pytest
+
+from taichi_ants.errors import AntsError
+from taichi_ants.worlds import World
+
+HUGE = 10**5000  # more digits than Python writes
+
+
+def world(**changes: object) -> World:
+    return World(**{"ranges": (5, 5, 5), "queen": (0, 0, 0), **changes})
+
+
+@pytest.mark.parametrize(
+    "ranges",
+    [
+        (5, 5),
+        (5, 5, 5, 5),
+        (5.0, 5, 5),
+        np.array([5.0, 5, 5]),
+        (0, 5, 5),
+        (-1, 5, 5),
+        (True, 5, 5),
+        "555",
+        5,
+        None,
+        (1, 1, HUGE),
+        (1, 1, 2**40),
+        {"x": 1, "y": 2, "z": 3},
+    ],
+)
+def test_ranges(ranges: object) -> None:
+    with pytest.raises(AntsError, match=r"ranges are .*three whole numbers \(X, Y, Z\)"):
+        world(ranges=ranges)
+
+
+def test_ranges_that_need_too_much_memory() -> None:
+    with pytest.raises(AntsError, match=r"\(100000, 100000, 1\).*smaller ranges"):
+        world(ranges=(100_000, 100_000, 1))
+
+
+@pytest.mark.parametrize(
+    "queen", [(0, 0), (0.0, 0, 0), (np.nan, 0, 0), "000", None, 7, [(0, 0, 0)], np.zeros(3)]
+)
+def test_the_queen_is_one_cell(queen: object) -> None:
+    with pytest.raises(AntsError, match=r"queen is .*one cell \(x, y, z\)"):
+        world(queen=queen)
+
+
+@pytest.mark.parametrize("queen", [(5, 0, 0), (-5, 0, 0), (7, 2, 2)])
+def test_the_queen_is_inside(queen: tuple) -> None:
+    with pytest.raises(AntsError, match=rf"queen is {re.escape(str(queen))}, outside.*\(5, 5, 5\)"):
+        world(queen=queen)
+
+
+@pytest.mark.parametrize("name", ["foods", "obstacles"])
+@pytest.mark.parametrize(
+    ("cells", "named"),
+    [
+        ([(1, 0, 0), (2.0, 0, 0)], "[1] is (2.0, 0, 0)"),
+        ([(1, 0, np.nan)], "[0] is (1, 0, nan)"),
+        ([(1, 0)], "[0] is (1, 0)"),
+        ([(1, 0, 0, 0)], "[0] is (1, 0, 0, 0)"),
+        ([(True, 0, 0)], "[0] is (True, 0, 0)"),
+        (["100"], "[0] is '100'"),
+        ((1, 0, 0), "[0] is 1"),
+        ("100", " is '100'"),
+        (None, " is None"),
+        (3, " is 3"),
+        ({(1, 0, 0): 2}, " is {"),
+        ([(10**30, 0, 0)], "[0] is (1000"),
+        ([(HUGE, 0, 0)], "[0] is a huge number"),
+        (np.array([1, 0, 0]), " is an array of shape (3,)"),
+        (np.ones((2, 4), dtype=int), " is an array of shape (2, 4)"),
+        (np.ones((2, 3)), " is an array of shape (2, 3) and type float64"),
+        (np.array([["1", "0", "0"]]), " is an array of shape (1, 3) and type <U1"),
+        (np.array([[2**63 - 1, -(2**63), 0]]), "[0] is (9223372036854775807"),
+        (np.array([[2**64 - 1, 0, 0]], dtype=np.uint64), "[0] is (18446744073709551615"),
+    ],
+)
+def test_cells_are_three_whole_numbers(name: str, cells: object, named: str) -> None:
+    with pytest.raises(AntsError) as caught:
+        world(**{name: cells})
+    assert f"{name}{named}" in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["foods", "obstacles"])
+def test_cells_are_inside(name: str) -> None:
+    message = rf"{name}\[1\] is \(1, 6, 1\), outside"
+    with pytest.raises(AntsError, match=message):
+        world(**{name: [(1, 0, 0), (1, 6, 1)]})
+    with pytest.raises(AntsError, match=message):
+        world(**{name: np.array([(1, 0, 0), (1, 6, 1)])})
+    with pytest.raises(
+        AntsError, match=r"\(5, 0, 0\).*\(6, 0, 0\).*\(7, 0, 0\) and 2 more, outside"
+    ):
+        world(**{name: [(i, 0, 0) for i in range(5, 10)]})
+
+
+@pytest.mark.parametrize(
+    ("name", "entries"),
+    [
+        ("foods", [(1, 0, 0), (2, 1, 1)]),
+        ("obstacles", np.array([(1, 0, 0), (1, 0, 0)])),
+        ("trails", [((1, 0, 0), 4), ((2, 1, 1), 5)]),
+        ("ants", [((1, 0, 0), 4), ((2, 1, 1), 5)]),
+    ],
+)
+def test_nothing_is_listed_twice(name: str, entries: object) -> None:
+    with pytest.raises(AntsError, match=rf"{name} hold \(1, 0, 0\) more than once"):
+        world(**{name: entries})
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"foods": [(3, 3, 3)]}, r"foods hold \(0, 0, 0\), where the queen stands"),
+        ({"obstacles": [(0, 0, 0)]}, r"obstacles hold \(0, 0, 0\), where the queen stands"),
+        (
+            {"foods": [(1, 0, 0)], "obstacles": [(2, 1, 1)]},
+            r"obstacles hold \(1, 0, 0\), where a food stands",
+        ),
+        (
+            {"obstacles": [(1, 0, 0)], "trails": [((1, 0, 0), 3)]},
+            r"trails hold \(1, 0, 0\), where an obstacle stands",
+        ),
+        ({"ants": [((0, 0, 0), 3)]}, r"ants hold \(0, 0, 0\), where the queen stands"),
+        (
+            {"foods": [(1, 0, 0)], "ants": [((1, 0, 0), 3)]},
+            r"ants hold \(1, 0, 0\), where a food stands",
+        ),
+        (
+            {"obstacles": [(1, 0, 0)], "ants": [((1, 0, 0), 3)]},
+            r"ants hold \(1, 0, 0\), where an obstacle stands",
+        ),
+    ],
+)
+def test_one_thing_per_cell(changes: dict, message: str) -> None:
+    with pytest.raises(AntsError, match=message):
+        world(**changes)
+
+
+def test_trails_may_lie_under_the_queen_food_and_ants() -> None:
+    made = world(
+        foods=[(1, 0, 0)],
+        ants=[((2, 0, 0), 0)],
+        trails=[((i, 0, 0), 10**9) for i in range(3)],
+    )
+    assert made.trails[:, 3].tolist() == [10**9] * 3
+
+
+@pytest.mark.parametrize(
+    ("name", "entry", "named"),
+    [
+        ("ants", ((1, 0, 0), 6), "heading"),
+        ("ants", ((1, 0, 0), -1), "heading"),
+        ("trails", ((1, 0, 0), -1), "level"),
+        ("trails", ((1, 0, 0), 10**9 + 1), "level"),
+    ],
+)
+def test_headings_and_levels_have_bounds(name: str, entry: tuple, named: str) -> None:
+    flat = (*entry[0], entry[1])
+    for entries in ([entry], [flat], np.array([flat])):
+        with pytest.raises(AntsError) as caught:
+            world(**{name: entries})
+        assert f"{name}[0] is {flat}" in str(caught.value)
+        assert f"the {named} (the last number) must lie between 0 and" in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["trails", "ants"])
+@pytest.mark.parametrize(
+    "entry",
+    [
+        ((1, 0, 0), 1.0),
+        ((1, 0, 0), "1"),
+        ((1, 0, 0), None),
+        ((1, 0, 0),),
+        (1, 0, 0),
+        ((1, 0), 1),
+        ("100", 1),
+        ((1, 0, 0), 1, 2),
+        ((1, 0, 0.5), 1),
+        (1, 2),
+    ],
+)
+def test_entries_with_a_number_have_their_form(name: str, entry: object) -> None:
+    with pytest.raises(AntsError) as caught:
+        world(**{name: [entry]})
+    assert f"{name}[0] is {entry}; it must be ((x, y, z), " in str(caught.value)
+
+
+def test_ants_are_inside() -> None:
+    with pytest.raises(AntsError, match=r"ants\[0\] is \(0, -5, 0, 2\), outside"):
+        world(ants=[((0, -5, 0), 2)])
