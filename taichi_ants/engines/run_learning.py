@@ -43,6 +43,36 @@ def update(
 
 
 @ti.func
+def pack_entry(pair, reward, ended, state):
+    """A model entry: what was seen last of a pair."""
+    return pair | state << _NEXT_AT | (reward + 1) << _REWARD_AT | ended << _ENDED_AT
+
+
+@ti.func
+def entry_pair(entry):
+    """The pair of a model entry, its offset in the table."""
+    return entry & (TABLE - 1)
+
+
+@ti.func
+def entry_next_state(entry):
+    """The next state of a model entry."""
+    return entry >> _NEXT_AT & (N_STATES - 1)
+
+
+@ti.func
+def entry_reward(entry):
+    """The reward of a model entry."""
+    return (entry >> _REWARD_AT & 15) - 1
+
+
+@ti.func
+def entry_ended(entry):
+    """1 if the transition of a model entry ended in a terminal state."""
+    return entry >> _ENDED_AT
+
+
+@ti.func
 def remember(
     entries: ti.template(), slots: ti.template(), model, n_visited, pair, reward, ended, state
 ):
@@ -52,8 +82,7 @@ def remember(
     if slots[key] == 0:
         count += 1
         slots[key] = count
-    entry = pair | state << _NEXT_AT | (reward + 1) << _REWARD_AT | ended << _ENDED_AT
-    entries[model + slots[key] - 1] = entry
+    entries[model + slots[key] - 1] = pack_entry(pair, reward, ended, state)
     return count
 
 
@@ -79,10 +108,10 @@ def plan(
             q,
             table,
             rates,
-            entry & (TABLE - 1),
-            (entry >> _REWARD_AT & 15) - 1,
-            entry >> _ENDED_AT,
-            entry >> _NEXT_AT & (N_STATES - 1),
+            entry_pair(entry),
+            entry_reward(entry),
+            entry_ended(entry),
+            entry_next_state(entry),
             -1,
         )
     return rng
