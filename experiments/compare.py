@@ -259,11 +259,9 @@ def do_comparison(
 
 def draw_figures(comparison: Comparison, baselines: list[dict[str, Any]], folder: Path) -> None:
     """Draw the figures into the folder `figures`."""
-    from taichi_ants import results
     from taichi_ants.analysis.figures import save_all
 
-    with progress_bar("figures"):
-        save_all(comparison, baselines, results.check_writable_folder(folder / "figures"))
+    save_all(comparison, baselines, folder / "figures")
 
 
 def show_finished(settings: argparse.Namespace, sweep: Sweep) -> None:

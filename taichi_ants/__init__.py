@@ -11,7 +11,9 @@ from taichi_ants.environment import prepare_for_taichi
 
 if TYPE_CHECKING:
     from taichi_ants import analysis, learners, reference, states, worlds
+    from taichi_ants.colony_config import ColonyConfig, Pheromone
     from taichi_ants.config import TrainingConfig
+    from taichi_ants.engines.colony import Colony, ColonyEpisodes
     from taichi_ants.engines.results import LearnerCost, Rollouts, TrainingResult
     from taichi_ants.engines.runs import continue_training, evaluate, train
     from taichi_ants.engines.traces import Trace, rollout, trace_training
@@ -23,6 +25,10 @@ __version__ = "0.1.0"
 
 _HOMES = {
     "AntsError": "taichi_ants.errors",
+    "Colony": "taichi_ants.engines.colony",
+    "ColonyConfig": "taichi_ants.colony_config",
+    "ColonyEpisodes": "taichi_ants.engines.colony",
+    "Pheromone": "taichi_ants.colony_config",
     "LearnerCost": "taichi_ants.engines.results",
     "Rollouts": "taichi_ants.engines.results",
     "Trace": "taichi_ants.engines.traces",
@@ -41,7 +47,11 @@ _MODULES = ("analysis", "learners", "reference", "states", "worlds")
 
 __all__ = [
     "AntsError",
+    "Colony",
+    "ColonyConfig",
+    "ColonyEpisodes",
     "LearnerCost",
+    "Pheromone",
     "Rollouts",
     "Trace",
     "TrainingConfig",

@@ -55,3 +55,5 @@ STREAM_ANT = 0  # number: the ant
 STREAM_ROLLOUT = 1  # number: the greedy rollout
 STREAM_START_CELL = 2  # number: the cell, in lexicographic order of (x, y, z)
 STREAM_START_HEADING = 3  # number: the ant
+STREAM_BORN = 4  # number: episode * 2**32 + the ant
+STREAM_QUEEN = 5  # number: 0

@@ -1,5 +1,4 @@
-"""Analysis of sweeps: statistics over seeds, figures, and the audit of the paper's claims.
+"""What to make of results: statistics over seeds, baselines, figures, the paper's claims tested.
 
-Reads a `Comparison` (NumPy arrays) and nothing else; imports no Taichi. matplotlib and SciPy are
-imported where they are used.
+Imports no Taichi; matplotlib and SciPy are imported where they are used.
 """

@@ -10,11 +10,12 @@ import numpy as np
 
 from taichi_ants.analysis.transitions import Phase
 
-# Action values this close count as equal, since the same sums in another order differ by rounding.
-# The first is relative to the state's value, so that a far goal counts however much it is
-# discounted; the second, relative to the largest value, is for sums that cancel to almost nothing.
+# Action values this close count as equal, since the same sums in another order differ by rounding:
+# relative to the value of the state, and, for sums that cancel to almost nothing, relative to the
+# largest value. So a goal of 10 that is discounted to less than about 1e-13 goes unnoticed, with a
+# discount factor of 0.9 after 300 steps.
 _RELATIVE_TOLERANCE = 1e-12
-_ABSOLUTE_TOLERANCE = 1e-15
+_ABSOLUTE_TOLERANCE = 1e-14
 # The discount of what an evaluation may leave out of the sum without end.
 _NEGLIGIBLE = 1e-18
 

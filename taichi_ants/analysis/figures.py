@@ -6,7 +6,6 @@ are made without pyplot, so nothing global changes and no window system is neede
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,6 +21,7 @@ from taichi_ants.analysis.statistics import student_interval
 from taichi_ants.analysis.style import (
     INK,
     frame,
+    in_training,
     legend_entries,
     looks,
     message,
@@ -30,6 +30,7 @@ from taichi_ants.analysis.style import (
     save,
     styled,
 )
+from taichi_ants.results import check_writable_folder
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -119,15 +120,14 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Mappin
 
     Args:
         comparison: The comparison.
-        baselines: Behaviours to compare with, each with "name", "return_mean" (reward) and
-            "deliveries_mean" (per episode); those without numbers are left out.
+        baselines: Rows of baselines.csv; those of the training setting are shown.
     """
     settings = comparison.delivery_settings
     style = looks(comparison.variants)
     returns = comparison.measure("return_last50")
     deliveries = comparison.measure("deliveries_last50")
     with styled():
-        figure = new_figure(4.6)
+        figure = new_figure(5.0)
         axes = figure.subplots(1, len(settings), sharex=True, sharey=True, squeeze=False)
         for axis, setting in zip(axes[0], settings, strict=True):
             axis.set_title(f"{setting.capitalize()} delivery")
@@ -168,9 +168,11 @@ def save_all(
 
     Returns:
         The paths written.
+
+    Raises:
+        AntsError: The folder or a file in it cannot be written.
     """
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = check_writable_folder(folder)
     figures = {
         "learning_curves": learning_curves(comparison),
         "sensitivity": sensitivity(comparison, baselines),
@@ -280,10 +282,8 @@ def _logarithmic(axis: Axes) -> None:
 
 def _baseline_marks(axis: Axes, baselines: Sequence[Mapping]) -> None:
     """Hollow marks, so that they hide neither the data nor each other."""
-    for number, baseline in enumerate(baselines):
-        place = baseline.get("deliveries_mean"), baseline.get("return_mean")
-        if None in place or not all(math.isfinite(value) for value in place):
-            continue
+    places = in_training(baselines, ["deliveries_mean", "return_mean"])
+    for number, (name, place) in enumerate(places.items()):
         axis.plot(
             *place,
             "osD^vph"[number % 7],
@@ -291,5 +291,5 @@ def _baseline_marks(axis: Axes, baselines: Sequence[Mapping]) -> None:
             markerfacecolor="none",
             markersize=10,
             markeredgewidth=1.1,
-            label=baseline["name"],
+            label=name,
         )

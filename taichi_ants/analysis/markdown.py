@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 MISSING = "-"
 
@@ -32,3 +32,9 @@ def table(headers: Sequence[str], lines: Sequence[Sequence[str]], text_columns: 
 def count(number_of: int, noun: str) -> str:
     """How many of something: "1 seed", "2 seeds"."""
     return f"{number_of} {noun}" + ("" if number_of == 1 else "s")
+
+
+def baseline_name(row: Mapping) -> str:
+    """A row of baselines.csv by name, for example "optimal policy, discount 0.9"."""
+    discount = row["discount"]
+    return row["baseline"] + ("" if discount is None else f", discount {discount:g}")

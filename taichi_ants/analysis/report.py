@@ -6,13 +6,13 @@ import io
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Any
 
 from taichi_ants.analysis.claims.assess import SIMULTANEOUS_LEVEL
 from taichi_ants.analysis.claims.model import Finding, Verdict
 from taichi_ants.analysis.claims.tables import by_claim, tally
 from taichi_ants.analysis.comparison import Comparison, Variant
-from taichi_ants.analysis.markdown import MISSING, count, interval, number
+from taichi_ants.analysis.markdown import MISSING, baseline_name, count, interval, number
 from taichi_ants.analysis.paper import GREEDY_RETURN, GREEDY_STEPS, TABLE_2, VARIANTS
 
 if TYPE_CHECKING:
@@ -52,8 +52,7 @@ def print_report(
         comparison: The comparison.
         lines: Its table 2, from `table2.table2`.
         findings: Its claims, from `claims.assess`.
-        baselines: Behaviours to compare with, each with "name", "return_mean" (reward),
-            "steps_mean" and "deliveries_mean" (per episode); missing numbers are shown as "-".
+        baselines: Rows of baselines.csv, see `baselines.baseline_rows`.
         costs: Time per step of learners, each with "learner", "planning_steps" and
             "nanoseconds_per_step".
         file: Where to; standard output by default.
@@ -83,7 +82,7 @@ def print_report(
             console.print(notes)
 
 
-def report_text(*arguments, **options) -> str:
+def render(*arguments: Any, **options: Any) -> str:
     """The report as plain text, `WIDTH` columns wide; arguments as for `print_report`."""
     text = io.StringIO()
     print_report(*arguments, **options, file=text)
@@ -119,7 +118,7 @@ def _table2(lines: Sequence[Mapping]) -> list[Section]:
                 tables[-1].add_row(*_table2_cells(line))
     notes = (
         "ours: the paper's configuration, mean over seeds [95 % interval]\n"
-        "best run: best by return of all configurations with one run each, again and again: median "
+        "best run: best by return of all configurations, one run each, repeated: median "
         "[95 % range]\n"
         "below: percentage of these below the paper's figure"
     )
@@ -159,7 +158,7 @@ def _greedy(comparison: Comparison) -> Section:
         cells = []
         for setting in settings:
             position = comparison.position(setting, variant, TABLE_2[variant].hyperparameters)
-            for name, (measure, digits) in _GREEDY.items():
+            for measure, digits in _GREEDY.values():
                 value = math.nan
                 if position is not None:
                     value = float(comparison.measure(measure)[position].mean())
@@ -203,24 +202,22 @@ def _claims(findings: Sequence[Finding]) -> Section:
 
 def _costs(costs: Sequence[Mapping]) -> Section:
     table = _table("Cost per step", ("Learner", "Nanoseconds", "Relative"))
-    fastest = min((cost["nanoseconds_per_step"] for cost in costs), default=1.0)
-    for cost in costs:
-        time = cost["nanoseconds_per_step"]
+    times = [cost["nanoseconds_per_step"] for cost in costs]
+    fastest = min((time for time in times if time > 0), default=math.nan)
+    for cost, time in zip(costs, times, strict=True):
         label = Variant(cost["learner"], cost["planning_steps"]).label
-        table.add_row(label, f"{time:.1f}", f"{time / fastest:.2f}")
+        table.add_row(label, number(time), number(time / fastest, 2))
     return table, ""
 
 
 def _baselines(baselines: Sequence[Mapping]) -> Section:
-    table = _table("Baselines", ("Behaviour", "Return", "Steps", "Deliveries"))
-    for baseline in baselines:
-        table.add_row(
-            baseline["name"],
-            *(_number(baseline.get(name)) for name in ("return_mean", "steps_mean")),
-            _number(baseline.get("deliveries_mean"), 2),
+    headers = ("Behaviour", "Setting", "Return", "Steps", "Deliveries")
+    table = _table("Baselines", headers, text_columns=2)
+    for row in baselines:
+        figures = (row["return_mean"], row["steps_mean"], row["deliveries_mean"])
+        cells = (
+            MISSING if figure is None else number(figure, digits)
+            for figure, digits in zip(figures, (1, 1, 2), strict=True)
         )
+        table.add_row(baseline_name(row), row["setting"], *cells)
     return table, ""
-
-
-def _number(value: float | None, digits: int = 1) -> str:
-    return MISSING if value is None else number(value, digits)

@@ -14,6 +14,7 @@ from taichi_ants.analysis.style import (
     GREY,
     INK,
     frame,
+    in_training,
     legend_entries,
     looks,
     new_figure,
@@ -39,8 +40,8 @@ def sensitivity(comparison: Comparison, baselines: Sequence[Mapping] = ()) -> Fi
 
     Args:
         comparison: The comparison.
-        baselines: Behaviours to compare with, each with "name" and "return_mean" (reward); those
-            within the axis are drawn as lines.
+        baselines: Rows of baselines.csv; those of the training setting are drawn as lines where
+            they lie within the axis.
     """
     configurations = sorted({row.hyperparameters for row in comparison.rows})
     variants, style = comparison.variants, looks(comparison.variants)
@@ -127,20 +128,16 @@ def _dots(
 
 
 def _lines(axis: Axes, baselines: Sequence[Mapping], limits: tuple[float, float]) -> None:
-    shown = [
-        baseline
-        for baseline in baselines
-        if baseline.get("return_mean") is not None
-        and limits[0] <= baseline["return_mean"] <= limits[1]
-    ]
-    for number, baseline in enumerate(shown):
+    places = in_training(baselines, ["return_mean"]).items()
+    shown = [(name, place) for name, (place,) in places if limits[0] <= place <= limits[1]]
+    for number, (name, place) in enumerate(shown):
         axis.axvline(
-            baseline["return_mean"],
+            place,
             color=GREY,
             linewidth=1.0,
             linestyle=_DASHES[number % len(_DASHES)],
             zorder=1,
-            label=f"{baseline['name']} ({baseline['return_mean']:.1f})",
+            label=f"{name} ({place:g})",
         )
 
 

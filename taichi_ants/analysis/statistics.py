@@ -87,7 +87,9 @@ def student_interval(values: np.ndarray, level: float = 0.95) -> tuple[np.ndarra
     return mean - half, mean + half
 
 
-def cautious_interval(values: np.ndarray, level: float) -> tuple[np.ndarray, np.ndarray]:
+def cautious_interval(
+    values: np.ndarray, level: float, resamples: int = RESAMPLES
+) -> tuple[np.ndarray, np.ndarray]:
     """The hull of both intervals, on which verdicts rest; arguments and results as above.
 
     Where all n seeds agree there is no spread to estimate. That they agree by chance, although
@@ -96,7 +98,8 @@ def cautious_interval(values: np.ndarray, level: float) -> tuple[np.ndarray, np.
     """
     values = np.asarray(values, float)
     n = values.shape[1]
-    bootstrap, student = bootstrap_interval(values, level), student_interval(values, level)
+    bootstrap = bootstrap_interval(values, level, resamples)
+    student = student_interval(values, level)
     low, high = np.minimum(bootstrap[0], student[0]), np.maximum(bootstrap[1], student[1])
     if n > 1 and 2.0 ** (1 - n) > 1 - level:
         same = all_equal(values)

@@ -7,8 +7,13 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from taichi_ants.analysis.baselines import TRAINING_SETTING
 from taichi_ants.analysis.comparison import Variant
+from taichi_ants.analysis.markdown import baseline_name
 from taichi_ants.analysis.paper import DYNA_P3, DYNA_P5, Q_LEARNING, SARSA
+from taichi_ants.results import write_atomically
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -105,7 +110,7 @@ def frame(figure: Figure, title: str, caption: str, entries: Mapping[str, Artist
         entries.values(),
         entries.keys(),
         loc="outside upper left",
-        ncols=4,
+        ncols=_columns(list(entries)),
         columnspacing=1.6,
         borderpad=0.2,
         title=title,
@@ -115,6 +120,17 @@ def frame(figure: Figure, title: str, caption: str, entries: Mapping[str, Artist
     figure.supxlabel(caption, x=0.008, ha="left", fontsize=8, color=GREY)
 
 
+def _columns(labels: Sequence[str]) -> int:
+    """The most columns of a legend that fit into the width of a figure, at least one."""
+    lengths = [len(label) for label in labels]
+    for columns in range(len(labels), 1, -1):
+        # As matplotlib fills them: one after the other, the first ones longer if they must be.
+        longest = [max(column) for column in np.array_split(lengths, columns)]
+        if sum(0.6 + 0.068 * length for length in longest) <= WIDTH:  # inches at 9 points
+            return columns
+    return 1
+
+
 def legend_entries(axes: Iterable[Axes]) -> dict[str, Artist]:
     """What is labelled in any of the panels, each label once."""
     entries: dict[str, Artist] = {}
@@ -122,6 +138,26 @@ def legend_entries(axes: Iterable[Axes]) -> dict[str, Artist]:
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
     return entries
+
+
+def in_training(
+    baselines: Iterable[Mapping], columns: Sequence[str]
+) -> dict[str, tuple[float, ...]]:
+    """Where to draw the baselines that were measured as training is, without evaporation.
+
+    Args:
+        baselines: Rows of baselines.csv.
+        columns: Columns that make up a place.
+
+    Returns:
+        Name -> place, rounded to two digits. Baselines at one place share a name.
+    """
+    names: dict[tuple[float, ...], list[str]] = {}
+    for row in baselines:
+        if row["setting"] == TRAINING_SETTING and None not in (row[name] for name in columns):
+            place = tuple(round(float(row[name]), 2) for name in columns)
+            names.setdefault(place, []).append(baseline_name(row))
+    return {"; ".join(alike): place for place, alike in names.items()}
 
 
 def over_seeds(seeds: int, spread: str) -> str:
@@ -137,6 +173,8 @@ def message(text: str) -> Figure:
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Writes a PNG."""
+    """Writes a PNG; raises AntsError where that cannot be done."""
     with styled():
-        figure.savefig(path, dpi=DPI, facecolor="white")
+        write_atomically(
+            path, lambda file: figure.savefig(file, format="png", dpi=DPI, facecolor="white")
+        )

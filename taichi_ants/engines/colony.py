@@ -10,9 +10,11 @@ import numpy as np
 from taichi_ants import learners, runtime
 from taichi_ants.colony_config import SHARINGS, ColonyConfig
 from taichi_ants.config import TrainingConfig
-from taichi_ants.constants import N_ACTIONS, N_STATES
-from taichi_ants.engines import checks, colony_memory
+from taichi_ants.constants import EMPTY, N_ACTIONS, N_STATES
+from taichi_ants.engines import checks, colony_files, colony_memory
 from taichi_ants.errors import AntsError
+from taichi_ants.hexgrid import AxialGrid
+from taichi_ants.results import PathLike
 from taichi_ants.worlds.world import World
 
 Progress = Callable[[float], None]
@@ -50,6 +52,27 @@ class ColonyEpisodes:
     deaths: np.ndarray
     regrown: np.ndarray
     living: np.ndarray
+
+
+@dataclass(frozen=True)
+class ColonySnapshot:
+    """One world of a colony at one moment, as `taichi_ants.rendering` draws it.
+
+    Attributes:
+        grid: Where the cells lie in the arrays.
+        ground: uint8 (grid.size,), EMPTY, OBSTACLE, FOOD or QUEEN; EMPTY under ants.
+        trail: int32 or float32 (grid.size,), trail levels.
+        ant_cells: int32 (n,), flat indices of the living ants.
+        ant_headings: int32 (n,), 0 to 5.
+        ant_carries: bool (n,).
+    """
+
+    grid: AxialGrid
+    ground: np.ndarray
+    trail: np.ndarray
+    ant_cells: np.ndarray
+    ant_headings: np.ndarray
+    ant_carries: np.ndarray
 
 
 class Colony:
@@ -102,22 +125,24 @@ class Colony:
         self._layout = colony_memory.Layout(
             [checks.checked_world(one) for one in several], config, self.seeds
         )
+        options = (config.births, config.lifespan, config.regrowth, config.wander)
+        self._lively = any(option not in (None, False) for option in options)
         large = config.slots >= _LARGE_COLONY
-        self._schedule = _one_of(
+        self.schedule = _one_of(
             "schedule", schedule or ("by_chunk" if large else "by_world"), ("by_world", "by_chunk")
         )
         chunks = 1
-        if self._schedule == "by_chunk":
+        if self.schedule == "by_chunk":
             chunks = min(_MOST_CHUNKS, -(-config.slots // _ANTS_PER_CHUNK))
-        self._chunks = chunks
+        self.chunks = chunks
         words = np.array([seed % 2**64 for seed in self.seeds], dtype=np.uint64)
         plans = self._learner.plans and sharing != "fixed"
-        self._arrays = colony_memory.allocate(
+        self.arrays = colony_memory.allocate(
             self._layout, config, self.training, words, sharing, plans, chunks
         )
         table = None if q_values is None else checks.checked_q_values(q_values)
         tables = colony_memory.allocate_tables(len(self.seeds), config.slots, sharing, table)
-        self._arrays["q"] = tables
+        self.arrays["q"] = tables
         self.epsilon = float(self.training.epsilon)
         self.episode = -1
         self.ticks = 0
@@ -128,7 +153,7 @@ class Colony:
 
         self.episode += 1
         self.ticks = 0
-        colony_memory.fill_episode(self._arrays, self._layout, self.config, self.epsilon)
+        colony_memory.fill_episode(self.arrays, self._layout, self.config, self.epsilon)
         self._launch(BEGIN, 0, 1)
 
     def tick(self, n: int = 1) -> None:
@@ -138,7 +163,7 @@ class Colony:
         if self.episode < 0:
             raise AntsError("no episode has begun; call begin_episode first.")
         n = checks.checked_count("n", n)
-        if self._schedule == "by_world":
+        if self.schedule == "by_world":
             self._launch(BY_WORLD, self.ticks, n)
             self.ticks += n
             return
@@ -147,8 +172,7 @@ class Colony:
             if self._learner.plans and self.sharing == "shared":
                 for _ in range(self.training.planning_steps):
                     self._launch(PLAN, self.ticks, 1)
-            config = self.config
-            if config.births or config.lifespan or config.ends_at_delivery:
+            if self._lively or self.config.ends_at_delivery:
                 self._launch(END, self.ticks, 1)
             self.ticks += 1
 
@@ -156,12 +180,12 @@ class Colony:
         """Keep the streams of the ants that start an episode, and let epsilon decay."""
         from taichi_ants.engines import colony_arrays as names
 
-        ants = self._arrays["ants"]
+        ants = self.arrays["ants"]
         first = (ants[names.LIFE] != names.VACANT) & (ants[names.NUMBER] < self.config.ants)
         (columns,) = np.nonzero(first & (ants[names.NUMBER] >= 0))
         slots = self.config.slots
         places = columns // slots * slots + ants[names.NUMBER, columns]
-        self._arrays["first_streams"][places] = self._arrays["streams"][columns]
+        self.arrays["first_streams"][places] = self.arrays["streams"][columns]
         decayed = self.epsilon * float(self.training.epsilon_decay)
         self.epsilon = max(float(self.training.min_epsilon), decayed)
 
@@ -178,7 +202,7 @@ class Colony:
         outcomes = []
         for episode in range(episodes):
             self.begin_episode()
-            while self.ticks < ticks and self._arrays["worlds"][0].any():
+            while self.ticks < ticks and self.arrays["worlds"][0].any():
                 self.tick(min(self._ticks_per_launch(), ticks - self.ticks))
                 if progress is not None:
                     progress((episode + self.ticks / ticks) / episodes)
@@ -204,18 +228,62 @@ class Colony:
             "regrown": names.REGROWN,
             "living": names.LIVING_ANTS,
         }
-        counts = {name: self._arrays["worlds"][row][None].copy() for name, row in rows.items()}
-        return ColonyEpisodes(returns=self._arrays["returns"][None].copy(), **counts)
+        counts = {name: self.arrays["worlds"][row][None].copy() for name, row in rows.items()}
+        return ColonyEpisodes(returns=self.arrays["returns"][None].copy(), **counts)
 
     @property
     def q_values(self) -> np.ndarray:
         """The action values, float32 (W, 128, 5), or (W, slots, 128, 5) with own tables; a copy."""
         n = self.config.slots if self.sharing == "own" else 1
-        tables = self._arrays["q"].reshape(len(self.seeds), n, N_STATES, -1)[..., :N_ACTIONS]
+        tables = self.arrays["q"].reshape(len(self.seeds), n, N_STATES, -1)[..., :N_ACTIONS]
         return (tables if self.sharing == "own" else tables[:, 0]).copy()
 
+    @property
+    def worlds(self) -> tuple[World, ...]:
+        """The worlds as they are at the start of an episode."""
+        return self._layout.worlds
+
+    def snapshot(self, world: int = 0) -> ColonySnapshot:
+        """World number `world` as it is now; arrays are copies."""
+        from taichi_ants.engines import colony_arrays as names
+
+        if not 0 <= world < len(self.seeds):
+            raise AntsError(f"world is {world}; it must be from 0 to {len(self.seeds) - 1}.")
+        cells = slice(world * self._layout.size, (world + 1) * self._layout.size)
+        slots = slice(world * self.config.slots, (world + 1) * self.config.slots)
+        ants = self.arrays["ants"][:, slots]
+        ants = ants[:, ants[names.LIFE] == names.LIVING]
+        ground = self.arrays["ground"][cells].copy()
+        ground[ants[names.CELL]] = EMPTY
+        if self.config.pheromone.dense:
+            trail = self.arrays["level"][cells].copy()
+        else:
+            clock = self.ticks if self.config.pheromone.evaporation == "linear" else 0
+            trail = np.maximum(self.arrays["trail"][cells] - clock, 0)
+        return ColonySnapshot(
+            self._layout.grid,
+            ground,
+            trail,
+            ants[names.CELL].copy(),
+            ants[names.HEADING].copy(),
+            ants[names.CARRIES].astype(bool),
+        )
+
+    def save(self, path: PathLike) -> None:
+        """Write the colony as it is now; `load` goes on from it, bit for bit."""
+        colony_files.save_colony(self, path)
+
+    @classmethod
+    def load(cls, path: PathLike, threads: int | None = None, *, arch: str | None = None) -> Colony:
+        """Read a colony that `save` wrote.
+
+        Raises:
+            AntsError: The file is missing, damaged, or holds no colony.
+        """
+        return colony_files.load_colony(cls, path, threads, arch)
+
     def _ticks_per_launch(self) -> int:
-        if self._schedule == "by_chunk":
+        if self.schedule == "by_chunk":
             return 1
         rounds = -(-len(self.seeds) // self._settings.threads)
         cost = _TICK_NS * (1 + self.training.planning_steps)
@@ -228,9 +296,9 @@ class Colony:
         from taichi_ants.engines.colony_kernels import colony_kernel
 
         dense = self.config.pheromone.dense
-        kernel = colony_kernel(self._learner, self.sharing, dense, what)
+        kernel = colony_kernel(self._learner, self.sharing, dense, self._lively, what)
         numbers = Settings(**self._numbers())
-        kernel(tick, n, *numbers, *Arrays(**self._arrays))
+        kernel(tick, n, *numbers, *Arrays(**self.arrays))
 
     def _numbers(self) -> dict[str, int | float]:
         config, pheromone = self.config, self.config.pheromone
@@ -240,7 +308,7 @@ class Colony:
             "worlds": len(self.seeds),
             "ants": config.ants,
             "slots": config.slots,
-            "chunks": self._chunks,
+            "chunks": self.chunks,
             "size": self._layout.size,
             "homes": self._layout.homes,
             "episode": self.episode,

@@ -85,9 +85,17 @@ def retire(c: ti.template(), k: ti.template(), w, ant):
 
 @cache
 def colony_kernel(
-    learner: Learner, sharing: str, dense: bool, schedule: str
+    learner: Learner, sharing: str, dense: bool, lively: bool, schedule: str
 ) -> Callable[..., None]:
-    """The kernel for one learner and way of sharing; it is compiled on first use."""
+    """The kernel for one learner and way of sharing; it is compiled on first use.
+
+    Args:
+        learner: The learner.
+        sharing: "shared", "own" or "fixed".
+        dense: Whether levels are f32, see `colony_trail`.
+        lively: Whether ants or food come and go; leaving that out halves the time to compile.
+        schedule: What the kernel does, one of the names above.
+    """
     learns = sharing != "fixed"
     alone = sharing == "own"
     on_policy = learns and learner.draws_next_action
@@ -133,8 +141,9 @@ def colony_kernel(
     def before_deaths(c: ti.template(), k: ti.template(), w, tick):
         if c.worlds[RUNNING, w] == 1:
             count_gives(c, k, w, tick)
-            if k.births == 1:
-                give_birth(c, k, alone, w)
+            if ti.static(lively):
+                if k.births == 1:
+                    give_birth(c, k, alone, w)
 
     @ti.func
     def after_deaths(c: ti.template(), k: ti.template(), w, tick):
@@ -142,8 +151,9 @@ def colony_kernel(
             count_deaths(c, k, w)
             if k.regrowth >= 0:
                 regrow(c, k, w, tick)
-            if k.wander > 0 and (tick + 1) % ti.max(k.wander, 1) == 0:
-                wander(c, k, w)
+            if k.wander > 0:
+                if (tick + 1) % k.wander == 0:
+                    wander(c, k, w)
 
     @ti.func
     def observe_all(c: ti.template(), k: ti.template(), chunk, tick):
@@ -215,9 +225,10 @@ def colony_kernel(
                 for place in range(w * k.size, (w + 1) * k.size):
                     c.level[place] = c.spare[place]
         before_deaths(c, k, w, tick)
-        if k.lifespan > 0:
-            grow_old_all(c, k, w)
-        after_deaths(c, k, w, tick)
+        if ti.static(lively):
+            if k.lifespan > 0:
+                grow_old_all(c, k, w)
+            after_deaths(c, k, w, tick)
         observe_all(c, k, w, tick)
         if ti.static(learns and not alone):
             learn_together(c, k, w)
@@ -225,7 +236,7 @@ def colony_kernel(
             for _ in range(k.planning_steps):
                 draw_all(c, k, w)
                 plan_together(c, k, w)
-        if k.births == 1 or k.lifespan > 0:
+        if ti.static(lively):
             retire_all(c, k, w)
         stop_at_delivery(c, k, w)
 
@@ -388,13 +399,14 @@ def colony_kernel(
             ti.loop_config(block_dim=1)
             for w in range(k.worlds):
                 before_deaths(c, k, w, first_tick)
-            ti.loop_config(block_dim=1)
-            for chunk in range(k.worlds * k.chunks):
-                if k.lifespan > 0:
-                    grow_old_all(c, k, chunk)
-            ti.loop_config(block_dim=1)
-            for w in range(k.worlds):
-                after_deaths(c, k, w, first_tick)
+            if ti.static(lively):
+                ti.loop_config(block_dim=1)
+                for chunk in range(k.worlds * k.chunks):
+                    if k.lifespan > 0:
+                        grow_old_all(c, k, chunk)
+                ti.loop_config(block_dim=1)
+                for w in range(k.worlds):
+                    after_deaths(c, k, w, first_tick)
             ti.loop_config(block_dim=1)
             for chunk in range(k.worlds * k.chunks):
                 observe_all(c, k, chunk, first_tick)

@@ -134,12 +134,11 @@ def resolve(c: ti.template(), base, ant, tick):
         cell = c.ants[CELL, ant]
         kind = ti.cast(c.ground[base + cell] >> 4, ti.i32) & 8  # 8 to take, 0 to enter
         lost = 0
-        for heading in ti.static(range(N_HEADINGS)):
+        for heading in range(N_HEADINGS):
             other = wanted + c.compass[heading + 1]
             mark = ti.cast(c.ground[base + other] >> 4, ti.i32)
             # The other ant looks back, along the opposite heading.
-            towards = ti.static(1 + (heading + 3) % N_HEADINGS)
-            if mark == (kind | towards) and other != cell:
+            if mark == (kind | 1 + turn_round(heading)) and other != cell:
                 if conflict_key(other, tick) < conflict_key(cell, tick):
                     lost = 1
         if lost == 1:

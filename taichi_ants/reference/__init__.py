@@ -4,10 +4,12 @@ It is an oracle, not a simulator to use: every rule is written down a second tim
 reads, with a geometry of its own (tuples of cube coordinates in normal form), its own random
 streams, its own vision and its own learners. Tests compare each step of the engines with it, for
 equality to the bit. To keep the two independent, this package imports nothing of `taichi_ants` but
-`constants`, `errors` and the types `TrainingConfig` and `World`, and of a world it reads only the
-fields (ranges, queen, foods, obstacles, trails, ants).
+`constants`, `errors`, the configurations (with the weights of `colony_config.update_weights`) and
+the type `World`, and of a world it reads only the fields (ranges, queen, foods, obstacles, trails,
+ants).
 
 - `train`, `rollout`, `start`: whole runs, with a record of every step if asked for.
+- `ReferenceColony`: many ants in one world, tick by tick; `Snapshot`: all of it between two ticks.
 - `WorldState`, `Ant`, `observe`, `act`: the world and one ant, step by step.
 - `choose_action`: the epsilon-greedy policy.
 - `register`, `learner_named`, `learner_names`: the twins of the package's learners.
@@ -18,6 +20,14 @@ fields (ranges, queen, foods, obstacles, trails, ants).
 from __future__ import annotations
 
 from taichi_ants.reference.ant import Ant, Event, act, cells_in_view, observe
+from taichi_ants.reference.colony import ReferenceColony
+from taichi_ants.reference.colony_records import (
+    AntSnapshot,
+    ColonyAnt,
+    EpisodeRecord,
+    Snapshot,
+    Transition,
+)
 from taichi_ants.reference.geometry import (
     Cell,
     distance,
@@ -36,14 +46,20 @@ from taichi_ants.reference.world_state import WorldState
 
 __all__ = [
     "Ant",
+    "AntSnapshot",
     "Cell",
+    "ColonyAnt",
+    "EpisodeRecord",
     "Event",
     "Learner",
     "LearningStep",
     "RandomStream",
+    "ReferenceColony",
     "Rollout",
     "Run",
+    "Snapshot",
     "Step",
+    "Transition",
     "WorldState",
     "act",
     "cells_in_view",

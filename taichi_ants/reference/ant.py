@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import Protocol
+
+import numpy as np
 
 from taichi_ants.constants import (
     EMPTY,
@@ -37,6 +40,22 @@ class Ant:
     carries: bool = False
 
 
+class Surroundings(Protocol):
+    """What an ant can look at: a world of one ant, or of many.
+
+    Attributes:
+        queen: The queen's cell.
+    """
+
+    queen: Cell
+
+    def content(self, cell: Cell) -> int:
+        """Return EMPTY, OBSTACLE, FOOD or QUEEN; other ants are an OBSTACLE."""
+
+    def level(self, cell: Cell) -> int | np.float32:
+        """Return the trail level of a cell."""
+
+
 class Event(Enum):
     """What came of an action."""
 
@@ -56,7 +75,7 @@ def cells_in_view(ant: Ant) -> tuple[Cell, Cell, Cell]:
     )
 
 
-def observe(world: WorldState, ant: Ant) -> int:
+def observe(world: Surroundings, ant: Ant) -> int:
     """Return the index (0..127) of the state that the ant sees."""
     cells = cells_in_view(ant)
     sees = _sees_with_food if ant.carries else _sees_without_food
@@ -64,7 +83,7 @@ def observe(world: WorldState, ant: Ant) -> int:
     return 64 * ant.carries + 16 * left + 4 * forward + right
 
 
-def _sees_without_food(world: WorldState, ant: Ant, cells: tuple[Cell, ...]) -> list[int]:
+def _sees_without_food(world: Surroundings, ant: Ant, cells: tuple[Cell, ...]) -> list[int]:
     contents = [world.content(cell) for cell in cells]
     # A trail on food, or on the queen's cell, is not seen and does not count for the strongest.
     levels = [
@@ -85,7 +104,7 @@ def _sees_without_food(world: WorldState, ant: Ant, cells: tuple[Cell, ...]) -> 
     return codes
 
 
-def _sees_with_food(world: WorldState, ant: Ant, cells: tuple[Cell, ...]) -> list[int]:
+def _sees_with_food(world: Surroundings, ant: Ant, cells: tuple[Cell, ...]) -> list[int]:
     own_distance = distance(ant.cell, world.queen)
     codes = []
     for cell in cells:

@@ -1,4 +1,4 @@
-"""The mind of an ant: its table, its model, its epsilon and its random stream."""
+"""The mind of an ant that learns alone: what it knows, its epsilon and its random stream."""
 
 from __future__ import annotations
 
@@ -6,15 +6,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from taichi_ants.constants import N_ACTIONS, N_STATES, STREAM_ANT
-from taichi_ants.errors import AntsError
-from taichi_ants.reference.learners import learner_named
+from taichi_ants.constants import STREAM_ANT
+from taichi_ants.reference.knowledge import Knowledge
 from taichi_ants.reference.policy import choose_action
-from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
-from taichi_ants.reference.records import Model, Run, Step
+from taichi_ants.reference.random_stream import RandomStream, stream_state
+from taichi_ants.reference.records import Model, Outcome, Pair, Run, Step
 
 if TYPE_CHECKING:
     from taichi_ants.config import TrainingConfig
+
+
+def decayed_epsilon(epsilon: float, config: TrainingConfig) -> float:
+    """Return the epsilon of the episode after one with this epsilon; float64."""
+    return max(float(config.min_epsilon), epsilon * float(config.epsilon_decay))
 
 
 class Learning:
@@ -24,7 +28,6 @@ class Learning:
         learner: The twin of the configuration's learner.
         stream: The ant's random stream.
         epsilon: Of the present episode, float64.
-        model: See `records.Model`; filled by planning learners only.
     """
 
     def __init__(self, config: TrainingConfig, seed: int, start_from: Run | None) -> None:
@@ -33,38 +36,29 @@ class Learning:
         Raises:
             AntsError: The learner is unknown, or `planning_steps` does not fit it.
         """
-        self.learner = learner_named(config.learner)
-        if self.learner.plans != (config.planning_steps > 0):
-            allowed = "at least 1" if self.learner.plans else "0"
-            raise AntsError(
-                f"planning_steps is {config.planning_steps}; it must be {allowed} for the learner "
-                f"{config.learner!r}."
-            )
-        self._config = config
-        self._learning_rate = np.float32(config.learning_rate)
-        self._discount = np.float32(config.discount)
-        q_values = np.zeros((N_STATES, N_ACTIONS), np.float32)
-        self.stream = RandomStream(stream_state(seed, STREAM_ANT, 0))
-        self.epsilon = float(config.epsilon)
-        self.model: Model = {}
-        if start_from is not None:
-            q_values = np.asarray(start_from.q_values, np.float32)
+        if start_from is None:
+            self._knowledge = Knowledge(config)
+            self.stream = RandomStream(stream_state(seed, STREAM_ANT, 0))
+            self.epsilon = float(config.epsilon)
+        else:
+            self._knowledge = Knowledge(config, start_from.q_values, start_from.model)
             self.stream = RandomStream(start_from.rng_state)
             self.epsilon = start_from.epsilon
-            self.model = dict(start_from.model)
-        # A dictionary keeps the order of first insertion, the order of first visit; the list of its
-        # keys is there to draw from.
-        self._visited = list(self.model)
-        # Rows of np.float32 scalars: plain lists are several times faster here than an array.
-        self._rows = [list(row) for row in q_values]
+        self.learner = self._knowledge.learner
+        self._config = config
+
+    @property
+    def model(self) -> Model:
+        """See `records.Model`; filled by planning learners only."""
+        return self._knowledge.model
 
     def table(self) -> np.ndarray:
         """Return a copy of the Q-table; (128, 5), float32."""
-        return np.array(self._rows, np.float32)
+        return self._knowledge.table()
 
     def choose(self, state: int) -> int:
         """Choose an action by the table and the epsilon of now."""
-        return choose_action(self._rows[state], self.epsilon, self.stream)
+        return choose_action(self._knowledge.rows[state], self.epsilon, self.stream)
 
     def learn(self, step: Step, terminated: bool, next_action: int | None) -> np.float32:
         """Update from a step, then from the model if the learner plans.
@@ -77,40 +71,49 @@ class Learning:
         Returns:
             The TD error of the step.
         """
-        pair = (step.state, step.action)
-        outcome = (step.reward, step.next_state, terminated)
-        td_error = self._update(pair, outcome, next_action)
-        if self.learner.plans:
-            if pair not in self.model:
-                self._visited.append(pair)
-            self.model[pair] = outcome
-            self._plan()
-        return td_error
-
-    def _plan(self) -> None:
-        for _ in range(self._config.planning_steps):
-            high, _ = self.stream.draw()
-            pair = self._visited[pick(high, len(self._visited))]
-            self._update(pair, self.model[pair], next_action=None)
-
-    def _update(
-        self, pair: tuple[int, int], outcome: tuple[int, int, bool], next_action: int | None
-    ) -> np.float32:
-        state, action = pair
-        reward, next_state, terminated = outcome
-        row = self._rows[state]
-        td_error = self.learner.td_error(
-            row[action],
-            np.float32(reward),
-            np.float32(0) if terminated else self._discount,
-            self._rows[next_state],
-            -1 if next_action is None else next_action,
-            np.float32(self.epsilon),
+        return learn_alone(
+            self._knowledge,
+            (step.state, step.action),
+            (step.reward, step.next_state, terminated),
+            next_action,
+            self.epsilon,
+            self.stream,
+            self._config.planning_steps,
         )
-        row[action] = row[action] + self._learning_rate * td_error
-        return td_error
 
     def end_episode(self) -> None:
         """Let epsilon decay."""
-        decayed = self.epsilon * float(self._config.epsilon_decay)
-        self.epsilon = max(float(self._config.min_epsilon), decayed)
+        self.epsilon = decayed_epsilon(self.epsilon, self._config)
+
+
+def learn_alone(
+    knowledge: Knowledge,
+    pair: Pair,
+    outcome: Outcome,
+    next_action: int | None,
+    epsilon: float,
+    stream: RandomStream,
+    planning_steps: int,
+) -> np.float32:
+    """Let one ant that has its table for itself learn from one transition.
+
+    Args:
+        knowledge: Changed: the table, and for learners that plan the model.
+        pair, outcome, next_action: The transition, see `Knowledge.td_error`.
+        epsilon: Of the policy.
+        stream: What planning draws from.
+        planning_steps: Updates from the model, for learners that plan.
+
+    Returns:
+        The TD error of the transition.
+    """
+    rate = knowledge.learning_rate
+    error = knowledge.td_error(pair, outcome, next_action, epsilon)
+    knowledge.update(pair, rate, error)
+    if knowledge.learner.plans:
+        knowledge.remember(pair, outcome)
+        for _ in range(planning_steps):
+            drawn = knowledge.draw_visited(stream)
+            planned = knowledge.td_error(drawn, knowledge.model[drawn], None, epsilon)
+            knowledge.update(drawn, rate, planned)
+    return error

@@ -16,6 +16,14 @@ def _mix(z: int) -> int:
     return z ^ (z >> 31)
 
 
+def hash_of(*numbers: int) -> int:
+    """Return a hash of integers, in their order, in 0 .. 2**64 - 1; each is taken modulo 2**64."""
+    state = 0
+    for number in numbers:
+        state = _mix(((state ^ number) + _GAMMA) & _MASK_64)
+    return state
+
+
 def stream_state(seed: int, purpose: int, number: int) -> int:
     """Return the first state of a stream, in 0 .. 2**64 - 1.
 
@@ -24,9 +32,7 @@ def stream_state(seed: int, purpose: int, number: int) -> int:
         purpose: What the stream is for, one of the constants STREAM_*.
         number: Which of the streams of that purpose, for example the number of the ant.
     """
-    state = _mix((seed + _GAMMA) & _MASK_64)
-    state = _mix(((state ^ purpose) + _GAMMA) & _MASK_64)
-    return _mix(((state ^ number) + _GAMMA) & _MASK_64)
+    return hash_of(seed, purpose, number)
 
 
 class RandomStream:

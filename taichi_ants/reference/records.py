@@ -9,9 +9,10 @@ import numpy as np
 from taichi_ants.reference.ant import Event
 from taichi_ants.reference.geometry import Cell
 
-# Of each visited (state, action), in the order of first visit, the last seen
-# (reward, next state, terminated).
-Model = dict[tuple[int, int], tuple[int, int, bool]]
+Pair = tuple[int, int]  # state, action
+Outcome = tuple[int, int, bool]  # reward, next state, terminated
+# Of each visited pair, in the order of first visit, the last seen outcome.
+Model = dict[Pair, Outcome]
 
 
 @dataclass(frozen=True)

@@ -33,8 +33,8 @@ _TRAIL_SAMPLES = (
 
 def channels(colours: int | np.ndarray) -> np.ndarray:
     """Red, green and blue, uint8 (..., 3), of colours 0xRRGGBB (...)."""
-    words = np.asarray(colours, dtype=np.uint32)
-    return np.stack([words >> 16 & 255, words >> 8 & 255, words & 255], axis=-1).astype(np.uint8)
+    words = np.asarray(colours, dtype=np.uint32)[..., None]
+    return (words >> np.array([16, 8, 0], dtype=np.uint32)).astype(np.uint8)
 
 
 def pack(rgb: np.ndarray) -> np.ndarray:

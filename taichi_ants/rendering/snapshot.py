@@ -50,6 +50,8 @@ class Snapshot:
         _check("ant_carries", self.ant_carries, (n,), "b")
         _check_below("ant_cells", self.ant_cells, size)
         _check_below("ant_headings", self.ant_headings, N_HEADINGS)
+        if not self.grid.exists[self.ant_cells].all():
+            raise AntsError("ant_cells holds a cell outside the world; ants must stand in it.")
         if self.letters is not None and not (len(self.letters) == 3 and 0 <= self.watched < n):
             raise AntsError(
                 f"letters are {self.letters!r} for ant {self.watched} of {n}; "

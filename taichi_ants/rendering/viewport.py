@@ -44,16 +44,17 @@ class Viewport:
             left, top, width, height: The rectangle, in pixels.
             margin: Pixels to leave free at each side.
         """
-        x_range, y_range, z_range = grid.ranges
-        # Bounds in units of the hexagon's size, see `hexgrid.centre_of`: x grows with y and falls
-        # with z, y falls with x.
-        low = np.array([-1.5 * (z_range - 1) - 1, -_SQRT_3 * (x_range - 0.5)])
-        high = np.array([1.5 * (y_range - 1) + 1, _SQRT_3 * (y_range + z_range - 1) / 2])
+        low, high = _bounds(grid)
         room = np.array([max(width - 2 * margin, 1.0), max(height - 2 * margin, 1.0)])
         hexagon = float((room / (high - low)).min())
         middle = np.array([left + width / 2, top + height / 2])
         x, y = (middle - hexagon * (low + high) / 2).tolist()
         return cls(left, top, width, height, hexagon, (x, y))
+
+    def height_of(self, grid: AxialGrid) -> float:
+        """The height of the whole world in pixels."""
+        low, high = _bounds(grid)
+        return float(high[1] - low[1]) * self.hexagon
 
     def centres(self, cells: object) -> np.ndarray:
         """Pixel coordinates, float64 (..., 2), of the centres of cells (..., 3) in any form."""
@@ -74,3 +75,12 @@ class Viewport:
         cells = self.cell_at(pixels)
         inside = grid.contains(cells)
         return np.where(inside, grid.index(np.where(inside[..., None], cells, 0)), np.int32(-1))
+
+
+def _bounds(grid: AxialGrid) -> tuple[np.ndarray, np.ndarray]:
+    """The lowest and the highest (x, y) of a world, in sizes of a hexagon from the origin."""
+    x_range, y_range, z_range = grid.ranges
+    # By `hexgrid.centre_of`, x grows with y and falls with z, y falls with x.
+    low = np.array([-1.5 * (z_range - 1) - 1, -_SQRT_3 * (x_range - 0.5)])
+    high = np.array([1.5 * (y_range - 1) + 1, _SQRT_3 * (y_range + z_range - 1) / 2])
+    return low, high

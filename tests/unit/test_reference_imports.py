@@ -9,6 +9,7 @@ from taichi_ants import reference
 
 FOLDER = Path(reference.__file__).parent
 ALLOWED = {
+    "taichi_ants.colony_config",
     "taichi_ants.constants",
     "taichi_ants.errors",
     "taichi_ants.config",
@@ -41,7 +42,9 @@ def test_the_reference_imports_only_what_it_may():
 def test_of_the_world_only_fields_are_read():
     # A world's helpers (its grid, ground, closer cells, starts) belong to what is tested.
     fields = {"ranges", "queen", "foods", "obstacles", "trails", "ants"}
-    for name in ("world_state.py", "start.py", "episode.py", "runs.py"):
+    alone = ("world_state.py", "start.py", "episode.py", "runs.py")
+    together = ("colony.py", "colony_world.py", "colony_trail.py")
+    for name in alone + together:
         tree = ast.parse((FOLDER / name).read_text(encoding="utf-8"))
         for function in ast.walk(tree):
             if not isinstance(function, ast.FunctionDef):

@@ -97,7 +97,8 @@ def _explanation(findings: Sequence[Finding]) -> str:
         "is shown. A claim 'above 0' is supported if its interval lies above 0 and reaches past "
         "the margin, contradicted if it lies below 0 and reaches past the negative margin; a "
         "claim of a range is supported if the interval lies inside it, contradicted if it lies "
-        "outside.\n"
+        "outside. Margins are what is too small to matter: one reward is one step on a trail, two "
+        "steps are what the paper itself calls alike.\n"
     )
 
 

@@ -1,0 +1,110 @@
+"""Colonies in files: everything that is needed to go on, bit for bit."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from taichi_ants import results
+from taichi_ants.colony_config import ColonyConfig, Pheromone
+from taichi_ants.config import TrainingConfig
+from taichi_ants.errors import AntsError
+from taichi_ants.worlds.world import World
+
+if TYPE_CHECKING:
+    from taichi_ants.engines.colony import Colony
+
+_FORMAT = "taichi-ants colony 1"
+# What the worlds and configurations determine is not stored.
+_DERIVED = frozenset({"walls", "closer", "compass", "weights", "spare", "seeds"})
+_WORLD_PARTS = ("foods", "obstacles", "trails", "ants")
+
+
+def save_colony(colony: Colony, path: results.PathLike) -> None:
+    """Write a colony, uncompressed; raises as `results.write_atomically` does."""
+    arrays: dict[str, np.ndarray] = {
+        f"array_{name}": array for name, array in colony.arrays.items() if name not in _DERIVED
+    }
+    distinct = list(dict.fromkeys(colony.worlds))
+    for number, world in enumerate(distinct):
+        for part in _WORLD_PARTS:
+            arrays[f"world{number}_{part}"] = getattr(world, part)
+    facts = {
+        "format": _FORMAT,
+        "config": asdict(colony.config),
+        "training": asdict(colony.training),
+        "sharing": colony.sharing,
+        "seeds": list(colony.seeds),
+        "worlds": [{"ranges": world.ranges, "queen": world.queen} for world in distinct],
+        "world_of": [distinct.index(world) for world in colony.worlds],
+        "chunks": colony.chunks,
+        "schedule": colony.schedule,
+        "epsilon": colony.epsilon,
+        "episode": colony.episode,
+        "ticks": colony.ticks,
+    }
+    arrays["facts"] = np.array(results.to_json(facts))
+    results.write_npz(path, arrays, compress=False)
+
+
+def load_colony(
+    cls: type[Colony], path: results.PathLike, threads: int | None, arch: str | None
+) -> Colony:
+    """Read a colony that `save_colony` wrote.
+
+    Raises:
+        AntsError: The file is missing, damaged, or holds no colony; or its learner is not
+            registered.
+    """
+    stored = results.read_npz(path)
+    try:
+        facts = json.loads(str(stored["facts"][()]))
+        if facts["format"] != _FORMAT:
+            raise ValueError(facts["format"])
+        colony = _rebuild(cls, stored, facts, threads, arch)
+        colony.epsilon, colony.episode = float(facts["epsilon"]), int(facts["episode"])
+        colony.ticks = int(facts["ticks"])
+        for name, array in colony.arrays.items():
+            if name not in _DERIVED:
+                kept = stored[f"array_{name}"]
+                if kept.shape != array.shape or kept.dtype != array.dtype:
+                    raise ValueError(name)
+                colony.arrays[name] = np.ascontiguousarray(kept)
+    except AntsError:
+        raise
+    except (KeyError, ValueError, TypeError) as error:
+        raise AntsError(
+            f"{str(path)!r} holds no colony of this version; name a file that Colony.save wrote."
+        ) from error
+    return colony
+
+
+def _rebuild(
+    cls: type[Colony],
+    stored: dict[str, np.ndarray],
+    facts: dict[str, Any],
+    threads: int | None,
+    arch: str | None,
+) -> Colony:
+    worlds = [
+        World(
+            tuple(facts["worlds"][number]["ranges"]),
+            tuple(facts["worlds"][number]["queen"]),
+            **{part: stored[f"world{number}_{part}"] for part in _WORLD_PARTS},
+        )
+        for number in range(len(facts["worlds"]))
+    ]
+    pheromone = Pheromone(**facts["config"].pop("pheromone"))
+    return cls(
+        [worlds[number] for number in facts["world_of"]],
+        ColonyConfig(pheromone=pheromone, **facts["config"]),
+        TrainingConfig(**facts["training"]),
+        facts["seeds"],
+        facts["sharing"],
+        threads=threads,
+        arch=arch,
+        schedule=facts["schedule"],
+    )

@@ -1,0 +1,111 @@
+"""Where the food of a colony's world belongs: it grows back there, and its piles wander."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from taichi_ants.constants import EMPTY, HEADING_STEPS, N_HEADINGS, OBSTACLE, QUEEN
+from taichi_ants.reference.colony_world import ColonyWorld
+from taichi_ants.reference.geometry import Cell, neighbour
+from taichi_ants.reference.random_stream import RandomStream, pick
+
+
+@dataclass(slots=True)
+class Home:
+    """The place of one food of the start.
+
+    Attributes:
+        cell: Where it is now.
+        waiting_since: The tick in which its food was taken; None while the food is there.
+    """
+
+    cell: Cell
+    waiting_since: int | None = None
+
+
+class Homes:
+    """The places of all foods of the start, in lexicographic order of their first cells.
+
+    Food that lies elsewhere, since a dying ant dropped it, has no home. At most one full home is
+    on a cell; waiting ones may share it, with each other or with a full one.
+
+    Attributes:
+        homes: In their order.
+    """
+
+    def __init__(self, foods: list[Cell]) -> None:
+        self.homes = [Home(cell) for cell in sorted(foods)]
+        self._piles = _connected(self.homes)
+
+    def taken(self, cell: Cell, tick: int) -> None:
+        """Note that food was taken from a cell: a full home there waits from now on."""
+        for home in self.homes:
+            if home.cell == cell and home.waiting_since is None:
+                home.waiting_since = tick
+
+    def regrow(self, world: ColonyWorld, delay: int, tick: int) -> int:
+        """Let food grow back on the empty cells of homes that have waited `delay` ticks.
+
+        Returns:
+            How many foods grew back.
+        """
+        regrown = 0
+        for home in self.homes:
+            since = home.waiting_since
+            if since is None or tick < since + delay or world.content(home.cell) != EMPTY:
+                continue
+            world.put_food(home.cell)
+            home.waiting_since = None
+            regrown += 1
+        return regrown
+
+    def wander(self, world: ColonyWorld, stream: RandomStream) -> None:
+        """Move each pile by one cell, in a direction drawn for it.
+
+        Foods go one after the other, those in front first, and stay where the cell ahead is not
+        empty. Homes whose food is missing go along over everything but rocks, queen and the end of
+        the world.
+        """
+        for pile in self._piles:
+            high, _ = stream.draw()
+            heading = pick(high, N_HEADINGS)
+            for home in _front_first(pile, heading):
+                ahead = neighbour(home.cell, heading)
+                if home.waiting_since is not None:
+                    if world.ground.get(ahead, OBSTACLE) not in (OBSTACLE, QUEEN):
+                        home.cell = ahead
+                elif world.content(ahead) == EMPTY:
+                    world.take_food(home.cell)
+                    world.put_food(ahead)
+                    home.cell = ahead
+
+
+def _connected(homes: list[Home]) -> list[list[Home]]:
+    """Return the piles: the homes that hang together, in the order of the first home of each."""
+    missing = {home.cell: home for home in homes}
+    piles = []
+    for home in homes:
+        if home.cell not in missing:
+            continue
+        found = [missing.pop(home.cell)]
+        for member in found:  # grows while it is walked along
+            around = (neighbour(member.cell, heading) for heading in range(N_HEADINGS))
+            found += [missing.pop(cell) for cell in around if cell in missing]
+        piles.append(sorted(found, key=homes.index))
+    return piles
+
+
+def _front_first(pile: list[Home], heading: int) -> list[Home]:
+    """Return the homes of a pile, the foremost in the direction of `heading` first."""
+    step_q, step_r = _axial(HEADING_STEPS[heading])
+
+    def progress(home: Home) -> int:
+        q, r = _axial(home.cell)
+        return step_q * q + step_r * r
+
+    return sorted(pile, key=progress, reverse=True)  # stable: ties keep the order of the homes
+
+
+def _axial(cell: Cell) -> tuple[int, int]:
+    x, y, z = cell
+    return x - z, y - z

@@ -1,0 +1,74 @@
+"""A world with many ants in it: the ground, who stands where, the trails."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from taichi_ants.constants import EMPTY, FOOD, OBSTACLE, QUEEN
+from taichi_ants.reference.colony_trail import make_trail
+from taichi_ants.reference.geometry import Cell, existing_cells
+
+if TYPE_CHECKING:
+    from taichi_ants.colony_config import Pheromone
+    from taichi_ants.worlds.world import World
+
+
+class ColonyWorld:
+    """The state of a world that many ants change, made anew for each episode.
+
+    Attributes:
+        queen: The queen's cell.
+        ground: What each existing cell holds, ants aside: EMPTY, OBSTACLE, FOOD or QUEEN.
+        occupied: The cells on which ants stand; they are EMPTY in `ground`.
+        trail: The trail of every cell.
+    """
+
+    def __init__(self, world: World, pheromone: Pheromone) -> None:
+        self._ranges = tuple(int(size) for size in world.ranges)
+        self.queen: Cell = tuple(int(value) for value in world.queen)
+        self.ground: dict[Cell, int] = dict.fromkeys(existing_cells(self._ranges), EMPTY)
+        self.ground[self.queen] = QUEEN
+        for x, y, z in world.foods.tolist():
+            self.ground[x, y, z] = FOOD
+        for x, y, z in world.obstacles.tolist():
+            self.ground[x, y, z] = OBSTACLE
+        self.occupied: set[Cell] = set()
+        self.trail = make_trail(world, pheromone)
+
+    def content(self, cell: Cell) -> int:
+        """Return what a cell looks like: the ground, or an OBSTACLE where an ant stands."""
+        if cell in self.occupied:
+            return OBSTACLE
+        return self.ground.get(cell, OBSTACLE)
+
+    def level(self, cell: Cell) -> int | np.float32:
+        """Return the trail level of a cell now."""
+        return self.trail.level(cell)
+
+    def levels(self) -> dict[Cell, int | np.float32]:
+        """Return the trail level of every existing cell."""
+        return {cell: self.trail.level(cell) for cell in self.ground}
+
+    def index(self, cell: Cell) -> int:
+        """Return the number of a cell in the flat array with a border of one void cell.
+
+        The array holds q = x - z from -Z to X and r = y - z from -Z to Y, row by row (r).
+        """
+        size_x, _, size_z = self._ranges
+        x, y, z = cell
+        width = size_x + size_z + 1
+        return (y - z + size_z) * width + (x - z + size_z)
+
+    def take_food(self, cell: Cell) -> None:
+        """Empty a cell that holds food."""
+        if self.ground[cell] != FOOD:
+            raise AssertionError(f"there is no food at {cell}")
+        self.ground[cell] = EMPTY
+
+    def put_food(self, cell: Cell) -> None:
+        """Lay food on an empty cell."""
+        if self.content(cell) != EMPTY:
+            raise AssertionError(f"{cell} is not empty")
+        self.ground[cell] = FOOD

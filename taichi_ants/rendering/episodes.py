@@ -1,0 +1,200 @@
+"""Animations of one ant that follows a policy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from taichi_ants.engines.traces import Trace, rollout
+from taichi_ants.rendering.panel import Status
+from taichi_ants.rendering.replay import Replay
+from taichi_ants.rendering.scene import DEFAULT_SIZE, Scene, check_size, range_with_zero
+from taichi_ants.rendering.snapshot import Snapshot
+from taichi_ants.rendering.writers import PathLike, check_animation, save_animation
+from taichi_ants.worlds.world import World
+
+Progress = Callable[[float], None]  # called with the share of the work that is done, 0 to 1
+
+DEFAULT_FPS = 8.0
+_LAST_PICTURE_SECONDS = 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class Episode:
+    """A rollout with what it takes to draw it.
+
+    Attributes:
+        world: Where it happened.
+        trace: Its n steps.
+        seed, number: Of the rollout.
+        evaporation: Whether trails fell by 1 with each step.
+        name: What the head-up lines call it.
+    """
+
+    world: World
+    trace: Trace
+    seed: int = 0
+    number: int = 0
+    evaporation: bool = True
+    name: str = ""
+
+    @classmethod
+    def play(
+        cls,
+        world: World,
+        q_values: np.ndarray,
+        *,
+        seed: int = 0,
+        number: int = 0,
+        max_steps: int = 600,
+        evaporation: bool = True,
+        epsilon: float = 0.0,
+    ) -> Episode:
+        """Roll a policy out; arguments and errors are those of `rollout`."""
+        trace = rollout(world, q_values, seed, number, max_steps, evaporation, epsilon)
+        name = "greedy" if epsilon == 0 else f"epsilon {epsilon:g}"
+        return cls(world, trace, seed, number, evaporation, name)
+
+    @property
+    def delivered(self) -> bool:
+        """Whether it ended with the food given to the queen."""
+        return bool(self.trace.delivered[-1])
+
+    def __len__(self) -> int:
+        """The number of its moments, n + 1."""
+        return len(self.trace) + 1
+
+    def moments(self) -> Iterator[tuple[Snapshot, Status]]:
+        """The world before each step with what the ant is about to do, and the world at the end."""
+        trace = self.trace
+        returns = np.concatenate([[0], np.cumsum(trace.rewards)]).tolist()
+        replay = Replay(self.world, trace, self.seed, self.number, self.evaporation)
+        for step, snapshot in enumerate(replay.snapshots()):
+            if step < len(trace):
+                yield (
+                    snapshot,
+                    Status(
+                        step=step,
+                        episode_return=returns[step],
+                        episode=self.name,
+                        state=int(trace.states[step]),
+                        action=int(trace.actions[step]),
+                        q_values=trace.q_values[step],
+                    ),
+                )
+            else:
+                yield (
+                    snapshot,
+                    Status(
+                        step=step,
+                        episode_return=returns[step],
+                        episode=self.name,
+                        state=int(trace.next_states[-1]),
+                        outcome="delivered" if self.delivered else "step limit",
+                    ),
+                )
+
+
+def episode_frames(
+    episode: Episode,
+    size: tuple[int, int] = DEFAULT_SIZE,
+    *,
+    hud: bool = True,
+    legend: bool = True,
+    view: bool = True,
+    title: str = "",
+) -> Iterator[np.ndarray]:
+    """The pictures of an episode, uint8 (height, width, 3), one for each of its moments.
+
+    Args:
+        episode: The episode.
+        size: Width and height in pixels.
+        hud: Whether to draw the head-up lines.
+        legend: Whether to draw what the colours mean.
+        view: Whether to mark the three cells in view, with the letters that the ant sees.
+        title: A line above head-up lines and legend.
+
+    Raises:
+        AntsError: The size is not allowed.
+    """
+    scene = Scene(
+        episode.world.grid,
+        size,
+        hud=hud,
+        legend=legend,
+        title=title,
+        q_range=range_with_zero(episode.trace.q_values),
+    )
+    for snapshot, status in episode.moments():
+        yield scene.draw(snapshot if view else without_view(snapshot), status)
+
+
+def without_view(snapshot: Snapshot) -> Snapshot:
+    """The same without the cells in view."""
+    return replace(snapshot, letters=None)
+
+
+def render_episode(
+    path: PathLike,
+    world: World,
+    q_values: np.ndarray,
+    *,
+    seed: int = 0,
+    number: int = 0,
+    max_steps: int = 600,
+    evaporation: bool = True,
+    epsilon: float = 0.0,
+    size: tuple[int, int] = DEFAULT_SIZE,
+    fps: float = DEFAULT_FPS,
+    hud: bool = True,
+    legend: bool = True,
+    view: bool = True,
+    title: str = "",
+    progress: Progress | None = None,
+) -> Episode:
+    """Roll a policy out and write the episode as an animation.
+
+    Args:
+        path: The ending decides: .gif, .webp or .mp4; a folder of numbered PNG pictures without.
+        world, q_values, seed, number, max_steps, evaporation, epsilon: As in `rollout`; a smaller
+            `max_steps` keeps the episode of an ant that has not learned short.
+        size: Width and height in pixels, 64 to 4096 each.
+        fps: Steps per second. The last picture stays a little longer.
+        hud, legend, view, title: What to draw, see `episode_frames`.
+        progress: Called after each picture with the share of the work that is done.
+
+    Returns:
+        The episode.
+
+    Raises:
+        AntsError: An argument is not allowed, PyAV is missing for an .mp4, or the file cannot be
+            written.
+    """
+    check_animation(path, fps)
+    check_size(size)
+    episode = Episode.play(
+        world,
+        q_values,
+        seed=seed,
+        number=number,
+        max_steps=max_steps,
+        evaporation=evaporation,
+        epsilon=epsilon,
+    )
+    frames = episode_frames(episode, size, hud=hud, legend=legend, view=view, title=title)
+    save_animation(path, with_pause(frames, len(episode), fps, progress), fps)
+    return episode
+
+
+def with_pause(
+    frames: Iterator[np.ndarray], n: int, fps: float, progress: Progress | None = None
+) -> Iterator[np.ndarray]:
+    """n frames, with the last one repeated, so that it can be looked at before all begins anew."""
+    for done, frame in enumerate(frames, start=1):
+        yield frame
+        if progress is not None:
+            progress(done / n)
+    for _ in range(round(_LAST_PICTURE_SECONDS * fps) - 1):
+        yield frame

@@ -1,0 +1,188 @@
+"""The text beside a world: what the ant does, and what the colours mean."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from taichi_ants.constants import ACTION_NAMES, EMPTY, FOOD, N_ACTIONS, OBSTACLE, QUEEN
+from taichi_ants.hexgrid import AxialGrid
+from taichi_ants.rendering import colours, text
+from taichi_ants.rendering.rasteriser import Rasteriser
+from taichi_ants.rendering.snapshot import Snapshot
+from taichi_ants.rendering.viewport import Viewport
+from taichi_ants.states import CELL_LETTERS, TASK_NAMES, state_from_index
+
+# What a cell holds, what an ant on it carries, a letter on it, and what it is called.
+_LEGEND = (
+    (EMPTY, None, "", "empty (E)"),
+    (OBSTACLE, None, "", "obstacle (O)"),
+    (FOOD, None, "", "food (F)"),
+    (QUEEN, None, "", "queen (Q)"),
+    (EMPTY, None, "S", "nearer to the queen"),
+    (EMPTY, False, "", "ant"),
+    (EMPTY, True, "", "ant with food"),
+)
+CHOSEN = 0x0072B2  # the bar of the chosen action
+
+# Heights in sizes of the text.
+STATUS_HEIGHT = 18.2
+LEGEND_HEIGHT = 14.8
+
+
+@dataclass(frozen=True, eq=False)
+class Status:
+    """What the head-up lines say.
+
+    Attributes:
+        step: Number of the step in its episode, from 0.
+        episode_return: Sum of the rewards so far.
+        episode: What kind of episode it is, or its number.
+        state: Index of the state; None if there is none to speak of.
+        action: The chosen action, 0 to 4; None if there is none.
+        q_values: float (5,), the action values of the state; None draws no bars.
+        outcome: How the episode ended; empty while it goes on.
+    """
+
+    step: int
+    episode_return: int
+    episode: str = ""
+    state: int | None = None
+    action: int | None = None
+    q_values: np.ndarray | None = None
+    outcome: str = ""
+
+
+def draw_status(
+    frame: np.ndarray,
+    status: Status,
+    place: tuple[int, int, int],
+    size: int,
+    q_range: tuple[float, float],
+) -> None:
+    """Draw the head-up lines.
+
+    Args:
+        frame: uint8 (height, width, 3).
+        status: What they say.
+        place: Left, top and width in pixels; `STATUS_HEIGHT` sizes of the text high.
+        size: Of the text, in pixels.
+        q_range: The action values at both ends of the bars, the first at most 0, the last above.
+    """
+    left, top, width = place
+    y = top + size
+    for label, value in _lines(status):
+        text.write(frame, label, left, y, size, colours.FAINT_INK)
+        room = width - text.width(label + "  ", size)
+        value = text.shortened(value, size, room)
+        text.write(frame, value, left + width, y, size, align="right")
+        y += round(1.45 * size)
+    if status.q_values is not None:
+        y += round(0.8 * size)
+        text.write(frame, "action values Q", left, y, size, colours.FAINT_INK)
+        _draw_bars(frame, status, (left, y + round(0.5 * size), width), size, q_range)
+
+
+def _lines(status: Status) -> list[tuple[str, str]]:
+    lines = [("episode", status.episode)] if status.episode else []
+    lines += [("step", str(status.step)), ("return", str(status.episode_return))]
+    if status.state is not None:
+        state = state_from_index(status.state)
+        seen = " ".join(CELL_LETTERS[state.carries][code] for code in state.view)
+        lines += [("task", TASK_NAMES[state.carries]), ("sees", seen)]
+    if status.outcome:
+        lines.append(("outcome", status.outcome))
+    elif status.action is not None:
+        lines.append(("action", ACTION_NAMES[status.action]))
+    return lines
+
+
+def _draw_bars(
+    frame: np.ndarray,
+    status: Status,
+    place: tuple[int, int, int],
+    size: int,
+    q_range: tuple[float, float],
+) -> None:
+    left, top, width = place
+    start = left + max(text.width(name, size) for name in ACTION_NAMES) + 0.6 * size
+    end = left + width - text.width("-00.00", size) - 0.3 * size
+    low, high = q_range
+    pixels = (end - start) / (high - low)
+    zero = start - low * pixels
+    pitch, thickness = round(1.4 * size), round(0.75 * size)
+    for action in range(N_ACTIONS):
+        y = top + action * pitch
+        value = float(np.clip(status.q_values[action], low, high))
+        ends = sorted((zero, zero + value * pixels))
+        chosen = action == status.action
+        colour = CHOSEN if chosen else colours.RULE
+        fill(frame, ends[0], y + 0.35 * size, ends[1] - ends[0], thickness, colour)
+        ink = CHOSEN if chosen else colours.INK
+        baseline = y + round(1.05 * size)
+        text.write(frame, ACTION_NAMES[action], left, baseline, size, ink)
+        number = f"{status.q_values[action]:.2f}"
+        text.write(frame, number, left + width, baseline, size, ink, align="right")
+    fill(frame, zero - 1, top + 0.1 * size, 1, N_ACTIONS * pitch - 0.1 * size, colours.FAINT_INK)
+
+
+def draw_legend(
+    frame: np.ndarray, place: tuple[int, int, int], size: int, full_level: float
+) -> None:
+    """Draw what colours, shapes and letters mean.
+
+    Args:
+        frame: uint8 (height, width, 3).
+        place: Left, top and width in pixels; `LEGEND_HEIGHT` sizes of the text high.
+        size: Of the text, in pixels.
+        full_level: The trail level of the last colour of the ramp.
+    """
+    left, top, width = place
+    pitch, side = round(1.55 * size), round(1.5 * size)
+    for row, (ground, carries, letter, label) in enumerate(_LEGEND):
+        y = top + row * pitch
+        baseline = y + round(0.5 * side + 0.36 * size)
+        _draw_swatch(frame, left, y, side, ground, carries)
+        text.write(frame, letter, left + 0.59 * side, baseline, size, align="middle")
+        text.write(frame, label, left + round(2.1 * size), baseline, size)
+    y = top + len(_LEGEND) * pitch + round(1.45 * size)
+    text.write(frame, "trail (T), by strength", left, y, size)
+    y += round(0.45 * size)
+    ramp = colours.channels(colours.TRAIL_RAMP)
+    columns = np.linspace(0, len(ramp) - 1, width).astype(int)
+    frame[y : y + round(0.7 * size), left : left + width] = ramp[columns]
+    y += round(1.75 * size)
+    text.write(frame, "1", left, y, size, colours.FAINT_INK)
+    strongest = f"{full_level:g} and more"
+    text.write(frame, strongest, left + width, y, size, colours.FAINT_INK, align="right")
+
+
+def _draw_swatch(
+    frame: np.ndarray, left: int, top: int, side: int, ground: int, carries: bool | None
+) -> None:
+    """A single cell as the worlds show it, with an ant if `carries` says what it carries."""
+    grid = AxialGrid((1, 1, 1))
+    held = np.full(grid.size, OBSTACLE, dtype=np.uint8)
+    cell = grid.index((0, 0, 0))
+    held[cell] = ground
+    n = 0 if carries is None else 1
+    snapshot = Snapshot(
+        grid=grid,
+        ground=held,
+        trail=np.zeros(grid.size, dtype=np.int32),
+        ant_cells=np.full(n, cell, dtype=np.int32),
+        ant_headings=np.full(n, 1, dtype=np.int32),
+        ant_carries=np.full(n, bool(carries)),
+    )
+    width = round(1.18 * side)
+    rasteriser = Rasteriser(grid, Viewport.fit(grid, left, top, width, side, margin=1))
+    rasteriser.draw(frame, snapshot)
+
+
+def fill(
+    frame: np.ndarray, left: float, top: float, width: float, height: float, colour: int
+) -> None:
+    """Fill a rectangle, its edges rounded to whole pixels."""
+    x, y = max(0, round(left)), max(0, round(top))
+    frame[y : round(top + height), x : round(left + width)] = colours.channels(colour)

@@ -1,0 +1,218 @@
+"""Draws the cells and the ants of a world into a frame."""
+
+from __future__ import annotations
+
+import math
+from types import ModuleType
+
+import numpy as np
+
+from taichi_ants import runtime
+from taichi_ants.constants import DEPOSIT_LEVEL, EMPTY, FOOD, OBSTACLE, QUEEN
+from taichi_ants.hexgrid import AxialGrid
+from taichi_ants.rendering import colours
+from taichi_ants.rendering.snapshot import Snapshot
+from taichi_ants.rendering.viewport import Viewport
+
+# Hexagons of fewer pixels are drawn by the mean of what a pixel covers.
+_SMALLEST_HEXAGON = 2.5
+# From this size on, food and queen are drawings on a light floor, below the whole cell is coloured.
+_SMALLEST_DRAWING = 6.0
+_SMALLEST_ANT = 11.0  # with legs; below, an ant is a dart
+_SMALLEST_LETTERS = 10.0
+
+_FILL = 0.83  # radius of what stands on a cell, in sizes of the hexagon; the largest disc is 0.866
+_DOT_RADIUS = 0.9  # pixels, of an ant in cells that are too small for it
+_QUEEN_RADIUS = 2.5
+_DOT_WITH_FOOD = 0x9A3F00
+_MOST_DOTS = 0.5  # the share of the world that dots may cover at full strength
+_SQRT_3 = math.sqrt(3.0)
+
+
+class Rasteriser:
+    """Draws worlds of one grid into one place of a frame.
+
+    What depends on the place alone, which cells a pixel shows and by how much, is found once.
+
+    Args:
+        grid: The grid of all worlds to draw.
+        viewport: Where to draw, within the frame.
+        full_level: The trail level that has the last colour of the ramp, as stronger ones have.
+        shown: bool (grid.size,), cells to draw, all others are page; None draws all that exist.
+    """
+
+    def __init__(
+        self,
+        grid: AxialGrid,
+        viewport: Viewport,
+        full_level: float = DEPOSIT_LEVEL,
+        shown: np.ndarray | None = None,
+    ) -> None:
+        self.grid = grid
+        self.viewport = viewport
+        self._full_level = full_level
+        self._shown = (grid.exists if shown is None else shown).view(np.uint8)
+        self.kernels = _kernels()
+        self._colours = np.zeros(grid.size, dtype=np.uint32)
+        self._map = self._map_pixels() if self.has_hexagons else None
+
+    @property
+    def has_hexagons(self) -> bool:
+        """Whether cells are large enough to be drawn one by one."""
+        return self.viewport.hexagon >= _SMALLEST_HEXAGON
+
+    @property
+    def has_room_for_letters(self) -> bool:
+        """Whether a letter in a cell could be read."""
+        return self.viewport.hexagon >= _SMALLEST_LETTERS
+
+    def draw(self, frame: np.ndarray, snapshot: Snapshot) -> None:
+        """Draw a world with its ants.
+
+        Args:
+            frame: uint8 (height, width, 3), contiguous; all pixels of the viewport are set.
+            snapshot: The world, of this grid. Letters are not drawn, only the cells in view.
+        """
+        self.draw_ground(frame, snapshot.ground, snapshot.trail)
+        table = [self._things(snapshot), *self._view(snapshot), self._ants(snapshot)]
+        self.draw_shapes(frame, *(np.concatenate(parts) for parts in zip(*table, strict=True)))
+
+    def draw_ground(self, frame: np.ndarray, ground: np.ndarray, trail: np.ndarray) -> None:
+        """Draw the cells: what they hold, uint8 (grid.size,), and the trail, any (grid.size,)."""
+        self.kernels.colour_cells(
+            self._colours,
+            np.ascontiguousarray(ground),
+            self._shown,
+            np.ascontiguousarray(trail, dtype=np.float32),
+            self._colours_of_ground(),
+            colours.TRAIL_RAMP,
+            self._full_level,
+            EMPTY,
+        )
+        self.draw_colours(frame, self._colours)
+
+    def draw_colours(self, frame: np.ndarray, of_cells: np.ndarray) -> None:
+        """Draw the cells in the given colours, uint32 (grid.size,)."""
+        view = self.viewport
+        place = (view.left, view.top, view.width, view.height)
+        if self._map is not None:
+            flat = [frame.reshape(-1), *self._map]
+            self.kernels.draw_cells(*flat, of_cells, frame.shape[1], *place)
+        else:
+            outline = self._relative_outline()
+            self.kernels.draw_small_cells(frame, of_cells, *place, *outline, *self._layout())
+
+    def draw_shapes(self, frame: np.ndarray, table: np.ndarray, of_shapes: np.ndarray) -> None:
+        """Draw shapes, rows of `table` as in `raster_kernels`, in colours uint32 (n,)."""
+        view = self.viewport
+        self.kernels.draw_shapes(
+            frame, table, of_shapes, view.left, view.top, view.width, view.height
+        )
+
+    def shapes(
+        self, cells: np.ndarray, shape: int | np.ndarray, headings: object = 0, fill: float = _FILL
+    ) -> np.ndarray:
+        """A table of shapes on cells (flat indices (n,)), float32 (n, 6)."""
+        table = np.empty((len(cells), 6), dtype=np.float32)
+        table[:, :2] = self.viewport.centres(self.grid.cells(cells))
+        table[:, 2] = fill * self.viewport.hexagon
+        table[:, 3] = headings
+        table[:, 4] = shape
+        table[:, 5] = 1.0
+        return table
+
+    def _things(self, snapshot: Snapshot) -> tuple[np.ndarray, np.ndarray]:
+        """Food and queen."""
+        kernels = self.kernels
+        queens = np.flatnonzero(snapshot.ground == QUEEN)
+        if self.viewport.hexagon < _SMALLEST_DRAWING:
+            marks = self.shapes(queens, kernels.DOT)
+            marks[:, 2] = np.maximum(marks[:, 2], _QUEEN_RADIUS)
+            return marks, np.full(len(queens), colours.CELL_QUEEN, dtype=np.uint32)
+        foods = np.flatnonzero(snapshot.ground == FOOD)
+        marks = np.concatenate(
+            [
+                self.shapes(foods, kernels.FOOD, fill=0.72),
+                self.shapes(queens, kernels.QUEEN, fill=0.72),
+            ]
+        )
+        if snapshot.letters is not None and self.has_room_for_letters:
+            make_room(marks, np.isin(np.concatenate([foods, queens]), snapshot.cells_in_view()))
+        of_shapes = np.repeat([colours.CELL_FOOD, colours.CELL_QUEEN], [len(foods), len(queens)])
+        return marks, of_shapes.astype(np.uint32)
+
+    def _view(self, snapshot: Snapshot) -> list[tuple[np.ndarray, np.ndarray]]:
+        """The outlines of the cells in view, if they are to be seen."""
+        if snapshot.letters is None or not self.has_hexagons:
+            return []
+        rings = self.shapes(snapshot.cells_in_view(), self.kernels.IN_VIEW, fill=0.98)
+        return [(rings, np.full(len(rings), colours.INK, dtype=np.uint32))]
+
+    def _ants(self, snapshot: Snapshot) -> tuple[np.ndarray, np.ndarray]:
+        kernels, hexagon = self.kernels, self.viewport.hexagon
+        carries = snapshot.ant_carries
+        of_shapes = np.full(len(carries), colours.ANT, dtype=np.uint32)
+        if hexagon < _SMALLEST_HEXAGON:
+            shape = np.full(len(carries), kernels.DOT)
+            of_shapes[carries] = _DOT_WITH_FOOD
+        elif hexagon < _SMALLEST_ANT:
+            shape = np.where(carries, kernels.DART_WITH_FOOD, kernels.DART)
+        else:
+            shape = np.where(carries, kernels.ANT_WITH_FOOD, kernels.ANT)
+        ants = self.shapes(snapshot.ant_cells, shape, snapshot.ant_headings)
+        if hexagon < _SMALLEST_HEXAGON:
+            ants[:, 2] = np.maximum(ants[:, 2], _DOT_RADIUS)
+            ants[:, 5] = self._dot_opacity(len(ants))
+        return ants, of_shapes
+
+    def _dot_opacity(self, n: int) -> float:
+        """1, unless dots larger than cells would hide the world: a crowd is a shade then."""
+        cell = 1.5 * _SQRT_3 * self.viewport.hexagon**2
+        dot = np.pi * _DOT_RADIUS**2
+        room = _MOST_DOTS * self.grid.count * cell / max(n * dot, 1.0)
+        return float(np.clip(room, min(1.0, cell / dot), 1.0))
+
+    def _colours_of_ground(self) -> np.ndarray:
+        """uint32 (16,), by the code of the ground."""
+        small = self.viewport.hexagon < _SMALLEST_DRAWING
+        table = np.full(16, colours.CELL_EMPTY, dtype=np.uint32)
+        table[OBSTACLE] = colours.CELL_OBSTACLE
+        table[FOOD] = colours.CELL_FOOD if small else colours.FLOOR_FOOD
+        table[QUEEN] = colours.CELL_QUEEN if small else colours.FLOOR_QUEEN
+        return table
+
+    def _map_pixels(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        shape = (self.viewport.height, self.viewport.width)
+        nearest, second, shares = (np.empty(shape, dtype=np.int32) for _ in range(3))
+        hexagon = self.viewport.hexagon
+        # The lines fade away where cells are small, and don't grow with large ones for ever.
+        line = float(np.clip(0.09 * hexagon - 0.25, 0.0, 3.0))
+        self.kernels.map_pixels(
+            *(nearest, second, shares),
+            *self._relative_outline(),
+            line,
+            *self._layout(),
+        )
+        return nearest.reshape(-1), second.reshape(-1), shares.reshape(-1)
+
+    def _relative_outline(self) -> tuple[float, float, float]:
+        """The origin relative to the viewport, and the size of a hexagon."""
+        x, y = self.viewport.origin
+        return x - self.viewport.left, y - self.viewport.top, self.viewport.hexagon
+
+    def _layout(self) -> tuple[int, int, int]:
+        return self.grid.width, self.grid.height, self.grid.ranges[2]
+
+
+def make_room(marks: np.ndarray, crowded: np.ndarray) -> None:
+    """Make shapes smaller and move them up, in place, where `crowded` (bool (n,)) by a letter."""
+    marks[crowded, 1] -= 0.45 * marks[crowded, 2]
+    marks[crowded, 2] *= 0.66
+
+
+def _kernels() -> ModuleType:
+    """The kernels, with Taichi started: it has to be configured before it is imported."""
+    runtime.start()
+    from taichi_ants.rendering import raster_kernels
+
+    return raster_kernels

@@ -1,0 +1,165 @@
+"""Pictures of a world: the cells, and beside them what the ant does and what the colours mean."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from taichi_ants.constants import DEPOSIT_LEVEL, FOOD, QUEEN
+from taichi_ants.errors import AntsError
+from taichi_ants.hexgrid import AxialGrid
+from taichi_ants.rendering import colours, panel, text
+from taichi_ants.rendering.panel import Status
+from taichi_ants.rendering.rasteriser import Rasteriser
+from taichi_ants.rendering.snapshot import Snapshot
+from taichi_ants.rendering.viewport import Viewport
+
+SMALLEST_SIDE, LARGEST_SIDE = 64, 4096
+DEFAULT_SIZE = (1280, 720)
+# In sizes of the text.
+_PANEL_WIDTH = 15
+_TITLE_HEIGHT = 2.2
+
+
+def check_size(size: tuple[int, int]) -> tuple[int, int]:
+    """Width and height of a picture, in pixels.
+
+    Raises:
+        AntsError: They are no two whole numbers from 64 to 4096.
+    """
+    try:
+        width, height = (int(side) for side in size)
+        whole = (width, height) == tuple(size)
+    except (TypeError, ValueError):
+        whole = False
+    if not whole or not all(SMALLEST_SIDE <= side <= LARGEST_SIDE for side in size):
+        raise AntsError(
+            f"the size is {size!r}; it must be two whole numbers of pixels from {SMALLEST_SIDE} "
+            f"to {LARGEST_SIDE}."
+        )
+    return width, height
+
+
+class Scene:
+    """Draws snapshots of worlds of one grid as pictures of one size.
+
+    Pictures whose shorter side is below 323 pixels have no room for text: there, head-up lines and
+    legend are left out.
+
+    Args:
+        grid: The grid of all worlds to draw.
+        size: Width and height of the pictures, 64 to 4096 pixels each.
+        hud: Whether to draw the head-up lines, of the `Status` given with a snapshot.
+        legend: Whether to draw what the colours mean.
+        title: A line above both.
+        full_level: The trail level that has the last colour of the ramp, as stronger ones have.
+        q_range: The action values at both ends of the bars; None takes those of each picture.
+
+    Raises:
+        AntsError: The size is not allowed.
+    """
+
+    def __init__(
+        self,
+        grid: AxialGrid,
+        size: tuple[int, int] = DEFAULT_SIZE,
+        *,
+        hud: bool = True,
+        legend: bool = True,
+        title: str = "",
+        full_level: float = DEPOSIT_LEVEL,
+        q_range: tuple[float, float] | None = None,
+    ) -> None:
+        width, height = self.size = check_size(size)
+        self._text_size = round(min(width, height) / 38)
+        readable = self._text_size >= text.SMALLEST
+        self._hud = hud and readable
+        self._legend = legend and readable
+        self._q_range = q_range
+        margin = max(2, round(min(width, height) / 60))
+        room = self._world_room(margin)
+        self.viewport = Viewport.fit(grid, *room, margin=margin)
+        self._rasteriser = Rasteriser(grid, self.viewport, full_level)
+        self._background = np.empty((height, width, 3), dtype=np.uint8)
+        self._background[:] = colours.channels(colours.PAGE)
+        self._places = self._panel_places(room, margin, title)
+        if self._legend:
+            panel.draw_legend(
+                self._background, self._places["legend"], self._text_size, full_level
+            )
+
+    def draw(self, snapshot: Snapshot, status: Status | None = None) -> np.ndarray:
+        """A picture, uint8 (height, width, 3), of a world and of what its head-up lines say."""
+        frame = self._background.copy()
+        self._rasteriser.draw(frame, snapshot)
+        if snapshot.letters is not None and self._rasteriser.has_room_for_letters:
+            self._write_letters(frame, snapshot)
+        if self._hud and status is not None:
+            panel.draw_status(
+                frame, status, self._places["status"], self._text_size, self._range_of(status)
+            )
+        return frame
+
+    def _write_letters(self, frame: np.ndarray, snapshot: Snapshot) -> None:
+        cells = snapshot.cells_in_view()
+        centres = self.viewport.centres(self._rasteriser.grid.cells(cells)).tolist()
+        crowded = np.isin(snapshot.ground[cells], (FOOD, QUEEN)).tolist()
+        for letter, centre, beside in zip(snapshot.letters, centres, crowded, strict=True):
+            write_letter(frame, letter, centre, self.viewport.hexagon, beside)
+
+    def _world_room(self, margin: int) -> tuple[int, int, int, int]:
+        """Left, top, width and height of the part of the picture for the world."""
+        width, height = self.size
+        if not (self._hud or self._legend):
+            return 0, 0, width, height
+        if width >= height:
+            return 0, 0, width - _PANEL_WIDTH * self._text_size - margin, height
+        lines = max(panel.STATUS_HEIGHT * self._hud, panel.LEGEND_HEIGHT * self._legend)
+        return 0, 0, width, height - round((lines + _TITLE_HEIGHT) * self._text_size) - margin
+
+    def _panel_places(
+        self, room: tuple[int, int, int, int], margin: int, title: str
+    ) -> dict[str, tuple[int, int, int]]:
+        """Left, top and width of the head-up lines and of the legend; writes the title."""
+        if not (self._hud or self._legend):
+            return {}
+        size, (width, height) = self._text_size, self.size
+        beside = width >= height
+        left, top = (room[2], margin) if beside else (margin, room[3])
+        right = width - margin
+        if title:
+            room_for_title = right - left
+            line = text.shortened(title, size, room_for_title)
+            text.write(self._background, line, left, top + size, size)
+            top += round(_TITLE_HEIGHT * size)
+        if beside:
+            bottom = height - margin - round(panel.LEGEND_HEIGHT * size)
+            legend_top = bottom if self._hud else top
+            column = right - left
+            return {"status": (left, top, column), "legend": (left, legend_top, column)}
+        column = (right - left - 2 * size) // 2
+        legend_left = left + column + 2 * size if self._hud else left
+        return {"status": (left, top, column), "legend": (legend_left, top, column)}
+
+    def _range_of(self, status: Status) -> tuple[float, float]:
+        """The action values at both ends of the bars, with 0 between them or at one of them."""
+        if self._q_range is not None:
+            return self._q_range
+        return range_with_zero(status.q_values)
+
+
+def write_letter(
+    frame: np.ndarray, letter: str, centre: tuple[float, float], hexagon: float, crowded: bool
+) -> None:
+    """Write a letter on a cell, below its middle if it is crowded by the drawing of a thing."""
+    x, y = centre
+    size = round((0.7 if crowded else 0.85) * hexagon)
+    baseline = y + (0.66 * hexagon if crowded else 0.36 * size)
+    text.write(frame, letter, x, baseline, size, align="middle", halo=max(1, size // 16))
+
+
+def range_with_zero(q_values: np.ndarray | None) -> tuple[float, float]:
+    """The lowest and the highest of action values and 0, never the same."""
+    if q_values is None or not np.asarray(q_values).size:
+        return 0.0, 1.0
+    low, high = min(0.0, float(np.min(q_values))), max(0.0, float(np.max(q_values)))
+    return (low, high) if high > low else (0.0, 1.0)

@@ -1,0 +1,102 @@
+"""Text in pictures, with the font that comes with Pillow."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from taichi_ants.rendering.colours import INK, PAGE, channels
+
+SMALLEST = 9  # pixels; smaller text cannot be read
+
+
+def write(
+    frame: np.ndarray,
+    text: str,
+    x: float,
+    baseline: float,
+    size: int,
+    colour: int = INK,
+    align: str = "left",
+    halo: int = 0,
+) -> None:
+    """Write a line of text into a frame; what lies beyond its edges is cut off.
+
+    Args:
+        frame: uint8 (height, width, 3).
+        text: The text, in ASCII: the font has little else.
+        x: The left edge, the middle or the right edge of the text, in pixels.
+        baseline: Where its letters stand, in pixels from the top.
+        size: Of the font, in pixels.
+        colour: 0xRRGGBB.
+        align: "left", "middle" or "right", what `x` is.
+        halo: Pixels in the colour of the page around the letters.
+    """
+    if not text:
+        return
+    moved = {"left": 0.0, "middle": 0.5, "right": 1.0}[align] * width(text, size)
+    if halo:
+        _stamp(frame, _mask(text, size, halo), x - moved, baseline, PAGE)
+    _stamp(frame, _mask(text, size, 0), x - moved, baseline, colour)
+
+
+@lru_cache(maxsize=4096)
+def width(text: str, size: int) -> float:
+    """Pixels from the start of a line of text to its end."""
+    return _font(size).getlength(text)
+
+
+def shortened(text: str, size: int, room: float) -> str:
+    """The text, or as much of its beginning as fits into `room` pixels, with three dots."""
+    if width(text, size) <= room:
+        return text
+    kept = text
+    while kept and width(kept + "...", size) > room:
+        kept = kept[:-1]
+    return kept + "..." if kept else ""
+
+
+@lru_cache(maxsize=64)
+def _font(size: int):  # noqa: ANN202 - Pillow's type would be imported with it
+    from PIL import ImageFont
+
+    return ImageFont.load_default(size)
+
+
+@lru_cache(maxsize=4096)
+def _mask(text: str, size: int, stroke: int) -> tuple[np.ndarray, int, int]:
+    """Coverage 0 to 1, float32 (height, width, 1), and where its corner lies from the start."""
+    from PIL import Image, ImageDraw
+
+    left, top, right, bottom = _font(size).getbbox(text, anchor="ls", stroke_width=stroke)
+    x, y = int(left) - 1, int(top) - 1
+    image = Image.new("L", (int(right) - x + 2, int(bottom) - y + 2))
+    ImageDraw.Draw(image).text(
+        (-x, -y), text, fill=255, font=_font(size), anchor="ls", stroke_width=stroke
+    )
+    return np.asarray(image, dtype=np.float32)[:, :, None] / np.float32(255), x, y
+
+
+def _stamp(
+    frame: np.ndarray,
+    mask: tuple[np.ndarray, int, int],
+    x: float,
+    baseline: float,
+    colour: int,
+) -> None:
+    coverage, dx, dy = mask
+    left, top = round(x) + dx, round(baseline) + dy
+    y0, x0 = max(0, -top), max(0, -left)
+    y1 = min(coverage.shape[0], frame.shape[0] - top)
+    x1 = min(coverage.shape[1], frame.shape[1] - left)
+    if y0 >= y1 or x0 >= x1:
+        return
+    share = coverage[y0:y1, x0:x1]
+    part = frame[top + y0 : top + y1, left + x0 : left + x1]
+    part[:] = part + share * (_ink(colour) - part) + np.float32(0.5)
+
+
+@lru_cache(maxsize=64)
+def _ink(colour: int) -> np.ndarray:
+    return channels(colour).astype(np.float32)

@@ -1,0 +1,161 @@
+"""Files of pictures: they appear when they are whole, or not at all."""
+
+from __future__ import annotations
+
+import math
+import os
+import secrets
+import shutil
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from taichi_ants import results
+from taichi_ants.errors import AntsError
+from taichi_ants.rendering import animated_files
+
+PathLike = str | os.PathLike[str]
+
+_ANIMATIONS: dict[str, Callable[[BinaryIO, Iterable[np.ndarray], float], None]] = {
+    ".gif": animated_files.write_gif,
+    ".webp": animated_files.write_webp,
+    ".mp4": animated_files.write_mp4,
+}
+# Viewers slow a GIF down whose frames are shorter than two hundredths of a second.
+_FASTEST = {".gif": 50.0}
+_MAX_FPS = 240.0
+
+
+def check_animation(path: PathLike, fps: float) -> Path:
+    """Make sure, before the work begins, that an animation can be written.
+
+    Args:
+        path: The file, its ending is the kind; without an ending a folder for numbered pictures.
+        fps: Frames per second.
+
+    Returns:
+        The path.
+
+    Raises:
+        AntsError: The ending or the speed is not allowed, PyAV is missing for an .mp4, or the place
+            cannot be written to.
+    """
+    target = Path(path)
+    kind = target.suffix.lower()
+    if kind and kind not in _ANIMATIONS:
+        raise AntsError(
+            f"{str(path)!r} ends in {target.suffix!r}; an animation ends in "
+            f"{', '.join(_ANIMATIONS)}, or in nothing for a folder of PNG pictures."
+        )
+    fastest = _FASTEST.get(kind, _MAX_FPS)
+    if isinstance(fps, (bool, str)) or not 0.1 <= fps <= fastest or not math.isfinite(fps):
+        raise AntsError(
+            f"fps is {fps!r}; it must be a number from 0.1 to {fastest:g} for "
+            f"{kind or 'pictures'}."
+        )
+    if kind == ".mp4":
+        animated_files.import_av()
+    if not kind and target.exists() and (not target.is_dir() or any(target.iterdir())):
+        raise AntsError(
+            f"{str(path)!r} exists already and is no empty folder; name a new folder, or a file "
+            f"that ends in {', '.join(_ANIMATIONS)}."
+        )
+    with _folder_of(target, keep=False):
+        pass
+    return target
+
+
+def save_animation(path: PathLike, frames: Iterable[np.ndarray], fps: float) -> None:
+    """Write frames as they come; raises as `check_animation` does, which it calls first.
+
+    Args:
+        path: The file or folder, see `check_animation`. A file that exists is replaced.
+        frames: At least one, uint8 (height, width, 3), all of one size.
+        fps: Frames per second.
+    """
+    target = check_animation(path, fps)
+    with _folder_of(target):
+        if target.suffix:
+            write = _ANIMATIONS[target.suffix.lower()]
+            results.write_atomically(target, lambda file: write(file, _checked(frames), fps))
+        else:
+            _save_pictures(target, _checked(frames))
+
+
+def save_picture(path: PathLike, frame: np.ndarray) -> None:
+    """Write a picture, uint8 (height, width, 3), as PNG.
+
+    Raises:
+        AntsError: The file does not end in .png, or cannot be written.
+    """
+    target = check_picture(path)
+    with _folder_of(target):
+        results.write_atomically(target, lambda file: _write_png(file, frame, optimize=True))
+
+
+def check_picture(path: PathLike) -> Path:
+    """Make sure that a picture can be written; raises as `save_picture` does."""
+    target = Path(path)
+    if target.suffix.lower() != ".png":
+        raise AntsError(f"{str(path)!r} is to hold one picture; give it a name that ends in .png.")
+    with _folder_of(target, keep=False):
+        pass
+    return target
+
+
+def _write_png(file: BinaryIO, frame: np.ndarray, optimize: bool = False) -> None:
+    from PIL import Image
+
+    Image.fromarray(frame).save(file, "PNG", optimize=optimize)
+
+
+def _save_pictures(folder: Path, frames: Iterable[np.ndarray]) -> None:
+    """Write numbered pictures to a folder that appears when all of them exist."""
+    temporary = folder.parent / f".{secrets.token_hex(8)}.tmp"
+    try:
+        temporary.mkdir()
+        for number, frame in enumerate(frames):
+            with open(temporary / f"frame_{number:06d}.png", "xb") as file:
+                _write_png(file, frame)
+        if folder.exists():
+            folder.rmdir()  # it was empty
+        os.replace(temporary, folder)
+    except OSError as error:
+        reason = error.strerror or type(error).__name__
+        raise AntsError(f"cannot write {str(folder)!r}: {reason}; choose another place.") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _checked(frames: Iterable[np.ndarray]) -> Iterator[np.ndarray]:
+    """The frames, which must be pictures of one size, and at least one."""
+    shape = None
+    for frame in frames:
+        shape = shape or frame.shape
+        if frame.shape != shape or frame.dtype != np.uint8 or frame.shape[2:] != (3,):
+            raise AntsError(
+                f"a frame is {frame.dtype} {frame.shape}; all must be uint8 (height, width, 3), "
+                "of one size."
+            )
+        yield frame
+    if shape is None:
+        raise AntsError("there are no frames; an animation needs at least one.")
+
+
+@contextmanager
+def _folder_of(target: Path, keep: bool = True) -> Iterator[None]:
+    """Make the folder that a file goes to; without `keep`, or on failure, it goes again."""
+    missing = [folder for folder in target.parents if not folder.exists()]
+    done = False
+    try:
+        results.check_writable_folder(target.parent)
+        yield
+        done = keep
+    finally:
+        if not done:
+            for folder in missing:
+                with suppress(OSError):
+                    folder.rmdir()

@@ -1,0 +1,188 @@
+"""Comparisons made up from a known truth, on which the analysis must find that truth.
+
+Every number is set by hand for each configuration. By default all that the paper claims is true,
+each claim clearly.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from taichi_ants.analysis.comparison import Comparison, Hyperparameters, Row, Variant
+from taichi_ants.analysis.paper import DYNA_P3, GRID, Q_LEARNING, SARSA, VARIANTS
+
+EARLY = 50  # episodes before the late level is reached
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What the runs of one configuration are drawn around.
+
+    Attributes:
+        early_return, late_return: Reward in the first `EARLY` episodes and after them.
+        swing: Odd episodes return so much more than the mean, even ones so much less.
+        early_steps, late_steps: Lengths of episodes.
+        steps_swing: As `swing`.
+        deliveries: Probability of a delivery in an episode.
+        greedy_return, greedy_steps, greedy_deliveries: Of every greedy rollout.
+        greedy_varies: Whether rollouts of one run differ.
+    """
+
+    early_return: float
+    late_return: float
+    swing: float
+    early_steps: float
+    late_steps: float
+    steps_swing: float
+    deliveries: float = 1.0
+    greedy_return: int = 45
+    greedy_steps: int = 35
+    greedy_deliveries: int = 1
+    greedy_varies: bool = False
+
+
+Edit = Callable[[Variant, Hyperparameters, Truth], Truth]
+
+
+def paper_truth(variant: Variant, point: Hyperparameters) -> Truth:
+    """A world in which every claim of the paper holds."""
+    fast = point.learning_rate == 0.01
+    # Effects of the discount that differ between configurations, and cancel over all.
+    twist = 3 if (point.epsilon == 0.3) == (point.epsilon_decay == 0.99) else -3
+    twist = twist if point.discount == 0.99 else 0
+    if variant == Q_LEARNING:
+        moderate = point.epsilon == 0.3 and point.epsilon_decay == 0.99
+        late = 50.0 - 4 * fast + 2 * (point.discount == 0.99) - 1.8 * (not moderate)
+        return Truth(20, late, 2 + 2 * fast, 130, 80 + 2 * (late - 46), 2)
+    if variant == SARSA:
+        return Truth(20, 46 - 3 * fast + twist, 1, 60, 56, 0)
+    high = point.epsilon == 0.5
+    late = 48 - 3 * fast + twist
+    if variant == DYNA_P3:
+        return Truth(20, late, 4 + 4 * fast, 130, 64 + 6 * high, 8)
+    special = high and point.discount == 0.99 and point.epsilon_decay == 0.995
+    return Truth(20, late + (0.6 if special else -1), 6 + 6 * fast, 130, 72 + 10 * high, 12)
+
+
+def level_truth(variant: Variant, point: Hyperparameters) -> Truth:
+    """A world in which nothing makes a difference."""
+    return Truth(45, 45, 0, 100, 100, 0)
+
+
+def unchanged(variant: Variant, point: Hyperparameters, truth: Truth) -> Truth:
+    return truth
+
+
+def change(
+    variants: Variant | Sequence[Variant] = VARIANTS,
+    where: Callable[[Hyperparameters], bool] = lambda point: True,
+    **amounts: float,
+) -> Edit:
+    """An edit that adds amounts to fields of the truth of some configurations."""
+    chosen = [variants] if isinstance(variants, Variant) else variants
+
+    def edit(variant: Variant, point: Hyperparameters, truth: Truth) -> Truth:
+        if variant not in chosen or not where(point):
+            return truth
+        return replace(
+            truth, **{name: getattr(truth, name) + amount for name, amount in amounts.items()}
+        )
+
+    return edit
+
+
+def build(
+    edits: dict[str, Edit],
+    seeds: int = 16,
+    episodes: int = 120,
+    rollouts: int = 3,
+    variants: Sequence[Variant] = VARIANTS,
+    grid: Sequence[Hyperparameters] = GRID,
+    noise: float = 0.5,
+    shared: float = 3.0,
+    truth: Callable[[Variant, Hyperparameters], Truth] = paper_truth,
+    random_seed: int = 7,
+) -> Comparison:
+    """A comparison drawn from the truth.
+
+    Args:
+        edits: For each delivery setting what to change in the truth.
+        seeds, episodes, rollouts: Sizes.
+        variants, grid: The configurations.
+        noise: Standard deviation of every episode's return and length.
+        shared: Standard deviation over seeds of what a seed adds to the returns of all rows.
+        truth: The truth before the edits.
+        random_seed: Seed of the noise.
+    """
+    random = np.random.default_rng(random_seed)
+    seed_effects = random.normal(0, shared, size=(seeds, 1))
+    rows, runs, greedy = [], [], []
+    for delivery, edit in edits.items():
+        for variant in variants:
+            for point in grid:
+                rows.append(Row(*variant, *point, delivery))
+                row = edit(variant, point, truth(variant, point))
+                runs.append(_runs(random, row, seed_effects, episodes, noise))
+                greedy.append(_rollouts(row, seeds, rollouts))
+    returns, steps, deliveries = np.moveaxis(np.array(runs), 1, 0)
+    greedy_returns, greedy_steps, greedy_deliveries = np.moveaxis(np.array(greedy), 1, 0)
+    return Comparison(
+        tuple(rows),
+        tuple(range(seeds)),
+        returns,
+        steps,
+        deliveries,
+        greedy_returns,
+        greedy_steps,
+        greedy_deliveries,
+        600,
+    )
+
+
+def _runs(
+    random: np.random.Generator,
+    row: Truth,
+    seed_effects: np.ndarray,
+    episodes: int,
+    noise: float,
+) -> np.ndarray:
+    """Returns, steps and deliveries of one configuration, int32 (3, seeds, episodes)."""
+    shape = len(seed_effects), episodes
+    early = np.arange(episodes) < EARLY
+    sign = np.where(np.arange(episodes) % 2, 1, -1)
+    returns = np.where(early, row.early_return, row.late_return) + row.swing * sign + seed_effects
+    steps = np.where(early, row.early_steps, row.late_steps) + row.steps_swing * sign
+    returns = np.rint(returns + random.normal(0, noise, shape))
+    steps = np.rint(steps + random.normal(0, noise, shape))
+    deliveries = random.random(shape) < row.deliveries
+    return np.stack([returns, np.clip(steps, 1, 600), deliveries]).astype(np.int32)
+
+
+def _rollouts(row: Truth, seeds: int, rollouts: int) -> np.ndarray:
+    """The same for greedy rollouts, int32 (3, seeds, rollouts)."""
+    figures = [row.greedy_return, row.greedy_steps, row.greedy_deliveries]
+    values = np.broadcast_to(np.array(figures)[:, None, None], (3, seeds, rollouts)).copy()
+    if row.greedy_varies:
+        values[0, :, 0] += 1
+    return values.astype(np.int32)
+
+
+def subset(comparison: Comparison, rows: Sequence[int], seeds: int, episodes: int) -> Comparison:
+    """Some rows, the first seeds and the first episodes of a comparison."""
+    rows = list(rows)
+
+    def cut(name: str, length: float = math.inf) -> np.ndarray:
+        values = getattr(comparison, name)
+        return values[rows, :seeds, : int(min(length, values.shape[2]))]
+
+    return Comparison(
+        tuple(comparison.rows[row] for row in rows),
+        comparison.seeds[:seeds],
+        *(cut(name, episodes) for name in ("returns", "steps", "deliveries")),
+        *(cut(name) for name in ("greedy_returns", "greedy_steps", "greedy_deliveries")),
+        comparison.max_steps,
+    )

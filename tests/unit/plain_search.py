@@ -1,0 +1,152 @@
+"""Plain searches for the tests of the exact bounds, in a simulator written only for them."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+
+from taichi_ants.analysis.dynamic_programming import Outcome
+from taichi_ants.worlds.world import World
+
+STEPS = [(1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1), (1, 0, 1)]
+
+# A state is (cell, heading, taken): `taken` is the cell of the carried food, None without food.
+# After the delivery it is None as a whole.
+DELIVERED = None
+
+
+class PlainWorld:
+    """The rules for one ant without evaporation, with no thought of speed."""
+
+    def __init__(self, world: World) -> None:
+        self.ranges, self.queen = world.ranges, world.queen
+        self.foods = set(map(tuple, world.foods.tolist()))
+        self.obstacles = set(map(tuple, world.obstacles.tolist()))
+        self.trails = {(x, y, z): level for x, y, z, level in world.trails.tolist()}
+        [[x, y, z, heading]] = world.ants.tolist()
+        self.start = ((x, y, z), heading, None)
+
+    def outcomes(self, state: tuple, action: int) -> list[tuple[tuple | None, int]]:
+        """The next states and rewards that an action can have, all equally probable."""
+        cell, heading, taken = state
+        seen = [self._neighbour(cell, heading + turn) for turn in (-1, 0, 1)]
+        foods = self.foods - {taken}
+        if action == 3:
+            in_view = [target for target in seen if target in foods]
+            if taken or not in_view:
+                return [(state, -1)]
+            return [((cell, (heading + 3) % 6, target), 3) for target in in_view]
+        if action == 4:
+            return [(DELIVERED, 10)] if taken and self.queen in seen else [(state, -1)]
+        target, heading = seen[action], (heading + action - 1) % 6
+        if not self._is_empty(target, foods):
+            return [((cell, heading, taken), -1)]
+        if taken:
+            lured = self._distance(target) < self._distance(cell)
+        else:
+            levels = [self.trails.get(c, 0) for c in seen if self._is_empty(c, foods)]
+            level = self.trails.get(target, 0)
+            lured = level >= 1 and level >= max(levels) / 2
+        return [((target, heading, taken), int(lured))]
+
+    def _is_empty(self, cell: tuple, foods: set) -> bool:
+        exists = all(value < size for value, size in zip(cell, self.ranges, strict=True))
+        return exists and cell not in foods | self.obstacles | {self.queen}
+
+    @staticmethod
+    def _neighbour(cell: tuple, heading: int) -> tuple:
+        moved = [a + b for a, b in zip(cell, STEPS[heading % 6], strict=True)]
+        return tuple(value - min(moved) for value in moved)
+
+    def _distance(self, cell: tuple) -> int:
+        difference = [a - b for a, b in zip(cell, self.queen, strict=True)]
+        return max(difference) - min(difference)
+
+    def all_states(self) -> dict[tuple, list[list[tuple[tuple | None, int]]]]:
+        """Every state that can be reached, with the outcomes of its five actions."""
+        found, todo = {}, [self.start]
+        while todo:
+            state = todo.pop()
+            if state is DELIVERED or state in found:
+                continue
+            found[state] = [self.outcomes(state, action) for action in range(5)]
+            todo += [after for outcomes in found[state] for after, _ in outcomes]
+        return found
+
+
+def search_all_sequences(plain: PlainWorld, max_steps: int) -> tuple[tuple, tuple]:
+    """The shortest and the best (return, steps, deliveries) of all sequences of actions."""
+    episodes = []
+    for actions in product(range(5), repeat=max_steps):
+        state, reward = plain.start, 0
+        for steps, action in enumerate(actions, start=1):
+            [(state, gained)] = plain.outcomes(state, action)
+            reward += gained
+            if state is DELIVERED or steps == max_steps:
+                episodes.append((reward, steps, int(state is DELIVERED)))
+                break
+    delivered = [episode for episode in episodes if episode[2]]
+    shortest = min(delivered, key=lambda episode: (episode[1], -episode[0]))
+    return shortest, max(episodes, key=lambda episode: (episode[0], -episode[1], episode[2]))
+
+
+def search_largest(plain: PlainWorld, max_steps: int) -> Outcome:
+    """The largest return, then the fewest steps, then a delivery, with luck at the pick-up."""
+    states = plain.all_states()
+    best = dict.fromkeys(states, (0, 0, 0))
+    best[DELIVERED] = (0, 0, 1)
+    for _ in range(max_steps):
+        later = {
+            state: max(
+                (best[after][0] + reward, best[after][1] - 1, best[after][2])
+                for outcomes in actions
+                for after, reward in outcomes
+            )
+            for state, actions in states.items()
+        }
+        best = {**later, DELIVERED: (0, 0, 1)}
+    reward, steps, deliveries = best[plain.start]
+    return Outcome(reward, -steps, deliveries)
+
+
+def search_shortest(plain: PlainWorld) -> Outcome | None:
+    """Breadth first, with the best return of each state where it is first reached."""
+    layer, seen, steps = {plain.start: 0}, set(), 0
+    while layer:
+        if DELIVERED in layer:
+            return Outcome(layer[DELIVERED], steps, 1)
+        seen |= set(layer)
+        following: dict = {}
+        for state, so_far in layer.items():
+            for action in range(5):
+                for after, reward in plain.outcomes(state, action):
+                    if after not in seen:
+                        total = so_far + reward
+                        following[after] = max(total, following.get(after, total))
+        layer, steps = following, steps + 1
+    return None
+
+
+def search_optimal(plain: PlainWorld, discount: float, max_steps: int) -> tuple[float, Outcome]:
+    """Value iteration, then the expected outcome of the first of the best actions."""
+    states = plain.all_states()
+
+    def action_value(outcomes: list) -> float:
+        return sum(reward + discount * values[after] for after, reward in outcomes) / len(outcomes)
+
+    values = dict.fromkeys([*states, DELIVERED], 0.0)
+    for _ in range(80):
+        values.update({s: max(map(action_value, actions)) for s, actions in states.items()})
+
+    def follow(state: tuple | None, left: int) -> np.ndarray:
+        if state is DELIVERED or left == 0:
+            return np.array([0.0, 0.0, float(state is DELIVERED)])
+        action_values = [action_value(outcomes) for outcomes in states[state]]
+        best = next(a for a in range(5) if action_values[a] > max(action_values) - 1e-11)
+        branches = [
+            follow(after, left - 1) + (reward, 1, 0) for after, reward in states[state][best]
+        ]
+        return np.mean(branches, axis=0)
+
+    return values[plain.start], Outcome(*follow(plain.start, max_steps))

@@ -1,0 +1,219 @@
+"""Intervals over seeds: known values, coverage, and what they must not depend on."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy import stats
+
+from taichi_ants.analysis.statistics import (
+    all_equal,
+    bootstrap_interval,
+    cautious_interval,
+    jackknife_values,
+    resampling_counts,
+    student_interval,
+)
+
+SAMPLES = arrays(float, (3, 8), elements=st.floats(-100, 100, width=32))
+
+
+def coverage(draw, truth: float, n: int, interval, level: float = 0.95) -> float:
+    """The share of 3000 samples of n whose interval holds the truth."""
+    low, high = interval(draw(np.random.default_rng(n), (3000, n)), level)
+    return float(((low <= truth) & (truth <= high)).mean())
+
+
+DISTRIBUTIONS = {
+    "normal": (lambda random, shape: random.normal(3, 2, shape), 3.0),
+    "skewed": (lambda random, shape: random.exponential(1.0, shape), 1.0),
+    "binary": (lambda random, shape: 1.0 * (random.random(shape) < 0.4), 0.4),
+}
+
+
+bootstrap = partial(bootstrap_interval, resamples=4000)
+cautious = partial(cautious_interval, resamples=4000)
+
+
+@pytest.mark.parametrize("n", [10, 100])
+@pytest.mark.parametrize("name", DISTRIBUTIONS)
+def test_intervals_cover_the_truth_as_often_as_they_say(name: str, n: int) -> None:
+    draw, truth = DISTRIBUTIONS[name]
+    least = 0.915 if (name, n) == ("skewed", 10) else 0.935
+    assert coverage(draw, truth, n, bootstrap) > least
+    assert coverage(draw, truth, n, cautious) > least
+    if name == "normal":
+        assert coverage(draw, truth, n, bootstrap) < 0.965
+
+
+@pytest.mark.parametrize("n", [2, 3, 5])
+def test_with_few_seeds_only_the_cautious_interval_covers(n: int) -> None:
+    draw, truth = DISTRIBUTIONS["normal"]
+    assert coverage(draw, truth, n, bootstrap) < 0.93
+    assert coverage(draw, truth, n, cautious) > 0.94
+    assert coverage(draw, truth, n, cautious, level=0.999) > 0.997
+
+
+def test_the_bootstrap_leans_to_the_long_tail() -> None:
+    values = np.random.default_rng(0).exponential(size=(200, 30))
+    mean = values.mean(axis=1)
+    low, high = bootstrap_interval(values)
+    assert np.mean((high - mean) / (mean - low)) > 1.2
+    low, high = student_interval(values)
+    np.testing.assert_allclose(high - mean, mean - low)
+
+
+def test_bca_without_expansion_agrees_with_scipy() -> None:
+    """The expansion is a change of level, which can be undone."""
+    values = np.random.default_rng(5).gamma(2.0, size=(1, 40))
+    n, level = 40, 0.9
+    half = stats.norm.ppf((1 + level) / 2) / np.sqrt(n / (n - 1))
+    undone = 2 * stats.t.cdf(half, n - 1) - 1
+    ours = np.array(bootstrap_interval(values, undone, resamples=40_000)).ravel()
+    theirs = stats.bootstrap(
+        (values[0],), np.mean, confidence_level=level, n_resamples=40_000, rng=1
+    ).confidence_interval
+    np.testing.assert_allclose(ours, theirs, rtol=0.005)
+
+
+def test_student_interval_by_hand() -> None:
+    # Mean 2, deviation 1, t quantile of 2 degrees of freedom 4.302653, sqrt(3) = 1.7320508.
+    low, high = student_interval(np.array([[1.0, 2.0, 3.0]]))
+    np.testing.assert_allclose([low[0], high[0]], [2 - 2.484138, 2 + 2.484138], rtol=1e-6)
+
+
+def test_equal_seeds_give_a_point_and_one_seed_gives_nothing() -> None:
+    # 0.1 + 0.2 is not 0.3: equal up to rounding counts as equal.
+    values = np.array([[7.0] * 20, [0.1 + 0.2] * 10 + [0.3] * 10])
+    for interval in (bootstrap_interval, student_interval, cautious_interval):
+        low, high = interval(values, 0.95)
+        np.testing.assert_allclose(low, [7.0, 0.3])
+        np.testing.assert_allclose(high, [7.0, 0.3])
+        low, high = interval(values[:, :1], 0.95)
+        assert np.isnan(low).all()
+        assert np.isnan(high).all()
+
+
+def test_few_equal_seeds_are_no_certainty() -> None:
+    """Ten seeds agree by chance with probability 2^-9 = 0.00195 if half of all differ."""
+    values = np.full((1, 10), 45.0)
+    low, high = cautious_interval(values, 1 - 0.002)
+    assert (low[0], high[0]) == (45.0, 45.0)
+    low, high = cautious_interval(values, 1 - 0.0019)
+    assert (low[0], high[0]) == (-np.inf, np.inf)
+
+
+def test_a_row_with_nan_stays_alone() -> None:
+    values = np.random.default_rng(0).normal(size=(2, 12))
+    alone = bootstrap_interval(values[1:])
+    values[0, 3] = np.nan
+    low, high = bootstrap_interval(values)
+    assert np.isnan([low[0], high[0]]).all()
+    np.testing.assert_allclose([low[1:], high[1:]], alone)
+
+
+def test_an_extreme_level_ends_at_the_extreme_seeds_and_the_hull_goes_on() -> None:
+    values = np.array([[0.0, 0.0, 0.0, 0.0, 10.0]])  # strongly skewed: past the pole
+    low, high = bootstrap_interval(values, 0.9999)
+    assert 0.0 <= low[0] < 2.0
+    assert 6.0 <= high[0] <= 10.0
+    low, high = cautious_interval(values, 0.9999)
+    assert low[0] < 0.0
+    assert high[0] > 10.0
+
+
+def test_resamples_are_drawn_once_with_each_seed_equally_often() -> None:
+    counts = resampling_counts(7, 30_000)
+    assert counts is resampling_counts(7, 30_000)
+    assert counts.shape == (30_000, 7)
+    assert (counts.sum(axis=1) == 7).all()
+    # A count is binomial(7, 1/7): mean 1, variance 6/7.
+    np.testing.assert_allclose(counts.mean(axis=0), 1.0, atol=0.02)
+    np.testing.assert_allclose(counts.var(axis=0), 6 / 7, atol=0.03)
+
+
+def test_rows_are_paired_by_seed() -> None:
+    """Two rows that differ by a constant have a difference without spread."""
+    noise = np.random.default_rng(1).normal(scale=50, size=(1, 20))
+    low, high = bootstrap_interval((noise + 3) - noise)
+    np.testing.assert_allclose([low[0], high[0]], 3.0)
+    low, high = bootstrap_interval((noise[:, ::-1] + 3) - noise)
+    assert low[0] < -5
+    assert high[0] > 11
+
+
+@given(SAMPLES)
+def test_the_interval_stays_within_the_seeds_and_around_the_middle(values: np.ndarray) -> None:
+    low, high = bootstrap_interval(values, resamples=2000)
+    slack = 1e-6
+    assert (values.min(axis=1) - slack <= low).all()
+    assert (low <= high + slack).all()
+    assert (high <= values.max(axis=1) + slack).all()
+
+
+@given(SAMPLES, st.floats(0.1, 10), st.floats(-50, 50))
+def test_units_and_origin_do_not_matter(values: np.ndarray, scale: float, shift: float) -> None:
+    values = np.round(values, 1)  # apart from ties by rounding
+    before = np.array(cautious_interval(values, 0.9))
+    after = np.array(cautious_interval(scale * values + shift, 0.9))
+    np.testing.assert_allclose(after, scale * before + shift, atol=1e-6)
+
+
+@given(SAMPLES)
+def test_rows_do_not_depend_on_each_other(values: np.ndarray) -> None:
+    together = np.array(bootstrap_interval(values, resamples=1000))
+    alone = [bootstrap_interval(values[k : k + 1], resamples=1000) for k in range(len(values))]
+    np.testing.assert_allclose(together, np.array(alone)[:, :, 0].T, atol=1e-9)
+
+
+def test_many_rows_are_cut_into_blocks_without_a_seam() -> None:
+    values = np.random.default_rng(2).normal(size=(150, 9))
+    low, high = bootstrap_interval(values, resamples=500)
+    backwards = bootstrap_interval(values[::-1], resamples=500)
+    np.testing.assert_allclose([low, high], np.array(backwards)[:, ::-1], atol=1e-12)
+
+
+def test_all_equal_by_hand() -> None:
+    values = np.array([[2.0, 2.0], [2.0, 2.0 + 1e-12], [2.0, 2.1], [0.0, 0.0], [np.nan, 1.0]])
+    assert all_equal(values).tolist() == [True, True, False, True, False]
+
+
+def test_jackknife_values_of_a_mean_are_the_values() -> None:
+    values = np.array([3.0, 5.0, 10.0])
+    np.testing.assert_allclose(jackknife_values(lambda means: 2 * means, values), 2 * values)
+
+
+def test_jackknife_values_remove_the_bias_of_noise() -> None:
+    """Effects of 8 configurations that do not differ have no spread; single seeds seem to."""
+    random = np.random.default_rng(3)
+    plain, single, corrected = [], [], []
+    for _ in range(300):
+        noise = random.normal(5, 1, size=(8, 40))
+        plain.append(variance(noise.mean(axis=1)))
+        single.append(variance(noise).mean())
+        corrected.append(jackknife_values(variance, noise).mean())
+    assert np.mean(single) == pytest.approx(1.0, abs=0.02)
+    assert np.mean(plain) == pytest.approx(1 / 40, abs=0.003)
+    assert np.mean(corrected) == pytest.approx(0.0, abs=0.003)
+
+
+def variance(means: np.ndarray) -> np.ndarray:
+    return means.var(axis=0, ddof=1)
+
+
+def test_the_interval_of_jackknife_values_covers_the_statistic() -> None:
+    """Three true means with variance 1, 30 seeds of noise."""
+    noise = np.random.default_rng(4).normal(0, 1, size=(1500, 3, 30))
+    samples = noise + np.array([-1.0, 0.0, 1.0])[:, None]
+    values = np.stack([jackknife_values(variance, sample) for sample in samples])
+    low, high = bootstrap(values)
+    assert 0.92 < np.mean((low <= 1.0) & (high >= 1.0)) < 0.98
+
+
+def test_jackknife_values_of_one_seed_are_nan() -> None:
+    assert np.isnan(jackknife_values(variance, np.ones((8, 1)))).all()

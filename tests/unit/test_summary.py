@@ -1,0 +1,70 @@
+"""The rows of summary.csv."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from synthetic_comparison import build, subset, unchanged
+
+from taichi_ants.analysis.paper import FIGURE_1, SARSA
+from taichi_ants.analysis.statistics import bootstrap_interval
+from taichi_ants.analysis.summary import SUMMARY_COLUMNS, summarise
+
+
+def test_a_line_by_hand() -> None:
+    comparison = build({"absorbing": unchanged}, seeds=3, variants=[SARSA], grid=[FIGURE_1])
+    comparison.returns[0, :, -50:] = np.array([40, 50, 60])[:, None]
+    comparison.steps[0, :, :70] = 100
+    comparison.steps[0, :, 70:] = np.array([30, 40, 50])[:, None]
+    (line,) = summarise(comparison)
+    assert tuple(line) == SUMMARY_COLUMNS
+    low, high = bootstrap_interval(np.array([[40.0, 50.0, 60.0]]))
+    assert line == {
+        "learner": "sarsa",
+        "planning_steps": 0,
+        "learning_rate": 0.01,
+        "discount": 0.9,
+        "epsilon": 0.3,
+        "epsilon_decay": 0.995,
+        "delivery": "absorbing",
+        "seeds": 3,
+        "return_last50_mean": 50.0,
+        "return_last50_ci_low": low[0],
+        "return_last50_ci_high": high[0],
+        "return_last50_sd": pytest.approx(10.0),
+        "steps_last50_mean": 40.0,
+        "steps_all_mean": pytest.approx((70 * 100 + 50 * 40) / 120),
+        "deliveries_last50_mean": 1.0,
+        "greedy_return_mean": 45.0,
+        "greedy_steps_mean": 35.0,
+        "greedy_deliveries_mean": 1.0,
+    }
+
+
+def test_one_line_per_row_in_their_order() -> None:
+    comparison = build({"continuing": unchanged, "absorbing": unchanged}, seeds=4)
+    lines = summarise(comparison)
+    assert [line["delivery"] for line in lines] == [row.delivery for row in comparison.rows]
+    means = comparison.measure("return_last50").mean(axis=1)
+    np.testing.assert_allclose([line["return_last50_mean"] for line in lines], means)
+    assert all(
+        line["return_last50_ci_low"] < line["return_last50_mean"] < line["return_last50_ci_high"]
+        for line in lines
+    )
+
+
+def test_one_seed_without_rollouts_has_means_only() -> None:
+    comparison = subset(build({"continuing": unchanged}, rollouts=0), [4], 1, 10)
+    (line,) = summarise(comparison)
+    missing = {name for name, value in line.items() if value != value}
+    assert missing == {
+        "return_last50_ci_low",
+        "return_last50_ci_high",
+        "return_last50_sd",
+        "greedy_return_mean",
+        "greedy_steps_mean",
+        "greedy_deliveries_mean",
+    }
+    assert math.isfinite(line["return_last50_mean"])

@@ -1,0 +1,156 @@
+"""The paper's table 2 beside ours, and the best of several configurations."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from synthetic_comparison import build, subset, unchanged
+
+from taichi_ants.analysis.best_of import best_of, held_out, percentile_of
+from taichi_ants.analysis.comparison import Comparison, Variant
+from taichi_ants.analysis.paper import DYNA_P3, FIGURE_1, Q_LEARNING, SARSA, TABLE_2, VARIANTS
+from taichi_ants.analysis.table2 import table2, table2_markdown
+
+
+@pytest.fixture(scope="module")
+def comparison() -> Comparison:
+    return build({"continuing": unchanged, "absorbing": unchanged}, seeds=8, noise=15.0)
+
+
+def exact_share_at_most(comparison: Comparison, variant: Variant, level: float) -> float:
+    """The best of independent runs is at most a level if all are: the product of the shares."""
+    rows = comparison.positions("continuing", variant)
+    return float((comparison.measure("return_last50")[rows] <= level).mean(axis=1).prod())
+
+
+@pytest.mark.parametrize("variant", VARIANTS, ids=lambda variant: variant.label)
+def test_best_of_16_has_the_distribution_of_the_maximum(
+    comparison: Comparison, variant: Variant
+) -> None:
+    best = best_of(comparison, "continuing", variant, draws=40_000)
+    assert best.configurations == 16
+    rows = comparison.positions("continuing", variant)
+    for level in np.unique(comparison.measure("return_last50")[rows])[-40::3]:
+        share = (best.returns <= level).mean()
+        assert share == pytest.approx(exact_share_at_most(comparison, variant, level), abs=0.01)
+
+
+def test_the_winners_other_figures_belong_to_the_same_run(comparison: Comparison) -> None:
+    best = best_of(comparison, "absorbing", DYNA_P3, draws=500)
+    rows = comparison.positions("absorbing", DYNA_P3)
+    runs = zip(
+        *(
+            comparison.measure(name)[rows].ravel()
+            for name in ("return_last50", "steps_all", "deliveries_last50")
+        ),
+        strict=True,
+    )
+    assert set(zip(best.returns, best.steps, best.deliveries, strict=True)) <= set(runs)
+
+
+def test_seeds_of_the_configurations_are_independent() -> None:
+    """Two configurations that are good on different seeds: together good with 3/4, not always."""
+    two = subset(build({"continuing": unchanged}, seeds=2), [0, 1], 2, 120)
+    two.returns[...] = 0
+    two.returns[0, 0] = two.returns[1, 1] = 50
+    best = best_of(two, "continuing", Q_LEARNING, draws=20_000)
+    assert (best.returns == 50).mean() == pytest.approx(0.75, abs=0.01)
+
+
+def test_percentiles_count_ties_by_half() -> None:
+    values = np.array([1.0, 2.0, 2.0, 3.0])
+    assert percentile_of(2.0, values) == 50
+    assert percentile_of(0.5, values) == 0
+    assert percentile_of(2.5, values) == 75
+    assert percentile_of(9.0, values) == 100
+
+
+def test_held_out_choice(comparison: Comparison) -> None:
+    rows = comparison.positions("continuing", SARSA)
+    chosen = held_out(comparison, rows)
+    choosing = comparison.measure("return_last50")[rows, ::2].mean(axis=1)
+    assert chosen.position == rows[int(choosing.argmax())]
+    assert comparison.rows[chosen.position].hyperparameters == chosen.hyperparameters
+    assert comparison.seeds[chosen.seeds] == (1, 3, 5, 7)
+    assert held_out(comparison, []) is None
+
+
+def test_table2_lines(comparison: Comparison) -> None:
+    lines = table2(comparison, draws=2000)
+    assert [(line["delivery"], line["learner"], line["planning_steps"]) for line in lines] == [
+        (delivery, *variant) for delivery in ("continuing", "absorbing") for variant in VARIANTS
+    ]
+    line = lines[1]
+    position = comparison.position("continuing", SARSA, FIGURE_1)
+    assert line["configuration"] == "0.01 / 0.9 / 0.3 / 0.995"
+    assert (line["paper_return"], line["paper_steps"], line["paper_deliveries"]) == (47.3, 73, 1)
+    assert line["seeds"] == 8
+    for stem, measure in (
+        ("same_return", "return_last50"),
+        ("same_steps", "steps_all"),
+        ("same_deliveries", "deliveries_last50"),
+    ):
+        mean = comparison.measure(measure)[position].mean()
+        assert line[f"{stem}_mean"] == pytest.approx(mean)
+        assert line[f"{stem}_ci_low"] <= mean <= line[f"{stem}_ci_high"]
+    best = best_of(comparison, "continuing", SARSA, draws=2000)
+    assert line["best_run_of"] == 16
+    assert line["best_run_return_median"] == np.median(best.returns)
+    assert line["best_run_steps_high"] == pytest.approx(np.percentile(best.steps, 97.5))
+    assert line["best_run_return_paper_percentile"] == percentile_of(47.3, best.returns)
+    chosen = held_out(comparison, comparison.positions("continuing", SARSA))
+    assert line["held_out_configuration"] == chosen.hyperparameters.label
+    assert line["held_out_seeds"] == 4
+    assert line["held_out_return_mean"] == pytest.approx(
+        comparison.measure("return_last50")[chosen.position, 1::2].mean()
+    )
+
+
+def test_choosing_by_luck_is_paid_for_on_the_other_seeds() -> None:
+    """With equal configurations the best run is above the mean, the held-out one is not."""
+    noisy = build({"continuing": unchanged}, seeds=40, variants=[SARSA], noise=0.0, shared=0.0)
+    luck = np.random.default_rng(0).normal(45, 10, size=(16, 40)).round().astype(int)
+    noisy.returns[...] = luck[..., None]
+    line = table2(noisy, draws=2000)[1]
+    assert line["best_run_return_median"] > 55
+    assert line["held_out_return_mean"] == pytest.approx(45, abs=4)
+
+
+def test_what_is_missing_is_nan() -> None:
+    full = build({"absorbing": unchanged}, variants=[SARSA, Variant("mine", 2)], seeds=3)
+    rows = [
+        number
+        for number, row in enumerate(full.rows)
+        if row.learner == "mine" or row.hyperparameters != FIGURE_1
+    ]
+    lines = table2(subset(full, rows, 1, 120), draws=100)
+    by_name = {line["learner"]: line for line in lines if line["planning_steps"] in (0, 2)}
+    sarsa, mine, absent = by_name["sarsa"], by_name["mine"], by_name["q_learning"]
+    assert (sarsa["seeds"], sarsa["best_run_of"], sarsa["held_out_seeds"]) == (0, 15, 0)
+    assert math.isnan(sarsa["same_return_mean"])
+    assert math.isnan(sarsa["held_out_return_mean"])
+    assert sarsa["best_run_return_low"] == sarsa["best_run_return_high"]
+    assert math.isnan(mine["paper_return"])
+    assert math.isnan(mine["best_run_return_paper_percentile"])
+    assert mine["best_run_of"] == 16
+    assert absent["best_run_of"] == 0
+    assert math.isnan(absent["best_run_return_median"])
+    assert absent["paper_return"] == TABLE_2[Q_LEARNING].return_last50
+    text = table2_markdown(lines)
+    assert "ours are not in this comparison" in text
+    assert "| mine (p2) | absorbing | 16 |" in text
+    assert "nan" not in text
+
+
+def test_the_markdown_holds_the_numbers(comparison: Comparison) -> None:
+    lines = table2(comparison, draws=2000)
+    text = table2_markdown(lines)
+    assert "means over 8 seeds" in text
+    row = next(line for line in text.splitlines() if line.startswith("| SARSA | continuing"))
+    cells = [cell.strip() for cell in row.strip("|").split("|")]
+    line = lines[1]
+    assert cells[:4] == ["SARSA", "continuing", "0.01 / 0.9 / 0.3 / 0.995", "47.3"]
+    assert cells[4].startswith(f"{line['same_return_mean']:.1f} [")
+    assert all(len(row.split("|")) in (8, 11) for row in text.splitlines() if row.startswith("|"))
