@@ -82,16 +82,16 @@ def _held_out(comparison: Comparison, delivery: str, variant: Variant) -> dict:
 
 def _means(comparison: Comparison, stem: str, position: int | None, seeds: slice) -> dict:
     """Means over seeds with 95 % intervals of one row of the comparison."""
+    means = low = high = np.full(len(FIGURES), np.nan)
+    if position is not None:
+        rows = [comparison.measure(measure)[position, seeds] for measure in FIGURES.values()]
+        means = np.mean(rows, axis=1)
+        low, high = bootstrap_interval(np.array(rows))
     columns = {}
-    for name, measure in FIGURES.items():
-        mean = low = high = math.nan
-        if position is not None:
-            values = comparison.measure(measure)[position : position + 1, seeds]
-            mean = float(values.mean())
-            low, high = (float(end[0]) for end in bootstrap_interval(values))
-        columns[f"{stem}_{name}_mean"] = mean
-        columns[f"{stem}_{name}_ci_low"] = low
-        columns[f"{stem}_{name}_ci_high"] = high
+    for place, name in enumerate(FIGURES):
+        columns[f"{stem}_{name}_mean"] = float(means[place])
+        columns[f"{stem}_{name}_ci_low"] = float(low[place])
+        columns[f"{stem}_{name}_ci_high"] = float(high[place])
     return columns
 
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from taichi_ants import learners
-from taichi_ants.config import TrainingConfig
+from taichi_ants.config import TrainingConfig, share_of_one
 from taichi_ants.constants import MAX_STEPS, N_ACTIONS, N_STATES
 from taichi_ants.errors import AntsError
+from taichi_ants.randomness import whole
 from taichi_ants.worlds.world import World
 
 
@@ -22,7 +23,11 @@ def checked_world(world: World) -> World:
 
 def checked_configs(configs: TrainingConfig | Sequence[TrainingConfig]) -> tuple:
     """One configuration or several as a tuple; their learners exist and plan as they say."""
-    several = (configs,) if isinstance(configs, TrainingConfig) else tuple(configs)
+    if isinstance(configs, TrainingConfig):
+        configs = (configs,)
+    elif not isinstance(configs, Iterable):
+        raise AntsError(f"configs is {configs!r}; it must be one TrainingConfig or several.")
+    several = tuple(configs)
     if not several:
         raise AntsError("configs is empty; give at least one TrainingConfig.")
     for config in several:
@@ -43,19 +48,23 @@ def checked_configs(configs: TrainingConfig | Sequence[TrainingConfig]) -> tuple
 
 def checked_seeds(seeds: int | Sequence[int]) -> tuple[int, ...]:
     """One seed or several different ones as a tuple."""
-    several = tuple(np.atleast_1d(np.asarray(seeds, dtype=object)).ravel().tolist())
+    if isinstance(seeds, np.ndarray):
+        seeds = seeds.ravel().tolist()
+    # Text can be iterated over too, but is no sequence of numbers.
+    one = isinstance(seeds, (str, bytes)) or not isinstance(seeds, Iterable)
+    several = tuple(whole("a seed", seed) for seed in ((seeds,) if one else seeds))
     if not several:
         raise AntsError("seeds is empty; give at least one whole number.")
+    taken: dict[int, int] = {}
     for seed in several:
-        if isinstance(seed, bool) or not hasattr(seed, "__index__"):
-            raise AntsError(f"seeds holds {seed!r}; it must hold whole numbers only.")
         if not -(2**63) <= seed < 2**64:
             raise AntsError(f"seeds holds {seed}; a seed must fit into 64 bits.")
-    whole = tuple(int(seed) for seed in several)
-    if len(set(whole)) < len(whole):
-        twice = next(seed for seed in whole if whole.count(seed) > 1)
-        raise AntsError(f"seeds holds {twice} more than once; each seed must differ.")
-    return whole
+        if (word := seed % 2**64) in taken:
+            same = taken[word]
+            reason = "more than once" if same == seed else f"and {same}, which are one in 64 bits"
+            raise AntsError(f"seeds holds {seed} {reason}; each seed must differ.")
+        taken[word] = seed
+    return several
 
 
 def checked_seeds_for(seeds: int | Sequence[int], shape: tuple[int, ...]) -> np.ndarray:
@@ -69,13 +78,12 @@ def checked_seeds_for(seeds: int | Sequence[int], shape: tuple[int, ...]) -> np.
     return np.broadcast_to(np.array(several, dtype=object), shape or (1,)).ravel()
 
 
-def checked_count(name: str, value: int, most: int = 2**31 - 1) -> int:
-    """A whole number from 1 to `most`."""
-    if isinstance(value, bool) or not hasattr(value, "__index__"):
-        raise AntsError(f"{name} is {value!r}; it must be a whole number.")
-    if not 1 <= value <= most:
-        raise AntsError(f"{name} is {value}; it must lie between 1 and {most}.")
-    return int(value)
+def checked_count(name: str, value: int, most: int = 2**31 - 1, least: int = 1) -> int:
+    """A whole number from `least` to `most`."""
+    value = whole(name, value)
+    if not least <= value <= most:
+        raise AntsError(f"{name} is {value}; it must lie between {least} and {most}.")
+    return value
 
 
 def checked_max_steps(value: int) -> int:
@@ -85,7 +93,7 @@ def checked_max_steps(value: int) -> int:
 
 def checked_share(name: str, value: float) -> float:
     """A number from 0 to 1."""
-    if isinstance(value, (bool, str)) or not 0 <= value <= 1:
+    if not share_of_one(value):
         raise AntsError(f"{name} is {value!r}; it must be a number between 0 and 1.")
     return float(value)
 

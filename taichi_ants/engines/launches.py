@@ -14,6 +14,9 @@ _SECONDS = 1.0
 _STEP_NS = 25  # of one thread, on a slow core
 _PLANNING_STEP_NS = 6
 _WORKSPACE_BYTES = 256 * 2**20
+# Kernels index the Q-tables (1024 numbers a run) and the episodes of a launch by 32 bits.
+_MOST_RUNS = 2**20
+_MOST_EPISODES = 2**30
 
 
 @dataclass(frozen=True)
@@ -55,7 +58,7 @@ def plan_launches(
     """
     steps_each = _SECONDS * 1e9 / (_STEP_NS + _PLANNING_STEP_NS * planning_steps)
     rounds = int(steps_each // (episodes * max_steps))
-    most_runs = max(1, _WORKSPACE_BYTES // (4 * cells))
+    most_runs = max(1, min(_WORKSPACE_BYTES // (4 * cells), _MOST_RUNS, _MOST_EPISODES // episodes))
     if rounds >= 1:
         return LaunchPlan(min(workers * rounds, most_runs), episodes)
     return LaunchPlan(min(workers, most_runs), max(1, int(steps_each // max_steps)))

@@ -89,7 +89,7 @@ def rollout(
     if tables.ndim != 2:
         raise AntsError(f"q_values has shape {tables.shape}; a rollout follows one (128, 5) table.")
     seeds = checks.checked_seeds_for(seed, ())
-    numbers = np.array([checks.checked_count("number", number + 1) - 1])
+    numbers = np.array([checks.checked_count("number", number, least=0)])
     state = fixed_policy_state(tables[None], checks.checked_share("epsilon", epsilon))
     streams = rollout_streams(seeds, numbers)
     rates = np.zeros((1, 2), dtype=np.float32)

@@ -240,6 +240,18 @@ def test_a_finding_shows_the_weakest_contrast_and_what_it_rests_on() -> None:
     assert (peak.seeds, peak.configurations) == (8, 48)
 
 
+def test_contrasts_name_what_they_subtract() -> None:
+    labels = {claim.id: [contrast.label for contrast in claim.contrasts] for claim in CLAIMS}
+    assert labels["rate-q-small-best"] == ["Q-learning, 0.001 minus 0.01"]
+    assert labels["discount-q"] == ["Q-learning, 0.99 minus 0.9"]
+    assert labels["epsilon-q-moderate"] == [
+        "0.3 / 0.99 minus 0.3 / 0.995",
+        "0.3 / 0.99 minus 0.5 / 0.99",
+        "0.3 / 0.99 minus 0.5 / 0.995",
+    ]
+    assert labels["rate-strongest"][2] == "learning rate minus epsilon decay"
+
+
 def test_levels_are_corrected_for_all_intervals_of_all_tested_claims() -> None:
     claims = [BY_ID["q-return-highest"], BY_ID["discount-q"], BY_ID["greedy-return"]]
     comparison = build({"continuing": unchanged, "absorbing": unchanged})

@@ -210,6 +210,15 @@ def test_homes_whose_food_is_missing_go_along():
     assert foods_of(colony) == set(moved)
 
 
+@pytest.mark.parametrize("ahead", ["queen", "outside"])
+def test_a_waiting_home_stays_before_queen_and_worlds_end(ahead):
+    cell, heading = {"queen": ((0, 0, 4), 4), "outside": ((6, 0, 0), 0)}[ahead]
+    ant = (neighbour(cell, 2), 5)
+    colony = wandering([cell], heading, ants=[ant], regrowth=50)
+    act(colony, PICK_UP)
+    assert (colony.homes.homes[0].cell, waiting(colony)) == (cell, [0])
+
+
 def test_a_waiting_home_walks_over_ants_and_food_but_not_over_rocks():
     # The taken food's home at (1, 0, 0) comes to lie under the ant, or stays beside a rock.
     for obstacles, expected in (((), (0, 0, 0)), ([neighbour((1, 0, 0), 5)], (1, 0, 0))):

@@ -68,6 +68,13 @@ def test_the_bootstrap_leans_to_the_long_tail() -> None:
     np.testing.assert_allclose(high - mean, mean - low)
 
 
+def test_symmetric_data_with_many_ties_give_a_symmetric_interval() -> None:
+    """A quarter of the resampled means equal the mean; they count by half to either side."""
+    low, high = bootstrap_interval(np.array([[0.0] * 5 + [1.0] * 5]))
+    assert low[0] + high[0] == pytest.approx(1.0, abs=1e-9)
+    assert low[0] > 0.05
+
+
 def test_bca_without_expansion_agrees_with_scipy() -> None:
     """The expansion is a change of level, which can be undone."""
     values = np.random.default_rng(5).gamma(2.0, size=(1, 40))
