@@ -127,7 +127,7 @@ class Colony:
             [checks.checked_world(one) for one in several], config, self.seeds
         )
         options = (config.births, config.lifespan, config.regrowth, config.wander)
-        self._lively = any(option not in (None, False) for option in options)
+        self._lively = any(option is not None and option is not False for option in options)
         large = config.slots >= _LARGE_COLONY
         self.schedule = _one_of(
             "schedule", schedule or ("by_chunk" if large else "by_world"), ("by_world", "by_chunk")

@@ -62,5 +62,6 @@ def diffused(c: ti.template(), k: ti.template(), place):
             if c.walls[neighbour] == 0:
                 n_open += 1.0
                 received += c.level[neighbour] * k.share
-        level = level - level * k.share * n_open + received
+        # At rate 1 all is given away, and rounding could leave less than nothing.
+        level = ti.max(level - level * k.share * n_open + received, 0.0)
     return level

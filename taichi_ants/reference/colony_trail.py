@@ -111,4 +111,5 @@ class DenseTrail:
         got = np.zeros_like(shares)
         for heading in range(N_HEADINGS):
             got = got + shares_and_wall[self._around[:, heading]]
-        self._levels = (self._levels - given) + got
+        # At rate 1 all is given away, and rounding could leave less than nothing.
+        self._levels = np.maximum((self._levels - given) + got, np.float32(0))

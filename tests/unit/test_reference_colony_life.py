@@ -219,16 +219,16 @@ def test_an_ant_that_gives_in_its_last_tick_leaves_nothing():
 
 
 def test_a_dying_ant_learns_from_what_it_sees_last_as_if_it_lived_on():
-    # Forward onto an empty cell, from where it sees E E E again. Q(E E E, left) = 4, so the target
-    # is 0 + 0.5 * 4 and the value of forward 0 + 0.5 * 2.
-    world = World((5, 5, 5), (0, 0, 4), ants=[((0, 0, 0), 0)])
+    # Forward onto an empty cell, from where it sees a rock ahead, E O E. Q(E O E, left) = 4, so the
+    # target is 0 + 0.5 * 4 and the value of forward 0 + 0.5 * 2.
+    world = World((5, 5, 5), (0, 0, 4), obstacles=[(2, 0, 0)], ants=[((0, 0, 0), 0)])
     q_values = np.zeros((128, 5), np.float32)
-    q_values[0, 0] = 4
+    q_values[4, 0] = 4
     colony = begun(world, sharing="shared", q_values=q_values, lifespan=1)
     act(colony, FORWARD)
     assert colony.ants == {}
     [step] = colony.transitions
-    assert (step.pair, step.outcome, step.died) == ((0, FORWARD), (0, 0, False), True)
+    assert (step.pair, step.outcome, step.died) == ((0, FORWARD), (0, 4, False), True)
     assert colony.td_errors == [2]
     assert colony.snapshot().q_values[0, FORWARD] == 1
 
