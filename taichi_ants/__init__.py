@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from taichi_ants.environment import prepare_for_taichi
 
 if TYPE_CHECKING:
-    from taichi_ants import analysis, learners, reference, states, worlds
+    from taichi_ants import analysis, learners, reference, rendering, states, worlds
     from taichi_ants.colony_config import ColonyConfig, Pheromone
     from taichi_ants.config import TrainingConfig
     from taichi_ants.engines.colony import Colony, ColonyEpisodes
@@ -43,7 +43,7 @@ _HOMES = {
     "trace_training": "taichi_ants.engines.traces",
     "train": "taichi_ants.engines.runs",
 }
-_MODULES = ("analysis", "learners", "reference", "states", "worlds")
+_MODULES = ("analysis", "learners", "reference", "rendering", "states", "worlds")
 
 __all__ = [
     "AntsError",
@@ -64,6 +64,7 @@ __all__ = [
     "learners",
     "load_policy",
     "reference",
+    "rendering",
     "rollout",
     "save_policy",
     "states",

@@ -1,4 +1,4 @@
-"""Small worlds drawn at random: several foods, rocks and trails of all strengths, one ant or none."""
+"""Small worlds drawn at random: several foods, rocks, trails of all strengths, one ant or none."""
 
 from __future__ import annotations
 

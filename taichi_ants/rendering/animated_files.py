@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import struct
 from collections.abc import Iterable, Iterator
+from types import ModuleType
 from typing import BinaryIO
 
 import numpy as np
@@ -35,7 +36,9 @@ def write_gif(file: BinaryIO, frames: Iterable[np.ndarray], fps: float) -> None:
         if previous is not None:
             same = part == previous[top:bottom, left:right]
             part = np.where(same, np.uint8(TRANSPARENT), part)
-        file.write(struct.pack("<BBBBHBB", 0x21, 0xF9, 4, 0x05, min(duration, 0xFFFF), TRANSPARENT, 0))
+        file.write(
+            struct.pack("<BBBBHBB", 0x21, 0xF9, 4, 0x05, min(duration, 0xFFFF), TRANSPARENT, 0)
+        )
         file.write(struct.pack("<BHHHHB", 0x2C, left, top, right - left, bottom - top, 0))
         file.write(_lzw(part))
     file.write(b"\x3b")
@@ -142,7 +145,7 @@ def write_mp4(file: BinaryIO, frames: Iterable[np.ndarray], fps: float) -> None:
         container.mux(stream.encode())
 
 
-def import_av():  # noqa: ANN201 - the type is the module's, which may be missing
+def import_av() -> ModuleType:
     """PyAV, which is needed for MP4 only.
 
     Raises:

@@ -10,16 +10,17 @@ import numpy as np
 
 PAGE = 0xFFFFFF  # also what lies outside the world, and the lines between cells
 CELL_EMPTY = 0xE9ECEF
-CELL_OBSTACLE = 0x5D6673
+CELL_OBSTACLE = 0x464B52
 CELL_FOOD = 0xD55E00
-CELL_QUEEN = 0xAA2E7E
+CELL_QUEEN = 0xA312DC
 # Under the drawings of food and queen, where cells are large enough for them.
 FLOOR_FOOD = 0xFBE6D4
-FLOOR_QUEEN = 0xF4DCEA
+FLOOR_QUEEN = 0xF0DDFA
 ANT = 0x14171C
 INK = 0x1F2429  # text
 FAINT_INK = 0x6B737C
-RULE = 0xC9CED4  # thin lines, and bars that are not chosen
+RULE = 0xC9CED4  # bars of actions
+CHOSEN = 0x0072B2  # the bar of the chosen action, arrows of moves
 
 # Samples of matplotlib's perceptually uniform map "viridis", from its light end (1.0) down to 0.28,
 # evenly spaced. Below that it would be too dark for an ant to stand out.

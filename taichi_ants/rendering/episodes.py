@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from itertools import islice
+from typing import Any
 
 import numpy as np
 
 from taichi_ants.engines.traces import Trace, rollout
+from taichi_ants.errors import AntsError
 from taichi_ants.rendering.panel import Status
 from taichi_ants.rendering.replay import Replay
 from taichi_ants.rendering.scene import DEFAULT_SIZE, Scene, check_size, range_with_zero
@@ -119,16 +122,36 @@ def episode_frames(
     Raises:
         AntsError: The size is not allowed.
     """
-    scene = Scene(
-        episode.world.grid,
-        size,
-        hud=hud,
-        legend=legend,
-        title=title,
-        q_range=range_with_zero(episode.trace.q_values),
-    )
+    scene = _scene_of(episode, size, hud=hud, legend=legend, title=title)
     for snapshot, status in episode.moments():
         yield scene.draw(snapshot if view else without_view(snapshot), status)
+
+
+def episode_picture(
+    episode: Episode,
+    step: int,
+    size: tuple[int, int] = DEFAULT_SIZE,
+    *,
+    hud: bool = True,
+    legend: bool = True,
+    view: bool = True,
+    title: str = "",
+) -> np.ndarray:
+    """The picture of one step, 0 to len(episode) - 1; other arguments as in `episode_frames`.
+
+    Raises:
+        AntsError: There is no such step, or the size is not allowed.
+    """
+    if step not in range(len(episode)):
+        raise AntsError(f"there is no step {step!r}; the episode has 0 to {len(episode) - 1}.")
+    scene = _scene_of(episode, size, hud=hud, legend=legend, title=title)
+    snapshot, status = next(islice(episode.moments(), step, None))
+    return scene.draw(snapshot if view else without_view(snapshot), status)
+
+
+def _scene_of(episode: Episode, size: tuple[int, int], **look: Any) -> Scene:
+    bars = range_with_zero(episode.trace.q_values)
+    return Scene(episode.world.grid, size, q_range=bars, **look)
 
 
 def without_view(snapshot: Snapshot) -> Snapshot:

@@ -195,9 +195,7 @@ class _Panel:
         line = text.shortened(line, self._text_size, self._width)
         baseline = self._footer + 1.2 * self._text_size
         ink = colours.INK if status.outcome else colours.FAINT_INK
-        text.write(
-            self._canvas, line, self._middle, baseline, self._text_size, ink, align="middle"
-        )
+        text.write(self._canvas, line, self._middle, baseline, self._text_size, ink, align="middle")
 
 
 def _tiles(

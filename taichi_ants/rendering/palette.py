@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from taichi_ants.rendering import colours
-from taichi_ants.rendering.panel import CHOSEN
 
 TRANSPARENT = 255  # the index that is no colour
 _N_COLOURS = 255
@@ -13,7 +12,7 @@ _BITS = 5  # of each channel that a colour is looked up by
 _KEPT = (
     *(colours.PAGE, colours.CELL_EMPTY, colours.CELL_OBSTACLE, colours.CELL_FOOD),
     *(colours.CELL_QUEEN, colours.FLOOR_FOOD, colours.FLOOR_QUEEN, colours.ANT),
-    *(colours.INK, colours.FAINT_INK, colours.RULE, CHOSEN),
+    *(colours.INK, colours.FAINT_INK, colours.RULE, colours.CHOSEN),
 )
 _RAMP_STEP = 6
 

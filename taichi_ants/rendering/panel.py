@@ -24,7 +24,6 @@ _LEGEND = (
     (EMPTY, False, "", "ant"),
     (EMPTY, True, "", "ant with food"),
 )
-CHOSEN = 0x0072B2  # the bar of the chosen action
 
 # Heights in sizes of the text.
 STATUS_HEIGHT = 18.2
@@ -36,22 +35,26 @@ class Status:
     """What the head-up lines say.
 
     Attributes:
-        step: Number of the step in its episode, from 0.
-        episode_return: Sum of the rewards so far.
-        episode: What kind of episode it is, or its number.
+        step: Number of the step in its episode, from 0; for a colony, of the tick.
+        episode_return: Sum of the rewards so far; None leaves it out.
+        episode: What kind of episode it is, or its number; empty leaves it out.
         state: Index of the state; None if there is none to speak of.
         action: The chosen action, 0 to 4; None if there is none.
         q_values: float (5,), the action values of the state; None draws no bars.
         outcome: How the episode ended; empty while it goes on.
+        more: Further lines, (name, value), for example of a colony.
+        step_name: What a step is called.
     """
 
     step: int
-    episode_return: int
+    episode_return: int | None = None
     episode: str = ""
     state: int | None = None
     action: int | None = None
     q_values: np.ndarray | None = None
     outcome: str = ""
+    more: tuple[tuple[str, str], ...] = ()
+    step_name: str = "step"
 
 
 def draw_status(
@@ -86,7 +89,9 @@ def draw_status(
 
 def _lines(status: Status) -> list[tuple[str, str]]:
     lines = [("episode", status.episode)] if status.episode else []
-    lines += [("step", str(status.step)), ("return", str(status.episode_return))]
+    lines.append((status.step_name, str(status.step)))
+    if status.episode_return is not None:
+        lines.append(("return", str(status.episode_return)))
     if status.state is not None:
         state = state_from_index(status.state)
         seen = " ".join(CELL_LETTERS[state.carries][code] for code in state.view)
@@ -95,7 +100,7 @@ def _lines(status: Status) -> list[tuple[str, str]]:
         lines.append(("outcome", status.outcome))
     elif status.action is not None:
         lines.append(("action", ACTION_NAMES[status.action]))
-    return lines
+    return [*lines, *status.more]
 
 
 def _draw_bars(
@@ -117,12 +122,12 @@ def _draw_bars(
         value = float(np.clip(status.q_values[action], low, high))
         ends = sorted((zero, zero + value * pixels))
         chosen = action == status.action
-        colour = CHOSEN if chosen else colours.RULE
+        colour = colours.CHOSEN if chosen else colours.RULE
         fill(frame, ends[0], y + 0.35 * size, ends[1] - ends[0], thickness, colour)
-        ink = CHOSEN if chosen else colours.INK
+        ink = colours.CHOSEN if chosen else colours.INK
         baseline = y + round(1.05 * size)
         text.write(frame, ACTION_NAMES[action], left, baseline, size, ink)
-        number = f"{status.q_values[action]:.2f}"
+        number = f"{round(float(status.q_values[action]), 2) + 0.0:.2f}"  # no minus zero
         text.write(frame, number, left + width, baseline, size, ink, align="right")
     fill(frame, zero - 1, top + 0.1 * size, 1, N_ACTIONS * pitch - 0.1 * size, colours.FAINT_INK)
 

@@ -36,8 +36,10 @@ def unpack(colour):
 @ti.func
 def pack(rgb):
     """A colour from red, green and blue, 0 to 255."""
-    return ti.cast(rgb.x + 0.5, ti.u32) << 16 | ti.cast(rgb.y + 0.5, ti.u32) << 8 | ti.cast(
-        rgb.z + 0.5, ti.u32
+    return (
+        ti.cast(rgb.x + 0.5, ti.u32) << 16
+        | ti.cast(rgb.y + 0.5, ti.u32) << 8
+        | ti.cast(rgb.z + 0.5, ti.u32)
     )
 
 
@@ -294,9 +296,9 @@ def draw_shapes(
         first, last = top + band * BAND, top + ti.min((band + 1) * BAND, height) - 1
         for n in range(table.shape[0]):
             x, y, radius = table[n, 0], table[n, 1], table[n, 2]
-            reach = radius + 2.0
+            shape, colour = ti.cast(table[n, 4], ti.i32), colours[n]
+            reach = radius + ti.select(shape == DOT, 0.5, _HALO + 0.5)  # with its smooth edge
             if y + reach >= first and y - reach <= last + 1:
-                shape, colour = ti.cast(table[n, 4], ti.i32), colours[n]
                 angle = table[n, 3] * (math.pi / 3)
                 cosine, sine = ti.cos(angle), ti.sin(angle)
                 j0, j1 = ti.max(first, ti.cast(y - reach, ti.i32)), ti.cast(y + reach, ti.i32)

@@ -25,7 +25,7 @@ _FILL = 0.83  # radius of what stands on a cell, in sizes of the hexagon; the la
 _DOT_RADIUS = 0.9  # pixels, of an ant in cells that are too small for it
 _QUEEN_RADIUS = 2.5
 _DOT_WITH_FOOD = 0x9A3F00
-_MOST_DOTS = 0.5  # the share of the world that dots may cover at full strength
+_FREE_SHARE = 0.3  # of the world, which dots may cover at full strength
 _SQRT_3 = math.sqrt(3.0)
 
 
@@ -74,8 +74,10 @@ class Rasteriser:
             snapshot: The world, of this grid. Letters are not drawn, only the cells in view.
         """
         self.draw_ground(frame, snapshot.ground, snapshot.trail)
-        table = [self._things(snapshot), *self._view(snapshot), self._ants(snapshot)]
-        self.draw_shapes(frame, *(np.concatenate(parts) for parts in zip(*table, strict=True)))
+        layers = [self._things(snapshot), *self._view(snapshot), self._ants(snapshot)]
+        if not self.has_hexagons:  # dots overlap, and a crowd must not hide the queen
+            layers.reverse()
+        self.draw_shapes(frame, *(np.concatenate(parts) for parts in zip(*layers, strict=True)))
 
     def draw_ground(self, frame: np.ndarray, ground: np.ndarray, trail: np.ndarray) -> None:
         """Draw the cells: what they hold, uint8 (grid.size,), and the trail, any (grid.size,)."""
@@ -90,6 +92,10 @@ class Rasteriser:
             EMPTY,
         )
         self.draw_colours(frame, self._colours)
+
+    def colour_of(self, cells: np.ndarray) -> np.ndarray:
+        """The colours, uint32 (...), in which `draw` has just drawn cells (flat indices (...))."""
+        return self._colours[cells]
 
     def draw_colours(self, frame: np.ndarray, of_cells: np.ndarray) -> None:
         """Draw the cells in the given colours, uint32 (grid.size,)."""
@@ -166,11 +172,19 @@ class Rasteriser:
         return ants, of_shapes
 
     def _dot_opacity(self, n: int) -> float:
-        """1, unless dots larger than cells would hide the world: a crowd is a shade then."""
+        """How strong n dots are drawn: fully, unless they would hide the world and each other.
+
+        Then all dots together cover a share of the world that grows with the logarithm of n, up to
+        the whole when there is an ant in each cell.
+        """
         cell = 1.5 * _SQRT_3 * self.viewport.hexagon**2
-        dot = np.pi * _DOT_RADIUS**2
-        room = _MOST_DOTS * self.grid.count * cell / max(n * dot, 1.0)
-        return float(np.clip(room, min(1.0, cell / dot), 1.0))
+        dot = math.pi * _DOT_RADIUS**2
+        covered = n * dot / (self.grid.count * cell)
+        most = max(dot / cell, 1.0)
+        if covered <= _FREE_SHARE:
+            return 1.0
+        growth = math.log(covered / _FREE_SHARE) / math.log(most / _FREE_SHARE)
+        return min(1.0, (_FREE_SHARE + (1.0 - _FREE_SHARE) * growth) / covered)
 
     def _colours_of_ground(self) -> np.ndarray:
         """uint32 (16,), by the code of the ground."""
@@ -205,9 +219,9 @@ class Rasteriser:
 
 
 def make_room(marks: np.ndarray, crowded: np.ndarray) -> None:
-    """Make shapes smaller and move them up, in place, where `crowded` (bool (n,)) by a letter."""
-    marks[crowded, 1] -= 0.45 * marks[crowded, 2]
-    marks[crowded, 2] *= 0.66
+    """Make shapes smaller and move them to the left, in place, where `crowded` (bool (n,))."""
+    marks[crowded, 0] -= 0.58 * marks[crowded, 2]
+    marks[crowded, 2] *= 0.6
 
 
 def _kernels() -> ModuleType:

@@ -83,12 +83,14 @@ class Scene:
         self._background[:] = colours.channels(colours.PAGE)
         self._places = self._panel_places(room, margin, title)
         if self._legend:
-            panel.draw_legend(
-                self._background, self._places["legend"], self._text_size, full_level
-            )
+            panel.draw_legend(self._background, self._places["legend"], self._text_size, full_level)
 
     def draw(self, snapshot: Snapshot, status: Status | None = None) -> np.ndarray:
-        """A picture, uint8 (height, width, 3), of a world and of what its head-up lines say."""
+        """A picture, uint8 (height, width, 3), of a world and of what its head-up lines say.
+
+        `snapshot` may be anything that `Snapshot.of` takes, for example `Colony.snapshot()`.
+        """
+        snapshot = Snapshot.of(snapshot)
         frame = self._background.copy()
         self._rasteriser.draw(frame, snapshot)
         if snapshot.letters is not None and self._rasteriser.has_room_for_letters:
@@ -102,9 +104,17 @@ class Scene:
     def _write_letters(self, frame: np.ndarray, snapshot: Snapshot) -> None:
         cells = snapshot.cells_in_view()
         centres = self.viewport.centres(self._rasteriser.grid.cells(cells)).tolist()
-        crowded = np.isin(snapshot.ground[cells], (FOOD, QUEEN)).tolist()
-        for letter, centre, beside in zip(snapshot.letters, centres, crowded, strict=True):
-            write_letter(frame, letter, centre, self.viewport.hexagon, beside)
+        floors = self._rasteriser.colour_of(cells).tolist()
+        beside = np.isin(snapshot.ground[cells], (FOOD, QUEEN)).tolist()
+        for number, letter in enumerate(snapshot.letters):
+            write_letter(
+                frame,
+                letter,
+                centres[number],
+                self.viewport.hexagon,
+                floor=floors[number],
+                beside=beside[number],
+            )
 
     def _world_room(self, margin: int) -> tuple[int, int, int, int]:
         """Left, top, width and height of the part of the picture for the world."""
@@ -148,13 +158,21 @@ class Scene:
 
 
 def write_letter(
-    frame: np.ndarray, letter: str, centre: tuple[float, float], hexagon: float, crowded: bool
+    frame: np.ndarray,
+    letter: str,
+    centre: tuple[float, float],
+    hexagon: float,
+    floor: int,
+    beside: bool,
 ) -> None:
-    """Write a letter on a cell, below its middle if it is crowded by the drawing of a thing."""
+    """Write a letter on a cell of the colour `floor`, `beside` what is drawn there if need be."""
     x, y = centre
-    size = round((0.7 if crowded else 0.85) * hexagon)
-    baseline = y + (0.66 * hexagon if crowded else 0.36 * size)
-    text.write(frame, letter, x, baseline, size, align="middle", halo=max(1, size // 16))
+    size = round((0.75 if beside else 0.85) * hexagon)
+    x += 0.38 * hexagon if beside else 0.0
+    red, green, blue = colours.channels(floor).tolist()
+    dark = 0.30 * red + 0.59 * green + 0.11 * blue < 128
+    ink = colours.PAGE if dark else colours.INK
+    text.write(frame, letter, x, y + 0.36 * size, size, ink, align="middle")
 
 
 def range_with_zero(q_values: np.ndarray | None) -> tuple[float, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -71,6 +72,14 @@ class Snapshot:
             ant_carries=np.zeros(n, dtype=bool),
         )
 
+    @classmethod
+    def of(cls, moment: Any) -> Snapshot:
+        """A snapshot of anything that has its attributes up to `ant_carries`, as colonies do.
+
+        A `Snapshot` is returned as it is.
+        """
+        return moment if isinstance(moment, cls) else cls(**vars(moment))
+
     def cells_in_view(self) -> np.ndarray:
         """Flat indices (3,) of the cells to the left, ahead and to the right of the watched ant."""
         headings = (self.ant_headings[self.watched] + np.array([-1, 0, 1])) % N_HEADINGS
@@ -88,8 +97,11 @@ def _check(name: str, array: np.ndarray, shape: tuple[int, ...], kinds: str) -> 
 
 
 def _check_below(name: str, array: np.ndarray, limit: int) -> None:
-    if len(array) and not (0 <= array.min() and array.max() < limit):
+    if not len(array):
+        return
+    lowest, highest = int(array.min()), int(array.max())
+    if lowest < 0 or highest >= limit:
         raise AntsError(
-            f"{name} holds values from {array.min()} to {array.max()}; they must lie between 0 "
-            f"and {limit - 1}."
+            f"{name} holds values from {lowest} to {highest}; they must lie between 0 and "
+            f"{limit - 1}."
         )

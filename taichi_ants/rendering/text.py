@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from taichi_ants.rendering.colours import INK, PAGE, channels
+from taichi_ants.rendering.colours import INK, channels
+
+if TYPE_CHECKING:
+    from PIL.ImageFont import FreeTypeFont
 
 SMALLEST = 9  # pixels; smaller text cannot be read
 
@@ -19,32 +23,28 @@ def write(
     size: int,
     colour: int = INK,
     align: str = "left",
-    halo: int = 0,
 ) -> None:
     """Write a line of text into a frame; what lies beyond its edges is cut off.
 
     Args:
         frame: uint8 (height, width, 3).
-        text: The text, in ASCII: the font has little else.
+        text: The text; what is not ASCII becomes a question mark, since the font has little else.
         x: The left edge, the middle or the right edge of the text, in pixels.
         baseline: Where its letters stand, in pixels from the top.
         size: Of the font, in pixels.
         colour: 0xRRGGBB.
         align: "left", "middle" or "right", what `x` is.
-        halo: Pixels in the colour of the page around the letters.
     """
     if not text:
         return
     moved = {"left": 0.0, "middle": 0.5, "right": 1.0}[align] * width(text, size)
-    if halo:
-        _stamp(frame, _mask(text, size, halo), x - moved, baseline, PAGE)
-    _stamp(frame, _mask(text, size, 0), x - moved, baseline, colour)
+    _stamp(frame, _mask(text, size), x - moved, baseline, colour)
 
 
 @lru_cache(maxsize=4096)
 def width(text: str, size: int) -> float:
     """Pixels from the start of a line of text to its end."""
-    return _font(size).getlength(text)
+    return _font(size).getlength(_plain(text))
 
 
 def shortened(text: str, size: int, room: float) -> str:
@@ -57,24 +57,27 @@ def shortened(text: str, size: int, room: float) -> str:
     return kept + "..." if kept else ""
 
 
+def _plain(text: str) -> str:
+    return text.encode("ascii", "replace").decode("ascii")
+
+
 @lru_cache(maxsize=64)
-def _font(size: int):  # noqa: ANN202 - Pillow's type would be imported with it
+def _font(size: int) -> FreeTypeFont:
     from PIL import ImageFont
 
     return ImageFont.load_default(size)
 
 
 @lru_cache(maxsize=4096)
-def _mask(text: str, size: int, stroke: int) -> tuple[np.ndarray, int, int]:
+def _mask(text: str, size: int) -> tuple[np.ndarray, int, int]:
     """Coverage 0 to 1, float32 (height, width, 1), and where its corner lies from the start."""
     from PIL import Image, ImageDraw
 
-    left, top, right, bottom = _font(size).getbbox(text, anchor="ls", stroke_width=stroke)
+    text = _plain(text)
+    left, top, right, bottom = _font(size).getbbox(text, anchor="ls")
     x, y = int(left) - 1, int(top) - 1
     image = Image.new("L", (int(right) - x + 2, int(bottom) - y + 2))
-    ImageDraw.Draw(image).text(
-        (-x, -y), text, fill=255, font=_font(size), anchor="ls", stroke_width=stroke
-    )
+    ImageDraw.Draw(image).text((-x, -y), text, fill=255, font=_font(size), anchor="ls")
     return np.asarray(image, dtype=np.float32)[:, :, None] / np.float32(255), x, y
 
 

@@ -53,8 +53,7 @@ def check_animation(path: PathLike, fps: float) -> Path:
     fastest = _FASTEST.get(kind, _MAX_FPS)
     if isinstance(fps, (bool, str)) or not 0.1 <= fps <= fastest or not math.isfinite(fps):
         raise AntsError(
-            f"fps is {fps!r}; it must be a number from 0.1 to {fastest:g} for "
-            f"{kind or 'pictures'}."
+            f"fps is {fps!r}; it must be a number from 0.1 to {fastest:g} for {kind or 'pictures'}."
         )
     if kind == ".mp4":
         animated_files.import_av()

@@ -82,6 +82,10 @@ def test_mp4(tmp_path, frames) -> None:
         error = np.abs(picture[:, :329].astype(int) - frame)
         assert error.mean() < 4
         assert np.median(error) <= 2
+        # Trails and bars keep their hue, so the colour space is the one that the file names.
+        bright = frame.max(axis=2).astype(int) - frame.min(axis=2) > 100
+        assert bright.sum() > 500
+        assert np.median(error[bright], axis=0).max() <= 8
 
 
 def test_numbered_pictures(tmp_path, frames) -> None:
@@ -116,7 +120,7 @@ def test_pictures_that_stay_the_same_are_joined(tmp_path, frames, ending) -> Non
 def test_a_single_pixel_may_change(tmp_path, ending) -> None:
     first = np.full((70, 81, 3), 255, dtype=np.uint8)
     second = first.copy()
-    second[33, 57] = 0
+    second[33, 57] = (0x14, 0x17, 0x1C)  # an ant's
     save_animation(tmp_path / f"a{ending}", [first, second, first], 10)
     pictures, _ = decoded(tmp_path / f"a{ending}")
     assert all((a == b).all() for a, b in zip(pictures, [first, second, first], strict=True))
@@ -173,7 +177,7 @@ def test_memory_does_not_grow(tmp_path, name) -> None:
             del frame
 
     save_animation(tmp_path / name, many(), 10)
-    assert most <= 4
+    assert most <= 6
 
 
 @pytest.mark.parametrize("name", ["a.avi", "a.png", "a.jpeg", "a.gif.zip", "a.7"])

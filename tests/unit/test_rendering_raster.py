@@ -150,6 +150,15 @@ def test_a_crowd_is_a_shade_that_grows_with_it() -> None:
     assert light[2] > light[3]
 
 
+def test_a_crowd_does_not_hide_the_queen() -> None:
+    world = World(ranges=(300, 300, 1), queen=(150, 150, 0))
+    scene = Scene(world.grid, (100, 100), hud=False, legend=False)
+    x, y = scene.viewport.centres(world.queen).astype(int).tolist()
+    frame = scene.draw(Snapshot.at_start(world, n=20_000))
+    assert (frame[y, x] == colours.channels(colours.CELL_QUEEN)).all()
+    assert frame[y, x + 8].max() < 130
+
+
 @pytest.mark.parametrize("hexagon", [4, 9, 20, 50])
 def test_an_ant_points_where_it_is_heading(hexagon) -> None:
     """Its tip is on the side of the heading, and a crumb there."""
@@ -252,8 +261,8 @@ def test_all_sizes(size) -> None:
     assert frame.shape == (size[1], size[0], 3)
     assert frame.dtype == np.uint8
     # The queen is there, whatever the size.
-    magenta = (frame[..., 0] > frame[..., 1] + 90) & (frame[..., 2] > frame[..., 1] + 40)
-    assert magenta.sum() >= 3
+    least, most = frame.min(axis=2).astype(int), frame.max(axis=2)
+    assert ((frame[..., 1] == least) & (most - least > 120) & (frame[..., 2] == most)).sum() >= 3
 
 
 def test_rasterising_takes_less_than_8_ms() -> None:

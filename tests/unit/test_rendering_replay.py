@@ -10,7 +10,7 @@ from taichi_ants import AntsError, World, reference, rollout
 from taichi_ants.constants import STREAM_ROLLOUT
 from taichi_ants.hexgrid import normal_form
 from taichi_ants.policies import random_policy, trail_follower
-from taichi_ants.rendering import Episode, episode_picture
+from taichi_ants.rendering import Episode, episode_frames, episode_picture
 from taichi_ants.rendering.replay import Replay
 from taichi_ants.worlds import paper
 
@@ -20,9 +20,9 @@ def pantry() -> World:
     return World(
         ranges=(6, 6, 6),
         queen=(0, 0, 0),
-        foods=[(x, y, 0) for x in range(2, 6) for y in range(2, 6)],
+        foods=[(1, 4, 0)] + [(x, y, 0) for x in range(2, 6) for y in range(2, 6)],
         trails=[((0, 1, 0), 3)],
-        ants=[((1, 1, 0), 1)],
+        ants=[((1, 3, 0), 1)],
     )
 
 
@@ -95,8 +95,10 @@ def test_what_the_head_up_lines_say() -> None:
 def test_a_picture_of_one_step_is_that_frame() -> None:
     episode = Episode.play(pantry(), trail_follower(), max_steps=12)
     last = len(episode) - 1
-    pictures = [episode_picture(episode, step, (400, 330)) for step in (0, 3, last)]
-    assert not (pictures[0] == pictures[1]).all()
+    frames = list(episode_frames(episode, (400, 330)))
+    for step in (0, 1, last):
+        assert (episode_picture(episode, step, (400, 330)) == frames[step]).all()
+    assert not (frames[0] == frames[1]).all()
     with pytest.raises(AntsError, match="step"):
         episode_picture(episode, last + 1, (400, 330))
 

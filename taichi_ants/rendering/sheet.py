@@ -26,7 +26,7 @@ from taichi_ants.constants import (
 from taichi_ants.errors import AntsError
 from taichi_ants.hexgrid import AxialGrid
 from taichi_ants.rendering import colours, text
-from taichi_ants.rendering.panel import CHOSEN, fill
+from taichi_ants.rendering.panel import fill
 from taichi_ants.rendering.rasteriser import Rasteriser, make_room
 from taichi_ants.rendering.scene import write_letter
 from taichi_ants.rendering.viewport import Viewport
@@ -47,6 +47,8 @@ _EXPLANATION = (
     "as a share of the gap from the best to the worst.",
     "Pale: all action values are equal, the state was never visited. "
     "Empty places are states that cannot occur.",
+    "E empty, O obstacle (also the outside and other ants), T trail, F food, "
+    "S nearer to the queen, Q queen.",
 )
 _FLOOR_NEARER = 0xDCE3F2
 _TRAIL = 120  # of the ramp
@@ -115,13 +117,13 @@ class _Sheet:
         hexagon = self._tile_width / 5.5
         self._picture_height = round(3.55 * hexagon)
         self._tile_height = self._picture_height + round(2.3 * self._small)
-        self._heading = round(2.9 * self._large)  # of a half, with the labels of its blocks
+        self._heading = round(3.9 * self._large)  # of a half, with the labels of its blocks
         self._half_height = self._heading + 4 * self._tile_height + round(0.5 * self._large)
-        self._top = round(2.2 * self._large) + len(_EXPLANATION) * round(1.6 * self._small)
+        self._top = round(3.0 * self._large) + len(_EXPLANATION) * round(1.6 * self._small)
         self._picture = _Picture(self._tile_width, self._picture_height, hexagon)
 
     def draw(self, title: str) -> np.ndarray:
-        height = self._top + 2 * self._half_height + self._margin
+        height = self._top + 2 * self._half_height
         sheet = np.empty((height, self._width, 3), dtype=np.uint8)
         sheet[:] = colours.channels(colours.PAGE)
         y = self._margin + self._large
@@ -136,7 +138,7 @@ class _Sheet:
         return sheet
 
     def _draw_half(self, sheet: np.ndarray, carries: bool, top: int) -> None:
-        y = top + round(1.9 * self._large)
+        y = top + round(1.6 * self._large)
         text.write(sheet, _HALVES[carries], self._margin, y, self._large)
         letters = CELL_LETTERS[carries]
         for ahead, label in enumerate(_AHEAD[carries]):
@@ -189,7 +191,7 @@ class _Sheet:
         words = text.shortened(
             " / ".join(ACTION_NAMES[action] for action in best), self._small, width
         )
-        colour = _ARROW_COLOURS.get(best[0], CHOSEN)
+        colour = _ARROW_COLOURS.get(best[0], colours.CHOSEN)
         text.write(sheet, words, middle, y, self._small, colour, align="middle")
         y += round(0.4 * self._small)
         length, thickness = round(0.72 * width), max(2, round(0.32 * self._small))
@@ -224,9 +226,14 @@ class _Picture:
         self._draw_ant(state.carries)
         centres = self._viewport.centres(_CELLS[1:]).tolist()
         for code, centre in zip(state.view, centres, strict=True):
-            letter = CELL_LETTERS[state.carries][code]
-            hexagon = self._viewport.hexagon
-            write_letter(self._frame, letter, centre, hexagon, code == SEES_GOAL)
+            write_letter(
+                self._frame,
+                CELL_LETTERS[state.carries][code],
+                (centre[0], centre[1] - _rise(code) * self._viewport.hexagon),
+                self._viewport.hexagon,
+                floor=_floor(state.carries, code),
+                beside=code == SEES_GOAL,
+            )
         self._draw_arrows(state, actions)
         return self._frame
 
@@ -240,6 +247,7 @@ class _Picture:
         cells = self._cells[1:][np.array(state.view) == SEES_GOAL]
         marks = self._rasteriser.shapes(cells, shape, fill=0.72)
         make_room(marks, np.ones(len(marks), dtype=bool))
+        marks[:, 1] -= _rise(SEES_GOAL) * self._viewport.hexagon
         self._rasteriser.draw_shapes(self._frame, marks, _repeated(colour, len(marks)))
 
     def _draw_ant(self, carries: bool) -> None:
@@ -262,12 +270,17 @@ class _Picture:
                 centres = self._viewport.centres(_CELLS[[0, place + 1]])
                 x, y = (0.5 * centres[0] + 0.5 * centres[1]).tolist()
                 turned = _HEADINGS[place] + (3 if action == PICK_UP else 0)
-                rows.append((x, y, 0.42 * hexagon, turned, self._rasteriser.kernels.ARROW, 1.0))
-                of_rows.append(_ARROW_COLOURS.get(action, CHOSEN))
+                rows.append((x, y, 0.37 * hexagon, turned, self._rasteriser.kernels.ARROW, 1.0))
+                of_rows.append(_ARROW_COLOURS.get(action, colours.CHOSEN))
         if rows:
             self._rasteriser.draw_shapes(
                 self._frame, np.array(rows, np.float32), np.array(of_rows, np.uint32)
             )
+
+
+def _rise(code: int) -> float:
+    """How far what is drawn on a cell moves up for the arrows, in sizes of a hexagon."""
+    return 0.27 if code == SEES_GOAL else 0.12
 
 
 def _floor(carries: bool, code: int) -> int:

@@ -1,0 +1,97 @@
+"""Animations of colonies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from taichi_ants.constants import DEPOSIT_LEVEL
+from taichi_ants.errors import AntsError
+from taichi_ants.rendering.episodes import DEFAULT_FPS, Progress, with_pause
+from taichi_ants.rendering.panel import Status
+from taichi_ants.rendering.scene import DEFAULT_SIZE, Scene
+from taichi_ants.rendering.snapshot import Snapshot
+from taichi_ants.rendering.writers import PathLike, check_animation, save_animation
+
+if TYPE_CHECKING:
+    from taichi_ants.engines.colony import Colony
+
+
+def colony_frames(
+    colony: Colony,
+    ticks: int,
+    size: tuple[int, int] = DEFAULT_SIZE,
+    *,
+    every: int = 1,
+    world: int = 0,
+    hud: bool = True,
+    legend: bool = True,
+    title: str = "",
+    full_level: float = DEPOSIT_LEVEL,
+) -> Iterator[np.ndarray]:
+    """Let time pass in a colony, and draw it: uint8 (height, width, 3), now and every few ticks.
+
+    Args:
+        colony: In an episode; it is moved on by `ticks`.
+        ticks: How many, at least 1; the last step is shorter if need be.
+        size: Width and height in pixels.
+        every: Ticks from one picture to the next, at least 1.
+        world: Number of the world to draw.
+        hud: Whether to write ticks, ants and deliveries beside the world.
+        legend: Whether to draw what the colours mean.
+        title: A line above both.
+        full_level: The trail level that has the last colour of the ramp.
+
+    Raises:
+        AntsError: `every` or `ticks` is below 1, or the size is not allowed.
+    """
+    if every < 1 or ticks < 1:
+        raise AntsError(f"every is {every} and ticks {ticks}; both must be at least 1.")
+    grid = colony.worlds[world].grid
+    scene = Scene(grid, size, hud=hud, legend=legend, title=title, full_level=full_level)
+    yield _drawn(scene, colony, world)
+    for done in range(0, ticks, every):
+        colony.tick(min(every, ticks - done))
+        yield _drawn(scene, colony, world)
+
+
+def colony_picture(
+    colony: Colony, size: tuple[int, int] = DEFAULT_SIZE, *, world: int = 0, **look: Any
+) -> np.ndarray:
+    """The picture of a colony as it is; other arguments as in `colony_frames`."""
+    return _drawn(Scene(colony.worlds[world].grid, size, **look), colony, world)
+
+
+def render_colony(
+    path: PathLike,
+    colony: Colony,
+    ticks: int,
+    size: tuple[int, int] = DEFAULT_SIZE,
+    *,
+    fps: float = DEFAULT_FPS,
+    every: int = 1,
+    world: int = 0,
+    hud: bool = True,
+    legend: bool = True,
+    title: str = "",
+    full_level: float = DEPOSIT_LEVEL,
+    progress: Progress | None = None,
+) -> None:
+    """Write what `colony_frames` draws as an animation; path, fps and errors: `render_episode`."""
+    check_animation(path, fps)
+    look = {"hud": hud, "legend": legend, "title": title, "full_level": full_level}
+    frames = colony_frames(colony, ticks, size, every=every, world=world, **look)
+    save_animation(path, with_pause(frames, 1 + -(-ticks // every), fps, progress), fps)
+
+
+def _drawn(scene: Scene, colony: Colony, world: int) -> np.ndarray:
+    snapshot = Snapshot.of(colony.snapshot(world))
+    delivered = int(colony.outcome().deliveries[0, world])
+    more = (
+        ("ants", str(len(snapshot.ant_cells))),
+        ("with food", str(int(snapshot.ant_carries.sum()))),
+        ("delivered", str(delivered)),
+    )
+    return scene.draw(snapshot, Status(step=colony.ticks, more=more, step_name="tick"))

@@ -1,0 +1,225 @@
+"""The command line of `experiments/render.py`, from outside."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from taichi_ants.policies import save_policy, trail_follower
+
+ROOT = Path(__file__).parents[2]
+SCRIPT = ROOT / "experiments" / "render.py"
+
+
+def environment(**changes: str) -> dict[str, str]:
+    """No display, and the package from this folder."""
+    kept = {name: value for name, value in os.environ.items() if name != "DISPLAY"}
+    return {**kept, "PYTHONPATH": str(ROOT), **changes}
+
+
+def run(*arguments: object, **changes: str) -> subprocess.CompletedProcess:
+    return subprocess.run(
+        [sys.executable, str(SCRIPT), *map(str, arguments)],
+        env=environment(**changes),
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def policy(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("policies") / "follower.npz"
+    save_policy(path, trail_follower(), {})
+    return path
+
+
+def files_in(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.rglob("*"))
+
+
+def test_an_episode_without_display_and_home(tmp_path, policy) -> None:
+    path = tmp_path / "new" / "a.gif"
+    done = run("--policy", policy, "--size", "400x330", "--out", path, HOME="/proc/nope")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert done.stdout == f"{path}: 34 steps, return 45, delivered\n"
+    with Image.open(path) as image:
+        assert image.n_frames == 35
+        assert image.size == (400, 330)
+    assert files_in(tmp_path) == ["a.gif", "new"]
+
+
+def test_training_on_the_spot(tmp_path) -> None:
+    done = run("--episodes", 30, "--out", tmp_path / "frames", "--size", "64x64", "--max-steps", 4)
+    assert done.returncode == 0, done.stderr
+    assert files_in(tmp_path / "frames")[0] == "frame_000000.png"
+    assert 5 <= len(files_in(tmp_path / "frames")) <= 17
+
+
+def test_one_step_and_a_sheet(tmp_path, policy) -> None:
+    path = tmp_path / "a.png"
+    assert run("--policy", policy, "--step", 3, "--out", path).stdout.endswith("step 3 of 34\n")
+    assert Image.open(path).size == (1280, 720)
+    late = run("--policy", policy, "--step", 35, "--out", tmp_path / "b.png")
+    assert late.returncode == 2
+    assert "no step 35" in late.stderr
+    done = run("--policy", policy, "--show", "sheet", "--out", tmp_path / "sheet.png")
+    assert done.returncode == 0, done.stderr
+    assert Image.open(tmp_path / "sheet.png").width == 1920
+    assert files_in(tmp_path) == ["a.png", "sheet.png"]
+
+
+def test_learning_and_a_colony(tmp_path) -> None:
+    done = run(
+        *("--show", "learning", "--stages", "0,2", "--max-steps", 9, "--size", "300x200"),
+        *("--out", tmp_path / "a.webp"),
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.endswith("a.webp: before learning, after 2 episodes\n")
+    with Image.open(tmp_path / "a.webp") as image:
+        assert image.n_frames >= 5
+    done = run(
+        *("--show", "colony", "--world", "open", "--ants", 7, "--episodes", 2, "--max-steps", 9),
+        *("--every", 3, "--size", "300x200", "--out", tmp_path / "b.gif"),
+    )
+    assert done.returncode == 0, done.stderr
+    assert "7 ants, 9 ticks" in done.stdout
+    with Image.open(tmp_path / "b.gif") as image:
+        assert image.n_frames == 4
+
+
+WRONG = {
+    "ending": (["--out", "{}/a.avi"], ".gif, .webp, .mp4"),
+    "ending of a sheet": (["--show", "sheet", "--out", "{}/a.gif"], ".png"),
+    "ending of learning": (["--show", "learning", "--out", "{}/a.png"], ".gif"),
+    "place": (["--out", "/proc/nope/a.gif"], "cannot write"),
+    "size": (["--size", "63x63", "--out", "{}/a.gif"], "64 to 4096"),
+    "large size": (["--size", "5000x100", "--out", "{}/a.gif"], "64 to 4096"),
+    "form of a size": (["--size", "1280*720"], "1280x720"),
+    "speed": (["--fps", "0", "--out", "{}/a.gif"], "fps"),
+    "no number": (["--fps", "fast"], "not a number"),
+    "world": (["--world", "mars", "--out", "{}/a.gif"], "mars"),
+    "policy": (["--policy", "nope.npz", "--out", "{}/a.gif"], "nope.npz"),
+    "policy and learning": (["--show", "learning", "--policy", "a.npz"], "--policy"),
+    "greedy and epsilon": (["--greedy", "--epsilon", "0.5"], "--greedy"),
+    "epsilon": (["--policy", "{policy}", "--epsilon", "2", "--out", "{}/a.gif"], "epsilon"),
+    "learner": (["--learner", "magic", "--out", "{}/a.gif"], "magic"),
+    "stages": (["--show", "learning", "--stages", "5,1", "--out", "{}/a.gif"], "ascend"),
+    "steps": (["--max-steps", "0"], "from 1 to"),
+    "unknown option": (["--colour", "red"], "--colour"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_mistakes_are_one_sentence(tmp_path, policy, name) -> None:
+    arguments, named = WRONG[name]
+    done = run(*(part.format(tmp_path, policy=policy) for part in arguments))
+    assert done.returncode == 2, done.stderr
+    assert named in done.stderr
+    assert done.stderr.startswith("error: ")
+    assert done.stderr.count("\n") == 1
+    assert done.stdout == ""
+    assert files_in(tmp_path) == []
+
+
+def test_without_pyav(tmp_path, policy) -> None:
+    hidden = "import sys, runpy; sys.modules['av'] = None; sys.argv = sys.argv[1:]; "
+    hidden += "runpy.run_path(sys.argv[0], run_name='__main__')"
+    done = subprocess.run(
+        [sys.executable, "-c", hidden, str(SCRIPT), "--out", str(tmp_path / "a.mp4")],
+        env=environment(),
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert "taichi-ants[video]" in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert files_in(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "sent", "status"),
+    [
+        ("a.gif", signal.SIGINT, 130),
+        ("frames", signal.SIGINT, 130),
+        ("a.webp", signal.SIGTERM, 143),
+    ],
+)
+def test_stopped_midway_it_leaves_nothing_behind(tmp_path, policy, name, sent, status) -> None:
+    # An ant that moves at random has far more steps to take than there is time for.
+    arguments = ["--policy", str(policy), "--epsilon", "1", "--max-steps", "100000"]
+    arguments += ["--world", "open", "--size", "1600x1200", "--out", str(tmp_path / "new" / name)]
+    with subprocess.Popen(
+        [sys.executable, str(SCRIPT), *arguments],
+        env=environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        for _ in range(600):
+            if any(path.name.endswith(".tmp") for path in tmp_path.rglob(".*")):
+                break
+            time.sleep(0.1)
+        else:
+            process.kill()
+            pytest.fail("it has not begun to write")
+        time.sleep(0.7)
+        process.send_signal(sent)
+        _, errors = process.communicate(timeout=30)
+    assert process.returncode == status
+    assert errors == ("Stopped; nothing was left behind.\n" if sent == signal.SIGINT else "")
+    assert files_in(tmp_path) == []
+
+
+def test_help_is_quick_and_needs_little() -> None:
+    took = []
+    for _ in range(3):
+        began = time.perf_counter()
+        done = run("--help")
+        took.append(time.perf_counter() - began)
+        assert "--policy" in done.stdout
+    assert min(took) < 1.0
+    heavy = "import sys; sys.path.insert(0, sys.argv[1]); import render, gallery; "
+    heavy += "print({'taichi', 'matplotlib', 'PIL', 'av', 'numpy'} & set(sys.modules))"
+    loaded = subprocess.run(
+        [sys.executable, "-c", heavy, str(SCRIPT.parent)],
+        env=environment(),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert loaded.stdout == "set()\n"
+
+
+def test_the_gallery_is_there_and_small() -> None:
+    sys.path.insert(0, str(SCRIPT.parent))
+    try:
+        import gallery
+        import render
+    finally:
+        sys.path.remove(str(SCRIPT.parent))
+    sizes = []
+    for name, arguments in gallery.GALLERY.items():
+        settings = render.parse_arguments([*arguments, "--out", name])
+        path = ROOT / "renders" / name
+        sizes.append(path.stat().st_size)
+        with Image.open(path) as image:
+            if settings.show != "sheet":
+                assert image.size == settings.size
+            frames = getattr(image, "n_frames", 1)
+            assert (frames > 1) == name.endswith(".gif")
+            assert np.asarray(image.convert("RGB")).std() > 5
+    assert len(sizes) == 5
+    assert sum(sizes) < 3_000_000

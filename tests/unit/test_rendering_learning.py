@@ -1,0 +1,177 @@
+"""Learning made visible, the policy sheet, and colonies."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from taichi_ants import AntsError, Colony, ColonyConfig, TrainingConfig, train
+from taichi_ants.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT
+from taichi_ants.policies import random_policy, trail_follower
+from taichi_ants.rendering import (
+    Snapshot,
+    best_actions,
+    clarity,
+    colony_frames,
+    colony_picture,
+    learning_frames,
+    learning_stages,
+    policy_sheet,
+    render_colony,
+    render_learning,
+)
+from taichi_ants.rendering.colours import CHOSEN
+from taichi_ants.states import REACHABLE_STATES, parse_state
+from taichi_ants.worlds import open_world, paper
+
+CONFIG = TrainingConfig("sarsa", 0.01, 0.9, 0.5, 0.995)
+
+
+def coloured(picture: np.ndarray, colour: int) -> np.ndarray:
+    return (picture == (colour >> 16, colour >> 8 & 255, colour & 255)).all(axis=2)
+
+
+def test_stages_are_those_of_one_training() -> None:
+    stages = learning_stages(paper(), CONFIG, seed=2, stages=(0, 3, 20), max_steps=60)
+    assert [stage.episodes for stage in stages] == [0, 3, 20]
+    assert [stage.title for stage in stages] == [
+        "before learning",
+        "after 3 episodes",
+        "after 20 episodes",
+    ]
+    for stage in stages:
+        table = np.zeros((128, 5), dtype=np.float32)
+        if stage.episodes:
+            table = train(paper(), CONFIG, 2, stage.episodes).q_values[0, 0]
+        trace = stage.episode.trace
+        assert (trace.q_values == table[trace.states]).all()
+        assert len(trace) <= 60
+
+
+@pytest.mark.parametrize("stages", [(), (3, 2), (1, 1), (-1, 5)])
+def test_stages_that_are_refused(stages) -> None:
+    with pytest.raises(AntsError, match="stages"):
+        learning_stages(paper(), CONFIG, stages=stages)
+
+
+def test_a_stage_that_has_ended_stays() -> None:
+    stages = learning_stages(paper(), CONFIG, seed=2, stages=(0, 50), max_steps=60)
+    short, long = sorted(stages, key=lambda stage: len(stage.episode))
+    assert len(short.episode) < len(long.episode) == 61
+    frames = list(learning_frames(stages, (640, 400), "a title"))
+    assert len(frames) == 61
+    halves = [(frame[:, :320], frame[:, 320:]) for frame in frames]
+    ended = stages.index(short)
+    last = len(short.episode) - 1
+    assert all((half[ended] == halves[last][ended]).all() for half in halves[last:])
+    assert not (halves[last - 1][ended] == halves[last][ended]).all()
+    assert not (halves[-1][1 - ended] == halves[last][1 - ended]).all()
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (400, 900), (64, 64), (4096, 200)])
+def test_all_stages_fit(size, tmp_path) -> None:
+    stages = learning_stages(paper(), CONFIG, stages=(0, 1, 2, 3), max_steps=3)
+    render_learning(tmp_path / "a.gif", stages, size=size, fps=10)
+    with Image.open(tmp_path / "a.gif") as image:
+        assert image.size == size
+        picture = np.asarray(image.convert("RGB")).astype(int)
+    # The columns and the rows of worlds, told by their queens.
+    purple = (picture[..., 0] - picture[..., 1] > 90) & (picture[..., 2] - picture[..., 1] > 90)
+    groups = [(np.diff(np.flatnonzero(purple.any(axis=axis))) > 8).sum() + 1 for axis in (0, 1)]
+    assert groups == {(1280, 720): [4, 1], (400, 900): [2, 2], (64, 64): [2, 2]}.get(size, [4, 1])
+
+
+def test_how_clear_a_choice_is() -> None:
+    """Worked by hand: the gap to the second best over the gap to the worst."""
+    assert clarity(np.array([0.0, 4.0, 3.0, -1.0, 0.0])) == pytest.approx(0.2)
+    assert clarity(np.array([1.0, 0.0, 0.0, 0.0, 0.0])) == 1.0
+    assert clarity(np.array([2.0, 2.0, 0.0, 0.0, 0.0])) == 0.0
+    assert math.isnan(clarity(np.full(5, 3.0)))
+    assert best_actions(np.array([0.0, 4.0, 3.0, -1.0, 4.0])) == [FORWARD, GIVE]
+    assert best_actions(np.zeros(5)) == [LEFT, FORWARD, RIGHT, PICK_UP, GIVE]
+
+
+def test_a_sheet_without_any_visited_state() -> None:
+    sheet = policy_sheet(random_policy())
+    assert sheet.shape[1] == 1920
+    assert sheet.dtype == np.uint8
+    assert not coloured(sheet, CHOSEN).any()
+
+
+def test_one_visited_state_has_a_bar_at_its_place() -> None:
+    blank = policy_sheet(random_policy())
+    places = {}
+    for name in ("foraging E E E", "foraging F E E", "foraging E E F", "foraging E F E"):
+        table = random_policy()
+        table[parse_state(name)] = (0.0, 4.0, 3.0, -1.0, 0.0)
+        sheet = policy_sheet(table)
+        rows, columns = np.nonzero((sheet != blank).any(axis=2))
+        places[name] = np.array([columns.mean(), rows.mean()])
+        assert np.ptp(columns) < 130
+        assert np.ptp(rows) < 130
+        bar = coloured(sheet, CHOSEN).sum(axis=1).max()
+        assert 10 <= bar < 30  # a fifth of about 76 pixels
+    # Left counts downwards, right to the right within a block, ahead from block to block.
+    first = places["foraging E E E"]
+    assert places["foraging F E E"][0] == pytest.approx(first[0], abs=12)
+    assert places["foraging F E E"][1] > first[1] + 200
+    assert places["foraging E E F"][1] == pytest.approx(first[1], abs=12)
+    assert 250 < places["foraging E E F"][0] - first[0] < 400
+    assert places["foraging E F E"][0] > first[0] + 1200
+
+
+def test_all_reachable_states_are_on_the_sheet() -> None:
+    """Each of the 100 states that is visited changes the sheet, each of the others does not."""
+    blank = policy_sheet(random_policy(), width=1200)
+    table = random_policy()
+    table[[index for index in range(128) if index not in REACHABLE_STATES]] = (1, 0, 0, 0, 0)
+    assert (policy_sheet(table, width=1200) == blank).all()
+    seen = set()
+    for index in REACHABLE_STATES[::9]:
+        table = random_policy()
+        table[index, GIVE] = 1
+        rows, columns = np.nonzero((policy_sheet(table, width=1200) != blank).any(axis=2))
+        seen.add((int(rows.min()) // 20, int(columns.min()) // 20))
+    assert len(seen) == len(REACHABLE_STATES[::9])
+
+
+def test_sheets_that_are_refused() -> None:
+    for wrong in (np.zeros((5, 128)), np.zeros((128, 5), bool), np.full((128, 5), "a")):
+        with pytest.raises(AntsError, match="q_values"):
+            policy_sheet(wrong)
+    for width in (100, 5000, 1920.5):
+        with pytest.raises(AntsError, match="width"):
+            policy_sheet(random_policy(), width=width)
+
+
+def colony(ants: int = 30) -> Colony:
+    made = Colony(open_world(3), ColonyConfig(ants=ants), CONFIG, 0, "fixed", trail_follower())
+    made.begin_episode()
+    return made
+
+
+def test_a_colony_on_the_move(tmp_path) -> None:
+    frames = list(colony_frames(colony(), 7, (200, 150), every=3))
+    assert len(frames) == 4
+    assert not any((a == b).all() for a, b in itertools.pairwise(frames))
+    other = colony()
+    other.tick(7)
+    assert (colony_picture(other, (200, 150)) == frames[-1]).all()
+    render_colony(tmp_path / "a.gif", colony(), 6, (200, 150), every=2, fps=10)
+    with Image.open(tmp_path / "a.gif") as image:
+        assert image.n_frames == 4
+    for wrong in ({"every": 0}, {"ticks": 0}):
+        with pytest.raises(AntsError, match="at least 1"):
+            list(colony_frames(colony(), **{"ticks": 5, **wrong}))
+
+
+def test_the_snapshot_of_a_colony_is_drawn_where_its_ants_are() -> None:
+    moment = colony(12).snapshot()
+    snapshot = Snapshot.of(moment)
+    assert Snapshot.of(snapshot) is snapshot
+    assert (snapshot.ant_cells == moment.ant_cells).all()
+    assert len(snapshot.ant_cells) == 12

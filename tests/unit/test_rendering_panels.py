@@ -1,0 +1,159 @@
+"""Head-up lines, legend and text: what is there, and where it may be."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from taichi_ants import AntsError
+from taichi_ants.rendering import Scene, Snapshot, Status, text
+from taichi_ants.rendering.colours import CHOSEN
+from taichi_ants.rendering.scene import range_with_zero
+from taichi_ants.worlds import paper
+
+WORLD = paper()
+Q_VALUES = np.array([0.5, 7.0, -1.0, 0.0, 2.0], dtype=np.float32)
+
+
+def picture(size=(640, 400), status: Status | None = None, **look: object) -> np.ndarray:
+    scene = Scene(WORLD.grid, size, **{"q_range": (-1.0, 10.0), **look})
+    return scene.draw(Snapshot.at_start(WORLD), status)
+
+
+def blue_columns(frame: np.ndarray, rows: slice = slice(None)) -> np.ndarray:
+    """How many pixels of each column are exactly in the colour of the chosen action."""
+    blue = (frame[rows] == (CHOSEN >> 16, CHOSEN >> 8 & 255, CHOSEN & 255)).all(axis=2)
+    return blue.sum(axis=0)
+
+
+def status(action: int) -> Status:
+    return Status(step=3, episode_return=4, state=8, action=action, q_values=Q_VALUES)
+
+
+def test_the_bar_of_the_chosen_action_is_as_long_as_its_value() -> None:
+    def length(action: int) -> int:
+        return int((blue_columns(picture(status=status(action))) >= 5).sum())
+
+    # Numbers in blue have columns as well, the same few for all.
+    assert length(1) > 3 * length(4) > 0
+    assert length(1) - length(4) == pytest.approx(2.5 * (length(4) - length(0)) * 4 / 3, abs=12)
+
+
+def test_bars_of_negative_values_lie_on_the_other_side_of_the_axis() -> None:
+    # Of eleven parts from -1 to 10, seven lie to the right of the axis and one to its left.
+    right, left = (
+        np.flatnonzero(blue_columns(picture(status=status(action))) >= 8) for action in (1, 2)
+    )
+    assert left.max() < right.min() <= left.max() + 3
+    assert len(right) == pytest.approx(7 * (len(left) + 1), abs=8)  # 1: the axis
+    view = Scene(WORLD.grid, (640, 400)).viewport
+    assert left.min() > view.left + view.width + text.width("forward", 11)
+
+
+def test_only_what_is_switched_on_is_there() -> None:
+    plain = picture(hud=False, legend=False)
+    right = Scene(WORLD.grid, (640, 400)).viewport
+    edge = right.left + right.width
+    everything = picture(status=status(1), title="x")
+    assert (everything[:, edge:] != 255).any()
+    without_status = picture()
+    only_legend = picture(hud=False)
+    assert (without_status[200:, edge:] == only_legend[200:, edge:]).mean() < 1.0  # it moves up
+    assert (picture(legend=False)[:, edge:] == 255).all()
+    # Alone, the world has the whole picture.
+    assert Scene(WORLD.grid, (640, 400), hud=False, legend=False).viewport.width == 640
+    assert plain.shape == (400, 640, 3)
+
+
+@pytest.mark.parametrize("size", [(640, 400), (400, 700), (500, 500), (330, 1200), (1280, 720)])
+def test_text_keeps_off_the_edges(size) -> None:
+    """A margin of white around it tells that nothing was cut off."""
+    state = Status(
+        step=10_000,
+        episode_return=-9999,
+        episode="epsilon 0.25",
+        state=8,
+        action=3,
+        q_values=Q_VALUES,
+    )
+    frame = picture(size, state, title="a title that is much longer than there is room for it" * 3)
+    assert (frame[:2] == 255).all()
+    assert (frame[-2:] == 255).all()
+    assert (frame[:, -2:] == 255).all()
+
+
+def test_small_pictures_have_no_text() -> None:
+    for size in ((64, 64), (320, 322)):
+        assert (picture(size, status(1), title="x") == picture(size, hud=False, legend=False)).all()
+
+
+@pytest.mark.parametrize(
+    "size", [(63, 100), (100, 4097), (0, 0), (-5, 100), (100.5, 100), ("a", 3), (100,), None, 100]
+)
+def test_sizes_that_are_refused(size) -> None:
+    with pytest.raises(AntsError, match="64 to 4096"):
+        Scene(WORLD.grid, size)
+
+
+def test_a_picture_is_the_callers_own() -> None:
+    scene = Scene(WORLD.grid, (128, 96))
+    first = scene.draw(Snapshot.at_start(WORLD))
+    kept = first.copy()
+    first[:] = 0
+    assert (scene.draw(Snapshot.at_start(WORLD)) == kept).all()
+
+
+def test_ranges_of_bars() -> None:
+    assert range_with_zero(None) == (0.0, 1.0)
+    assert range_with_zero(np.zeros(5)) == (0.0, 1.0)
+    assert range_with_zero(np.array([2.0, 5.0])) == (0.0, 5.0)
+    assert range_with_zero(np.array([-2.0, -5.0])) == (-5.0, 0.0)
+
+
+def test_letters_lie_in_the_cells_in_view() -> None:
+    snapshot = Snapshot.at_start(WORLD)
+    scene = Scene(WORLD.grid, (500, 500), hud=False, legend=False)
+    plain = scene.draw(snapshot)
+    seen = replace(snapshot, letters="ETO")
+    changed = (scene.draw(seen) != plain).any(axis=2)
+    rows, columns = np.nonzero(changed)
+    centres = scene.viewport.centres(WORLD.grid.cells(seen.cells_in_view()))
+    places = np.stack([columns, rows], axis=-1) + 0.5
+    away = np.linalg.norm(places[:, None] - centres, axis=2).min(axis=1)
+    assert away.max() < scene.viewport.hexagon + 1
+    for cell in seen.cells_in_view():
+        x, y = scene.viewport.centres(WORLD.grid.cells(cell))
+        around = changed[int(y) - 6 : int(y) + 6, int(x) - 6 : int(x) + 6]
+        assert around.sum() > 12
+
+
+def test_text_is_cut_off_at_the_frame() -> None:
+    frame = np.full((20, 30, 3), 255, dtype=np.uint8)
+    for x, y in ((-100, 10), (25, 10), (10, -50), (10, 500), (-5, 4)):
+        text.write(frame, "words", x, y, 14)
+    assert frame.shape == (20, 30, 3)
+    blank = np.full((20, 30, 3), 255, dtype=np.uint8)
+    text.write(blank, "", 5, 15, 14)
+    assert (blank == 255).all()
+
+
+def test_text_in_place() -> None:
+    for align, low, high in (("left", 50, 90), ("middle", 30, 70), ("right", 10, 51)):
+        frame = np.full((40, 100, 3), 255, dtype=np.uint8)
+        text.write(frame, "Hxg", 50, 25, 14, align=align)
+        columns = np.flatnonzero((frame != 255).any(axis=(0, 2)))
+        rows = np.flatnonzero((frame != 255).any(axis=(1, 2)))
+        assert low <= columns[0] <= columns[-1] <= high
+        assert 10 <= rows[0] <= 18  # the top of a capital letter
+        assert rows[-1] > 25  # the g reaches below the baseline
+
+
+def test_shortening() -> None:
+    assert text.shortened("short", 12, 500) == "short"
+    cut = text.shortened("a rather long line of text", 12, 80)
+    assert cut.endswith("...")
+    assert text.width(cut, 12) <= 80
+    assert text.shortened("anything", 12, 1) == ""
+    assert text.width("\u00e9\u4e2d", 12) == text.width("??", 12)
