@@ -93,18 +93,19 @@ def error_of(td_error: ti.template(), c: ti.template(), w, pair, reward, ended, 
 
 @ti.func
 def share_error(
-    td_error: ti.template(), c: ti.template(), k: ti.template(), w, chunk, ant, seen, next_action
-):
+    td_error: ti.template(), plans: ti.template(), c: ti.template(), k: ti.template(), w, chunk,
+    ant, seen, next_action,
+):  # fmt: skip
     """Add the TD error of an ant to the sums of its chunk, and what it saw."""
     reward = c.ants[REWARD, ant]
     ended = ti.cast(reward == REWARD_GIVE, ti.i32) & (1 - k.continuing)
     state, action = c.ants[STATE, ant], c.ants[ACTION, ant]
     pair = state * ROW + action
     error = error_of(td_error, c, w, pair, reward, ended, seen, next_action)
-    outcome = pack_entry(pair, reward, ended, seen)
-    add_to_sums(
-        c, chunk, state * N_ACTIONS + action, error, fixed(error), 1, c.ants[NUMBER, ant], outcome
-    )
+    place = chunk * MODEL + state * N_ACTIONS + action
+    add_to_sums(c, chunk, state * N_ACTIONS + action, error, fixed(error), 1)
+    if ti.static(plans):
+        note_outcome(c, place, c.ants[NUMBER, ant], pack_entry(pair, reward, ended, seen))
 
 
 @ti.func
@@ -114,8 +115,8 @@ def fixed(error):
 
 
 @ti.func
-def add_to_sums(c: ti.template(), chunk, key, error, total, count, number, outcome):
-    """Add `count` updates of a pair to a chunk's sums; the highest ant number's outcome stays."""
+def add_to_sums(c: ti.template(), chunk, key, error, total, count):
+    """Add `count` updates of a pair to a chunk's sums, the last of them with this error."""
     place, listed = chunk * MODEL + key, chunk * (MODEL + 1)
     known = c.sums_of[COUNT, place]
     if known == 0:
@@ -126,6 +127,11 @@ def add_to_sums(c: ti.template(), chunk, key, error, total, count, number, outco
     c.sums_of[COUNT, place] = known + count
     c.sums[place] += total
     c.errors[place] = error
+
+
+@ti.func
+def note_outcome(c: ti.template(), place, number, outcome):
+    """Note what an ant saw of a pair, for the model; the highest ant number's outcome stays."""
     if number > c.sums_of[LATEST, place]:
         c.sums_of[LATEST, place] = number
         c.sums_of[OUTCOME, place] = outcome
@@ -140,16 +146,10 @@ def join_sums(c: ti.template(), k: ti.template(), w):
         for i in range(c.touched[listed]):
             key = c.touched[listed + 1 + i]
             place = chunk * MODEL + key
-            add_to_sums(
-                c,
-                first,
-                key,
-                c.errors[place],
-                c.sums[place],
-                c.sums_of[COUNT, place],
-                c.sums_of[LATEST, place],
-                c.sums_of[OUTCOME, place],
-            )
+            count = c.sums_of[COUNT, place]
+            add_to_sums(c, first, key, c.errors[place], c.sums[place], count)
+            latest, outcome = c.sums_of[LATEST, place], c.sums_of[OUTCOME, place]
+            note_outcome(c, first * MODEL + key, latest, outcome)
             c.sums_of[COUNT, place] = 0
         c.touched[listed] = 0
 
@@ -205,7 +205,8 @@ def draw_pair(c: ti.template(), w, chunk, ant):
     entry = c.entries[w * MODEL + drawn]
     pair = entry_pair(entry)
     key = pair // ROW * N_ACTIONS + pair % ROW
-    add_to_sums(c, chunk, key, 0.0, ti.cast(0, ti.i64), 1, 0, entry)
+    add_to_sums(c, chunk, key, 0.0, ti.cast(0, ti.i64), 1)
+    note_outcome(c, chunk * MODEL + key, 0, entry)
 
 
 @ti.func

@@ -149,7 +149,7 @@ def phases(learner: Learner, sharing: str, dense: bool, lively: bool) -> SimpleN
                     if ti.static(learns and alone):
                         learn_alone(td_error, plans, c, k, w, ant, seen, next_action)
                     elif ti.static(learns):
-                        share_error(td_error, c, k, w, chunk, ant, seen, next_action)
+                        share_error(td_error, plans, c, k, w, chunk, ant, seen, next_action)
                 c.ants[STATE, ant] = seen
                 c.ants[ACTION, ant] = next_action
 

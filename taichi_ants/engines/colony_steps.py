@@ -42,7 +42,13 @@ from taichi_ants.engines.colony_arrays import (
     WANT,
 )
 from taichi_ants.engines.colony_trail import deposit, level_in_view
-from taichi_ants.rules.actions import is_open, move_reward, step_towards, turn, turn_round
+from taichi_ants.rules.actions import (
+    is_open,
+    move_reward,
+    step_towards,
+    turn_round,
+    turned_by,
+)
 from taichi_ants.rules.policy import bit_number, lowest_bit_number
 from taichi_ants.rules.random_bits import advance, below, bits_of, high_word
 from taichi_ants.rules.vision import (
@@ -94,16 +100,16 @@ def observe(c: ti.template(), k: ti.template(), dense: ti.template(), base, ant,
 
 @ti.func
 def want(c: ti.template(), base, ant, action):
-    """Turn, and write down what the action needs: a cell to enter, or a food to take."""
-    state, cell, heading = c.ants[STATE, ant], c.ants[CELL, ant], c.ants[HEADING, ant]
-    wanted, mark = -1, 0
-    if action <= RIGHT:
-        heading = turn(c.compass, heading, action)
-        c.ants[HEADING, ant] = heading
-        if is_open(code_in_view(state, action)):
-            wanted = cell + step_towards(c.compass, heading, FORWARD)
-            mark = _ENTER + heading
-    elif action == PICK_UP and c.ants[CARRIES, ant] == 0:
+    """Turn, and write down what the action needs: a cell to enter, or a food to take.
+
+    Hardly a branch: what the next ant does cannot be predicted from what this one did.
+    """
+    state, cell = c.ants[STATE, ant], c.ants[CELL, ant]
+    heading = turned_by(c.compass, c.ants[HEADING, ant], action)
+    enters = is_open(code_in_view(state, ti.min(action, RIGHT))) and action <= RIGHT
+    wanted = ti.select(enters, cell + step_towards(c.compass, heading, FORWARD), -1)
+    mark = ti.select(enters, _ENTER + heading, 0)
+    if action == PICK_UP and c.ants[CARRIES, ant] == 0:
         foods = goals_in_view(state)
         if foods != 0:
             position = lowest_bit_number(foods)
@@ -113,10 +119,10 @@ def want(c: ti.template(), base, ant, action):
                 position = bit_number(foods, below(word, popcnt(foods)))
             wanted = cell + step_towards(c.compass, heading, position)
             mark = _TAKE + (heading + position + N_HEADINGS - 1) % N_HEADINGS
+    c.ants[HEADING, ant] = heading
     c.ants[ACTION, ant] = action
     c.ants[WANT, ant] = wanted
-    if mark != 0:
-        c.ground[base + cell] = ti.cast(OBSTACLE | mark << 4, ti.u8)
+    c.ground[base + cell] = ti.cast(OBSTACLE | mark << 4, ti.u8)
 
 
 @ti.func
@@ -131,18 +137,30 @@ def resolve(c: ti.template(), base, ant, tick):
     """Give up what another ant wins."""
     wanted = c.ants[WANT, ant]
     if wanted >= 0:
-        cell = c.ants[CELL, ant]
-        kind = ti.cast(c.ground[base + cell] >> 4, ti.i32) & 8  # 8 to take, 0 to enter
-        lost = 0
-        for heading in range(N_HEADINGS):
-            other = wanted + c.compass[heading + 1]
-            mark = ti.cast(c.ground[base + other] >> 4, ti.i32)
-            # The other ant looks back, along the opposite heading.
-            if mark == (kind | 1 + turn_round(heading)) and other != cell:
-                if conflict_key(other, tick) < conflict_key(cell, tick):
-                    lost = 1
-        if lost == 1:
+        kind = ti.cast(c.ground[base + c.ants[CELL, ant]] >> 4, ti.i32) & 8  # 8 to take, else 0
+        rivals = -1  # the ant itself is found too
+        for heading in ti.static(range(N_HEADINGS)):
+            mark = c.ground[base + wanted + c.compass[heading + 1]] >> 4
+            rivals += ti.cast(mark == wanting(kind, heading), ti.i32)
+        if rivals > 0 and not wins(c, base, c.ants[CELL, ant], wanted, kind, tick):
             c.ants[WANT, ant] = -1
+
+
+@ti.func
+def wanting(kind, heading):
+    """The mark of an ant at `heading` from a cell that wants that cell: it looks back."""
+    return kind | 1 + turn_round(heading)
+
+
+@ti.func
+def wins(c: ti.template(), base, cell, wanted, kind, tick):
+    """Whether no other ant that wants the same has a smaller key than the one on `cell`."""
+    own, won = conflict_key(cell, tick), True
+    for heading in range(N_HEADINGS):
+        other = wanted + c.compass[heading + 1]
+        if c.ground[base + other] >> 4 == wanting(kind, heading) and other != cell:
+            won = won and conflict_key(other, tick) > own
+    return won
 
 
 @ti.func
@@ -150,19 +168,23 @@ def commit(c: ti.template(), k: ti.template(), dense: ti.template(), base, ant, 
     """Do what was won: move, take, give, deposit; the reward."""
     clock = tick * k.evaporates
     action, cell, wanted = c.ants[ACTION, ant], c.ants[CELL, ant], c.ants[WANT, ant]
-    reward = REWARD_FAILED
-    c.ground[base + cell] = OBSTACLE  # nothing wanted any more
-    if action <= RIGHT:
-        c.tallies[T_MOVES, chunk] += 1
-        if wanted >= 0:
-            reward = move_reward(code_in_view(c.ants[STATE, ant], action))
-            c.ground[base + cell] = EMPTY
-            c.ground[base + wanted] = OBSTACLE
-            c.ants[CELL, ant] = wanted
-            if c.ants[CARRIES, ant] == 1:
-                deposit(c, k, dense, base + wanted, clock)
-        else:
-            c.tallies[T_BLOCKED, chunk] += 1
+    moves = action <= RIGHT
+    enters = moves and wanted >= 0
+    destination = ti.select(enters, wanted, cell)
+    code = code_in_view(c.ants[STATE, ant], ti.min(action, RIGHT))
+    reward = ti.select(enters, move_reward(code), REWARD_FAILED)
+    c.ground[base + cell] = EMPTY
+    c.ground[base + destination] = OBSTACLE  # and nothing wanted any more
+    c.ants[CELL, ant] = destination
+    c.tallies[T_MOVES, chunk] += ti.cast(moves, ti.i32)
+    c.tallies[T_BLOCKED, chunk] += ti.cast(moves and not enters, ti.i32)
+    if c.ants[CARRIES, ant] == 1:
+        if enters:
+            deposit(c, k, dense, base + destination, clock)
+        elif action == GIVE and goals_in_view(c.ants[STATE, ant]) != 0:
+            reward = REWARD_GIVE
+            c.ants[CARRIES, ant] = 0
+            c.tallies[T_GIVES, chunk] += 1
     elif action == PICK_UP and wanted >= 0:
         reward = REWARD_PICK_UP
         c.ground[base + wanted] = EMPTY
@@ -171,10 +193,6 @@ def commit(c: ti.template(), k: ti.template(), dense: ti.template(), base, ant, 
         deposit(c, k, dense, base + cell, clock)
         c.ants[HEADING, ant] = turn_round(c.ants[HEADING, ant])
         c.ants[CARRIES, ant] = 1
-    elif action == GIVE and c.ants[CARRIES, ant] == 1 and goals_in_view(c.ants[STATE, ant]) != 0:
-        reward = REWARD_GIVE
-        c.ants[CARRIES, ant] = 0
-        c.tallies[T_GIVES, chunk] += 1
     c.ants[REWARD, ant] = reward
     return reward
 

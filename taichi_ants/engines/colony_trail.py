@@ -14,12 +14,13 @@ LINEAR = -1.0  # the value of `decay` that stands for linear evaporation in dens
 @ti.func
 def level_in_view(c: ti.template(), k: ti.template(), dense: ti.template(), place, clock):
     """The trail that an ant can see in a cell: 0 unless the cell is empty. i32, or f32 if dense."""
-    level = ti.cast(0, ti.f32) if ti.static(dense) else ti.cast(0, ti.i32)
-    if c.ground[place] & 15 == EMPTY:
-        if ti.static(dense):
-            level = c.level[place]
-        else:
-            level = ti.max(c.trail[place] - clock, 0)
+    # Always read, never branch: most cells are empty, and nobody can predict which.
+    is_empty = c.ground[place] & 15 == EMPTY
+    level = 0.0 if ti.static(dense) else 0
+    if ti.static(dense):
+        level = ti.select(is_empty, c.level[place], 0.0)
+    else:
+        level = ti.select(is_empty, ti.max(c.trail[place] - clock, 0), 0)
     return level
 
 

@@ -24,8 +24,8 @@ def pack_cells(world: World) -> np.ndarray:
 
 
 def compass_of(grid: AxialGrid) -> np.ndarray:
-    """Index steps and turns by heading, i32 (20,); its layout is that of `rules.actions`."""
+    """Index steps and turns by heading, i32 (38,); its layout is that of `rules.actions`."""
     headings = np.arange(N_HEADINGS)
     steps = grid.offsets[(np.arange(N_HEADINGS + 2) - 1) % N_HEADINGS]
-    turns = np.concatenate([(headings - 1) % N_HEADINGS, (headings + 1) % N_HEADINGS])
-    return np.concatenate([steps, turns]).astype(np.int32)
+    turns = [(headings + by) % N_HEADINGS for by in (-1, 0, 1, 0, 0)]
+    return np.concatenate([steps, *turns]).astype(np.int32)

@@ -2,12 +2,12 @@
 
 import taichi as ti
 
-from taichi_ants.constants import LEFT, REWARD_FAILED, RIGHT
+from taichi_ants.constants import LEFT, N_HEADINGS, REWARD_FAILED, RIGHT
 
-# A compass is an i32 array of 20: the index steps to the left, forward and right cell of heading h
-# at h, h + 1 and h + 2, then the headings after a turn left and after a turn right.
-_TURN_LEFT_AT, _TURN_RIGHT_AT = 8, 14
-COMPASS_SIZE = 20
+# A compass is an i32 array of 38: the index steps to the left, forward and right cell of heading h
+# at h, h + 1 and h + 2, then the heading after each of the five actions, by action and heading
+# (picking up turns round only if it succeeds, so that it stands there as no turn).
+_TURNS_AT = 8
 
 
 @ti.func
@@ -25,10 +25,16 @@ def turn(compass: ti.template(), heading, move):
     """
     turned = heading
     if move == LEFT:
-        turned = compass[_TURN_LEFT_AT + heading]
+        turned = turned_by(compass, heading, LEFT)
     elif move == RIGHT:
-        turned = compass[_TURN_RIGHT_AT + heading]
+        turned = turned_by(compass, heading, RIGHT)
     return turned
+
+
+@ti.func
+def turned_by(compass: ti.template(), heading, action):
+    """The same by look-up alone, for any action: for crowds, whose actions nobody can predict."""
+    return compass[_TURNS_AT + N_HEADINGS * action + heading]
 
 
 @ti.func
