@@ -7,6 +7,7 @@ against the paper and against exact bounds, and writes tables, figures and polic
 from __future__ import annotations
 
 import argparse
+import csv
 import itertools
 import sys
 import time
@@ -26,25 +27,35 @@ from taichi_ants.command_line import (
 if TYPE_CHECKING:
     from taichi_ants.analysis.comparison import Comparison
     from taichi_ants.config import TrainingConfig
+    from taichi_ants.result_folder import ResultFolder
     from taichi_ants.sweeps import Sweep, SweepResult
 
 DELIVERIES = ("continuing", "absorbing")
 ROLLOUTS = 50
 QUICK_SEEDS = 10
-REPORT = "report.txt"
+MOST_SEEDS = 10_000
+REPORT, EPISODES, BASELINES, FIGURES = "report.txt", "episodes.npz", "baselines.csv", "figures"
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """The settings of the command line; the defaults are the paper's."""
     parser = Parser(__doc__.split("\n", 1)[0])
     add = parser.add_argument
-    add("--seeds", type=whole_number(1), default=100, help="how many seeds")
+    add(
+        "--seeds", type=whole_number(1, MOST_SEEDS), default=100, metavar="N", help="how many seeds"
+    )
     add("--seed", type=whole_number(), default=0, metavar="BASE", help="the first of them")
-    add("--episodes", type=whole_number(1), default=500, help="training episodes of a run")
-    add("--max-steps", type=whole_number(1), default=600, help="step limit of an episode")
+    add(
+        "--episodes",
+        type=whole_number(1),
+        default=500,
+        metavar="N",
+        help="training episodes of a run",
+    )
+    add("--max-steps", type=whole_number(1), default=600, metavar="N", help="step limit")
     add("--delivery", choices=(*DELIVERIES, "both"), default="both", help="what delivery means")
     names = ("q_learning", "sarsa", "dyna_q")
-    add("--learners", action=ListAction, default=names, help="names of learners")
+    add("--learners", action=ListAction, default=names, metavar="NAME", help="one or more")
     lists = {
         "--learning-rates": (0.001, 0.01),
         "--discounts": (0.9, 0.99),
@@ -62,19 +73,20 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
         help="one or more, for learners that plan",
     )
     add("--world", default="paper", help="paper, open, or the path of a map file")
-    add("--world-seed", type=whole_number(), default=0, help="seed of a world drawn at random")
+    add("--world-seed", type=whole_number(), default=0, metavar="N", help="seed of an open world")
     add("--plugin", metavar="FILE", help="a Python file that registers learners or worlds")
-    add("--threads", type=whole_number(1, 1024), help="CPU threads, by default all")
+    add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
     add("--arch", choices=("cpu", "cuda"), default="cpu", help="where kernels run")
-    add("--out", type=Path, default=Path("results/compare"), help="folder of the results")
-    add("--quick", action="store_true", help=f"{QUICK_SEEDS} seeds, into OUT-quick by default")
-    add("--force", action="store_true", help="replace what OUT holds")
+    out = "for the results (default: results/compare, with --quick results/compare-quick)"
+    add("--out", type=Path, metavar="FOLDER", help=out)
+    add("--quick", action="store_true", help=f"at most {QUICK_SEEDS} seeds")
+    add("--force", action="store_true", help="replace what FOLDER holds")
     add("--no-figures", action="store_true", help="draw no figures")
     settings = parser.parse_args(arguments)
     if settings.quick:
         settings.seeds = min(settings.seeds, QUICK_SEEDS)
-        if settings.out == parser.get_default("out"):
-            settings.out = Path("results/compare-quick")
+    if settings.out is None:
+        settings.out = Path("results/compare-quick" if settings.quick else "results/compare")
     return settings
 
 
@@ -102,11 +114,16 @@ def configurations(settings: argparse.Namespace) -> tuple[TrainingConfig, ...]:
 def build_sweep(settings: argparse.Namespace) -> Sweep:
     """The work, checked as a whole before any of it is done."""
     from taichi_ants import AntsError, worlds
+    from taichi_ants.analysis.comparison import Row
     from taichi_ants.sweeps import Sweep
 
     if settings.plugin:
         load_plugin(settings.plugin)
     configs = configurations(settings)
+    # The tables find configurations by six digits of their numbers.
+    rows = [Row.of(config) for config in configs]
+    if len({(row.delivery, row.variant, row.hyperparameters.key()) for row in rows}) < len(rows):
+        raise AntsError("two values of a list agree in six digits; leave one of them out.")
     world = worlds.build(settings.world, settings.world_seed)
     if not world.reachable_foods().any():
         raise AntsError(
@@ -145,7 +162,7 @@ def write_tables(
 
     lines = summary.summarise(comparison)
     results.write_csv(folder / "summary.csv", lines, summary.SUMMARY_COLUMNS)
-    results.write_csv(folder / "baselines.csv", baselines, BASELINE_COLUMNS)
+    results.write_csv(folder / BASELINES, baselines, BASELINE_COLUMNS)
     table = table2.table2(comparison)
     results.write_csv(folder / "table2.csv", table, list(table[0]))
     results.write_text(folder / "table2.md", table2.table2_markdown(table))
@@ -163,7 +180,7 @@ def write_episodes(folder: Path, comparison: Comparison) -> None:
     names = ("returns", "steps", "deliveries", "greedy_returns", "greedy_steps")
     arrays = {name: getattr(comparison, name) for name in (*names, "greedy_deliveries")}
     results.write_npz(
-        folder / "episodes.npz", {name: results.smallest(array) for name, array in arrays.items()}
+        folder / EPISODES, {name: results.smallest(array) for name, array in arrays.items()}
     )
 
 
@@ -199,13 +216,15 @@ def write_policies(folder: Path, sweep: Sweep, comparison: Comparison, tables: A
 
 def compare(settings: argparse.Namespace) -> None:
     """Run the comparison, or show the finished one."""
-    from taichi_ants.provenance import provenance, sweep_settings
+    from taichi_ants.provenance import file_hash, provenance, sweep_settings
     from taichi_ants.result_folder import ResultFolder
 
     sweep = build_sweep(settings)
-    folder = ResultFolder(settings.out, {**sweep_settings(sweep), "arch": settings.arch})
+    plugin = file_hash(settings.plugin) if settings.plugin else None
+    facts = {**sweep_settings(sweep), "arch": settings.arch, "plugin": plugin}
+    folder = ResultFolder(settings.out, facts)
     if folder.is_finished() and not settings.force:
-        show_finished(settings, sweep)
+        show_finished(settings, sweep, folder)
         return
     began = time.perf_counter()
     with folder.work(settings.force) as (blocks, ready):
@@ -261,20 +280,52 @@ def draw_figures(comparison: Comparison, baselines: list[dict[str, Any]], folder
     """Draw the figures into the folder `figures`."""
     from taichi_ants.analysis.figures import save_all
 
-    save_all(comparison, baselines, folder / "figures")
+    save_all(comparison, baselines, folder / FIGURES)
 
 
-def show_finished(settings: argparse.Namespace, sweep: Sweep) -> None:
+def show_finished(settings: argparse.Namespace, sweep: Sweep, folder: ResultFolder) -> None:
     """Print the summary of a finished comparison; draw figures that were left out."""
+    if not settings.no_figures and not (settings.out / FIGURES).is_dir():
+        comparison, baselines = read_back(settings.out, sweep)
+        with folder.addition() as place:
+            draw_figures(comparison, baselines, place)
     print((settings.out / REPORT).read_text("utf-8"))
     print(f"{settings.out}/ holds this comparison already; --force runs it again.")
 
 
+def read_back(folder: Path, sweep: Sweep) -> tuple[Comparison, list[dict[str, Any]]]:
+    """The comparison and the baselines that a folder holds."""
+    from taichi_ants import AntsError, results
+    from taichi_ants.analysis.baselines import BASELINE_COLUMNS
+    from taichi_ants.sweeps import SweepResult
+
+    arrays = {
+        name: array.astype(int) for name, array in results.read_npz(folder / EPISODES).items()
+    }
+    try:
+        comparison = to_comparison(sweep, SweepResult(**arrays, q_values=None, costs=()))
+        with open(folder / BASELINES, newline="", encoding="utf-8") as file:
+            lines = csv.DictReader(file)
+            baselines = [read_baseline(line) for line in lines]
+        if lines.fieldnames != list(BASELINE_COLUMNS):
+            raise ValueError("other columns")
+    except (TypeError, ValueError, KeyError) as error:
+        raise AntsError(f"the results in {str(folder)!r} are damaged; give --force.") from error
+    return comparison, baselines
+
+
+def read_baseline(row: dict[str, str]) -> dict[str, Any]:
+    """A row of baselines.csv, with numbers and None for empty fields."""
+    words = ("baseline", "setting", "note")
+    return {
+        name: text if name in words else float(text) if text else None for name, text in row.items()
+    }
+
+
 def main(arguments: list[str] | None = None) -> None:
     """The command line."""
-    settings = parse_arguments(arguments)
     again = "Stopped; finished runs are kept, and the same command goes on from there."
-    run_command(lambda: compare(settings), again)
+    run_command(lambda: compare(parse_arguments(arguments)), again)
 
 
 if __name__ == "__main__":

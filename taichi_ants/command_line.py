@@ -5,10 +5,13 @@ from __future__ import annotations
 import argparse
 import importlib.util
 import os
+import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import FrameType
 from typing import NoReturn
 
 from taichi_ants.errors import AntsError
@@ -17,19 +20,31 @@ EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 
 
+class _HelpFormatter(argparse.HelpFormatter):
+    """Shows defaults as they would be typed, and none that says nothing."""
+
+    def _get_help_string(self, action: argparse.Action) -> str | None:
+        default = action.default
+        silent = default is None or default is False or default is argparse.SUPPRESS
+        if not action.help or silent:
+            return action.help
+        shown = " ".join(map(str, default)) if isinstance(default, tuple) else default
+        return f"{action.help} (default: {shown})"
+
+
 class Parser(argparse.ArgumentParser):
     """A parser whose errors are one sentence on standard error."""
 
     def __init__(self, description: str, **settings: object) -> None:
         super().__init__(
             description=description,
-            formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+            formatter_class=_HelpFormatter,
             allow_abbrev=False,
             **settings,
         )
 
     def error(self, message: str) -> NoReturn:
-        text = message.removeprefix("argument ").rstrip(".")
+        text = _on_one_line(message).removeprefix("argument ").rstrip(".")
         self.exit(EXIT_BAD_INPUT, f"error: {text}; see --help.\n")
 
 
@@ -88,9 +103,13 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
         command: The work.
         interrupted: What Ctrl-C says.
     """
+    if hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(errors="replace")  # a terminal that lacks a character shows "?"
     try:
-        command()
-        sys.stdout.flush()
+        with _noting_interruption():
+            command()
+        if sys.stdout is not None:  # it is None if the caller has closed it
+            sys.stdout.flush()
         status = 0
     except AntsError as error:
         _complain(f"error: {error}")
@@ -102,8 +121,13 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
         _complain(interrupted)
         status = EXIT_INTERRUPTED
     except BrokenPipeError:  # the reader of our output has gone, for example `| head`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _discard_output()
         status = 0
+    except OSError as error:
+        _discard_output()
+        place = "the output" if error.filename is None else repr(str(error.filename))
+        _complain(f"error: cannot read or write {place}: {error.strerror or error}.")
+        status = EXIT_BAD_INPUT
     sys.exit(status)
 
 
@@ -111,7 +135,7 @@ def load_plugin(path: str) -> None:
     """Execute a Python file of the user's, which registers learners or worlds.
 
     Raises:
-        AntsError: The file cannot be read, or raises.
+        AntsError: The file cannot be read, raises or exits.
     """
     spec = importlib.util.spec_from_file_location(f"plugin_{Path(path).stem}", path)
     if spec is None or spec.loader is None or not Path(path).is_file():
@@ -122,10 +146,9 @@ def load_plugin(path: str) -> None:
         spec.loader.exec_module(module)
     except AntsError:
         raise
-    except Exception as error:
-        raise AntsError(
-            f"the plugin {path!r} failed with {type(error).__name__}: {error}; mend the file."
-        ) from error
+    except (Exception, SystemExit) as error:
+        reason = f"{type(error).__name__}: {_on_one_line(str(error))}"
+        raise AntsError(f"the plugin {path!r} failed with {reason}; mend the file.") from error
 
 
 @contextmanager
@@ -133,10 +156,11 @@ def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
     """A progress bar with the time left on standard error; nothing where that is no terminal.
 
     Yields:
-        To be called with the share of the work that is done, 0 to 1.
+        To be called with the share of the work that is done, 0 to 1. It raises KeyboardInterrupt
+        if Ctrl-C was pressed, but a library has swallowed it.
     """
-    if not sys.stderr.isatty():
-        yield lambda share: None
+    if sys.stderr is None or not sys.stderr.isatty():
+        yield lambda share: _stop_if_interrupted()
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -149,9 +173,57 @@ def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(title, total=1.0)
-        yield lambda share: bar.update(task, completed=share)
+
+        def update(share: float) -> None:
+            _stop_if_interrupted()
+            bar.update(task, completed=share)
+
+        yield update
+
+
+_interruptions: list[int] = []
+
+
+@contextmanager
+def _noting_interruption() -> Iterator[None]:
+    """Note Ctrl-C besides raising KeyboardInterrupt: Taichi swallows it at some moments."""
+
+    def note(number: int, frame: FrameType | None) -> NoReturn:
+        _interruptions.append(number)
+        raise KeyboardInterrupt
+
+    _interruptions.clear()
+    before = signal.getsignal(signal.SIGINT)
+    ours = threading.current_thread() is threading.main_thread()
+    if not ours or before is not signal.default_int_handler:  # it may be ignored on purpose
+        yield
+        return
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _stop_if_interrupted() -> None:
+    if _interruptions:
+        raise KeyboardInterrupt
 
 
 def _complain(text: str) -> None:
-    with suppress(OSError):
-        print(text, file=sys.stderr)
+    if sys.stderr is not None:
+        with suppress(OSError):
+            print(_on_one_line(text), file=sys.stderr)
+
+
+def _on_one_line(text: str) -> str:
+    return " ".join(text.splitlines())
+
+
+def _discard_output() -> None:
+    """Drop what cannot be written, so that Python does not fail over it once more at exit."""
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
+from numbers import Real
 from typing import Literal, get_args
 
 from taichi_ants.errors import AntsError
+from taichi_ants.randomness import whole
 
 Delivery = Literal["absorbing", "continuing"]
 DELIVERIES: tuple[str, ...] = get_args(Delivery)
@@ -48,29 +49,30 @@ class TrainingConfig:
     def __post_init__(self) -> None:
         if not isinstance(self.learner, str):
             raise AntsError(f"learner is {self.learner!r}; it must be the name of a learner.")
-        _check_number("learning_rate", self.learning_rate, "above 0 and at most 1", open_below=True)
-        _check_number("discount", self.discount, "between 0 and 1")
-        _check_number("epsilon", self.epsilon, "between 0 and 1")
-        _check_number("epsilon_decay", self.epsilon_decay, "above 0 and at most 1", open_below=True)
-        _check_number("min_epsilon", self.min_epsilon, "between 0 and 1")
-        steps = self.planning_steps
-        if isinstance(steps, bool) or not hasattr(steps, "__index__"):
-            raise AntsError(f"planning_steps is {steps!r}; it must be a whole number.")
+        self._check_number("learning_rate", "above 0 and at most 1", open_below=True)
+        self._check_number("discount", "between 0 and 1")
+        self._check_number("epsilon", "between 0 and 1")
+        self._check_number("epsilon_decay", "above 0 and at most 1", open_below=True)
+        self._check_number("min_epsilon", "between 0 and 1")
+        steps = whole("planning_steps", self.planning_steps)
         if not 0 <= steps <= MAX_PLANNING_STEPS:
             raise AntsError(
                 f"planning_steps is {steps}; it must lie between 0 and {MAX_PLANNING_STEPS}."
             )
+        object.__setattr__(self, "planning_steps", steps)
         if self.delivery not in DELIVERIES:
             raise AntsError(
                 f"delivery is {self.delivery!r}; it must be one of {', '.join(DELIVERIES)}."
             )
 
+    def _check_number(self, name: str, allowed: str, open_below: bool = False) -> None:
+        """Check a field and store it as a Python float, so that equal settings are equal."""
+        value = getattr(self, name)
+        if not share_of_one(value) or (open_below and value == 0):
+            raise AntsError(f"{name} is {value!r}; it must be a number {allowed}.")
+        object.__setattr__(self, name, float(value))
 
-def _check_number(name: str, value: object, allowed: str, open_below: bool = False) -> None:
-    try:
-        number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        number = math.nan
-    inside = (0 < number <= 1) if open_below else (0 <= number <= 1)
-    if isinstance(value, (bool, str)) or not inside:
-        raise AntsError(f"{name} is {value!r}; it must be a number {allowed}.")
+
+def share_of_one(value: object) -> bool:
+    """Whether a value is a number from 0 to 1; booleans, text and arrays are none."""
+    return isinstance(value, Real) and not isinstance(value, bool) and 0 <= value <= 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+from contextlib import suppress
 
 
 def prepare_for_taichi() -> None:
@@ -20,16 +21,25 @@ def prepare_for_taichi() -> None:
 
 
 def is_writable_folder(path: str) -> bool:
-    """Whether files can be made there."""
-    return bool(path) and os.path.isdir(path) and os.access(path, os.W_OK | os.X_OK)
+    """Whether files can be made there, tried with one that has no name.
+
+    Permission bits do not tell: root passes all of them, and some file systems keep no files.
+    """
+    if not path:
+        return False
+    try:
+        with tempfile.TemporaryFile(dir=path):
+            return True
+    except (OSError, ValueError):
+        return False
 
 
 def fallback_folder() -> str:
-    """A folder of this user's among the temporary files."""
+    """A folder among the temporary files that belongs to this user."""
     user = os.getuid() if hasattr(os, "getuid") else "user"
     folder = os.path.join(tempfile.gettempdir(), f"taichi_ants-{user}")
-    try:
+    with suppress(OSError):
         os.makedirs(folder, mode=0o700, exist_ok=True)
-    except OSError:
-        folder = ""
-    return folder if is_writable_folder(folder) else tempfile.mkdtemp(prefix="taichi_ants-")
+    if is_writable_folder(folder) and os.lstat(folder).st_uid in (user, 0):
+        return folder
+    return tempfile.mkdtemp(prefix="taichi_ants-")  # others could have put kernels in the usual one

@@ -1,14 +1,16 @@
 """A folder of results: finished once, never mixed, never lost.
 
 While the work goes on, everything lies in the folder's subfolder `unfinished`, with the settings
-that it belongs to. The results move up when all of them exist, the manifest last; a folder with a
-manifest is finished.
+that it belongs to. When all results exist they move up and the manifest is written; the work is
+finished once those settings are gone.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import shutil
+import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -44,8 +46,8 @@ class ResultFolder:
 
     def is_finished(self) -> bool:
         """Whether the folder holds finished results of these settings, and nothing unfinished."""
-        same = self._settings_in(self.path / MANIFEST) == self._settings
-        return same and not self._unfinished.exists()
+        same = _settings_in(self.path / MANIFEST) == self._settings
+        return same and not os.path.exists(self._unfinished / _SETTINGS)
 
     @contextmanager
     def work(self, replace: bool = False) -> Iterator[tuple[Path, Path]]:
@@ -65,64 +67,112 @@ class ResultFolder:
         """
         if not replace:
             self._check_nothing_else()
-        existed = self.path.exists()
-        results.check_writable_folder(self._unfinished)
-        with open(self._unfinished / _LOCK, "w") as lock:
-            self._lock(lock)
-            if replace and self._settings_in(self._unfinished / _SETTINGS) is not None:
-                shutil.rmtree(self._unfinished / BLOCKS, ignore_errors=True)
-            shutil.rmtree(self._unfinished / READY, ignore_errors=True)
-            blocks = results.check_writable_folder(self._unfinished / BLOCKS)
-            ready = results.check_writable_folder(self._unfinished / READY)
-            results.write_json(self._unfinished / _SETTINGS, {"settings": self._settings})
-            try:
-                yield blocks, ready
-            finally:
-                self._leave_nothing_empty(existed)
+        new = [part for part in (self.path, *self.path.parents) if not os.path.exists(part)]
+        try:
+            results.check_writable_folder(self.path)
+            results.check_writable_folder(self._unfinished)
+            with open(self._unfinished / _LOCK, "w") as lock:
+                self._lock(lock)
+                try:
+                    yield self._prepare(replace)
+                finally:
+                    self._drop_work_without_blocks()
+        finally:
+            for folder in (self._unfinished, *new):
+                with suppress(OSError, ValueError):  # it is not empty, or was never made
+                    folder.rmdir()
 
     def publish(self, manifest: Mapping[str, Any]) -> None:
-        """Move what is ready into the folder, then write the manifest with the settings in it."""
-        (self.path / MANIFEST).unlink(missing_ok=True)
-        for item in sorted((self._unfinished / READY).iterdir()):
-            target = self.path / item.name
-            if target.is_dir() and not target.is_symlink():
-                shutil.rmtree(target)
-            item.replace(target)
-        results.write_json(self.path / MANIFEST, {**manifest, "settings": self._settings})
-        shutil.rmtree(self._unfinished)
+        """Move what is ready into the folder, and write the manifest with the settings in it.
+
+        What an older manifest lists is replaced or removed; other files stay.
+        """
+        ready = sorted((self._unfinished / READY).iterdir())
+        names = [item.name for item in ready]
+        try:
+            for name in self._published():
+                if name not in names:
+                    _remove(self.path / name)
+            (self.path / MANIFEST).unlink(missing_ok=True)
+            for item in ready:
+                _remove(self.path / item.name)
+                item.replace(self.path / item.name)
+        except OSError as error:
+            raise _cannot_write(self.path, error) from error
+        contents = {**manifest, "files": names, "settings": self._settings}
+        results.write_json(self.path / MANIFEST, contents)
+        (self._unfinished / _SETTINGS).unlink(missing_ok=True)  # now the work is finished
+        shutil.rmtree(self._unfinished, ignore_errors=True)
+
+    @contextmanager
+    def addition(self) -> Iterator[Path]:
+        """Hold a folder for what is added to finished results; it moves up when it is complete.
+
+        Raises:
+            AntsError: The folder cannot be written.
+        """
+        try:
+            folder = Path(tempfile.mkdtemp(prefix=".", suffix=".tmp", dir=self.path))
+        except OSError as error:
+            raise _cannot_write(self.path, error) from error
+        try:
+            yield folder
+            added = sorted(folder.iterdir())
+            for item in added:
+                _remove(self.path / item.name)
+                item.replace(self.path / item.name)
+            manifest = json.loads((self.path / MANIFEST).read_text("utf-8"))
+            names = {*self._published(), *(item.name for item in added)}
+            results.write_json(self.path / MANIFEST, {**manifest, "files": sorted(names)})
+        except OSError as error:
+            raise _cannot_write(self.path, error) from error
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    def _prepare(self, replace: bool) -> tuple[Path, Path]:
+        """Folders for blocks and for what is ready; blocks of other settings are removed."""
+        if replace or _settings_in(self._unfinished / _SETTINGS) != self._settings:
+            shutil.rmtree(self._unfinished / BLOCKS, ignore_errors=True)
+        shutil.rmtree(self._unfinished / READY, ignore_errors=True)
+        blocks = results.check_writable_folder(self._unfinished / BLOCKS)
+        ready = results.check_writable_folder(self._unfinished / READY)
+        results.write_json(self._unfinished / _SETTINGS, {"settings": self._settings})
+        return blocks, ready
+
+    def _published(self) -> list[str]:
+        """The names that the manifest lists, if there is one."""
+        with suppress(OSError, ValueError, TypeError, KeyError):
+            files = json.loads((self.path / MANIFEST).read_text("utf-8"))["files"]
+            return [name for name in files if Path(name).name == name and name != ".."]
+        return []
 
     def _check_nothing_else(self) -> None:
-        begun = self._settings_in(self._unfinished / _SETTINGS)
+        begun = _settings_in(self._unfinished / _SETTINGS)
         if begun is not None:
             if begun != self._settings:
-                raise AntsError(f"{self._holds('unfinished work', begun)}")
+                raise AntsError(self._holds("unfinished work", begun))
             return
-        done = self._settings_in(self.path / MANIFEST)
+        done = _settings_in(self.path / MANIFEST)
         if done is not None and done != self._settings:
-            raise AntsError(f"{self._holds('results', done)}")
-        if done is None and self.path.is_dir() and self._has_foreign_files():
+            raise AntsError(self._holds("results", done))
+        if done is None and self._has_foreign_files():
             raise AntsError(
                 f"{str(self.path)!r} holds files that no finished results go with; "
                 "choose another --out, or give --force to write among them."
             )
 
     def _has_foreign_files(self) -> bool:
+        if not os.path.isdir(self.path):
+            return False
         return any(item.name != _UNFINISHED for item in self.path.iterdir())
 
     def _holds(self, what: str, other: Mapping[str, Any]) -> str:
-        different = [key for key in self._settings if self._settings[key] != other.get(key)]
+        keys = dict.fromkeys([*self._settings, *other])
+        different = [key for key in keys if self._settings.get(key) != other.get(key)]
         return (
             f"{str(self.path)!r} holds {what} of other settings ({', '.join(different)} differ); "
             "choose another --out, or give --force to replace them."
         )
-
-    def _settings_in(self, path: Path) -> dict[str, Any] | None:
-        """The settings that a file names; None if there is no such file."""
-        if not path.exists():
-            return None
-        with suppress(OSError, ValueError, TypeError, KeyError):
-            return dict(json.loads(path.read_text("utf-8"))["settings"])
-        return {}  # damaged: of other settings than any
 
     def _lock(self, lock: Any) -> None:
         if fcntl is None:
@@ -135,11 +185,30 @@ class ResultFolder:
                 "another --out."
             ) from None
 
-    def _leave_nothing_empty(self, existed: bool) -> None:
-        """If no block was finished, leave the place as it was found."""
+    def _drop_work_without_blocks(self) -> None:
         blocks = self._unfinished / BLOCKS
-        if blocks.is_dir() and not any(blocks.iterdir()):
+        if not blocks.is_dir() or not any(blocks.iterdir()):
             shutil.rmtree(self._unfinished, ignore_errors=True)
-            if not existed:
-                with suppress(OSError):
-                    self.path.rmdir()
+
+
+def _settings_in(path: Path) -> dict[str, Any] | None:
+    """The settings that a file names; None if there is no such file."""
+    if not os.path.exists(path):
+        return None
+    with suppress(OSError, ValueError, TypeError, KeyError):
+        return dict(json.loads(path.read_text("utf-8"))["settings"])
+    return {}  # damaged: of other settings than any
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _cannot_write(path: Path, error: OSError) -> AntsError:
+    reason = (error.strerror or str(error)).lower()
+    return AntsError(
+        f"cannot write to {str(path)!r}: {reason}; make room for it or choose another."
+    )

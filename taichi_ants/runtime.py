@@ -14,6 +14,7 @@ from types import ModuleType
 
 from taichi_ants.environment import fallback_folder, is_writable_folder
 from taichi_ants.errors import AntsError
+from taichi_ants.randomness import whole
 
 ARCHITECTURES = ("cpu", "cuda")
 MAX_THREADS = 1024
@@ -27,9 +28,6 @@ class Runtime:
     threads: int
 
 
-_current: Runtime | None = None
-
-
 def available_threads() -> int:
     """The number of CPU threads that this process may use."""
     if hasattr(os, "sched_getaffinity"):
@@ -40,6 +38,8 @@ def available_threads() -> int:
 def start(threads: int | None = None, arch: str | None = None) -> Runtime:
     """Start Taichi, or restart it if other settings are asked for.
 
+    A Taichi that the caller has started is used as it is, so that the caller's fields stay alive.
+
     Args:
         threads: CPU threads, 1 to 1024; None keeps what runs, or takes all that are available.
         arch: "cpu" or "cuda"; None keeps what runs, or takes the CPU.
@@ -49,52 +49,44 @@ def start(threads: int | None = None, arch: str | None = None) -> Runtime:
 
     Raises:
         AntsError: A setting is not allowed, "cuda" finds no device, or Taichi was started by
-            somebody else with fast_math on, which would change results in the last bit.
+            somebody else on other hardware, or with fast_math on, which would change results in
+            the last bit.
     """
-    global _current
-    wanted = Runtime(arch or _running_arch(), _checked_threads(threads))
-    if wanted.arch not in ARCHITECTURES:
+    if arch is not None and arch not in ARCHITECTURES:
         raise AntsError(f"arch is {arch!r}; it must be one of {', '.join(ARCHITECTURES)}.")
+    threads = None if threads is None else _checked_threads(threads)
     import taichi as ti
 
-    if _program(ti) is None:
-        _current = None
-    elif _current is None:
-        _current = _adopt_foreign(ti)
-        wanted = _current if threads is None and arch is None else wanted
-    if _current != wanted:
+    running = _running(ti)
+    if running is None:
+        wanted = Runtime(arch or "cpu", threads or available_threads())
+    else:
+        wanted = Runtime(arch or running.arch, threads or running.threads)
+    if wanted != running:
         _init(ti, wanted)
-        _current = wanted
     return wanted
 
 
-def _running_arch() -> str:
-    return _current.arch if _current else "cpu"
-
-
-def _checked_threads(threads: int | None) -> int:
-    if threads is None:
-        return _current.threads if _current else available_threads()
-    if isinstance(threads, bool) or not hasattr(threads, "__index__"):
-        raise AntsError(f"threads is {threads!r}; it must be a whole number.")
+def _checked_threads(threads: int) -> int:
+    threads = whole("threads", threads)
     if not 1 <= threads <= MAX_THREADS:
         raise AntsError(f"threads is {threads}; it must lie between 1 and {MAX_THREADS}.")
-    return int(threads)
+    return threads
 
 
-def _program(ti: ModuleType) -> object | None:
-    return ti.lang.impl.get_runtime().prog
-
-
-def _adopt_foreign(ti: ModuleType) -> Runtime:
-    """Use a Taichi that the caller has started, so that the caller's fields stay alive."""
+def _running(ti: ModuleType) -> Runtime | None:
+    """What runs now, whoever has started it; None if nothing does."""
+    if ti.lang.impl.get_runtime().prog is None:
+        return None
     config = ti.lang.impl.current_cfg()
-    if config.fast_math:
+    arch = {ti.x64: "cpu", ti.arm64: "cpu", ti.cuda: "cuda"}.get(config.arch)
+    if arch is None or config.fast_math:
+        how = "with fast_math=True, which changes results in the last bit"
+        how = how if arch else f"on {config.arch}, where the kernels were never tried"
         raise AntsError(
-            "Taichi is running with fast_math=True, which changes results in the last bit; "
-            "call ti.init(..., fast_math=False), or let taichi_ants start Taichi."
+            f"Taichi is running {how}; call ti.init(arch=ti.cpu, fast_math=False), or ti.reset() "
+            "and let taichi_ants start Taichi."
         )
-    arch = "cuda" if config.arch == ti.cuda else "cpu"
     return Runtime(arch, int(config.cpu_max_num_threads))
 
 

@@ -7,6 +7,8 @@ and seed, blocks can be done in any order without changing anything.
 
 from __future__ import annotations
 
+import math
+import os
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -16,11 +18,15 @@ import numpy as np
 
 from taichi_ants import results
 from taichi_ants.config import TrainingConfig
+from taichi_ants.constants import N_ACTIONS, N_STATES
+from taichi_ants.engines import checks
 from taichi_ants.engines.results import LearnerCost
 from taichi_ants.errors import AntsError
 from taichi_ants.worlds.world import World
 
 _STEPS_OF_A_BLOCK = 300_000_000  # at most, if every episode used all its steps
+_RUNS_OF_A_BLOCK = 5000  # at most, each needs about 20 KB while it is trained
+_COPIES = 3  # of the results in memory while they are analysed
 _ARRAYS = ("returns", "steps", "deliveries")
 _GREEDY = tuple(f"greedy_{name}" for name in _ARRAYS)
 
@@ -36,6 +42,10 @@ class Sweep:
         episodes: Training episodes of each run, without evaporation.
         max_steps: Step limit of episodes and rollouts.
         rollouts: Greedy rollouts of each final policy, with evaporation.
+
+    Raises:
+        AntsError: A value is not allowed, the world has no room for the ant, or the results would
+            not fit into the memory of this machine.
     """
 
     world: World
@@ -45,9 +55,26 @@ class Sweep:
     max_steps: int = 600
     rollouts: int = 50
 
+    def __post_init__(self) -> None:
+        checks.checked_world(self.world).start(checks.checked_seeds(self.seeds)[0])
+        checks.checked_configs(self.configs)
+        checks.checked_count("episodes", self.episodes)
+        checks.checked_max_steps(self.max_steps)
+        checks.checked_count("rollouts", self.rollouts)
+        runs = len(self.configs) * len(self.seeds)
+        figures = len(_ARRAYS) * (self.episodes + self.rollouts)
+        needed = runs * (4 * figures + 4 * N_STATES * N_ACTIONS) * _COPIES
+        if needed > available_memory():
+            raise AntsError(
+                f"{runs} runs of {self.episodes} episodes need about {needed / 1e9:.0f} GB of "
+                f"memory, this machine has {available_memory() / 1e9:.0f} GB; take fewer seeds, "
+                "configurations or episodes at once."
+            )
+
     def blocks(self) -> Iterator[tuple[int, slice]]:
         """The configuration and the range of seeds of each block."""
-        size = max(1, _STEPS_OF_A_BLOCK // (self.episodes * self.max_steps))
+        longest = self.episodes * self.max_steps
+        size = min(max(1, _STEPS_OF_A_BLOCK // longest), _RUNS_OF_A_BLOCK)
         for c in range(len(self.configs)):
             for first in range(0, len(self.seeds), size):
                 yield c, slice(first, min(first + size, len(self.seeds)))
@@ -74,6 +101,13 @@ class SweepResult:
     costs: tuple[LearnerCost, ...]
 
 
+def available_memory() -> float:
+    """Bytes of memory that this machine has; infinite where the system does not tell."""
+    with suppress(AttributeError, ValueError, OSError):
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    return math.inf
+
+
 def run_sweep(
     sweep: Sweep,
     folder: Path,
@@ -87,7 +121,7 @@ def run_sweep(
         sweep: What to do.
         folder: Where finished blocks are kept; it must belong to this sweep alone.
         threads, arch: As in `train`.
-        progress: Called after each block with the share of the work that is done.
+        progress: Called at first and after each block with the share of the work that is done.
 
     Raises:
         AntsError: A block cannot be written, or an argument is not allowed.
@@ -97,6 +131,7 @@ def run_sweep(
     total, done = sum(weights), 0.0
     joined = _empty_result(sweep)
     costs: dict[tuple[str, int], LearnerCost] = {}
+    progress(0.0)
     for (c, seeds), weight in zip(blocks, weights, strict=True):
         path = folder / f"block-{c:04d}-{seeds.start:06d}.npz"
         block = _read_block(path, sweep, seeds)
@@ -145,7 +180,8 @@ def _read_block(path: Path, sweep: Sweep, seeds: slice) -> dict[str, np.ndarray]
         n = seeds.stop - seeds.start
         fits = all(block[name].shape == (1, n, sweep.episodes) for name in _ARRAYS)
         fits = fits and all(block[name].shape == (1, n, sweep.rollouts) for name in _GREEDY)
-        if fits and block["q_values"].shape[:2] == (1, n) and block["cost"].shape == (2,):
+        fits = fits and block["q_values"].shape == (1, n, N_STATES, N_ACTIONS)
+        if fits and block["cost"].shape == (2,):
             return block
     return None
 
@@ -154,7 +190,7 @@ def _empty_result(sweep: Sweep) -> dict[str, np.ndarray]:
     runs = (len(sweep.configs), len(sweep.seeds))
     arrays = {name: np.zeros((*runs, sweep.episodes), dtype=np.int32) for name in _ARRAYS}
     arrays |= {name: np.zeros((*runs, sweep.rollouts), dtype=np.int32) for name in _GREEDY}
-    return arrays | {"q_values": np.zeros((*runs, 128, 5), dtype=np.float32)}
+    return arrays | {"q_values": np.zeros((*runs, N_STATES, N_ACTIONS), dtype=np.float32)}
 
 
 def _add_cost(

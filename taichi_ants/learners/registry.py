@@ -44,13 +44,19 @@ def register(learner: Learner) -> Learner:
     """Make a learner known by its name.
 
     Raises:
-        AntsError: The name is taken, or is not usable in files and on command lines.
+        AntsError: The name is taken, or is not usable in files and on command lines; or the TD
+            error is no `ti.func`.
     """
     if not isinstance(learner, Learner):
         raise AntsError(f"{learner!r} is not a Learner; wrap the TD error in Learner(name, ...).")
-    if not learner.name.isidentifier():
+    if not isinstance(learner.name, str) or not learner.name.isidentifier():
         raise AntsError(
             f"{learner.name!r} cannot name a learner; use letters, digits and underscores."
+        )
+    # Taichi's own mark; a plain function would be taken apart without its branches and loops.
+    if not getattr(learner.td_error, "_is_taichi_function", False):
+        raise AntsError(
+            f"the TD error of {learner.name!r} is no Taichi function; mark it @ti.func."
         )
     if learner.name in _LEARNERS:
         raise AntsError(f"a learner named {learner.name!r} exists already; choose another name.")

@@ -1,0 +1,210 @@
+"""What no colony can exceed where food grows back at once, whatever it has learned.
+
+All hold in the long run, for ants that neither die nor are born, and food that stays in place.
+
+- Time: an ant needs a number of ticks from one delivery to the next, at least that of the shortest
+  cycle queen -> food -> queen over (cell, heading, carrying). Food that grows back in the tick in
+  which it is taken never leaves its cell free, so that the ground stays the same and this is a
+  shortest path. In company a cycle can be shorter than alone: an ant that is blocked by another
+  turns on the spot, which an ant alone can do only beside walls. So the limit of many ants lets
+  them turn on the spot everywhere.
+- Food: a food taken in tick t with regrowth k is back at the end of tick t + k at the earliest,
+  and can be taken in tick t + k + 1: a place of food gives at most one in k + 1 ticks. And it is
+  taken from its neighbour cells. The ant that picks up in tick t leaves in t + 1 at the earliest;
+  the cell must be empty when a tick starts, so that the next ant enters in t + 2 and picks up in
+  t + 3. An ant that stays, since it can give to a queen next to it, needs three ticks for one and
+  the same food as well: give, turn (a pick-up turns it round), pick up; only with food on both
+  sides it takes two. So a neighbour cell serves one food once in 3 ticks, and all foods around it
+  together once in 3, or once in 2 beside the queen. What all places give together is a maximum
+  flow from places of food through neighbour cells.
+- Queen: for the same reason each of the queen's neighbour cells serves one delivery in 3 ticks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from taichi_ants.constants import EMPTY, FOOD, N_HEADINGS, QUEEN
+from taichi_ants.worlds.world import World
+
+TICKS_A_CELL = 3
+TICKS_A_CELL_BESIDE_QUEEN = 2
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The limits of one world; inf or 0 where nothing can be delivered.
+
+    Attributes:
+        first: Ticks to the first delivery of one ant alone, from its start.
+        cycle: Ticks from one delivery to the next of one ant alone, in the long run.
+        crowd_cycle: The same of an ant that can turn on the spot everywhere.
+        food: Foods that can be taken, per 1000 ticks.
+        queen: Foods that can be given, per 1000 ticks.
+    """
+
+    first: float
+    cycle: float
+    crowd_cycle: float
+    food: float
+    queen: float
+
+    def deliveries(self, ants: int) -> float:
+        """The most that so many ants can deliver per 1000 ticks in the long run."""
+        cycle = self.cycle if ants == 1 else self.crowd_cycle
+        return min(ants * 1000 / cycle, self.food, self.queen)
+
+
+def limits_of(world: World, seed: int = 0, regrowth: int = 0) -> Limits:
+    """The limits of a world.
+
+    Args:
+        world: The world.
+        seed: Where and how one ant starts.
+        regrowth: Ticks until a food grows back; of the food's limit alone, the cycles are those
+            of food that grows back at once.
+    """
+    alone, crowd = _Walks(world, can_stay=False), _Walks(world, can_stay=True)
+    cells, headings = world.start(seed, 1)
+    return Limits(
+        first=alone.first_delivery(int(cells[0]), int(headings[0])),
+        cycle=alone.cycle(),
+        crowd_cycle=crowd.cycle(),
+        food=food_limit(world, regrowth),
+        queen=queen_limit(world),
+    )
+
+
+def food_limit(world: World, regrowth: int = 0) -> float:
+    """The most foods that can be taken per 1000 ticks."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import maximum_flow
+
+    reachable = _reachable(world)
+    foods = world.grid.index(world.foods)
+    around = foods[:, None] + world.grid.offsets
+    food, direction = np.nonzero(reachable[around])
+    if not len(food):
+        return 0.0
+    cells, cell = np.unique(around[food, direction], return_inverse=True)
+    beside_queen = (world.ground()[cells[:, None] + world.grid.offsets] == QUEEN).any(axis=1)
+    # Flows are integers: in units of one food in `unit` ticks.
+    unit = TICKS_A_CELL * TICKS_A_CELL_BESIDE_QUEEN * (regrowth + 1)
+    per_cell = np.where(beside_queen, unit // TICKS_A_CELL_BESIDE_QUEEN, unit // TICKS_A_CELL)
+    first_cell, sink = 1 + len(foods), 1 + len(foods) + len(cells)
+    source_edges = (np.zeros(len(foods), int), 1 + np.arange(len(foods)))
+    sink_edges = (first_cell + np.arange(len(cells)), np.full(len(cells), sink))
+    rows = np.concatenate([source_edges[0], 1 + food, sink_edges[0]])
+    columns = np.concatenate([source_edges[1], first_cell + cell, sink_edges[1]])
+    most = np.concatenate(
+        [
+            np.full(len(foods), unit // (regrowth + 1)),
+            np.full(len(food), unit // TICKS_A_CELL),
+            per_cell,
+        ]
+    ).astype(np.int32)
+    graph = coo_array((most, (rows, columns)), shape=(sink + 1, sink + 1)).tocsr()
+    return 1000 * int(maximum_flow(graph, 0, sink).flow_value) / unit
+
+
+def queen_limit(world: World) -> float:
+    """The most foods that can be given per 1000 ticks."""
+    around = int(world.grid.index(world.queen)) + world.grid.offsets
+    return 1000 * int(_reachable(world)[around].sum()) / TICKS_A_CELL
+
+
+def _reachable(world: World) -> np.ndarray:
+    """bool (grid.size,): empty cells to which a way over empty cells leads from the queen."""
+    ground, offsets = world.ground(), world.grid.offsets
+    reached = np.zeros(ground.size, dtype=bool)
+    frontier = np.array([int(world.grid.index(world.queen))])
+    while len(frontier):
+        ahead = np.unique(frontier[:, None] + offsets)
+        frontier = ahead[(ground[ahead] == EMPTY) & ~reached[ahead]]
+        reached[frontier] = True
+    return reached
+
+
+class _Walks:
+    """Shortest walks of an ant between deliveries, as paths in a graph.
+
+    A node is (carrying, heading, cell); edges are moves, blocked or not, and pick-ups. A delivery
+    leaves the ant where it is, so it is the end of one walk and the start of the next.
+
+    Args:
+        world: The world; its ground stays as it is.
+        can_stay: Whether a move can also turn the ant on the spot where nothing is in its way.
+    """
+
+    def __init__(self, world: World, can_stay: bool) -> None:
+        from scipy.sparse import coo_array
+
+        ground, offsets = world.ground(), world.grid.offsets.astype(np.int64)
+        cells = np.flatnonzero(ground == EMPTY)
+        self._number = np.full(ground.size, -1)
+        self._number[cells] = np.arange(len(cells))
+        self._cells = n = len(cells)
+        around = cells + offsets[:, None]  # (6, n)
+        is_free, sees = ground[around] == EMPTY, {}
+        for name, code in (("food", FOOD), ("queen", QUEEN)):
+            near = ground[around] == code
+            sees[name] = near | np.roll(near, 1, axis=0) | np.roll(near, -1, axis=0)
+        heading, cell = np.indices((N_HEADINGS, n))
+        edges = []
+        for turn in (-1, 0, 1):
+            towards = (heading + turn) % N_HEADINGS
+            free = is_free[towards, cell]
+            ahead = np.where(free, self._number[around[towards, cell]], cell)
+            edges.append((heading * n + cell, towards * n + ahead))
+            if can_stay:
+                edges.append(((heading * n + cell)[free], (towards * n + cell)[free]))
+        walks = [np.stack([np.ravel(a), np.ravel(b)]) for a, b in edges]
+        half = N_HEADINGS * n
+        picks = np.flatnonzero(sees["food"])
+        turned = (picks // n + 3) % N_HEADINGS * n + picks % n
+        rows, columns = np.concatenate(
+            [*walks, *[walk + half for walk in walks], np.stack([picks, turned + half])], axis=1
+        )
+        ones = np.ones(len(rows), np.int8)
+        self._graph = coo_array((ones, (rows, columns)), shape=(2 * half, 2 * half)).tocsr()
+        self._half = half
+        self._gives = np.flatnonzero(sees["queen"])  # where a carrying ant can give
+
+    def first_delivery(self, cell: int, heading: int) -> float:
+        """Ticks to a delivery of an ant that starts on a cell (flat index) without food."""
+        start = heading * self._cells + int(self._number[cell])
+        return float(self._to_deliveries([start]).min(initial=np.inf))
+
+    def cycle(self) -> float:
+        """The least mean number of ticks from one delivery to the next, inf if there is no way."""
+        if not len(self._gives):
+            return np.inf
+        return least_mean_cycle(self._to_deliveries(self._gives))
+
+    def _to_deliveries(self, starts: np.ndarray | list[int]) -> np.ndarray:
+        """Ticks (starts, gives) from states without food to each state after a delivery."""
+        from scipy.sparse.csgraph import dijkstra
+
+        steps = dijkstra(self._graph, indices=starts, unweighted=True)
+        return steps[:, self._half + self._gives] + 1
+
+
+def least_mean_cycle(lengths: np.ndarray) -> float:
+    """The least mean length of an edge over all cycles of a complete graph, by Karp's theorem.
+
+    Args:
+        lengths: Float (n, n), from each node to each; inf where there is no edge.
+    """
+    n = len(lengths)
+    walks = np.full((n + 1, n), np.inf)  # the shortest walk of k edges that ends in a node
+    walks[0] = 0.0  # from anywhere
+    for k in range(n):
+        walks[k + 1] = (walks[k][:, None] + lengths).min(axis=0)
+    ends = np.isfinite(walks[n])
+    if not ends.any():
+        return np.inf
+    with np.errstate(invalid="ignore"):
+        means = (walks[n] - walks[:n]) / (n - np.arange(n))[:, None]
+    return float(means[:, ends].max(axis=0).min())

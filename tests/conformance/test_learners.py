@@ -1,0 +1,164 @@
+"""What every registered learner must be, in whatever file it stands."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import taichi as ti
+from random_worlds import random_world
+
+from taichi_ants import (
+    AntsError,
+    TrainingConfig,
+    evaluate,
+    learners,
+    reference,
+    trace_training,
+    train,
+)
+from taichi_ants.learners import Learner, registry
+from taichi_ants.reference import learners as twins
+from taichi_ants.worlds import paper
+
+DELIVERIES = ("absorbing", "continuing")
+
+
+@ti.func
+def clipped_td_error(value, reward, discount, next_values, next_action, epsilon):
+    """SARSA that never believes a surprise of more than 2."""
+    next_value = next_values[0]
+    for a in ti.static(range(1, 5)):
+        if next_action == a:
+            next_value = next_values[a]
+    error = reward + discount * next_value - value
+    return ti.max(ti.min(error, 2.0), -2.0)
+
+
+def clipped_twin(value, reward, discount, next_values, next_action, epsilon):
+    error = (reward + discount * next_values[next_action]) - value
+    return max(min(error, np.float32(2)), np.float32(-2))
+
+
+CLIPPED = Learner("clipped_sarsa", clipped_td_error, draws_next_action=True)
+
+
+@pytest.fixture(autouse=True)
+def _clipped_sarsa(monkeypatch):
+    """A learner from outside of the package, known during these tests only."""
+    monkeypatch.setattr(registry, "_LEARNERS", dict(registry._LEARNERS))
+    monkeypatch.setattr(twins, "_learners", dict(twins._learners))
+    learners.register(CLIPPED)
+    twins.register("clipped_sarsa", clipped_twin, draws_next_action=True)
+
+
+NAMES = (*learners.names(), "clipped_sarsa")
+
+
+def config_for(name, delivery="absorbing", **changes):
+    planning_steps = 3 if learners.get(name).plans else 0
+    settings = {
+        **{"learning_rate": 0.1, "discount": 0.9, "epsilon": 0.3, "epsilon_decay": 0.97},
+        **{"planning_steps": planning_steps, "delivery": delivery, **changes},
+    }
+    return TrainingConfig(name, **settings)
+
+
+def test_the_registry_lists_them():
+    assert {"q_learning", "sarsa", "expected_sarsa", "dyna_q"} < set(NAMES)
+    assert learners.names() == NAMES
+    assert learners.get("clipped_sarsa") is CLIPPED
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_has_a_twin_in_the_reference(name):
+    assert name in reference.learner_names()
+    learner, twin = learners.get(name), reference.learner_named(name)
+    assert learner.name == name
+    assert (learner.plans, learner.draws_next_action) == (twin.plans, twin.draws_next_action)
+
+
+@pytest.mark.parametrize("delivery", DELIVERIES)
+@pytest.mark.parametrize("name", NAMES)
+def test_it_equals_its_twin_in_every_step(name, delivery):
+    """Some hundred steps in random worlds: states, actions, TD errors and tables, to the bit."""
+    steps = deliveries = 0
+    for seed in range(12):
+        world = random_world(seed + 200)
+        config = config_for(name, delivery, learning_rate=0.37, discount=0.99, epsilon=0.2)
+        ours = trace_training(world, config, seed, 3, 30, seed % 2 == 0)
+        plain = reference.train(
+            world, config, seed, 3, 30, seed % 2 == 0, trace=True, trace_tables=True
+        )
+        assert len(ours) == len(plain.trace)
+        for k, step in enumerate(plain.trace):
+            assert (ours.states[k], ours.actions[k]) == (step.state, step.action)
+            assert (ours.rewards[k], ours.next_states[k]) == (step.reward, step.next_state)
+            assert ours.terminated[k] == step.terminated
+            assert ours.td_errors[k] == step.td_error
+            assert np.array_equal(ours.tables[k], step.q_values)
+        result = train(world, config, seed, 3, 30, seed % 2 == 0)
+        assert result.returns[0, 0].tolist() == plain.returns
+        assert np.array_equal(result.q_values[0, 0], plain.q_values)
+        steps += len(ours)
+        deliveries += sum(plain.deliveries)
+    assert steps > 300
+    assert deliveries > 0
+
+
+@pytest.mark.parametrize("delivery", DELIVERIES)
+@pytest.mark.parametrize("name", NAMES)
+def test_it_learns_to_deliver_in_the_papers_world(name, delivery):
+    config = config_for(name, delivery)
+    result = train(paper(), config, range(10), 400, 600)
+    assert np.isfinite(result.q_values).all()
+    late, early = result.steps[0, :, -50:], result.steps[0, :, :3]
+    assert late.mean() < early.mean() / 2
+    greedy = evaluate(paper(), result.q_values, 10, range(10))
+    assert greedy.deliveries.mean() > 0.9
+    assert np.median(greedy.steps) <= 36  # 34 is the shortest way
+    untrained = evaluate(paper(), np.zeros((128, 5)), 100)
+    assert untrained.deliveries.mean() < 0.5
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_planning_steps_must_fit(name):
+    plans = learners.get(name).plans
+    with pytest.raises(AntsError, match="planning_steps"):
+        train(paper(), config_for(name, planning_steps=0 if plans else 4), 0, 1, 1)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_taken_name_is_refused(name):
+    with pytest.raises(AntsError, match=f"'{name}' exists already"):
+        learners.register(Learner(name, clipped_td_error))
+    with pytest.raises(AntsError, match=f"'{name}' already"):
+        twins.register(name, clipped_twin)
+
+
+def plain_function(value, reward, discount, next_values, next_action, epsilon):
+    return reward - value
+
+
+@pytest.mark.parametrize(
+    ("learner", "says"),
+    [
+        (None, "None is not a Learner"),
+        (clipped_td_error, "is not a Learner"),
+        (Learner("two words", clipped_td_error), "'two words' cannot name a learner"),
+        (Learner("", clipped_td_error), "'' cannot name a learner"),
+        (Learner("a/b", clipped_td_error), "'a/b' cannot name a learner"),
+        (Learner(3, clipped_td_error), "3 cannot name a learner"),
+        (Learner("plain", plain_function), "'plain' is no Taichi function"),
+        (Learner("none", None), "'none' is no Taichi function"),
+    ],
+)
+def test_what_cannot_be_registered(learner, says):
+    with pytest.raises(AntsError) as caught:
+        learners.register(learner)
+    assert says in str(caught.value)
+    assert learners.names() == NAMES
+
+
+def test_an_unknown_name_is_answered_with_the_known_ones():
+    with pytest.raises(AntsError, match=r"no learner 'td_zero'; choose one of q_learning, .*"):
+        learners.get("td_zero")

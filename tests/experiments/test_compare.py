@@ -1,0 +1,335 @@
+"""The paper's comparison as a command: its files, held against the library."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_lines import assert_one_sentence, call, contents, run
+
+from taichi_ants import (
+    TrainingConfig,
+    continue_training,
+    evaluate,
+    load_policy,
+    train,
+    worlds,
+)
+from taichi_ants.analysis.statistics import bootstrap_interval
+
+SEEDS, EPISODES, MAX_STEPS, ROLLOUTS = (7, 8, 9), 60, 45, 50
+SMALL = [
+    *("--seeds", len(SEEDS), "--seed", SEEDS[0], "--episodes", EPISODES),
+    *("--max-steps", MAX_STEPS, "--learners", "q_learning", "sarsa", "dyna_q"),
+    *("--planning-steps", 2, "--learning-rates", 0.01, "--discounts", 0.9, 0.99),
+    *("--epsilons", 0.3, "--epsilon-decays", 0.995),
+]
+COLUMNS = [
+    *("learner", "planning_steps", "learning_rate", "discount", "epsilon", "epsilon_decay"),
+    *("delivery", "seeds", "return_last50_mean", "return_last50_ci_low", "return_last50_ci_high"),
+    *("return_last50_sd", "steps_last50_mean", "steps_all_mean", "deliveries_last50_mean"),
+    *("greedy_return_mean", "greedy_steps_mean", "greedy_deliveries_mean"),
+]
+FIGURES = {
+    *("figures/best_runs.png", "figures/learning_curves.png"),
+    *("figures/return_against_deliveries.png", "figures/sensitivity.png"),
+}
+FILES = {
+    *("baselines.csv", "claims.csv", "claims.md", "episodes.npz", "manifest.json", "report.txt"),
+    *("summary.csv", "table2.csv", "table2.md"),
+    *("policies/dyna_q_p2.npz", "policies/q_learning.npz", "policies/sarsa.npz"),
+    *FIGURES,
+}
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory, kernels):
+    """The folder that one run of the command has left; not to be written to."""
+    place = tmp_path_factory.mktemp("compare")
+    done = run("compare", [*SMALL, "--out", "deep/out"], kernels, place)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""  # no progress bar where nobody looks
+    folder = place / "deep" / "out"
+    report = (folder / "report.txt").read_text("utf-8")
+    assert done.stdout.startswith(report)
+    assert re.fullmatch(
+        r"\n\d+\.\d s; everything is in deep/out/\n", done.stdout.removeprefix(report)
+    )
+    return folder
+
+
+@pytest.fixture
+def copy(finished, tmp_path):
+    """A copy of it to try things on."""
+    return Path(shutil.copytree(finished, tmp_path / "out"))
+
+
+@pytest.fixture
+def compare(capsys):
+    """Calls the command within this process."""
+    return lambda *arguments: call("compare", arguments, capsys)
+
+
+def read_csv(path):
+    with open(path, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def config_of(row):
+    """The configuration that a row of summary.csv names."""
+    numbers = [float(row[name]) for name in COLUMNS[2:6]]
+    planning = int(row["planning_steps"])
+    return TrainingConfig(
+        row["learner"], *numbers, planning_steps=planning, delivery=row["delivery"]
+    )
+
+
+def test_files(finished):
+    assert set(contents(finished)) == FILES
+    assert not (finished / "unfinished").exists()
+
+
+def test_summary_lists_the_grid(finished):
+    text = (finished / "summary.csv").read_text("utf-8")
+    assert text.splitlines()[0] == ",".join(COLUMNS)
+    rows = read_csv(finished / "summary.csv")
+    assert len({config_of(row) for row in rows}) == len(rows) == 2 * 3 * 2
+    learners = [(row["learner"], row["planning_steps"], row["delivery"]) for row in rows]
+    names = ("q_learning", "0"), ("sarsa", "0"), ("dyna_q", "2")
+    deliveries = "continuing", "absorbing"
+    assert set(learners) == {(*name, delivery) for name in names for delivery in deliveries}
+    assert {row["discount"] for row in rows} == {"0.9", "0.99"}
+    assert {row["seeds"] for row in rows} == {str(len(SEEDS))}
+
+
+def test_episodes_are_what_the_library_gives_in_the_order_of_the_summary(finished):
+    rows = read_csv(finished / "summary.csv")
+    with np.load(finished / "episodes.npz") as archive:
+        arrays = dict(archive)
+    runs = (len(rows), len(SEEDS))
+    shapes = dict.fromkeys(("returns", "steps", "deliveries"), (*runs, EPISODES))
+    shapes |= {f"greedy_{name}": (*runs, ROLLOUTS) for name in list(shapes)}
+    assert {name: array.shape for name, array in arrays.items()} == shapes
+    assert all(array.dtype.kind in "iu" for array in arrays.values())
+
+    trained = train(worlds.paper(), [config_of(row) for row in rows], SEEDS, EPISODES, MAX_STEPS)
+    greedy = evaluate(worlds.paper(), trained.q_values, ROLLOUTS, SEEDS, MAX_STEPS)
+    for name in ("returns", "steps", "deliveries"):
+        assert np.array_equal(arrays[name], getattr(trained, name))
+        assert np.array_equal(arrays[f"greedy_{name}"], getattr(greedy, name))
+    assert arrays["deliveries"].any()
+    assert arrays["greedy_deliveries"].any()
+
+
+def test_summary_figures_are_those_of_the_episodes(finished):
+    rows = read_csv(finished / "summary.csv")
+    with np.load(finished / "episodes.npz") as archive:
+        arrays = {name: archive[name].astype(float) for name in archive.files}
+    last = {name: array[:, :, -50:].mean(axis=2) for name, array in arrays.items()}
+    low, high = bootstrap_interval(last["returns"])
+    expected = {
+        "return_last50_mean": last["returns"].mean(axis=1),
+        "return_last50_ci_low": low,
+        "return_last50_ci_high": high,
+        "return_last50_sd": last["returns"].std(axis=1, ddof=1),
+        "steps_last50_mean": last["steps"].mean(axis=1),
+        "steps_all_mean": arrays["steps"].mean(axis=(1, 2)),
+        "deliveries_last50_mean": last["deliveries"].mean(axis=1),
+        "greedy_return_mean": arrays["greedy_returns"].mean(axis=(1, 2)),
+        "greedy_steps_mean": arrays["greedy_steps"].mean(axis=(1, 2)),
+        "greedy_deliveries_mean": arrays["greedy_deliveries"].mean(axis=(1, 2)),
+    }
+    assert list(expected) == COLUMNS[8:]
+    for name, values in expected.items():
+        written = [float(row[name]) for row in rows]
+        np.testing.assert_allclose(written, values, rtol=1e-9, atol=1e-12, err_msg=name)
+    assert (low < expected["return_last50_mean"]).all()
+    assert (expected["return_last50_mean"] < high).all()
+
+
+def test_baselines(finished):
+    rows = {
+        (row["baseline"], row["setting"], row["discount"]): row
+        for row in read_csv(finished / "baselines.csv")
+    }
+    training, greedy = "training, no evaporation", "greedy, evaporation"
+    assert set(rows) == {
+        *(("shortest delivery", training, ""), ("largest return", training, "")),
+        *(("optimal policy", training, "0.9"), ("optimal policy", training, "0.99")),
+        *(("random policy", setting, "") for setting in (training, greedy)),
+        *(("trail follower", setting, "") for setting in (training, greedy)),
+    }
+    shortest = rows["shortest delivery", training, ""]
+    assert (float(shortest["return_mean"]), float(shortest["steps_mean"])) == (45, 34)
+    uniform = np.zeros((len(SEEDS), 128, 5))
+    for setting, evaporation in ((training, False), (greedy, True)):
+        outcome = evaluate(worlds.paper(), uniform, ROLLOUTS, SEEDS, MAX_STEPS, evaporation)
+        row = rows["random policy", setting, ""]
+        assert float(row["return_mean"]) == pytest.approx(outcome.returns.mean())
+        assert float(row["steps_mean"]) == pytest.approx(outcome.steps.mean())
+
+
+def test_policies_are_those_of_median_runs(finished):
+    rows = read_csv(finished / "summary.csv")
+    for learner, planning_steps in (("q_learning", 0), ("sarsa", 0), ("dyna_q", 2)):
+        suffix = f"_p{planning_steps}" if planning_steps else ""
+        q_values, metadata = load_policy(finished / "policies" / f"{learner}{suffix}.npz")
+        mine = [
+            row for row in rows if row["learner"] == learner and row["delivery"] == "continuing"
+        ]
+        if learner == "sarsa":  # its configuration in the paper's table 2 is one of these
+            (chosen,) = [row for row in mine if row["discount"] == "0.9"]
+        else:
+            chosen = max(mine, key=lambda row: float(row["return_last50_mean"]))
+        assert TrainingConfig(**metadata["config"]) == config_of(chosen)
+        trained = train(worlds.paper(), config_of(chosen), SEEDS, EPISODES, MAX_STEPS)
+        number = SEEDS.index(metadata["seed"])
+        assert np.array_equal(q_values, trained.q_values[0, number])
+        returns = trained.returns[0, :, -50:].mean(axis=1)
+        assert metadata["return_last50"] == returns[number] == np.median(returns)
+
+
+def test_manifest(finished):
+    manifest = json.loads((finished / "manifest.json").read_text("utf-8"))
+    assert "compare.py --seeds 3 --seed 7" in manifest["command"]
+    assert manifest["settings"]["seeds"] == list(SEEDS)
+    assert manifest["settings"]["world"]["ranges"] == [10, 10, 10]
+    assert {"taichi", "numpy", "taichi_ants"} <= set(manifest["packages"])
+    assert set(manifest["files"]) == {name.split("/")[0] for name in FILES} - {"manifest.json"}
+    assert manifest["seconds"]["total"] > 0
+    costs = {(cost["learner"], cost["planning_steps"]): cost for cost in manifest["cost_per_step"]}
+    assert set(costs) == {("q_learning", 0), ("sarsa", 0), ("dyna_q", 2)}
+    with np.load(finished / "episodes.npz") as archive:
+        steps = archive["steps"].sum(dtype=int)
+    assert sum(cost["steps"] for cost in costs.values()) == steps
+    assert all(cost["nanoseconds_per_step"] > 0 for cost in costs.values())
+
+
+def test_the_same_command_shows_the_finished_comparison(copy, compare):
+    before = contents(copy)
+    status, out, err = compare(*SMALL, "--out", copy)
+    report = before["report.txt"].decode("utf-8")
+    assert (status, err) == (0, "")
+    assert out == f"{report}\n{copy}/ holds this comparison already; --force runs it again.\n"
+    assert contents(copy) == before
+
+
+def test_force_runs_again_and_leaves_no_old_figures(copy, compare):
+    before = contents(copy)
+    (copy / "notes.txt").write_text("mine")
+    status, out, _ = compare(*SMALL, "--out", copy, "--force", "--no-figures")
+    after = contents(copy)
+    assert status == 0
+    assert "already" not in out
+    assert set(after) == FILES - FIGURES | {"notes.txt"}
+    for name in ("summary.csv", "episodes.npz", "claims.csv", "policies/sarsa.npz"):
+        assert after[name] == before[name], name
+    assert after["manifest.json"] != before["manifest.json"]
+
+
+def test_figures_that_were_left_out_are_drawn_from_the_files(finished, copy, compare):
+    shutil.rmtree(copy / "figures")
+    before = contents(copy)
+    status, out, err = compare(*SMALL, "--out", copy)
+    assert (status, err) == (0, "")
+    assert "holds this comparison already" in out
+    assert contents(copy) == contents(finished)
+    assert before == {name: text for name, text in contents(copy).items() if name not in FIGURES}
+
+
+@pytest.mark.parametrize("name", ["episodes.npz", "baselines.csv"])
+@pytest.mark.parametrize("damage", [lambda path: path.unlink(), lambda path: path.write_text("x")])
+def test_figures_cannot_be_drawn_from_damaged_files(name, damage, copy, compare):
+    shutil.rmtree(copy / "figures")
+    damage(copy / name)
+    status, _, err = compare(*SMALL, "--out", copy)
+    assert status == 2
+    assert_one_sentence(err)
+    assert not (copy / "figures").exists()
+    assert not list(copy.glob(".*"))
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        (["--seeds", 4], "seeds"),
+        (["--episodes", 61], "episodes"),
+        (["--max-steps", 46], "max_steps"),
+        (["--discounts", 0.9], "configurations"),
+        (["--world", "open", "--world-seed", 3], "world"),
+    ],
+)
+def test_other_settings_do_not_mix_with_results(change, named, copy, compare):
+    before = contents(copy)
+    status, _, err = compare(*SMALL, *change, "--out", copy)
+    assert status == 2
+    assert_one_sentence(err)
+    assert re.search(rf"\(.*\b{named}\b.* differ\)", err)
+    assert "--force" in err
+    assert contents(copy) == before
+
+
+TINY = [
+    *("--seeds", 1, "--episodes", 2, "--max-steps", 30, "--learners", "q_learning"),
+    *("--learning-rates", 0.1, "--discounts", 0.9, "--epsilons", 0.3, "--epsilon-decays", 0.9),
+    *("--delivery", "absorbing", "--no-figures"),
+]
+
+
+def test_lists_take_blanks_and_commas_and_drop_what_is_said_twice(tmp_path, compare):
+    lists = ["--discounts", "0.5,0.9", "0.90", "--epsilons", "0.1,0.2"]
+    status, _, _ = compare(*TINY, *lists, "--out", tmp_path / "out")
+    rows = read_csv(tmp_path / "out" / "summary.csv")
+    assert status == 0
+    assert [(row["discount"], row["epsilon"]) for row in rows] == [
+        *(("0.5", "0.1"), ("0.5", "0.2"), ("0.9", "0.1"), ("0.9", "0.2")),
+    ]
+
+
+def test_quick_takes_few_seeds_and_a_folder_of_its_own(tmp_path, compare, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert compare(*TINY, "--quick", "--seeds", 50)[0] == 0
+    rows = read_csv(tmp_path / "results" / "compare-quick" / "summary.csv")
+    assert {row["seeds"] for row in rows} == {"10"}
+    assert compare(*TINY, "--quick", "--seeds", 2, "--out", "results/compare")[0] == 0
+    rows = read_csv(tmp_path / "results" / "compare" / "summary.csv")
+    assert {row["seeds"] for row in rows} == {"2"}
+
+
+@pytest.mark.parametrize("world", ["open", "garden"])
+def test_other_worlds(world, tmp_path, compare):
+    garden = Path(__file__).parents[2] / "experiments" / "maps" / "garden.txt"
+    chosen = ["--world", garden if world == "garden" else "open", "--world-seed", 5]
+    status, _, err = compare(*TINY, *chosen, "--out", tmp_path / "out")
+    assert (status, err) == (0, "")
+    (row,) = read_csv(tmp_path / "out" / "summary.csv")
+    built = worlds.load_map(garden) if world == "garden" else worlds.open_world(5)
+    expected = train(built, config_of(row), 0, 2, 30)
+    with np.load(tmp_path / "out" / "episodes.npz") as archive:
+        assert np.array_equal(archive["returns"], expected.returns)
+        assert np.array_equal(archive["steps"], expected.steps)
+
+
+def test_all_learners_of_the_library_can_be_compared(tmp_path, compare):
+    names = ["expected_sarsa", "dyna_q"]
+    status, out, _ = compare(*TINY, "--learners", *names, "--out", tmp_path / "out")
+    rows = read_csv(tmp_path / "out" / "summary.csv")
+    assert status == 0
+    assert [(row["learner"], row["planning_steps"]) for row in rows] == [
+        *(("expected_sarsa", "0"), ("dyna_q", "3"), ("dyna_q", "5"))
+    ]
+    assert "Expected SARSA" in out
+
+
+def test_training_of_the_comparison_can_be_continued(finished):
+    """A run of the comparison is the beginning of any longer one."""
+    row = read_csv(finished / "summary.csv")[0]
+    first = train(worlds.paper(), config_of(row), SEEDS, EPISODES, MAX_STEPS)
+    longer = continue_training(first, 5)
+    with np.load(finished / "episodes.npz") as archive:
+        assert np.array_equal(longer.returns[0, :, :EPISODES], archive["returns"][0])

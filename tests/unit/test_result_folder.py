@@ -1,0 +1,274 @@
+"""A folder of results: finished once, never mixed, never lost, whenever the work stops."""
+
+from __future__ import annotations
+
+import json
+import os
+
+import numpy as np
+import pytest
+
+from taichi_ants.errors import AntsError
+from taichi_ants.result_folder import ResultFolder
+
+SETTINGS = {"seeds": (0, 1), "rate": np.float32(0.5), "world": {"ranges": [3, 3, 3]}}
+OTHER = {**SETTINGS, "rate": 0.25}
+
+
+def finish(path, settings=SETTINGS, files=("table.csv",), text="result", replace=False):
+    """Do a whole piece of work."""
+    folder = ResultFolder(path, settings)
+    with folder.work(replace) as (blocks, ready):
+        (blocks / "block").write_text(text)
+        for name in files:
+            (ready / name).write_text(text)
+        folder.publish({"made": text})
+    return folder
+
+
+def interrupted_work(path, settings=SETTINGS, replace=False, block="done"):
+    """The work stops after one block, or before it."""
+    with ResultFolder(path, settings).work(replace) as (blocks, ready):
+        if block:
+            (blocks / "block").write_text(block)
+        (ready / "half").write_text("half")
+        raise KeyboardInterrupt
+
+
+def stop_after_a_block(*arguments, **options):
+    with pytest.raises(KeyboardInterrupt):
+        interrupted_work(*arguments, **options)
+
+
+def names(path):
+    return sorted(item.name for item in path.iterdir())
+
+
+def test_finished_work(tmp_path):
+    path = tmp_path / "a" / "b"
+    assert not ResultFolder(path, SETTINGS).is_finished()
+    finish(path)
+    assert names(path) == ["manifest.json", "table.csv"]
+    assert (path / "table.csv").read_text() == "result"
+    manifest = json.loads((path / "manifest.json").read_text())
+    assert manifest == {
+        "made": "result",
+        "files": ["table.csv"],
+        "settings": {"seeds": [0, 1], "rate": 0.5, "world": {"ranges": [3, 3, 3]}},
+    }
+    assert ResultFolder(path, SETTINGS).is_finished()
+    assert not ResultFolder(path, OTHER).is_finished()
+
+
+def test_blocks_survive_what_is_ready_does_not(tmp_path):
+    stop_after_a_block(tmp_path / "out")
+    assert names(tmp_path / "out") == ["unfinished"]
+    with ResultFolder(tmp_path / "out", SETTINGS).work() as (blocks, ready):
+        assert (blocks / "block").read_text() == "done"
+        assert names(ready) == []
+    assert not ResultFolder(tmp_path / "out", SETTINGS).is_finished()
+    finish(tmp_path / "out")
+    assert names(tmp_path / "out") == ["manifest.json", "table.csv"]
+
+
+@pytest.mark.parametrize("existed", [False, True])
+def test_work_without_a_block_leaves_nothing(existed, tmp_path):
+    path = tmp_path / "new" / "out"
+    if existed:
+        path.mkdir(parents=True)
+    with pytest.raises(KeyboardInterrupt):
+        interrupted_work(path, block="")
+    assert path.exists() == existed
+    assert (tmp_path / "new").exists() == existed
+    assert not existed or names(path) == []
+
+
+def test_an_interruption_while_folders_are_made_leaves_nothing(tmp_path, monkeypatch):
+    def interrupt(folder, lock):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(ResultFolder, "_prepare", interrupt)
+    with pytest.raises(KeyboardInterrupt), ResultFolder(tmp_path / "a" / "b", SETTINGS).work():
+        pass
+    assert names(tmp_path) == []
+
+
+def test_results_of_other_settings_are_kept_apart(tmp_path):
+    finish(tmp_path)
+    with pytest.raises(AntsError, match=r"results of other settings \(rate differ\)"):
+        ResultFolder(tmp_path, OTHER).work().__enter__()
+    with pytest.raises(AntsError, match=r"\(more, rate, world differ\)"):
+        ResultFolder(tmp_path, {"seeds": [0, 1], "more": 1}).work().__enter__()
+    assert names(tmp_path) == ["manifest.json", "table.csv"]
+    assert ResultFolder(tmp_path, SETTINGS).is_finished()
+
+
+def test_unfinished_work_of_other_settings_is_kept_apart(tmp_path):
+    stop_after_a_block(tmp_path)
+    with pytest.raises(AntsError, match=r"unfinished work of other settings \(rate differ\)"):
+        ResultFolder(tmp_path, OTHER).work().__enter__()
+    assert (tmp_path / "unfinished" / "blocks" / "block").exists()
+
+
+def test_replacing_starts_anew_and_keeps_old_results_until_the_end(tmp_path):
+    finish(tmp_path, files=("table.csv", "old.csv"), text="old")
+    (tmp_path / "notes.txt").write_text("mine")
+    stop_after_a_block(tmp_path, OTHER, replace=True)
+    assert (tmp_path / "table.csv").read_text() == "old"
+    assert not ResultFolder(tmp_path, SETTINGS).is_finished()  # the work on the others is not done
+    finish(tmp_path, OTHER, text="new")
+    assert names(tmp_path) == ["manifest.json", "notes.txt", "table.csv"]
+    assert (tmp_path / "table.csv").read_text() == "new"
+    assert ResultFolder(tmp_path, OTHER).is_finished()
+
+
+@pytest.mark.parametrize("settings", [SETTINGS, OTHER])
+def test_replacing_does_not_use_old_blocks(settings, tmp_path):
+    stop_after_a_block(tmp_path)
+    with ResultFolder(tmp_path, settings).work(replace=True) as (blocks, _):
+        assert names(blocks) == []
+
+
+def test_blocks_without_settings_are_not_trusted(tmp_path):
+    """Where a process was killed while it cleaned up, nobody knows whose blocks are left."""
+    stop_after_a_block(tmp_path)
+    (tmp_path / "unfinished" / "settings.json").unlink()
+    with ResultFolder(tmp_path, OTHER).work() as (blocks, _):
+        assert names(blocks) == []
+
+
+def test_left_overs_of_a_killed_clean_up_do_not_matter(tmp_path):
+    finish(tmp_path)
+    (tmp_path / "unfinished" / "blocks").mkdir(parents=True)
+    assert ResultFolder(tmp_path, SETTINGS).is_finished()
+
+
+@pytest.mark.parametrize("damage", ["", "{", "[]", '{"settings": 3}', "\0"])
+def test_damaged_settings_are_of_other_settings(damage, tmp_path):
+    stop_after_a_block(tmp_path)
+    (tmp_path / "unfinished" / "settings.json").write_text(damage)
+    with pytest.raises(AntsError, match="other settings"):
+        ResultFolder(tmp_path, SETTINGS).work().__enter__()
+
+
+def test_a_damaged_manifest_is_of_other_settings(tmp_path):
+    finish(tmp_path)
+    (tmp_path / "manifest.json").write_text("{}")
+    assert not ResultFolder(tmp_path, SETTINGS).is_finished()
+    with pytest.raises(AntsError, match="results of other settings"):
+        ResultFolder(tmp_path, SETTINGS).work().__enter__()
+    finish(tmp_path, replace=True)
+    assert ResultFolder(tmp_path, SETTINGS).is_finished()
+
+
+def test_foreign_files_are_not_written_among(tmp_path):
+    (tmp_path / "diary.txt").write_text("mine")
+    with pytest.raises(AntsError, match=r"no finished results .*--force"):
+        ResultFolder(tmp_path, SETTINGS).work().__enter__()
+    assert names(tmp_path) == ["diary.txt"]
+    finish(tmp_path, replace=True)
+    assert names(tmp_path) == ["diary.txt", "manifest.json", "table.csv"]
+
+
+def test_an_empty_folder_can_be_used(tmp_path):
+    finish(tmp_path)
+    assert ResultFolder(tmp_path, SETTINGS).is_finished()
+
+
+def test_one_process_at_a_time(tmp_path):
+    with ResultFolder(tmp_path, SETTINGS).work() as (blocks, _):
+        for replace in (False, True):
+            with pytest.raises(AntsError, match="another process"):
+                ResultFolder(tmp_path, SETTINGS).work(replace).__enter__()
+        assert blocks.is_dir()
+        (blocks / "block").write_text("done")
+    assert (tmp_path / "unfinished" / "blocks" / "block").exists()
+    finish(tmp_path)
+
+
+def test_what_is_in_the_way_is_replaced(tmp_path):
+    """A file where a folder goes, a folder where a file goes, links: their targets stay."""
+    target = tmp_path / "target"
+    target.mkdir()
+    (target / "precious").write_text("mine")
+    path = tmp_path / "out"
+    path.mkdir()
+    (path / "figures").write_text("a file")
+    (path / "table.csv").mkdir()
+    (path / "policies").symlink_to(target)
+    folder = ResultFolder(path, SETTINGS)
+    with folder.work(replace=True) as (_, ready):
+        for name in ("figures", "policies"):
+            (ready / name).mkdir()
+            (ready / name / "x").write_text("new")
+        (ready / "table.csv").write_text("new")
+        folder.publish({})
+    assert (path / "figures" / "x").read_text() == (path / "policies" / "x").read_text() == "new"
+    assert (path / "table.csv").read_text() == "new"
+    assert names(target) == ["precious"]
+
+
+def test_only_files_of_the_folder_itself_are_replaced(tmp_path):
+    """A manifest from elsewhere cannot make us remove what lies outside."""
+    finish(tmp_path / "out")
+    (tmp_path / "precious").write_text("mine")
+    manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
+    files = ["../precious", str(tmp_path / "precious"), "..", ".", "table.csv"]
+    (tmp_path / "out" / "manifest.json").write_text(json.dumps({**manifest, "files": files}))
+    finish(tmp_path / "out", replace=True, files=("new.csv",))
+    assert names(tmp_path) == ["out", "precious"]
+    assert names(tmp_path / "out") == ["manifest.json", "new.csv"]
+
+
+def test_additions(tmp_path):
+    folder = finish(tmp_path)
+    with folder.addition() as place:
+        (place / "figures").mkdir()
+        (place / "figures" / "one.png").write_text("drawn")
+        assert "figures" not in names(tmp_path)
+    assert names(tmp_path) == ["figures", "manifest.json", "table.csv"]
+    assert folder.is_finished()
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    assert manifest["files"] == ["figures", "table.csv"]
+    assert manifest["made"] == "result"
+    finish(tmp_path, replace=True)  # what was added goes with the results
+    assert names(tmp_path) == ["manifest.json", "table.csv"]
+
+
+def test_additions_that_fail_leave_nothing(tmp_path):
+    def add_half(folder):
+        with folder.addition() as place:
+            (place / "half").write_text("half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        add_half(finish(tmp_path))
+    assert names(tmp_path) == ["manifest.json", "table.csv"]
+
+
+@pytest.mark.parametrize("place", ["file", "file/below", "/proc/nothing", "a\0b", "x" * 300])
+def test_folders_that_cannot_be_written(place, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").write_text("in the way")
+    folder = ResultFolder(place, SETTINGS)
+    assert not folder.is_finished()
+    with pytest.raises(AntsError, match="cannot write"):
+        folder.work().__enter__()
+    assert names(tmp_path) == ["file"]
+
+
+def test_errors_of_the_system_while_publishing(tmp_path, monkeypatch):
+    folder = ResultFolder(tmp_path / "out", SETTINGS)
+    with folder.work() as (blocks, ready):
+        (blocks / "block").write_text("done")
+        (ready / "table.csv").write_text("new")
+
+        def fail(*arguments):
+            raise OSError(28, os.strerror(28))
+
+        monkeypatch.setattr("pathlib.Path.replace", fail)
+        with pytest.raises(AntsError, match="no space left"):
+            folder.publish({})
+    assert not folder.is_finished()
+    monkeypatch.undo()
+    finish(tmp_path / "out")
