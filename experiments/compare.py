@@ -34,7 +34,9 @@ DELIVERIES = ("continuing", "absorbing")
 ROLLOUTS = 50
 QUICK_SEEDS = 10
 MOST_SEEDS = 10_000
-REPORT, EPISODES, BASELINES, FIGURES = "report.txt", "episodes.npz", "baselines.csv", "figures"
+REPORT, EPISODES, BASELINES = "report.txt", "episodes.npz", "baselines.csv"
+FIGURES, POLICIES, RENDERS = "figures", "policies", "renders"
+RENDERED_STEPS = 150  # at most; an ant that has learned needs 34
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -82,6 +84,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--quick", action="store_true", help=f"at most {QUICK_SEEDS} seeds")
     add("--force", action="store_true", help="replace what FOLDER holds")
     add("--no-figures", action="store_true", help="draw no figures")
+    add("--no-render", action="store_true", help="show no episodes of the learned policies")
     settings = parser.parse_args(arguments)
     if settings.quick:
         settings.seeds = min(settings.seeds, QUICK_SEEDS)
@@ -264,13 +267,15 @@ def do_comparison(
     text = write_tables(ready, comparison, baselines, costs)
     results.write_text(ready / REPORT, text)
     write_episodes(ready, comparison)
-    write_policies(
-        results.check_writable_folder(ready / "policies"), sweep, comparison, result.q_values
-    )
+    policies = results.check_writable_folder(ready / POLICIES)
+    write_policies(policies, sweep, comparison, result.q_values)
     laps["tables"] = time.perf_counter()
     if not settings.no_figures:
         draw_figures(comparison, baselines, ready)
     laps["figures"] = time.perf_counter()
+    if not settings.no_render:
+        render_policies(sweep, policies, ready)
+    laps["renders"] = time.perf_counter()
     marks = list(laps.items())
     seconds = {name: end - marks[i][1] for i, (name, end) in enumerate(marks[1:])}
     return {"cost_per_step": costs, "seconds": seconds}
@@ -283,8 +288,33 @@ def draw_figures(comparison: Comparison, baselines: list[dict[str, Any]], folder
     save_all(comparison, baselines, folder / FIGURES)
 
 
+def render_policies(sweep: Sweep, policies: Path, folder: Path) -> None:
+    """Show a greedy episode of each policy that was written, in the folder `renders`."""
+    from taichi_ants import load_policy, results
+    from taichi_ants.rendering import render_episode
+
+    place = results.check_writable_folder(folder / RENDERS)
+    with progress_bar("rendering") as report_progress:
+        paths = sorted(policies.glob("*.npz"))
+        for done, path in enumerate(paths):
+            q_values, metadata = load_policy(path)
+            render_episode(
+                place / f"{path.stem}.gif",
+                sweep.world,
+                q_values,
+                seed=metadata["seed"],
+                max_steps=min(sweep.max_steps, RENDERED_STEPS),
+                size=(720, 480),
+                title=f"{path.stem}, seed {metadata['seed']}",
+            )
+            report_progress((done + 1) / len(paths))
+
+
 def show_finished(settings: argparse.Namespace, sweep: Sweep, folder: ResultFolder) -> None:
-    """Print the summary of a finished comparison; draw figures that were left out."""
+    """Print the summary of a finished comparison; add figures and episodes that were left out."""
+    if not settings.no_render and not (settings.out / RENDERS).is_dir():
+        with folder.addition() as place:
+            render_policies(sweep, settings.out / POLICIES, place)
     if not settings.no_figures and not (settings.out / FIGURES).is_dir():
         comparison, baselines = read_back(settings.out, sweep)
         with folder.addition() as place:
