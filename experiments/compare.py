@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import csv
 import itertools
+import signal
 import sys
 import time
 from pathlib import Path
@@ -270,22 +271,33 @@ def do_comparison(
     policies = results.check_writable_folder(ready / POLICIES)
     write_policies(policies, sweep, comparison, result.q_values)
     laps["tables"] = time.perf_counter()
-    if not settings.no_figures:
-        draw_figures(comparison, baselines, ready)
-    laps["figures"] = time.perf_counter()
-    if not settings.no_render:
-        render_policies(sweep, policies, ready)
-    laps["renders"] = time.perf_counter()
+    draw_pictures(settings, sweep, ready)
+    laps["figures and renders"] = time.perf_counter()
     marks = list(laps.items())
     seconds = {name: end - marks[i][1] for i, (name, end) in enumerate(marks[1:])}
     return {"cost_per_step": costs, "seconds": seconds}
 
 
-def draw_figures(comparison: Comparison, baselines: list[dict[str, Any]], folder: Path) -> None:
-    """Draw the figures into the folder `figures`."""
+def draw_pictures(settings: argparse.Namespace, sweep: Sweep, folder: Path) -> None:
+    """Draw figures and episodes of what lies in a folder, side by side: each takes one core."""
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    # Spawned, since a fork of a process in which Taichi runs hangs. Ctrl-C is for this process.
+    quiet = (signal.SIGINT, signal.SIG_IGN)
+    with ProcessPoolExecutor(1, get_context("spawn"), signal.signal, quiet) as pool:
+        figures = None if settings.no_figures else pool.submit(draw_figures, sweep, folder, folder)
+        if not settings.no_render:
+            render_policies(sweep, folder / POLICIES, folder)
+        if figures is not None:
+            figures.result()
+
+
+def draw_figures(sweep: Sweep, results: Path, folder: Path) -> None:
+    """Draw the figures of the comparison in one folder into the folder `figures` of another."""
     from taichi_ants.analysis.figures import save_all
 
-    save_all(comparison, baselines, folder / FIGURES)
+    save_all(*read_back(results, sweep), folder / FIGURES)
 
 
 def render_policies(sweep: Sweep, policies: Path, folder: Path) -> None:
@@ -316,9 +328,8 @@ def show_finished(settings: argparse.Namespace, sweep: Sweep, folder: ResultFold
         with folder.addition() as place:
             render_policies(sweep, settings.out / POLICIES, place)
     if not settings.no_figures and not (settings.out / FIGURES).is_dir():
-        comparison, baselines = read_back(settings.out, sweep)
         with folder.addition() as place:
-            draw_figures(comparison, baselines, place)
+            draw_figures(sweep, settings.out, place)
     print((settings.out / REPORT).read_text("utf-8"))
     print(f"{settings.out}/ holds this comparison already; --force runs it again.")
 
