@@ -53,7 +53,8 @@ static int observe(const World *world, const Ant *ant)
     int state = ant->carries;
     if (ant->carries) {
         int nearer = world->closer[ant->cell];
-        nearer = (nearer | nearer << N_HEADINGS) >> (ant->heading + N_HEADINGS - 1);
+        nearer |= nearer << N_HEADINGS | nearer << 2 * N_HEADINGS; /* headings turn round */
+        nearer >>= ant->heading + N_HEADINGS - 1;
         for (int k = 0; k < 3; k++) {
             int ground = ant->ground[in_view(world, ant, k)];
             int lure = (ground == 0) & (nearer >> k);

@@ -147,7 +147,7 @@ def _add_colony(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
     add("--regrowth", type=whole_number(0), metavar="N", help="ticks until taken food is back")
     add("--wander", type=whole_number(1), metavar="N", help="ticks until a pile of food moves")
     add("--evaporation", choices=("linear", "exponential", "none"), help="(default: linear)")
-    add("--half-life", type=number, metavar="X", help="ticks, of exponential evaporation")
+    add("--half-life", type=number, metavar="X", help="ticks; trails evaporate exponentially")
     add("--diffusion", type=number, metavar="X", help="share of a trail that spreads per tick")
     add("--deposit", choices=("set", "add", "none"), help="(default: set)")
     add("--level", type=whole_number(1), metavar="N", help="what a deposit sets or adds")
@@ -316,10 +316,12 @@ def one_colony(settings: argparse.Namespace) -> None:
 
 def new_colony(settings: argparse.Namespace) -> Colony:
     """A colony at the start of its episode."""
-    from taichi_ants import Colony, ColonyConfig, Pheromone, load_policy
+    from taichi_ants import AntsError, Colony, ColonyConfig, Pheromone, load_policy
 
     names = ("evaporation", "half_life", "diffusion", "deposit", "level")
     given = {name: getattr(settings, name) for name in names if getattr(settings, name) is not None}
+    if "half_life" in given and given.setdefault("evaporation", "exponential") != "exponential":
+        raise AntsError("--half-life is for exponential evaporation; leave one of the two out.")
     life = ColonyConfig(
         settings.ants,
         settings.capacity,

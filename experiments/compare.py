@@ -9,9 +9,9 @@ from __future__ import annotations
 import argparse
 import csv
 import itertools
-import signal
 import sys
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,7 @@ from taichi_ants.command_line import (
     Parser,
     load_plugin,
     number,
+    process_beside,
     progress_bar,
     run_command,
     whole_number,
@@ -280,17 +281,11 @@ def do_comparison(
 
 def draw_pictures(settings: argparse.Namespace, sweep: Sweep, folder: Path) -> None:
     """Draw figures and episodes of what lies in a folder, side by side: each takes one core."""
-    from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import get_context
-
-    # Spawned, since a fork of a process in which Taichi runs hangs. Ctrl-C is for this process.
-    quiet = (signal.SIGINT, signal.SIG_IGN)
-    with ProcessPoolExecutor(1, get_context("spawn"), signal.signal, quiet) as pool:
-        figures = None if settings.no_figures else pool.submit(draw_figures, sweep, folder, folder)
+    with ExitStack() as stack:
+        if not settings.no_figures:
+            stack.enter_context(process_beside(draw_figures, sweep, folder, folder))
         if not settings.no_render:
             render_policies(sweep, folder / POLICIES, folder)
-        if figures is not None:
-            figures.result()
 
 
 def draw_figures(sweep: Sweep, results: Path, folder: Path) -> None:

@@ -82,8 +82,8 @@ class ArenaPlan:
         room = min(int((world.ground() == 0).sum()) for world in self.worlds)
         if max(self.sizes) > room:
             raise AntsError(
-                f"{max(self.sizes)} ants are asked for; {self.words} have room for {room}, so ask "
-                "for fewer ants or larger worlds."
+                f"{max(self.sizes)} ants do not fit into {self.words}, where there is room for "
+                f"{room}; ask for fewer."
             )
 
     def conditions(self) -> Iterator[Condition]:

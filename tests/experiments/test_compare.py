@@ -39,11 +39,13 @@ FIGURES = {
     *("figures/best_runs.png", "figures/learning_curves.png"),
     *("figures/return_against_deliveries.png", "figures/sensitivity.png"),
 }
+RENDERS = {"renders/dyna_q_p2.gif", "renders/q_learning.gif", "renders/sarsa.gif"}
 FILES = {
     *("baselines.csv", "claims.csv", "claims.md", "episodes.npz", "manifest.json", "report.txt"),
     *("summary.csv", "table2.csv", "table2.md"),
     *("policies/dyna_q_p2.npz", "policies/q_learning.npz", "policies/sarsa.npz"),
     *FIGURES,
+    *RENDERS,
 }
 
 
@@ -219,27 +221,41 @@ def test_the_same_command_shows_the_finished_comparison(copy, compare):
     assert contents(copy) == before
 
 
-def test_force_runs_again_and_leaves_no_old_figures(copy, compare):
+def test_force_runs_again_and_leaves_no_old_pictures(copy, compare):
     before = contents(copy)
     (copy / "notes.txt").write_text("mine")
-    status, out, _ = compare(*SMALL, "--out", copy, "--force", "--no-figures")
+    status, out, _ = compare(*SMALL, "--out", copy, "--force", "--no-figures", "--no-render")
     after = contents(copy)
     assert status == 0
     assert "already" not in out
-    assert set(after) == FILES - FIGURES | {"notes.txt"}
+    assert set(after) == FILES - FIGURES - RENDERS | {"notes.txt"}
     for name in ("summary.csv", "episodes.npz", "claims.csv", "policies/sarsa.npz"):
         assert after[name] == before[name], name
     assert after["manifest.json"] != before["manifest.json"]
 
 
-def test_figures_that_were_left_out_are_drawn_from_the_files(finished, copy, compare):
-    shutil.rmtree(copy / "figures")
+@pytest.mark.parametrize(
+    ("missing", "flag"), [("figures", "--no-render"), ("renders", "--no-figures")]
+)
+def test_pictures_that_were_left_out_are_drawn_from_the_files(
+    missing, flag, finished, copy, compare
+):
+    shutil.rmtree(copy / missing)
     before = contents(copy)
-    status, out, err = compare(*SMALL, "--out", copy)
+    status, out, err = compare(*SMALL, "--out", copy, flag)
     assert (status, err) == (0, "")
     assert "holds this comparison already" in out
-    assert contents(copy) == contents(finished)
-    assert before == {name: text for name, text in contents(copy).items() if name not in FIGURES}
+    after = contents(copy)
+    assert after == contents(finished)
+    assert before.items() <= after.items()  # nothing was computed again
+
+
+def test_pictures_can_be_left_out(finished, copy, compare):
+    for folder in ("figures", "renders"):
+        shutil.rmtree(copy / folder)
+    before = contents(copy)
+    assert compare(*SMALL, "--out", copy, "--no-figures", "--no-render")[0] == 0
+    assert contents(copy) == before
 
 
 @pytest.mark.parametrize("name", ["episodes.npz", "baselines.csv"])
@@ -277,7 +293,7 @@ def test_other_settings_do_not_mix_with_results(change, named, copy, compare):
 TINY = [
     *("--seeds", 1, "--episodes", 2, "--max-steps", 30, "--learners", "q_learning"),
     *("--learning-rates", 0.1, "--discounts", 0.9, "--epsilons", 0.3, "--epsilon-decays", 0.9),
-    *("--delivery", "absorbing", "--no-figures"),
+    *("--delivery", "absorbing", "--no-figures", "--no-render"),
 ]
 
 

@@ -20,13 +20,13 @@ from taichi_ants.reference import learners as twins
 LONG = [
     *("--seeds", 4, "--episodes", 500, "--learners", "q_learning", "dyna_q"),
     *("--planning-steps", 9, "--learning-rates", 0.001, 0.01, "--discounts", 0.9, 0.99),
-    *("--epsilons", 0.5, "--no-figures"),
+    *("--epsilons", 0.5, "--no-figures", "--no-render"),
 ]
 BLOCKS = 2 * 2 * 2 * 2 * 2
 TINY = [
     *("--seeds", 1, "--episodes", 2, "--max-steps", 30, "--learners", "q_learning"),
     *("--learning-rates", 0.1, "--discounts", 0.9, "--epsilons", 0.3, "--epsilon-decays", 0.9),
-    *("--delivery", "absorbing", "--no-figures"),
+    *("--delivery", "absorbing", "--no-figures", "--no-render"),
 ]
 
 
@@ -112,6 +112,32 @@ def test_an_interruption_before_the_first_block_leaves_nothing(kernels, tmp_path
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("seconds", [0.05, 0.5, 1.2])
+def test_an_interruption_of_the_pictures_keeps_the_runs(seconds, kernels, tmp_path):
+    """Ctrl-C on a terminal goes to the process that draws, too, and that says nothing."""
+    process = subprocess.Popen(
+        command("compare", ["--seeds", 2, "--episodes", 20, "--discounts", 0.9, "--out", "out"]),
+        cwd=tmp_path,
+        env=environment(kernels),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    unfinished = tmp_path / "out" / "unfinished"
+    while process.poll() is None and not (unfinished / "ready/policies/sarsa.npz").exists():
+        time.sleep(0.002)
+    time.sleep(seconds)
+    os.killpg(process.pid, signal.SIGINT)
+    sent = time.perf_counter()
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (130, "")
+    assert err.startswith("Stopped")
+    assert err.count("\n") == 1
+    assert time.perf_counter() - sent < 2
+    assert len(blocks_in(tmp_path / "out")) == 2 * 4 * 8
+
+
 def test_a_second_process_waits_its_turn(kernels, tmp_path):
     process = start([*LONG, "--out", "out"], kernels, tmp_path)
     try:
@@ -154,7 +180,7 @@ def test_help_is_quick_and_needs_no_taichi(tmp_path):
         *("--seeds", "--seed", "--episodes", "--max-steps", "--delivery", "--learners"),
         *("--learning-rates", "--discounts", "--epsilons", "--epsilon-decays"),
         *("--planning-steps", "--world", "--threads", "--arch", "--out", "--quick", "--force"),
-        "--no-figures",
+        *("--no-figures", "--no-render"),
     ):
         assert f"  {flag}" in done.stdout
 

@@ -132,18 +132,18 @@ def test_without_a_way_nothing_is_possible() -> None:
 
 
 def test_in_a_crowd_ants_turn_on_the_spot() -> None:
-    """In the open, turning round takes moves along a curve; against another ant it does not."""
-    limits = limits_of(World((6, 6, 6), (0, 0, 0), [(4, 0, 0)]))
-    assert limits.crowd_cycle <= limits.cycle
-    wide = [
-        limits_of(worlds.open_world(seed, (12, 12, 12), rock_share=0.0, food_share=0.005))
-        for seed in range(8)
-    ]
-    assert all(one.crowd_cycle <= one.cycle for one in wide)
+    """Between food and queen in the open, a turn leads away, unless another ant is in the way."""
+    limits = limits_of(World((9, 9, 9), (0, 0, 0), [(2, 0, 0)]))
+    assert (limits.cycle, limits.crowd_cycle) == (6, 3)
+    # Cycles of 6 and of 7 ticks in turn.
+    assert limits_of(World((9, 9, 9), (0, 0, 0), [(2, 1, 0)])).cycle == 6.5
+    # Farther away, the way there and back is a loop anyway.
+    far = limits_of(World((9, 9, 9), (0, 0, 0), [(6, 0, 0)]))
+    assert far.cycle == far.crowd_cycle == 12
 
 
 def plain_deliveries(world: World, ticks: int) -> list[int]:
-    """The most deliveries within 0 .. `ticks` ticks from any state without food, searched plainly."""
+    """The most deliveries within 0 .. `ticks` ticks from any state without food, searched."""
     foods = set(map(tuple, world.foods.tolist()))
     rocks = set(map(tuple, world.obstacles.tolist()))
     cells = [c for c in itertools.product(*map(range, world.ranges)) if min(c) == 0]

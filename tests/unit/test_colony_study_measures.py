@@ -139,9 +139,8 @@ def test_the_report_is_plain_and_narrow() -> None:
     text = report_text(study, condition_rows(study), findings)
     assert "\x1b" not in text
     assert max(len(line) for line in text.splitlines()) <= WIDTH
-    assert text.splitlines()[0] == (
-        "The paper world, 12 seeds: deliveries per 1000 ticks by number of ants"
-    )
+    assert text.splitlines()[0] == "The paper world, 12 seeds: deliveries per 1000 ticks"
+    assert text.splitlines()[2].split() == ["ants", *map(str, SIZES)]
     row = next(line for line in text.splitlines() if "trained jointly; no trails laid" in line)
     assert row.split()[-4:] == ["20.0", "40.0", "80.0", "160"]
     limit = next(line for line in text.splitlines() if line.strip().startswith("limit"))

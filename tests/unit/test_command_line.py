@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import io
+import multiprocessing
+import os
 import signal
 import sys
 import threading
+import time
 
 import pytest
 
@@ -15,6 +18,7 @@ from taichi_ants.command_line import (
     Parser,
     load_plugin,
     number,
+    process_beside,
     progress_bar,
     run_command,
     whole_number,
@@ -220,6 +224,52 @@ def test_commands_run_in_other_threads_too():
     thread.start()
     thread.join()
     assert statuses == [0]
+
+
+def leave_a_note(path):
+    path.write_text("done")
+
+
+def complain(text):
+    raise AntsError(text)
+
+
+def die():
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def sleep_for_long(path):
+    path.write_text("asleep")
+    time.sleep(60)
+
+
+def test_work_in_a_process_beside(tmp_path, capfd):
+    with process_beside(leave_a_note, tmp_path / "note"):
+        pass
+    assert (tmp_path / "note").read_text() == "done"
+
+    with pytest.raises(SystemExit) as end, process_beside(complain, "it is dark."):
+        pass
+    assert end.value.code == 2
+    assert capfd.readouterr().err == "error: it is dark.\n"
+
+    with pytest.raises(AntsError, match="stopped a process"), process_beside(die):
+        pass
+
+
+def test_a_process_beside_does_not_outlive_an_interruption(tmp_path):
+    def command():
+        with process_beside(sleep_for_long, tmp_path / "note"):
+            while not (tmp_path / "note").exists():
+                time.sleep(0.002)
+            raise KeyboardInterrupt
+
+    began = time.perf_counter()
+    with pytest.raises(KeyboardInterrupt):
+        command()
+    assert time.perf_counter() - began < 30
+    assert multiprocessing.active_children() == []
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
 
 
 class Terminal(io.StringIO):

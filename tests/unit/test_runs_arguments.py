@@ -278,6 +278,7 @@ def test_launches_cover_all_work_once_and_episodes_in_order(n_runs, n_episodes):
     done = np.zeros((n_runs, n_episodes), int)
     for launch in plan.launches(n_runs, n_episodes):
         rows = slice(launch.first, launch.first + launch.count)
+        assert launch.end <= n_episodes
         assert (done[rows, : launch.begin] == 1).all()
         done[rows, launch.begin : launch.end] += 1
     assert (done == 1).all()

@@ -140,10 +140,11 @@ def _by_way(
     study: ColonyStudy, measures: dict[str, str], title: str, caption: str, limits: bool = False
 ) -> Figure:
     """A row of panels for each measure, a line for each way, trails evaporating."""
+    share = False if limits else "row"  # limits already set the scale
     with styled():
         figure = new_figure(5.6)
         axes = figure.subplots(
-            len(measures), len(study.arenas), sharex="col", sharey="row", squeeze=False
+            len(measures), len(study.arenas), sharex="col", sharey=share, squeeze=False
         )
         for row, (measure, label) in zip(axes, measures.items(), strict=True):
             row[0].set_ylabel(label)
@@ -229,9 +230,11 @@ def _finish(
     plain = FuncFormatter(lambda value, _: f"{value:g}")
     for row, by_powers in zip(axes, logarithmic, strict=True):
         for axis in row:
-            if by_powers:
+            if by_powers and np.isfinite(axis.dataLim.minposy):  # something is above 0
                 axis.set_yscale("log")
-                axis.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5), numticks=30))
+                low, high = axis.get_ylim()
+                subs = (1, 2, 5) if high < 1000 * low else (1,)
+                axis.yaxis.set_major_locator(LogLocator(subs=subs, numticks=30))
                 axis.yaxis.set_minor_locator(NullLocator())
             else:
                 axis.margins(y=0.08)

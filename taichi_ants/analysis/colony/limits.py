@@ -22,6 +22,7 @@ All hold in the long run, for ants that neither die nor are born, and food that 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +32,7 @@ from taichi_ants.worlds.world import World
 
 TICKS_A_CELL = 3
 TICKS_A_CELL_BESIDE_QUEEN = 2
+_FIRST_HORIZON = 64
 
 
 @dataclass(frozen=True)
@@ -175,19 +177,36 @@ class _Walks:
     def first_delivery(self, cell: int, heading: int) -> float:
         """Ticks to a delivery of an ant that starts on a cell (flat index) without food."""
         start = heading * self._cells + int(self._number[cell])
-        return float(self._to_deliveries([start]).min(initial=np.inf))
+        for horizon in self._horizons():
+            ticks = self._to_deliveries([start], horizon).min(initial=np.inf)
+            if np.isfinite(ticks):
+                return float(ticks)
+        return np.inf
 
     def cycle(self) -> float:
         """The least mean number of ticks from one delivery to the next, inf if there is no way."""
-        if not len(self._gives):
-            return np.inf
-        return least_mean_cycle(self._to_deliveries(self._gives))
+        n = len(self._gives)
+        for horizon in self._horizons() if n else ():
+            ticks = self._to_deliveries(self._gives, horizon)
+            mean = least_mean_cycle(ticks)
+            # If so, a cycle of up to n walks with one beyond the horizon has a greater mean.
+            if np.isfinite(mean) and mean + (n - 1) * (mean - ticks.min()) <= horizon:
+                return mean
+        return np.inf
 
-    def _to_deliveries(self, starts: np.ndarray | list[int]) -> np.ndarray:
+    def _horizons(self) -> Iterator[int]:
+        """Lengths up to which to search for walks: short ones are quick, and mostly enough."""
+        horizon = _FIRST_HORIZON
+        while horizon < 2 * self._half:
+            yield horizon
+            horizon *= 4
+        yield 2 * self._half
+
+    def _to_deliveries(self, starts: np.ndarray | list[int], horizon: int) -> np.ndarray:
         """Ticks (starts, gives) from states without food to each state after a delivery."""
         from scipy.sparse.csgraph import dijkstra
 
-        steps = dijkstra(self._graph, indices=starts, unweighted=True)
+        steps = dijkstra(self._graph, indices=starts, unweighted=True, limit=horizon)
         return steps[:, self._half + self._gives] + 1
 
 

@@ -51,14 +51,14 @@ def _table(arena: Arena, rows: list[dict[str, Any]]) -> Any:
     table = Table(
         title=(
             f"{arena.words[0].upper()}{arena.words[1:]}, {markdown.count(arena.seeds, 'seed')}: "
-            "deliveries per 1000 ticks by number of ants"
+            "deliveries per 1000 ticks"
         ),
         box=SIMPLE_HEAD,
         padding=(0, 1, 0, 0),
         title_justify="left",
         title_style="bold",
     )
-    table.add_column("")
+    table.add_column("ants")
     for ants in arena.sizes:
         table.add_column(str(ants), justify="right")
     found = {(row["pheromone"], row["way"], row["ants"]): row for row in rows}

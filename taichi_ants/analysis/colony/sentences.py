@@ -97,6 +97,6 @@ def _clearest(
 ) -> str:
     """The example with the greatest ratio."""
     n = max(those, key=lambda n: abs(math.log((firsts[n] + 1e-9) / (seconds[n] + 1e-9))))
-    which = "" if len(those) == 1 else f"most with {n}: "
+    which = "" if len(those) == 1 else f"clearest with {n}: "
     numbers = f"{figure(firsts[n])} against {figure(seconds[n])} per 1000 ticks"
     return f"{which}{numbers}, {change(firsts[n], seconds[n])}"

@@ -28,7 +28,7 @@ ON, OFF, LASTING = "on", "off", "lasting"
 PHEROMONES: dict[str, str] = {
     ON: "evaporating trails",
     OFF: "no trails laid",
-    LASTING: "trails that never evaporate",
+    LASTING: "lasting trails",
 }
 
 

@@ -1,0 +1,327 @@
+"""The scaling study and single colonies as a command: files held against the library."""
+
+from __future__ import annotations
+
+import csv
+import json
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from command_lines import (
+    EXPERIMENTS,
+    assert_one_sentence,
+    call,
+    command,
+    contents,
+    environment,
+    run,
+)
+
+from taichi_ants import Colony, ColonyConfig, Pheromone, TrainingConfig, load_policy, worlds
+
+SEEDS, EPISODES, TICKS, ROLLOUTS = (3, 4), 4, 80, 2
+SMALL = [
+    *("--arenas", "paper", "open", "--sizes", 1, 3, "--seeds", len(SEEDS), "--seed", SEEDS[0]),
+    *("--episodes", EPISODES, "--ticks", TICKS, "--rollouts", ROLLOUTS),
+]
+FILES = {
+    *("conditions.csv", "differences.csv", "episodes.npz", "findings.md", "manifest.json"),
+    *("report.txt", "table.md"),
+    *(f"figures/{name}.png" for name in ("crowding", "joint_learning", "scaling", "trails")),
+    *(f"policies/{arena}_{way}.npz" for arena in ("paper", "open") for way in ("alone", "joint_3")),
+}
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory, kernels):
+    """What one run of the command has printed, and its folder; not to be written to."""
+    place = tmp_path_factory.mktemp("finished")
+    done = run("colony", [*SMALL, "--out", "out"], kernels, place)
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout, place / "out"
+
+
+def test_all_files_are_there(finished):
+    out, folder = finished
+    assert set(contents(folder)) == FILES
+    report = (folder / "report.txt").read_text("utf-8")
+    assert out.startswith(report)
+    assert "The paper's world, 2 seeds: deliveries per 1000 ticks" in report
+    assert "Does joint learning cure it?" in report
+    with open(folder / "conditions.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 2 * (5 + 4 + 4) * 2
+    manifest = json.loads((folder / "manifest.json").read_text("utf-8"))
+    assert manifest["settings"]["training"]["learner"] == "sarsa"
+    assert manifest["settings"]["arenas"][0]["seeds"] == list(SEEDS)
+
+
+TRAINING = TrainingConfig(
+    "sarsa", 0.1, 0.9, 0.3, (0.01 / 0.3) ** (1 / 3), min_epsilon=0.01, delivery="continuing"
+)
+
+
+def test_the_numbers_are_those_of_the_library(finished):
+    """Three ants in open worlds without trails: trained alone, then jointly, then evaluated."""
+    _, folder = finished
+    world = [worlds.open_world(seed, (30, 30, 30)) for seed in SEEDS]
+    off = Pheromone(deposit="none")
+    alone = Colony(world, ColonyConfig(1, pheromone=off, regrowth=0), TRAINING, SEEDS)
+    alone.run(EPISODES, TICKS)
+    life = ColonyConfig(3, pheromone=off, regrowth=0)
+    together = Colony(world, life, TRAINING, SEEDS, q_values=alone.q_values)
+    together.run(EPISODES, TICKS)
+    assert not np.array_equal(alone.q_values, together.q_values)
+
+    greedy = TrainingConfig("sarsa", 0.1, 0.9, 0.01, 1.0, min_epsilon=0.01, delivery="continuing")
+    others = [seed + 2**32 for seed in SEEDS]
+    with np.load(folder / "episodes.npz") as archive:
+        for way, table in (("copied", alone.q_values), ("then_joint", together.q_values)):
+            colony = Colony(world, life, greedy, others, "fixed", table)
+            outcome = colony.run(ROLLOUTS, TICKS)
+            for name in ("deliveries", "first_delivery", "moves", "blocked", "returns"):
+                stored = archive[f"open.off.{way}.3.{name}"]
+                np.testing.assert_array_equal(stored, getattr(outcome, name).T)
+
+
+def test_tables_of_ones_own_are_trained_and_kept_apart(finished):
+    _, folder = finished
+    life = ColonyConfig(3, regrowth=0)
+    own = Colony(worlds.paper(), life, TRAINING, SEEDS, "own")
+    own.run(EPISODES, TICKS)
+    greedy = TrainingConfig("sarsa", 0.1, 0.9, 0.01, 1.0, min_epsilon=0.01, delivery="continuing")
+    others = [seed + 2**32 for seed in SEEDS]
+    colony = Colony(worlds.paper(), life, greedy, others, "fixed", own.q_values)
+    outcome = colony.run(ROLLOUTS, TICKS)
+    with np.load(folder / "episodes.npz") as archive:
+        np.testing.assert_array_equal(archive["paper.on.own.3.moves"], outcome.moves.T)
+
+
+def test_policies_say_where_they_come_from(finished):
+    _, folder = finished
+    q_values, metadata = load_policy(folder / "policies" / "open_joint_3.npz")
+    assert q_values.any()
+    assert (metadata["way"], metadata["ants"], metadata["arena"]) == ("joint", 3, "open")
+    assert metadata["seed"] in SEEDS
+
+
+def test_a_finished_study_is_shown_and_nothing_is_lost(finished, tmp_path, kernels):
+    _, folder = finished
+    before = contents(folder)
+    again = run("colony", [*SMALL, "--out", folder], kernels, tmp_path)
+    assert again.returncode == 0
+    assert again.stdout.startswith((folder / "report.txt").read_text("utf-8"))
+    assert "holds this study already" in again.stdout
+    other = run("colony", [*SMALL, "--out", folder, "--learner", "dyna_q"], kernels, tmp_path)
+    assert other.returncode == 2
+    assert_one_sentence(other.stderr)
+    assert "training" in other.stderr
+    assert contents(folder) == before
+
+
+def blocks_in(folder):
+    """Finished blocks with the time at which they were written."""
+    found = (folder / "unfinished" / "blocks").glob("*.npz")
+    return {path.name: path.stat().st_mtime_ns for path in found}
+
+
+def stop_after_blocks(arguments, kernels, place, stop_signal, least):
+    """Send a signal once there are `least` blocks; the process, its complaint, how long it took."""
+    process = subprocess.Popen(
+        command("colony", arguments),
+        cwd=place,
+        env=environment(kernels),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    while process.poll() is None and len(blocks_in(place / "out")) < least:
+        time.sleep(0.002)
+    sent = time.perf_counter()
+    process.send_signal(stop_signal)
+    _, complaint = process.communicate(timeout=60)
+    return process, complaint, time.perf_counter() - sent
+
+
+def test_stopped_and_killed_it_goes_on_to_the_same_results(finished, kernels, tmp_path):
+    arguments, folder = [*SMALL, "--out", "out"], tmp_path / "out"
+    process, complaint, seconds = stop_after_blocks(arguments, kernels, tmp_path, signal.SIGINT, 2)
+    assert process.returncode == 130
+    assert complaint == (
+        "Stopped; finished parts are kept, and the same command goes on from there.\n"
+    )
+    assert seconds < 3
+    kept = blocks_in(folder)
+    assert len(kept) >= 2
+    process, *_ = stop_after_blocks(arguments, kernels, tmp_path, signal.SIGKILL, len(kept) + 2)
+    assert process.returncode == -signal.SIGKILL
+    assert kept.items() < blocks_in(folder).items()  # none of them was done again
+    # A block that was damaged meanwhile is done again.
+    (folder / "unfinished" / "blocks" / next(iter(kept))).write_bytes(b"nothing")
+
+    done = run("colony", [*arguments, "--no-figures"], kernels, tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    after, expected = contents(folder), contents(finished[1])
+    assert set(after) == {name for name in FILES if not name.startswith("figures")}
+    for name in set(after) - {"manifest.json"}:
+        assert after[name] == expected[name], name
+
+    # Figures that were left out are drawn later, from what the folder holds.
+    later = run("colony", arguments, kernels, tmp_path)
+    assert later.returncode == 0
+    assert set(contents(folder)) == FILES
+    for name in ("figures/scaling.png", "figures/trails.png"):
+        assert contents(folder)[name] == expected[name]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["--quick", "--ants", 3], "--quick is for the study"),
+        (["--save", "x"], "--save is for one colony"),
+        (["--resume", "x", "--regrowth", 0], "--regrowth cannot change a colony that is resumed"),
+        (["--resume", "x", "--discount", 0.5], "--discount cannot change a colony"),
+        (["--resume", "x"], "cannot read 'x'"),
+        (["--arenas", "moon"], "'moon' is no arena, choose of paper, open, large"),
+        (["--sizes", 300, "--arenas", "paper"], "300 ants do not fit into the paper's world"),
+        (["--learner", "none"], "there is no learner 'none'"),
+        (["--epsilon", 2], "epsilon is 2.0"),
+        (["--ants", 0], "0 is not allowed"),
+        (["--ants", 500, "--ranges", 10, 10, 10], "500 ants are asked for"),
+        (["--ants", 2, "--world", "paper", "--ranges", 9, 9, 9], "--ranges are those of an open"),
+        (["--ants", 2, "--world", "nowhere"], "there is no world named 'nowhere'"),
+        (["--ants", 9, "--births", "--capacity", 5], "capacity is 5, but 9 ants start"),
+        (["--ants", 2, "--render", "x.bmp"], "'x.bmp' ends in '.bmp'"),
+        (["--ants", 2, "--save", "/proc/x/y"], "cannot write to the folder '/proc/x'"),
+        (["--ants", 2, "--save", "."], "'.' is a folder"),
+        (["--ants", 2, "--diffusion", 2], "diffusion is 2.0"),
+        (
+            ["--ants", 2, "--half-life", 5, "--evaporation", "none"],
+            "--half-life is for exponential",
+        ),
+        (["--ants", 2, "--policy", "x.npz"], "cannot read 'x.npz'"),
+        (["--ants", 2, "--plugin", "x.py"], "cannot read the plugin"),
+    ],
+)
+def test_mistakes_end_in_one_sentence(arguments, expected, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    status, out, err = call("colony", arguments, capsys)
+    assert (status, out) == (2, "")
+    assert_one_sentence(err)
+    assert expected in err
+    assert list(tmp_path.iterdir()) == []
+
+
+LIFE = [
+    *("--ants", 40, "--ranges", 20, 20, 20, "--births", "--capacity", 60, "--lifespan", 90),
+    *("--regrowth", 3, "--wander", 20, "--half-life", 30, "--diffusion", 0.1, "--deposit", "add"),
+    *("--learner", "q_learning", "--seed", 5),
+]
+
+
+def test_a_colony_that_is_saved_and_resumed_is_the_one_that_lived_on(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    whole = [*LIFE, "--ticks", 120, "--save", "whole.npz", "--render", "end.png"]
+    status, out, _ = call("colony", whole, capsys)
+    assert status == 0
+    assert "ants, 120 ticks: " in out
+    assert "million ant-steps per second" in out
+    assert "deliveries by tick 120" in out
+    assert call("colony", [*LIFE, "--ticks", 50, "--save", "part.npz"], capsys)[0] == 0
+    more = ["--resume", "part.npz", "--ticks", 70, "--save", "part.npz"]
+    status, out, _ = call("colony", [*more, "--render", "rest.gif", "--every", 7], capsys)
+    assert status == 0
+    assert "ants, 70 ticks: " in out
+    with np.load("whole.npz") as one, np.load("part.npz") as other:
+        assert one.files == other.files
+        assert all(np.array_equal(one[name], other[name]) for name in one.files)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        *("end.png", "part.npz", "rest.gif", "whole.npz"),
+    ]
+
+
+def test_a_colony_as_the_library_makes_it(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    status, out, _ = call("colony", [*LIFE, "--ticks", 90, "--save", "colony.npz"], capsys)
+    assert status == 0
+    pheromone = Pheromone("exponential", half_life=30.0, diffusion=0.1, deposit="add")
+    life = ColonyConfig(40, 60, pheromone, births=True, lifespan=90, regrowth=3, wander=20)
+    training = TrainingConfig("q_learning", 0.1, 0.9, 0.1, 1.0, 0.1, delivery="continuing")
+    colony = Colony(worlds.open_world(5, (20, 20, 20)), life, training, 5)
+    colony.run(1, 90)
+    saved = Colony.load("colony.npz")
+    np.testing.assert_array_equal(saved.q_values, colony.q_values)
+    assert f"{colony.outcome().deliveries.sum()} deliveries by tick 90" in out
+
+
+def test_interrupted_a_colony_is_saved_at_a_whole_tick(capsys, kernels, tmp_path, monkeypatch):
+    arguments = ["--ants", 60, "--world", "paper", "--ticks", 10_000_000, "--regrowth", 0]
+    process = subprocess.Popen(
+        [*command("colony", [*arguments, "--save", "colony.npz"])],
+        cwd=tmp_path,
+        env=environment(kernels),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    time.sleep(5)  # it has begun, and would take half a minute
+    sent = time.perf_counter()
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert time.perf_counter() - sent < 3
+    assert process.returncode == 130
+    ticks = int(err.removeprefix("Stopped at tick ").split(";")[0])
+    assert err == f"Stopped at tick {ticks}; --resume colony.npz goes on from there.\n"
+    assert f"60 ants, {ticks} ticks: " in out
+    monkeypatch.chdir(tmp_path)
+    training = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0, 0.1, delivery="continuing")
+    colony = Colony(worlds.paper(), ColonyConfig(60, regrowth=0), training, 0)
+    colony.run(1, ticks)
+    saved = Colony.load("colony.npz")
+    np.testing.assert_array_equal(saved.q_values, colony.q_values)
+    assert saved.outcome().deliveries == colony.outcome().deliveries
+
+
+def test_a_colony_starts_from_a_policy(finished, capsys):
+    policy = finished[1] / "policies" / "paper_alone.npz"
+    fixed = ["--ants", 2, "--world", "paper", "--ticks", 60, "--sharing", "fixed"]
+    assert call("colony", [*fixed, "--policy", policy, "--regrowth", 0], capsys)[0] == 0
+
+
+def test_help_is_quick_and_needs_no_taichi(tmp_path):
+    script = (
+        "import runpy, sys\n"
+        "sys.argv = ['colony.py', '--help']\n"
+        "try:\n"
+        f"    runpy.run_path({str(EXPERIMENTS / 'colony.py')!r}, run_name='__main__')\n"
+        "except SystemExit as end:\n"
+        "    assert end.code == 0\n"
+        "heavy = {'taichi', 'numpy', 'scipy', 'matplotlib', 'rich'} & set(sys.modules)\n"
+        "print('heavy:', sorted(heavy))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        env=environment(tmp_path),
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.stdout.endswith("heavy: []\n")
+    for flag in ("--ants", "--ranges", "--save", "--resume", "--render", "--quick", "--arenas"):
+        assert f"  {flag}" in done.stdout
+
+
+def test_the_guides_example_works(capsys):
+    """The Python of docs/colony.md."""
+    guide = (EXPERIMENTS.parent / "docs" / "colony.md").read_text("utf-8")
+    (code,) = (part.split("```")[0] for part in guide.split("```python\n")[1:])
+    exec(compile(code, "colony.md", "exec"), {})
+    *training, copies = capsys.readouterr().out.splitlines()
+    deliveries = np.array(" ".join(training).strip("[]").split(), int)
+    assert deliveries.shape == (50,)
+    assert deliveries[-10:].mean() > deliveries[:10].mean()
+    assert len(copies.strip("[]").split()) == 4
