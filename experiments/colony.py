@@ -211,7 +211,7 @@ def plan_arena(name: str, settings: argparse.Namespace) -> ArenaPlan:
     if name == "large":
         ways = {names.ON: (names.COPIED, *trained), names.OFF: (names.COPIED, names.JOINT)}
     ranges = {"open": OPEN_RANGES, "large": LARGE_RANGES}.get(name)
-    words = {"paper": "the paper's world", "large": f"large open worlds {LARGE_RANGES}"}
+    words = {"paper": "the paper's world", "large": f"large worlds {LARGE_RANGES}"}
     large = name == "large"
     return ArenaPlan(
         name=name,
