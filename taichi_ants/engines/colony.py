@@ -89,7 +89,8 @@ class Colony:
         seeds: One seed for each of the W worlds.
         sharing: "shared": one table for all ants of a world. "own": one for each slot. "fixed":
             nobody learns.
-        q_values: Action values to start from, float (128, 5) or (W, 128, 5); None: zeros.
+        q_values: Action values to start from, float (128, 5) or (W, 128, 5); None: zeros. If tables
+            are not shared, (W, slots, 128, 5) too, also for ants that do not learn.
         threads: CPU threads; None keeps what runs, or takes all.
         arch: "cpu" or "cuda"; None keeps what runs, or takes the CPU.
         schedule: "by_world" hands worlds to threads, "by_chunk" groups of ants; None chooses by
@@ -142,7 +143,8 @@ class Colony:
             self._layout, config, self.training, words, sharing, plans, chunks
         )
         table = None if q_values is None else checks.checked_q_values(q_values)
-        tables = colony_memory.allocate_tables(len(self.seeds), config.slots, sharing, table)
+        self._own = sharing == "own" or (sharing == "fixed" and np.ndim(table) == 4)
+        tables = colony_memory.allocate_tables(len(self.seeds), config.slots, self._own, table)
         self.arrays["q"] = tables
         self.epsilon = float(self.training.epsilon)
         self.episode = -1
@@ -237,9 +239,9 @@ class Colony:
     @property
     def q_values(self) -> np.ndarray:
         """The action values, float32 (W, 128, 5), or (W, slots, 128, 5) with own tables; a copy."""
-        n = self.config.slots if self.sharing == "own" else 1
+        n = self.config.slots if self._own else 1
         tables = self.arrays["q"].reshape(len(self.seeds), n, N_STATES, -1)[..., :N_ACTIONS]
-        return (tables if self.sharing == "own" else tables[:, 0]).copy()
+        return (tables if self._own else tables[:, 0]).copy()
 
     @property
     def worlds(self) -> tuple[World, ...]:
@@ -302,7 +304,7 @@ class Colony:
         """
         from taichi_ants.engines import colony_arrays as names
 
-        if self.config.births or self.config.lifespan or self.sharing == "own":
+        if self.config.births or self.config.lifespan or self._own:
             return
         ants = self.arrays["ants"]
         cells = ants[names.CELL].reshape(len(self.seeds), -1)
@@ -317,7 +319,7 @@ class Colony:
         from taichi_ants.engines.colony_kernels import colony_kernel
 
         dense = self.config.pheromone.dense
-        kernel = colony_kernel(self._learner, self.sharing, dense, self._lively, what)
+        kernel = colony_kernel(self._learner, self.sharing, self._own, dense, self._lively, what)
         numbers = Settings(**self._numbers())
         kernel(tick, n, *numbers, *Arrays(**self.arrays))
 

@@ -11,6 +11,7 @@ import numpy as np
 from taichi_ants import results
 from taichi_ants.colony_config import ColonyConfig, Pheromone
 from taichi_ants.config import TrainingConfig
+from taichi_ants.constants import N_ACTIONS, N_STATES
 from taichi_ants.errors import AntsError
 from taichi_ants.worlds.world import World
 
@@ -104,7 +105,17 @@ def _rebuild(
         TrainingConfig(**facts["training"]),
         facts["seeds"],
         facts["sharing"],
+        q_values=_own_tables(stored, facts),
         threads=threads,
         arch=arch,
         schedule=facts["schedule"],
     )
+
+
+def _own_tables(stored: dict[str, np.ndarray], facts: dict[str, Any]) -> np.ndarray | None:
+    """Any tables of the right shape, if a colony that does not learn has one a slot."""
+    slots = stored["array_ants"].shape[1] // len(facts["seeds"])
+    one_a_slot = stored["array_q"].size == len(facts["seeds"]) * slots * N_STATES * 8
+    if facts["sharing"] != "fixed" or not one_a_slot:
+        return None
+    return np.zeros((len(facts["seeds"]), slots, N_STATES, N_ACTIONS), np.float32)

@@ -35,18 +35,19 @@ BEGIN, BY_WORLD, BY_CHUNK, PLAN, END = "begin", "by_world", "by_chunk", "plan", 
 
 @cache
 def colony_kernel(
-    learner: Learner, sharing: str, dense: bool, lively: bool, schedule: str
+    learner: Learner, sharing: str, own: bool, dense: bool, lively: bool, schedule: str
 ) -> Callable[..., None]:
     """The kernel for one learner and way of sharing; it is compiled on first use.
 
     Args:
         learner: The learner.
         sharing: "shared", "own" or "fixed".
+        own: Whether there is a table for each slot.
         dense: Whether levels are f32, see `colony_trail`.
         lively: Whether ants or food come and go; leaving that out halves the time to compile.
         schedule: What the kernel does, one of the names above.
     """
-    p = phases(learner, sharing, dense, lively)
+    p = phases(learner, sharing, own, dense, lively)
     shares = sharing == "shared"
 
     @ti.kernel

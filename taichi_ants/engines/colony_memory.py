@@ -121,19 +121,19 @@ def allocate(
 
 
 def allocate_tables(
-    n_worlds: int, slots: int, sharing: str, q_values: np.ndarray | None
+    n_worlds: int, slots: int, own: bool, q_values: np.ndarray | None
 ) -> np.ndarray:
-    """The Q-tables, one a world or one a slot, from (128, 5) or (W, 128, 5) values or zeros."""
-    shape = (n_worlds, slots if sharing == "own" else 1, N_STATES, _ROW)
-    q = np.zeros(shape, np.float32)
+    """The Q-tables, one a slot if `own`, else one a world, see `Colony`; zeros without values."""
+    q = np.zeros((n_worlds, slots if own else 1, N_STATES, _ROW), np.float32)
     if q_values is not None:
-        if q_values.ndim not in (2, 3) or (q_values.ndim == 3 and len(q_values) != n_worlds):
+        leading = q_values.shape[:-2]
+        if leading not in ((), (n_worlds,)) and not (own and leading == (n_worlds, slots)):
             raise AntsError(
-                f"q_values has shape {q_values.shape}; give (128, 5), or ({n_worlds}, 128, 5) for "
-                "one table a world."
+                f"q_values has shape {q_values.shape}; give (128, 5), ({n_worlds}, 128, 5) for one "
+                f"table a world, or ({n_worlds}, {slots}, 128, 5) for one a slot, if they are not "
+                "shared."
             )
-        tables = q_values if q_values.ndim == 3 else q_values[None]
-        q[..., :N_ACTIONS] = tables[:, None]
+        q[..., :N_ACTIONS] = q_values if len(leading) == 2 else q_values[..., None, :, :]
     return q.reshape(-1)
 
 

@@ -69,10 +69,11 @@ def retire(c: ti.template(), k: ti.template(), w, ant):
             c.first_streams[w * k.slots + c.ants[NUMBER, ant]] = c.streams[ant]
 
 
-def phases(learner: Learner, sharing: str, dense: bool, lively: bool) -> SimpleNamespace:
+def phases(learner: Learner, sharing: str, own: bool, dense: bool, lively: bool) -> SimpleNamespace:
     """The phases for one learner and way of sharing, see `colony_kernels.colony_kernel`."""
     learns = sharing != "fixed"
-    alone = sharing == "own"
+    alone = own
+    forgets = own and learns  # a newborn knows nothing
     on_policy = learns and learner.draws_next_action
     plans = learns and learner.plans
     shared_plans = plans and not alone
@@ -118,7 +119,7 @@ def phases(learner: Learner, sharing: str, dense: bool, lively: bool) -> SimpleN
             count_gives(c, k, w, tick)
             if ti.static(lively):
                 if k.births == 1:
-                    give_birth(c, k, alone, w)
+                    give_birth(c, k, forgets, w)
 
     @ti.func
     def after_deaths(c: ti.template(), k: ti.template(), w, tick):
