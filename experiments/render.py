@@ -37,6 +37,8 @@ DEFAULT_OUT = {
     "sheet": "renders/policy_sheet.png",
 }
 DEFAULT_MAX_STEPS = {"episode": 600, "colony": 600, "learning": 150}
+DEFAULT_SIZE = {"colony": (960, 540), "learning": (1280, 460)}  # all others: 1280 x 720
+DEFAULT_EVERY = 4
 DEFAULT_EPISODES = {"colony": 60}  # all others: 500
 DEFAULT_PLANNING_STEPS = 5
 
@@ -56,10 +58,20 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     settings = parser.parse_args(arguments)
     if settings.policy and settings.show == "learning":
         parser.error("--policy holds a finished policy; --show learning trains one, leave it out")
+    if settings.size and settings.show == "sheet":
+        parser.error("--size is not for --show sheet, which is always 1920 wide; leave it out")
     settings.out = settings.out or DEFAULT_OUT[settings.show]
     settings.episodes = settings.episodes or DEFAULT_EPISODES.get(settings.show, 500)
     settings.max_steps = settings.max_steps or DEFAULT_MAX_STEPS.get(settings.show)
+    settings.size = settings.size or _default_size(settings)
     return settings
+
+
+def _default_size(settings: argparse.Namespace) -> tuple[int, int]:
+    """Width and height; a long animation of many ants is smaller, so that its file is."""
+    if settings.show == "colony" and Path(settings.out).suffix.lower() == ".png":
+        return 1280, 720
+    return DEFAULT_SIZE.get(settings.show, (1280, 720))
 
 
 def _add_policy(parser: argparse.ArgumentParser) -> None:
@@ -105,11 +117,22 @@ def _add_episode(parser: argparse.ArgumentParser) -> None:
 def _add_picture(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("picture")
     add = group.add_argument
-    add("--size", type=_size, default=(1280, 720), metavar="WxH", help="in pixels")
+    add(
+        "--size",
+        type=_size,
+        metavar="WxH",
+        help="in pixels, by default 1280x720, of learning 1280x460, of a moving colony 960x540",
+    )
     add("--fps", type=number, default=8.0, metavar="X", help="steps per second")
     add("--title", help="a line above all")
     add("--step", type=whole_number(0), metavar="N", help="of a .png: which step, else the last")
-    add("--every", type=whole_number(1), default=2, metavar="N", help="ticks of a colony a picture")
+    add(
+        "--every",
+        type=whole_number(1),
+        default=DEFAULT_EVERY,
+        metavar="N",
+        help=f"ticks of a colony a picture, by default {DEFAULT_EVERY}",
+    )
     add("--no-hud", action="store_true", help="no head-up lines")
     add("--no-legend", action="store_true", help="no legend")
     add("--no-view", action="store_true", help="do not mark the cells in view")

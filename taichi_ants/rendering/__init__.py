@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     )
     from taichi_ants.rendering.panel import Status
     from taichi_ants.rendering.scene import Scene, check_size
-    from taichi_ants.rendering.sheet import best_actions, clarity, policy_sheet
+    from taichi_ants.rendering.sheet import best_actions, clarity, policy_sheet, usual_spread
     from taichi_ants.rendering.snapshot import Snapshot
     from taichi_ants.rendering.viewport import Viewport
     from taichi_ants.rendering.writers import (
@@ -67,6 +67,7 @@ _HOMES = {
     "render_learning": "learning",
     "save_animation": "writers",
     "save_picture": "writers",
+    "usual_spread": "sheet",
 }
 
 __all__ = [
@@ -93,6 +94,7 @@ __all__ = [
     "render_learning",
     "save_animation",
     "save_picture",
+    "usual_spread",
 ]
 
 

@@ -156,7 +156,7 @@ def import_av() -> ModuleType:
     except ImportError as error:
         raise AntsError(
             f"MP4 needs PyAV, which cannot be imported ({error}); install it with "
-            "pip install 'taichi-ants[video]', or choose .gif or .webp."
+            "pip install -e '.[video]' in the project's folder, or choose .gif or .webp."
         ) from error
     return av
 

@@ -16,12 +16,13 @@ from taichi_ants.hexgrid import AxialGrid
 from taichi_ants.rendering import colours, text
 from taichi_ants.rendering.episodes import DEFAULT_FPS, Episode, Progress, with_pause, without_view
 from taichi_ants.rendering.rasteriser import Rasteriser
-from taichi_ants.rendering.scene import DEFAULT_SIZE, check_size
+from taichi_ants.rendering.scene import check_size
 from taichi_ants.rendering.viewport import Viewport
 from taichi_ants.rendering.writers import PathLike, check_animation, save_animation
 from taichi_ants.worlds.world import World
 
 STAGES = (0, 10, 100, 500)
+DEFAULT_SIZE = (1280, 460)  # four worlds in a row fill it
 # In sizes of the text: the title of a tile, and all its text.
 _TITLE_LINES, _TILE_LINES = 1.7, 4.2
 

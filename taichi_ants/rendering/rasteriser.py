@@ -20,6 +20,10 @@ _SMALLEST_HEXAGON = 2.5
 _SMALLEST_DRAWING = 6.0
 _SMALLEST_ANT = 11.0  # with legs; below, an ant is a dart
 _SMALLEST_LETTERS = 10.0
+# Below, the outlines of three cells would bury the ant: one stands around it and what it sees.
+_SMALLEST_OUTLINE = 7.0
+_MARK = 2.7  # its radius in sizes of the hexagon, and in pixels at least
+_SMALLEST_MARK = 8.0
 
 _FILL = 0.83  # radius of what stands on a cell, in sizes of the hexagon; the largest disc is 0.866
 _DOT_RADIUS = 0.9  # pixels, of an ant in cells that are too small for it
@@ -142,16 +146,19 @@ class Rasteriser:
                 self.shapes(queens, kernels.QUEEN, fill=0.72),
             ]
         )
-        if snapshot.letters is not None and self.has_room_for_letters:
-            make_room(marks, np.isin(np.concatenate([foods, queens]), snapshot.cells_in_view()))
         of_shapes = np.repeat([colours.CELL_FOOD, colours.CELL_QUEEN], [len(foods), len(queens)])
         return marks, of_shapes.astype(np.uint32)
 
     def _view(self, snapshot: Snapshot) -> list[tuple[np.ndarray, np.ndarray]]:
-        """The outlines of the cells in view, if they are to be seen."""
-        if snapshot.letters is None or not self.has_hexagons:
+        """The outlines of the cells in view, or around the ant where cells are small."""
+        if snapshot.letters is None:
             return []
-        rings = self.shapes(snapshot.cells_in_view(), self.kernels.IN_VIEW, fill=0.98)
+        if self.viewport.hexagon >= _SMALLEST_OUTLINE:
+            rings = self.shapes(snapshot.cells_in_view(), self.kernels.IN_VIEW, fill=0.98)
+        else:
+            ant = snapshot.ant_cells[[snapshot.watched]]
+            rings = self.shapes(ant, self.kernels.IN_VIEW, fill=_MARK)
+            rings[:, 2] = np.maximum(rings[:, 2], _SMALLEST_MARK)
         return [(rings, np.full(len(rings), colours.INK, dtype=np.uint32))]
 
     def _ants(self, snapshot: Snapshot) -> tuple[np.ndarray, np.ndarray]:
@@ -216,12 +223,6 @@ class Rasteriser:
 
     def _layout(self) -> tuple[int, int, int]:
         return self.grid.width, self.grid.height, self.grid.ranges[2]
-
-
-def make_room(marks: np.ndarray, crowded: np.ndarray) -> None:
-    """Make shapes smaller and move them to the left, in place, where `crowded` (bool (n,))."""
-    marks[crowded, 0] -= 0.58 * marks[crowded, 2]
-    marks[crowded, 2] *= 0.6
 
 
 def _kernels() -> ModuleType:

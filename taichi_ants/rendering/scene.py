@@ -105,16 +105,11 @@ class Scene:
         cells = snapshot.cells_in_view()
         centres = self.viewport.centres(self._rasteriser.grid.cells(cells)).tolist()
         floors = self._rasteriser.colour_of(cells).tolist()
-        beside = np.isin(snapshot.ground[cells], (FOOD, QUEEN)).tolist()
+        taken = np.isin(snapshot.ground[cells], (FOOD, QUEEN)).tolist()  # by their drawings
         for number, letter in enumerate(snapshot.letters):
-            write_letter(
-                frame,
-                letter,
-                centres[number],
-                self.viewport.hexagon,
-                floor=floors[number],
-                beside=beside[number],
-            )
+            if not taken[number]:
+                hexagon = self.viewport.hexagon
+                write_letter(frame, letter, centres[number], hexagon, floor=floors[number])
 
     def _world_room(self, margin: int) -> tuple[int, int, int, int]:
         """Left, top, width and height of the part of the picture for the world."""
@@ -163,7 +158,7 @@ def write_letter(
     centre: tuple[float, float],
     hexagon: float,
     floor: int,
-    beside: bool,
+    beside: bool = False,
 ) -> None:
     """Write a letter on a cell of the colour `floor`, `beside` what is drawn there if need be."""
     x, y = centre

@@ -27,12 +27,13 @@ from taichi_ants.errors import AntsError
 from taichi_ants.hexgrid import AxialGrid
 from taichi_ants.rendering import colours, text
 from taichi_ants.rendering.panel import fill
-from taichi_ants.rendering.rasteriser import Rasteriser, make_room
+from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.rendering.scene import write_letter
 from taichi_ants.rendering.viewport import Viewport
 from taichi_ants.states import CELL_LETTERS, REACHABLE_STATES, State, state_index
 
 DEFAULT_WIDTH = 1920
+HARDLY = 0.01
 SMALLEST_WIDTH, LARGEST_WIDTH = 1200, 4096
 
 _HALVES = ("Foraging (without food)", "Carrying (with food)")
@@ -43,13 +44,16 @@ _AHEAD = (
 _EXPLANATION = (
     "Each picture shows what the ant sees: the cells to its left, ahead and to its right. "
     "The arrow and the word below it are its best action.",
-    "The bar tells how clear the choice is: the gap from the best action value to the second best, "
-    "as a share of the gap from the best to the worst.",
-    "Pale: all action values are equal, the state was never visited. "
-    "Empty places are states that cannot occur.",
+    "The bar tells how clear the choice is: the gap from the best action value to the second best. "
+    "It is full where the gap is as large as the mean gap from best to worst, over all states.",
+    "Pale, hardly visited: the values differ by less than 1 % of that. Paler, not visited: "
+    "they are equal. Empty places are states that cannot occur.",
     "E empty, O obstacle (also the outside and other ants), T trail, F food, "
     "S nearer to the queen, Q queen.",
 )
+# How much of a picture's colours is left, by the words that stand below it.
+_NOT_VISITED, _HARDLY_VISITED = "not visited", "hardly visited"
+_PALE = {_NOT_VISITED: 0.35, _HARDLY_VISITED: 0.55}
 _FLOOR_NEARER = 0xDCE3F2
 _TRAIL = 120  # of the ramp
 _ARROW_COLOURS = {PICK_UP: colours.CELL_FOOD, GIVE: colours.CELL_QUEEN}
@@ -64,14 +68,31 @@ def best_actions(values: np.ndarray) -> list[int]:
     return np.flatnonzero(values == np.max(values)).tolist()
 
 
-def clarity(values: np.ndarray) -> float:
+def usual_spread(q_values: np.ndarray) -> float:
+    """By how much the action values (128, 5) of a state usually differ.
+
+    The mean of the gaps from the best to the worst, over the reachable states with values that
+    differ; 0 where there are none.
+    """
+    rows = np.asarray(q_values, dtype=np.float64)[list(REACHABLE_STATES)]
+    spreads = np.ptp(rows, axis=1)
+    return float(spreads[spreads > 0].mean()) if spreads.any() else 0.0
+
+
+def clarity(values: np.ndarray, spread: float) -> float:
     """How clear the best of action values (5,) is, from 0 to 1.
 
-    The gap from the best to the second best as a share of the gap from the best to the worst; 0
-    where several are best, NaN where all are equal.
+    The gap from the best to the second best as a share of `spread`, the table's `usual_spread`: a
+    state's own values would make every hair's breadth look like a clear choice. NaN where all
+    values are equal.
     """
     worst, *_, second, best = np.sort(np.asarray(values, dtype=np.float64)).tolist()
-    return (best - second) / (best - worst) if best > worst else math.nan
+    return min(1.0, (best - second) / spread) if best > worst else math.nan
+
+
+def hardly_learned(values: np.ndarray, spread: float) -> bool:
+    """Whether action values (5,) differ by less than 1 % of the table's `usual_spread`."""
+    return float(np.ptp(np.asarray(values, dtype=np.float64))) < HARDLY * spread
 
 
 def policy_sheet(
@@ -106,6 +127,7 @@ class _Sheet:
 
     def __init__(self, table: np.ndarray, width: int) -> None:
         self._table = table
+        self._spread = usual_spread(table)
         self._width = width
         self._small = round(width / 150)  # sizes of text
         self._large = round(width / 75)
@@ -174,19 +196,17 @@ class _Sheet:
         if index not in REACHABLE_STATES:
             return
         values = self._table[index]
-        best, clear = best_actions(values), clarity(values)
-        visited = not math.isnan(clear)
+        best, clear = best_actions(values), clarity(values, self._spread)
+        doubt = self._doubt(values)
         width, height = self._tile_width, self._picture_height
-        picture = self._picture.draw(state, best if visited else [])
-        if not visited:
-            picture = (0.35 * picture + 0.65 * 255).astype(np.uint8)
+        picture = self._picture.draw(state, [] if doubt == _NOT_VISITED else best)
+        if doubt:
+            picture = (_PALE[doubt] * picture + (1 - _PALE[doubt]) * 255).astype(np.uint8)
         sheet[top : top + height, left : left + width] = picture
         y = top + height + round(0.75 * self._small)
         middle = left + width / 2
-        if not visited:
-            text.write(
-                sheet, "not visited", middle, y, self._small, colours.FAINT_INK, align="middle"
-            )
+        if doubt:
+            text.write(sheet, doubt, middle, y, self._small, colours.FAINT_INK, align="middle")
             return
         words = text.shortened(
             " / ".join(ACTION_NAMES[action] for action in best), self._small, width
@@ -197,6 +217,12 @@ class _Sheet:
         length, thickness = round(0.72 * width), max(2, round(0.32 * self._small))
         fill(sheet, middle - length / 2, y, length, thickness, colours.CELL_EMPTY)
         fill(sheet, middle - length / 2, y, length * clear, thickness, colour)
+
+    def _doubt(self, values: np.ndarray) -> str:
+        """What stands below a state in place of an action; empty where something was learned."""
+        if np.ptp(values) == 0:
+            return _NOT_VISITED
+        return _HARDLY_VISITED if hardly_learned(values, self._spread) else ""
 
 
 class _Picture:
@@ -246,7 +272,8 @@ class _Picture:
         )
         cells = self._cells[1:][np.array(state.view) == SEES_GOAL]
         marks = self._rasteriser.shapes(cells, shape, fill=0.72)
-        make_room(marks, np.ones(len(marks), dtype=bool))
+        marks[:, 0] -= 0.58 * marks[:, 2]  # room for a letter beside them
+        marks[:, 2] *= 0.6
         marks[:, 1] -= _rise(SEES_GOAL) * self._viewport.hexagon
         self._rasteriser.draw_shapes(self._frame, marks, _repeated(colour, len(marks)))
 

@@ -43,7 +43,7 @@ def check_animation(path: PathLike, fps: float) -> Path:
         AntsError: The ending or the speed is not allowed, PyAV is missing for an .mp4, or the place
             cannot be written to.
     """
-    target = Path(path)
+    target = _named_place(path)
     kind = target.suffix.lower()
     if kind and kind not in _ANIMATIONS:
         raise AntsError(
@@ -97,11 +97,22 @@ def save_picture(path: PathLike, frame: np.ndarray) -> None:
 
 def check_picture(path: PathLike) -> Path:
     """Make sure that a picture can be written; raises as `save_picture` does."""
-    target = Path(path)
+    target = _named_place(path)
     if target.suffix.lower() != ".png":
         raise AntsError(f"{str(path)!r} is to hold one picture; give it a name that ends in .png.")
     with _folder_of(target, keep=False):
         pass
+    return target
+
+
+def _named_place(path: PathLike) -> Path:
+    """The path, unless it ends both as a folder and as a file do."""
+    target, name = Path(path), os.fspath(path)
+    if target.suffix and name.endswith(("/", os.sep)):
+        raise AntsError(
+            f"{name!r} ends in {target.suffix!r} as a file and in {name[-1]!r} as a folder; leave "
+            "out the one or the other."
+        )
     return target
 
 

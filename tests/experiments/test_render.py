@@ -105,6 +105,9 @@ WRONG = {
     "place": (["--out", "/proc/nope/a.gif"], "cannot write"),
     "size": (["--size", "63x63", "--out", "{}/a.gif"], "64 to 4096"),
     "large size": (["--size", "5000x100", "--out", "{}/a.gif"], "64 to 4096"),
+    "size of a sheet": (["--show", "sheet", "--size", "400x300"], "--size"),
+    "file as a folder": (["--out", "{}/a.gif/"], "as a folder"),
+    "picture as a folder": (["--show", "sheet", "--out", "{}/a.png/"], "as a folder"),
     "form of a size": (["--size", "1280*720"], "1280x720"),
     "speed": (["--fps", "0", "--out", "{}/a.gif"], "fps"),
     "no number": (["--fps", "fast"], "not a number"),
@@ -144,7 +147,7 @@ def test_without_pyav(tmp_path, policy) -> None:
         check=False,
     )
     assert done.returncode == 2
-    assert "taichi-ants[video]" in done.stderr
+    assert ".[video]" in done.stderr
     assert done.stderr.count("\n") == 1
     assert files_in(tmp_path) == []
 
@@ -181,6 +184,25 @@ def test_stopped_midway_it_leaves_nothing_behind(tmp_path, policy, name, sent, s
     assert process.returncode == status
     assert errors == ("Stopped; nothing was left behind.\n" if sent == signal.SIGINT else "")
     assert files_in(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "size"),
+    [
+        ([], (1280, 720)),
+        (["--show", "learning"], (1280, 460)),
+        (["--show", "colony"], (960, 540)),
+        (["--show", "colony", "--out", "a.png"], (1280, 720)),
+        (["--show", "colony", "--size", "320x200"], (320, 200)),
+    ],
+)
+def test_default_sizes(arguments, size) -> None:
+    sys.path.insert(0, str(SCRIPT.parent))
+    try:
+        import render
+    finally:
+        sys.path.remove(str(SCRIPT.parent))
+    assert render.parse_arguments(arguments).size == size
 
 
 def test_help_is_quick_and_needs_little() -> None:

@@ -187,6 +187,18 @@ def test_wrong_endings(tmp_path, name) -> None:
     assert leftovers(tmp_path) == []
 
 
+@pytest.mark.parametrize("name", ["a.gif", "a.png", "a.folder"])
+def test_a_file_with_a_slash_is_refused(tmp_path, frames, name) -> None:
+    path = f"{tmp_path}/{name}/"
+    with pytest.raises(AntsError, match="leave out the one or the other"):
+        check_animation(path, 8)
+    with pytest.raises(AntsError, match="leave out the one or the other"):
+        save_picture(path, frames[0])
+    assert leftovers(tmp_path) == []
+    save_animation(f"{tmp_path}/frames/", frames[:1], 8)
+    assert leftovers(tmp_path / "frames") == ["frame_000000.png"]
+
+
 @pytest.mark.parametrize("fps", [0, -1, 51, float("nan"), float("inf"), True, "8"])
 def test_wrong_speeds(tmp_path, fps) -> None:
     with pytest.raises(AntsError, match="fps"):
@@ -195,7 +207,7 @@ def test_wrong_speeds(tmp_path, fps) -> None:
 
 def test_a_missing_pyav_is_named(tmp_path, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "av", None)
-    with pytest.raises(AntsError, match=r"pip install 'taichi-ants\[video\]'"):
+    with pytest.raises(AntsError, match=r"pip install -e '\.\[video\]'"):
         check_animation(tmp_path / "a.mp4", 8)
 
 

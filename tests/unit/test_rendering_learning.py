@@ -23,8 +23,10 @@ from taichi_ants.rendering import (
     policy_sheet,
     render_colony,
     render_learning,
+    usual_spread,
 )
 from taichi_ants.rendering.colours import CHOSEN
+from taichi_ants.rendering.sheet import hardly_learned
 from taichi_ants.states import REACHABLE_STATES, parse_state
 from taichi_ants.worlds import open_world, paper
 
@@ -86,13 +88,54 @@ def test_all_stages_fit(size, tmp_path) -> None:
 
 
 def test_how_clear_a_choice_is() -> None:
-    """Worked by hand: the gap to the second best over the gap to the worst."""
-    assert clarity(np.array([0.0, 4.0, 3.0, -1.0, 0.0])) == pytest.approx(0.2)
-    assert clarity(np.array([1.0, 0.0, 0.0, 0.0, 0.0])) == 1.0
-    assert clarity(np.array([2.0, 2.0, 0.0, 0.0, 0.0])) == 0.0
-    assert math.isnan(clarity(np.full(5, 3.0)))
+    """Worked by hand: the gap to the second best over the spread that is usual in the table."""
+    assert clarity(np.array([0.0, 4.0, 3.0, -1.0, 0.0]), 4.0) == pytest.approx(0.25)
+    assert clarity(np.array([1.0, 0.0, 0.0, 0.0, 0.0]), 1.0) == 1.0
+    assert clarity(np.array([9.0, 0.0, 0.0, 0.0, 0.0]), 3.0) == 1.0
+    assert clarity(np.array([2.0, 2.0, 0.0, 0.0, 0.0]), 2.0) == 0.0
+    assert math.isnan(clarity(np.full(5, 3.0), 1.0))
+    assert math.isnan(clarity(np.zeros(5), 0.0))
     assert best_actions(np.array([0.0, 4.0, 3.0, -1.0, 4.0])) == [FORWARD, GIVE]
     assert best_actions(np.zeros(5)) == [LEFT, FORWARD, RIGHT, PICK_UP, GIVE]
+
+
+def test_the_usual_spread() -> None:
+    """Worked by hand: the mean over states that can occur and whose values differ."""
+    table = random_policy()
+    assert usual_spread(table) == 0.0
+    table[parse_state("foraging E E E")] = (0.0, 4.0, 3.0, -1.0, 0.0)
+    table[parse_state("foraging E F E")] = (2.0, 2.0, 2.0, 3.0, 2.0)
+    table[parse_state("foraging F F F")] = 7.0
+    assert usual_spread(table) == pytest.approx((5 + 1) / 2)
+    unreachable = next(index for index in range(128) if index not in REACHABLE_STATES)
+    table[unreachable] = (100.0, 0.0, 0.0, 0.0, 0.0)
+    assert usual_spread(table) == pytest.approx(3.0)
+
+
+HARDLY_VISITED = [
+    (0.0, 0.0, 1.97e-5, 0.0, 0.0),
+    (2.6e-6, 0.0, 0.0, 0.0, 0.0),
+    (-0.002, 0.0, -0.001, -0.001, -0.001),  # the best is the one that was never tried
+]
+
+
+@pytest.mark.parametrize("values", HARDLY_VISITED)
+def test_a_hairline_is_no_clear_choice(values) -> None:
+    assert clarity(np.array(values), 0.4) < 0.01
+    assert hardly_learned(np.array(values), 0.4)
+    assert not hardly_learned(np.array(values), 100 * 2.5e-6)
+    table = random_policy()
+    table[parse_state("foraging E F E")] = (0.0, 0.0, 0.0, 0.8, 0.0)
+    blank = policy_sheet(table)
+    place = parse_state("foraging O O O")
+    table[place] = values
+    hardly = policy_sheet(table)
+    table[place] = (0.0, 0.8, 0.0, 0.0, 0.0)
+    learned = policy_sheet(table)
+    # Neither as if never visited, nor with a bar and an arrow of full strength.
+    assert (hardly != blank).any()
+    assert not coloured(hardly, CHOSEN).any()
+    assert coloured(learned, CHOSEN).sum(axis=1).max() > 60
 
 
 def test_a_sheet_without_any_visited_state() -> None:

@@ -11,7 +11,7 @@ from taichi_ants import AntsError
 from taichi_ants.rendering import Scene, Snapshot, Status, text
 from taichi_ants.rendering.colours import CHOSEN
 from taichi_ants.rendering.scene import range_with_zero
-from taichi_ants.worlds import paper
+from taichi_ants.worlds import World, paper
 
 WORLD = paper()
 Q_VALUES = np.array([0.5, 7.0, -1.0, 0.0, 2.0], dtype=np.float32)
@@ -127,6 +127,24 @@ def test_letters_lie_in_the_cells_in_view() -> None:
         x, y = scene.viewport.centres(WORLD.grid.cells(cell))
         around = changed[int(y) - 6 : int(y) + 6, int(x) - 6 : int(x) + 6]
         assert around.sum() > 12
+
+
+@pytest.mark.parametrize("side", [500, 700])
+def test_no_letter_lies_on_food_or_queen(side) -> None:
+    """The ant of a delivered episode sees the queen as an obstacle; her crown stays whole."""
+    world = World((3, 3, 3), (0, 0, 0), [(1, 1, 0)], ants=[((0, 1, 0), 5)])
+    scene = Scene(world.grid, (side, side), hud=False, legend=False)
+    snapshot = Snapshot.at_start(world)
+    in_view = snapshot.cells_in_view().tolist()
+    taken = [in_view.index(world.grid.index(cell)) for cell in (world.queen, (1, 1, 0))]
+    free = ({0, 1, 2} - set(taken)).pop()
+    plain = scene.draw(snapshot)
+    seen = scene.draw(replace(snapshot, letters="OOO"))
+    reach = int(0.5 * scene.viewport.hexagon)
+    for place in (*taken, free):
+        x, y = scene.viewport.centres(world.grid.cells(in_view[place])).astype(int)
+        part = (slice(y - reach, y + reach), slice(x - reach, x + reach))
+        assert (seen[part] == plain[part]).all() == (place != free)
 
 
 def test_text_is_cut_off_at_the_frame() -> None:

@@ -184,6 +184,23 @@ def test_an_ant_points_where_it_is_heading(hexagon) -> None:
         assert np.linalg.norm(crumb - (crumb @ direction) * direction) < 0.15 * view.hexagon + 0.5
 
 
+@pytest.mark.parametrize("hexagon", [0.8, 3.0, 5.0, 9.0])
+def test_the_marks_of_the_view_leave_the_ant_free(hexagon) -> None:
+    """What marks the view changes pixels near the ant, but none where it stands."""
+    world = World(ranges=(11, 11, 11), queen=(10, 0, 0), ants=[((0, 0, 0), 0)])
+    view = Viewport(0, 0, 200, 200, hexagon, (100.0, 100.0))
+    plain, marked = (np.zeros((200, 200, 3), dtype=np.uint8) for _ in range(2))
+    snapshot = Snapshot.at_start(world)
+    rasteriser = Rasteriser(world.grid, view)
+    rasteriser.draw(plain, snapshot)
+    rasteriser.draw(marked, dataclasses.replace(snapshot, letters="EEE"))
+    rows, columns = np.nonzero((plain != marked).any(axis=2))
+    away = np.hypot(rows + 0.5 - 100, columns + 0.5 - 100)
+    assert len(away) > 30
+    assert away.min() > max(0.8 * hexagon, 1.8)
+    assert away.max() < max(2.9 * hexagon, 9.0)
+
+
 def test_nothing_is_drawn_outside_the_world() -> None:
     grid = AxialGrid((4, 9, 2))
     scene = Scene(grid, (500, 260), hud=False, legend=False)
