@@ -139,9 +139,19 @@ def build_sweep(settings: argparse.Namespace) -> Sweep:
     return Sweep(world, configs, seeds, settings.episodes, settings.max_steps, ROLLOUTS)
 
 
-def to_comparison(sweep: Sweep, result: SweepResult) -> Comparison:
-    """What the analysis reads."""
-    from taichi_ants.analysis.comparison import Comparison, Row
+def world_name(settings: argparse.Namespace) -> str:
+    """The world for readers: a registered name with its seed, or the name of a map file."""
+    from taichi_ants import worlds
+
+    if settings.world in worlds.names():
+        return f"{settings.world}, world seed {settings.world_seed}"
+    return Path(settings.world).name
+
+
+def to_comparison(sweep: Sweep, result: SweepResult, world: str) -> Comparison:
+    """What the analysis reads; the world's name counts where it is not the paper's."""
+    from taichi_ants import worlds
+    from taichi_ants.analysis.comparison import PAPER_WORLD, Comparison, Row
 
     return Comparison(
         rows=tuple(Row.of(config) for config in sweep.configs),
@@ -153,6 +163,7 @@ def to_comparison(sweep: Sweep, result: SweepResult) -> Comparison:
         greedy_steps=result.greedy_steps,
         greedy_deliveries=result.greedy_deliveries,
         max_steps=sweep.max_steps,
+        world=PAPER_WORLD if sweep.world == worlds.paper() else world,
     )
 
 
@@ -170,11 +181,11 @@ def write_tables(
     results.write_csv(folder / BASELINES, baselines, BASELINE_COLUMNS)
     table = table2.table2(comparison)
     results.write_csv(folder / "table2.csv", table, list(table[0]))
-    results.write_text(folder / "table2.md", table2.table2_markdown(table))
+    results.write_text(folder / "table2.md", table2.table2_markdown(table, comparison.world))
     findings = assess(comparison)
     rows = claims_rows(findings)
     results.write_csv(folder / "claims.csv", rows, list(rows[0]))
-    results.write_text(folder / "claims.md", claims_markdown(findings))
+    results.write_text(folder / "claims.md", claims_markdown(findings, comparison.world))
     return report.render(comparison, table, findings, baselines, costs)
 
 
@@ -196,17 +207,14 @@ def write_policies(folder: Path, sweep: Sweep, comparison: Comparison, tables: A
     import numpy as np
 
     from taichi_ants import save_policy
-    from taichi_ants.analysis.paper import TABLE_2
+    from taichi_ants.analysis.best_of import best_position, paper_position
 
     setting = comparison.delivery_settings[0]
     returns = comparison.measure("return_last50")
     for variant in comparison.variants:
-        row = None
-        if variant in TABLE_2:
-            row = comparison.position(setting, variant, TABLE_2[variant].hyperparameters)
+        row = paper_position(comparison, setting, variant)
         if row is None:  # not of the paper: its best configuration here
-            rows = comparison.positions(setting, variant)
-            row = max(rows, key=lambda position: returns[position].mean())
+            row = best_position(comparison, comparison.positions(setting, variant))
         run = int(np.argsort(returns[row], kind="stable")[(len(sweep.seeds) - 1) // 2])
         metadata = {
             "config": asdict(sweep.configs[row]),
@@ -255,7 +263,7 @@ def do_comparison(
     with progress_bar("training") as report_progress:
         result = run_sweep(sweep, blocks, settings.threads, settings.arch, report_progress)
     laps["training and evaluation"] = time.perf_counter()
-    comparison = to_comparison(sweep, result)
+    comparison = to_comparison(sweep, result, world_name(settings))
     baselines = baseline_rows(
         sweep.world,
         partial(evaluate, threads=settings.threads, arch=settings.arch),
@@ -339,7 +347,7 @@ def read_back(folder: Path, sweep: Sweep) -> tuple[Comparison, list[dict[str, An
         name: array.astype(int) for name, array in results.read_npz(folder / EPISODES).items()
     }
     try:
-        comparison = to_comparison(sweep, SweepResult(**arrays, q_values=None, costs=()))
+        comparison = to_comparison(sweep, SweepResult(**arrays, q_values=None, costs=()), "another")
         with open(folder / BASELINES, newline="", encoding="utf-8") as file:
             lines = csv.DictReader(file)
             baselines = [read_baseline(line) for line in lines]

@@ -27,6 +27,11 @@ BASELINE_COLUMNS: tuple[str, ...] = (
 TRAINING_SETTING = "training, no evaporation"
 GREEDY_SETTING = "greedy, evaporation"
 
+_ENDLESS = (
+    "there is no optimal policy: without a discount below 1 the return of an episode without step "
+    "limit may grow without bound"
+)
+
 # One row of baselines.csv; None for an empty field.
 BaselineRow = dict[str, Any]
 
@@ -79,7 +84,7 @@ def baseline_rows(
 def bound_rows(world: World, discounts: Sequence[float], max_steps: int) -> list[BaselineRow]:
     """The exact bounds of `dynamic_programming.exact_bounds` as rows.
 
-    A discount of 1 has no row: the return of an episode without end may grow without bound.
+    A discount of 1 has a row without figures, whose note says why.
 
     Raises:
         AntsError: As `exact_bounds` does, above all if the world is too large.
@@ -99,6 +104,10 @@ def bound_rows(world: World, discounts: Sequence[float], max_steps: int) -> list
         )
         row = _outcome_row("optimal policy", optimal.outcome, note)
         rows.append({**row, "discount": optimal.discount})
+    endless = [discount for discount in discounts if discount >= 1]
+    for discount in dict.fromkeys(endless):
+        row = _row("optimal policy", TRAINING_SETTING, note=_ENDLESS)
+        rows.append({**row, "discount": discount})
     return rows
 
 

@@ -3,17 +3,20 @@
 The paper trains each configuration once and reports, for each algorithm, the one of its 16 with
 the highest return. `best_of` repeats exactly that with every seed we have: how far would the
 reported figures have varied by luck? `held_out` chooses on one half of the seeds and reports on
-the other, which removes the luck from the report.
+the other, which removes the luck from the report. `choice` is what stands for a learner in the
+report: the paper's configuration where there is one, else the best.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 
 from taichi_ants.analysis.comparison import Comparison, Hyperparameters, Variant
+from taichi_ants.analysis.paper import TABLE_2
 from taichi_ants.analysis.statistics import RANDOM_SEED
 
 DRAWS = 20_000
@@ -93,3 +96,62 @@ def held_out(comparison: Comparison, positions: Sequence[int]) -> HeldOut | None
     choice = comparison.measure("return_last50")[positions, ::2].mean(axis=1).argmax()
     best = positions[int(choice)]
     return HeldOut(comparison.rows[best].hyperparameters, best, slice(1, None, 2))
+
+
+class Chosen(Enum):
+    """Why a configuration stands for its learner."""
+
+    PAPER = "its configuration in the paper's table 2"
+    HELD_OUT = "best by return on half of the seeds, reported on the other half"
+    BEST = "best by return on the one seed there is, which flatters it"
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The configuration that stands for a learner.
+
+    Attributes:
+        why: How it was chosen.
+        hyperparameters: The configuration.
+        position: Its row in the comparison.
+        seeds: Positions of the seeds on which it is reported.
+    """
+
+    why: Chosen
+    hyperparameters: Hyperparameters
+    position: int
+    seeds: slice
+
+
+def choice(comparison: Comparison, delivery: str, variant: Variant) -> Choice | None:
+    """The paper's configuration of a learner, or its best one outside of the paper's table.
+
+    Returns None where the comparison has no configuration of the learner.
+    """
+    same = paper_position(comparison, delivery, variant)
+    if same is not None:
+        return Choice(Chosen.PAPER, TABLE_2[variant].hyperparameters, same, slice(None))
+    positions = comparison.positions(delivery, variant)
+    best = held_out(comparison, positions)
+    if best is not None:
+        return Choice(Chosen.HELD_OUT, best.hyperparameters, best.position, best.seeds)
+    if not positions:
+        return None
+    position = best_position(comparison, positions)
+    return Choice(Chosen.BEST, comparison.rows[position].hyperparameters, position, slice(None))
+
+
+def paper_position(comparison: Comparison, delivery: str, variant: Variant) -> int | None:
+    """The row at the learner's configuration in the paper's table 2.
+
+    None where the comparison does not have it, or its world is not the paper's.
+    """
+    if variant not in TABLE_2 or not comparison.in_paper_world:
+        return None
+    return comparison.position(delivery, variant, TABLE_2[variant].hyperparameters)
+
+
+def best_position(comparison: Comparison, positions: Sequence[int]) -> int:
+    """The row with the highest mean return over all seeds; the first of equals."""
+    returns = comparison.measure("return_last50")[list(positions)].mean(axis=1)
+    return positions[int(returns.argmax())]

@@ -25,6 +25,9 @@ _NAMES = {
     "expected_sarsa": "Expected SARSA",
     "dyna_q": "Dyna-Q",
 }
+# The name of the world in which the paper's figures and claims mean something.
+PAPER_WORLD = "the paper's"
+
 _PER_EPISODE = ("returns", "steps", "deliveries")
 _PER_ROLLOUT = ("greedy_returns", "greedy_steps", "greedy_deliveries")
 
@@ -109,6 +112,7 @@ class Comparison:
         greedy_steps: Integer (rows, seeds, rollouts).
         greedy_deliveries: Integer (rows, seeds, rollouts).
         max_steps: Limit of an episode in steps.
+        world: Name of the world; only in `PAPER_WORLD` ours can be held against the paper.
 
     Raises:
         AntsError: The shapes do not fit together, or a configuration is listed twice.
@@ -123,6 +127,7 @@ class Comparison:
     greedy_steps: np.ndarray
     greedy_deliveries: np.ndarray
     max_steps: int
+    world: str = PAPER_WORLD
     _positions: dict = field(init=False, repr=False)
     _measured: dict = field(init=False, repr=False, default_factory=dict)
 
@@ -155,6 +160,11 @@ class Comparison:
                     f"{name} has the shape {got}; it must be {(*expected, 'n')} "
                     f"with n at least {smallest} and the same for {', '.join(names)}."
                 )
+
+    @property
+    def in_paper_world(self) -> bool:
+        """Whether the world is the paper's."""
+        return self.world == PAPER_WORLD
 
     @property
     def episodes(self) -> int:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from taichi_ants.analysis.best_of import best_of
+from taichi_ants.analysis.best_of import best_of, best_position
 from taichi_ants.analysis.comparison import Comparison, Variant
 from taichi_ants.analysis.markdown import count
 from taichi_ants.analysis.paper import FIGURE_1, TABLE_2
@@ -20,11 +20,11 @@ from taichi_ants.analysis.sensitivity import sensitivity
 from taichi_ants.analysis.statistics import student_interval
 from taichi_ants.analysis.style import (
     INK,
+    for_setting,
     frame,
     in_training,
     legend_entries,
     looks,
-    message,
     new_figure,
     over_seeds,
     save,
@@ -42,22 +42,34 @@ _CURVES = {
     "steps": "Episode length\n(steps)",
     "deliveries": "Deliveries\n(per episode)",
 }
+# Delivery setting and learner -> row of the comparison.
+Shown = dict[tuple[str, Variant], int]
+_FEW = 0.9  # deliveries per episode
 _BINS = 160
+_CIRCLES = " High returns with few deliveries come from\nwalking in circles on a trail."
 _DROP = 0.16  # of the bar below its ridge, in rows
 
 
 def learning_curves(comparison: Comparison) -> Figure:
-    """Return, length and deliveries per episode at the configuration of the paper's figure 1.
+    """Return, length and deliveries per episode, at the configuration of the paper's figure 1.
 
-    Lines are moving averages over `SMOOTHING` episodes, averaged over seeds; bands are pointwise
-    95 % Student intervals over seeds (none for one seed).
+    Where a learner lacks that one, or the world is not the paper's, each learner is shown at the
+    configuration with its highest mean return. Lines are moving averages over `SMOOTHING`
+    episodes, averaged over seeds; bands are pointwise 95 % Student intervals over seeds, cut off
+    where no mean can be (none for one seed).
     """
     settings = comparison.delivery_settings
     style = looks(comparison.variants)
-    if not any(_at_figure_1(comparison, setting) for setting in settings):
-        return message(f"No configuration {FIGURE_1.label} in this comparison")
+    shared = _at_figure_1(comparison)
+    shown = shared or _at_best(comparison)
+    title, words = (
+        ("Learning at one shared configuration, the paper's figure 1", [f"{FIGURE_1.label}"])
+        if shared
+        else ("Learning, each learner at its configuration with the highest return", [])
+    )
+    words = words or _configurations(comparison, shown)
     with styled():
-        figure = new_figure(7.0)
+        figure = new_figure(7.0 + 0.15 * len(words))
         axes = figure.subplots(
             len(_CURVES), len(settings), sharex=True, sharey="row", squeeze=False
         )
@@ -65,28 +77,36 @@ def learning_curves(comparison: Comparison) -> Figure:
             column[0].set_title(f"{setting.capitalize()} delivery")
             column[-1].set_xlabel("Episode")
             for axis, name in zip(column, _CURVES, strict=True):
-                for variant, position in _at_figure_1(comparison, setting).items():
-                    _curve(axis, getattr(comparison, name)[position], *_line(style, variant))
+                limits = (0, 1) if name == "deliveries" else (-np.inf, np.inf)
+                for variant in comparison.variants:
+                    if (setting, variant) in shown:
+                        runs = getattr(comparison, name)[shown[setting, variant]]
+                        _curve(axis, runs, *_line(style, variant), limits)
         for axis, label in zip(axes[:, 0], _CURVES.values(), strict=True):
             axis.set_ylabel(label)
         axes[0, 0].margins(x=0.01)
         figure.align_ylabels(axes[:, 0])
+        window = _window(comparison.episodes)
+        averaged = f"Moving average over {window} episodes, " if window > 1 else ""
+        spread = over_seeds(len(comparison.seeds), "95 % band")
+        caption = (
+            f"{averaged}{spread}. Learning rate / discount / epsilon / decay: ",
+            *words,
+        )
         frame(
             figure,
-            "Learning at one shared configuration, the paper's figure 1",
-            f"Learning rate / discount / epsilon / decay {FIGURE_1.label}; moving average over "
-            f"{_window(comparison.episodes)} episodes, "
-            f"{over_seeds(len(comparison.seeds), '95 % band')}.",
+            title,
+            "".join(caption) if shared else "\n".join(caption),
             legend_entries(axes.flat),
         )
     return figure
 
 
 def best_runs(comparison: Comparison) -> Figure:
-    """What "train each configuration once, report the best" gives, with the paper's figures.
+    """What "train each configuration once, report the best" gives.
 
     For each learner the distribution over independent draws of seeds of the winner's return and
-    length, with its median and 95 % range, and the figure that the paper reports.
+    length, with its median and 95 % range; in the paper's world the figure that the paper reports.
     """
     settings = comparison.delivery_settings
     with styled():
@@ -97,6 +117,9 @@ def best_runs(comparison: Comparison) -> Figure:
             _ridges(row, comparison, setting)
             row[0].set_xlabel("Return of the best run (reward)")
             row[1].set_xlabel("Its mean length (steps)")
+            for axis in row:
+                if axis.get_xscale() == "log":
+                    axis.set_xlabel(f"{axis.get_xlabel()}, logarithmic")
         counts = {
             len(comparison.positions(setting, variant))
             for setting in settings
@@ -120,7 +143,8 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Mappin
 
     Args:
         comparison: The comparison.
-        baselines: Rows of baselines.csv; those of the training setting are shown.
+        baselines: Rows of baselines.csv; those of the training setting are shown, the optimal
+            policies, for which delivery is the end, only in the panel of absorbing delivery.
     """
     settings = comparison.delivery_settings
     style = looks(comparison.variants)
@@ -147,15 +171,16 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Mappin
                     markersize=6.5,
                     markeredgecolor="white",
                     markeredgewidth=0.7,
+                    zorder=4,
                     label=variant.label,
                 )
-            _baseline_marks(axis, baselines)
+            _baseline_marks(axis, for_setting(baselines, setting))
         axes[0, 0].set_ylabel("Return (reward per episode, last 50)")
         frame(
             figure,
             "Return against deliveries",
-            "Filled marks: means of configurations. Small dots: single runs. High returns with "
-            "few deliveries come from\nwalking in circles on a trail.",
+            "Filled marks: means of configurations. Small dots: single runs."
+            + (_CIRCLES if _circles(comparison, baselines) else ""),
             legend_entries(axes.flat),
         )
     return figure
@@ -186,12 +211,39 @@ def save_all(
     return paths
 
 
-def _at_figure_1(comparison: Comparison, setting: str) -> dict[Variant, int]:
-    """The rows at the configuration of the paper's figure 1, by learner."""
+def _at_figure_1(comparison: Comparison) -> Shown:
+    """The rows at the configuration of the paper's figure 1; none if a learner lacks it."""
     found = {
-        variant: comparison.position(setting, variant, FIGURE_1) for variant in comparison.variants
+        (setting, variant): comparison.position(setting, variant, FIGURE_1)
+        for setting in comparison.delivery_settings
+        for variant in comparison.variants
+        if comparison.positions(setting, variant)
     }
-    return {variant: position for variant, position in found.items() if position is not None}
+    complete = comparison.in_paper_world and None not in found.values()
+    return found if complete else {}
+
+
+def _at_best(comparison: Comparison) -> Shown:
+    """The rows with the highest mean return of each learner."""
+    return {
+        (setting, variant): best_position(comparison, positions)
+        for setting in comparison.delivery_settings
+        for variant in comparison.variants
+        if (positions := comparison.positions(setting, variant))
+    }
+
+
+def _configurations(comparison: Comparison, shown: Shown) -> list[str]:
+    """A line for each learner with its configuration in each delivery setting."""
+    lines = []
+    for variant in comparison.variants:
+        parts = [
+            f"{comparison.rows[position].hyperparameters.label} ({setting})"
+            for (setting, other), position in shown.items()
+            if other == variant
+        ]
+        lines.append(f"{variant.label}: {', '.join(parts)}")
+    return lines
 
 
 def _line(style: dict[Variant, tuple[str, str]], variant: Variant) -> tuple[str, str]:
@@ -202,8 +254,10 @@ def _window(episodes: int) -> int:
     return max(1, min(SMOOTHING, episodes // SMOOTHING))
 
 
-def _curve(axis: Axes, runs: np.ndarray, colour: str, label: str) -> None:
-    """One learner's line with its band; runs are (seeds, episodes)."""
+def _curve(
+    axis: Axes, runs: np.ndarray, colour: str, label: str, limits: tuple[float, float]
+) -> None:
+    """One learner's line with its band within limits; runs are (seeds, episodes)."""
     window = _window(runs.shape[1])
     sums = np.cumsum(np.pad(runs, ((0, 0), (1, 0))), axis=1, dtype=float)
     smooth = (sums[:, window:] - sums[:, :-window]) / window
@@ -212,7 +266,7 @@ def _curve(axis: Axes, runs: np.ndarray, colour: str, label: str) -> None:
     marker = "o" if len(episodes) == 1 else ""
     axis.plot(episodes, smooth.mean(axis=0), color=colour, label=label, marker=marker)
     if len(runs) > 1:
-        low, high = student_interval(smooth.T)
+        low, high = np.clip(student_interval(smooth.T), *limits)
         axis.fill_between(episodes, low, high, color=colour, alpha=0.2, linewidth=0)
 
 
@@ -225,7 +279,7 @@ def _ridges(row: Sequence[Axes], comparison: Comparison, setting: str) -> None:
         paper = {
             variant: figures.return_last50 if name == "returns" else figures.steps_all
             for variant, figures in TABLE_2.items()
-            if variant in drawn
+            if variant in drawn and comparison.in_paper_world
         }
         edges = _edges([*drawn.values(), *paper.values()])
         for height, variant in enumerate(reversed(comparison.variants)):
@@ -280,8 +334,18 @@ def _logarithmic(axis: Axes) -> None:
     axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
+def _circles(comparison: Comparison, baselines: Sequence[Mapping]) -> bool:
+    """Whether a configuration seldom delivers, yet returns more than the shortest delivery."""
+    known = [row["return_mean"] for row in baselines if row["baseline"] == "shortest delivery"]
+    if not known or known[0] is None:
+        return False
+    returns = comparison.measure("return_last50").mean(axis=1)
+    deliveries = comparison.measure("deliveries_last50").mean(axis=1)
+    return bool(((deliveries < _FEW) & (returns > known[0])).any())
+
+
 def _baseline_marks(axis: Axes, baselines: Sequence[Mapping]) -> None:
-    """Hollow marks, so that they hide neither the data nor each other."""
+    """Hollow marks, larger than those of the data and below them."""
     places = in_training(baselines, ["deliveries_mean", "return_mean"])
     for number, (name, place) in enumerate(places.items()):
         axis.plot(
@@ -289,7 +353,8 @@ def _baseline_marks(axis: Axes, baselines: Sequence[Mapping]) -> None:
             "osD^vph"[number % 7],
             color=INK,
             markerfacecolor="none",
-            markersize=10,
+            markersize=13,
             markeredgewidth=1.1,
+            zorder=3,
             label=name,
         )

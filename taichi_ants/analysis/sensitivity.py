@@ -13,6 +13,7 @@ from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.analysis.style import (
     GREY,
     INK,
+    for_setting,
     frame,
     in_training,
     legend_entries,
@@ -41,13 +42,16 @@ def sensitivity(comparison: Comparison, baselines: Sequence[Mapping] = ()) -> Fi
     Args:
         comparison: The comparison.
         baselines: Rows of baselines.csv; those of the training setting are drawn as lines where
-            they lie within the axis.
+            they lie within the axis (optimal policies only if there is absorbing delivery, for
+            which they are optimal).
     """
     configurations = sorted({row.hyperparameters for row in comparison.rows})
     variants, style = comparison.variants, looks(comparison.variants)
     means = comparison.measure("return_last50").mean(axis=1)
     ends = bootstrap_interval(comparison.measure("return_last50"))
     limits = _limits(means, *ends)
+    if "absorbing" not in comparison.delivery_settings:
+        baselines = for_setting(baselines, comparison.delivery_settings[0])
     with styled():
         wide = min(_COLUMNS, len(variants))
         deep = math.ceil(len(variants) / wide)

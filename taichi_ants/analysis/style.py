@@ -160,16 +160,19 @@ def in_training(
     return {"; ".join(alike): place for place, alike in names.items()}
 
 
+def for_setting(baselines: Iterable[Mapping], setting: str) -> list[Mapping]:
+    """The baselines without the optimal policies where delivery is not the end.
+
+    They are optimal for absorbing delivery only.
+    """
+    return [
+        row for row in baselines if setting == "absorbing" or row["baseline"] != "optimal policy"
+    ]
+
+
 def over_seeds(seeds: int, spread: str) -> str:
     """What marks and bars are, for a caption: one seed has no spread."""
     return f"mean of {seeds} seeds with {spread}" if seeds > 1 else "one seed"
-
-
-def message(text: str) -> Figure:
-    """A figure that says why there is nothing to draw."""
-    figure = new_figure(1.2)
-    figure.text(0.5, 0.5, text, ha="center", va="center", color=GREY)
-    return figure
 
 
 def save(figure: Figure, path: Path) -> None:

@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
-from taichi_ants.analysis.best_of import DRAWS, best_of, held_out, percentile_of
-from taichi_ants.analysis.comparison import Comparison, Variant
+from taichi_ants.analysis.best_of import DRAWS, best_of, held_out, paper_position, percentile_of
+from taichi_ants.analysis.comparison import PAPER_WORLD, Comparison, Variant
 from taichi_ants.analysis.markdown import MISSING, interval, number, table
 from taichi_ants.analysis.paper import TABLE_2, VARIANTS
 from taichi_ants.analysis.statistics import bootstrap_interval
@@ -26,19 +26,21 @@ _DIGITS = {"return": 1, "steps": 1, "deliveries": 2}
 def table2(comparison: Comparison, draws: int = DRAWS) -> list[dict]:
     """The rows of table2.csv: the paper's four and any other learner, per delivery setting.
 
+    In another world than the paper's only the learners that there are, and nothing of the paper.
     What is missing is nan (or "" for a configuration): the paper's figures of a learner that it
     does not have, ours of a configuration that the comparison does not have, and intervals and
     held-out figures where there are too few seeds. Return is in reward per episode (mean of the
     last 50), steps is the mean length of all episodes, deliveries are per episode (last 50);
     intervals are at 95 %, ranges of the best run from 2.5 % to 97.5 %.
     """
-    others = [variant for variant in comparison.variants if variant not in VARIANTS]
+    of_paper = VARIANTS if comparison.in_paper_world else ()
+    others = [variant for variant in comparison.variants if variant not in of_paper]
     lines = []
     for delivery in comparison.delivery_settings:
-        for variant in (*VARIANTS, *others):
+        for variant in (*of_paper, *others):
             line = {"learner": variant.learner, "planning_steps": variant.planning_steps}
             line["delivery"] = delivery
-            line |= _paper(variant)
+            line |= _paper(comparison, variant)
             line |= _same_configuration(comparison, delivery, variant)
             line |= _best_run(comparison, delivery, variant, draws)
             line |= _held_out(comparison, delivery, variant)
@@ -46,8 +48,8 @@ def table2(comparison: Comparison, draws: int = DRAWS) -> list[dict]:
     return lines
 
 
-def _paper(variant: Variant) -> dict:
-    row = TABLE_2.get(variant)
+def _paper(comparison: Comparison, variant: Variant) -> dict:
+    row = TABLE_2.get(variant) if comparison.in_paper_world else None
     if row is None:
         return {"configuration": "", **{f"paper_{name}": math.nan for name in FIGURES}}
     figures = (row.return_last50, row.steps_all, row.deliveries_last50)
@@ -58,11 +60,9 @@ def _paper(variant: Variant) -> dict:
 
 
 def _same_configuration(comparison: Comparison, delivery: str, variant: Variant) -> dict:
-    position = None
-    if variant in TABLE_2:
-        position = comparison.position(delivery, variant, TABLE_2[variant].hyperparameters)
+    position = paper_position(comparison, delivery, variant)
     seeds = 0 if position is None else len(comparison.seeds)
-    return {"seeds": seeds, **_means(comparison, "same", position, slice(None))}
+    return {"seeds": seeds, **means(comparison, "same", position, slice(None))}
 
 
 def _held_out(comparison: Comparison, delivery: str, variant: Variant) -> dict:
@@ -71,25 +71,25 @@ def _held_out(comparison: Comparison, delivery: str, variant: Variant) -> dict:
         return {
             "held_out_configuration": "",
             "held_out_seeds": 0,
-            **_means(comparison, "held_out", None, slice(None)),
+            **means(comparison, "held_out", None, slice(None)),
         }
     return {
         "held_out_configuration": chosen.hyperparameters.label,
         "held_out_seeds": len(comparison.seeds[chosen.seeds]),
-        **_means(comparison, "held_out", chosen.position, chosen.seeds),
+        **means(comparison, "held_out", chosen.position, chosen.seeds),
     }
 
 
-def _means(comparison: Comparison, stem: str, position: int | None, seeds: slice) -> dict:
+def means(comparison: Comparison, stem: str, position: int | None, seeds: slice) -> dict:
     """Means over seeds with 95 % intervals of one row of the comparison."""
-    means = low = high = np.full(len(FIGURES), np.nan)
+    middle = low = high = np.full(len(FIGURES), np.nan)
     if position is not None:
         rows = [comparison.measure(measure)[position, seeds] for measure in FIGURES.values()]
-        means = np.mean(rows, axis=1)
+        middle = np.mean(rows, axis=1)
         low, high = bootstrap_interval(np.array(rows))
     columns = {}
     for place, name in enumerate(FIGURES):
-        columns[f"{stem}_{name}_mean"] = float(means[place])
+        columns[f"{stem}_{name}_mean"] = float(middle[place])
         columns[f"{stem}_{name}_ci_low"] = float(low[place])
         columns[f"{stem}_{name}_ci_high"] = float(high[place])
     return columns
@@ -99,7 +99,7 @@ def _best_run(comparison: Comparison, delivery: str, variant: Variant, draws: in
     best = best_of(comparison, delivery, variant, draws)
     columns = {"best_run_of": best.configurations if best else 0}
     drawn = (best.returns, best.steps, best.deliveries) if best else (None,) * 3
-    for (name, figure), values in zip(_paper_figures(variant), drawn, strict=True):
+    for (name, figure), values in zip(_paper_figures(comparison, variant), drawn, strict=True):
         low = median = high = percentile = math.nan
         if values is not None:
             low, median, high = np.percentile(values, (2.5, 50, 97.5)).tolist()
@@ -112,29 +112,47 @@ def _best_run(comparison: Comparison, delivery: str, variant: Variant, draws: in
     return columns
 
 
-def _paper_figures(variant: Variant) -> list[tuple[str, float]]:
-    figures = _paper(variant)
+def _paper_figures(comparison: Comparison, variant: Variant) -> list[tuple[str, float]]:
+    figures = _paper(comparison, variant)
     return [(name, figures[f"paper_{name}"]) for name in FIGURES]
 
 
-def table2_markdown(lines: list[dict]) -> str:
-    """The list of `table2` as Markdown: three tables, each with a sentence that explains it."""
-    seeds = max((line["seeds"] for line in lines), default=0)
-    ours = f"means over {seeds} seeds with 95 % intervals" if seeds else "not in this comparison"
-    return "\n".join(
-        (
+def table2_markdown(lines: list[dict], world: str = PAPER_WORLD) -> str:
+    """The list of `table2` as Markdown: tables, each with a sentence that explains it.
+
+    Args:
+        lines: The list.
+        world: The world's name; outside of the paper's there is no table of its configurations.
+    """
+    of_paper = world == PAPER_WORLD
+    parts = [f"World: {world}.\n"]
+    if of_paper:
+        seeds = max((line["seeds"] for line in lines), default=0)
+        ours = (
+            f"means over {seeds} seeds with 95 % intervals" if seeds else "not in this comparison"
+        )
+        parts += [
             f"The paper's configurations. Its figures are single runs; ours are {ours}.\n",
             _same_table(lines),
-            "Training each configuration once and reporting the best by return, repeated with "
-            "independent random seeds: median and 95 % range of the reported figures. In "
-            "brackets, the percentage of repetitions that fall below the paper's figure.\n",
-            _best_table(lines),
+        ]
+    parts += [
+        "Training each configuration once and reporting the best by return, repeated with "
+        "independent random seeds: median and 95 % range of the reported figures."
+        + (
+            " In brackets, the percentage of repetitions that fall below the paper's figure.\n"
+            if of_paper
+            else "\n"
+        ),
+        _best_table(lines),
+    ]
+    if any(line["held_out_seeds"] for line in lines):
+        parts += [
             "The configuration with the highest mean return on half of the seeds, reported on "
             "the other half, with 95 % intervals: what choosing the best is worth without its "
             "luck.\n",
             _held_out_table(lines),
-        )
-    )
+        ]
+    return "\n".join(parts)
 
 
 def _name(line: dict) -> list[str]:

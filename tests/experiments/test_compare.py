@@ -323,12 +323,37 @@ def test_other_worlds(world, tmp_path, compare):
     chosen = ["--world", garden if world == "garden" else "open", "--world-seed", 5]
     status, _, err = compare(*TINY, *chosen, "--out", tmp_path / "out")
     assert (status, err) == (0, "")
+    name = "garden.txt" if world == "garden" else "open, world seed 5"
+    for file in ("report.txt", "claims.md", "table2.md"):
+        text = (tmp_path / "out" / file).read_text("utf-8")
+        assert text.startswith(f"World: {name}.\n"), file
+    assert "47.3" not in text
+    verdicts = read_csv(tmp_path / "out" / "claims.csv")
+    assert {row["note"] for row in verdicts} == {"the claims are about the paper's world"}
     (row,) = read_csv(tmp_path / "out" / "summary.csv")
     built = worlds.load_map(garden) if world == "garden" else worlds.open_world(5)
     expected = train(built, config_of(row), 0, 2, 30)
     with np.load(tmp_path / "out" / "episodes.npz") as archive:
         assert np.array_equal(archive["returns"], expected.returns)
         assert np.array_equal(archive["steps"], expected.steps)
+
+
+def test_a_learner_of_ones_own_and_a_discount_of_one_are_reported(tmp_path, compare):
+    plugin = Path(__file__).parents[2] / "experiments" / "plugins" / "hysteretic.py"
+    changes = ["--plugin", plugin, "--learners", "hysteretic", "--discounts", 0, 1]
+    status, out, _ = compare(*TINY, *changes, "--out", tmp_path / "out")
+    assert status == 0
+    assert out.startswith("World: the paper's.\n")
+    with np.load(tmp_path / "out" / "episodes.npz") as archive:
+        returns = archive["returns"].mean(axis=2)[:, 0]
+        best = int(returns.argmax())
+        greedy = archive["greedy_returns"][best].mean()
+    cells = [line.split() for line in out.splitlines() if line.startswith("hysteretic *")]
+    assert cells[0][3] == f"{returns[best]:.1f}"
+    assert cells[1][2] == f"{greedy:.1f}"
+    assert f"hysteretic, absorbing: 0.1 / {best} / 0.3 / 0.9" in out
+    assert "optimal policy, discount 1: there is no optimal policy" in out
+    assert max(len(line) for line in out.splitlines()[:-1]) < 80
 
 
 def test_all_learners_of_the_library_can_be_compared(tmp_path, compare):

@@ -121,9 +121,11 @@ def test_one_seed_has_no_interval() -> None:
     assert rows[2]["return_mean"] == 45
 
 
-def test_a_discount_of_one_is_left_out() -> None:
-    discounts = [row["discount"] for row in bound_rows(paper(), [1.0, 0.5, 1], 600)]
-    assert discounts == [None, None, 0.5]
+def test_a_discount_of_one_has_no_figures_but_a_reason() -> None:
+    rows = bound_rows(paper(), [1.0, 0.5, 1], 600)
+    assert [row["discount"] for row in rows] == [None, None, 0.5, 1.0]
+    assert rows[-1]["return_mean"] is None
+    assert "may grow without bound" in rows[-1]["note"]
 
 
 def test_a_world_without_a_delivery_says_so() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from synthetic_comparison import Edit, build, change, level_truth, subset, unchanged
@@ -261,6 +263,40 @@ def test_levels_are_corrected_for_all_intervals_of_all_tested_claims() -> None:
     without = build({"continuing": unchanged, "absorbing": unchanged}, rollouts=0)
     for finding in assess(without, claims[:2]):
         assert finding.level == pytest.approx(1 - (1 - SIMULTANEOUS_LEVEL) / (2 * 4))
+
+
+def test_in_another_world_nothing_is_tested_for_one_reason() -> None:
+    garden = replace(build({"continuing": unchanged, "absorbing": unchanged}), world="garden.txt")
+    findings = assess(garden)
+    assert {finding.verdict for finding in findings} == {Verdict.NOT_TESTED}
+    assert {finding.note for finding in findings} == {"the claims are about the paper's world"}
+    assert claims_markdown(findings, "garden.txt").startswith("World: garden.txt.\n")
+
+
+def test_intervals_of_shares_end_where_shares_do() -> None:
+    comparison = build({"continuing": change(SARSA, deliveries=-0.2)}, seeds=4, episodes=101)
+    comparison.greedy_returns[:, 0, 0] += 1  # one seed's rollouts differ
+    limits = {"share": (0, 1), "correlation": (-1, 1), "deliveries": (-1, 1)}
+    cut = 0
+    for finding in assess(comparison):
+        bounds = limits.get(finding.claim.unit.split()[0])
+        if bounds is None:
+            assert finding.claim.possible == (-np.inf, np.inf)
+            continue
+        assert bounds[0] <= finding.low <= finding.effect <= finding.high <= bounds[1]
+        cut += finding.low in bounds or finding.high in bounds
+        differs = " minus " in finding.contrast or finding.claim.unit == "correlation"
+        assert finding.claim.possible == ((-1, 1) if differs else (0, 1))
+    assert cut >= 3
+
+
+def test_findings_say_which_configurations_they_rest_on() -> None:
+    scopes = {f.claim.id: f.scope for f in assess(build({"continuing": unchanged}))}
+    assert scopes["q-return-highest"] == "table 2 configurations"
+    assert scopes["curves-sarsa-stable"] == "figure 1 configuration"
+    assert scopes["overall-q-return"] == scopes["discount-q"] == "all 16"
+    assert scopes["dyna-below-q-peak"] == "best, on other seeds"
+    assert scopes["epsilon-dyna-return"] == "single configurations"
 
 
 def test_the_tables_hold_the_findings() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -93,11 +94,66 @@ def test_one_seed_has_lines_without_bands(comparison: Comparison) -> None:
         assert axis.lines[0].get_xdata().tolist() == [1, 2, 3, 4, 5]
 
 
-def test_without_the_configuration_the_figure_says_so(comparison: Comparison) -> None:
-    rows = [n for n, row in enumerate(comparison.rows) if row.hyperparameters != FIGURE_1]
-    figure = learning_curves(subset(comparison, rows, 6, 120))
-    assert not figure.axes
-    assert FIGURE_1.label in figure.texts[0].get_text()
+def words_of(figure: Figure) -> str:
+    return f"{figure.legends[0].get_title().get_text()} {figure.get_supxlabel()}"
+
+
+def test_without_the_shared_configuration_each_learner_is_shown_at_its_best(
+    comparison: Comparison,
+) -> None:
+    """Already if one learner lacks it; a curve for everyone, and the words name what is shown."""
+    rows = [
+        number
+        for number, row in enumerate(comparison.rows)
+        if row.variant != SARSA or row.hyperparameters != FIGURE_1
+    ]
+    some = subset(comparison, rows, 6, 120)
+    figure = learning_curves(some)
+    means = some.measure("return_last50").mean(axis=1)
+    words = words_of(figure)
+    assert "figure 1" not in words
+    for axis, setting in zip(panels(figure)[:2], ("continuing", "absorbing"), strict=True):
+        assert list(labelled(axis)) == [variant.label for variant in VARIANTS]
+        best = max(some.positions(setting, SARSA), key=lambda row: means[row])
+        runs = some.returns[best].astype(float).mean(axis=0)
+        smooth = np.convolve(runs, np.full(10, 0.1), "valid")
+        np.testing.assert_allclose(labelled(axis)["SARSA"].get_ydata(), smooth)
+        assert f"{some.rows[best].hyperparameters.label} ({setting})" in words
+    assert FIGURE_1.label in words_of(learning_curves(comparison))
+    assert "figure 1" not in words_of(learning_curves(replace(comparison, world="garden.txt")))
+
+
+def test_the_captions_say_only_what_is_true(comparison: Comparison) -> None:
+    assert "oving average over 10 episodes" in words_of(learning_curves(comparison))
+    short = subset(comparison, range(128), 2, 5)
+    assert "average" not in words_of(learning_curves(short))
+    assert "in circles" in words_of(return_against_deliveries(comparison, BASELINES))
+    assert "in circles" not in words_of(return_against_deliveries(comparison))
+    direct = subset(comparison, range(64), 6, 120)
+    assert "in circles" not in words_of(return_against_deliveries(direct, BASELINES))
+
+
+def test_other_worlds_have_none_of_the_papers_figures(comparison: Comparison) -> None:
+    for axis in panels(best_runs(replace(comparison, world="garden.txt"))):
+        assert not [line for line in axis.lines if line.get_marker() == "D"]
+
+
+def test_axes_that_are_not_linear_say_so(comparison: Comparison) -> None:
+    negative = replace(comparison, returns=comparison.returns - 500)
+    for data, scale in ((comparison, "log"), (negative, "linear")):
+        axis = panels(best_runs(data))[0]
+        assert axis.get_xscale() == scale
+        assert axis.get_xlabel().endswith("logarithmic") == (scale == "log")
+
+
+def test_bands_of_deliveries_stay_where_means_can_be(comparison: Comparison) -> None:
+    varied = replace(comparison, deliveries=comparison.deliveries.copy())
+    varied.deliveries[:, ::2, ::3] = 0
+    for axis in panels(learning_curves(varied))[4:]:
+        for band in axis.collections:
+            heights = band.get_paths()[0].vertices[:, 1]
+            assert heights.min() >= 0
+            assert heights.max() <= 1
 
 
 def test_sensitivity_shows_every_configuration(comparison: Comparison) -> None:
@@ -128,6 +184,8 @@ def test_sensitivity_shows_every_configuration(comparison: Comparison) -> None:
     lines = labelled(axes[0])
     assert lines["shortest delivery; optimal policy, discount 0.9 (45)"].get_xdata()[0] == 45
     assert not any("0.99" in name for name in lines)
+    continuing = sensitivity(subset(comparison, range(64), 6, 120), BASELINES)
+    assert not any("optimal" in name for name in labelled(panels(continuing)[0]))
 
 
 def test_best_runs_shows_the_distribution_and_the_papers_figures(comparison: Comparison) -> None:
@@ -166,9 +224,16 @@ def test_returns_against_deliveries_shows_configurations_runs_and_baselines(
         np.testing.assert_allclose(marks.get_ydata(), returns[rows].mean(axis=1))
         runs = sum(len(line.get_xdata()) for line in axis.lines if line.get_marker() == ".")
         assert runs == 64 * 6
-        joint = lines["shortest delivery; optimal policy, discount 0.9"]
-        assert (joint.get_xdata()[0], joint.get_ydata()[0]) == (1.0, 45.0)
-        assert lines["optimal policy, discount 0.99"].get_ydata()[0] == 476.0
+        # Optimal policies are optimal where delivery is the end.
+        absorbing = setting == "absorbing"
+        name = "shortest delivery" + "; optimal policy, discount 0.9" * absorbing
+        assert (lines[name].get_xdata()[0], lines[name].get_ydata()[0]) == (1.0, 45.0)
+        assert any(line.startswith("optimal") for line in lines) == absorbing
+        # Means stay visible on baselines at the same place.
+        assert marks.get_zorder() > lines[name].get_zorder()
+        assert marks.get_markersize() < lines[name].get_markersize()
+        if absorbing:
+            assert lines["optimal policy, discount 0.99"].get_ydata()[0] == 476.0
         assert "random policy" not in lines
         assert "exact bounds" not in lines
 

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import io
 import math
+from dataclasses import replace
 
 import pytest
 from synthetic_comparison import build, change, subset, unchanged
 
 from taichi_ants.analysis.baselines import TRAINING_SETTING
 from taichi_ants.analysis.claims import CLAIMS, assess
-from taichi_ants.analysis.comparison import Comparison
+from taichi_ants.analysis.comparison import PAPER_WORLD, Comparison, Variant
 from taichi_ants.analysis.markdown import count, interval, number, table
-from taichi_ants.analysis.paper import DYNA_P5, SARSA
+from taichi_ants.analysis.paper import DYNA_P5, FIGURE_1, SARSA
 from taichi_ants.analysis.report import WIDTH, print_report, render
 from taichi_ants.analysis.table2 import table2
 
@@ -52,7 +53,10 @@ def row(text: str, start: str, after: str = "") -> list[str]:
 def test_it_is_plain_and_narrow(text: str) -> None:
     assert "\x1b" not in text
     assert max(len(line) for line in text.splitlines()) <= WIDTH
-    assert text.startswith("128 configurations, 16 seeds, 120 episodes of at most 600 steps, 3 gr")
+    assert all(line == line.rstrip() for line in text.splitlines())
+    first, second = text.splitlines()[:2]
+    assert first == "World: the paper's."
+    assert second.startswith("128 configurations, 16 seeds, 120 episodes of at most 600 steps")
 
 
 def test_table_2_stands_beside_the_papers(text: str, comparison: Comparison) -> None:
@@ -96,13 +100,93 @@ def test_a_terminal_gets_colours(comparison: Comparison, monkeypatch: pytest.Mon
 def test_a_small_comparison_says_what_is_missing() -> None:
     one = subset(build({"absorbing": unchanged}, variants=[SARSA], rollouts=0), [3], 1, 7)
     text = render(one, table2(one, 10), assess(one))
-    assert text.startswith("1 configuration, 1 seed, 7 episodes of at most 600 steps, 0 greedy ro")
+    assert "\n1 configuration, 1 seed, 7 episodes of at most 600 steps, 0 greedy ro" in text
     assert f"absorbing: {len(CLAIMS)} not tested" in text
     assert "not tested (12): no Q-learning at 0.001 / 0.99 / 0.3 / 0.99" in text
     assert "Greedy evaluation" not in text
     assert "The paper's claims" not in text
-    assert row(text, "SARSA", after="Table 2")[1:3] == ["47.3", "-"]
+    mean = float(one.returns.mean())
+    assert row(text, "SARSA *", after="Table 2")[2:4] == ["47.3", f"{mean:.1f}"]
     assert "nan" not in text
+
+
+def halves(world: str, variants: list[Variant], seeds: int) -> Comparison:
+    """SARSA lacks the paper's configuration; the fourth row is best on even seeds only."""
+    full = build({"absorbing": unchanged}, seeds=seeds, variants=variants, noise=0.0, shared=0.0)
+    rows = [n for n, one in enumerate(full.rows) if one.hyperparameters != FIGURE_1]
+    cut = subset(full, rows, seeds, 120)
+    for start in range(0, len(cut.rows), len(cut.rows) // len(variants)):
+        cut.returns[start + 3, ::2] = 80
+        cut.returns[start + 3, 1::2] = 30
+        cut.greedy_returns[start + 3, ::2] = 99
+        cut.greedy_returns[start + 3, 1::2] = 17
+    return replace(cut, world=world)
+
+
+@pytest.mark.parametrize("world", [PAPER_WORLD, "garden.txt"])
+def test_learners_beside_the_papers_are_shown_at_their_best_on_other_seeds(world: str) -> None:
+    comparison = halves(world, [SARSA, Variant("hysteretic")], 6)
+    text = render(comparison, table2(comparison, 100), assess(comparison))
+    place = "Table 2" if world == PAPER_WORLD else "Training"
+    label = comparison.rows[3].hyperparameters.label
+    for name, paper in (("SARSA", ["47.3"]), ("hysteretic", ["-"])):
+        cells = row(text, f"{name} *", after=f"{place}, absorbing")
+        expected = [*paper, "30.0"] if world == PAPER_WORLD else ["30.0"]
+        assert cells[2 : 2 + len(expected)] == expected
+        assert row(text, f"{name} *", after="Greedy")[2] == "17.0"
+        assert f"{name}, absorbing: {label}" in text
+    assert "* best by return on half of the seeds, reported on the other half" in text
+
+
+def test_one_seed_shows_the_plain_best_as_such() -> None:
+    comparison = halves(PAPER_WORLD, [Variant("hysteretic")], 1)
+    text = render(comparison, table2(comparison, 100), assess(comparison))
+    assert row(text, "hysteretic *", after="Table 2")[2:5] == ["-", "80.0", "80.0"]
+    assert row(text, "hysteretic *", after="Greedy")[2] == "99.0"
+    assert "* best by return on the one seed there is" in text
+
+
+def test_another_world_is_not_held_against_the_paper(comparison: Comparison) -> None:
+    garden = replace(comparison, world="garden.txt")
+    text = render(garden, table2(garden, 100), assess(garden), BASELINES, COSTS)
+    assert text.splitlines()[0] == "World: garden.txt."
+    mentions = [line for line in text.splitlines() if "paper" in line]
+    assert mentions == ["The paper's claims: not tested, the claims are about the paper's world."]
+    assert "47.3" not in text
+
+
+def test_claims_name_their_scope_and_doubtful_sizes(text: str, comparison: Comparison) -> None:
+    words = " ".join(text.split())
+    assert "The improvement is reliable (all 16)" in words
+    assert "(figure 1 configuration)" in words
+    assert "claims.md holds effects, intervals" in words
+    assert "~" not in text
+    first, *others = assess(comparison)
+    doubtful = [replace(first, note="may be within the margin"), *others]
+    text = render(comparison, [], doubtful)
+    assert row(text, "3.2", after="In our words")[-3:] == ["supported", "~", "contradicted"]
+    assert "~ the effect may be too small to matter" in text
+
+
+@pytest.mark.parametrize("columns", [60, 79, 140])
+def test_the_tables_fit_the_terminal(
+    comparison: Comparison, columns: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("taichi_ants.analysis.report.WIDTH", columns)
+    lines = table2(comparison, 100)
+    text = render(comparison, lines, assess(comparison), BASELINES, COSTS)
+    assert max(len(line) for line in text.splitlines()) <= columns
+    if columns >= 79:  # no number is broken
+        span = row(text, "[", after="Table 2")
+        assert len(span) == 4
+        assert row(text, "Dyna-Q (p5)", after="Greedy")[-6:] == ["45.0", "35.0", "1.00"] * 2
+
+
+def test_a_baseline_without_figures_says_why(comparison: Comparison) -> None:
+    empty = dict.fromkeys(("return_mean", "steps_mean", "deliveries_mean"))
+    endless = BASELINES[0] | empty | {"discount": 1.0, "note": "without bound"}
+    text = render(comparison, [], [], [endless])
+    assert "optimal policy, discount 1: without bound" in text
 
 
 def test_numbers_as_text() -> None:

@@ -143,6 +143,21 @@ def test_left_overs_of_a_killed_clean_up_do_not_matter(tmp_path):
     assert ResultFolder(tmp_path, SETTINGS).is_finished()
 
 
+def test_an_interrupted_clean_up_does_not_undo_the_work(tmp_path, monkeypatch):
+    def interrupt(folder, **options):
+        raise KeyboardInterrupt
+
+    folder = ResultFolder(tmp_path, SETTINGS)
+    with folder.work() as (blocks, ready):
+        (blocks / "block").write_text("done")
+        (ready / "table.csv").write_text("result")
+        monkeypatch.setattr("shutil.rmtree", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            folder.publish({})
+        monkeypatch.undo()
+    assert folder.is_finished()
+
+
 @pytest.mark.parametrize("damage", ["", "{", "[]", '{"settings": 3}', "\0"])
 def test_damaged_settings_are_of_other_settings(damage, tmp_path):
     stop_after_a_block(tmp_path)

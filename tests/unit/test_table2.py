@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from synthetic_comparison import build, subset, unchanged
 
-from taichi_ants.analysis.best_of import best_of, held_out, percentile_of
+from taichi_ants.analysis.best_of import Chosen, best_of, choice, held_out, percentile_of
 from taichi_ants.analysis.comparison import Comparison, Variant
 from taichi_ants.analysis.paper import DYNA_P3, FIGURE_1, Q_LEARNING, SARSA, TABLE_2, VARIANTS
 from taichi_ants.analysis.table2 import table2, table2_markdown
@@ -144,9 +145,40 @@ def test_what_is_missing_is_nan() -> None:
     assert "nan" not in text
 
 
+def test_another_world_has_nothing_of_the_paper(comparison: Comparison) -> None:
+    lines = table2(replace(comparison, world="garden.txt"), draws=200)
+    assert len(lines) == 8
+    assert {line["configuration"] for line in lines} == {""}
+    assert {line["seeds"] for line in lines} == {0}
+    assert all(math.isnan(line["paper_return"]) for line in lines)
+    assert all(math.isnan(line["best_run_steps_paper_percentile"]) for line in lines)
+    assert not any(math.isnan(line["held_out_return_mean"]) for line in lines)
+    text = table2_markdown(lines, "garden.txt")
+    assert text.startswith("World: garden.txt.\n")
+    assert "paper" not in text
+    one = subset(replace(comparison, world="garden.txt"), [16], 2, 120)
+    assert [line["learner"] for line in table2(replace(one, world="x"), 10)] == ["sarsa"]
+
+
+def test_what_stands_for_a_learner(comparison: Comparison) -> None:
+    chosen = choice(comparison, "absorbing", SARSA)
+    assert (chosen.why, chosen.hyperparameters) == (Chosen.PAPER, FIGURE_1)
+    garden = replace(comparison, world="garden.txt")
+    best = held_out(garden, garden.positions("absorbing", SARSA))
+    chosen = choice(garden, "absorbing", SARSA)
+    assert (chosen.why, chosen.position) == (Chosen.HELD_OUT, best.position)
+    single = replace(subset(comparison, range(128), 1, 120), world="garden.txt")
+    rows = single.positions("absorbing", SARSA)
+    chosen = choice(single, "absorbing", SARSA)
+    assert chosen.why is Chosen.BEST
+    assert chosen.position == max(rows, key=lambda row: single.measure("return_last50")[row, 0])
+    assert choice(comparison, "absorbing", Variant("mine")) is None
+
+
 def test_the_markdown_holds_the_numbers(comparison: Comparison) -> None:
     lines = table2(comparison, draws=2000)
     text = table2_markdown(lines)
+    assert text.startswith("World: the paper's.\n")
     assert "means over 8 seeds" in text
     row = next(line for line in text.splitlines() if line.startswith("| SARSA | continuing"))
     cells = [cell.strip() for cell in row.strip("|").split("|")]

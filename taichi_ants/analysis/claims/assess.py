@@ -18,6 +18,7 @@ from taichi_ants.analysis.comparison import Comparison
 from taichi_ants.analysis.statistics import cautious_interval
 
 SIMULTANEOUS_LEVEL = 0.95
+OTHER_WORLD = "the claims are about the paper's world"
 _BY_OBJECTION = (Verdict.CONTRADICTED, Verdict.UNDISTINGUISHED, Verdict.SUPPORTED)
 
 
@@ -26,7 +27,7 @@ def assess(comparison: Comparison, claims: Sequence[Claim] = CLAIMS) -> list[Fin
 
     A claim is supported if all its contrasts are and contradicted if one is; the finding shows
     the weakest contrast. A claim whose configurations, episodes, rollouts or seeds are missing is
-    not tested.
+    not tested, and none is in another world than the paper's.
     """
     tests = [
         _Test(claim, comparison, delivery)
@@ -41,7 +42,7 @@ def assess(comparison: Comparison, claims: Sequence[Claim] = CLAIMS) -> list[Fin
         ends = cautious_interval(np.concatenate([test.effects for test in batch]), level)
         borders = np.cumsum([len(test.effects) for test in batch])[:-1]
         for test, low, high in zip(batch, *(np.split(end, borders) for end in ends), strict=True):
-            test.low, test.high = low, high
+            test.low, test.high = np.clip((low, high), *test.claim.possible)
     return [test.finding(level) for test in tests]
 
 
@@ -50,6 +51,9 @@ class _Test:
 
     def __init__(self, claim: Claim, comparison: Comparison, delivery: str) -> None:
         self.claim, self.delivery, self.reason = claim, delivery, ""
+        if not comparison.in_paper_world:
+            self.reason = OTHER_WORLD
+            return
         part = Slice(comparison, delivery)
         try:
             self.effects = np.stack([contrast.effect(part) for contrast in claim.contrasts])
@@ -57,6 +61,7 @@ class _Test:
             self.reason = str(error)
             return
         self.seeds, self.rows = self.effects.shape[1], len(part.used)
+        self.scope = part.scope
         if self.seeds < 2:
             self.reason = "one seed gives no interval"
         self.low = self.high = np.full(len(self.effects), np.nan)
@@ -84,4 +89,5 @@ class _Test:
             level,
             self.seeds,
             self.rows,
+            self.scope,
         )

@@ -20,6 +20,9 @@ FLUCTUATION_MARGIN = 0.5  # reward
 # "Substantially", "strongly" in steps: a tenth of the paper's 101 steps of Q-learning.
 MANY_STEPS = 10.0
 
+# What effects cannot leave: an episode ends with a delivery, so that deliveries are a share too.
+SHARE, DIFFERENCE = (0.0, 1.0), (-1.0, 1.0)
+
 REWARD, STEPS, DELIVERIES = "reward", "steps", "deliveries per episode"
 
 # What must be positive for Dyna-Q to lie between the two others.

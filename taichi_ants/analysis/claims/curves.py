@@ -10,9 +10,11 @@ import numpy as np
 
 from taichi_ants.analysis.claims.contrasts import (
     DELIVERIES,
+    DIFFERENCE,
     FLUCTUATION_MARGIN,
     REWARD,
     REWARD_MARGIN,
+    SHARE,
     STEPS,
     STEPS_MARGIN,
     differences,
@@ -110,6 +112,7 @@ FIGURE_1_CLAIMS = (
         DELIVERIES,
         Within(0.95, np.inf),
         each(Slice.figure1, "deliveries_second50", VARIANTS),
+        SHARE,
     ),
     Claim(
         "curves-equal-success",
@@ -120,6 +123,7 @@ FIGURE_1_CLAIMS = (
         DELIVERIES,
         Within(-0.02, 0.02),
         differences(Slice.figure1, "deliveries_last50", _ALGORITHMS),
+        DIFFERENCE,
     ),
 )
 
@@ -150,6 +154,7 @@ GREEDY_CLAIMS = (
         DELIVERIES,
         Within(0.98, np.inf),
         each(Slice.table2, "greedy_deliveries", VARIANTS),
+        SHARE,
     ),
     Claim(
         "greedy-deterministic",
@@ -160,6 +165,7 @@ GREEDY_CLAIMS = (
         "share of runs",
         Within(0.95, np.inf),
         each(Slice.table2, "greedy_repeats", VARIANTS),
+        SHARE,
     ),
     Claim(
         "greedy-alike-return",

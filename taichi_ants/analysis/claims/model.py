@@ -14,6 +14,8 @@ import numpy as np
 
 from taichi_ants.analysis.claims.slice import Slice
 
+WITHIN_MARGIN = "may be within the margin"
+
 
 class Verdict(str, Enum):
     """What the data say about a claim, the strongest objection first."""
@@ -37,9 +39,9 @@ class Above:
     def judge(self, low: float, high: float) -> tuple[Verdict, str]:
         """The verdict on an interval, and a note."""
         if low > 0 and high > self.margin:
-            return Verdict.SUPPORTED, "" if low > self.margin else "may be within the margin"
+            return Verdict.SUPPORTED, "" if low > self.margin else WITHIN_MARGIN
         if high < 0 and low < -self.margin:
-            return Verdict.CONTRADICTED, "" if high < -self.margin else "may be within the margin"
+            return Verdict.CONTRADICTED, "" if high < -self.margin else WITHIN_MARGIN
         inside = -self.margin <= low and high <= self.margin
         return Verdict.UNDISTINGUISHED, "equal within the margin" if inside else "undecided"
 
@@ -109,6 +111,7 @@ class Claim:
         unit: Unit of the effects and of the criterion.
         criterion: What the effects must fulfil.
         contrasts: All must fulfil it.
+        possible: The range that an effect cannot leave; its interval is cut off there.
     """
 
     id: str
@@ -118,6 +121,7 @@ class Claim:
     unit: str
     criterion: Above | Within
     contrasts: tuple[Contrast, ...]
+    possible: tuple[float, float] = (-np.inf, np.inf)
 
 
 @dataclass(frozen=True)
@@ -135,6 +139,7 @@ class Finding:
         level: Confidence level of that one interval; nan if untested.
         seeds: Seeds on which the effect rests, 0 if untested.
         configurations: Rows of the comparison that the claim uses, 0 if untested.
+        scope: Which configurations these are, for example "table 2 configurations".
     """
 
     claim: Claim
@@ -148,3 +153,4 @@ class Finding:
     level: float = np.nan
     seeds: int = 0
     configurations: int = 0
+    scope: str = ""

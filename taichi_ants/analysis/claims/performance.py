@@ -12,11 +12,13 @@ import numpy as np
 
 from taichi_ants.analysis.claims.contrasts import (
     DELIVERIES,
+    DIFFERENCE,
     FLUCTUATION_MARGIN,
     MANY_STEPS,
     Q_OVER_DYNA_OVER_SARSA,
     REWARD,
     REWARD_MARGIN,
+    SHARE,
     STEPS,
     STEPS_MARGIN,
     differences,
@@ -79,6 +81,7 @@ Q_LEARNING_CLAIMS = (
         "correlation",
         Above(0.1),
         (Contrast(Q_LEARNING.label, _rank_correlation),),
+        DIFFERENCE,
     ),
 )
 
@@ -112,6 +115,7 @@ SARSA_CLAIMS = (
         _SHARE_OF_PAIRS,
         Within(0.75, np.inf),
         (Contrast(f"{SARSA.label} below {Q_LEARNING.label}", _share_shorter_sarsa),),
+        SHARE,
     ),
     Claim(
         "sarsa-shortest-episode",
@@ -171,6 +175,7 @@ DYNA_CLAIMS = (
         _SHARE_OF_PAIRS,
         Within(1 / 16, 0.5),
         (_share_p5_above_p3("return_last50"),),
+        SHARE,
     ),
     Claim(
         "dyna-depth-length-best",
@@ -202,6 +207,7 @@ DYNA_CLAIMS = (
         _SHARE_OF_PAIRS,
         Within(0.5, np.inf),
         (_share_p5_above_p3("steps_all"),),
+        SHARE,
     ),
     Claim(
         "dyna-below-q-peak",
@@ -243,5 +249,6 @@ DYNA_CLAIMS = (
         DELIVERIES,
         Within(0.98, np.inf),
         each(Slice.table2, "deliveries_last50", VARIANTS),
+        SHARE,
     ),
 )

@@ -15,6 +15,7 @@ from taichi_ants.analysis.claims.contrasts import (
     Q_OVER_DYNA_OVER_SARSA,
     REWARD,
     REWARD_MARGIN,
+    SHARE,
     STEPS,
     STEPS_MARGIN,
     differences,
@@ -331,5 +332,6 @@ GENERAL_CLAIMS = (
         "share of runs",
         Within(0.95, np.inf),
         each(Slice.mean, "improved", VARIANTS),
+        SHARE,
     ),
 )

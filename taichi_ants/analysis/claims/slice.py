@@ -22,12 +22,14 @@ class Slice:
 
     Attributes:
         used: The rows read so far.
+        scope: Which configurations these are, in a few words.
     """
 
     def __init__(self, comparison: Comparison, delivery: str) -> None:
         self._comparison = comparison
         self._delivery = delivery
         self.used: set[int] = set()
+        self.scope = "single configurations"
 
     def at(self, measure: str, variant: Variant, hyperparameters: Hyperparameters) -> np.ndarray:
         """The values of one configuration, float64 (seeds,)."""
@@ -38,14 +40,17 @@ class Slice:
 
     def table2(self, measure: str, variant: Variant) -> np.ndarray:
         """The values at the learner's configuration in the paper's table 2, float64 (seeds,)."""
+        self.scope = "table 2 configurations"
         return self.at(measure, variant, TABLE_2[variant].hyperparameters)
 
     def figure1(self, measure: str, variant: Variant) -> np.ndarray:
         """The values at the shared configuration of the paper's figure 1, float64 (seeds,)."""
+        self.scope = "figure 1 configuration"
         return self.at(measure, variant, FIGURE_1)
 
     def grid(self, measure: str, variant: Variant) -> np.ndarray:
         """All 16 configurations, float64 (2, 2, 2, 2, seeds), axes in the order of `FACTORS`."""
+        self.scope = f"all {len(GRID)}"
         return self._read(measure, self._grid(variant)).reshape(*[2] * len(FACTORS), -1)
 
     def mean(self, measure: str, variant: Variant) -> np.ndarray:
@@ -62,6 +67,7 @@ class Slice:
 
         Float64 (half of the seeds,).
         """
+        self.scope = "best, on other seeds"
         best = held_out(self._comparison, self._grid(variant))
         if best is None:
             raise NotTestedError("needs a second seed")

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from taichi_ants.analysis.claims.assess import SIMULTANEOUS_LEVEL
 from taichi_ants.analysis.claims.model import Finding, Verdict
+from taichi_ants.analysis.comparison import PAPER_WORLD
 from taichi_ants.analysis.markdown import interval, number, table
 
 
@@ -22,6 +23,7 @@ def claims_rows(findings: Sequence[Finding]) -> list[dict]:
             "criterion": finding.claim.criterion.words,
             "unit": finding.claim.unit,
             "delivery": finding.delivery,
+            "scope": finding.scope,
             "contrast": finding.contrast,
             "effect": finding.effect,
             "ci_low": finding.low,
@@ -70,8 +72,8 @@ def tally(findings: Sequence[Finding]) -> str:
     return ", ".join(f"{counts[verdict]} {verdict.value}" for verdict in order if counts[verdict])
 
 
-def claims_markdown(findings: Sequence[Finding]) -> str:
-    """A table of all verdicts, then every claim made precise."""
+def claims_markdown(findings: Sequence[Finding], world: str = PAPER_WORLD) -> str:
+    """The world's name, a table of all verdicts, then every claim made precise."""
     settings = list(dict.fromkeys(finding.delivery for finding in findings))
     parts = [
         f"{setting}: {tally([f for f in findings if f.delivery == setting])}."
@@ -79,6 +81,7 @@ def claims_markdown(findings: Sequence[Finding]) -> str:
     ]
     return "\n".join(
         (
+            f"World: {world}.\n",
             "\n".join(f"- {part}" for part in parts) + "\n",
             _explanation(findings),
             _verdict_table(findings, settings),
