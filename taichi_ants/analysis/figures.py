@@ -150,6 +150,10 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Mappin
     style = looks(comparison.variants)
     returns = comparison.measure("return_last50")
     deliveries = comparison.measure("deliveries_last50")
+    if "absorbing" not in settings:
+        baselines = for_setting(baselines, settings[0])
+    # One mark for each place, the same in all panels.
+    marks = in_training(baselines, ["deliveries_mean", "return_mean"])
     with styled():
         figure = new_figure(5.0)
         axes = figure.subplots(1, len(settings), sharex=True, sharey=True, squeeze=False)
@@ -174,7 +178,7 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Mappin
                     zorder=4,
                     label=variant.label,
                 )
-            _baseline_marks(axis, for_setting(baselines, setting))
+            _baseline_marks(axis, marks, setting)
         axes[0, 0].set_ylabel("Return (reward per episode, last 50)")
         frame(
             figure,
@@ -344,16 +348,20 @@ def _circles(comparison: Comparison, baselines: Sequence[Mapping]) -> bool:
     return bool(((deliveries < _FEW) & (returns > known[0])).any())
 
 
-def _baseline_marks(axis: Axes, baselines: Sequence[Mapping]) -> None:
+def _baseline_marks(axis: Axes, marks: Mapping[str, Sequence[float]], setting: str) -> None:
     """Hollow marks, larger than those of the data and below them."""
-    places = in_training(baselines, ["deliveries_mean", "return_mean"])
-    for number, (name, place) in enumerate(places.items()):
+    for number, (name, place) in enumerate(marks.items()):
+        # Optimal policies take delivery for the end; elsewhere they are no yardstick.
+        if setting != "absorbing" and all(
+            part.startswith("optimal policy") for part in name.split("; ")
+        ):
+            continue
         axis.plot(
             *place,
             "osD^vph"[number % 7],
             color=INK,
             markerfacecolor="none",
-            markersize=13,
+            markersize=11,
             markeredgewidth=1.1,
             zorder=3,
             label=name,

@@ -226,7 +226,7 @@ def test_returns_against_deliveries_shows_configurations_runs_and_baselines(
         assert runs == 64 * 6
         # Optimal policies are optimal where delivery is the end.
         absorbing = setting == "absorbing"
-        name = "shortest delivery" + "; optimal policy, discount 0.9" * absorbing
+        name = "shortest delivery; optimal policy, discount 0.9"
         assert (lines[name].get_xdata()[0], lines[name].get_ydata()[0]) == (1.0, 45.0)
         assert any(line.startswith("optimal") for line in lines) == absorbing
         # Means stay visible on baselines at the same place.
@@ -236,6 +236,11 @@ def test_returns_against_deliveries_shows_configurations_runs_and_baselines(
             assert lines["optimal policy, discount 0.99"].get_ydata()[0] == 476.0
         assert "random policy" not in lines
         assert "exact bounds" not in lines
+    # A place has the same mark in all panels.
+    shared = labelled(axes[0]).keys() & labelled(axes[1]).keys()
+    assert len(shared) > 4
+    for name in shared:
+        assert labelled(axes[0])[name].get_marker() == labelled(axes[1])[name].get_marker()
 
 
 def test_baselines_at_one_place_share_a_name() -> None:
