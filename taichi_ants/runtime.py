@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -95,21 +96,33 @@ def _init(ti: ModuleType, wanted: Runtime) -> None:
         "fast_math": False,  # no reordering of floats: the same bits everywhere
         "cpu_max_num_threads": wanted.threads,
         "make_cpu_multithreading_loop": False,  # hand out runs one by one, they are uneven
-        "offline_cache": True,
         "offline_cache_file_path": str(_cache_folder()),
     }
     arch = ti.cuda if wanted.arch == "cuda" else ti.cpu
-    with contextlib.redirect_stdout(io.StringIO()):
+    hidden = _without_variables(["arch", "log_level", *settings])
+    with hidden, contextlib.redirect_stdout(io.StringIO()):
         ti.init(arch=arch, log_level=ti.ERROR, **settings)
     if wanted.arch == "cuda" and ti.lang.impl.current_cfg().arch != ti.cuda:
         ti.reset()
         raise AntsError("arch is 'cuda', but no CUDA device can be used here; choose 'cpu'.")
 
 
+@contextlib.contextmanager
+def _without_variables(settings: Iterable[str]) -> Iterator[None]:
+    """Hide the environment's word on some settings, with which Taichi would change ours or warn."""
+    names = [f"TI_{setting.upper()}" for setting in settings]
+    hidden = {name: os.environ.pop(name) for name in names if name in os.environ}
+    try:
+        yield
+    finally:
+        os.environ.update(hidden)
+
+
 def _cache_folder() -> Path:
     """Where compiled kernels are kept between processes; a temporary folder if need be."""
     base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.environ["HOME"], ".cache")
-    folder = Path(base) / "taichi_ants" / "kernels"
+    chosen = os.environ.get("TI_OFFLINE_CACHE_FILE_PATH")  # Taichi's own variable for it
+    folder = Path(chosen) if chosen else Path(base) / "taichi_ants" / "kernels"
     with contextlib.suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
     return folder if is_writable_folder(str(folder)) else Path(fallback_folder()) / "kernels"

@@ -16,6 +16,9 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 EXPERIMENTS = ROOT / "experiments"
 
+# Seconds. Alone on two cores it takes one or two; other tests run at the same time.
+PROMPTLY = 4.0
+
 
 def environment(kernels: Path, **changes: str | None) -> dict[str, str]:
     """The environment of a process that keeps compiled kernels in a folder; None removes a name."""

@@ -73,6 +73,30 @@ assert runtime.start() == runtime.Runtime("cpu", runtime.available_threads())
     assert list((tmp_path / "kernels" / "taichi_ants" / "kernels").iterdir())
 
 
+def test_variables_of_taichi_change_no_results_and_may_name_the_cache(tmp_path):
+    script = """
+import os
+import taichi as ti
+before = dict(os.environ)
+trained()
+config = ti.lang.impl.current_cfg()
+assert (config.arch in (ti.x64, ti.arm64), config.fast_math) == (True, False)
+assert config.cpu_max_num_threads == runtime.available_threads()
+assert dict(os.environ) == before
+"""
+    python(
+        BEGINNING + script,
+        tmp_path,
+        TI_ARCH="cuda",
+        TI_FAST_MATH="1",
+        TI_LOG_LEVEL="debug",
+        TI_CPU_MAX_NUM_THREADS="17",
+        TI_OFFLINE_CACHE_FILE_PATH=str(tmp_path / "chosen"),
+    )
+    assert list((tmp_path / "chosen").iterdir())
+    assert not (tmp_path / "kernels").exists()
+
+
 def test_beside_a_taichi_of_the_callers(tmp_path):
     """It is used as it is, and refused if it would change results."""
     script = """
