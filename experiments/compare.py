@@ -173,12 +173,10 @@ def write_tables(
     """Write all tables; the summary for the terminal."""
     from taichi_ants import results
     from taichi_ants.analysis import report, summary, table2
-    from taichi_ants.analysis.baselines import BASELINE_COLUMNS
     from taichi_ants.analysis.claims import assess, claims_markdown, claims_rows
 
     lines = summary.summarise(comparison)
     results.write_csv(folder / "summary.csv", lines, summary.SUMMARY_COLUMNS)
-    results.write_csv(folder / BASELINES, baselines, BASELINE_COLUMNS)
     table = table2.table2(comparison)
     results.write_csv(folder / "table2.csv", table, list(table[0]))
     results.write_text(folder / "table2.md", table2.table2_markdown(table, comparison.world))
@@ -255,7 +253,7 @@ def do_comparison(
     from functools import partial
 
     from taichi_ants import results
-    from taichi_ants.analysis.baselines import baseline_rows
+    from taichi_ants.analysis.baselines import BASELINE_COLUMNS, baseline_rows
     from taichi_ants.engines.runs import evaluate
     from taichi_ants.sweeps import run_sweep
 
@@ -274,26 +272,22 @@ def do_comparison(
     )
     laps["baselines"] = time.perf_counter()
     costs = [cost.as_row() for cost in result.costs]
-    text = write_tables(ready, comparison, baselines, costs)
-    results.write_text(ready / REPORT, text)
     write_episodes(ready, comparison)
-    policies = results.check_writable_folder(ready / POLICIES)
-    write_policies(policies, sweep, comparison, result.q_values)
-    laps["tables"] = time.perf_counter()
-    draw_pictures(settings, sweep, ready)
+    results.write_csv(ready / BASELINES, baselines, BASELINE_COLUMNS)
+    with ExitStack() as beside:  # figures take one core and need no more than these two files
+        if not settings.no_figures:
+            beside.enter_context(process_beside(draw_figures, sweep, ready, ready))
+        text = write_tables(ready, comparison, baselines, costs)
+        results.write_text(ready / REPORT, text)
+        policies = results.check_writable_folder(ready / POLICIES)
+        write_policies(policies, sweep, comparison, result.q_values)
+        laps["tables"] = time.perf_counter()
+        if not settings.no_render:
+            render_policies(sweep, policies, ready)
     laps["figures and renders"] = time.perf_counter()
     marks = list(laps.items())
     seconds = {name: end - marks[i][1] for i, (name, end) in enumerate(marks[1:])}
     return {"cost_per_step": costs, "seconds": seconds}
-
-
-def draw_pictures(settings: argparse.Namespace, sweep: Sweep, folder: Path) -> None:
-    """Draw figures and episodes of what lies in a folder, side by side: each takes one core."""
-    with ExitStack() as stack:
-        if not settings.no_figures:
-            stack.enter_context(process_beside(draw_figures, sweep, folder, folder))
-        if not settings.no_render:
-            render_policies(sweep, folder / POLICIES, folder)
 
 
 def draw_figures(sweep: Sweep, results: Path, folder: Path) -> None:

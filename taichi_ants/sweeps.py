@@ -1,12 +1,13 @@
 """Many configurations over many seeds, trained and evaluated, kept on disk as they finish.
 
-The work is cut into blocks (one configuration, some seeds). Each finished block is a file, so that
-a sweep that was stopped goes on where it was. Since a run depends only on its world, configuration
-and seed, blocks can be done in any order without changing anything.
+The work is cut into blocks (some configurations of a learner, some seeds). Each finished block is a
+file, so that a sweep that was stopped goes on where it was. Since a run depends only on its world,
+configuration and seed, blocks can be done in any order without changing anything.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 from collections.abc import Callable, Iterator
@@ -24,7 +25,7 @@ from taichi_ants.engines.results import LearnerCost
 from taichi_ants.errors import AntsError
 from taichi_ants.worlds.world import World
 
-_STEPS_OF_A_BLOCK = 300_000_000  # at most, if every episode used all its steps
+_STEPS_OF_A_BLOCK = 100_000_000  # at most, if every episode used all its steps
 _RUNS_OF_A_BLOCK = 5000  # at most, each needs about 20 KB while it is trained
 _COPIES = 3  # of the results in memory while they are analysed
 _ARRAYS = ("returns", "steps", "deliveries")
@@ -71,13 +72,23 @@ class Sweep:
                 "configurations or episodes at once."
             )
 
-    def blocks(self) -> Iterator[tuple[int, slice]]:
-        """The configuration and the range of seeds of each block."""
+    def blocks(self) -> Iterator[tuple[slice, slice]]:
+        """The range of configurations, all with one learner and depth, and of seeds of each block.
+
+        Large enough for the cost of a launch not to count, small enough for a stop to come soon.
+        """
         longest = self.episodes * self.max_steps
         size = min(max(1, _STEPS_OF_A_BLOCK // longest), _RUNS_OF_A_BLOCK)
-        for c in range(len(self.configs)):
-            for first in range(0, len(self.seeds), size):
-                yield c, slice(first, min(first + size, len(self.seeds)))
+        for _, alike in itertools.groupby(range(len(self.configs)), lambda c: self.cost_of(c)):
+            first, *others = alike
+            configs = slice(first, first + 1 + len(others))
+            for some in _pieces(configs, max(1, size // len(self.seeds))):
+                for seeds in _pieces(slice(0, len(self.seeds)), size):
+                    yield some, seeds
+
+    def cost_of(self, c: int) -> tuple[str, int]:
+        """What the cost of a configuration depends on: its learner and its planning steps."""
+        return self.configs[c].learner, self.configs[c].planning_steps
 
 
 @dataclass(frozen=True)
@@ -99,6 +110,11 @@ class SweepResult:
     greedy_deliveries: np.ndarray
     q_values: np.ndarray
     costs: tuple[LearnerCost, ...]
+
+
+def _pieces(whole: slice, size: int) -> Iterator[slice]:
+    for first in range(whole.start, whole.stop, size):
+        yield slice(first, min(first + size, whole.stop))
 
 
 def available_memory() -> float:
@@ -127,34 +143,34 @@ def run_sweep(
         AntsError: A block cannot be written, or an argument is not allowed.
     """
     blocks = list(sweep.blocks())
-    weights = [_weight(sweep, c, seeds) for c, seeds in blocks]
+    weights = [_weight(sweep, configs, seeds) for configs, seeds in blocks]
     total, done = sum(weights), 0.0
     joined = _empty_result(sweep)
     costs: dict[tuple[str, int], LearnerCost] = {}
     progress(0.0)
-    for (c, seeds), weight in zip(blocks, weights, strict=True):
-        path = folder / f"block-{c:04d}-{seeds.start:06d}.npz"
-        block = _read_block(path, sweep, seeds)
+    for (configs, seeds), weight in zip(blocks, weights, strict=True):
+        path = folder / f"block-{configs.start:04d}-{seeds.start:06d}.npz"
+        block = _read_block(path, sweep, configs, seeds)
         if block is None:
-            block = _do_block(sweep, c, seeds, threads, arch)
+            block = _do_block(sweep, configs, seeds, threads, arch)
             results.write_npz(path, block, compress=False)
         for name, array in joined.items():
-            array[c, seeds] = block[name][0]
-        _add_cost(costs, sweep.configs[c], block)
+            array[configs, seeds] = block[name]
+        _add_cost(costs, sweep.cost_of(configs.start), block)
         done += weight
         progress(done / total)
     return SweepResult(**joined, costs=tuple(costs.values()))
 
 
 def _do_block(
-    sweep: Sweep, c: int, seeds: slice, threads: int | None, arch: str | None
+    sweep: Sweep, configs: slice, seeds: slice, threads: int | None, arch: str | None
 ) -> dict[str, np.ndarray]:
     from taichi_ants.engines.runs import evaluate, train
 
     chosen = sweep.seeds[seeds]
     trained = train(
         sweep.world,
-        sweep.configs[c],
+        sweep.configs[configs],
         chosen,
         sweep.episodes,
         sweep.max_steps,
@@ -171,16 +187,18 @@ def _do_block(
     return block | {"q_values": tables, "cost": np.array([cost.steps, cost.seconds])}
 
 
-def _read_block(path: Path, sweep: Sweep, seeds: slice) -> dict[str, np.ndarray] | None:
+def _read_block(
+    path: Path, sweep: Sweep, configs: slice, seeds: slice
+) -> dict[str, np.ndarray] | None:
     """A finished block, None if there is none or it is damaged."""
     if not path.exists():
         return None
     with suppress(AntsError, KeyError):
         block = results.read_npz(path)
-        n = seeds.stop - seeds.start
-        fits = all(block[name].shape == (1, n, sweep.episodes) for name in _ARRAYS)
-        fits = fits and all(block[name].shape == (1, n, sweep.rollouts) for name in _GREEDY)
-        fits = fits and block["q_values"].shape == (1, n, N_STATES, N_ACTIONS)
+        runs = (configs.stop - configs.start, seeds.stop - seeds.start)
+        fits = all(block[name].shape == (*runs, sweep.episodes) for name in _ARRAYS)
+        fits = fits and all(block[name].shape == (*runs, sweep.rollouts) for name in _GREEDY)
+        fits = fits and block["q_values"].shape == (*runs, N_STATES, N_ACTIONS)
         if fits and block["cost"].shape == (2,):
             return block
     return None
@@ -195,14 +213,14 @@ def _empty_result(sweep: Sweep) -> dict[str, np.ndarray]:
 
 def _add_cost(
     costs: dict[tuple[str, int], LearnerCost],
-    config: TrainingConfig,
+    key: tuple[str, int],
     block: dict[str, np.ndarray],
 ) -> None:
-    key = (config.learner, config.planning_steps)
     known = costs.get(key, LearnerCost(*key, steps=0, seconds=0.0))
     steps, seconds = block["cost"].tolist()
     costs[key] = LearnerCost(*key, known.steps + int(steps), known.seconds + seconds)
 
 
-def _weight(sweep: Sweep, c: int, seeds: slice) -> float:
-    return (4 + sweep.configs[c].planning_steps) * (seeds.stop - seeds.start)
+def _weight(sweep: Sweep, configs: slice, seeds: slice) -> float:
+    runs = (configs.stop - configs.start) * (seeds.stop - seeds.start)
+    return (4 + sweep.configs[configs.start].planning_steps) * runs
