@@ -133,7 +133,7 @@ def _draw_bars(
 
 
 def draw_legend(
-    frame: np.ndarray, place: tuple[int, int, int], size: int, full_level: float
+    frame: np.ndarray, place: tuple[int, int, int], size: int, full_level: float, hexagon: float
 ) -> None:
     """Draw what colours, shapes and letters mean.
 
@@ -142,13 +142,14 @@ def draw_legend(
         place: Left, top and width in pixels; `LEGEND_HEIGHT` sizes of the text high.
         size: Of the text, in pixels.
         full_level: The trail level of the last colour of the ramp.
+        hexagon: Size of the world's hexagons in pixels, on which the look of its ants depends.
     """
     left, top, width = place
     pitch, side = round(1.55 * size), round(1.5 * size)
     for row, (ground, carries, letter, label) in enumerate(_LEGEND):
         y = top + row * pitch
         baseline = y + round(0.5 * side + 0.36 * size)
-        _draw_swatch(frame, left, y, side, ground, carries)
+        _draw_swatch(frame, (left, y, side), ground, carries, hexagon)
         text.write(frame, letter, left + 0.59 * side, baseline, size, align="middle")
         text.write(frame, label, left + round(2.1 * size), baseline, size)
     y = top + len(_LEGEND) * pitch + round(1.45 * size)
@@ -164,9 +165,14 @@ def draw_legend(
 
 
 def _draw_swatch(
-    frame: np.ndarray, left: int, top: int, side: int, ground: int, carries: bool | None
+    frame: np.ndarray,
+    place: tuple[int, int, int],
+    ground: int,
+    carries: bool | None,
+    hexagon: float,
 ) -> None:
-    """A single cell as the worlds show it, with an ant if `carries` says what it carries."""
+    """A single cell as the world shows it, with an ant if `carries` says what it carries."""
+    left, top, side = place
     grid = AxialGrid((1, 1, 1))
     held = np.full(grid.size, OBSTACLE, dtype=np.uint8)
     cell = grid.index((0, 0, 0))
@@ -181,7 +187,8 @@ def _draw_swatch(
         ant_carries=np.full(n, bool(carries)),
     )
     width = round(1.18 * side)
-    rasteriser = Rasteriser(grid, Viewport.fit(grid, left, top, width, side, margin=1))
+    viewport = Viewport.fit(grid, left, top, width, side, margin=1)
+    rasteriser = Rasteriser(grid, viewport, ants_like=hexagon)
     rasteriser.draw(frame, snapshot)
 
 

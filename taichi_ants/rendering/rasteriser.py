@@ -43,6 +43,8 @@ class Rasteriser:
         viewport: Where to draw, within the frame.
         full_level: The trail level that has the last colour of the ramp, as stronger ones have.
         shown: bool (grid.size,), cells to draw, all others are page; None draws all that exist.
+        ants_like: Draw ants as in hexagons of this size, in pixels, for a legend; None takes that
+            of the viewport.
     """
 
     def __init__(
@@ -51,10 +53,12 @@ class Rasteriser:
         viewport: Viewport,
         full_level: float = DEPOSIT_LEVEL,
         shown: np.ndarray | None = None,
+        ants_like: float | None = None,
     ) -> None:
         self.grid = grid
         self.viewport = viewport
         self._full_level = full_level
+        self._ants_like = viewport.hexagon if ants_like is None else ants_like
         self._shown = (grid.exists if shown is None else shown).view(np.uint8)
         self.kernels = _kernels()
         self._colours = np.zeros(grid.size, dtype=np.uint32)
@@ -162,7 +166,7 @@ class Rasteriser:
         return [(rings, np.full(len(rings), colours.INK, dtype=np.uint32))]
 
     def _ants(self, snapshot: Snapshot) -> tuple[np.ndarray, np.ndarray]:
-        kernels, hexagon = self.kernels, self.viewport.hexagon
+        kernels, hexagon = self.kernels, self._ants_like
         carries = snapshot.ant_carries
         of_shapes = np.full(len(carries), colours.ANT, dtype=np.uint32)
         if hexagon < _SMALLEST_HEXAGON:
@@ -174,7 +178,7 @@ class Rasteriser:
             shape = np.where(carries, kernels.ANT_WITH_FOOD, kernels.ANT)
         ants = self.shapes(snapshot.ant_cells, shape, snapshot.ant_headings)
         if hexagon < _SMALLEST_HEXAGON:
-            ants[:, 2] = np.maximum(ants[:, 2], _DOT_RADIUS)
+            ants[:, 2] = max(_FILL * hexagon, _DOT_RADIUS)
             ants[:, 5] = self._dot_opacity(len(ants))
         return ants, of_shapes
 

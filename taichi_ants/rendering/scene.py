@@ -83,7 +83,8 @@ class Scene:
         self._background[:] = colours.channels(colours.PAGE)
         self._places = self._panel_places(room, margin, title)
         if self._legend:
-            panel.draw_legend(self._background, self._places["legend"], self._text_size, full_level)
+            place, hexagon = self._places["legend"], self.viewport.hexagon
+            panel.draw_legend(self._background, place, self._text_size, full_level, hexagon)
 
     def draw(self, snapshot: Snapshot, status: Status | None = None) -> np.ndarray:
         """A picture, uint8 (height, width, 3), of a world and of what its head-up lines say.

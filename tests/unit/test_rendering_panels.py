@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from taichi_ants import AntsError
-from taichi_ants.rendering import Scene, Snapshot, Status, text
+from taichi_ants.rendering import Scene, Snapshot, Status, panel, text
 from taichi_ants.rendering.colours import CHOSEN
 from taichi_ants.rendering.scene import range_with_zero
 from taichi_ants.worlds import World, paper
@@ -65,6 +65,26 @@ def test_only_what_is_switched_on_is_there() -> None:
     # Alone, the world has the whole picture.
     assert Scene(WORLD.grid, (640, 400), hud=False, legend=False).viewport.width == 640
     assert plain.shape == (400, 640, 3)
+
+
+def test_ants_of_the_legend_look_as_those_of_the_world() -> None:
+    """Drawn alike: darts in small cells, with legs in large ones, dots where cells are dots."""
+
+    def legend(hexagon: float) -> np.ndarray:
+        frame = np.full((260, 200, 3), 255, dtype=np.uint8)
+        panel.draw_legend(frame, (4, 4, 180), 16, 250.0, hexagon)
+        return frame
+
+    darts, legs, dots = legend(8.0), legend(20.0), legend(1.0)
+    assert (legend(10.0) == darts).all()
+    assert (legend(40.0) == legs).all()
+    rows = slice(4 + 5 * 25, 4 + 7 * 25)  # the last two of seven entries
+    ink = []
+    for picture_ in (darts, legs, dots):
+        assert (np.delete(picture_, rows, axis=0) == np.delete(darts, rows, axis=0)).all()
+        ink.append(int((picture_[rows, :30].max(axis=2) < 160).sum()))
+    assert 0 < ink[2] < 20 < min(ink[:2])
+    assert (darts != legs).any()
 
 
 @pytest.mark.parametrize("size", [(640, 400), (400, 700), (500, 500), (330, 1200), (1280, 720)])
