@@ -300,6 +300,7 @@ def draw_figures(sweep: Sweep, results: Path, folder: Path) -> None:
 def render_policies(sweep: Sweep, policies: Path, folder: Path) -> None:
     """Show a greedy episode of each policy that was written, in the folder `renders`."""
     from taichi_ants import load_policy, results
+    from taichi_ants.analysis.comparison import Variant
     from taichi_ants.rendering import render_episode
 
     place = results.check_writable_folder(folder / RENDERS)
@@ -307,6 +308,8 @@ def render_policies(sweep: Sweep, policies: Path, folder: Path) -> None:
         paths = sorted(policies.glob("*.npz"))
         for done, path in enumerate(paths):
             q_values, metadata = load_policy(path)
+            config = metadata["config"]
+            variant = Variant(config["learner"], config["planning_steps"])
             render_episode(
                 place / f"{path.stem}.gif",
                 sweep.world,
@@ -314,7 +317,7 @@ def render_policies(sweep: Sweep, policies: Path, folder: Path) -> None:
                 seed=metadata["seed"],
                 max_steps=min(sweep.max_steps, RENDERED_STEPS),
                 size=(720, 480),
-                title=f"{path.stem}, seed {metadata['seed']}",
+                title=f"{variant.label}, {config['delivery']}, seed {metadata['seed']}",
             )
             report_progress((done + 1) / len(paths))
 
