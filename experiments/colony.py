@@ -288,11 +288,12 @@ def show_finished(settings: argparse.Namespace, plan: StudyPlan, folder: ResultF
     from taichi_ants.analysis.colony import figures
     from taichi_ants.colony_study import from_arrays
 
-    if not settings.no_figures and not (settings.out / FIGURES).is_dir():
+    folder.check_whole(apart_from=(FIGURES,))
+    print(results.read_text(settings.out / REPORT))
+    if not settings.no_figures and folder.lacks(FIGURES):
         found = from_arrays(plan, results.read_npz(settings.out / EPISODES))
         with folder.addition() as place:
             figures.save_all(found, place / FIGURES)
-    print((settings.out / REPORT).read_text("utf-8"))
     print(f"{settings.out}/ holds this study already; --force runs it again.")
 
 

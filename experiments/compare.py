@@ -324,13 +324,16 @@ def render_policies(sweep: Sweep, policies: Path, folder: Path) -> None:
 
 def show_finished(settings: argparse.Namespace, sweep: Sweep, folder: ResultFolder) -> None:
     """Print the summary of a finished comparison; add figures and episodes that were left out."""
-    if not settings.no_render and not (settings.out / RENDERS).is_dir():
+    from taichi_ants import results
+
+    folder.check_whole(apart_from=(FIGURES, RENDERS))
+    print(results.read_text(settings.out / REPORT))
+    if not settings.no_render and folder.lacks(RENDERS):
         with folder.addition() as place:
             render_policies(sweep, settings.out / POLICIES, place)
-    if not settings.no_figures and not (settings.out / FIGURES).is_dir():
+    if not settings.no_figures and folder.lacks(FIGURES):
         with folder.addition() as place:
             draw_figures(sweep, settings.out, place)
-    print((settings.out / REPORT).read_text("utf-8"))
     print(f"{settings.out}/ holds this comparison already; --force runs it again.")
 
 
@@ -340,17 +343,16 @@ def read_back(folder: Path, sweep: Sweep) -> tuple[Comparison, list[dict[str, An
     from taichi_ants.analysis.baselines import BASELINE_COLUMNS
     from taichi_ants.sweeps import SweepResult
 
-    arrays = {
-        name: array.astype(int) for name, array in results.read_npz(folder / EPISODES).items()
-    }
     try:
+        arrays = results.read_npz(folder / EPISODES)
+        arrays = {name: array.astype(int) for name, array in arrays.items()}
         comparison = to_comparison(sweep, SweepResult(**arrays, q_values=None, costs=()), "another")
         with open(folder / BASELINES, newline="", encoding="utf-8") as file:
             lines = csv.DictReader(file)
             baselines = [read_baseline(line) for line in lines]
         if lines.fieldnames != list(BASELINE_COLUMNS):
             raise ValueError("other columns")
-    except (TypeError, ValueError, KeyError) as error:
+    except (AntsError, OSError, TypeError, ValueError, KeyError) as error:
         raise AntsError(f"the results in {str(folder)!r} are damaged; give --force.") from error
     return comparison, baselines
 

@@ -210,7 +210,14 @@ def process_beside(work: Callable[..., None], *arguments: object) -> Iterator[No
 
 
 def _work_apart(work: Callable[..., None], arguments: Sequence[object]) -> None:
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     run_command(lambda: work(*arguments))
+
+
+def _end_with_parent() -> None:
+    """A parent that was killed cannot end this process, which would write where others now work."""
+    multiprocessing.parent_process().join()
+    os._exit(EXIT_INTERRUPTED)
 
 
 @contextmanager

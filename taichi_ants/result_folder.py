@@ -10,8 +10,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -49,6 +48,31 @@ class ResultFolder:
         same = _settings_in(self.path / MANIFEST) == self._settings
         return same and not os.path.exists(self._unfinished / _SETTINGS)
 
+    def lacks(self, name: str) -> bool:
+        """Whether a file or a folder was left out of the results, or some of it is gone."""
+        listed = [path for path in self._published() if path.parts[0] == name]
+        return not listed or any(self._is_gone(path) for path in listed)
+
+    def check_whole(self, apart_from: Collection[str] = ()) -> None:
+        """Make sure that finished results are still all there.
+
+        Args:
+            apart_from: Files and folders that may be gone.
+
+        Raises:
+            AntsError: A file is gone or empty.
+        """
+        for path in self._published():
+            if path.parts[0] not in apart_from and self._is_gone(path):
+                raise AntsError(
+                    f"{str(self.path / path)!r}, a part of the results, is gone or empty; "
+                    "give --force to run all again."
+                )
+
+    def _is_gone(self, path: Path) -> bool:
+        file = self.path / path
+        return not file.is_file() or file.stat().st_size == 0
+
     @contextmanager
     def work(self, replace: bool = False) -> Iterator[tuple[Path, Path]]:
         """Lock the folder and hold the work in progress.
@@ -67,16 +91,22 @@ class ResultFolder:
         """
         if not replace:
             self._check_nothing_else()
+        with self._locked():
+            try:
+                yield self._prepare(replace)
+            finally:
+                self._drop_work_without_blocks()
+
+    @contextmanager
+    def _locked(self) -> Iterator[None]:
+        """Make the folders that are missing and keep others away; empty folders go again."""
         new = [part for part in (self.path, *self.path.parents) if not os.path.exists(part)]
         try:
             results.check_writable_folder(self.path)
             results.check_writable_folder(self._unfinished)
             with open(self._unfinished / _LOCK, "w") as lock:
                 self._lock(lock)
-                try:
-                    yield self._prepare(replace)
-                finally:
-                    self._drop_work_without_blocks()
+                yield
         finally:
             for folder in (self._unfinished, *new):
                 with suppress(OSError, ValueError):  # it is not empty, or was never made
@@ -87,19 +117,15 @@ class ResultFolder:
 
         What an older manifest lists is replaced or removed; other files stay.
         """
-        ready = sorted((self._unfinished / READY).iterdir())
-        names = [item.name for item in ready]
+        files = _files_in(self._unfinished / READY)
         try:
-            for name in self._published():
-                if name not in names:
-                    _remove(self.path / name)
+            for name in {path.parts[0] for path in self._published()}:
+                _remove(self.path / name)
             (self.path / MANIFEST).unlink(missing_ok=True)
-            for item in ready:
-                _remove(self.path / item.name)
-                item.replace(self.path / item.name)
+            self._move_up()
         except OSError as error:
             raise _cannot_write(self.path, error) from error
-        contents = {**manifest, "files": names, "settings": self._settings}
+        contents = {**manifest, "files": files, "settings": self._settings}
         results.write_json(self.path / MANIFEST, contents)
         (self._unfinished / _SETTINGS).unlink(missing_ok=True)  # now the work is finished
         shutil.rmtree(self._unfinished, ignore_errors=True)
@@ -109,25 +135,28 @@ class ResultFolder:
         """Hold a folder for what is added to finished results; it moves up when it is complete.
 
         Raises:
-            AntsError: The folder cannot be written.
+            AntsError: The folder cannot be written, or another process works in it.
         """
-        try:
-            folder = Path(tempfile.mkdtemp(prefix=".", suffix=".tmp", dir=self.path))
-        except OSError as error:
-            raise _cannot_write(self.path, error) from error
-        try:
-            yield folder
-            added = sorted(folder.iterdir())
-            for item in added:
-                _remove(self.path / item.name)
-                item.replace(self.path / item.name)
-            manifest = json.loads((self.path / MANIFEST).read_text("utf-8"))
-            names = {*self._published(), *(item.name for item in added)}
-            results.write_json(self.path / MANIFEST, {**manifest, "files": sorted(names)})
-        except OSError as error:
-            raise _cannot_write(self.path, error) from error
-        finally:
-            shutil.rmtree(folder, ignore_errors=True)
+        with self._locked():
+            try:
+                shutil.rmtree(self._unfinished / READY, ignore_errors=True)
+                yield results.check_writable_folder(self._unfinished / READY)
+                files = _files_in(self._unfinished / READY)
+                added = {Path(file).parts[0] for file in files}
+                kept = [str(file) for file in self._published() if file.parts[0] not in added]
+                manifest = json.loads((self.path / MANIFEST).read_text("utf-8"))
+                results.write_json(
+                    self.path / MANIFEST, {**manifest, "files": sorted([*kept, *files])}
+                )
+                self._move_up()
+            finally:
+                shutil.rmtree(self._unfinished, ignore_errors=True)
+
+    def _move_up(self) -> None:
+        """Put what is ready in its place, instead of what is there."""
+        for item in sorted((self._unfinished / READY).iterdir()):
+            _remove(self.path / item.name)
+            item.replace(self.path / item.name)
 
     def _prepare(self, replace: bool) -> tuple[Path, Path]:
         """Folders for blocks and for what is ready; blocks of other settings are removed."""
@@ -139,11 +168,11 @@ class ResultFolder:
         results.write_json(self._unfinished / _SETTINGS, {"settings": self._settings})
         return blocks, ready
 
-    def _published(self) -> list[str]:
-        """The names that the manifest lists, if there is one."""
+    def _published(self) -> list[Path]:
+        """The files that the manifest lists, relative to the folder, if there is one."""
         with suppress(OSError, ValueError, TypeError, KeyError):
             files = json.loads((self.path / MANIFEST).read_text("utf-8"))["files"]
-            return [name for name in files if Path(name).name == name and name != ".."]
+            return [path for path in map(Path, files) if _lies_below(path)]
         return []
 
     def _check_nothing_else(self) -> None:
@@ -167,6 +196,11 @@ class ResultFolder:
         return any(item.name != _UNFINISHED for item in self.path.iterdir())
 
     def _holds(self, what: str, other: Mapping[str, Any]) -> str:
+        if not other:
+            return (
+                f"{str(self.path)!r} holds {what} whose settings are damaged; "
+                "choose another --out, or give --force to replace them."
+            )
         keys = dict.fromkeys([*self._settings, *other])
         different = [key for key in keys if self._settings.get(key) != other.get(key)]
         return (
@@ -198,6 +232,16 @@ def _settings_in(path: Path) -> dict[str, Any] | None:
     with suppress(OSError, ValueError, TypeError, KeyError):
         return dict(json.loads(path.read_text("utf-8"))["settings"])
     return {}  # damaged: of other settings than any
+
+
+def _files_in(folder: Path) -> list[str]:
+    """All files below a folder, relative to it."""
+    paths = sorted(path for path in folder.rglob("*") if not path.is_dir())
+    return [path.relative_to(folder).as_posix() for path in paths]
+
+
+def _lies_below(path: Path) -> bool:
+    return bool(path.parts) and not path.is_absolute() and ".." not in path.parts
 
 
 def _remove(path: Path) -> None:

@@ -65,6 +65,20 @@ def write_text(path: PathLike, text: str) -> None:
     write_atomically(path, write_content)
 
 
+def read_text(path: PathLike) -> str:
+    """Read text that `write_text` has written.
+
+    Raises:
+        AntsError: The file cannot be read, or holds no text.
+    """
+    try:
+        return Path(path).read_text("utf-8")
+    except (OSError, UnicodeError) as error:
+        raise AntsError(
+            f"cannot read {os.fspath(path)!r}: {_reason(error)}; give --force to write it again."
+        ) from error
+
+
 def write_json(path: PathLike, value: Any) -> None:
     """Write a value as indented JSON; raises as `write_atomically` does.
 

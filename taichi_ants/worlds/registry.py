@@ -52,7 +52,7 @@ def build(name_or_path: str | os.PathLike[str], seed: int = 0) -> World:
     """
     seed = whole("seed", seed)
     if isinstance(name_or_path, str) and name_or_path in _BUILDERS:
-        world = _BUILDERS[name_or_path](seed)
+        world = _build(name_or_path, seed)
         if not isinstance(world, World):
             raise AntsError(
                 f"the builder of {name_or_path!r} returned a {type(world).__name__}; "
@@ -64,6 +64,16 @@ def build(name_or_path: str | os.PathLike[str], seed: int = 0) -> World:
     if isinstance(name_or_path, str) and not _looks_like_a_path(name_or_path):
         raise AntsError(f"there is no world named {name_or_path!r}; {_known()}")
     return load_map(name_or_path)
+
+
+def _build(name: str, seed: int) -> object:
+    try:
+        return _BUILDERS[name](seed)
+    except AntsError:
+        raise
+    except Exception as error:
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        raise AntsError(f"the builder of {name!r} failed with {reason}; mend it.") from error
 
 
 def _known() -> str:

@@ -202,7 +202,7 @@ def test_manifest(finished):
     assert manifest["settings"]["seeds"] == list(SEEDS)
     assert manifest["settings"]["world"]["ranges"] == [10, 10, 10]
     assert {"taichi", "numpy", "taichi_ants"} <= set(manifest["packages"])
-    assert set(manifest["files"]) == {name.split("/")[0] for name in FILES} - {"manifest.json"}
+    assert set(manifest["files"]) == set(FILES) - {"manifest.json"}
     assert manifest["seconds"]["total"] > 0
     costs = {(cost["learner"], cost["planning_steps"]): cost for cost in manifest["cost_per_step"]}
     assert set(costs) == {("q_learning", 0), ("sarsa", 0), ("dyna_q", 2)}
@@ -268,6 +268,34 @@ def test_figures_cannot_be_drawn_from_damaged_files(name, damage, copy, compare)
     assert_one_sentence(err)
     assert not (copy / "figures").exists()
     assert not list(copy.glob(".*"))
+
+
+@pytest.mark.parametrize("damage", ["figures/sensitivity.png", "renders/sarsa.gif"])
+def test_a_picture_that_is_gone_is_drawn_again(damage, finished, copy, compare):
+    (copy / damage).unlink()
+    assert compare(*SMALL, "--out", copy)[0] == 0
+    assert contents(copy) == contents(finished)
+
+
+@pytest.mark.parametrize(
+    ("name", "damage"),
+    [
+        ("summary.csv", lambda path: path.unlink()),
+        ("policies/sarsa.npz", lambda path: path.unlink()),
+        ("report.txt", lambda path: path.unlink()),
+        ("report.txt", lambda path: path.write_text("")),
+        ("report.txt", lambda path: path.write_bytes(b"\xff\xfe\x00")),
+    ],
+)
+def test_results_that_are_gone_are_not_passed_over(name, damage, copy, compare):
+    damage(copy / name)
+    shutil.rmtree(copy / "renders")
+    status, out, err = compare(*SMALL, "--out", copy)
+    assert (status, out) == (2, "")
+    assert_one_sentence(err)
+    assert name in err
+    assert "--force" in err
+    assert not (copy / "renders").exists()
 
 
 @pytest.mark.parametrize(

@@ -257,6 +257,35 @@ def test_work_in_a_process_beside(tmp_path, capfd):
         pass
 
 
+def write_for_long(path):
+    for _ in range(6000):
+        with open(path, "a") as file:
+            file.write(".")
+        time.sleep(0.01)
+
+
+def hold_a_process_beside(path):
+    with process_beside(write_for_long, path):
+        pass
+
+
+def test_a_process_beside_does_not_outlive_a_killed_parent(tmp_path):
+    note = tmp_path / "note"
+    parent = multiprocessing.get_context("spawn").Process(
+        target=hold_a_process_beside, args=(note,)
+    )
+    parent.start()
+    while not note.exists():
+        time.sleep(0.002)
+    parent.kill()
+    parent.join()
+    lengths = []
+    while len(lengths) < 2 or lengths[-1] > lengths[-2]:
+        assert len(lengths) < 20
+        lengths.append(note.stat().st_size)
+        time.sleep(0.5)
+
+
 def test_a_process_beside_does_not_outlive_an_interruption(tmp_path):
     def command():
         with process_beside(sleep_for_long, tmp_path / "note"):

@@ -159,18 +159,18 @@ def test_an_interrupted_clean_up_does_not_undo_the_work(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("damage", ["", "{", "[]", '{"settings": 3}', "\0"])
-def test_damaged_settings_are_of_other_settings(damage, tmp_path):
+def test_damaged_settings_are_of_no_settings(damage, tmp_path):
     stop_after_a_block(tmp_path)
     (tmp_path / "unfinished" / "settings.json").write_text(damage)
-    with pytest.raises(AntsError, match="other settings"):
+    with pytest.raises(AntsError, match="unfinished work whose settings are damaged"):
         ResultFolder(tmp_path, SETTINGS).work().__enter__()
 
 
-def test_a_damaged_manifest_is_of_other_settings(tmp_path):
+def test_a_damaged_manifest_is_of_no_settings(tmp_path):
     finish(tmp_path)
     (tmp_path / "manifest.json").write_text("{}")
     assert not ResultFolder(tmp_path, SETTINGS).is_finished()
-    with pytest.raises(AntsError, match="results of other settings"):
+    with pytest.raises(AntsError, match="results whose settings are damaged"):
         ResultFolder(tmp_path, SETTINGS).work().__enter__()
     finish(tmp_path, replace=True)
     assert ResultFolder(tmp_path, SETTINGS).is_finished()
@@ -244,9 +244,57 @@ def test_additions(tmp_path):
     assert names(tmp_path) == ["figures", "manifest.json", "table.csv"]
     assert folder.is_finished()
     manifest = json.loads((tmp_path / "manifest.json").read_text())
-    assert manifest["files"] == ["figures", "table.csv"]
+    assert manifest["files"] == ["figures/one.png", "table.csv"]
     assert manifest["made"] == "result"
     finish(tmp_path, replace=True)  # what was added goes with the results
+    assert names(tmp_path) == ["manifest.json", "table.csv"]
+
+
+def test_what_is_gone_is_noticed(tmp_path):
+    folder = finish(tmp_path, files=("table.csv", "policy.npz"))
+    with folder.addition() as place:
+        (place / "figures").mkdir()
+        for name in ("one.png", "two.png"):
+            (place / "figures" / name).write_text("drawn")
+    folder.check_whole()
+    assert [folder.lacks(name) for name in ("figures", "table.csv", "renders")] == [
+        False,
+        False,
+        True,
+    ]
+    (tmp_path / "figures" / "two.png").unlink()
+    assert folder.lacks("figures")
+    folder.check_whole(apart_from={"figures"})
+    with pytest.raises(
+        AntsError, match=r"figures/two\.png', a part of the results, is gone or empty"
+    ):
+        folder.check_whole()
+    (tmp_path / "policy.npz").write_text("")
+    with pytest.raises(AntsError, match=r"policy\.npz', .* give --force"):
+        folder.check_whole(apart_from={"figures"})
+
+
+def test_an_addition_that_was_killed_leaves_nothing_for_ever(tmp_path):
+    folder = finish(tmp_path)
+    left = tmp_path / "unfinished" / "ready" / "figures"
+    left.mkdir(parents=True)
+    (left / "half.png").write_text("half")
+    assert folder.is_finished()
+    with folder.addition() as place:
+        assert list(place.iterdir()) == []
+    assert names(tmp_path) == ["manifest.json", "table.csv"]
+
+
+def test_additions_wait_for_nobody(tmp_path):
+    folder = finish(tmp_path)
+    with folder.addition(), pytest.raises(AntsError, match="another process"):
+        folder.addition().__enter__()
+    assert folder.is_finished()
+
+
+def test_what_fails_beside_an_addition_is_not_taken_for_its_place(tmp_path):
+    with pytest.raises(FileNotFoundError), finish(tmp_path).addition():
+        (tmp_path / "gone.csv").read_text()
     assert names(tmp_path) == ["manifest.json", "table.csv"]
 
 

@@ -58,6 +58,9 @@ def test_a_builder_builds_worlds() -> None:
     worlds.register("empty", lambda seed: None)
     with pytest.raises(AntsError, match="'empty' returned a NoneType"):
         worlds.build("empty")
+    worlds.register("broken", lambda seed: seed // 0)
+    with pytest.raises(AntsError, match=r"'broken' failed with ZeroDivisionError: .*; mend it"):
+        worlds.build("broken")
 
 
 def test_a_path_is_a_world_too(tmp_path: Path) -> None:
