@@ -99,14 +99,16 @@ def write_csv(path: PathLike, rows: Iterable[Mapping[str, Any]], columns: Sequen
     Args:
         path: The file.
         rows: Any values that have a text; floats are written so that they read back exactly.
-            None and missing keys become an empty field, a key that is no column is a ValueError.
+            None, NaN and missing keys become an empty field, a key that is no column is a
+            ValueError.
         columns: The keys to write, in this order.
     """
     text = io.StringIO()
     table = csv.DictWriter(text, fieldnames=columns, restval="", lineterminator="\n")
     table.writeheader()
     for row in rows:
-        table.writerow({key: _plain_scalar(value) for key, value in row.items()})
+        scalars = {key: _plain_scalar(value) for key, value in row.items()}
+        table.writerow({key: None if value != value else value for key, value in scalars.items()})
     write_text(path, text.getvalue())
 
 

@@ -115,12 +115,16 @@ def exact_bounds(world: World, discounts: Sequence[float], max_steps: int = 600)
 def _check_size(states: int, foods: int, max_steps: int) -> None:
     """Refuse a world with too many states of one phase, counted for all its phases."""
     phases = 1 + foods
-    backups = phases * max_steps * (states + _BACKUP_OVERHEAD)
-    if phases * states > MAX_STATES or backups > MAX_BACKUPS:
+    if phases * states > MAX_STATES:
         raise AntsError(
-            f"the exact bounds of this world need {phases * states} states over {max_steps} "
-            f"steps, more than the {MAX_STATES} states or the minute of work that are allowed, so "
-            "leave them out or choose a smaller world, fewer foods or fewer steps."
+            f"the exact bounds of this world need {phases * states} states, more than the "
+            f"{MAX_STATES} that are allowed; choose a smaller world or fewer foods to get them."
+        )
+    if phases * max_steps * (states + _BACKUP_OVERHEAD) > MAX_BACKUPS:
+        raise AntsError(
+            f"the exact bounds of this world, {phases * states} states over {max_steps} steps, "
+            "take more than the minute of work that is allowed; choose a smaller world, fewer "
+            "foods or fewer steps to get them."
         )
 
 

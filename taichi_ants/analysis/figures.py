@@ -47,6 +47,7 @@ Shown = dict[tuple[str, Variant], int]
 _FEW = 0.9  # deliveries per episode
 _BINS = 160
 _CIRCLES = " High returns with few deliveries come from\nwalking in circles on a trail."
+_HILLS = 10  # values from which on they are shown as a histogram
 _DROP = 0.16  # of the bar below its ridge, in rows
 
 
@@ -55,8 +56,9 @@ def learning_curves(comparison: Comparison) -> Figure:
 
     Where a learner lacks that one, or the world is not the paper's, each learner is shown at the
     configuration with its highest mean return. Lines are moving averages over `SMOOTHING`
-    episodes, averaged over seeds; bands are pointwise 95 % Student intervals over seeds, cut off
-    where no mean can be (none for one seed).
+    episodes, averaged over seeds; bands are pointwise 95 % Student intervals over seeds (none for
+    one seed), cut off where no mean can be. The axes are those of the lines: the bands of two seeds
+    would flatten all of them.
     """
     settings = comparison.delivery_settings
     style = looks(comparison.variants)
@@ -68,6 +70,11 @@ def learning_curves(comparison: Comparison) -> Figure:
         else ("Learning, each learner at its configuration with the highest return", [])
     )
     words = words or _configurations(comparison, shown)
+    possible = {
+        "returns": (-np.inf, np.inf),
+        "steps": (0, comparison.max_steps),
+        "deliveries": (0, 1),
+    }
     with styled():
         figure = new_figure(7.0 + 0.15 * len(words))
         axes = figure.subplots(
@@ -77,13 +84,14 @@ def learning_curves(comparison: Comparison) -> Figure:
             column[0].set_title(f"{setting.capitalize()} delivery")
             column[-1].set_xlabel("Episode")
             for axis, name in zip(column, _CURVES, strict=True):
-                limits = (0, 1) if name == "deliveries" else (-np.inf, np.inf)
+                limits = possible[name]
                 for variant in comparison.variants:
                     if (setting, variant) in shown:
                         runs = getattr(comparison, name)[shown[setting, variant]]
                         _curve(axis, runs, *_line(style, variant), limits)
-        for axis, label in zip(axes[:, 0], _CURVES.values(), strict=True):
-            axis.set_ylabel(label)
+        for row, label in zip(axes, _CURVES.values(), strict=True):
+            row[0].set_ylabel(label)
+            _keep_to_lines(row)
         axes[0, 0].margins(x=0.01)
         figure.align_ylabels(axes[:, 0])
         window = _window(comparison.episodes)
@@ -274,6 +282,14 @@ def _curve(
         axis.fill_between(episodes, low, high, color=colour, alpha=0.2, linewidth=0)
 
 
+def _keep_to_lines(row: Sequence[Axes]) -> None:
+    """Let panels that share an axis show little beside what their lines span."""
+    lines = np.concatenate([line.get_ydata() for axis in row for line in axis.get_lines()])
+    room = 0.25 * np.ptp(lines) or 1.0
+    low, high = row[0].get_ylim()
+    row[0].set_ylim(max(low, lines.min() - room), min(high, lines.max() + room))
+
+
 def _ridges(row: Sequence[Axes], comparison: Comparison, setting: str) -> None:
     """A ridge for each learner in the panels for return and steps."""
     style = looks(comparison.variants)
@@ -313,11 +329,16 @@ def _edges(values: Sequence[np.ndarray | float]) -> np.ndarray:
 
 
 def _ridge(axis: Axes, values: np.ndarray, edges: np.ndarray, height: int, colour: str) -> None:
-    """Smoothed histogram above a bar of the 95 % range with a dot at the median."""
+    """Smoothed histogram above a bar of the 95 % range with a dot at the median.
+
+    So few values that a histogram would be a hill around each are dots.
+    """
     low, median, high = np.percentile(values, (2.5, 50, 97.5))
     kernel = np.exp(-0.5 * (np.arange(-6, 7) / 2) ** 2)
     shares = np.convolve(np.histogram(values, edges)[0], kernel, mode="same")
-    if shares.max() > 0:
+    if len(few := np.unique(values)) < _HILLS:
+        axis.plot(few, np.full(len(few), height), ".", color=colour, alpha=0.6)
+    elif shares.max() > 0:
         top = height + 0.75 * shares / shares.max()
         middles = (edges[1:] + edges[:-1]) / 2
         axis.fill_between(middles, height, top, color=colour, alpha=0.35, linewidth=0)

@@ -31,7 +31,9 @@ INK, GREY, PALE = "#222222", "#767676", "#E4E4E4"
 
 _COLOURS = {Q_LEARNING: _BLUE, SARSA: _ORANGE, DYNA_P3: _GREEN, DYNA_P5: _VERMILION}
 _MARKERS = {Q_LEARNING: "o", SARSA: "s", DYNA_P3: "^", DYNA_P5: "D"}
+# Then those of the paper's learners that are not compared, and Tol's wine and olive.
 _MORE_COLOURS = (_PURPLE, _SKY, INK, GREY)
+_LAST_COLOURS = ("#882255", "#999933")
 _MORE_MARKERS = ("v", "P", "X", "h")
 
 _SETTINGS = {
@@ -67,16 +69,17 @@ _SETTINGS = {
 def looks(variants: Sequence[Variant]) -> dict[Variant, tuple[str, str]]:
     """Colour and marker of each learner; the paper's have their own, others take turns."""
     others = [variant for variant in variants if variant not in _COLOURS]
+    free = [colour for variant, colour in _COLOURS.items() if variant not in variants]
+    colours = [*_MORE_COLOURS, *free, *_LAST_COLOURS]
     chosen = {}
     for variant in variants:
         if variant in _COLOURS:
             chosen[variant] = _COLOURS[variant], _MARKERS[variant]
         else:
             turn = others.index(variant)
-            chosen[variant] = (
-                _MORE_COLOURS[turn % len(_MORE_COLOURS)],
-                _MORE_MARKERS[(turn + turn // len(_MORE_COLOURS)) % len(_MORE_MARKERS)],
-            )
+            again, place = divmod(turn, len(colours))
+            marker = _MORE_MARKERS[(place + again) % len(_MORE_MARKERS)]
+            chosen[variant] = colours[place], marker
     return chosen
 
 

@@ -101,7 +101,9 @@ def _best_run(comparison: Comparison, delivery: str, variant: Variant, draws: in
     drawn = (best.returns, best.steps, best.deliveries) if best else (None,) * 3
     for (name, figure), values in zip(_paper_figures(comparison, variant), drawn, strict=True):
         low = median = high = percentile = math.nan
-        if values is not None:
+        if values is not None and len(comparison.seeds) == 1:  # nothing to draw from
+            median = float(values[0])
+        elif values is not None:
             low, median, high = np.percentile(values, (2.5, 50, 97.5)).tolist()
             if not math.isnan(figure):
                 percentile = percentile_of(figure, values)
@@ -190,12 +192,9 @@ def _best_table(lines: list[dict]) -> str:
             stem = f"best_run_{name}"
             span = interval(line[f"{stem}_low"], line[f"{stem}_high"], digits)
             below = number(line[f"{stem}_paper_percentile"], 0)
-            cells.append(
-                f"{number(line[f'{stem}_median'], digits)} {span}"
-                + (f" ({below} %)" if below != MISSING else "")
-                if span != MISSING
-                else MISSING
-            )
+            below = MISSING if below == MISSING else f"({below} %)"
+            parts = (number(line[f"{stem}_median"], digits), span, below)
+            cells.append(" ".join(part for part in parts if part != MISSING) or MISSING)
         rows.append(cells)
     headers = ["Learner", "Delivery", "Best of", "Return", "Steps", "Deliveries"]
     return table(headers, rows, text_columns=2)

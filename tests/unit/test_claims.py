@@ -156,6 +156,15 @@ def test_one_seed_tests_nothing() -> None:
     assert {finding.verdict for finding in findings} == {Verdict.NOT_TESTED}
     reasons = {finding.note for finding in findings}
     assert reasons == {"one seed gives no interval", "needs a second seed"}
+    text = claims_markdown(findings)
+    assert "No claim could be tested here." in text
+    assert "- %" not in text
+
+
+def test_two_seeds_have_no_halves_to_compare() -> None:
+    findings = assess(build({"continuing": unchanged}, seeds=2))
+    reasons = {f.note for f in findings if f.verdict is Verdict.NOT_TESTED}
+    assert reasons == {"one seed in each half gives no interval"}
 
 
 def test_missing_configurations_are_named_and_the_rest_is_tested() -> None:

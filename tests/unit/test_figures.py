@@ -255,6 +255,31 @@ def test_learners_look_different() -> None:
     chosen = looks(variants)
     assert len(set(chosen.values())) == len(variants)
     assert looks(variants[:2]) == {variant: chosen[variant] for variant in variants[:2]}
+    # Lines have no markers: up to ten learners have colours of their own.
+    for compared in (variants[:10], [VARIANTS[2], *variants[4:13]]):
+        assert len({colour for colour, _ in looks(compared).values()}) == 10
+
+
+def test_bands_of_two_seeds_do_not_flatten_the_lines(comparison: Comparison) -> None:
+    few = subset(comparison, range(len(comparison.rows)), 2, 60)
+    few.returns[:, 0] += 4000  # a band far beyond all lines
+    few.steps[:, 0] += 3
+    for number, axis in enumerate(panels(learning_curves(few))):
+        low, high = axis.get_ylim()
+        lines = np.concatenate([line.get_ydata() for line in axis.lines])
+        assert low <= lines.min() <= lines.max() <= high
+        row = panels(learning_curves(few))[2 * (number // 2) : 2 * (number // 2) + 2]
+        both = np.concatenate([line.get_ydata() for other in row for line in other.lines])
+        assert high - low <= 1.51 * np.ptp(both) + 2
+        for band in axis.collections if number in (2, 3) else ():
+            heights = band.get_paths()[0].vertices[:, 1]
+            assert 0 <= heights.min() <= heights.max() <= few.max_steps
+
+
+def test_few_values_are_dots_not_hills(comparison: Comparison) -> None:
+    for seeds, hills in ((1, 0), (2, 0), (12, 1)):
+        axis = panels(best_runs(subset(comparison, range(len(comparison.rows)), seeds, 60)))[0]
+        assert len(axis.collections) == hills * len(VARIANTS), seeds
 
 
 def test_all_figures_are_files(comparison: Comparison, tmp_path: Path) -> None:

@@ -222,13 +222,14 @@ def test_csv_reads_back(tmp_path: Path) -> None:
         {"b": 0.1 + 0.2, "a": 'with, comma and "quotes"\nand a line'},
         {"a": None, "b": np.float64(1e-300)},
         {"b": np.float32(0.1)},
+        {"a": float("nan"), "b": 2},
     ]
     results.write_csv(path, rows, ["a", "b"])
     assert path.read_bytes().startswith(b"a,b\n")
     with open(path, newline="", encoding="utf-8") as file:
         read = list(csv.DictReader(file))
-    assert [row["a"] for row in read] == ['with, comma and "quotes"\nand a line', "", ""]
-    assert [float(row["b"]) for row in read] == [0.1 + 0.2, 1e-300, float(np.float32(0.1))]
+    assert [row["a"] for row in read] == ['with, comma and "quotes"\nand a line', "", "", ""]
+    assert [float(row["b"]) for row in read] == [0.1 + 0.2, 1e-300, float(np.float32(0.1)), 2]
 
 
 def test_csv_without_rows_is_a_header(tmp_path: Path) -> None:

@@ -63,7 +63,8 @@ class _Test:
         self.seeds, self.rows = self.effects.shape[1], len(part.used)
         self.scope = part.scope
         if self.seeds < 2:
-            self.reason = "one seed gives no interval"
+            few = len(comparison.seeds) < 2
+            self.reason = f"{'one seed' if few else 'one seed in each half'} gives no interval"
         self.low = self.high = np.full(len(self.effects), np.nan)
 
     def finding(self, level: float) -> Finding:

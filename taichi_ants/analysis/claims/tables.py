@@ -93,6 +93,8 @@ def claims_markdown(findings: Sequence[Finding], world: str = PAPER_WORLD) -> st
 
 def _explanation(findings: Sequence[Finding]) -> str:
     level = max((f.level for f in findings if not math.isnan(f.level)), default=math.nan)
+    if math.isnan(level):
+        return "No claim could be tested here.\n"
     return (
         "Effects are means over seeds, paired by seed, with an interval at "
         f"{number(100 * level, 3)} % each, so that all hold at once with "
