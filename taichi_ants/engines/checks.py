@@ -101,6 +101,8 @@ def checked_share(name: str, value: float) -> float:
 def checked_q_values(q_values: np.ndarray) -> np.ndarray:
     """Action values as float32 (..., 128, 5), finite."""
     try:
+        if np.iscomplexobj(q_values):
+            raise TypeError
         tables = np.asarray(q_values, dtype=np.float32)
     except (TypeError, ValueError):
         raise AntsError(

@@ -22,6 +22,7 @@ from taichi_ants.engines.checks import (
 )
 from taichi_ants.engines.results import LearnerCost, Rollouts, RunState, TrainingResult
 from taichi_ants.engines.run_engine import Progress, RunEngine
+from taichi_ants.errors import AntsError
 from taichi_ants.randomness import stream_state
 from taichi_ants.worlds.world import World
 
@@ -102,6 +103,8 @@ def continue_training(
     Raises:
         AntsError: An argument is not allowed; the message names it.
     """
+    if not isinstance(result, TrainingResult):
+        raise AntsError(f"result is {result!r}; give what train has returned.")
     episodes = checked_count("episodes", episodes)
     settings = runtime.start(threads, arch)
     state = result.state.take(...)

@@ -157,6 +157,7 @@ def test_epsilon(value):
         (np.full((128, 5), 1e39), "q_values holds numbers that are not finite"),
         (None, "q_values"),
         ("policy", "q_values is not an array of numbers"),
+        (np.zeros((128, 5), complex), "q_values is not an array of numbers"),
         ([[1, 2], [3]], "q_values is not an array of numbers"),
     ],
 )
@@ -219,6 +220,7 @@ def test_arguments_are_left_as_they_are():
 
     result = train(paper(), [CONFIG, PLANS], [0, 1], 3, 50)
     kept = {name: array.copy() for name, array in vars(result.state).items()}
+    says("result is None; give what train has returned", continue_training, None, 2)
     longer = continue_training(result, 2)
     for name, array in kept.items():
         assert np.array_equal(getattr(result.state, name), array)
