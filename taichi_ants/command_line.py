@@ -20,6 +20,7 @@ from taichi_ants.errors import AntsError
 
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
+_LEFT_OUT = object()
 
 
 class _HelpFormatter(argparse.HelpFormatter):
@@ -44,6 +45,22 @@ class Parser(argparse.ArgumentParser):
             allow_abbrev=False,
             **settings,
         )
+
+    def parse_given(self, arguments: list[str] | None = None) -> tuple[argparse.Namespace, dict]:
+        """Parse a command line, and tell what it holds from what is left to defaults.
+
+        Returns:
+            The settings; and of those that were given, even as their defaults, the flag by name.
+        """
+        actions = [one for one in self._actions if one.default is not argparse.SUPPRESS]
+        blank = argparse.Namespace(**{action.dest: _LEFT_OUT for action in actions})
+        settings, given = self.parse_args(arguments, blank), {}
+        for action in actions:
+            if getattr(settings, action.dest) is _LEFT_OUT:
+                setattr(settings, action.dest, action.default)
+            else:
+                given[action.dest] = action.option_strings[0]
+        return settings, given
 
     def error(self, message: str) -> NoReturn:
         text = _on_one_line(message).removeprefix("argument ").rstrip(".")

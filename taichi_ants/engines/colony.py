@@ -244,6 +244,13 @@ class Colony:
         return (tables if self._own else tables[:, 0]).copy()
 
     @property
+    def waiting_foods(self) -> int:
+        """Foods that the queens have been given, but could not turn into ants yet."""
+        from taichi_ants.engines import colony_arrays as names
+
+        return int(self.arrays["worlds"][names.STORE].sum())
+
+    @property
     def worlds(self) -> tuple[World, ...]:
         """The worlds as they are at the start of an episode."""
         return self._layout.worlds
