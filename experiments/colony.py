@@ -326,7 +326,7 @@ def new_colony(settings: argparse.Namespace) -> Colony:
     if "half_life" in given and given.setdefault("evaporation", "exponential") != "exponential":
         raise AntsError("--half-life is for exponential evaporation; leave one of the two out.")
     if "cap" in given and given.get("deposit") != "add":
-        raise AntsError("--cap is for deposits that add up; give --deposit add too, or leave it out.")
+        raise AntsError("--cap is for deposits that add up; give --deposit add, or leave it out.")
     life = ColonyConfig(
         settings.ants,
         settings.capacity,

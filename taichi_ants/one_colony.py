@@ -210,9 +210,9 @@ def summary(colony: Colony, pace: Pace) -> str:
 
 
 def _crowded(places: int, foods: int) -> str:
+    waiting = f"{foods} food{' waits' if foods == 1 else 's wait'}"
     return (
-        f"\n{places} of {places} places are taken, {foods} food{'s wait' if foods != 1 else ' waits'}"
-        " at the queen; --capacity gives more."
+        f"\n{places} of {places} places are taken, {waiting} at the queen; --capacity gives more."
     )
 
 

@@ -257,7 +257,9 @@ def test_a_colony_as_the_library_makes_it(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     status, out, _ = call("colony", [*LIFE, "--ticks", 90, "--save", "colony.npz"], capsys)
     assert status == 0
-    pheromone = Pheromone("exponential", half_life=30.0, diffusion=0.1, deposit="add", level=90, cap=170)
+    pheromone = Pheromone(
+        "exponential", half_life=30.0, diffusion=0.1, deposit="add", level=90, cap=170
+    )
     life = ColonyConfig(40, 60, pheromone, births=True, lifespan=90, regrowth=3, wander=20)
     training = TrainingConfig("q_learning", 0.1, 0.9, 0.1, 1.0, 0.1, delivery="continuing")
     colony = Colony(worlds.open_world(5, (20, 20, 20)), life, training, 5)
