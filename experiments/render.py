@@ -100,9 +100,8 @@ def _refuse_what_changes_nothing(
     for name, flag in given.items():
         counts = _WHERE_IT_COUNTS.get(name, {shown})
         if shown not in counts:
-            parser.error(
-                f"{flag} changes nothing in {shown}, but in {_listed(counts)}; leave it out"
-            )
+            places = ", ".join(sorted(counts))
+            parser.error(f"{flag} changes nothing in {shown}, but in {places}; leave it out")
         if name in _OF_TRAINING and settings.policy:
             parser.error(f"{flag} is for training, but --policy is given; leave out one of the two")
 
@@ -111,14 +110,9 @@ def _what_is_shown(settings: argparse.Namespace) -> str:
     """One of the names in `_WHERE_IT_COUNTS`."""
     if settings.show in ("learning", "sheet"):
         return {"learning": "learning", "sheet": "a sheet"}[settings.show]
-    still = Path(settings.out).suffix.lower() == ".png"
-    names = {"episode": ("an episode", "a still episode"), "colony": ("a colony", "a still colony")}
-    return names[settings.show][still]
-
-
-def _listed(names: set[str]) -> str:
-    *most, last = sorted(names)
-    return f"{', '.join(most)} or {last}" if most else last
+    if Path(settings.out).suffix.lower() == ".png":
+        return f"a still {settings.show}"
+    return {"episode": "an episode", "colony": "a colony"}[settings.show]
 
 
 def _default_size(settings: argparse.Namespace) -> tuple[int, int]:

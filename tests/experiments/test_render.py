@@ -120,7 +120,7 @@ WRONG = {
     "episodes of learning": (["--show", "learning", "--episodes", "500"], "--episodes changes"),
     "step of a GIF": (
         ["--step", "3"],
-        "--step changes nothing in an episode, but in a still colony or a still episode; leave",
+        "--step changes nothing in an episode, but in a still colony, a still episode; leave",
     ),
     "step of a sheet": (["--show", "sheet", "--step", "3"], "--step changes nothing in a sheet"),
     "ants of an episode": (["--ants", "80"], "--ants changes nothing in an episode"),
