@@ -128,6 +128,18 @@ def test_wrong_arguments_are_named(arguments, said):
     assert said in str(caught.value)
 
 
+def test_both_schedules_agree_where_places_stay_vacant():
+    """The ants are sorted by their cells now and then, but not in among the vacant places."""
+    config, deliveries = ColonyConfig(ants=5, capacity=9, regrowth=0), []
+    for schedule in ("by_world", "by_chunk"):
+        colony = Colony(worlds.paper(), config, TRAINING, 3, schedule=schedule)
+        colony.begin_episode()
+        colony.tick(100)
+        deliveries.append(vars(colony.outcome()))
+    for name, counted in deliveries[0].items():
+        np.testing.assert_array_equal(counted, deliveries[1][name], name)
+
+
 def test_a_tick_needs_an_episode():
     with pytest.raises(AntsError, match="begin_episode"):
         Colony(worlds.paper(), ColonyConfig(), TRAINING).tick()
