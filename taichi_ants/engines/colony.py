@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -115,13 +115,16 @@ class Colony:
     ) -> None:
         if not isinstance(config, ColonyConfig):
             raise AntsError(f"config is {config!r}; it must be a ColonyConfig.")
+        if not isinstance(training, TrainingConfig):
+            raise AntsError(f"training is {training!r}; it must be one TrainingConfig.")
         (self.training,) = checks.checked_configs(training)
         self.config = config
         self.seeds = checks.checked_seeds(seeds)
         self.sharing = _one_of("sharing", sharing, SHARINGS)
         self._learner = learners.get(training.learner)
         self._settings = runtime.start(threads, arch)
-        several = (world,) * len(self.seeds) if isinstance(world, World) else tuple(world)
+        one = isinstance(world, (str, World)) or not isinstance(world, Iterable)
+        several = (world,) * len(self.seeds) if one else tuple(world)
         if len(several) != len(self.seeds):
             raise AntsError(f"there are {len(several)} worlds for {len(self.seeds)} seeds.")
         self.layout = colony_memory.Layout(
@@ -163,8 +166,7 @@ class Colony:
         """Let n ticks pass; worlds whose episode has ended stand still."""
         from taichi_ants.engines.colony_kernels import BY_CHUNK, BY_WORLD, END, PLAN
 
-        if self.episode < 0:
-            raise AntsError("no episode has begun; call begin_episode first.")
+        self._check_begun()
         n = checks.checked_count("n", n)
         if self.schedule == "by_world":
             self._launch(BY_WORLD, self.ticks, n)
@@ -256,9 +258,14 @@ class Colony:
         return self.layout.worlds
 
     def snapshot(self, world: int = 0) -> ColonySnapshot:
-        """World number `world` as it is now; arrays are copies."""
+        """World number `world` as it is now; arrays are copies.
+
+        Raises:
+            AntsError: There is no such world, or no episode has begun.
+        """
         from taichi_ants.engines import colony_arrays as names
 
+        self._check_begun()
         if not 0 <= world < len(self.seeds):
             raise AntsError(f"world is {world}; it must be from 0 to {len(self.seeds) - 1}.")
         cells = slice(world * self.layout.size, (world + 1) * self.layout.size)
@@ -293,6 +300,10 @@ class Colony:
             AntsError: The file is missing, damaged, or holds no colony.
         """
         return colony_files.load_colony(cls, path, threads, arch)
+
+    def _check_begun(self) -> None:
+        if self.episode < 0:
+            raise AntsError("no episode has begun; call begin_episode first.")
 
     def _ticks_per_launch(self) -> int:
         if self.schedule == "by_chunk":

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from taichi_ants import AntsError, Colony, ColonyConfig, Pheromone, TrainingConfig, World, worlds
 from taichi_ants.constants import FOOD
 from taichi_ants.engines import colony_arrays as names
+from taichi_ants.rendering import colony_picture
 
 TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 1.0, 1.0)
 
@@ -118,6 +119,11 @@ def test_births_fill_the_slots_and_no_more():
         ({"schedule": "quick"}, "'quick'"),
         ({"q_values": np.zeros((3, 3))}, "(3, 3)"),
         ({"q_values": np.zeros((2, 128, 5))}, "(2, 128, 5)"),
+        ({"training": [TRAINING, TRAINING]}, "it must be one TrainingConfig"),
+        ({"training": None}, "training is None"),
+        ({"world": "paper"}, "world is 'paper'; it must be a World"),
+        ({"world": 7}, "world is 7; it must be a World"),
+        ({"world": ["paper"]}, "world is 'paper'; it must be a World"),
         ({"training": TrainingConfig("nobody", 0.1, 0.9, 0.3, 0.9)}, "'nobody'"),
     ],
 )
@@ -143,6 +149,9 @@ def test_both_schedules_agree_where_places_stay_vacant():
 def test_a_tick_needs_an_episode():
     with pytest.raises(AntsError, match="begin_episode"):
         Colony(worlds.paper(), ColonyConfig(), TRAINING).tick()
+    for look in (Colony.snapshot, colony_picture):
+        with pytest.raises(AntsError, match="begin_episode"):
+            look(Colony(worlds.paper(), ColonyConfig(), TRAINING))
 
 
 @pytest.mark.parametrize("content", [b"", b"nothing", None])
