@@ -137,6 +137,7 @@ def _add_policy(parser: argparse.ArgumentParser) -> None:
         "--stages",
         action=ListAction,
         item=whole_number(0),
+        unique=False,
         default=(0, 10, 100, 500),
         metavar="N",
         help="numbers of episodes after which --show learning looks at the ant",

@@ -92,11 +92,20 @@ def number(text: str) -> float:
 
 
 class ListAction(argparse.Action):
-    """Collects values that are separated by blanks or commas: `--x 1 2` and `--x 1,2` alike."""
+    """Collects values that are separated by blanks or commas: `--x 1 2` and `--x 1,2` alike.
 
-    def __init__(self, *args: object, item: Callable[[str], object] = str, **settings: object):
+    Of equal ones the first counts, unless all are kept with `unique=False`.
+    """
+
+    def __init__(
+        self,
+        *args: object,
+        item: Callable[[str], object] = str,
+        unique: bool = True,
+        **settings: object,
+    ):
         super().__init__(*args, nargs="+", **settings)
-        self.item = item
+        self.item, self.unique = item, unique
 
     def __call__(
         self,
@@ -107,12 +116,12 @@ class ListAction(argparse.Action):
     ) -> None:
         items = [part for value in values or () for part in value.split(",") if part]
         try:
-            parsed = tuple(dict.fromkeys(self.item(part) for part in items))
+            parsed = tuple(self.item(part) for part in items)
         except argparse.ArgumentTypeError as error:
             raise argparse.ArgumentError(self, str(error)) from None
         if not parsed:
             raise argparse.ArgumentError(self, "the list is empty, give at least one value")
-        setattr(namespace, self.dest, parsed)
+        setattr(namespace, self.dest, tuple(dict.fromkeys(parsed)) if self.unique else parsed)
 
 
 def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> NoReturn:

@@ -135,6 +135,10 @@ WRONG = {
     "epsilon": (["--policy", "{policy}", "--epsilon", "2", "--out", "{}/a.gif"], "epsilon"),
     "learner": (["--learner", "magic", "--out", "{}/a.gif"], "magic"),
     "stages": (["--show", "learning", "--stages", "5,1", "--out", "{}/a.gif"], "ascend"),
+    "order of stages": (
+        ["--show", "learning", "--stages", "5", "5", "2", "--out", "{}/a.gif"],
+        "stages are (5, 5, 2); they must ascend",
+    ),
     "steps": (["--max-steps", "0"], "from 1 to"),
     "unknown option": (["--colour", "red"], "--colour"),
 }
