@@ -10,11 +10,11 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from taichi_ants.command_line import (
-    EXIT_INTERRUPTED,
     ListAction,
     Parser,
     load_plugin,
@@ -59,28 +59,30 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """The settings of the command line."""
     parser = Parser(__doc__.split("\n", 1)[0], epilog=__doc__.split("\n", 1)[1])
     add = parser.add_argument
-    add("--seed", type=whole_number(), default=0, metavar="N", help="the (first) seed")
+    seed = add("--seed", type=whole_number(), default=0, metavar="N", help="the (first) seed")
     add("--ticks", type=whole_number(1, 10_000_000), metavar="N", help="of an episode, 1000")
     add("--plugin", metavar="FILE", help="a Python file that registers learners or worlds")
     add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
     add("--arch", choices=("cpu", "cuda"), default="cpu", help="where kernels run")
     groups = (_add_learning, _add_study, _add_colony, _add_files)
     learning, study, life, files = (add_group(parser) for add_group in groups)
-    settings = parser.parse_args(arguments)
+    settings, given = parser.parse_given(arguments)
     settings.single = settings.ants is not None or settings.resume is not None
 
-    def refuse(reason: str, *groups: argparse._ArgumentGroup) -> None:
-        """What was given of the groups is an error."""
-        for action in (action for group in groups for action in group._group_actions):
-            if getattr(settings, action.dest) != action.default:
-                parser.error(f"{action.option_strings[0]} {reason}")
+    def refuse(reason: str, actions: Iterable[argparse.Action]) -> None:
+        """What was given of these is an error."""
+        for action in actions:
+            if action.dest in given:
+                parser.error(f"{given[action.dest]} {reason}")
 
     if settings.resume:
-        refuse("cannot change a colony that is resumed, leave it out", life, learning)
+        refuse("cannot change a colony that is resumed, leave it out", [seed, *life, *learning])
     if settings.single:
         refuse("is for the study, not for one colony", study)
     else:
-        refuse("is for one colony, give --ants", life, files)
+        refuse("is for one colony, give --ants", [*life, *files])
+    if "capacity" in given and not settings.births:
+        parser.error("--capacity is for colonies in which ants are born, give --births too")
     _fill_in(settings)
     return settings
 
@@ -100,7 +102,7 @@ def _fill_in(settings: argparse.Namespace) -> None:
         settings.out = Path("results/colony-quick" if settings.quick else "results/colony")
 
 
-def _add_learning(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
+def _add_learning(parser: argparse.ArgumentParser) -> list[argparse.Action]:
     group = parser.add_argument_group("learning")
     add = group.add_argument
     add("--learner", default="sarsa", metavar="NAME", help="name of a learner")
@@ -108,10 +110,10 @@ def _add_learning(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
     add("--discount", type=number, default=0.9, metavar="X", help="in [0, 1]")
     add("--epsilon", type=number, metavar="X", help="in a first episode 0.3, of one colony 0.1")
     add("--planning-steps", type=whole_number(1), metavar="N", help="of learners that plan, 5")
-    return group
+    return group._group_actions
 
 
-def _add_study(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
+def _add_study(parser: argparse.ArgumentParser) -> list[argparse.Action]:
     group = parser.add_argument_group("study")
     add = group.add_argument
     add("--arenas", action=ListAction, item=_arena, metavar="NAME", help=f"of {', '.join(ARENAS)}")
@@ -130,10 +132,10 @@ def _add_study(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
     add("--quick", action="store_true", help="fewer seeds, sizes and ticks, no large worlds")
     add("--force", action="store_true", help="replace what FOLDER holds")
     add("--no-figures", action="store_true", help="draw no figures")
-    return group
+    return group._group_actions
 
 
-def _add_colony(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
+def _add_colony(parser: argparse.ArgumentParser) -> list[argparse.Action]:
     group = parser.add_argument_group("one colony")
     add = group.add_argument
     add("--ants", type=whole_number(1), metavar="N", help="how many start")
@@ -151,17 +153,18 @@ def _add_colony(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
     add("--diffusion", type=number, metavar="X", help="share of a trail that spreads per tick")
     add("--deposit", choices=("set", "add", "none"), help="(default: set)")
     add("--level", type=whole_number(1), metavar="N", help="what a deposit sets or adds")
-    return group
+    add("--cap", type=whole_number(1), metavar="N", help="most that deposits add up to")
+    return group._group_actions
 
 
-def _add_files(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
+def _add_files(parser: argparse.ArgumentParser) -> list[argparse.Action]:
     group = parser.add_argument_group("files of one colony")
     add = group.add_argument
-    add("--save", metavar="FILE", help="to keep the colony in, at the end or on Ctrl-C")
+    add("--save", metavar="FILE", help="to keep the colony in, at the end, on Ctrl-C or SIGTERM")
     add("--resume", metavar="FILE", help="a colony that was saved; it lives on for --ticks more")
     add("--render", metavar="FILE", help="a .png of the end, or a .gif, .webp or .mp4 of all")
     add("--every", type=whole_number(1), default=2, metavar="N", help="ticks of a picture")
-    return group
+    return group._group_actions
 
 
 def _arena(text: str) -> str:
@@ -305,24 +308,26 @@ def one_colony(settings: argparse.Namespace) -> None:
     outputs.check()
     colony = resumed_colony(settings) if settings.resume else new_colony(settings)
     with progress_bar("colony") as progress:
-        pace, stopped = live(colony, settings.ticks, outputs, progress)
+        pace, stop_signal = live(colony, settings.ticks, outputs, progress)
     print(summary(colony, pace))
     for path in filter(None, (settings.save, settings.render)):
         print(f"{path} is written.")
-    if stopped:
+    if stop_signal:
         kept = f"; --resume {settings.save} goes on from there" if settings.save else ""
         print(f"Stopped at tick {colony.ticks}{kept}.", file=sys.stderr)
-        sys.exit(EXIT_INTERRUPTED)
+        sys.exit(128 + stop_signal)
 
 
 def new_colony(settings: argparse.Namespace) -> Colony:
     """A colony at the start of its episode."""
     from taichi_ants import AntsError, Colony, ColonyConfig, Pheromone, load_policy
 
-    names = ("evaporation", "half_life", "diffusion", "deposit", "level")
+    names = ("evaporation", "half_life", "diffusion", "deposit", "level", "cap")
     given = {name: getattr(settings, name) for name in names if getattr(settings, name) is not None}
     if "half_life" in given and given.setdefault("evaporation", "exponential") != "exponential":
         raise AntsError("--half-life is for exponential evaporation; leave one of the two out.")
+    if "cap" in given and given.get("deposit") != "add":
+        raise AntsError("--cap is for deposits that add up; give --deposit add, or leave it out.")
     life = ColonyConfig(
         settings.ants,
         settings.capacity,

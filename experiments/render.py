@@ -41,6 +41,34 @@ DEFAULT_SIZE = {"colony": (960, 540), "learning": (1280, 460)}  # all others: 12
 DEFAULT_EVERY = 4
 DEFAULT_EPISODES = {"colony": 60}  # all others: 500
 DEFAULT_PLANNING_STEPS = 5
+DEFAULT_WORLD = {"colony": "open"}  # all others: the paper's, with one food for them all
+
+# What is shown, and whether as a single picture or moving.
+_EPISODES, _COLONIES = {"a still episode", "an episode"}, {"a still colony", "a colony"}
+_ROLLOUTS = _EPISODES | _COLONIES | {"learning"}
+# Options that change nothing in all that is shown, by where they do.
+_WHERE_IT_COUNTS: dict[str, set[str]] = {
+    "policy": _EPISODES | _COLONIES | {"a sheet"},
+    "episodes": _EPISODES | _COLONIES | {"a sheet"},
+    "stages": {"learning"},
+    "greedy": _ROLLOUTS,
+    "epsilon": _ROLLOUTS,
+    "number": _EPISODES,
+    "max_steps": _ROLLOUTS,
+    "ants": _COLONIES,
+    "no_evaporation": _ROLLOUTS,
+    "size": _ROLLOUTS,
+    "fps": {"an episode", "a colony", "learning"},
+    "step": {"a still episode", "a still colony"},
+    "every": {"a colony"},
+    "no_hud": _EPISODES | _COLONIES,
+    "no_legend": _EPISODES | _COLONIES,
+    "no_view": _EPISODES,
+}
+_OF_TRAINING = (
+    *("learner", "episodes", "learning_rate", "discount", "train_epsilon", "epsilon_decay"),
+    "planning_steps",
+)
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -48,23 +76,43 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     parser = Parser(__doc__.split("\n", 1)[0], epilog=__doc__.split("\n", 1)[1])
     add = parser.add_argument
     add("--show", choices=tuple(DEFAULT_OUT), default="episode", help="what to show")
-    add("--world", default="paper", help="paper, open, or the path of a map file")
+    add("--world", help="paper, open, or the path of a map file (default: paper, of a colony open)")
     add("--world-seed", type=whole_number(), default=0, help="seed of a world drawn at random")
     add("--seed", type=whole_number(), default=0, help="seed of training and of the episode")
     add("--plugin", metavar="FILE", help="a Python file that registers learners or worlds")
     _add_policy(parser)
     _add_episode(parser)
     _add_picture(parser)
-    settings = parser.parse_args(arguments)
-    if settings.policy and settings.show == "learning":
-        parser.error("--policy holds a finished policy; --show learning trains one, leave it out")
-    if settings.size and settings.show == "sheet":
-        parser.error("--size is not for --show sheet, which is always 1920 wide; leave it out")
+    settings, given = parser.parse_given(arguments)
     settings.out = settings.out or DEFAULT_OUT[settings.show]
+    _refuse_what_changes_nothing(parser, settings, given)
+    settings.world = settings.world or DEFAULT_WORLD.get(settings.show, "paper")
     settings.episodes = settings.episodes or DEFAULT_EPISODES.get(settings.show, 500)
     settings.max_steps = settings.max_steps or DEFAULT_MAX_STEPS.get(settings.show)
     settings.size = settings.size or _default_size(settings)
     return settings
+
+
+def _refuse_what_changes_nothing(
+    parser: Parser, settings: argparse.Namespace, given: dict[str, str]
+) -> None:
+    shown = _what_is_shown(settings)
+    for name, flag in given.items():
+        counts = _WHERE_IT_COUNTS.get(name, {shown})
+        if shown not in counts:
+            places = ", ".join(sorted(counts))
+            parser.error(f"{flag} changes nothing in {shown}, but in {places}; leave it out")
+        if name in _OF_TRAINING and settings.policy:
+            parser.error(f"{flag} is for training, but --policy is given; leave out one of the two")
+
+
+def _what_is_shown(settings: argparse.Namespace) -> str:
+    """One of the names in `_WHERE_IT_COUNTS`."""
+    if settings.show in ("learning", "sheet"):
+        return {"learning": "learning", "sheet": "a sheet"}[settings.show]
+    if Path(settings.out).suffix.lower() == ".png":
+        return f"a still {settings.show}"
+    return {"episode": "an episode", "colony": "a colony"}[settings.show]
 
 
 def _default_size(settings: argparse.Namespace) -> tuple[int, int]:
@@ -89,6 +137,7 @@ def _add_policy(parser: argparse.ArgumentParser) -> None:
         "--stages",
         action=ListAction,
         item=whole_number(0),
+        unique=False,
         default=(0, 10, 100, 500),
         metavar="N",
         help="numbers of episodes after which --show learning looks at the ant",
@@ -298,9 +347,10 @@ def show_colony(settings: argparse.Namespace, world: World) -> None:
 
 def settled_colony(settings: argparse.Namespace, world: World) -> tuple[Colony, str]:
     """A colony that follows a policy from a file or one that it has learned, and a title."""
-    from taichi_ants import Colony, ColonyConfig, load_policy
+    from taichi_ants import Colony, ColonyConfig, Pheromone, load_policy
 
-    life = ColonyConfig(ants=settings.ants)
+    pheromone = Pheromone(evaporation="none" if settings.no_evaporation else "linear")
+    life = ColonyConfig(ants=settings.ants, pheromone=pheromone)
     training = training_config(settings)
     if settings.policy:
         table, _ = load_policy(settings.policy)

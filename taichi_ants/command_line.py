@@ -20,6 +20,7 @@ from taichi_ants.errors import AntsError
 
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
+_LEFT_OUT = object()
 
 
 class _HelpFormatter(argparse.HelpFormatter):
@@ -44,6 +45,22 @@ class Parser(argparse.ArgumentParser):
             allow_abbrev=False,
             **settings,
         )
+
+    def parse_given(self, arguments: list[str] | None = None) -> tuple[argparse.Namespace, dict]:
+        """Parse a command line, and tell what it holds from what is left to defaults.
+
+        Returns:
+            The settings; and of those that were given, even as their defaults, the flag by name.
+        """
+        actions = [one for one in self._actions if one.default is not argparse.SUPPRESS]
+        blank = argparse.Namespace(**{action.dest: _LEFT_OUT for action in actions})
+        settings, given = self.parse_args(arguments, blank), {}
+        for action in actions:
+            if getattr(settings, action.dest) is _LEFT_OUT:
+                setattr(settings, action.dest, action.default)
+            else:
+                given[action.dest] = action.option_strings[0]
+        return settings, given
 
     def error(self, message: str) -> NoReturn:
         text = _on_one_line(message).removeprefix("argument ").rstrip(".")
@@ -75,11 +92,20 @@ def number(text: str) -> float:
 
 
 class ListAction(argparse.Action):
-    """Collects values that are separated by blanks or commas: `--x 1 2` and `--x 1,2` alike."""
+    """Collects values that are separated by blanks or commas: `--x 1 2` and `--x 1,2` alike.
 
-    def __init__(self, *args: object, item: Callable[[str], object] = str, **settings: object):
+    Of equal ones the first counts, unless all are kept with `unique=False`.
+    """
+
+    def __init__(
+        self,
+        *args: object,
+        item: Callable[[str], object] = str,
+        unique: bool = True,
+        **settings: object,
+    ):
         super().__init__(*args, nargs="+", **settings)
-        self.item = item
+        self.item, self.unique = item, unique
 
     def __call__(
         self,
@@ -90,12 +116,12 @@ class ListAction(argparse.Action):
     ) -> None:
         items = [part for value in values or () for part in value.split(",") if part]
         try:
-            parsed = tuple(dict.fromkeys(self.item(part) for part in items))
+            parsed = tuple(self.item(part) for part in items)
         except argparse.ArgumentTypeError as error:
             raise argparse.ArgumentError(self, str(error)) from None
         if not parsed:
             raise argparse.ArgumentError(self, "the list is empty, give at least one value")
-        setattr(namespace, self.dest, parsed)
+        setattr(namespace, self.dest, tuple(dict.fromkeys(parsed)) if self.unique else parsed)
 
 
 def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> NoReturn:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
@@ -77,12 +79,20 @@ class Outputs:
             if Path(self.save).is_dir():
                 raise AntsError(f"{self.save!r} is a folder; name a file to save to.")
             results.check_writable_folder(Path(self.save).parent)
+        both = self.save and self.render
+        if both and os.path.realpath(self.save) == os.path.realpath(self.render):
+            raise AntsError(
+                f"{self.save!r} and {self.render!r} are one place, to save the colony in and for "
+                "its picture; name two."
+            )
 
 
 def live(
     colony: Colony, ticks: int, outputs: Outputs, progress: Callable[[float], None]
-) -> tuple[Pace, bool]:
-    """Let time pass in a colony, then write its files; Ctrl-C ends it at a whole tick.
+) -> tuple[Pace, int]:
+    """Let time pass in a colony, then write its files; Ctrl-C or SIGTERM end it at a whole tick.
+
+    The colony is saved even if its picture or animation cannot be written.
 
     Args:
         colony: In an episode.
@@ -91,28 +101,32 @@ def live(
         progress: Called now and then with the share of the work that is done.
 
     Returns:
-        How much was done, and whether it was stopped before its end.
-    """
-    from taichi_ants.rendering import colony_picture, save_picture
+        How much was done, and the signal that stopped it before its end, 0 without one.
 
+    Raises:
+        AntsError: A file cannot be written; the message says where the colony is, if it is saved.
+    """
     pace = Pace()
     with stop_requests() as stop:
         passing = let_time_pass(colony, ticks, pace, stop, outputs.every * outputs.animated)
         shown = _with_progress(passing, ticks, progress)
-        if outputs.animated:
-            _save_animation(outputs, colony, shown)
-        else:
-            for _ in shown:
+        try:
+            if outputs.animated:
+                _save_animation(outputs, colony, shown)
+            for _ in shown:  # what the animation has left, all without one
                 pass
-        if outputs.save:
-            colony.save(outputs.save)
+        except Exception as error:
+            # Pictures are drawn between ticks, so this one is whole, and may have taken hours.
+            _save(outputs, colony)
+            _report(error, outputs, colony)
+        _save(outputs, colony)
         if outputs.render and not outputs.animated:
-            save_picture(outputs.render, colony_picture(colony))
-    return pace, pace.ticks < ticks
+            _save_picture(outputs, colony)
+    return pace, stop() if pace.ticks < ticks else 0
 
 
 def let_time_pass(
-    colony: Colony, ticks: int, pace: Pace, stop: Callable[[], bool], every: int = 0
+    colony: Colony, ticks: int, pace: Pace, stop: Callable[[], int], every: int = 0
 ) -> Iterator[int]:
     """Move a colony on, piece by piece.
 
@@ -145,29 +159,44 @@ def let_time_pass(
 
 
 @contextmanager
-def stop_requests() -> Iterator[Callable[[], bool]]:
-    """Let Ctrl-C ask for an end instead of raising; a second one raises as ever.
+def stop_requests() -> Iterator[Callable[[], int]]:
+    """Let Ctrl-C and SIGTERM ask for an end instead of causing it; a second one ends as ever.
+
+    What the parent process ignores, as nohup does, stays ignored. Signals reach the main thread
+    only; in others nothing is asked for.
 
     Yields:
-        Whether it was asked for.
+        The signal that asked for an end, 0 while there was none.
     """
     requests: list[int] = []
 
     def note(number: int, frame: object) -> None:
         if requests:
-            raise KeyboardInterrupt
+            _end_at_once(number)
         requests.append(number)
 
-    previous = signal.signal(signal.SIGINT, note)
+    main = threading.current_thread() is threading.main_thread()
+    numbers = (signal.SIGINT, signal.SIGTERM) if main else ()
+    heard = [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
+    previous = {number: signal.signal(number, note) for number in heard}
     try:
-        yield lambda: bool(requests)
+        yield lambda: requests[0] if requests else 0
     finally:
-        signal.signal(signal.SIGINT, previous)
+        for number, handler in previous.items():
+            signal.signal(number, handler)
+
+
+def _end_at_once(number: int) -> None:
+    if number == signal.SIGINT:
+        raise KeyboardInterrupt
+    raise SystemExit(128 + number)
 
 
 def summary(colony: Colony, pace: Pace) -> str:
-    """What happened, in two lines."""
+    """What happened, in two lines; a third one if no ant can be born any more."""
     outcome = {name: int(array.sum()) for name, array in vars(colony.outcome()).items()}
+    places = colony.config.slots * len(colony.seeds)
+    full = colony.config.births and outcome["living"] == places
     blocked = 100 * outcome["blocked"] / max(1, outcome["moves"])
     changes = "".join(
         f", {outcome[name]} {name}" for name in ("births", "deaths", "regrown") if outcome[name]
@@ -176,7 +205,14 @@ def summary(colony: Colony, pace: Pace) -> str:
         f"{outcome['living']} ants, {pace.ticks} ticks: {pace.steps_per_second / 1e6:.2f} million "
         "ant-steps per second.\n"
         f"{outcome['deliveries']} deliveries by tick {colony.ticks}, {blocked:.1f} % of the moves "
-        f"blocked{changes}."
+        f"blocked{changes}." + (_crowded(places, colony.waiting_foods) if full else "")
+    )
+
+
+def _crowded(places: int, foods: int) -> str:
+    waiting = f"{foods} food{' waits' if foods == 1 else 's wait'}"
+    return (
+        f"\n{places} of {places} places are taken, {waiting} at the queen; --capacity gives more."
     )
 
 
@@ -197,3 +233,27 @@ def _save_animation(outputs: Outputs, colony: Colony, passing: Iterator[int]) ->
             yield colony_picture(colony)
 
     save_animation(outputs.render, frames(), FRAMES_PER_SECOND)
+
+
+def _save_picture(outputs: Outputs, colony: Colony) -> None:
+    from taichi_ants.rendering import colony_picture, save_picture
+
+    try:
+        save_picture(outputs.render, colony_picture(colony))
+    except Exception as error:
+        _report(error, outputs, colony)
+
+
+def _save(outputs: Outputs, colony: Colony) -> None:
+    if outputs.save:
+        colony.save(outputs.save)
+
+
+def _report(error: Exception, outputs: Outputs, colony: Colony) -> NoReturn:
+    """Raise the error, saying where the colony has been saved if it has."""
+    if not outputs.save or not isinstance(error, (AntsError, OSError)):
+        raise error
+    reason = str(error).rstrip(".")
+    raise AntsError(
+        f"{reason}; the colony is saved in {outputs.save!r}, at tick {colony.ticks}."
+    ) from error

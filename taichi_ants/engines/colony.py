@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -115,16 +115,19 @@ class Colony:
     ) -> None:
         if not isinstance(config, ColonyConfig):
             raise AntsError(f"config is {config!r}; it must be a ColonyConfig.")
+        if not isinstance(training, TrainingConfig):
+            raise AntsError(f"training is {training!r}; it must be one TrainingConfig.")
         (self.training,) = checks.checked_configs(training)
         self.config = config
         self.seeds = checks.checked_seeds(seeds)
         self.sharing = _one_of("sharing", sharing, SHARINGS)
         self._learner = learners.get(training.learner)
         self._settings = runtime.start(threads, arch)
-        several = (world,) * len(self.seeds) if isinstance(world, World) else tuple(world)
+        one = isinstance(world, (str, World)) or not isinstance(world, Iterable)
+        several = (world,) * len(self.seeds) if one else tuple(world)
         if len(several) != len(self.seeds):
             raise AntsError(f"there are {len(several)} worlds for {len(self.seeds)} seeds.")
-        self._layout = colony_memory.Layout(
+        self.layout = colony_memory.Layout(
             [checks.checked_world(one) for one in several], config, self.seeds
         )
         options = (config.births, config.lifespan, config.regrowth, config.wander)
@@ -140,7 +143,7 @@ class Colony:
         words = np.array([seed % 2**64 for seed in self.seeds], dtype=np.uint64)
         plans = self._learner.plans and sharing != "fixed"
         self.arrays = colony_memory.allocate(
-            self._layout, config, self.training, words, sharing, plans, chunks
+            self.layout, config, self.training, words, sharing, plans, chunks
         )
         table = None if q_values is None else checks.checked_q_values(q_values)
         self._own = sharing == "own" or (sharing == "fixed" and np.ndim(table) == 4)
@@ -156,15 +159,14 @@ class Colony:
 
         self.episode += 1
         self.ticks = 0
-        colony_memory.fill_episode(self.arrays, self._layout, self.config, self.epsilon)
+        colony_memory.fill_episode(self.arrays, self.layout, self.config, self.epsilon)
         self._launch(BEGIN, 0, 1)
 
     def tick(self, n: int = 1) -> None:
         """Let n ticks pass; worlds whose episode has ended stand still."""
         from taichi_ants.engines.colony_kernels import BY_CHUNK, BY_WORLD, END, PLAN
 
-        if self.episode < 0:
-            raise AntsError("no episode has begun; call begin_episode first.")
+        self._check_begun()
         n = checks.checked_count("n", n)
         if self.schedule == "by_world":
             self._launch(BY_WORLD, self.ticks, n)
@@ -244,17 +246,29 @@ class Colony:
         return (tables if self._own else tables[:, 0]).copy()
 
     @property
-    def worlds(self) -> tuple[World, ...]:
-        """The worlds as they are at the start of an episode."""
-        return self._layout.worlds
-
-    def snapshot(self, world: int = 0) -> ColonySnapshot:
-        """World number `world` as it is now; arrays are copies."""
+    def waiting_foods(self) -> int:
+        """Foods that the queens have been given, but could not turn into ants yet."""
         from taichi_ants.engines import colony_arrays as names
 
+        return int(self.arrays["worlds"][names.STORE].sum())
+
+    @property
+    def worlds(self) -> tuple[World, ...]:
+        """The worlds as they are at the start of an episode."""
+        return self.layout.worlds
+
+    def snapshot(self, world: int = 0) -> ColonySnapshot:
+        """World number `world` as it is now; arrays are copies.
+
+        Raises:
+            AntsError: There is no such world, or no episode has begun.
+        """
+        from taichi_ants.engines import colony_arrays as names
+
+        self._check_begun()
         if not 0 <= world < len(self.seeds):
             raise AntsError(f"world is {world}; it must be from 0 to {len(self.seeds) - 1}.")
-        cells = slice(world * self._layout.size, (world + 1) * self._layout.size)
+        cells = slice(world * self.layout.size, (world + 1) * self.layout.size)
         slots = slice(world * self.config.slots, (world + 1) * self.config.slots)
         ants = self.arrays["ants"][:, slots]
         ants = ants[:, ants[names.LIFE] == names.LIVING]
@@ -266,7 +280,7 @@ class Colony:
             clock = self.ticks if self.config.pheromone.evaporation == "linear" else 0
             trail = np.maximum(self.arrays["trail"][cells] - clock, 0)
         return ColonySnapshot(
-            self._layout.grid,
+            self.layout.grid,
             ground,
             trail,
             ants[names.CELL].copy(),
@@ -287,28 +301,34 @@ class Colony:
         """
         return colony_files.load_colony(cls, path, threads, arch)
 
+    def _check_begun(self) -> None:
+        if self.episode < 0:
+            raise AntsError("no episode has begun; call begin_episode first.")
+
     def _ticks_per_launch(self) -> int:
         if self.schedule == "by_chunk":
             return 1
         rounds = -(-len(self.seeds) // self._settings.threads)
         cost = _TICK_NS * (1 + self.training.planning_steps)
         if self.config.pheromone.dense:
-            cost += 2 * self._layout.size / self.config.slots
+            cost += 2 * self.layout.size / self.config.slots
         return max(1, int(_LAUNCH_SECONDS * 1e9 / (rounds * self.config.slots * cost)))
 
     def _sort_ants(self) -> None:
         """Store the ants of a world in the order of their cells, so that neighbours share caches.
 
         Their order changes nothing but the speed: ants have numbers. Slots do matter where ants are
-        born or have tables of their own; there the order stays.
+        born or have tables of their own, and vacant ones stay behind the others; there the order
+        stays.
         """
         from taichi_ants.engines import colony_arrays as names
 
-        if self.config.births or self.config.lifespan or self._own:
+        config = self.config
+        if config.births or config.lifespan or self._own or config.slots > config.ants:
             return
         ants = self.arrays["ants"]
         cells = ants[names.CELL].reshape(len(self.seeds), -1)
-        first = np.arange(len(self.seeds))[:, None] * self.config.slots
+        first = np.arange(len(self.seeds))[:, None] * config.slots
         order = (np.argsort(cells, axis=1) + first).ravel()
         for row in ants:
             row[:] = row[order]
@@ -332,8 +352,8 @@ class Colony:
             "ants": config.ants,
             "slots": config.slots,
             "chunks": self.chunks,
-            "size": self._layout.size,
-            "homes": self._layout.homes,
+            "size": self.layout.size,
+            "homes": self.layout.homes,
             "episode": self.episode,
             "evaporates": int(pheromone.evaporation == "linear"),
             "adds": {"add": 1, "set": 0, "none": -1}[pheromone.deposit],

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taichi_ants import results
+from taichi_ants import learners, results, runtime
 from taichi_ants.colony_config import ColonyConfig, Pheromone
 from taichi_ants.config import TrainingConfig
 from taichi_ants.constants import N_ACTIONS, N_STATES
+from taichi_ants.engines import checks
+from taichi_ants.engines.colony_damage import check_contents
 from taichi_ants.errors import AntsError
 from taichi_ants.worlds.world import World
 
@@ -21,6 +23,11 @@ if TYPE_CHECKING:
 _FORMAT = "taichi-ants colony 1"
 # What the worlds and configurations determine is not stored.
 _DERIVED = frozenset({"walls", "closer", "compass", "weights", "spare", "seeds"})
+# What numbers, texts and arrays that mean nothing lead to while a colony is built from them.
+_SIGNS_OF_DAMAGE = (
+    *(AntsError, ArithmeticError, AttributeError, LookupError, RecursionError, TypeError),
+    ValueError,
+)
 _WORLD_PARTS = ("foods", "obstacles", "trails", "ants")
 
 
@@ -61,26 +68,51 @@ def load_colony(
             registered.
     """
     stored = results.read_npz(path)
+    facts = _facts(stored, path)
+    runtime.start(threads, arch)  # what is wrong with these says nothing about the file
     try:
-        facts = json.loads(str(stored["facts"][()]))
-        if facts["format"] != _FORMAT:
-            raise ValueError(facts["format"])
+        learners.get(facts["training"]["learner"])
+    except (KeyError, TypeError) as error:
+        raise _damaged(path, "its learner is missing") from error
+    try:
         colony = _rebuild(cls, stored, facts, threads, arch)
-        colony.epsilon, colony.episode = float(facts["epsilon"]), int(facts["episode"])
-        colony.ticks = int(facts["ticks"])
+        colony.epsilon = checks.checked_share("epsilon", facts["epsilon"])
+        colony.episode = checks.checked_count("episode", facts["episode"], least=-1)
+        colony.ticks = checks.checked_count("ticks", facts["ticks"], least=0)
         for name, array in colony.arrays.items():
             if name not in _DERIVED:
                 kept = stored[f"array_{name}"]
                 if kept.shape != array.shape or kept.dtype != array.dtype:
-                    raise ValueError(name)
+                    raise ValueError(f"{name} has another shape or type")
                 colony.arrays[name] = np.ascontiguousarray(kept)
-    except AntsError:
-        raise
-    except (KeyError, ValueError, TypeError) as error:
+        check_contents(colony)
+    except _SIGNS_OF_DAMAGE as error:
+        raise _damaged(path, _reason(error)) from error
+    return colony
+
+
+def _facts(stored: dict[str, np.ndarray], path: results.PathLike) -> dict[str, Any]:
+    try:
+        facts = json.loads(str(stored["facts"][()]))
+        if facts["format"] != _FORMAT:
+            raise ValueError(facts["format"])
+    except (KeyError, ValueError, TypeError, RecursionError) as error:
         raise AntsError(
             f"{str(path)!r} holds no colony of this version; name a file that Colony.save wrote."
         ) from error
-    return colony
+    return facts
+
+
+def _damaged(path: results.PathLike, reason: str) -> AntsError:
+    return AntsError(
+        f"the colony in {str(path)!r} is damaged ({reason}); name a file that Colony.save wrote."
+    )
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, KeyError):
+        return f"{error} is missing"
+    return " ".join(str(error).rstrip(".").split()) or type(error).__name__
 
 
 def _rebuild(

@@ -122,6 +122,33 @@ def _three_bytes(value: int) -> bytes:
 
 def write_mp4(file: BinaryIO, frames: Iterable[np.ndarray], fps: float) -> None:
     """Write frames, uint8 (height, width, 3), as MP4 (H.264), an odd width or height made even."""
+    noting = _FailureNote(file)
+    try:
+        _encode_mp4(noting, frames, fps)
+    except Exception as error:
+        # PyAV hides what the file has raised behind errors of its own.
+        if noting.failure is None or noting.failure is error:
+            raise
+        raise noting.failure from error
+
+
+class _FailureNote:
+    """A file to write to that keeps what was raised first."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+        self.failure: BaseException | None = None
+        self.seek, self.tell = file.seek, file.tell
+
+    def write(self, part: bytes) -> int:
+        try:
+            return self._file.write(part)
+        except BaseException as error:
+            self.failure = self.failure or error
+            raise
+
+
+def _encode_mp4(file: _FailureNote, frames: Iterable[np.ndarray], fps: float) -> None:
     av = import_av()
     from fractions import Fraction
 

@@ -15,6 +15,7 @@ from taichi_ants.errors import AntsError
 from taichi_ants.hexgrid import AxialGrid
 from taichi_ants.rendering import colours, text
 from taichi_ants.rendering.episodes import DEFAULT_FPS, Episode, Progress, with_pause, without_view
+from taichi_ants.rendering.panel import Status
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.rendering.scene import check_size
 from taichi_ants.rendering.viewport import Viewport
@@ -59,7 +60,7 @@ def learning_stages(
         world: The world.
         config: The learner and its settings.
         seed: Of training and rollouts.
-        stages: Numbers of episodes, ascending; 0 is before learning.
+        stages: Numbers of episodes, ascending, of equal ones one counts; 0 is before learning.
         train_steps: Step limit of a training episode.
         max_steps: Step limit of a rollout.
         evaporation: Whether trails fall in the rollouts; they never do in training.
@@ -69,10 +70,11 @@ def learning_stages(
     Raises:
         AntsError: An argument is not allowed; the message names it.
     """
-    if not stages or list(stages) != sorted(set(stages)) or stages[0] < 0:
+    if not stages or list(stages) != sorted(stages) or stages[0] < 0:
         raise AntsError(f"stages are {tuple(stages)!r}; they must ascend, from 0 or more.")
     played, result = [], None
-    for n in stages:
+    different = tuple(dict.fromkeys(stages))
+    for n in different:
         table = np.zeros((N_STATES, N_ACTIONS), dtype=np.float32)
         if n:
             result = (
@@ -91,7 +93,7 @@ def learning_stages(
         )
         played.append(Stage(n, episode))
         if progress is not None:
-            progress(len(played) / len(stages))
+            progress(len(played) / len(different))
     return played
 
 
@@ -191,12 +193,27 @@ class _Panel:
         left = round(self._middle - self._width / 2)
         footer = self._canvas[self._footer :, left : left + self._width]
         footer[: round(1.8 * self._text_size)] = colours.channels(colours.PAGE)
-        line = f"step {status.step}, return {status.episode_return}"
-        line += f", {status.outcome}" if status.outcome == "delivered" else ""
-        line = text.shortened(line, self._text_size, self._width)
+        line = self._fitting_line(status)
         baseline = self._footer + 1.2 * self._text_size
         ink = colours.INK if status.outcome else colours.FAINT_INK
         text.write(self._canvas, line, self._middle, baseline, self._text_size, ink, align="middle")
+
+    def _fitting_line(self, status: Status) -> str:
+        room = self._width - self._text_size / 2
+        lines = _lines(status)
+        return next((one for one in lines if text.width(one, self._text_size) <= room), lines[-1])
+
+
+def _lines(status: Status) -> tuple[str, ...]:
+    """What stands below a world, the longest first; the return is in all of them."""
+    result = f"return {status.episode_return}"
+    end = f", {status.outcome}" if status.outcome == "delivered" else ""
+    return (
+        f"step {status.step}, {result}{end}",
+        f"{result}{end}",
+        result,
+        str(status.episode_return),
+    )
 
 
 def _tiles(

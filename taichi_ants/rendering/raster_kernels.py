@@ -15,7 +15,7 @@ from taichi_ants.rendering import shapes
 from taichi_ants.rendering.colours import CELL_FOOD, PAGE
 
 # Shapes, in the last column of a table of shapes.
-FOOD, QUEEN, IN_VIEW, ANT, ANT_WITH_FOOD, DART, DART_WITH_FOOD, DOT, ARROW = range(9)
+FOOD, QUEEN, IN_VIEW, ANT, ANT_WITH_FOOD, DART, DART_WITH_FOOD, DOT, ARROW, RING = range(10)
 
 BAND = 16  # rows that one thread draws
 _SQRT_3 = math.sqrt(3.0)
@@ -23,6 +23,7 @@ _SQRT_3 = math.sqrt(3.0)
 _OUTWARD = [(math.sin(h * math.pi / 3), -math.cos(h * math.pi / 3)) for h in range(N_HEADINGS)]
 _STEPS = [(x - z, y - z) for x, y, z in HEADING_STEPS]
 _HALO = 1.2  # pixels around an ant in the colour of the page
+_HALF_RING = 1.0  # pixels, half the width of a ring
 _WHOLE = 255  # a share of a pixel
 
 
@@ -269,6 +270,9 @@ def draw_mark(rgb, p, radius, shape, colour):
     elif shape == IN_VIEW:
         ring = ti.max(0.06 * radius, 0.6)
         distance = ti.abs(radius * shapes.hexagon(p) + ring) - ring
+    elif shape == RING:
+        disc = radius * shapes.disc(p, 0.0, 0.0, 1.0)
+        distance, halo = ti.abs(disc + _HALF_RING) - _HALF_RING, 0.5 * _HALO
     elif shape == ARROW:
         distance, halo = radius * shapes.arrow(p), _HALO
     else:

@@ -27,7 +27,7 @@ _SMALLEST_MARK = 8.0
 
 _FILL = 0.83  # radius of what stands on a cell, in sizes of the hexagon; the largest disc is 0.866
 _DOT_RADIUS = 0.9  # pixels, of an ant in cells that are too small for it
-_QUEEN_RADIUS = 2.5
+_QUEEN_RADIUS, _QUEEN_RING = 2.5, 6.5  # pixels
 _DOT_WITH_FOOD = 0x9A3F00
 _FREE_SHARE = 0.3  # of the world, which dots may cover at full strength
 _SQRT_3 = math.sqrt(3.0)
@@ -83,8 +83,10 @@ class Rasteriser:
         """
         self.draw_ground(frame, snapshot.ground, snapshot.trail)
         layers = [self._things(snapshot), *self._view(snapshot), self._ants(snapshot)]
-        if not self.has_hexagons:  # dots overlap, and a crowd must not hide the queen
-            layers.reverse()
+        if not self.has_hexagons:
+            # Dots overlap. A dot of hers over the ants would hide those beside her, one under them
+            # may be hidden by a crowd: they lie over it, and a ring around it over them.
+            layers.append(self._queen_rings(snapshot))
         self.draw_shapes(frame, *(np.concatenate(parts) for parts in zip(*layers, strict=True)))
 
     def draw_ground(self, frame: np.ndarray, ground: np.ndarray, trail: np.ndarray) -> None:
@@ -152,6 +154,11 @@ class Rasteriser:
         )
         of_shapes = np.repeat([colours.CELL_FOOD, colours.CELL_QUEEN], [len(foods), len(queens)])
         return marks, of_shapes.astype(np.uint32)
+
+    def _queen_rings(self, snapshot: Snapshot) -> tuple[np.ndarray, np.ndarray]:
+        rings = self.shapes(np.flatnonzero(snapshot.ground == QUEEN), self.kernels.RING)
+        rings[:, 2] = _QUEEN_RING
+        return rings, np.full(len(rings), colours.CELL_QUEEN, dtype=np.uint32)
 
     def _view(self, snapshot: Snapshot) -> list[tuple[np.ndarray, np.ndarray]]:
         """The outlines of the cells in view, or around the ant where cells are small."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import unicodedata
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -28,7 +29,8 @@ def write(
 
     Args:
         frame: uint8 (height, width, 3).
-        text: The text; what is not ASCII becomes a question mark, since the font has little else.
+        text: The text; the font has little but ASCII, so accents are left out, and other letters
+            become question marks.
         x: The left edge, the middle or the right edge of the text, in pixels.
         baseline: Where its letters stand, in pixels from the top.
         size: Of the font, in pixels.
@@ -58,7 +60,9 @@ def shortened(text: str, size: int, room: float) -> str:
 
 
 def _plain(text: str) -> str:
-    return text.encode("ascii", "replace").decode("ascii")
+    parts = unicodedata.normalize("NFKD", text)
+    bare = "".join(one for one in parts if not unicodedata.combining(one))
+    return bare.encode("ascii", "replace").decode("ascii")
 
 
 @lru_cache(maxsize=64)

@@ -186,6 +186,13 @@ def test_stopped_and_killed_it_goes_on_to_the_same_results(finished, kernels, tm
         (["--save", "x"], "--save is for one colony"),
         (["--resume", "x", "--regrowth", 0], "--regrowth cannot change a colony that is resumed"),
         (["--resume", "x", "--discount", 0.5], "--discount cannot change a colony"),
+        (["--resume", "x", "--seed", 7], "--seed cannot change a colony that is resumed"),
+        (["--resume", "x", "--learner", "sarsa"], "--learner cannot change a colony"),
+        (["--resume", "x", "--births"], "--births cannot change a colony"),
+        (["--every", 2], "--every is for one colony"),
+        (["--ants", 2, "--capacity", 5], "--capacity is for colonies in which ants are born"),
+        (["--ants", 2, "--cap", 5], "--cap is for deposits that add up"),
+        (["--ants", 2, "--save", "x.png", "--render", "x.png"], "are one place"),
         (["--resume", "x"], "cannot read 'x'"),
         (["--arenas", "moon"], "'moon' is no arena, choose of paper, open, large"),
         (["--sizes", 300, "--arenas", "paper"], "300 ants do not fit into the paper's world"),
@@ -220,6 +227,7 @@ def test_mistakes_end_in_one_sentence(arguments, expected, capsys, tmp_path, mon
 LIFE = [
     *("--ants", 40, "--ranges", 20, 20, 20, "--births", "--capacity", 60, "--lifespan", 90),
     *("--regrowth", 3, "--wander", 20, "--half-life", 30, "--diffusion", 0.1, "--deposit", "add"),
+    *("--level", 90, "--cap", 170),
     *("--learner", "q_learning", "--seed", 5),
 ]
 
@@ -249,7 +257,9 @@ def test_a_colony_as_the_library_makes_it(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     status, out, _ = call("colony", [*LIFE, "--ticks", 90, "--save", "colony.npz"], capsys)
     assert status == 0
-    pheromone = Pheromone("exponential", half_life=30.0, diffusion=0.1, deposit="add")
+    pheromone = Pheromone(
+        "exponential", half_life=30.0, diffusion=0.1, deposit="add", level=90, cap=170
+    )
     life = ColonyConfig(40, 60, pheromone, births=True, lifespan=90, regrowth=3, wander=20)
     training = TrainingConfig("q_learning", 0.1, 0.9, 0.1, 1.0, 0.1, delivery="continuing")
     colony = Colony(worlds.open_world(5, (20, 20, 20)), life, training, 5)
@@ -259,7 +269,8 @@ def test_a_colony_as_the_library_makes_it(capsys, tmp_path, monkeypatch):
     assert f"{colony.outcome().deliveries.sum()} deliveries by tick 90" in out
 
 
-def test_interrupted_a_colony_is_saved_at_a_whole_tick(capsys, kernels, tmp_path, monkeypatch):
+@pytest.mark.parametrize(("sent", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_stopped_a_colony_is_saved_at_a_whole_tick(sent, status, kernels, tmp_path, monkeypatch):
     arguments = ["--ants", 60, "--world", "paper", "--ticks", 10_000_000, "--regrowth", 0]
     process = subprocess.Popen(
         [*command("colony", [*arguments, "--save", "colony.npz"])],
@@ -270,11 +281,11 @@ def test_interrupted_a_colony_is_saved_at_a_whole_tick(capsys, kernels, tmp_path
         text=True,
     )
     time.sleep(5)  # it has begun, and would take half a minute
-    sent = time.perf_counter()
-    process.send_signal(signal.SIGINT)
+    began = time.perf_counter()
+    process.send_signal(sent)
     out, err = process.communicate(timeout=60)
-    assert time.perf_counter() - sent < PROMPTLY
-    assert process.returncode == 130
+    assert time.perf_counter() - began < PROMPTLY
+    assert process.returncode == status
     ticks = int(err.removeprefix("Stopped at tick ").split(";")[0])
     assert err == f"Stopped at tick {ticks}; --resume colony.npz goes on from there.\n"
     assert f"60 ants, {ticks} ticks: " in out

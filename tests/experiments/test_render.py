@@ -113,11 +113,32 @@ WRONG = {
     "no number": (["--fps", "fast"], "not a number"),
     "world": (["--world", "mars", "--out", "{}/a.gif"], "mars"),
     "policy": (["--policy", "nope.npz", "--out", "{}/a.gif"], "nope.npz"),
-    "policy and learning": (["--show", "learning", "--policy", "a.npz"], "--policy"),
+    "policy and learning": (
+        ["--show", "learning", "--policy", "a.npz"],
+        "--policy changes nothing in learning, but in a colony, a sheet, a still colony",
+    ),
+    "episodes of learning": (["--show", "learning", "--episodes", "500"], "--episodes changes"),
+    "step of a GIF": (
+        ["--step", "3"],
+        "--step changes nothing in an episode, but in a still colony, a still episode; leave",
+    ),
+    "step of a sheet": (["--show", "sheet", "--step", "3"], "--step changes nothing in a sheet"),
+    "ants of an episode": (["--ants", "80"], "--ants changes nothing in an episode"),
+    "every of a still": (["--show", "colony", "--every", "4", "--out", "a.png"], "--every"),
+    "view of a colony": (["--show", "colony", "--no-view"], "--no-view changes nothing"),
+    "legend of learning": (["--show", "learning", "--no-legend"], "--no-legend changes nothing"),
+    "lines of learning": (["--show", "learning", "--no-hud"], "--no-hud changes nothing"),
+    "speed of a still": (["--fps", "9", "--out", "a.png"], "--fps changes nothing in a still"),
+    "stages of an episode": (["--stages", "1"], "--stages changes nothing in an episode"),
+    "training and policy": (["--policy", "a.npz", "--learner", "sarsa"], "--learner is for"),
     "greedy and epsilon": (["--greedy", "--epsilon", "0.5"], "--greedy"),
     "epsilon": (["--policy", "{policy}", "--epsilon", "2", "--out", "{}/a.gif"], "epsilon"),
     "learner": (["--learner", "magic", "--out", "{}/a.gif"], "magic"),
     "stages": (["--show", "learning", "--stages", "5,1", "--out", "{}/a.gif"], "ascend"),
+    "order of stages": (
+        ["--show", "learning", "--stages", "5", "5", "2", "--out", "{}/a.gif"],
+        "stages are (5, 5, 2); they must ascend",
+    ),
     "steps": (["--max-steps", "0"], "from 1 to"),
     "unknown option": (["--colour", "red"], "--colour"),
 }
@@ -184,6 +205,32 @@ def test_stopped_midway_it_leaves_nothing_behind(tmp_path, policy, name, sent, s
     assert process.returncode == status
     assert errors == ("Stopped; nothing was left behind.\n" if sent == signal.SIGINT else "")
     assert files_in(tmp_path) == []
+
+
+def test_trails_of_a_colony_stay_without_evaporation(tmp_path, policy) -> None:
+    pictures = []
+    for more in ([], ["--no-evaporation"]):
+        path = tmp_path / f"{len(more)}.png"
+        colony = ["--show", "colony", "--policy", policy, "--ants", 60, "--max-steps", 300]
+        done = run(*colony, "--no-hud", "--no-legend", "--world", "paper", *more, "--out", path)
+        assert done.returncode == 0, done.stderr
+        pictures.append(np.asarray(Image.open(path)).astype(int))
+    yellow = [((p[..., 0] > 200) & (p[..., 2] < 80)).sum() for p in pictures]
+    assert (pictures[0] != pictures[1]).any()
+    assert yellow[1] != yellow[0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "world"),
+    [([], "paper"), (["--show", "colony"], "open"), (["--show", "colony", "--world", "x"], "x")],
+)
+def test_default_worlds(arguments, world) -> None:
+    sys.path.insert(0, str(SCRIPT.parent))
+    try:
+        import render
+    finally:
+        sys.path.remove(str(SCRIPT.parent))
+    assert render.parse_arguments(arguments).world == world
 
 
 @pytest.mark.parametrize(

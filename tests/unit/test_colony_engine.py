@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from taichi_ants import AntsError, Colony, ColonyConfig, Pheromone, TrainingConfig, World, worlds
 from taichi_ants.constants import FOOD
 from taichi_ants.engines import colony_arrays as names
+from taichi_ants.rendering import colony_picture
 
 TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 1.0, 1.0)
 
@@ -118,6 +119,11 @@ def test_births_fill_the_slots_and_no_more():
         ({"schedule": "quick"}, "'quick'"),
         ({"q_values": np.zeros((3, 3))}, "(3, 3)"),
         ({"q_values": np.zeros((2, 128, 5))}, "(2, 128, 5)"),
+        ({"training": [TRAINING, TRAINING]}, "it must be one TrainingConfig"),
+        ({"training": None}, "training is None"),
+        ({"world": "paper"}, "world is 'paper'; it must be a World"),
+        ({"world": 7}, "world is 7; it must be a World"),
+        ({"world": ["paper"]}, "world is 'paper'; it must be a World"),
         ({"training": TrainingConfig("nobody", 0.1, 0.9, 0.3, 0.9)}, "'nobody'"),
     ],
 )
@@ -128,9 +134,24 @@ def test_wrong_arguments_are_named(arguments, said):
     assert said in str(caught.value)
 
 
+def test_both_schedules_agree_where_places_stay_vacant():
+    """The ants are sorted by their cells now and then, but not in among the vacant places."""
+    config, deliveries = ColonyConfig(ants=5, capacity=9, regrowth=0), []
+    for schedule in ("by_world", "by_chunk"):
+        colony = Colony(worlds.paper(), config, TRAINING, 3, schedule=schedule)
+        colony.begin_episode()
+        colony.tick(100)
+        deliveries.append(vars(colony.outcome()))
+    for name, counted in deliveries[0].items():
+        np.testing.assert_array_equal(counted, deliveries[1][name], name)
+
+
 def test_a_tick_needs_an_episode():
     with pytest.raises(AntsError, match="begin_episode"):
         Colony(worlds.paper(), ColonyConfig(), TRAINING).tick()
+    for look in (Colony.snapshot, colony_picture):
+        with pytest.raises(AntsError, match="begin_episode"):
+            look(Colony(worlds.paper(), ColonyConfig(), TRAINING))
 
 
 @pytest.mark.parametrize("content", [b"", b"nothing", None])

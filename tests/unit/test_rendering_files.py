@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import io
 import sys
 import weakref
 from collections.abc import Iterator
@@ -15,6 +17,7 @@ from taichi_ants import AntsError
 from taichi_ants.policies import trail_follower
 from taichi_ants.rendering import (
     Episode,
+    animated_files,
     check_animation,
     episode_frames,
     render_episode,
@@ -139,6 +142,35 @@ def test_nothing_is_left_behind(tmp_path, frames, name, error) -> None:
     with pytest.raises(error):
         save_animation(tmp_path / "sub" / name, failing(), 8)
     assert leftovers(tmp_path) == []
+
+
+class FullDisk(io.BytesIO):
+    """Takes only so many bytes."""
+
+    def __init__(self, room: int) -> None:
+        super().__init__()
+        self.room = room
+
+    def write(self, part: bytes) -> int:
+        if self.tell() + len(part) > self.room:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return super().write(part)
+
+
+@pytest.mark.parametrize("room", [0, 40, 100, 20_000, -200, -1])
+@pytest.mark.parametrize("ending", ["gif", "webp", "mp4"])
+def test_a_disk_that_fills_up_is_named_as_it_is(ending, room) -> None:
+    """Not as an error of PyAV's; `room` counts from the end if it is below 0."""
+    if ending == "mp4":
+        pytest.importorskip("av")
+    write = getattr(animated_files, f"write_{ending}")
+    noise = np.random.default_rng(0).integers(0, 256, (30, 96, 96, 3)).astype(np.uint8)
+    whole = FullDisk(10**9)
+    write(whole, iter(noise), 8)
+    assert len(whole.getvalue()) > 20_000
+    with pytest.raises(OSError, match="No space left") as caught:
+        write(FullDisk(room % len(whole.getvalue())), iter(noise), 8)
+    assert type(caught.value) is OSError
 
 
 def test_an_old_file_survives_a_failure(tmp_path, frames) -> None:

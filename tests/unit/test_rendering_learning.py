@@ -23,6 +23,7 @@ from taichi_ants.rendering import (
     policy_sheet,
     render_colony,
     render_learning,
+    text,
     usual_spread,
 )
 from taichi_ants.rendering.colours import CHOSEN
@@ -54,7 +55,34 @@ def test_stages_are_those_of_one_training() -> None:
         assert len(trace) <= 60
 
 
-@pytest.mark.parametrize("stages", [(), (3, 2), (1, 1), (-1, 5)])
+def test_a_stage_that_is_given_twice_is_shown_once() -> None:
+    stages = learning_stages(paper(), CONFIG, stages=(0, 2, 2), max_steps=5)
+    assert [stage.episodes for stage in stages] == [0, 2]
+
+
+@pytest.mark.parametrize("n", [2, 12, 40, 80])
+def test_the_return_stays_where_there_is_little_room(n, monkeypatch) -> None:
+    """Many worlds side by side are narrow."""
+    written = []
+    original = text.write
+
+    def noting(frame, line, *place, **settings) -> None:
+        written.append(line)
+        original(frame, line, *place, **settings)
+
+    stages = learning_stages(paper(), CONFIG, seed=2, stages=range(n), max_steps=9)
+    monkeypatch.setattr(text, "write", noting)
+    *_, last = learning_frames(stages, (600, 400))
+    assert last.shape == (400, 600, 3)
+    captions = [line for line in written if not line.startswith(("bef", "aft", "..."))]
+    assert len(captions) == sum(len(stage.episode) for stage in stages)
+    for line in captions:
+        assert "..." not in line
+        number = line.split("return ")[-1].removesuffix(", delivered")
+        assert number.lstrip("-").isdecimal()
+
+
+@pytest.mark.parametrize("stages", [(), (3, 2), (5, 5, 2), (-1, 5)])
 def test_stages_that_are_refused(stages) -> None:
     with pytest.raises(AntsError, match="stages"):
         learning_stages(paper(), CONFIG, stages=stages)

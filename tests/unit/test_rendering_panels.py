@@ -194,4 +194,13 @@ def test_shortening() -> None:
     assert cut.endswith("...")
     assert text.width(cut, 12) <= 80
     assert text.shortened("anything", 12, 1) == ""
-    assert text.width("\u00e9\u4e2d", 12) == text.width("??", 12)
+    assert text.width("\u00e9\u4e2d", 12) == text.width("e?", 12)
+
+
+def test_letters_with_accents_lose_these_only() -> None:
+    for written, plain in (("Ångström é ñ ü", "Angstrom e n u"), ("蟻 ants", "? ants")):
+        assert text.width(written, 14) == text.width(plain, 14)
+        frames = [np.full((30, 200, 3), 255, dtype=np.uint8) for _ in range(2)]
+        text.write(frames[0], written, 5, 20, 14)
+        text.write(frames[1], plain, 5, 20, 14)
+        assert (frames[0] == frames[1]).all()

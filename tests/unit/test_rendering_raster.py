@@ -155,8 +155,21 @@ def test_a_crowd_does_not_hide_the_queen() -> None:
     scene = Scene(world.grid, (100, 100), hud=False, legend=False)
     x, y = scene.viewport.centres(world.queen).astype(int).tolist()
     frame = scene.draw(Snapshot.at_start(world, n=20_000))
-    assert (frame[y, x] == colours.channels(colours.CELL_QUEEN)).all()
-    assert frame[y, x + 8].max() < 130
+    ring = (frame == colours.channels(colours.CELL_QUEEN)).all(axis=2)
+    assert ring[y - 7 : y + 8, x - 7 : x + 8].sum() >= 20
+    assert frame[y, x + 10].max() < 130
+
+
+def test_the_queen_does_not_hide_the_ants_beside_her() -> None:
+    """A picture of 20 ants, all of them within a pixel of her."""
+    world = World(ranges=(2000, 2000, 1), queen=(1000, 1000, 0))
+    scene = Scene(world.grid, (1280, 720), hud=False, legend=False)
+    x, y = scene.viewport.centres(world.queen).astype(int).tolist()
+    frame = scene.draw(Snapshot.at_start(world, n=20))
+    near = frame[y - 1 : y + 2, x - 1 : x + 2]
+    assert near.max(axis=2).min() < 60  # as dark as an ant
+    ring = (frame == colours.channels(colours.CELL_QUEEN)).all(axis=2)
+    assert ring[y - 7 : y + 8, x - 7 : x + 8].sum() >= 20
 
 
 @pytest.mark.parametrize("hexagon", [4, 9, 20, 50])
