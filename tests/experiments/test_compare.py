@@ -277,8 +277,7 @@ def test_a_picture_that_is_gone_is_drawn_again(damage, finished, copy, compare):
     assert contents(copy) == contents(finished)
 
 
-GONE = [("summary.csv", None), ("policies/sarsa.npz", b"")]
-GONE += [("report.txt", None), ("report.txt", b"\xff")]
+GONE = [("summary.csv", None), ("policies/sarsa.npz", b""), ("report.txt", b"\xff")]
 
 
 @pytest.mark.parametrize(("name", "content"), GONE)
