@@ -52,6 +52,21 @@ def run(
     )
 
 
+def start(
+    name: str, arguments: Sequence[object], kernels: Path, folder: Path, **settings: object
+) -> subprocess.Popen[str]:
+    """Start an experiment in a process of its own, in a folder; what it writes can be read."""
+    return subprocess.Popen(
+        command(name, arguments),
+        cwd=folder,
+        env=environment(kernels),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        **settings,
+    )
+
+
 @cache
 def load(name: str) -> ModuleType:
     """An experiment as a module."""

@@ -16,10 +16,10 @@ from command_lines import (
     PROMPTLY,
     assert_one_sentence,
     call,
-    command,
     contents,
     environment,
     run,
+    start,
 )
 
 from taichi_ants import Colony, ColonyConfig, Pheromone, TrainingConfig, load_policy, worlds
@@ -132,14 +132,7 @@ def blocks_in(folder):
 
 def stop_after_blocks(arguments, kernels, place, stop_signal, least):
     """Send a signal once there are `least` blocks; the process, its complaint, how long it took."""
-    process = subprocess.Popen(
-        command("colony", arguments),
-        cwd=place,
-        env=environment(kernels),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    process = start("colony", arguments, kernels, place)
     while process.poll() is None and len(blocks_in(place / "out")) < least:
         time.sleep(0.002)
     sent = time.perf_counter()
@@ -272,14 +265,7 @@ def test_a_colony_as_the_library_makes_it(capsys, tmp_path, monkeypatch):
 @pytest.mark.parametrize(("sent", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_stopped_a_colony_is_saved_at_a_whole_tick(sent, status, kernels, tmp_path, monkeypatch):
     arguments = ["--ants", 60, "--world", "paper", "--ticks", 10_000_000, "--regrowth", 0]
-    process = subprocess.Popen(
-        [*command("colony", [*arguments, "--save", "colony.npz"])],
-        cwd=tmp_path,
-        env=environment(kernels),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    process = start("colony", [*arguments, "--save", "colony.npz"], kernels, tmp_path)
     time.sleep(5)  # it has begun, and would take half a minute
     began = time.perf_counter()
     process.send_signal(sent)

@@ -20,6 +20,7 @@ from command_lines import (
     contents,
     environment,
     run,
+    start,
 )
 
 from taichi_ants import TrainingConfig, reference, worlds
@@ -34,23 +35,13 @@ PICTURED = [
     *("--seeds", 2, "--episodes", 20, "--learners", "q_learning", "sarsa", "--discounts", 0.9),
     *("--learning-rates", 0.1, "--epsilons", 0.3, "--epsilon-decays", 0.9),
 ]
-BLOCKS = 2 * 2 * 2 * 2 * 2
+MANY = [*LONG, "--seeds", 50]
+BLOCKS = 2 * 2 * 2  # settings of delivery, learners, pieces of at most 333 runs
 TINY = [
     *("--seeds", 1, "--episodes", 2, "--max-steps", 30, "--learners", "q_learning"),
     *("--learning-rates", 0.1, "--discounts", 0.9, "--epsilons", 0.3, "--epsilon-decays", 0.9),
     *("--delivery", "absorbing", "--no-figures", "--no-render"),
 ]
-
-
-def start(arguments, kernels, folder):
-    return subprocess.Popen(
-        command("compare", arguments),
-        cwd=folder,
-        env=environment(kernels),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
 
 
 def blocks_in(folder):
@@ -72,15 +63,15 @@ def stop_after_a_block(process, folder, stop_signal, least):
 @pytest.fixture(scope="module")
 def uninterrupted(tmp_path_factory, kernels):
     place = tmp_path_factory.mktemp("uninterrupted")
-    assert run("compare", [*LONG, "--out", "out"], kernels, place).returncode == 0
+    assert run("compare", [*MANY, "--out", "out"], kernels, place).returncode == 0
     return contents(place / "out")
 
 
 def test_stopped_and_killed_it_goes_on_to_the_same_results(uninterrupted, kernels, tmp_path):
     folder = tmp_path / "out"
-    arguments = [*LONG, "--out", "out"]
+    arguments = [*MANY, "--out", "out"]
 
-    process = start(arguments, kernels, tmp_path)
+    process = start("compare", arguments, kernels, tmp_path)
     out, err, seconds = stop_after_a_block(process, folder, signal.SIGINT, 1)
     assert process.returncode == 130
     assert (out, err) == (
@@ -98,7 +89,7 @@ def test_stopped_and_killed_it_goes_on_to_the_same_results(uninterrupted, kernel
     assert_one_sentence(refused.stderr)
     assert "unfinished" in refused.stderr
 
-    process = start(arguments, kernels, tmp_path)
+    process = start("compare", arguments, kernels, tmp_path)
     stop_after_a_block(process, folder, signal.SIGKILL, len(kept) + 1)
     assert process.returncode == -signal.SIGKILL
     assert len(kept) < len(blocks_in(folder)) < BLOCKS
@@ -113,7 +104,7 @@ def test_stopped_and_killed_it_goes_on_to_the_same_results(uninterrupted, kernel
 
 
 def test_an_interruption_before_the_first_block_leaves_nothing(kernels, tmp_path):
-    process = start([*LONG, "--out", "new/folder"], kernels, tmp_path)
+    process = start("compare", [*LONG, "--out", "new/folder"], kernels, tmp_path)
     while process.poll() is None and not (tmp_path / "new").exists():
         time.sleep(0.002)
     process.send_signal(signal.SIGINT)
@@ -127,15 +118,8 @@ def test_an_interruption_before_the_first_block_leaves_nothing(kernels, tmp_path
 @pytest.mark.parametrize("seconds", [0.05, 0.6])
 def test_an_interruption_of_the_pictures_keeps_the_runs(seconds, kernels, tmp_path):
     """Ctrl-C on a terminal goes to the process that draws, too, and that says nothing."""
-    process = subprocess.Popen(
-        command("compare", [*PICTURED, "--out", "out"]),
-        cwd=tmp_path,
-        env=environment(kernels),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
+    arguments = [*PICTURED, "--out", "out"]
+    process = start("compare", arguments, kernels, tmp_path, start_new_session=True)
     unfinished = tmp_path / "out" / "unfinished"
     while process.poll() is None and not (unfinished / "ready/policies/sarsa.npz").exists():
         time.sleep(0.002)
@@ -151,7 +135,7 @@ def test_an_interruption_of_the_pictures_keeps_the_runs(seconds, kernels, tmp_pa
 
 
 def test_a_second_process_waits_its_turn(kernels, tmp_path):
-    process = start([*LONG, "--out", "out"], kernels, tmp_path)
+    process = start("compare", [*LONG, "--out", "out"], kernels, tmp_path)
     try:
         while process.poll() is None and not (tmp_path / "out" / "unfinished" / "ready").exists():
             time.sleep(0.002)
