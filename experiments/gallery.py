@@ -8,9 +8,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-import render
-
 from taichi_ants.command_line import Parser, run_command
+from taichi_ants.commands import render
 
 _MAP = str(Path(__file__).parent / "maps" / "garden.txt")
 

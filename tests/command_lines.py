@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 import os
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
-from functools import cache
 from pathlib import Path
 from types import ModuleType
 
@@ -67,13 +66,9 @@ def start(
     )
 
 
-@cache
 def load(name: str) -> ModuleType:
-    """An experiment as a module."""
-    spec = importlib.util.spec_from_file_location(name, EXPERIMENTS / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    """A command as a module."""
+    return importlib.import_module(f"taichi_ants.commands.{name}")
 
 
 Outcome = tuple[int, str, str]

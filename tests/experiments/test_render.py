@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from taichi_ants.commands import render
 from taichi_ants.policies import save_policy, trail_follower
 
 ROOT = Path(__file__).parents[2]
@@ -225,11 +226,6 @@ def test_trails_of_a_colony_stay_without_evaporation(tmp_path, policy) -> None:
     [([], "paper"), (["--show", "colony"], "open"), (["--show", "colony", "--world", "x"], "x")],
 )
 def test_default_worlds(arguments, world) -> None:
-    sys.path.insert(0, str(SCRIPT.parent))
-    try:
-        import render
-    finally:
-        sys.path.remove(str(SCRIPT.parent))
     assert render.parse_arguments(arguments).world == world
 
 
@@ -244,11 +240,6 @@ def test_default_worlds(arguments, world) -> None:
     ],
 )
 def test_default_sizes(arguments, size) -> None:
-    sys.path.insert(0, str(SCRIPT.parent))
-    try:
-        import render
-    finally:
-        sys.path.remove(str(SCRIPT.parent))
     assert render.parse_arguments(arguments).size == size
 
 
@@ -276,7 +267,6 @@ def test_the_gallery_is_there_and_small() -> None:
     sys.path.insert(0, str(SCRIPT.parent))
     try:
         import gallery
-        import render
     finally:
         sys.path.remove(str(SCRIPT.parent))
     sizes = []

@@ -1,0 +1,371 @@
+"""The paper's comparison of Q-learning, SARSA and Dyna-Q, over many seeds, with honest statistics.
+
+Trains every configuration with every seed, follows the final policies greedily, holds the outcome
+against the paper and against exact bounds, and writes tables, figures and policies to a folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import itertools
+import sys
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from taichi_ants.command_line import (
+    ListAction,
+    Parser,
+    load_plugin,
+    number,
+    process_beside,
+    progress_bar,
+    run_command,
+    whole_number,
+)
+
+if TYPE_CHECKING:
+    from taichi_ants.analysis.comparison import Comparison
+    from taichi_ants.config import TrainingConfig
+    from taichi_ants.result_folder import ResultFolder
+    from taichi_ants.sweeps import Sweep, SweepResult
+
+DELIVERIES = ("continuing", "absorbing")
+ROLLOUTS = 50
+QUICK_SEEDS = 10
+MOST_SEEDS = 10_000
+REPORT, EPISODES, BASELINES = "report.txt", "episodes.npz", "baselines.csv"
+FIGURES, POLICIES, RENDERS = "figures", "policies", "renders"
+RENDERED_STEPS = 150  # at most; an ant that has learned needs 34
+
+
+def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
+    """The settings of the command line; the defaults are the paper's."""
+    parser = Parser(__doc__.split("\n", 1)[0])
+    add = parser.add_argument
+    add(
+        "--seeds", type=whole_number(1, MOST_SEEDS), default=100, metavar="N", help="how many seeds"
+    )
+    add("--seed", type=whole_number(), default=0, metavar="BASE", help="the first of them")
+    add(
+        "--episodes",
+        type=whole_number(1),
+        default=500,
+        metavar="N",
+        help="training episodes of a run",
+    )
+    add("--max-steps", type=whole_number(1), default=600, metavar="N", help="step limit")
+    add("--delivery", choices=(*DELIVERIES, "both"), default="both", help="what delivery means")
+    names = ("q_learning", "sarsa", "dyna_q")
+    add("--learners", action=ListAction, default=names, metavar="NAME", help="one or more")
+    lists = {
+        "--learning-rates": (0.001, 0.01),
+        "--discounts": (0.9, 0.99),
+        "--epsilons": (0.3, 0.5),
+        "--epsilon-decays": (0.99, 0.995),
+    }
+    for flag, values in lists.items():
+        add(flag, action=ListAction, item=number, default=values, metavar="X", help="one or more")
+    add(
+        "--planning-steps",
+        action=ListAction,
+        item=whole_number(1),
+        default=(3, 5),
+        metavar="N",
+        help="one or more, for learners that plan",
+    )
+    add("--world", default="paper", help="paper, open, or the path of a map file")
+    add("--world-seed", type=whole_number(), default=0, metavar="N", help="seed of an open world")
+    add("--plugin", metavar="FILE", help="a Python file that registers learners or worlds")
+    add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
+    add("--arch", choices=("cpu", "cuda"), default="cpu", help="where kernels run")
+    out = "for the results (default: results/compare, with --quick results/compare-quick)"
+    add("--out", type=Path, metavar="FOLDER", help=out)
+    add("--quick", action="store_true", help=f"at most {QUICK_SEEDS} seeds")
+    add("--force", action="store_true", help="replace what FOLDER holds")
+    add("--no-figures", action="store_true", help="draw no figures")
+    add("--no-render", action="store_true", help="show no episodes of the learned policies")
+    settings = parser.parse_args(arguments)
+    if settings.quick:
+        settings.seeds = min(settings.seeds, QUICK_SEEDS)
+    if settings.out is None:
+        settings.out = Path("results/compare-quick" if settings.quick else "results/compare")
+    return settings
+
+
+def configurations(settings: argparse.Namespace) -> tuple[TrainingConfig, ...]:
+    """The grid: learners and planning steps, times rates, discounts and exploration."""
+    from taichi_ants import TrainingConfig, learners
+
+    deliveries = DELIVERIES if settings.delivery == "both" else (settings.delivery,)
+    variants = [
+        (name, planning_steps)
+        for name in settings.learners
+        for planning_steps in (settings.planning_steps if learners.get(name).plans else (0,))
+    ]
+    grid = itertools.product(
+        settings.learning_rates, settings.discounts, settings.epsilons, settings.epsilon_decays
+    )
+    return tuple(
+        TrainingConfig(name, *values, planning_steps=planning_steps, delivery=delivery)
+        for delivery, (name, planning_steps), values in itertools.product(
+            deliveries, variants, tuple(grid)
+        )
+    )
+
+
+def build_sweep(settings: argparse.Namespace) -> Sweep:
+    """The work, checked as a whole before any of it is done."""
+    from taichi_ants import AntsError, worlds
+    from taichi_ants.analysis.comparison import Row
+    from taichi_ants.sweeps import Sweep
+
+    if settings.plugin:
+        load_plugin(settings.plugin)
+    configs = configurations(settings)
+    # The tables find configurations by six digits of their numbers.
+    rows = [Row.of(config) for config in configs]
+    if len({(row.delivery, row.variant, row.hyperparameters.key()) for row in rows}) < len(rows):
+        raise AntsError("two values of a list agree in six digits; leave one of them out.")
+    world = worlds.build(settings.world, settings.world_seed)
+    if not world.reachable_foods().any():
+        raise AntsError(
+            f"no food of the world {settings.world!r} can be reached from the queen; "
+            "open a way or choose another world."
+        )
+    seeds = tuple(range(settings.seed, settings.seed + settings.seeds))
+    return Sweep(world, configs, seeds, settings.episodes, settings.max_steps, ROLLOUTS)
+
+
+def world_name(settings: argparse.Namespace) -> str:
+    """The world for readers: a registered name with its seed, or the name of a map file."""
+    from taichi_ants import worlds
+
+    if settings.world in worlds.names():
+        return f"{settings.world}, world seed {settings.world_seed}"
+    return Path(settings.world).name
+
+
+def to_comparison(sweep: Sweep, result: SweepResult, world: str) -> Comparison:
+    """What the analysis reads; the world's name counts where it is not the paper's."""
+    from taichi_ants import worlds
+    from taichi_ants.analysis.comparison import PAPER_WORLD, Comparison, Row
+
+    return Comparison(
+        rows=tuple(Row.of(config) for config in sweep.configs),
+        seeds=sweep.seeds,
+        returns=result.returns,
+        steps=result.steps,
+        deliveries=result.deliveries,
+        greedy_returns=result.greedy_returns,
+        greedy_steps=result.greedy_steps,
+        greedy_deliveries=result.greedy_deliveries,
+        max_steps=sweep.max_steps,
+        world=PAPER_WORLD if sweep.world == worlds.paper() else world,
+    )
+
+
+def write_tables(
+    folder: Path, comparison: Comparison, baselines: list[dict[str, Any]], costs: list[dict]
+) -> str:
+    """Write all tables; the summary for the terminal."""
+    from taichi_ants import results
+    from taichi_ants.analysis import report, summary, table2
+    from taichi_ants.analysis.claims import assess, claims_markdown, claims_rows
+
+    lines = summary.summarise(comparison)
+    results.write_csv(folder / "summary.csv", lines, summary.SUMMARY_COLUMNS)
+    table = table2.table2(comparison)
+    results.write_csv(folder / "table2.csv", table, list(table[0]))
+    results.write_text(folder / "table2.md", table2.table2_markdown(table, comparison.world))
+    findings = assess(comparison)
+    rows = claims_rows(findings)
+    results.write_csv(folder / "claims.csv", rows, list(rows[0]))
+    results.write_text(folder / "claims.md", claims_markdown(findings, comparison.world))
+    return report.render(comparison, table, findings, baselines, costs)
+
+
+def write_episodes(folder: Path, comparison: Comparison) -> None:
+    """Write what each episode and rollout gave, in the order of summary.csv."""
+    from taichi_ants import results
+
+    names = ("returns", "steps", "deliveries", "greedy_returns", "greedy_steps")
+    arrays = {name: getattr(comparison, name) for name in (*names, "greedy_deliveries")}
+    results.write_npz(
+        folder / EPISODES, {name: results.smallest(array) for name, array in arrays.items()}
+    )
+
+
+def write_policies(folder: Path, sweep: Sweep, comparison: Comparison, tables: Any) -> None:
+    """Write the final Q-table of a median run per learner, in the first delivery setting."""
+    from dataclasses import asdict
+
+    import numpy as np
+
+    from taichi_ants import save_policy
+    from taichi_ants.analysis.best_of import best_position, paper_position
+
+    setting = comparison.delivery_settings[0]
+    returns = comparison.measure("return_last50")
+    for variant in comparison.variants:
+        row = paper_position(comparison, setting, variant)
+        if row is None:  # not of the paper: its best configuration here
+            row = best_position(comparison, comparison.positions(setting, variant))
+        run = int(np.argsort(returns[row], kind="stable")[(len(sweep.seeds) - 1) // 2])
+        metadata = {
+            "config": asdict(sweep.configs[row]),
+            "seed": sweep.seeds[run],
+            "episodes": sweep.episodes,
+            "max_steps": sweep.max_steps,
+            "return_last50": returns[row, run],
+        }
+        depth = f"_p{variant.planning_steps}" if variant.planning_steps else ""
+        save_policy(folder / f"{variant.learner}{depth}.npz", tables[row, run], metadata)
+
+
+def compare(settings: argparse.Namespace) -> None:
+    """Run the comparison, or show the finished one."""
+    from taichi_ants.provenance import file_hash, provenance, sweep_settings
+    from taichi_ants.result_folder import ResultFolder
+
+    sweep = build_sweep(settings)
+    plugin = file_hash(settings.plugin) if settings.plugin else None
+    facts = {**sweep_settings(sweep), "arch": settings.arch, "plugin": plugin}
+    folder = ResultFolder(settings.out, facts)
+    if folder.is_finished() and not settings.force:
+        show_finished(settings, sweep, folder)
+        return
+    began = time.perf_counter()
+    with folder.work(settings.force) as (blocks, ready):
+        manifest = do_comparison(settings, sweep, blocks, ready)
+        manifest["seconds"]["total"] = time.perf_counter() - began
+        folder.publish({**provenance(sys.argv), **manifest})
+    print((settings.out / REPORT).read_text("utf-8"))
+    print(f"{manifest['seconds']['total']:.1f} s; everything is in {settings.out}/")
+
+
+def do_comparison(
+    settings: argparse.Namespace, sweep: Sweep, blocks: Path, ready: Path
+) -> dict[str, Any]:
+    """All the work; what the manifest says of it."""
+    from functools import partial
+
+    from taichi_ants import results
+    from taichi_ants.analysis.baselines import BASELINE_COLUMNS, baseline_rows
+    from taichi_ants.engines.runs import evaluate
+    from taichi_ants.sweeps import run_sweep
+
+    laps = {"start": time.perf_counter()}
+    with progress_bar("training") as report_progress:
+        result = run_sweep(sweep, blocks, settings.threads, settings.arch, report_progress)
+    laps["training and evaluation"] = time.perf_counter()
+    comparison = to_comparison(sweep, result, world_name(settings))
+    baselines = baseline_rows(
+        sweep.world,
+        partial(evaluate, threads=settings.threads, arch=settings.arch),
+        sweep.seeds,
+        ROLLOUTS,
+        settings.discounts,
+        sweep.max_steps,
+    )
+    laps["baselines"] = time.perf_counter()
+    costs = [cost.as_row() for cost in result.costs]
+    write_episodes(ready, comparison)
+    results.write_csv(ready / BASELINES, baselines, BASELINE_COLUMNS)
+    with ExitStack() as beside:  # figures take one core and need no more than these two files
+        if not settings.no_figures:
+            beside.enter_context(process_beside(draw_figures, sweep, ready, ready))
+        text = write_tables(ready, comparison, baselines, costs)
+        results.write_text(ready / REPORT, text)
+        policies = results.check_writable_folder(ready / POLICIES)
+        write_policies(policies, sweep, comparison, result.q_values)
+        laps["tables"] = time.perf_counter()
+        if not settings.no_render:
+            render_policies(sweep, policies, ready)
+    laps["figures and renders"] = time.perf_counter()
+    marks = list(laps.items())
+    seconds = {name: end - marks[i][1] for i, (name, end) in enumerate(marks[1:])}
+    return {"cost_per_step": costs, "seconds": seconds}
+
+
+def draw_figures(sweep: Sweep, results: Path, folder: Path) -> None:
+    """Draw the figures of the comparison in one folder into the folder `figures` of another."""
+    from taichi_ants.analysis.figures import save_all
+
+    save_all(*read_back(results, sweep), folder / FIGURES)
+
+
+def render_policies(sweep: Sweep, policies: Path, folder: Path) -> None:
+    """Show a greedy episode of each policy that was written, in the folder `renders`."""
+    from taichi_ants import load_policy, results
+    from taichi_ants.analysis.comparison import Variant
+    from taichi_ants.rendering import render_episode
+
+    place = results.check_writable_folder(folder / RENDERS)
+    with progress_bar("rendering") as report_progress:
+        paths = sorted(policies.glob("*.npz"))
+        for done, path in enumerate(paths):
+            q_values, metadata = load_policy(path)
+            config = metadata["config"]
+            variant = Variant(config["learner"], config["planning_steps"])
+            render_episode(
+                place / f"{path.stem}.gif",
+                sweep.world,
+                q_values,
+                seed=metadata["seed"],
+                max_steps=min(sweep.max_steps, RENDERED_STEPS),
+                size=(720, 480),
+                title=f"{variant.label}, {config['delivery']}, seed {metadata['seed']}",
+            )
+            report_progress((done + 1) / len(paths))
+
+
+def show_finished(settings: argparse.Namespace, sweep: Sweep, folder: ResultFolder) -> None:
+    """Print the summary of a finished comparison; add figures and episodes that were left out."""
+    from taichi_ants import results
+
+    folder.check_whole(apart_from=(FIGURES, RENDERS))
+    print(results.read_text(settings.out / REPORT))
+    if not settings.no_render and folder.lacks(RENDERS):
+        with folder.addition() as place:
+            render_policies(sweep, settings.out / POLICIES, place)
+    if not settings.no_figures and folder.lacks(FIGURES):
+        with folder.addition() as place:
+            draw_figures(sweep, settings.out, place)
+    print(f"{settings.out}/ holds this comparison already; --force runs it again.")
+
+
+def read_back(folder: Path, sweep: Sweep) -> tuple[Comparison, list[dict[str, Any]]]:
+    """The comparison and the baselines that a folder holds."""
+    from taichi_ants import AntsError, results
+    from taichi_ants.analysis.baselines import BASELINE_COLUMNS
+    from taichi_ants.sweeps import SweepResult
+
+    try:
+        arrays = results.read_npz(folder / EPISODES)
+        arrays = {name: array.astype(int) for name, array in arrays.items()}
+        comparison = to_comparison(sweep, SweepResult(**arrays, q_values=None, costs=()), "another")
+        with open(folder / BASELINES, newline="", encoding="utf-8") as file:
+            lines = csv.DictReader(file)
+            baselines = [read_baseline(line) for line in lines]
+        if lines.fieldnames != list(BASELINE_COLUMNS):
+            raise ValueError("other columns")
+    except (AntsError, OSError, TypeError, ValueError, KeyError) as error:
+        raise AntsError(f"the results in {str(folder)!r} are damaged; give --force.") from error
+    return comparison, baselines
+
+
+def read_baseline(row: dict[str, str]) -> dict[str, Any]:
+    """A row of baselines.csv, with numbers and None for empty fields."""
+    words = ("baseline", "setting", "note")
+    return {
+        name: text if name in words else float(text) if text else None for name, text in row.items()
+    }
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """The command line."""
+    again = "Stopped; finished runs are kept, and the same command goes on from there."
+    run_command(lambda: compare(parse_arguments(arguments)), again)
