@@ -24,16 +24,21 @@ BEHAVIOURS: tuple[str, ...] = (
 )
 DELIVERS, WALKS, CIRCLES, OTHER = range(len(BEHAVIOURS))
 
-# The definition in words, for reports and captions.
-DEFINITION = (
-    "Each final policy is followed greedily once, with evaporation as in training.\n"
-    "delivers: the episode ends with a delivery. The others are told by the second\n"
-    "half of the episode. walks the trail: without food, at least every fourth step\n"
-    "leads onto a trail. circles beside the queen: with food, never more than 3\n"
-    "cells from her, at least every fourth step leads nearer to her. other: the rest."
+NAMES: tuple[str, ...] = tuple(name.replace(" ", "_") for name in BEHAVIOURS)  # of columns, files
+
+# What each of them means, for reports; of an episode without delivery its second half counts.
+DEFINITIONS: tuple[str, ...] = (
+    "the episode ends with a delivery",
+    "without food, at least every fourth step leads onto a trail",
+    "with food, at most 3 cells from her, at least every fourth step leads nearer",
+    "none of these",
 )
 _PAID_SHARE = 0.25
 _BESIDE = 3  # a circle of six cells that touches the queen reaches that far
+
+
+# What to say of means over runs that are not alike.
+MIXED = "the runs do different things, and no run has their mean"
 
 
 class Steps(Protocol):
@@ -60,7 +65,7 @@ class Steps(Protocol):
 
 
 def classify(world: World, trace: Steps, max_steps: int) -> tuple[np.ndarray, np.ndarray]:
-    """What the ant does in each episode of a trace, see `DEFINITION`, and what it earns.
+    """What the ant does in each episode of a trace, see `DEFINITIONS`, and what it earns.
 
     Rewards play no part in it, so it holds whatever the steps are paid.
 
@@ -89,6 +94,20 @@ def classify(world: World, trace: Steps, max_steps: int) -> tuple[np.ndarray, np
     behaviours = np.select([delivers, walks, circles], [DELIVERS, WALKS, CIRCLES], OTHER)
     returns = np.bincount(episode, weights=trace.rewards).astype(np.int64)
     return behaviours.astype(np.int8), returns
+
+
+def counts(behaviours: np.ndarray) -> dict[int, int]:
+    """How many runs do what, without what nobody does, in the order of `BEHAVIOURS`."""
+    number_of = np.bincount(np.ravel(behaviours), minlength=len(BEHAVIOURS)).tolist()
+    return {code: number for code, number in enumerate(number_of) if number}
+
+
+def mixture(behaviours: np.ndarray) -> str:
+    """The counts in words where runs do different things, "" where all do the same."""
+    found = counts(behaviours)
+    if len(found) < 2:
+        return ""
+    return ", ".join(f"{BEHAVIOURS[code]} {number}" for code, number in found.items())
 
 
 def _enters_lure(states: np.ndarray, actions: np.ndarray) -> np.ndarray:

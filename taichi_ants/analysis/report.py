@@ -11,6 +11,9 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import IO, TYPE_CHECKING, Any
 
+import numpy as np
+
+from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS, MIXED, counts, mixture
 from taichi_ants.analysis.best_of import Choice, Chosen, choice
 from taichi_ants.analysis.claims.assess import OTHER_WORLD, SIMULTANEOUS_LEVEL
 from taichi_ants.analysis.claims.model import WITHIN_MARGIN, Finding, Verdict
@@ -18,6 +21,7 @@ from taichi_ants.analysis.claims.tables import by_claim, tally
 from taichi_ants.analysis.comparison import Comparison, Variant
 from taichi_ants.analysis.markdown import MISSING, baseline_name, count, interval, number
 from taichi_ants.analysis.paper import GREEDY_RETURN, GREEDY_STEPS, VARIANTS
+from taichi_ants.analysis.summary import mean_returns
 from taichi_ants.analysis.table2 import means
 
 if TYPE_CHECKING:
@@ -75,6 +79,7 @@ def print_report(
         f"{count(comparison.episodes, 'episode')} of at most {comparison.max_steps} steps, "
         f"{count(comparison.rollouts, 'greedy rollout')} a run."
     )
+    console.print(comparison.conditions)
     choices = {
         (setting, variant): chosen
         for setting in comparison.delivery_settings
@@ -84,6 +89,7 @@ def print_report(
     sections = (
         *_table2(comparison, lines, choices),
         _greedy(comparison, choices),
+        *_behaviours(comparison, choices),
         _claims(findings) if comparison.in_paper_world else _no_claims(),
         _costs(costs),
         _baselines(baselines),
@@ -137,8 +143,8 @@ def _table2(comparison: Comparison, lines: Sequence[Mapping], choices: Choices) 
             chosen = choices.get((setting, variant))
             if line["delivery"] == setting and chosen is not None:
                 cells = _table2_cells(comparison, line, chosen, of_paper)
-                tables[-1].add_row(_marked(variant, chosen), *cells)
-    notes = _table2_notes(of_paper, choices)
+                tables[-1].add_row(_marked(comparison, variant, chosen), *cells)
+    notes = _table2_notes(of_paper, choices) + _mixed_note(comparison, choices)
     return [(table, notes if table is tables[-1] else "") for table in tables]
 
 
@@ -178,9 +184,23 @@ def _table2_notes(of_paper: bool, choices: Choices) -> str:
     return "\n".join(notes)
 
 
-def _marked(variant: Variant, chosen: Choice) -> str:
-    """The learner's name, with a star if its configuration is not the paper's."""
-    return variant.label + ("" if chosen.why is Chosen.PAPER else " *")
+def _marked(comparison: Comparison, variant: Variant, *chosen: Choice | None) -> str:
+    """The learner's name, with a star if a configuration is not the paper's, a + if it is mixed."""
+    star = any(one is not None and one.why is not Chosen.PAPER for one in chosen)
+    plus = any(_mixed(comparison, one) for one in chosen)
+    return variant.label + (" *" if star else "") + (" +" if plus else "")
+
+
+def _mixed(comparison: Comparison, chosen: Choice | None) -> bool:
+    """Whether the runs that are shown do different things."""
+    return chosen is not None and bool(
+        mixture(comparison.behaviours[chosen.position, chosen.seeds])
+    )
+
+
+def _mixed_note(comparison: Comparison, choices: Choices) -> str:
+    mixed = any(_mixed(comparison, chosen) for chosen in choices.values())
+    return f"\n+ {MIXED}: see what the ants do" if mixed else ""
 
 
 def _with_range(line: Mapping, stem: str, *names: str) -> str:
@@ -211,15 +231,53 @@ def _greedy(comparison: Comparison, choices: Choices) -> Section:
                 if one is not None:
                     value = float(comparison.measure(measure)[one.position, one.seeds].mean())
                 cells.append(number(value, digits))
-        star = any(one is not None and one.why is not Chosen.PAPER for one in chosen)
-        table.add_row(variant.label + (" *" if star else ""), *cells)
+        table.add_row(_marked(comparison, variant, *chosen), *cells)
     if not table.row_count:
         return table, ""
     notes = "Configurations and seeds as in the tables above, means over seeds."
     if comparison.in_paper_world:
         low, high = GREEDY_STEPS
         notes += f"\nThe paper: about {GREEDY_RETURN:g} reward in {low:g} to {high:g} steps."
-    return table, notes
+    return table, notes + _mixed_note(comparison, choices)
+
+
+def _behaviours(comparison: Comparison, choices: Choices) -> list[Section]:
+    """What the final policies do, one table for each delivery setting, explained after the last."""
+    headers = ("Learner", "Behaviour", "Runs", "Return\ntraining", "followed", "greedy", "All")
+    tables = []
+    for setting in comparison.delivery_settings:
+        title = f"What the ants do, {setting} delivery"
+        tables.append(_table(title, headers, text_columns=2, gap=1))
+        for variant in sorted(comparison.variants, key=_order(comparison)):
+            chosen = choices.get((setting, variant))
+            if chosen is None:
+                continue
+            label = _marked(comparison, variant, chosen)
+            positions = comparison.positions(setting, variant)
+            for code, number_of in counts(comparison.behaviours[positions]).items():
+                cells = _behaviour_cells(comparison, chosen, code)
+                tables[-1].add_row(label, BEHAVIOURS[code], *cells, str(number_of))
+                label = ""
+    notes = (
+        f"Each final policy is followed greedily once, {comparison.as_trained}.",
+        *(f"{BEHAVIOURS[code]}: {DEFINITIONS[code]}" for code in counts(comparison.behaviours)),
+        "An episode without delivery is told by its second half.",
+        "runs and their mean returns: configurations and seeds as in the tables above",
+        "training: the last 50 episodes; followed: the episode that tells the behaviour",
+        "greedy: the greedy evaluation above; all: runs in all configurations",
+    )
+    return [(table, "\n".join(notes) if table is tables[-1] else "") for table in tables]
+
+
+def _behaviour_cells(comparison: Comparison, chosen: Choice, code: int) -> list[str]:
+    """How many of the runs that are shown behave so, and what these return."""
+    shown = np.arange(len(comparison.seeds))[chosen.seeds]
+    alike = shown[comparison.behaviours[chosen.position, shown] == code]
+    if not alike.size:
+        return ["0", *[MISSING] * 3]
+    means = mean_returns(comparison, chosen.position, alike)
+    names = ("return_last50_mean", "policy_return_mean", "greedy_return_mean")
+    return [str(alike.size), *(number(means[name]) for name in names)]
 
 
 def _order(comparison: Comparison) -> Callable[[Variant], int]:

@@ -12,6 +12,7 @@ import math
 
 import numpy as np
 
+from taichi_ants.analysis.behaviour import MIXED, mixture
 from taichi_ants.analysis.best_of import DRAWS, best_of, held_out, paper_position, percentile_of
 from taichi_ants.analysis.comparison import PAPER_WORLD, Comparison, Variant
 from taichi_ants.analysis.markdown import MISSING, interval, number, table
@@ -81,13 +82,17 @@ def _held_out(comparison: Comparison, delivery: str, variant: Variant) -> dict:
 
 
 def means(comparison: Comparison, stem: str, position: int | None, seeds: slice) -> dict:
-    """Means over seeds with 95 % intervals of one row of the comparison."""
+    """Means over seeds with 95 % intervals of one row of the comparison.
+
+    Where its policies do different things, `behaviours` says how many do what, else it is "".
+    """
     middle = low = high = np.full(len(FIGURES), np.nan)
     if position is not None:
         rows = [comparison.measure(measure)[position, seeds] for measure in FIGURES.values()]
         middle = np.mean(rows, axis=1)
         low, high = bootstrap_interval(np.array(rows))
-    columns = {}
+    mixed = "" if position is None else mixture(comparison.behaviours[position, seeds])
+    columns: dict[str, float | str] = {f"{stem}_behaviours": mixed}
     for place, name in enumerate(FIGURES):
         columns[f"{stem}_{name}_mean"] = float(middle[place])
         columns[f"{stem}_{name}_ci_low"] = float(low[place])
@@ -119,15 +124,16 @@ def _paper_figures(comparison: Comparison, variant: Variant) -> list[tuple[str, 
     return [(name, figures[f"paper_{name}"]) for name in FIGURES]
 
 
-def table2_markdown(lines: list[dict], world: str = PAPER_WORLD) -> str:
+def table2_markdown(lines: list[dict], world: str = PAPER_WORLD, conditions: str = "") -> str:
     """The list of `table2` as Markdown: tables, each with a sentence that explains it.
 
     Args:
         lines: The list.
         world: The world's name; outside of the paper's there is no table of its configurations.
+        conditions: Where trails evaporated, see `Comparison.conditions`.
     """
     of_paper = world == PAPER_WORLD
-    parts = [f"World: {world}.\n"]
+    parts = [f"{line}\n" for line in (f"World: {world}.", conditions) if line]
     if of_paper:
         seeds = max((line["seeds"] for line in lines), default=0)
         ours = (
@@ -136,6 +142,7 @@ def table2_markdown(lines: list[dict], world: str = PAPER_WORLD) -> str:
         parts += [
             f"The paper's configurations. Its figures are single runs; ours are {ours}.\n",
             _same_table(lines),
+            *_mixtures(lines, "same"),
         ]
     parts += [
         "Training each configuration once and reporting the best by return, repeated with "
@@ -153,6 +160,7 @@ def table2_markdown(lines: list[dict], world: str = PAPER_WORLD) -> str:
             "the other half, with 95 % intervals: what choosing the best is worth without its "
             "luck.\n",
             _held_out_table(lines),
+            *_mixtures(lines, "held_out"),
         ]
     return "\n".join(parts)
 
@@ -168,6 +176,17 @@ def _cell(line: dict, stem: str) -> list[str]:
         mean = number(line[f"{stem}_{name}_mean"], digits)
         cells.append(f"{mean} {interval(low, high, digits)}" if mean != MISSING else MISSING)
     return cells
+
+
+def _mixtures(lines: list[dict], stem: str) -> list[str]:
+    """A paragraph on the lines whose means are over runs that do different things, if any."""
+    mixed = [
+        f"{', '.join(_name(line))}: {line[f'{stem}_behaviours']}"
+        for line in lines
+        if line[f"{stem}_behaviours"]
+    ]
+    # Two blanks break the line in Markdown.
+    return ["  \n".join([f"Here {MIXED}:", *mixed]) + "\n"] if mixed else []
 
 
 def _same_table(lines: list[dict]) -> str:
