@@ -259,7 +259,7 @@ def _behaviours(comparison: Comparison, choices: Choices) -> list[Section]:
                 tables[-1].add_row(label, BEHAVIOURS[code], *cells, str(number_of))
                 label = ""
     notes = (
-        f"Each final policy is followed greedily once, {comparison.as_trained}.",
+        f"Each policy is followed greedily once, {comparison.as_trained}.",
         *(f"{BEHAVIOURS[code]}: {DEFINITIONS[code]}" for code in counts(comparison.behaviours)),
         "An episode without delivery is told by its second half.",
         "runs and their mean returns: configurations and seeds as in the tables above",

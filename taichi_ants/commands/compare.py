@@ -77,9 +77,9 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
         help="one or more, for learners that plan",
     )
     switch = {"choices": ("on", "off"), "metavar": "on|off"}
-    words = "evaporation of trails in training (default: off, as in the paper)"
+    words = "evaporation of trails in training; off in the paper"
     add("--train-evaporation", default="off", help=words, **switch)
-    words = "evaporation in the greedy evaluation (default: on, as in the paper)"
+    words = "evaporation in the greedy evaluation; on in the paper"
     add("--greedy-evaporation", default="on", help=words, **switch)
     add("--world", default="paper", help="paper, open, or the path of a map file")
     add("--world-seed", type=whole_number(), default=0, metavar="N", help="seed of an open world")
