@@ -38,7 +38,7 @@ QUICK_SEEDS = 10
 MOST_SEEDS = 10_000
 REPORT, EPISODES, BASELINES = "report.txt", "episodes.npz", "baselines.csv"
 FIGURES, POLICIES, RENDERS = "figures", "policies", "renders"
-RENDERED_STEPS = 150  # at most; an ant that has learned needs 34
+RENDERED_STEPS = 80  # at most; a delivery takes 34, to and fro on the trail 38
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -349,7 +349,6 @@ def render_policies(sweep: Sweep, policies: Path, folder: Path) -> None:
     training, not as in the greedy evaluation.
     """
     from taichi_ants import load_policy, results
-    from taichi_ants.analysis.comparison import Variant
     from taichi_ants.rendering import render_episode
 
     place = results.check_writable_folder(folder / RENDERS)
@@ -357,8 +356,6 @@ def render_policies(sweep: Sweep, policies: Path, folder: Path) -> None:
         paths = sorted(policies.glob("*.npz"))
         for done, path in enumerate(paths):
             q_values, metadata = load_policy(path)
-            config = metadata["config"]
-            variant = Variant(config["learner"], config["planning_steps"])
             render_episode(
                 place / f"{path.stem}.gif",
                 sweep.world,
@@ -367,7 +364,7 @@ def render_policies(sweep: Sweep, policies: Path, folder: Path) -> None:
                 max_steps=min(sweep.max_steps, RENDERED_STEPS),
                 evaporation=sweep.train_evaporation,
                 size=(720, 480),
-                title=f"{variant.label}, {config['delivery']}: {metadata['behaviour']}",
+                title=metadata["behaviour"],
             )
             report_progress((done + 1) / len(paths))
 

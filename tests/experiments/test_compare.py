@@ -277,7 +277,7 @@ def test_pictures_show_the_episode_that_told_the_behaviour(finished, tmp_path):
     name = "continuing_sarsa_other"
     q_values, metadata = load_policy(finished / "policies" / f"{name}.npz")
     shown = (finished / "renders" / f"{name}.gif").read_bytes()
-    look = {"size": (720, 480), "title": "SARSA, continuing: other"}
+    look = {"size": (720, 480), "title": "other"}
     for evaporation in (False, True):
         path = tmp_path / f"{evaporation}.gif"
         more = {"seed": metadata["seed"], "max_steps": MAX_STEPS, "evaporation": evaporation}
