@@ -119,7 +119,9 @@ def trace_policies(
         AntsError: An argument is not allowed; the message names it.
     """
     tables = checks.checked_q_values(q_values)
-    per_policy = max(checks.checked_max_steps(max_steps), world.grid.size)
+    checks.checked_world(world)
+    # A step takes ten times as much memory as a cell of the world.
+    per_policy = max(checks.checked_max_steps(max_steps), world.grid.size // 10)
     for first in range(0, len(tables), size := max(1, MAX_ROLLOUT_STEPS // per_policy)):
         some = tables[first : first + size]
         words = np.array(seeds[first : first + size], dtype=object)

@@ -109,7 +109,7 @@ def test_traces_of_many_policies_are_single_rollouts():
 def test_traces_come_in_pieces_of_bounded_size(monkeypatch):
     tables = [table for table, _ in CASES.values()]
     (whole,) = trace_policies(paper(), tables, range(7), 50)
-    monkeypatch.setattr("taichi_ants.engines.traces.MAX_ROLLOUT_STEPS", 3 * paper().grid.size)
+    monkeypatch.setattr("taichi_ants.engines.traces.MAX_ROLLOUT_STEPS", 3 * 50)
     pieces = list(trace_policies(paper(), tables, range(7), 50))
     assert [np.unique(piece.episodes).tolist() for piece in pieces] == [[0, 1, 2], [3, 4, 5], [6]]
     for name in ("episodes", "steps", "states", "q_values"):
