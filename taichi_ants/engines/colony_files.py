@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _FORMAT = "taichi-ants colony 1"
 # What the worlds and configurations determine is not stored.
-_DERIVED = frozenset({"walls", "closer", "compass", "weights", "spare", "seeds"})
+_DERIVED = frozenset({"walls", "closer", "compass", "rewards", "weights", "spare", "seeds"})
 # What numbers, texts and arrays that mean nothing lead to while a colony is built from them.
 _SIGNS_OF_DAMAGE = (
     *(AntsError, ArithmeticError, AttributeError, LookupError, RecursionError, TypeError),

@@ -12,7 +12,7 @@ import numpy as np
 
 from taichi_ants import learners, runtime
 from taichi_ants.config import TrainingConfig
-from taichi_ants.constants import N_ACTIONS
+from taichi_ants.constants import DELIVERED, N_ACTIONS
 from taichi_ants.engines import checks
 from taichi_ants.engines.results import RunState
 from taichi_ants.engines.run_engine import RunEngine
@@ -174,7 +174,7 @@ def _trace(
     engine = RunEngine(checks.checked_world(world), max_steps, evaporation, runtime.start())
     before = state.q.copy()
     runs, integers, errors, tables = engine.trace(learner, seeds, rates, state, episodes, streams)
-    (episode, step, cell, heading, states, action, reward, seen, ended, delivered) = integers.T
+    (episode, step, cell, heading, states, action, reward, seen, ended, event) = integers.T
     chosen_from, number = before, runs
     if learner is not None:
         chosen_from, number = np.concatenate([before, tables[:-1]]), np.arange(len(states))
@@ -188,7 +188,7 @@ def _trace(
         rewards=reward,
         next_states=seen,
         terminated=ended.astype(bool),
-        delivered=delivered.astype(bool),
+        delivered=event == DELIVERED,
         q_values=chosen_from[number, states, :N_ACTIONS],
         td_errors=None if learner is None else errors,
         tables=None if learner is None else tables[:, :, :N_ACTIONS],

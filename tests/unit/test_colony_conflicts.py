@@ -26,7 +26,8 @@ def ants(colony: Colony) -> list[tuple[tuple[int, ...], int, int, int]]:
     """Cell, heading, carries and reward of each ant."""
     table = colony.arrays["ants"]
     cells = colony.snapshot().grid.cells(table[names.CELL]).tolist()
-    rows = (table[names.HEADING], table[names.CARRIES], table[names.REWARD])
+    rewards = colony.arrays["rewards"][table[names.EVENT]]
+    rows = (table[names.HEADING], table[names.CARRIES], rewards)
     return [(tuple(cell), *map(int, row)) for cell, *row in zip(cells, *rows, strict=True)]
 
 
