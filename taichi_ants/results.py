@@ -16,9 +16,21 @@ from typing import Any, BinaryIO
 import numpy as np
 import numpy.typing as npt
 
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, shown
 
 PathLike = str | os.PathLike[str]
+
+
+def checked_path(path: PathLike) -> str:
+    """The name of a file. Numbers are none: they would be taken for files that are open already.
+
+    Raises:
+        AntsError: It is no text and no path.
+    """
+    name = os.fspath(path) if isinstance(path, os.PathLike) else path
+    if not isinstance(name, str):
+        raise AntsError(f"the path is {shown(path)}; it must be the name of a file.")
+    return name
 
 
 def write_atomically(path: PathLike, writer: Callable[[BinaryIO], None]) -> None:
@@ -32,7 +44,7 @@ def write_atomically(path: PathLike, writer: Callable[[BinaryIO], None]) -> None
     Raises:
         AntsError: The file cannot be written. Other exceptions of the writer pass through.
     """
-    name = os.fspath(path)
+    name = checked_path(path)
     if "\0" in name:
         raise AntsError(f"{name!r} contains a null character; name a file to write to.")
     temporary: Path | None = None
@@ -72,7 +84,7 @@ def read_text(path: PathLike) -> str:
         AntsError: The file cannot be read, or holds no text.
     """
     try:
-        return Path(path).read_text("utf-8")
+        return Path(checked_path(path)).read_text("utf-8")
     except (OSError, UnicodeError) as error:
         raise AntsError(
             f"cannot read {os.fspath(path)!r}: {_reason(error)}; give --force to write it again."
@@ -139,7 +151,7 @@ def read_npz(path: PathLike) -> dict[str, np.ndarray]:
         AntsError: The file is missing, unreadable, damaged, or no .npz of plain arrays.
     """
     try:
-        with open(path, "rb") as file:
+        with open(checked_path(path), "rb") as file:
             archive = np.load(file, allow_pickle=False)
             if not isinstance(archive, np.lib.npyio.NpzFile):
                 raise ValueError("it holds a single array")
@@ -147,6 +159,8 @@ def read_npz(path: PathLike) -> dict[str, np.ndarray]:
                 arrays = {name: archive[name] for name in archive.files}
     except OSError as error:
         raise AntsError(f"cannot read {str(path)!r}: {_reason(error)}.") from error
+    except AntsError:
+        raise
     # A damaged archive fails in many ways (zipfile, zlib, struct, tokenize, memory ...).
     except Exception as error:
         raise AntsError(
@@ -169,7 +183,7 @@ def check_writable_folder(path: PathLike) -> Path:
     Raises:
         AntsError: The folder cannot be created or written to.
     """
-    folder = Path(path)
+    folder = Path(checked_path(path))
     created: list[Path] = []
     try:
         _create_folders(folder, created)

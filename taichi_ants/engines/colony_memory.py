@@ -34,7 +34,10 @@ class Layout:
         self.closer = np.stack([world.closer() for world in worlds])
         self.compass = compass_of(self.grid)
         self.queens = np.array([int(self.grid.index(world.queen)) for world in worlds], np.int32)
-        starts = [world.start(seed, config.ants) for world, seed in zip(worlds, seeds, strict=True)]
+        starts = [
+            world.start(seed, config.ants, config.start)
+            for world, seed in zip(worlds, seeds, strict=True)
+        ]
         self.start_cells = np.stack([cells for cells, _ in starts])
         self.start_headings = np.stack([headings for _, headings in starts])
         moving = config.regrowth is not None or config.wander is not None

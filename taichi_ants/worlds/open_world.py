@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, shown
 from taichi_ants.hexgrid import AxialGrid, axial, cube
 from taichi_ants.randomness import Stream, choose
 from taichi_ants.worlds.validation import parse_ranges
@@ -76,7 +76,7 @@ def _share(name: str, value: object) -> float:
     except (TypeError, ValueError):
         share = np.nan
     if isinstance(value, (bool, str)) or not 0 <= share <= MAX_SHARE:
-        raise AntsError(f"{name} is {value!r}; it must be a number between 0 and {MAX_SHARE}.")
+        raise AntsError(f"{name} is {shown(value)}; it must be a number between 0 and {MAX_SHARE}.")
     return share
 
 

@@ -16,6 +16,7 @@ from taichi_ants import (
 )
 from taichi_ants.engines.checks import checked_count, checked_seeds, checked_seeds_for
 from taichi_ants.engines.launches import plan_launches
+from taichi_ants.errors import shown
 from taichi_ants.worlds import World, paper
 
 CONFIG = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 0.99)
@@ -141,7 +142,7 @@ def test_counts_of_any_kind_of_integer():
 @pytest.mark.parametrize("value", [-0.1, 1.1, float("nan"), "0.5", None, True, [0.5], 10**400])
 def test_epsilon(value):
     for function in (evaluate, rollout):
-        says(f"epsilon is {value!r}", function, paper(), TABLE, epsilon=value)
+        says(f"epsilon is {shown(value)}", function, paper(), TABLE, epsilon=value)
 
 
 @pytest.mark.parametrize(
