@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from taichi_ants import learners
+from taichi_ants import learners, rewards
 from taichi_ants.config import TrainingConfig, share_of_one
 from taichi_ants.constants import MAX_STEPS, N_ACTIONS, N_STATES
 from taichi_ants.errors import AntsError, shown
@@ -105,8 +105,9 @@ def checked_count(name: str, value: int, most: int = 2**31 - 1, least: int = 1) 
 
 
 def checked_max_steps(value: int) -> int:
-    """The step limit of an episode."""
-    return checked_count("max_steps", value, MAX_STEPS)
+    """The step limit of an episode, whose return must fit into 32 bits."""
+    most = (2**31 - 1) // max(1, rewards.REWARDS.largest)
+    return checked_count("max_steps", value, min(MAX_STEPS, most))
 
 
 def checked_share(name: str, value: float) -> float:

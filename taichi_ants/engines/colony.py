@@ -236,7 +236,7 @@ class Colony:
 
         rows = {
             "ticks": names.TICKS,
-            "deliveries": names.DELIVERED,
+            "deliveries": names.DELIVERIES,
             "first_delivery": names.FIRST_DELIVERY,
             "moves": names.MOVES,
             "blocked": names.BLOCKED,

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 _KIND = FileKind("taichi-ants colony 2", "colony", "Colony.save")
 # What the worlds and configurations determine is not stored.
-_DERIVED = frozenset({"walls", "closer", "compass", "weights", "spare", "seeds"})
+_DERIVED = frozenset({"walls", "closer", "compass", "rewards", "weights", "spare", "seeds"})
 
 
 def save_colony(colony: Colony, path: results.PathLike) -> None:

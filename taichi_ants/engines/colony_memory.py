@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from taichi_ants import rewards
 from taichi_ants.colony_config import ColonyConfig, update_weights
 from taichi_ants.config import TrainingConfig
 from taichi_ants.constants import N_ACTIONS, N_STATES, STREAM_ANT, STREAM_QUEEN
@@ -105,6 +106,7 @@ def allocate(
         "worlds": np.zeros((names.WORLD_ROWS, n_worlds), np.int32),
         "queen_streams": np.atleast_1d(stream_state(seeds, STREAM_QUEEN, 0)).astype(np.uint64),
         "seeds": seeds.copy(),
+        "rewards": rewards.REWARDS.by_event(),
         "returns": np.zeros(n_worlds, np.int64),
         "tallies": np.zeros((names.TALLY_ROWS, n_worlds * chunks), np.int32),
         "homes": np.zeros((names.HOME_ROWS, max(1, n_worlds * homes)), np.int32),

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from taichi_ants import runtime
+from taichi_ants import rewards, runtime
 from taichi_ants.engines.launches import Launch, plan_launches
 from taichi_ants.engines.packing import compass_of, pack_cells
 from taichi_ants.engines.results import RunState
@@ -37,7 +37,12 @@ class RunEngine:
         self._evaporation = evaporation
         self._settings = settings
         self._size = world.grid.size
-        self._shared = (pack_cells(world), world.closer().copy(), compass_of(world.grid))
+        self._shared = (
+            pack_cells(world),
+            world.closer().copy(),
+            compass_of(world.grid),
+            rewards.REWARDS.by_event(),
+        )
 
     def run(
         self,

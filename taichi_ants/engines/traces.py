@@ -11,7 +11,7 @@ import numpy as np
 
 from taichi_ants import learners, runtime
 from taichi_ants.config import TrainingConfig
-from taichi_ants.constants import N_ACTIONS, N_STATES
+from taichi_ants.constants import DELIVERED, N_ACTIONS, N_STATES
 from taichi_ants.engines import checks
 from taichi_ants.engines.records import Record
 from taichi_ants.engines.results import RunState
@@ -142,7 +142,7 @@ def _trace(
     engine = RunEngine(checks.checked_world(world), max_steps, bool(evaporation), runtime.start())
     before = state.q[0].copy()
     integers, errors, tables = engine.trace(learner, seeds, rates, state, episodes, streams)
-    (episode, step, cell, heading, states, action, reward, seen, ended, delivered) = integers.T
+    (episode, step, cell, heading, states, action, reward, seen, ended, event) = integers.T
     rows = np.arange(len(states))
     chosen_from = np.broadcast_to(before, (len(states), N_STATES, before.shape[-1]))
     if learner is not None:
@@ -157,7 +157,7 @@ def _trace(
         rewards=reward,
         next_states=seen,
         terminated=ended.astype(bool),
-        delivered=delivered.astype(bool),
+        delivered=event == DELIVERED,
         q_values=chosen_from[rows, states, :N_ACTIONS].copy(),
         td_errors=None if learner is None else errors,
         tables=None if learner is None else tables[:, :, :N_ACTIONS],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from random_rewards import put_in_force, random_rewards
 from random_worlds import random_world
 
 from taichi_ants import Colony, ColonyConfig, Pheromone, TrainingConfig
@@ -89,7 +90,7 @@ def assert_equal(colony: Colony, plain: ReferenceColony) -> None:
         assert (mine[names.HEADING], mine[names.CARRIES]) == (ant.heading, ant.carries)
         assert (mine[names.NUMBER], mine[names.AGE]) == (ant.number, ant.age)
         assert (mine[names.STATE], int(arrays["streams"][slot])) == (ant.state, ant.rng_state)
-        assert ant.action < 0 or mine[names.REWARD] == ant.reward
+        assert ant.action < 0 or arrays["rewards"][mine[names.EVENT]] == ant.reward
     existing = np.array(list(theirs.ground), dtype=np.int64).reshape(-1, 3)
     places = grid.index(existing)
     assert ours.ground[places].tolist() == list(theirs.ground.values())
@@ -119,12 +120,13 @@ def assert_equal_records(colony: Colony, theirs) -> None:
 
 
 @pytest.mark.parametrize(("learner", "planning_steps", "sharing", "dense"), KERNELS)
-def test_every_tick_in_crowded_micro_worlds(learner, planning_steps, sharing, dense):
+def test_every_tick_in_crowded_micro_worlds(learner, planning_steps, sharing, dense, monkeypatch):
     """More than 1000 micro-worlds in all, two episodes each: something goes on between them."""
     happened = np.zeros(5, dtype=int)
     for seed in range(86):
         world, config = random_colony(seed, dense)
         training = random_training(seed, learner, planning_steps)
+        put_in_force(monkeypatch, random_rewards(seed))
         table = random_policy() if sharing == "fixed" else None
         colony = Colony(world, config, training, seed - 3, sharing, table)
         plain = ReferenceColony(world, config, training, seed - 3, sharing)

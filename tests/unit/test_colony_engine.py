@@ -27,9 +27,8 @@ def levels_after(pheromone: Pheromone, ticks: int, level: int = 400) -> np.ndarr
         ants=[((0, 0, 11), 0)],
     )
     training = TrainingConfig("q_learning", 0.1, 0.9, 0.0, 1.0)
-    colony = Colony(
-        world, ColonyConfig(ants=1, pheromone=pheromone), training, 0, "fixed", random_policy()
-    )
+    life = ColonyConfig(ants=1, pheromone=pheromone)
+    colony = Colony(world, life, training, 0, "fixed", random_policy())
     colony.begin_episode()
     colony.tick(ticks)
     return colony.snapshot().trail

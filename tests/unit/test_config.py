@@ -12,6 +12,7 @@ import pytest
 
 from taichi_ants import AntsError, TrainingConfig
 from taichi_ants.config import share_of_one
+from taichi_ants.errors import shown
 
 GOOD = {
     **{"learner": "dyna_q", "learning_rate": 0.1, "discount": 0.9, "epsilon": 0.3},
