@@ -179,7 +179,8 @@ class TrainingResult(Record):
         runs = (len(self.configs), len(self.seeds))
         plans = any(config.planning_steps for config in self.configs)
         model = (*runs, _PAIRS if plans or np.shape(self.state.slots)[2:] == (_PAIRS,) else 1)
-        outcome = ("int32", (*runs, *np.shape(self.returns)[2:3]))
+        episodes = np.shape(self.returns)[2] if np.ndim(self.returns) == 3 else 0
+        outcome = ("int32", (*runs, episodes))
         forms = {
             **dict.fromkeys(("returns", "steps", "deliveries"), outcome),
             "q": ("float32", (*runs, N_STATES, 8)),
