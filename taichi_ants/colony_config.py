@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
@@ -195,8 +196,14 @@ def _number(value: object) -> float:
 
 
 def _check_whole(name: str, value: object, least: int, most: int, otherwise: str = "") -> None:
-    if isinstance(value, bool) or not hasattr(value, "__index__"):
-        raise AntsError(f"{name} is {shown(value)}; it must be a whole number{otherwise}.")
+    try:
+        if isinstance(value, (bool, np.bool_)):
+            raise TypeError
+        operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        raise AntsError(
+            f"{name} is {shown(value)}; it must be a whole number{otherwise}."
+        ) from None
     if not least <= value <= most:
         raise AntsError(
             f"{name} is {shown(value)}; it must lie between {least} and {most}{otherwise}."

@@ -46,13 +46,13 @@ def write_atomically(path: PathLike, writer: Callable[[BinaryIO], None]) -> None
     """
     name = checked_path(path)
     if "\0" in name:
-        raise AntsError(f"{name!r} contains a null character; name a file to write to.")
+        raise AntsError(f"{_named(name)} contains a null character; name a file to write to.")
     temporary: Path | None = None
     try:
         target = Path(os.path.realpath(name))
         # Replacing a device, a pipe or a folder would destroy it or fail.
         if target.exists() and not target.is_file():
-            raise AntsError(f"{name!r} is not a regular file; name a file to write to.")
+            raise AntsError(f"{_named(name)} is not a regular file; name a file to write to.")
         # Not derived from the file's name: it fits even if that one has the greatest length.
         temporary = target.parent / f".{secrets.token_hex(8)}.tmp"
         with open(temporary, "xb") as file:
@@ -60,7 +60,7 @@ def write_atomically(path: PathLike, writer: Callable[[BinaryIO], None]) -> None
         os.replace(temporary, target)
     except (OSError, UnicodeError) as error:
         raise AntsError(
-            f"cannot write {name!r}: {_reason(error)}; choose another place."
+            f"cannot write {_named(name)}: {_reason(error)}; choose another place."
         ) from error
     finally:
         if temporary is not None:
@@ -158,16 +158,16 @@ def read_npz(path: PathLike) -> dict[str, np.ndarray]:
             with archive:
                 arrays = {name: archive[name] for name in archive.files}
     except OSError as error:
-        raise AntsError(f"cannot read {str(path)!r}: {_reason(error)}.") from error
+        raise AntsError(f"cannot read {_named(path)}: {_reason(error)}.") from error
     except AntsError:
         raise
     # A damaged archive fails in many ways (zipfile, zlib, struct, tokenize, memory ...).
     except Exception as error:
         raise AntsError(
-            f"{str(path)!r} is damaged or not an .npz file; write it again or name another file."
+            f"{_named(path)} is damaged or not an .npz file; write it again or name another file."
         ) from error
     if not all(isinstance(array, np.ndarray) for array in arrays.values()):
-        raise AntsError(f"{str(path)!r} holds more than arrays; name an .npz file.")
+        raise AntsError(f"{_named(path)} holds more than arrays; name an .npz file.")
     return arrays
 
 
@@ -196,7 +196,7 @@ def check_writable_folder(path: PathLike) -> Path:
             for made in reversed(created):
                 made.rmdir()
         raise AntsError(
-            f"cannot write to the folder {str(path)!r}: {_reason(error)}; choose another folder."
+            f"cannot write to the folder {_named(path)}: {_reason(error)}; choose another folder."
         ) from error
     return folder
 
@@ -221,6 +221,11 @@ def _create_folder(folder: Path, created: list[Path]) -> None:
             raise
     else:
         created.append(folder)
+
+
+def _named(path: PathLike) -> str:
+    """A path for a message, whole unless it is longer than most systems allow."""
+    return shown(str(path), 400)
 
 
 def _reason(error: Exception) -> str:

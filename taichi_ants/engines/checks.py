@@ -123,7 +123,7 @@ def checked_q_values(q_values: np.ndarray) -> np.ndarray:
         if np.iscomplexobj(q_values):
             raise TypeError
         tables = np.asarray(q_values, dtype=np.float32)
-    except (TypeError, ValueError):
+    except (OverflowError, TypeError, ValueError):
         raise AntsError(
             "q_values is not an array of numbers; give a float (..., 128, 5) array."
         ) from None

@@ -44,7 +44,7 @@ def _free_cells(world: World, seed: int, n: int, taken: np.ndarray, where: str) 
     index = np.flatnonzero(free)
     if n > len(index):
         raise AntsError(
-            f"{n + len(taken)} ants are asked for; this world has room for "
+            f"{shown(n + len(taken))} ants are asked for; this world has room for "
             f"{len(index) + len(taken)}, so ask for fewer ants or choose a larger world."
         )
     if where == "nest":
