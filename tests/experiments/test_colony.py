@@ -291,6 +291,29 @@ def test_a_colony_starts_from_a_policy(finished, capsys):
     assert call("colony", [*fixed, "--policy", policy, "--regrowth", 0], capsys)[0] == 0
 
 
+def test_colonies_live_side_by_side_and_can_start_spread(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    where = ["--ranges", 20, 20, 20, "--regrowth", 0, "--ticks", 60, "--seed", 3, "--save", "x.npz"]
+    for place in ("nest", "spread"):
+        many = ["--ants", 9, "--colonies", 5, "--start", place]
+        status, out, err = call("colony", [*many, *where], capsys)
+        assert (status, err) == (0, "")
+        assert out.startswith("45 ants in 5 colonies, 60 ticks: ")
+        colony = Colony.load("x.npz")
+        assert colony.config == ColonyConfig(9, regrowth=0, start=place)
+        assert colony.seeds == (3, 4, 5, 6, 7)
+        world = worlds.open_world(3, (20, 20, 20))
+        assert set(colony.worlds) == {world}
+        training = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0, 0.1, delivery="continuing")
+        alone = Colony(world, colony.config, training, 5)
+        alone.begin_episode()
+        alone.tick(60)
+        assert alone.outcome().deliveries[0, 0] == colony.outcome().deliveries[0, 2]
+        assert np.array_equal(alone.q_values[0], colony.q_values[2])
+        cells, _ = world.start(5, 9, place)
+        assert np.array_equal(colony.layout.start_cells[2], cells)
+
+
 def test_help_is_quick_and_needs_no_taichi(tmp_path):
     script = (
         "import runpy, sys\n"
