@@ -198,19 +198,25 @@ def summary(colony: Colony, pace: Pace) -> str:
     places = colony.config.slots * len(colony.seeds)
     full = colony.config.births and outcome["living"] == places
     blocked = 100 * outcome["blocked"] / max(1, outcome["moves"])
-    changes = "".join(
-        f", {outcome[name]} {name}" for name in ("births", "deaths", "regrown") if outcome[name]
-    )
+    changes = [counted(outcome[f"{one}s"], one) for one in ("birth", "death") if outcome[f"{one}s"]]
+    changes += [f"{outcome['regrown']} regrown"] if outcome["regrown"] else []
+    colonies = f" in {len(colony.seeds)} colonies" if len(colony.seeds) > 1 else ""
     return (
-        f"{outcome['living']} ants, {pace.ticks} ticks: {pace.steps_per_second / 1e6:.2f} million "
-        "ant-steps per second.\n"
-        f"{outcome['deliveries']} deliveries by tick {colony.ticks}, {blocked:.1f} % of the moves "
-        f"blocked{changes}." + (_crowded(places, colony.waiting_foods) if full else "")
+        f"{counted(outcome['living'], 'ant')}{colonies}, {counted(pace.ticks, 'tick')}: "
+        f"{pace.steps_per_second / 1e6:.2f} million ant-steps per second.\n"
+        f"{counted(outcome['deliveries'], 'delivery', 'deliveries')} by tick {colony.ticks}, "
+        f"{', '.join([f'{blocked:.1f} % of the moves blocked', *changes])}."
+        + (_crowded(places, colony.waiting_foods) if full else "")
     )
+
+
+def counted(number: int, one: str, several: str | None = None) -> str:
+    """A number of things, for example "1 delivery" or "2 ants"."""
+    return f"{number} {one if number == 1 else several or f'{one}s'}"
 
 
 def _crowded(places: int, foods: int) -> str:
-    waiting = f"{foods} food{' waits' if foods == 1 else 's wait'}"
+    waiting = counted(foods, "food waits", "foods wait")
     return (
         f"\n{places} of {places} places are taken, {waiting} at the queen; --capacity gives more."
     )

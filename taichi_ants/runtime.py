@@ -14,7 +14,7 @@ from pathlib import Path
 from types import ModuleType
 
 from taichi_ants.environment import fallback_folder, is_writable_folder
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, check_one_of, shown
 from taichi_ants.randomness import whole
 
 ARCHITECTURES = ("cpu", "cuda")
@@ -53,8 +53,8 @@ def start(threads: int | None = None, arch: str | None = None) -> Runtime:
             somebody else on other hardware, or with fast_math on, which would change results in
             the last bit.
     """
-    if arch is not None and arch not in ARCHITECTURES:
-        raise AntsError(f"arch is {arch!r}; it must be one of {', '.join(ARCHITECTURES)}.")
+    if arch is not None:
+        check_one_of("arch", arch, ARCHITECTURES)
     threads = None if threads is None else _checked_threads(threads)
     import taichi as ti
 
@@ -71,7 +71,7 @@ def start(threads: int | None = None, arch: str | None = None) -> Runtime:
 def _checked_threads(threads: int) -> int:
     threads = whole("threads", threads)
     if not 1 <= threads <= MAX_THREADS:
-        raise AntsError(f"threads is {threads}; it must lie between 1 and {MAX_THREADS}.")
+        raise AntsError(f"threads is {shown(threads)}; it must lie between 1 and {MAX_THREADS}.")
     return threads
 
 

@@ -21,6 +21,7 @@ from taichi_ants import results
 from taichi_ants.config import TrainingConfig
 from taichi_ants.constants import N_ACTIONS, N_STATES
 from taichi_ants.engines import checks
+from taichi_ants.engines.records import Record
 from taichi_ants.engines.results import LearnerCost
 from taichi_ants.errors import AntsError, checked_flag
 from taichi_ants.worlds.world import World
@@ -97,8 +98,8 @@ class Sweep:
         return self.configs[c].learner, self.configs[c].planning_steps
 
 
-@dataclass(frozen=True)
-class SweepResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class SweepResult(Record):
     """What came of it.
 
     Attributes:

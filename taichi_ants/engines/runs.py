@@ -14,15 +14,17 @@ from taichi_ants.engines.checks import (
     checked_configs,
     checked_count,
     checked_max_steps,
+    checked_progress,
     checked_q_values,
     checked_seeds,
     checked_seeds_for,
     checked_share,
+    checked_task,
     checked_world,
 )
 from taichi_ants.engines.results import LearnerCost, Rollouts, RunState, TrainingResult
 from taichi_ants.engines.run_engine import Progress, RunEngine
-from taichi_ants.errors import AntsError, checked_flag
+from taichi_ants.errors import AntsError, checked_flag, shown
 from taichi_ants.randomness import stream_state
 from taichi_ants.worlds.world import World
 
@@ -63,9 +65,10 @@ def train(
     """
     configs = checked_configs(configs)
     seeds = checked_seeds(seeds)
+    checked_task(world)
     none_yet = np.zeros((len(configs), len(seeds), 0), dtype=np.int32)
     start = TrainingResult(
-        world=checked_world(world),
+        world=world,
         configs=configs,
         seeds=seeds,
         max_steps=checked_max_steps(max_steps),
@@ -104,8 +107,11 @@ def continue_training(
         AntsError: An argument is not allowed; the message names it.
     """
     if not isinstance(result, TrainingResult):
-        raise AntsError(f"result is {result!r}; give what train has returned.")
+        raise AntsError(f"result is {shown(result)}; give what train has returned.")
+    result.check()
+    checked_configs(result.configs)
     episodes = checked_count("episodes", episodes)
+    progress = checked_progress(progress)
     settings = runtime.start(threads, arch)
     state = result.state.take(...)
     shape = (len(result.configs), len(result.seeds))
@@ -176,6 +182,7 @@ def evaluate(
     epsilon = checked_share("epsilon", epsilon)
     max_steps = checked_max_steps(max_steps)
     evaporation = checked_flag("evaporation", evaporation)
+    progress = checked_progress(progress)
     engine = RunEngine(checked_world(world), max_steps, evaporation, runtime.start(threads, arch))
     outcomes = engine.run(
         None,

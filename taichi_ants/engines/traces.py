@@ -14,6 +14,7 @@ from taichi_ants import learners, runtime
 from taichi_ants.config import TrainingConfig
 from taichi_ants.constants import DELIVERED, N_ACTIONS
 from taichi_ants.engines import checks
+from taichi_ants.engines.records import Record
 from taichi_ants.engines.results import RunState
 from taichi_ants.engines.run_engine import RunEngine
 from taichi_ants.engines.runs import fixed_policy_state, fresh_state, rates_of, rollout_streams
@@ -25,8 +26,8 @@ MAX_ROLLOUT_STEPS = 1_000_000
 MAX_TRAINING_STEPS = 100_000  # each keeps a Q-table of 4 KiB
 
 
-@dataclass(frozen=True)
-class Trace:
+@dataclass(frozen=True, eq=False, repr=False)
+class Trace(Record):
     """What happened in each of n steps; position, heading and state are those before the action.
 
     Attributes:
@@ -144,7 +145,11 @@ def trace_training(
 
     Args and errors as in `train`; episodes * max_steps may not exceed 100 000.
     """
-    (config,) = checks.checked_configs(config)
+    checks.checked_task(world)
+    several = checks.checked_configs(config)
+    if len(several) > 1:
+        raise AntsError(f"config holds {len(several)} configurations; a trace is of one.")
+    (config,) = several
     seeds = checks.checked_seeds_for(seed, ())
     state = fresh_state((config,), seeds.tolist()).take(0)
     episodes = checks.checked_count("episodes", episodes)

@@ -8,8 +8,10 @@ from random_rewards import put_in_force, random_rewards
 from random_worlds import random_world
 
 from taichi_ants import Colony, ColonyConfig, Pheromone, TrainingConfig
+from taichi_ants.colony_config import STARTS
 from taichi_ants.constants import EMPTY
 from taichi_ants.engines import colony_arrays as names
+from taichi_ants.policies import random_policy
 from taichi_ants.reference import ReferenceColony
 
 # Each entry is a kernel of its own, so that there are few; all options occur in each.
@@ -37,23 +39,25 @@ def random_colony(seed: int, dense: bool):
     free = int((world.ground() == EMPTY).sum())
     ants = int(min(free, rng.choice([1, 2, 3, 5, 8, 13, 20, 30])))
     births, lifespan = bool(rng.random() < 0.5), rng.choice([0, 0, 3, 9, 25])
+    evaporations = ["exponential", "linear", "none"] if dense else ["linear", "none"]
+    evaporation, deposit = str(rng.choice(evaporations)), str(rng.choice(["set", "add", "none"]))
+    half_life, cap = float(rng.choice([0.7, 3.0, 40.0])), int(rng.choice([200, 600]))
     config = ColonyConfig(
         ants=ants,
         capacity=ants + int(rng.integers(0, 6)) if births else None,
         pheromone=Pheromone(
-            evaporation=str(
-                rng.choice(["exponential", "linear", "none"] if dense else ["linear", "none"])
-            ),
-            half_life=float(rng.choice([0.7, 3.0, 40.0])),
+            evaporation=evaporation,
+            half_life=half_life if evaporation == "exponential" else None,
             diffusion=float(rng.choice([0.05, 0.5, 1.0])) if dense else 0.0,
-            deposit=str(rng.choice(["set", "add", "none"])),
+            deposit=deposit,
             level=int(rng.choice([3, 250])),
-            cap=int(rng.choice([200, 600])),
+            cap=cap if deposit == "add" else None,
         ),
         births=births,
         lifespan=int(lifespan) or None,
         regrowth=[None, 0, 1, 4][rng.integers(4)],
         wander=int(rng.choice([1, 2, 5, 1000])),
+        start=str(rng.choice(STARTS)),
     )
     return world, config
 
@@ -123,7 +127,8 @@ def test_every_tick_in_crowded_micro_worlds(learner, planning_steps, sharing, de
         world, config = random_colony(seed, dense)
         training = random_training(seed, learner, planning_steps)
         put_in_force(monkeypatch, random_rewards(seed))
-        colony = Colony(world, config, training, seed - 3, sharing)
+        table = random_policy() if sharing == "fixed" else None
+        colony = Colony(world, config, training, seed - 3, sharing, table)
         plain = ReferenceColony(world, config, training, seed - 3, sharing)
         for ticks in (12, 9):
             colony.begin_episode()

@@ -7,6 +7,7 @@ import pytest
 
 from taichi_ants import (
     AntsError,
+    Colony,
     ColonyConfig,
     TrainingConfig,
     continue_training,
@@ -14,9 +15,11 @@ from taichi_ants import (
     rollout,
     trace_training,
     train,
+    worlds,
 )
 from taichi_ants.engines.checks import checked_count, checked_seeds, checked_seeds_for
 from taichi_ants.engines.launches import plan_launches
+from taichi_ants.errors import shown
 from taichi_ants.rendering import Episode, episode_picture
 from taichi_ants.rendering.learning import learning_stages
 from taichi_ants.rendering.replay import Replay
@@ -168,7 +171,7 @@ def test_flags_of_numpy_are_fine():
 @pytest.mark.parametrize("value", [-0.1, 1.1, float("nan"), "0.5", None, True, [0.5], 10**400])
 def test_epsilon(value):
     for function in (evaluate, rollout):
-        says(f"epsilon is {value!r}", function, paper(), TABLE, epsilon=value)
+        says(f"epsilon is {shown(value)}", function, paper(), TABLE, epsilon=value)
 
 
 @pytest.mark.parametrize(
@@ -282,6 +285,41 @@ def test_progress_rises_to_one():
     shares.clear()
     evaluate(paper(), TABLE, 3, progress=shares.append)
     assert shares[-1] == pytest.approx(1)
+
+
+@pytest.mark.parametrize("progress", [3, "yes", True])
+def test_progress_can_be_called(progress):
+    text = f"progress is {progress!r}; it must be a function"
+    says(text, train, paper(), CONFIG, 0, 1, 1, progress=progress)
+    says(text, evaluate, paper(), TABLE, 1, progress=progress)
+    says(text, Colony(paper(), ColonyConfig(), CONFIG).run, 1, 1, progress)
+
+
+def test_a_world_to_learn_in_has_food():
+    bare = World((4, 4, 4), (0, 0, 0))
+    text = "the world has no food, so there is nothing to learn"
+    says(text, train, bare, CONFIG, 0, 1, 1)
+    says(text, trace_training, bare, CONFIG)
+    assert evaluate(bare, TABLE, 2, max_steps=3).deliveries.sum() == 0
+    assert len(rollout(bare, TABLE, max_steps=3)) == 3
+
+
+@pytest.mark.parametrize(
+    "value",
+    [[0] * 10**6, "x" * 10**7, np.zeros(10**6), 10**5000],
+    ids=["list", "text", "array", "number"],
+)
+def test_messages_stay_short_whatever_they_name(value):
+    for function, arguments in (
+        *((train, (value, CONFIG, 0, 1, 1)), (train, (paper(), [value], 0, 1, 1))),
+        *((train, (paper(), CONFIG, [value], 1, 1)), (train, (paper(), CONFIG, 0, value, 1))),
+        *((evaluate, (paper(), TABLE, value)), (World, ((3, 3, 3), value))),
+        *((worlds.build, (value,)), (worlds.register, (value, None)), (ColonyConfig, (value,))),
+        *((continue_training, (value, 1)), (Colony, (paper(), value, CONFIG))),
+    ):
+        with pytest.raises(AntsError) as caught:
+            function(*arguments)
+        assert len(str(caught.value)) < 300
 
 
 @pytest.mark.parametrize("workers", [1, 2, 64, 4096])
