@@ -14,6 +14,12 @@ def larger(a, b):
 
 
 @ti.func
+def smaller(a, b):
+    """The smaller of two floats."""
+    return ti.select(a < b, a, b)
+
+
+@ti.func
 def best_value(values):
     """The largest of five action values (f32)."""
     return larger(larger(larger(values[0], values[1]), larger(values[2], values[3])), values[4])
