@@ -18,7 +18,7 @@ def prepare_for_taichi() -> None:
     """
     warnings.filterwarnings(
         "ignore",
-        "'locale.getdefaultlocale' is deprecated",
+        ".*getlocale",
         DeprecationWarning,
         r"taichi\._lib\.utils",
     )
