@@ -117,6 +117,18 @@ def checked_share(name: str, value: float) -> float:
     return float(value)
 
 
+def check_finite(
+    tables: np.ndarray, configs: Sequence[TrainingConfig], seeds: Sequence[int]
+) -> None:
+    """Refuse what a learner has made if it is not finite, tables (configurations * seeds, ...)."""
+    finite = np.isfinite(tables).reshape(len(configs), len(seeds), -1).all(axis=-1)
+    for c, s in np.argwhere(~finite)[:1]:
+        raise AntsError(
+            f"learner {configs[c].learner!r} made action values that are not finite, with "
+            f"{configs[c]} and seed {seeds[s]}; mend its TD error."
+        )
+
+
 def checked_q_values(q_values: np.ndarray) -> np.ndarray:
     """Action values as float32 (..., 128, 5), finite."""
     try:

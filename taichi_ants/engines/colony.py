@@ -193,7 +193,11 @@ class Colony:
             self.ticks += 1
 
     def end_episode(self) -> None:
-        """Keep the streams of the ants that start an episode, and let epsilon decay."""
+        """Keep the streams of the ants that start an episode, and let epsilon decay.
+
+        Raises:
+            AntsError: The learner has made action values that are not finite.
+        """
         from taichi_ants.engines import colony_arrays as names
 
         ants = self.arrays["ants"]
@@ -202,6 +206,8 @@ class Colony:
         slots = self.config.slots
         places = columns // slots * slots + ants[names.NUMBER, columns]
         self.arrays["first_streams"][places] = self.arrays["streams"][columns]
+        tables = self.arrays["q"].reshape(len(self.seeds), -1)
+        checks.check_finite(tables, [self.training], self.seeds)
         decayed = self.epsilon * float(self.training.epsilon_decay)
         self.epsilon = max(float(self.training.min_epsilon), decayed)
 
@@ -369,6 +375,7 @@ class Colony:
         from taichi_ants.engines.colony_arrays import Arrays, Settings
         from taichi_ants.engines.colony_kernels import colony_kernel
 
+        self._settings = runtime.start()  # the caller may have reset Taichi, or forked
         dense = self.config.pheromone.dense
         kernel = colony_kernel(
             self._learner, self.sharing, self.one_a_slot, dense, self._lively, what

@@ -39,6 +39,7 @@ from taichi_ants.rules.policy import choose
 from taichi_ants.rules.random_bits import advance, below, bits_of, high_word
 
 _ONE = 4294967296.0  # fixed-point numbers have 32 binary places
+_LARGEST = 2147483648.0  # and an error must lie below this
 
 
 @ti.func
@@ -90,7 +91,7 @@ def error_of(td_error: ti.template(), c: ti.template(), w, pair, event, ended, s
     discount = rates.discount
     if ended == 1:
         discount = 0.0
-    return td_error(
+    error = td_error(
         c.q[table + pair],
         ti.cast(c.rewards[event], ti.f32),
         discount,
@@ -98,6 +99,9 @@ def error_of(td_error: ti.template(), c: ti.template(), w, pair, event, ended, s
         next_action,
         rates.epsilon,
     )
+    if not ti.abs(error) < _LARGEST:
+        c.q[table + pair] = ti.math.nan  # a fixed-point number would hide it
+    return error
 
 
 @ti.func

@@ -44,6 +44,7 @@ from taichi_ants.engines.colony_life import (
 from taichi_ants.engines.colony_steps import commit, grow_old, observe, resolve, want
 from taichi_ants.engines.colony_trail import diffused, evaporate
 from taichi_ants.engines.run_learning import TABLE
+from taichi_ants.engines.trial import tried
 from taichi_ants.learners.registry import Learner
 
 
@@ -77,7 +78,7 @@ def phases(learner: Learner, sharing: str, own: bool, dense: bool, lively: bool)
     on_policy = learns and learner.draws_next_action
     plans = learns and learner.plans
     shared_plans = plans and not alone
-    td_error = learner.td_error
+    td_error = tried(learner) if learns else None
 
     @ti.func
     def choose_all(c: ti.template(), k: ti.template(), chunk):

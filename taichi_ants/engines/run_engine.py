@@ -11,7 +11,6 @@ from taichi_ants import rewards, runtime
 from taichi_ants.engines.launches import Launch, plan_launches
 from taichi_ants.engines.packing import compass_of, pack_cells
 from taichi_ants.engines.results import RunState
-from taichi_ants.errors import AntsError
 from taichi_ants.learners.registry import Learner
 from taichi_ants.worlds.world import World
 
@@ -72,7 +71,7 @@ class RunEngine:
         from taichi_ants.engines.run_kernels import EXTRA_CELLS, run_kernel
 
         kernel = run_kernel(learner)
-        self._compile(kernel, learner)
+        self._compile(kernel)
         per_run = self._size + EXTRA_CELLS
         on_cpu = self._settings.arch == "cpu"
         workers = self._settings.threads if on_cpu else _PARALLEL_RUNS_ON_GPU
@@ -129,7 +128,7 @@ class RunEngine:
         outcomes = np.zeros((3, n_runs, episodes), dtype=np.int32)
         drawn = np.zeros(1, dtype=np.uint64) if streams is None else streams
         kernel = run_kernel(learner, traced=True)
-        self._compile(kernel, learner)
+        self._compile(kernel)
         kernel(
             *self._shared_arguments(n_runs, episodes),
             *_run_arguments(state, self._starts(seeds), rates, slice(0, n_runs), drawn),
@@ -150,22 +149,11 @@ class RunEngine:
         sizes = (n_runs, n_episodes, self._max_steps, int(self._evaporation), self._size)
         return (*sizes, *self._shared)
 
-    def _compile(self, kernel: Callable[..., None], learner: Learner | None) -> None:
+    def _compile(self, kernel: Callable[..., None]) -> None:
         """Launch a kernel on nothing, so that its compilation is not counted as work."""
-        import taichi as ti
-
         nothing = [np.zeros(1, kind) for kind in _RUN_DTYPES]
         outcomes = np.zeros((3, 1, 1), dtype=np.int32)
-        try:
-            kernel(*self._shared_arguments(0, 0), *nothing, *outcomes, *_NO_TRACE)
-        except (ti.TaichiCompilationError, RuntimeError) as error:
-            if learner is None:
-                raise
-            reason = str(error).strip().splitlines()[-1].rstrip(".")
-            raise AntsError(
-                f"the TD error of learner {learner.name!r} does not compile: {reason}; see "
-                "taichi_ants.learners.Learner for what it takes and returns."
-            ) from error
+        kernel(*self._shared_arguments(0, 0), *nothing, *outcomes, *_NO_TRACE)
 
     def _clock(self) -> float:
         """Seconds of all threads of this process on the CPU, which other processes do not slow."""

@@ -21,6 +21,7 @@ from taichi_ants.engines.run_learning import (
     values_of,
 )
 from taichi_ants.engines.run_step import EXTRA_CELLS, Ant, act, observe, restore
+from taichi_ants.engines.trial import tried
 from taichi_ants.learners.registry import Learner
 from taichi_ants.rules.policy import choose
 from taichi_ants.rules.random_bits import advance, bits_of
@@ -56,7 +57,7 @@ def run_kernel(learner: Learner | None, traced: bool = False) -> Callable[..., N
     learns = learner is not None
     on_policy = learns and learner.draws_next_action
     plans = learns and learner.plans
-    td_error = learner.td_error if learns else None
+    td_error = tried(learner) if learns else None
 
     @ti.func
     def decide(q: ti.template(), table, ant, state, explore_below):

@@ -11,6 +11,7 @@ from taichi_ants import learners, runtime
 from taichi_ants.config import TrainingConfig
 from taichi_ants.constants import N_ACTIONS, N_STATES, STREAM_ANT, STREAM_ROLLOUT
 from taichi_ants.engines.checks import (
+    check_finite,
     checked_configs,
     checked_count,
     checked_max_steps,
@@ -130,6 +131,8 @@ def continue_training(
             episodes,
             progress=work.part(group),
         ).reshape(3, len(group), shape[1], episodes)
+        trained = [result.configs[c] for c in group]
+        check_finite(runs.q, trained, result.seeds)
         state.put(group, _shaped(runs, (len(group), shape[1])))
         steps = int(outcomes[1, group].sum(dtype=np.int64))
         costs.append(LearnerCost(config.learner, config.planning_steps, steps, engine.seconds))
