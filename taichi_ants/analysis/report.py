@@ -40,7 +40,7 @@ _GREEDY = {
 _STYLES = {
     Verdict.SUPPORTED: "green",
     Verdict.CONTRADICTED: "red",
-    Verdict.UNDISTINGUISHED: "yellow",
+    Verdict.UNDECIDED: "yellow",
     Verdict.NOT_TESTED: "dim",
 }
 

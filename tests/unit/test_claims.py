@@ -147,7 +147,7 @@ def test_where_nothing_differs_no_difference_is_claimed(seeds: int) -> None:
             random_seed=number,
         )
         findings = assess(comparison, directed)
-        errors += any(finding.verdict is not Verdict.UNDISTINGUISHED for finding in findings)
+        errors += any(finding.verdict is not Verdict.UNDECIDED for finding in findings)
     assert errors <= 2
 
 
@@ -234,7 +234,7 @@ def test_seeds_pair_the_rows() -> None:
     unpaired.returns[rows] = unpaired.returns[rows][:, ::-1]
     (blurred,) = assess(unpaired, [BY_ID["sarsa-return-slightly-lower"]])
     assert blurred.effect == pytest.approx(paired.effect)
-    assert blurred.verdict is Verdict.UNDISTINGUISHED
+    assert blurred.verdict is Verdict.UNDECIDED
 
 
 def test_a_finding_shows_the_weakest_contrast_and_what_it_rests_on() -> None:

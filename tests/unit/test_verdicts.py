@@ -21,7 +21,7 @@ from taichi_ants.analysis.claims import (
 from taichi_ants.analysis.paper import FIGURE_1, Q_LEARNING, SARSA
 
 SUPPORTED, CONTRADICTED = Verdict.SUPPORTED, Verdict.CONTRADICTED
-UNDISTINGUISHED = Verdict.UNDISTINGUISHED
+UNDISTINGUISHED = Verdict.UNDECIDED
 
 
 @pytest.mark.parametrize(

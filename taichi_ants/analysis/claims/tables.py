@@ -66,7 +66,7 @@ def tally(findings: Sequence[Finding]) -> str:
     order = (
         Verdict.SUPPORTED,
         Verdict.CONTRADICTED,
-        Verdict.UNDISTINGUISHED,
+        Verdict.UNDECIDED,
         Verdict.NOT_TESTED,
     )
     return ", ".join(f"{counts[verdict]} {verdict.value}" for verdict in order if counts[verdict])
