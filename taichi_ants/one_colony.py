@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NoReturn
 import numpy as np
 
 from taichi_ants import results
+from taichi_ants.analysis.markdown import count
 from taichi_ants.errors import AntsError
 
 if TYPE_CHECKING:
@@ -202,9 +203,9 @@ def summary(colony: Colony, pace: Pace) -> str:
         f", {outcome[name]} {name}" for name in ("births", "deaths", "regrown") if outcome[name]
     )
     return (
-        f"{outcome['living']} ants, {pace.ticks} ticks: {pace.steps_per_second / 1e6:.2f} million "
+        f"{count(outcome['living'], 'ant')}, {count(pace.ticks, 'tick')}: {pace.steps_per_second / 1e6:.2f} million "
         "ant-steps per second.\n"
-        f"{outcome['deliveries']} deliveries by tick {colony.ticks}, {blocked:.1f} % of the moves "
+        f"{count(outcome['deliveries'], 'delivery')} by tick {colony.ticks}, {blocked:.1f} % of the moves "
         f"blocked{changes}." + (_crowded(places, colony.waiting_foods) if full else "")
     )
 

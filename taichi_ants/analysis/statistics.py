@@ -109,6 +109,32 @@ def interquartile_values(values: np.ndarray) -> np.ndarray:
     return interquartile_mean(values)[:, None] + moved
 
 
+def centres(values: np.ndarray, typical: bool = True) -> dict[str, np.ndarray]:
+    """Columns of a table: the mean with its 95 % interval, and the IQM with its own if `typical`.
+
+    Args:
+        values: Float (rows, seeds).
+        typical: Whether the IQM makes sense; of shares and counts it does not.
+
+    Returns:
+        "mean", "ci_low" and "ci_high", then "iqm", "iqm_ci_low" and "iqm_ci_high", float64
+        (rows,) each.
+    """
+    values = np.asarray(values, float)
+    columns = {"mean": values.mean(axis=1)}
+    columns["ci_low"], columns["ci_high"] = bootstrap_interval(values)
+    if typical:
+        columns["iqm"] = interquartile_mean(values)
+        columns["iqm_ci_low"], columns["iqm_ci_high"] = bootstrap_interval(values, iqm=True)
+    return {name: without_noise(column, values) for name, column in columns.items()}
+
+
+def without_noise(numbers: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Numbers (rows,) computed from values (rows, seeds), 0 where they are rounding errors."""
+    tiny = TIE_TOLERANCE * np.abs(values).max(axis=1)
+    return np.where(np.abs(numbers) <= tiny, 0.0, numbers)
+
+
 def bootstrap_interval(
     values: np.ndarray, level: float = 0.95, resamples: int = RESAMPLES, iqm: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:

@@ -320,6 +320,7 @@ def show_colony(settings: argparse.Namespace, world: World) -> None:
 
     As a single picture, the episode is shown at its last tick, or at `--step`.
     """
+    from taichi_ants.analysis.markdown import count
     from taichi_ants.rendering import colony_picture, render_colony, save_picture
 
     colony, title = settled_colony(settings, world)
@@ -342,7 +343,8 @@ def show_colony(settings: argparse.Namespace, world: World) -> None:
                 **look,
             )
     delivered = int(colony.outcome().deliveries.sum())
-    print(f"{settings.out}: {settings.ants} ants, {colony.ticks} ticks, {delivered} deliveries")
+    numbers = ((settings.ants, "ant"), (colony.ticks, "tick"), (delivered, "delivery"))
+    print(f"{settings.out}: {', '.join(count(*number) for number in numbers)}")
 
 
 def settled_colony(settings: argparse.Namespace, world: World) -> tuple[Colony, str]:

@@ -18,7 +18,7 @@ from taichi_ants.analysis.claims.model import Claim, Finding, Verdict
 from taichi_ants.analysis.claims.slice import NotTestedError, Slice
 from taichi_ants.analysis.comparison import Comparison
 from taichi_ants.analysis.measures import WINDOW
-from taichi_ants.analysis.statistics import cautious_interval, interquartile_mean
+from taichi_ants.analysis.statistics import cautious_interval, interquartile_mean, without_noise
 
 SIMULTANEOUS_LEVEL = 0.95
 OTHER_WORLD = "the claims are about the paper's world"
@@ -100,16 +100,10 @@ def _read(claim: Claim, comparison: Comparison, delivery: str) -> _Test:
     try:
         _check(comparison)
         for typical in (True, False) if claim.typical else (False,):
-            readings.append(
-                [
-                    _Effect(
-                        contrast.label,
-                        contrast.values(part, typical),
-                        iqm=typical and contrast.of_centres is None,
-                    )
-                    for contrast in claim.contrasts
-                ]
-            )
+            effects = (contrast.values(part, typical) for contrast in claim.contrasts)
+            iqm = (typical and contrast.of_centres is None for contrast in claim.contrasts)
+            labels = (contrast.label for contrast in claim.contrasts)
+            readings.append([*map(_Effect, labels, effects, iqm)])
         if len(readings[0][0].values) < 2:
             few = len(comparison.seeds) < 2
             one = "one seed" if few else "one seed in each half"
@@ -134,6 +128,7 @@ def _measure(effects: Sequence[_Effect], level: float) -> None:
         batch = [one for one in effects if (len(one.values), one.iqm) == (seeds, iqm)]
         values = np.stack([one.values for one in batch])
         centres = interquartile_mean(values) if iqm else values.mean(axis=1)
-        ends = zip(centres, *cautious_interval(values, level, iqm=iqm), strict=True)
+        columns = (centres, *cautious_interval(values, level, iqm=iqm))
+        ends = zip(*(without_noise(column, values) for column in columns), strict=True)
         for one, numbers in zip(batch, ends, strict=True):
             one.centre, one.low, one.high = map(float, numbers)
