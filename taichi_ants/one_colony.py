@@ -203,10 +203,11 @@ def summary(colony: Colony, pace: Pace) -> str:
         f", {outcome[name]} {name}" for name in ("births", "deaths", "regrown") if outcome[name]
     )
     return (
-        f"{count(outcome['living'], 'ant')}, {count(pace.ticks, 'tick')}: {pace.steps_per_second / 1e6:.2f} million "
-        "ant-steps per second.\n"
-        f"{count(outcome['deliveries'], 'delivery')} by tick {colony.ticks}, {blocked:.1f} % of the moves "
-        f"blocked{changes}." + (_crowded(places, colony.waiting_foods) if full else "")
+        f"{count(outcome['living'], 'ant')}, {count(pace.ticks, 'tick')}: "
+        f"{pace.steps_per_second / 1e6:.2f} million ant-steps per second.\n"
+        f"{count(outcome['deliveries'], 'delivery')} by tick {colony.ticks}, "
+        f"{blocked:.1f} % of the moves blocked{changes}."
+        + (_crowded(places, colony.waiting_foods) if full else "")
     )
 
 
