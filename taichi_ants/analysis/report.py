@@ -121,8 +121,9 @@ def _print(
         _baselines(baselines),
     )
     for table, notes in sections:
-        if table.row_count:
+        if table.row_count or notes:
             console.print()
+        if table.row_count:
             console.print(table)
         if notes:
             console.print(notes)
@@ -213,7 +214,7 @@ def _table2_notes(comparison: Comparison, lines: Sequence[Mapping], choices: Cho
             f"food: deliveries per episode, {comparison.late}",
             f"steps: {nearer_steps(lines)}",
         ]
-    if seeds < FEW_SEEDS:
+    if 1 < seeds < FEW_SEEDS:
         notes += [
             f"Few seeds ({seeds}): where one run in a hundred is far off, the interval of the mean",
             "misses it more often than not. The IQM's holds from 10 seeds on (docs/statistics.md).",
