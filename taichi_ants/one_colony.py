@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NoReturn
 import numpy as np
 
 from taichi_ants import results
+from taichi_ants.analysis.markdown import count
 from taichi_ants.errors import AntsError
 
 if TYPE_CHECKING:
@@ -198,25 +199,20 @@ def summary(colony: Colony, pace: Pace) -> str:
     places = colony.config.slots * len(colony.seeds)
     full = colony.config.births and outcome["living"] == places
     blocked = 100 * outcome["blocked"] / max(1, outcome["moves"])
-    changes = [counted(outcome[f"{one}s"], one) for one in ("birth", "death") if outcome[f"{one}s"]]
+    changes = [count(outcome[f"{one}s"], one) for one in ("birth", "death") if outcome[f"{one}s"]]
     changes += [f"{outcome['regrown']} regrown"] if outcome["regrown"] else []
     colonies = f" in {len(colony.seeds)} colonies" if len(colony.seeds) > 1 else ""
     return (
-        f"{counted(outcome['living'], 'ant')}{colonies}, {counted(pace.ticks, 'tick')}: "
+        f"{count(outcome['living'], 'ant')}{colonies}, {count(pace.ticks, 'tick')}: "
         f"{pace.steps_per_second / 1e6:.2f} million ant-steps per second.\n"
-        f"{counted(outcome['deliveries'], 'delivery', 'deliveries')} by tick {colony.ticks}, "
+        f"{count(outcome['deliveries'], 'delivery')} by tick {colony.ticks}, "
         f"{', '.join([f'{blocked:.1f} % of the moves blocked', *changes])}."
         + (_crowded(places, colony.waiting_foods) if full else "")
     )
 
 
-def counted(number: int, one: str, several: str | None = None) -> str:
-    """A number of things, for example "1 delivery" or "2 ants"."""
-    return f"{number} {one if number == 1 else several or f'{one}s'}"
-
-
 def _crowded(places: int, foods: int) -> str:
-    waiting = counted(foods, "food waits", "foods wait")
+    waiting = f"{count(foods, 'food')} {'waits' if foods == 1 else 'wait'}"
     return (
         f"\n{places} of {places} places are taken, {waiting} at the queen; --capacity gives more."
     )

@@ -31,12 +31,14 @@ class BestOf:
         configurations: How many compete.
         returns: Reward, mean of the winner's last 50 episodes, float64 (draws,).
         steps: The winner's mean length of all episodes, float64 (draws,).
+        steps_last50: The winner's mean length of its last 50 episodes, float64 (draws,).
         deliveries: The winner's mean deliveries in its last 50 episodes, float64 (draws,).
     """
 
     configurations: int
     returns: np.ndarray
     steps: np.ndarray
+    steps_last50: np.ndarray
     deliveries: np.ndarray
 
 
@@ -59,6 +61,7 @@ def best_of(
         len(positions),
         comparison.measure("return_last50")[won],
         comparison.measure("steps_all")[won],
+        comparison.measure("steps_last50")[won],
         comparison.measure("deliveries_last50")[won],
     )
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from taichi_ants.analysis.measures import MEASURES
+from taichi_ants.analysis.measures import MEASURES, WINDOW
 from taichi_ants.config import TrainingConfig
 from taichi_ants.errors import AntsError
 
@@ -186,6 +186,11 @@ class Comparison:
     def episodes(self) -> int:
         """Training episodes of a run."""
         return self.returns.shape[2]
+
+    @property
+    def late(self) -> str:
+        """The episodes that "last 50" measures speak of: "last 50", or "all 20" of a short run."""
+        return f"last {WINDOW}" if self.episodes > WINDOW else f"all {self.episodes}"
 
     @property
     def rollouts(self) -> int:

@@ -40,6 +40,11 @@ class Measure:
     episodes: int = 1
     rollouts: int = 0
 
+    @property
+    def typical(self) -> bool:
+        """Whether it has a typical run (an IQM); a share or a count has a mean only."""
+        return self.unit in ("reward", "steps")
+
     def lacks(self, comparison: Comparison) -> str:
         """What the comparison has too little of, "" if it has enough."""
         if comparison.episodes < self.episodes:

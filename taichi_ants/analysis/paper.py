@@ -19,7 +19,9 @@ class PaperRow(NamedTuple):
 
     hyperparameters: Hyperparameters
     return_last50: float  # reward, mean of the last 50 episodes of one run
-    steps_all: float  # steps, mean of all episodes ("train avg steps")
+    # Steps. The column is headed "train avg steps", section 3.1 says "the last 50 episodes"; ours
+    # come near them as a mean of all episodes, and do not as one of the last 50.
+    steps_all: float
     deliveries_last50: float  # per episode
 
 

@@ -9,7 +9,7 @@ import io
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
@@ -20,11 +20,14 @@ from taichi_ants.analysis.claims.model import WITHIN_MARGIN, Finding, Verdict
 from taichi_ants.analysis.claims.tables import by_claim, tally
 from taichi_ants.analysis.comparison import Comparison, Variant
 from taichi_ants.analysis.markdown import MISSING, baseline_name, count, interval, number
+from taichi_ants.analysis.measures import MEASURES
 from taichi_ants.analysis.paper import GREEDY_RETURN, GREEDY_STEPS, VARIANTS
+from taichi_ants.analysis.statistics import centres
 from taichi_ants.analysis.summary import mean_returns
-from taichi_ants.analysis.table2 import means
+from taichi_ants.analysis.table2 import APART, apart, means, nearer_steps
 
 if TYPE_CHECKING:
+    from rich.console import Console
     from rich.table import Table
 
 # Delivery setting and learner -> the configuration that is shown.
@@ -35,16 +38,17 @@ Section = tuple["Table", str]
 # Columns where the output is no terminal: what the narrowest common terminal shows.
 WIDTH = 79
 
+# Below, the report warns that means have too few seeds; what intervals cover is measured in
+# docs/statistics.md.
+FEW_SEEDS = 50
+
 _LEVEL = round(100 * SIMULTANEOUS_LEVEL)
-_GREEDY = {
-    "return": ("greedy_return", 1),
-    "steps": ("greedy_steps", 1),
-    "deliveries": ("greedy_deliveries", 2),
-}
+_GREEDY = {"greedy_return": 1, "greedy_steps": 1, "greedy_deliveries": 2}  # measure -> digits
 _STYLES = {
     Verdict.SUPPORTED: "green",
     Verdict.CONTRADICTED: "red",
-    Verdict.UNDISTINGUISHED: "yellow",
+    Verdict.EQUIVALENT: "cyan",
+    Verdict.UNDECIDED: "yellow",
     Verdict.NOT_TESTED: "dim",
 }
 
@@ -57,7 +61,7 @@ def print_report(
     costs: Sequence[Mapping] = (),
     file: IO[str] | None = None,
 ) -> None:
-    """Prints the report; without colours and `WIDTH` columns wide where there is no terminal.
+    """Prints the report: in colours and as wide as the terminal, or as `render` has it elsewhere.
 
     Args:
         comparison: The comparison.
@@ -71,8 +75,36 @@ def print_report(
     from rich.console import Console
 
     console = Console(file=file, highlight=False, markup=False)
-    if not console.is_terminal:
-        console = Console(file=file, highlight=False, markup=False, width=WIDTH)
+    if console.is_terminal:
+        _print(console, comparison, lines, findings, baselines, costs)
+    else:
+        print(render(comparison, lines, findings, baselines, costs), end="", file=file)
+
+
+def render(
+    comparison: Comparison,
+    lines: Sequence[Mapping],
+    findings: Sequence[Finding],
+    baselines: Sequence[Mapping] = (),
+    costs: Sequence[Mapping] = (),
+) -> str:
+    """The report as plain text of at most `WIDTH` columns; arguments as for `print_report`."""
+    from rich.console import Console
+
+    text = io.StringIO()
+    console = Console(file=text, highlight=False, markup=False, width=WIDTH, color_system=None)
+    _print(console, comparison, lines, findings, baselines, costs)
+    return "".join(f"{line.rstrip()}\n" for line in text.getvalue().splitlines())
+
+
+def _print(
+    console: Console,
+    comparison: Comparison,
+    lines: Sequence[Mapping],
+    findings: Sequence[Finding],
+    baselines: Sequence[Mapping],
+    costs: Sequence[Mapping],
+) -> None:
     console.print(f"World: {comparison.world}.")
     console.print(
         f"{count(len(comparison.rows), 'configuration')}, {count(len(comparison.seeds), 'seed')}, "
@@ -95,18 +127,12 @@ def print_report(
         _baselines(baselines),
     )
     for table, notes in sections:
-        if table.row_count:
+        if table.row_count or notes:
             console.print()
+        if table.row_count:
             console.print(table)
         if notes:
             console.print(notes)
-
-
-def render(*arguments: Any, **options: Any) -> str:
-    """The report as plain text of at most `WIDTH` columns; arguments as for `print_report`."""
-    text = io.StringIO()
-    print_report(*arguments, **options, file=text)
-    return "".join(f"{line.rstrip()}\n" for line in text.getvalue().splitlines())
 
 
 def _table(title: str, columns: Iterable[str], text_columns: int = 1, gap: int = 2) -> Table:
@@ -123,55 +149,81 @@ def _table(title: str, columns: Iterable[str], text_columns: int = 1, gap: int =
     )
     for position, column in enumerate(columns):
         justify = "left" if position < text_columns else "right"
-        table.add_column(column, justify=justify, overflow="fold")
+        least = len("Q-learning") if column == "Learner" else None  # no name breaks within a word
+        table.add_column(column, justify=justify, overflow="fold", min_width=least)
     return table
 
 
 def _table2(comparison: Comparison, lines: Sequence[Mapping], choices: Choices) -> list[Section]:
-    """One table for each delivery setting, explained after the last."""
-    of_paper = comparison.in_paper_world
-    headers = ("Learner", "Return\npaper", "ours", "best run", "below", "Steps\npaper", "ours")
-    headers += ("Food\npaper", "ours")
+    """Two tables for each delivery setting, returns and steps, explained after the last."""
+    of_paper, late = comparison.in_paper_world, comparison.late
+    headers = ("Learner", "Return\npaper", "mean", "IQM", "best run", "below")
+    headers += ("Food\npaper", "mean")
+    steps_headers = ("Learner", "Steps\npaper", "all\nmean", "IQM", f"{late}\nmean", "IQM")
     if not of_paper:
-        headers = ("Learner", "Return", "best run", "Steps", "Deliveries")
+        headers = ("Learner", "Return\nmean", "IQM", "best run", "Deliveries")
+        steps_headers = tuple(name for name in steps_headers if "paper" not in name)
+    name = "Table 2" if of_paper else "Training"
     tables = []
     for setting in dict.fromkeys(line["delivery"] for line in lines):
-        name = "Table 2" if of_paper else "Training"
-        tables.append(_table(f"{name}, {setting} delivery", headers, gap=1))
+        title = f"{name}, {setting} delivery"
+        returns = _table(f"{title}: {late} episodes", headers, gap=1)
+        steps = _table(f"{title}: steps of an episode", steps_headers, gap=1)
+        tables += [returns, steps]
         for line in lines:
             variant = Variant(line["learner"], line["planning_steps"])
             chosen = choices.get((setting, variant))
             if line["delivery"] == setting and chosen is not None:
-                cells = _table2_cells(comparison, line, chosen, of_paper)
-                tables[-1].add_row(_marked(comparison, variant, chosen), *cells)
-    notes = _table2_notes(of_paper, choices) + _mixed_note(comparison, choices)
+                cells = _table2_cells(comparison, line, chosen)
+                for table, figures in zip((returns, steps), cells, strict=True):
+                    shown = (
+                        text for name, text in figures.items() if of_paper or "paper" not in name
+                    )
+                    table.add_row(_marked(comparison, variant, chosen), *shown)
+    notes = _table2_notes(comparison, lines, choices) + _mixed_note(comparison, choices)
     return [(table, notes if table is tables[-1] else "") for table in tables]
 
 
 def _table2_cells(
-    comparison: Comparison, line: Mapping, chosen: Choice, of_paper: bool
-) -> Iterable[str]:
+    comparison: Comparison, line: Mapping, chosen: Choice
+) -> tuple[dict[str, str], dict[str, str]]:
+    """The cells of returns and of steps; those of the paper are named so."""
     ours = means(comparison, "ours", chosen.position, chosen.seeds)
-    cells = {
-        "paper return": number(line["paper_return"]),
-        "return": _with_range(ours, "ours_return", "mean", "ci_low", "ci_high"),
+    returns = {
+        "paper": number(line["paper_return"]),
+        "mean": _centre(ours, "ours_return"),
+        "IQM": _with_range(ours, "ours_return", "iqm", "iqm_ci_low", "iqm_ci_high"),
         "best run": _with_range(line, "best_run_return", "median", "low", "high"),
-        "paper below": _percent(line["best_run_return_paper_percentile"]),
-        "paper steps": number(line["paper_steps"]),
-        "steps": number(ours["ours_steps_mean"]),
-        "paper deliveries": number(line["paper_deliveries"], 2),
+        "below paper": _percent(line["best_run_return_paper_percentile"]),
+        "deliveries, paper": number(line["paper_deliveries"], 2),
         "deliveries": number(ours["ours_deliveries_mean"], 2),
     }
-    return (cell for name, cell in cells.items() if of_paper or not name.startswith("paper"))
+    steps = {"paper": number(line["paper_steps"])}
+    for name in ("ours_steps_all", "ours_steps_last50"):
+        steps[name] = _centre(ours, name)
+        steps[f"{name}_iqm"] = _with_range(ours, name, "iqm", "iqm_ci_low", "iqm_ci_high")
+    return returns, steps
 
 
-def _table2_notes(of_paper: bool, choices: Choices) -> str:
-    notes = ["best run: best by return of all configurations, one run each: median [95 %]"]
+def _table2_notes(comparison: Comparison, lines: Sequence[Mapping], choices: Choices) -> str:
+    of_paper, seeds = comparison.in_paper_world, len(comparison.seeds)
+    whose = "at the paper's configuration, " if of_paper else ""
+    notes = [
+        f"mean, IQM: over seeds, {whose}intervals at 95 %",
+        "IQM: interquartile mean, of the middle half of the runs: the typical run",
+        f"{APART} the mean lies outside of the IQM's interval: a few far runs have moved it",
+        "best run: best by return of all configurations, one run each: median [95 %]",
+    ]
     if of_paper:
-        notes.insert(0, "ours: the paper's configuration, mean over seeds; intervals at 95 %")
         notes += [
             "below: percentage of these below the paper's figure",
-            "food: deliveries per episode, last 50",
+            f"food: deliveries per episode, {comparison.late}",
+            f"steps: {nearer_steps(lines)}",
+        ]
+    if 1 < seeds < FEW_SEEDS:
+        notes += [
+            f"Few seeds ({seeds}): where one run in a hundred is far off, the interval of the mean",
+            "misses it more often than not. The IQM's holds from 10 seeds on (docs/statistics.md).",
         ]
     # Why -> the choices made so, as lines.
     starred: dict[Chosen, list[str]] = {}
@@ -203,6 +255,13 @@ def _mixed_note(comparison: Comparison, choices: Choices) -> str:
     return f"\n+ {MIXED}: see what the ants do" if mixed else ""
 
 
+def _centre(line: Mapping, stem: str) -> str:
+    """A mean with its interval, marked where the IQM's excludes it."""
+    text = _with_range(line, stem, "mean", "ci_low", "ci_high")
+    first, *rest = text.split("\n")
+    return "\n".join([f"{first} {APART}" if apart(line, f"{stem}_") else first, *rest])
+
+
 def _with_range(line: Mapping, stem: str, *names: str) -> str:
     middle, low, high = (line[f"{stem}_{name}"] for name in names)
     digits = 0 if max(abs(middle), abs(high)) >= 100 else 1
@@ -217,24 +276,27 @@ def _percent(value: float) -> str:
 
 def _greedy(comparison: Comparison, choices: Choices) -> Section:
     """Greedy rollouts at the configurations of the tables above."""
-    settings = comparison.delivery_settings
-    headers = [f"{setting}\n{name}" for setting in settings for name in _GREEDY]
-    table = _table("Greedy evaluation", ("Learner", *headers), gap=1)
+    headers = ("Learner", "Delivery", "Return\nmean", "IQM", "Steps\nmean", "IQM", "Food\nmean")
+    table = _table("Greedy evaluation", headers, text_columns=2, gap=1)
+    order = _order(comparison)
+    settings = list(comparison.delivery_settings)
     # Learners in the order of the tables above.
-    variants = sorted({variant for _, variant in choices}, key=_order(comparison))
-    for variant in variants if comparison.rollouts else ():
-        chosen = [choices.get((setting, variant)) for setting in settings]
+    places = sorted(choices, key=lambda place: (order(place[1]), settings.index(place[0])))
+    for setting, variant in places if comparison.rollouts else ():
+        chosen = choices[setting, variant]
         cells = []
-        for one in chosen:
-            for measure, digits in _GREEDY.values():
-                value = math.nan
-                if one is not None:
-                    value = float(comparison.measure(measure)[one.position, one.seeds].mean())
-                cells.append(number(value, digits))
-        table.add_row(_marked(comparison, variant, *chosen), *cells)
+        for measure, digits in _GREEDY.items():
+            values = comparison.measure(measure)[[chosen.position], chosen.seeds]
+            columns = centres(values, MEASURES[measure].typical)
+            line = {name: float(column[0]) for name, column in columns.items()}
+            off = MEASURES[measure].typical and apart(line)
+            cells.append(number(line["mean"], digits) + (f" {APART}" if off else ""))
+            if MEASURES[measure].typical:
+                cells.append(number(line["iqm"], digits))
+        table.add_row(_marked(comparison, variant, chosen), setting, *cells)
     if not table.row_count:
         return table, ""
-    notes = "Configurations and seeds as in the tables above, means over seeds."
+    notes = "Configurations and seeds as in the tables above."
     if comparison.in_paper_world:
         low, high = GREEDY_STEPS
         notes += f"\nThe paper: about {GREEDY_RETURN:g} reward in {low:g} to {high:g} steps."
@@ -263,7 +325,7 @@ def _behaviours(comparison: Comparison, choices: Choices) -> list[Section]:
         *(f"{BEHAVIOURS[code]}: {DEFINITIONS[code]}" for code in counts(comparison.behaviours)),
         "An episode without delivery is told by its second half.",
         "runs and their mean returns: configurations and seeds as in the tables above",
-        "training: the last 50 episodes; followed: the episode that tells the behaviour",
+        f"training: {comparison.late} episodes; followed: the episode that tells the behaviour",
         "greedy: the greedy evaluation above; all: runs in all configurations",
     )
     return [(table, "\n".join(notes) if table is tables[-1] else "") for table in tables]
@@ -294,7 +356,7 @@ def _claims(findings: Sequence[Finding]) -> Section:
     headers = ("Section", "In our words (tested on)", *settings)
     table = _table("The paper's claims", headers, text_columns=len(headers))
     for column in table.columns[2:]:
-        column.max_width = len("distinguishable")
+        column.max_width = len("mean: contradicted")
     shown = []
     for group in by_claim(findings):
         tested = [finding for finding in group if finding.verdict is not Verdict.NOT_TESTED]
@@ -313,18 +375,33 @@ def _claims(findings: Sequence[Finding]) -> Section:
         f"{setting}: {tally([f for f in findings if f.delivery == setting])}"
         for setting in settings
     ]
+    if any(finding.verdict is Verdict.EQUIVALENT for finding in shown):
+        notes.append("equivalent: what the claim says differs, differs by less than matters")
     if any(finding.note == WITHIN_MARGIN for finding in shown):
         notes.append("~ the effect may be too small to matter (within the margin)")
+    if any(finding.disagrees for finding in shown):
+        notes.append("mean: the verdict by the mean, where it is not that on the typical run (IQM)")
     if shown:
         notes.append(f"All intervals behind the verdicts hold at once with {_LEVEL} %.")
         notes.append("claims.md holds effects, intervals and what each claim was tested on.")
+    return table, "\n".join([*notes, *_untested(findings)])
+
+
+def _untested(findings: Sequence[Finding]) -> list[str]:
+    """Why claims were not tested, the three most frequent reasons and a count of the others."""
     reasons = Counter(f.note for f in findings if f.verdict is Verdict.NOT_TESTED)
-    notes += [f"not tested ({times}): {reason}" for reason, times in reasons.most_common(3)]
-    return table, "\n".join(notes)
+    notes = [f"not tested ({times}): {reason}" for reason, times in reasons.most_common(3)]
+    others = [times for _, times in reasons.most_common()[3:]]
+    if others:
+        notes.append(
+            f"not tested ({sum(others)}): {count(len(others), 'other reason')}, see claims.md"
+        )
+    return notes
 
 
 def _verdict(finding: Finding) -> str:
-    return finding.verdict.value + (" ~" if finding.note == WITHIN_MARGIN else "")
+    text = finding.verdict.value + (" ~" if finding.note == WITHIN_MARGIN else "")
+    return f"{text}\nmean: {finding.by_mean.verdict.value}" if finding.disagrees else text
 
 
 def _no_claims() -> Section:

@@ -2,35 +2,38 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, NAMES, counts
-from taichi_ants.analysis.comparison import Comparison
-from taichi_ants.analysis.statistics import bootstrap_interval
+from taichi_ants.analysis.comparison import Comparison, Row
+from taichi_ants.analysis.measures import MEASURES
+from taichi_ants.analysis.statistics import centres
 
+_MEASURES = (
+    "return_last50",
+    "steps_last50",
+    "steps_all",
+    "deliveries_last50",
+    "greedy_return",
+    "greedy_steps",
+    "greedy_deliveries",
+)
+_TYPICAL = ("iqm", "iqm_ci_low", "iqm_ci_high")
 SUMMARY_COLUMNS: tuple[str, ...] = (
-    "learner",
-    "planning_steps",
-    "learning_rate",
-    "discount",
-    "epsilon",
-    "epsilon_decay",
-    "delivery",
+    *(field.name for field in fields(Row)),
     "seeds",
-    "return_last50_mean",
-    "return_last50_ci_low",
-    "return_last50_ci_high",
     "return_last50_sd",
-    "steps_last50_mean",
-    "steps_all_mean",
-    "deliveries_last50_mean",
-    "greedy_return_mean",
-    "greedy_steps_mean",
-    "greedy_deliveries_mean",
+    *(
+        f"{name}_{column}"
+        for name in _MEASURES
+        for column in ("mean", "ci_low", "ci_high", *(_TYPICAL if MEASURES[name].typical else ()))
+    ),
     *(f"runs_{name}" for name in NAMES),
 )
 BEHAVIOUR_COLUMNS: tuple[str, ...] = (
-    *SUMMARY_COLUMNS[:7],
+    *(field.name for field in fields(Row)),
     "behaviour",
     "runs",
     "return_last50_mean",
@@ -40,34 +43,23 @@ BEHAVIOUR_COLUMNS: tuple[str, ...] = (
     "greedy_deliveries_mean",
 )
 
-_MEANS = (
-    "return_last50",
-    "steps_last50",
-    "steps_all",
-    "deliveries_last50",
-    "greedy_return",
-    "greedy_steps",
-    "greedy_deliveries",
-)
-
 
 def summarise(comparison: Comparison) -> list[dict]:
     """The rows of summary.csv, with the keys of `SUMMARY_COLUMNS`.
 
-    Means, 95 % intervals (see `statistics.bootstrap_interval`) and standard deviations (n - 1)
-    over seeds, and the number of runs whose final policy behaves so. What cannot exist is nan:
-    interval and deviation of one seed, greedy figures without rollouts.
+    Means and interquartile means over seeds with 95 % intervals (see `statistics`), and the
+    standard deviation (n - 1) of returns; then how many final policies behave so. What cannot
+    exist is nan: intervals and deviation of one seed, greedy figures without rollouts.
     """
-    returns = comparison.measure("return_last50")
-    seeds = len(comparison.seeds)
-    low, high = bootstrap_interval(returns)
-    sd = returns.std(axis=1, ddof=1) if seeds > 1 else np.full(len(returns), np.nan)
+    returns, seeds = comparison.measure("return_last50"), len(comparison.seeds)
     columns = {
-        "return_last50_ci_low": low,
-        "return_last50_ci_high": high,
-        "return_last50_sd": sd,
-        **{f"{name}_mean": comparison.measure(name).mean(axis=1) for name in _MEANS},
+        f"{name}_{column}": values
+        for name in _MEASURES
+        for column, values in centres(comparison.measure(name), MEASURES[name].typical).items()
     }
+    columns["return_last50_sd"] = (
+        returns.std(axis=1, ddof=1) if seeds > 1 else np.full(len(returns), np.nan)
+    )
     lines = []
     for number, row in enumerate(comparison.rows):
         line = {**vars(row), "seeds": seeds}

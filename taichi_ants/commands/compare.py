@@ -209,8 +209,8 @@ def what_policies_do(sweep: Sweep, q_values: Any) -> tuple[Any, Any]:
 
 def write_tables(
     folder: Path, comparison: Comparison, baselines: list[dict[str, Any]], costs: list[dict]
-) -> str:
-    """Write all tables; the summary for the terminal."""
+) -> tuple[Any, ...]:
+    """Write all tables and the report; what `report.print_report` needs to show it."""
     from taichi_ants import results
     from taichi_ants.analysis import report, summary, table2
     from taichi_ants.analysis.claims import assess, claims_markdown, claims_rows
@@ -221,13 +221,14 @@ def write_tables(
     results.write_csv(folder / "behaviours.csv", lines, summary.BEHAVIOUR_COLUMNS)
     table = table2.table2(comparison)
     results.write_csv(folder / "table2.csv", table, list(table[0]))
-    text = table2.table2_markdown(table, comparison.world, comparison.conditions)
-    results.write_text(folder / "table2.md", text)
+    results.write_text(folder / "table2.md", table2.table2_markdown(table, comparison))
     findings = assess(comparison)
     rows = claims_rows(findings)
     results.write_csv(folder / "claims.csv", rows, list(rows[0]))
     results.write_text(folder / "claims.md", claims_markdown(findings, comparison.world))
-    return report.render(comparison, table, findings, baselines, costs)
+    shown = (comparison, table, findings, baselines, costs)
+    results.write_text(folder / REPORT, report.render(*shown))
+    return shown
 
 
 def write_episodes(folder: Path, comparison: Comparison) -> None:
@@ -268,6 +269,7 @@ def write_policies(folder: Path, sweep: Sweep, comparison: Comparison, tables: A
 
 def compare(settings: argparse.Namespace) -> None:
     """Run the comparison, or show the finished one."""
+    from taichi_ants.analysis.report import print_report
     from taichi_ants.provenance import file_hash, provenance, sweep_settings
     from taichi_ants.result_folder import ResultFolder
 
@@ -280,17 +282,17 @@ def compare(settings: argparse.Namespace) -> None:
         return
     began = time.perf_counter()
     with folder.work(settings.force) as (blocks, ready):
-        manifest = do_comparison(settings, sweep, blocks, ready)
+        manifest, shown = do_comparison(settings, sweep, blocks, ready)
         manifest["seconds"]["total"] = time.perf_counter() - began
         folder.publish({**provenance(sys.argv), **manifest})
-    print((settings.out / REPORT).read_text("utf-8"))
-    print(f"{manifest['seconds']['total']:.1f} s; everything is in {settings.out}/")
+    print_report(*shown)
+    print(f"\n{manifest['seconds']['total']:.1f} s; everything is in {settings.out}/")
 
 
 def do_comparison(
     settings: argparse.Namespace, sweep: Sweep, blocks: Path, ready: Path
-) -> dict[str, Any]:
-    """All the work; what the manifest says of it."""
+) -> tuple[dict[str, Any], tuple[Any, ...]]:
+    """All the work; what the manifest says of it, and what the report shows."""
     from functools import partial
 
     from taichi_ants import results
@@ -322,8 +324,7 @@ def do_comparison(
     with ExitStack() as beside:  # figures take one core and need no more than these two files
         if not settings.no_figures:
             beside.enter_context(process_beside(draw_figures, sweep, ready, ready))
-        text = write_tables(ready, comparison, baselines, costs)
-        results.write_text(ready / REPORT, text)
+        shown = write_tables(ready, comparison, baselines, costs)
         policies = results.check_writable_folder(ready / POLICIES)
         write_policies(policies, sweep, comparison, result.q_values)
         laps["tables"] = time.perf_counter()
@@ -332,7 +333,7 @@ def do_comparison(
     laps["figures and renders"] = time.perf_counter()
     marks = list(laps.items())
     seconds = {name: end - marks[i][1] for i, (name, end) in enumerate(marks[1:])}
-    return {"cost_per_step": costs, "seconds": seconds}
+    return {"cost_per_step": costs, "seconds": seconds}, shown
 
 
 def draw_figures(sweep: Sweep, results: Path, folder: Path) -> None:
@@ -374,7 +375,10 @@ def show_finished(settings: argparse.Namespace, sweep: Sweep, folder: ResultFold
     from taichi_ants import results
 
     folder.check_whole(apart_from=(FIGURES, RENDERS))
-    print(results.read_text(settings.out / REPORT))
+    if sys.stdout.isatty():  # as wide as it is now
+        show_report(settings, sweep)
+    else:
+        print(results.read_text(settings.out / REPORT))
     if not settings.no_render and folder.lacks(RENDERS):
         with folder.addition() as place:
             render_policies(sweep, settings.out / POLICIES, place)
@@ -382,6 +386,24 @@ def show_finished(settings: argparse.Namespace, sweep: Sweep, folder: ResultFold
         with folder.addition() as place:
             draw_figures(sweep, settings.out, place)
     print(f"{settings.out}/ holds this comparison already; --force runs it again.")
+
+
+def show_report(settings: argparse.Namespace, sweep: Sweep) -> None:
+    """Print the report of a finished comparison for the terminal that there is now."""
+    import json
+    from dataclasses import replace
+
+    from taichi_ants import results
+    from taichi_ants.analysis import report, table2
+    from taichi_ants.analysis.claims import assess
+    from taichi_ants.result_folder import MANIFEST
+
+    comparison, baselines = read_back(settings.out, sweep)
+    if not comparison.in_paper_world:
+        comparison = replace(comparison, world=world_name(settings))
+    costs = json.loads(results.read_text(settings.out / MANIFEST))["cost_per_step"]
+    lines, findings = table2.table2(comparison), assess(comparison)
+    report.print_report(comparison, lines, findings, baselines, costs)
 
 
 def read_back(folder: Path, sweep: Sweep) -> tuple[Comparison, list[dict[str, Any]]]:

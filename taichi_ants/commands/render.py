@@ -320,7 +320,7 @@ def show_colony(settings: argparse.Namespace, world: World) -> None:
 
     As a single picture, the episode is shown at its last tick, or at `--step`.
     """
-    from taichi_ants.one_colony import counted
+    from taichi_ants.analysis.markdown import count
     from taichi_ants.rendering import colony_picture, render_colony, save_picture
 
     colony, title = settled_colony(settings, world)
@@ -342,8 +342,8 @@ def show_colony(settings: argparse.Namespace, world: World) -> None:
                 progress=progress,
                 **look,
             )
-    delivered = counted(int(colony.outcome().deliveries.sum()), "delivery", "deliveries")
-    ants, ticks = counted(settings.ants, "ant"), counted(colony.ticks, "tick")
+    delivered = count(int(colony.outcome().deliveries.sum()), "delivery")
+    ants, ticks = count(settings.ants, "ant"), count(colony.ticks, "tick")
     print(f"{settings.out}: {ants}, {ticks}, {delivered}")
 
 

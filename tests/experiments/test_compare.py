@@ -6,6 +6,7 @@ import csv
 import json
 import re
 import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -38,10 +39,17 @@ TINY = [
 ]
 COLUMNS = [
     *("learner", "planning_steps", "learning_rate", "discount", "epsilon", "epsilon_decay"),
-    *("delivery", "seeds", "return_last50_mean", "return_last50_ci_low", "return_last50_ci_high"),
-    *("return_last50_sd", "steps_last50_mean", "steps_all_mean", "deliveries_last50_mean"),
-    *("greedy_return_mean", "greedy_steps_mean", "greedy_deliveries_mean"),
-    *("runs_delivers", "runs_walks_the_trail", "runs_circles_beside_the_queen", "runs_other"),
+    *("delivery", "seeds", "return_last50_sd"),
+]
+for measure in (
+    *("return_last50", "steps_last50", "steps_all", "deliveries_last50"),
+    *("greedy_return", "greedy_steps", "greedy_deliveries"),
+):
+    COLUMNS += [f"{measure}_{name}" for name in ("mean", "ci_low", "ci_high")]
+    if not measure.startswith(("deliveries", "greedy_deliveries")):
+        COLUMNS += [f"{measure}_{name}" for name in ("iqm", "iqm_ci_low", "iqm_ci_high")]
+COLUMNS += [
+    f"runs_{name}" for name in ("delivers", "walks_the_trail", "circles_beside_the_queen", "other")
 ]
 FIGURES = {
     *("figures/best_runs.png", "figures/learning_curves.png"),
@@ -166,7 +174,10 @@ def test_summary_figures_are_those_of_the_episodes(finished):
         "greedy_steps_mean": arrays["greedy_steps"].mean(axis=(1, 2)),
         "greedy_deliveries_mean": arrays["greedy_deliveries"].mean(axis=(1, 2)),
     }
-    assert list(expected) == COLUMNS[8:-4]
+    for name in ("returns", "steps"):  # of three seeds the IQM is the mean
+        stem = f"{name.removesuffix('s') if name == 'returns' else name}_last50"
+        expected[f"{stem}_iqm"] = expected[f"{stem}_mean"]
+    assert set(expected) <= set(COLUMNS)
     for name, values in expected.items():
         written = [float(row[name]) for row in rows]
         np.testing.assert_allclose(written, values, rtol=1e-9, atol=1e-12, err_msg=name)
@@ -308,6 +319,21 @@ def test_the_same_command_shows_the_finished_comparison(copy, compare):
     assert (status, err) == (0, "")
     assert out == f"{report}\n{copy}/ holds this comparison already; --force runs it again.\n"
     assert contents(copy) == before
+
+
+def test_a_terminal_shows_the_finished_comparison_as_wide_as_it_is(copy, compare, monkeypatch):
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    for name, value in (("COLUMNS", "150"), ("TERM", "xterm-256color"), ("NO_COLOR", "1")):
+        monkeypatch.setenv(name, value)
+    status, out, err = compare(*SMALL, "--out", copy)
+    assert (status, err) == (0, "")
+    numbers = (
+        "12 configurations, 3 seeds, 60 episodes of at most 45 steps, 50 greedy rollouts a run."
+    )
+    assert numbers in out  # one line, two in the file
+    assert numbers not in (copy / "report.txt").read_text("utf-8")
+    for section in ("Table 2", "Greedy evaluation", "Cost per step", "Baselines"):
+        assert section in out
 
 
 def test_force_runs_again_and_leaves_no_old_pictures(copy, compare):
@@ -465,7 +491,8 @@ def test_a_learner_of_ones_own_and_a_discount_of_one_are_reported(tmp_path, comp
         greedy = archive["greedy_returns"][best].mean()
     cells = [line.split() for line in out.splitlines() if line.startswith("hysteretic *")]
     assert cells[0][3] == f"{returns[best]:.1f}"
-    assert cells[1][2] == f"{greedy:.1f}"
+    assert cells[1][2] == "-"  # the paper's steps of a learner that it does not have
+    assert cells[2][3] == f"{greedy:.1f}"
     assert f"hysteretic, absorbing: 0.1 / {best} / 0.3 / 0.9" in out
     assert "optimal policy, discount 1: there is no optimal policy" in out
     assert max(len(line) for line in out.splitlines()[:-1]) < 80

@@ -147,7 +147,8 @@ def test_where_nothing_differs_no_difference_is_claimed(seeds: int) -> None:
             random_seed=number,
         )
         findings = assess(comparison, directed)
-        errors += any(finding.verdict is not Verdict.UNDISTINGUISHED for finding in findings)
+        verdicts = {finding.verdict for finding in findings}
+        errors += not verdicts <= {Verdict.UNDECIDED, Verdict.EQUIVALENT}
     assert errors <= 2
 
 
@@ -233,8 +234,8 @@ def test_seeds_pair_the_rows() -> None:
     rows = [n for n, row in enumerate(unpaired.rows) if row.variant == SARSA]
     unpaired.returns[rows] = unpaired.returns[rows][:, ::-1]
     (blurred,) = assess(unpaired, [BY_ID["sarsa-return-slightly-lower"]])
-    assert blurred.effect == pytest.approx(paired.effect)
-    assert blurred.verdict is Verdict.UNDISTINGUISHED
+    assert blurred.by_mean.effect == pytest.approx(paired.by_mean.effect)
+    assert blurred.verdict is Verdict.UNDECIDED
 
 
 def test_a_finding_shows_the_weakest_contrast_and_what_it_rests_on() -> None:
@@ -266,12 +267,14 @@ def test_contrasts_name_what_they_subtract() -> None:
 def test_levels_are_corrected_for_all_intervals_of_all_tested_claims() -> None:
     claims = [BY_ID["q-return-highest"], BY_ID["discount-q"], BY_ID["greedy-return"]]
     comparison = build({"continuing": unchanged, "absorbing": unchanged})
-    contrasts = 3 + 1 + 4
+    intervals = 2 * (3 + 1 + 4)  # of the typical run and of the mean
     for finding in assess(comparison, claims):
-        assert finding.level == pytest.approx(1 - (1 - SIMULTANEOUS_LEVEL) / (2 * contrasts))
+        assert finding.level == pytest.approx(1 - (1 - SIMULTANEOUS_LEVEL) / (2 * intervals))
     without = build({"continuing": unchanged, "absorbing": unchanged}, rollouts=0)
     for finding in assess(without, claims[:2]):
-        assert finding.level == pytest.approx(1 - (1 - SIMULTANEOUS_LEVEL) / (2 * 4))
+        assert finding.level == pytest.approx(1 - (1 - SIMULTANEOUS_LEVEL) / (2 * 2 * 4))
+    shares = assess(without, [BY_ID["overall-improvement-reliable"]])
+    assert shares[0].level == pytest.approx(1 - (1 - SIMULTANEOUS_LEVEL) / (2 * 4))
 
 
 def test_in_another_world_nothing_is_tested_for_one_reason() -> None:
@@ -317,6 +320,12 @@ def test_the_tables_hold_the_findings() -> None:
     assert rows[0]["claim"] == "q-return-highest"
     assert rows[0]["criterion"] == "above 0, margin 1"
     assert rows[0]["effect"] == findings[0].effect
+    assert (rows[0]["centre"], rows[0]["mean_effect"]) == (
+        "interquartile mean",
+        findings[0].by_mean.effect,
+    )
+    share = rows[[claim.id for claim in CLAIMS].index("deliveries-about-one") * 2]
+    assert (share["centre"], share["mean_verdict"]) == ("mean", "")
     text = claims_markdown(findings)
     assert all(text.count(f"**{claim.id}**") == 1 for claim in CLAIMS)
     line = next(line for line in text.splitlines() if line.startswith("| q-return-highest"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import re
 from dataclasses import replace
 
 import pytest
@@ -12,7 +13,7 @@ from synthetic_comparison import build, change, subset, unchanged
 from taichi_ants.analysis.baselines import TRAINING_SETTING
 from taichi_ants.analysis.behaviour import CIRCLES, OTHER, WALKS
 from taichi_ants.analysis.best_of import paper_position
-from taichi_ants.analysis.claims import CLAIMS, assess
+from taichi_ants.analysis.claims import CLAIMS, Verdict, assess
 from taichi_ants.analysis.comparison import PAPER_WORLD, Comparison, Variant
 from taichi_ants.analysis.markdown import count, interval, number, table
 from taichi_ants.analysis.paper import DYNA_P5, FIGURE_1, SARSA
@@ -68,13 +69,37 @@ def test_table_2_stands_beside_the_papers(text: str, comparison: Comparison) -> 
         if line["learner"] == "sarsa" and line["delivery"] == "continuing"
     )
     cells = row(text, "SARSA", after="Table 2, continuing")
-    assert cells[:3] == ["SARSA", "47.3", f"{line['same_return_mean']:.1f}"]
-    assert cells[-4:-2] == ["73.0", f"{line['same_steps_mean']:.1f}"]
+    centres = [f"{line[f'same_return_{centre}']:.1f}" for centre in ("mean", "iqm")]
+    assert cells[:4] == ["SARSA", "47.3", *centres]
+    steps = row(text, "SARSA", after="Table 2, continuing delivery: steps")
+    names = ("steps_all_mean", "steps_all_iqm", "steps_last50_mean", "steps_last50_iqm")
+    assert steps == ["SARSA", "73.0", *(f"{line[f'same_{name}']:.1f}" for name in names)]
     assert row(text, "Dyna-Q (p5)", after="Table 2, absorbing")[3] == "248"
+    words = " ".join(text.split())
+    assert "IQM: interquartile mean, of the middle half of the runs" in words
+    assert "the paper leaves open whether it means all episodes or the last 50; ours come" in words
+
+
+def test_means_that_far_runs_have_moved_are_marked() -> None:
+    comparison = build({"continuing": unchanged}, seeds=60, noise=5.0, shared=0.0)
+    position = comparison.position("continuing", SARSA, FIGURE_1)
+    comparison.returns[position, 7] = 4000
+    comparison.greedy_steps[position, 5] = 600
+    text = render(comparison, table2(comparison, 50), [])
+    cells = row(text, "SARSA", after="Table 2")
+    assert cells[3] == "!"
+    assert float(cells[4]) < 45 < 90 < float(cells[2])
+    greedy = row(text, "SARSA", after="Greedy")
+    assert greedy == ["SARSA", "continuing", "45.0", "45.0", "44.4", "!", "35.0", "1.00"]
+    assert text.count(" !\n") + text.count(" ! ") == 2
+    assert "Few seeds" not in text
+    few = subset(comparison, range(len(comparison.rows)), 10, 120)
+    assert "Few seeds (10): where one run in a hundred" in render(few, table2(few, 50), [])
 
 
 def test_greedy_claims_costs_and_baselines(text: str) -> None:
-    assert row(text, "SARSA", after="Greedy evaluation") == ["SARSA"] + ["45.0", "35.0", "1.00"] * 2
+    greedy = ["45.0", "45.0", "35.0", "35.0", "1.00"]
+    assert row(text, "SARSA", after="Greedy evaluation") == ["SARSA", "continuing", *greedy]
     words = " ".join(text.split())
     first = CLAIMS[0].statement.removesuffix(".").split(" of all")[0]
     assert first in words
@@ -134,7 +159,8 @@ def test_means_that_no_run_has_are_marked(comparison: Comparison, text: str) -> 
     marked = render(mixed, table2(mixed, 10), [])
     for start in ("Table 2, absorbing", "Greedy evaluation", "What the ants do, absorbing"):
         rows = [line for line in section(marked, start).splitlines() if "Dyna-Q" in line]
-        assert [line.startswith("Dyna-Q (p5) +") for line in rows] == [False, True], start
+        assert [line.startswith("Dyna-Q (p5) +") for line in rows][-1], start
+        assert sum(line.startswith("Dyna-Q (p5) +") for line in rows) == 1, start
     assert "Dyna-Q (p5) +" not in section(marked, "Table 2, continuing")
     assert marked.count("\n+ the runs do different things, and no run has their mean") == 2
 
@@ -147,23 +173,44 @@ def test_a_terminal_gets_colours(comparison: Comparison, monkeypatch: pytest.Mon
     for name in ("NO_COLOR", "FORCE_COLOR", "TTY_COMPATIBLE"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("TERM", "xterm-256color")
+    monkeypatch.setenv("COLUMNS", "150")
     terminal = Terminal()
     print_report(comparison, [], assess(comparison, CLAIMS[:1]), file=terminal)
+    # As wide as the terminal: the statement takes one line, not three.
+    assert CLAIMS[0].statement.removesuffix(".") in terminal.getvalue()
     assert "\x1b[32msupported" in terminal.getvalue()
     assert "\x1b[31mcontradicted" in terminal.getvalue()
+
+
+def test_what_is_no_terminal_gets_the_plain_text(comparison: Comparison) -> None:
+    pipe = io.StringIO()
+    findings = assess(comparison, CLAIMS[:1])
+    print_report(comparison, [], findings, file=pipe)
+    assert pipe.getvalue() == render(comparison, [], findings)
 
 
 def test_a_small_comparison_says_what_is_missing() -> None:
     one = subset(build({"absorbing": unchanged}, variants=[SARSA], rollouts=0), [3], 1, 7)
     text = render(one, table2(one, 10), assess(one))
+    assert "last 50" not in text.replace("all episodes or the last 50", "")
+    assert "not tested (51): the claims need at least 50 episodes, there are 7" in text
     assert "\n1 configuration, 1 seed, 7 episodes of at most 600 steps, 0 greedy ro" in text
     assert f"absorbing: {len(CLAIMS)} not tested" in text
-    assert "not tested (12): no Q-learning at 0.001 / 0.99 / 0.3 / 0.99" in text
     assert "Greedy evaluation" not in text
     assert "The paper's claims" not in text
     mean = float(one.returns.mean())
     assert row(text, "SARSA *", after="Table 2")[2:4] == ["47.3", f"{mean:.1f}"]
     assert "nan" not in text
+
+
+def test_counts_of_what_was_not_tested_add_up() -> None:
+    one = subset(build({"absorbing": unchanged}, variants=[SARSA], rollouts=0), [3], 3, 60)
+    text = render(one, [], assess(one))
+    assert ": no Q-learning at 0.001 / 0.99 / 0.3 / 0.99\n" in text
+    counts = [int(count) for count in re.findall(r"^not tested \((\d+)\)", text, re.MULTILINE)]
+    assert len(counts) == 4
+    assert sum(counts) == len(CLAIMS)
+    assert re.search(r"not tested \(\d+\): \d+ other reasons, see claims.md", text)
 
 
 def halves(world: str, variants: list[Variant], seeds: int) -> Comparison:
@@ -189,7 +236,7 @@ def test_learners_beside_the_papers_are_shown_at_their_best_on_other_seeds(world
         cells = row(text, f"{name} *", after=f"{place}, absorbing")
         expected = [*paper, "30.0"] if world == PAPER_WORLD else ["30.0"]
         assert cells[2 : 2 + len(expected)] == expected
-        assert row(text, f"{name} *", after="Greedy")[2] == "17.0"
+        assert row(text, f"{name} *", after="Greedy")[3] == "17.0"
         assert f"{name}, absorbing: {label}" in text
     assert "* best by return on half of the seeds, reported on the other half" in text
 
@@ -197,8 +244,8 @@ def test_learners_beside_the_papers_are_shown_at_their_best_on_other_seeds(world
 def test_one_seed_shows_the_plain_best_as_such() -> None:
     comparison = halves(PAPER_WORLD, [Variant("hysteretic")], 1)
     text = render(comparison, table2(comparison, 100), assess(comparison))
-    assert row(text, "hysteretic *", after="Table 2")[2:5] == ["-", "80.0", "80.0"]
-    assert row(text, "hysteretic *", after="Greedy")[2] == "99.0"
+    assert row(text, "hysteretic *", after="Table 2")[2:6] == ["-", "80.0", "80.0", "80.0"]
+    assert row(text, "hysteretic *", after="Greedy")[3] == "99.0"
     assert "* best by return on the one seed there is" in text
 
 
@@ -209,6 +256,18 @@ def test_another_world_is_not_held_against_the_paper(comparison: Comparison) -> 
     mentions = [line for line in text.splitlines() if "paper" in line]
     assert mentions == ["The paper's claims: not tested, the claims are about the paper's world."]
     assert "47.3" not in text
+
+
+def test_the_means_verdict_stands_below_where_it_is_another(comparison: Comparison) -> None:
+    first, *others = assess(comparison)
+    other = replace(first.by_mean, verdict=Verdict.UNDECIDED)
+    equal = replace(first, verdict=Verdict.EQUIVALENT, by_mean=other)
+    text = render(comparison, [], [equal, *others])
+    assert row(text, "3.2", after="In our words")[-2:] == ["equivalent", "contradicted"]
+    assert "mean: undecided" in text
+    assert "1 equivalent" in text
+    assert "equivalent: what the claim says differs, differs by less than matters" in text
+    assert "mean: undecided" not in render(comparison, [], [first, *others])
 
 
 def test_claims_name_their_scope_and_doubtful_sizes(text: str, comparison: Comparison) -> None:
@@ -234,8 +293,11 @@ def test_the_tables_fit_the_terminal(
     assert max(len(line) for line in text.splitlines()) <= columns
     if columns >= 79:  # no number is broken
         span = row(text, "[", after="Table 2")
-        assert len(span) == 4
-        assert row(text, "Dyna-Q (p5)", after="Greedy")[-6:] == ["45.0", "35.0", "1.00"] * 2
+        assert len(span) == 6  # mean, IQM and best run
+        assert row(text, "Dyna-Q (p5)", after="Greedy")[-5:] == ["45.0"] * 2 + ["35.0"] * 2 + [
+            "1.00"
+        ]
+    assert "Q-learning" in text
 
 
 def test_a_baseline_without_figures_says_why(comparison: Comparison) -> None:
@@ -253,4 +315,5 @@ def test_numbers_as_text() -> None:
     assert interval(-1.0, 2.25, 2) == "[-1.00, 2.25]"
     assert interval(1.0, math.nan) == "-"
     assert (count(1, "seed"), count(0, "seed")) == ("1 seed", "0 seeds")
+    assert (count(1, "delivery"), count(2, "delivery")) == ("1 delivery", "2 deliveries")
     assert table(["a", "b"], [["x", "1"]]) == "| a | b |\n| --- | ---: |\n| x | 1 |\n"

@@ -28,7 +28,7 @@ def test_a_line_by_hand() -> None:
     (line,) = summarise(comparison)
     assert tuple(line) == SUMMARY_COLUMNS
     low, high = bootstrap_interval(np.array([[40.0, 50.0, 60.0]]))
-    assert line == {
+    assert {name: line[name] for name in SUMMARY_COLUMNS[:9]} == {
         "learner": "sarsa",
         "planning_steps": 0,
         "learning_rate": 0.01,
@@ -37,21 +37,39 @@ def test_a_line_by_hand() -> None:
         "epsilon_decay": 0.995,
         "delivery": "absorbing",
         "seeds": 3,
-        "return_last50_mean": 50.0,
-        "return_last50_ci_low": low[0],
-        "return_last50_ci_high": high[0],
         "return_last50_sd": pytest.approx(10.0),
+    }
+    assert (line["return_last50_ci_low"], line["return_last50_ci_high"]) == (low[0], high[0])
+    centres = {name: value for name, value in line.items() if name.endswith(("mean", "iqm"))}
+    runs = {name: value for name, value in line.items() if name.startswith("runs_")}
+    assert centres == {
+        "return_last50_mean": 50.0,
+        "return_last50_iqm": 50.0,
         "steps_last50_mean": 40.0,
+        "steps_last50_iqm": 40.0,
         "steps_all_mean": pytest.approx((70 * 100 + 50 * 40) / 120),
+        "steps_all_iqm": pytest.approx((70 * 100 + 50 * 40) / 120),
         "deliveries_last50_mean": 1.0,
         "greedy_return_mean": 45.0,
+        "greedy_return_iqm": 45.0,
         "greedy_steps_mean": 35.0,
+        "greedy_steps_iqm": 35.0,
         "greedy_deliveries_mean": 1.0,
+    }
+    assert runs == {
         "runs_delivers": 2,
         "runs_walks_the_trail": 0,
         "runs_circles_beside_the_queen": 1,
         "runs_other": 0,
     }
+
+
+def test_a_far_run_moves_the_mean_and_not_the_interquartile_mean() -> None:
+    comparison = build({"absorbing": unchanged}, seeds=16, variants=[SARSA], grid=[FIGURE_1])
+    comparison.returns[0, :, -50:] = np.array([*range(36, 51), 436])[:, None]
+    (line,) = summarise(comparison)
+    assert (line["return_last50_mean"], line["return_last50_iqm"]) == (67.5625, 43.5)
+    assert line["return_last50_iqm_ci_high"] < 50
 
 
 def test_one_line_per_row_in_their_order() -> None:
@@ -70,14 +88,9 @@ def test_one_seed_without_rollouts_has_means_only() -> None:
     comparison = subset(build({"continuing": unchanged}, rollouts=0), [4], 1, 10)
     (line,) = summarise(comparison)
     missing = {name for name, value in line.items() if value != value}
-    assert missing == {
-        "return_last50_ci_low",
-        "return_last50_ci_high",
-        "return_last50_sd",
-        "greedy_return_mean",
-        "greedy_steps_mean",
-        "greedy_deliveries_mean",
-    }
+    ends = {name for name in SUMMARY_COLUMNS if name.endswith(("ci_low", "ci_high", "sd"))}
+    assert missing == ends | {name for name in SUMMARY_COLUMNS if name.startswith("greedy")}
+    assert line["return_last50_iqm"] == line["return_last50_mean"]
     assert math.isfinite(line["return_last50_mean"])
 
 

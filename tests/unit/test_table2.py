@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic_comparison import build, subset, unchanged
+from synthetic_comparison import build, change, subset, unchanged
 
 from taichi_ants.analysis.behaviour import CIRCLES, DELIVERS, MIXED, OTHER, WALKS
 from taichi_ants.analysis.best_of import (
@@ -21,7 +21,8 @@ from taichi_ants.analysis.best_of import (
 )
 from taichi_ants.analysis.comparison import Comparison, Variant
 from taichi_ants.analysis.paper import DYNA_P3, FIGURE_1, Q_LEARNING, SARSA, TABLE_2, VARIANTS
-from taichi_ants.analysis.table2 import table2, table2_markdown
+from taichi_ants.analysis.statistics import interquartile_mean
+from taichi_ants.analysis.table2 import apart, table2, table2_markdown
 
 
 @pytest.fixture(scope="module")
@@ -53,11 +54,12 @@ def test_the_winners_other_figures_belong_to_the_same_run(comparison: Comparison
     runs = zip(
         *(
             comparison.measure(name)[rows].ravel()
-            for name in ("return_last50", "steps_all", "deliveries_last50")
+            for name in ("return_last50", "steps_all", "steps_last50", "deliveries_last50")
         ),
         strict=True,
     )
-    assert set(zip(best.returns, best.steps, best.deliveries, strict=True)) <= set(runs)
+    won = (best.returns, best.steps, best.steps_last50, best.deliveries)
+    assert set(zip(*won, strict=True)) <= set(runs)
 
 
 def test_seeds_of_the_configurations_are_independent() -> None:
@@ -99,16 +101,24 @@ def test_table2_lines(comparison: Comparison) -> None:
     assert line["seeds"] == 8
     for stem, measure in (
         ("same_return", "return_last50"),
-        ("same_steps", "steps_all"),
+        ("same_steps_all", "steps_all"),
+        ("same_steps_last50", "steps_last50"),
         ("same_deliveries", "deliveries_last50"),
     ):
         mean = comparison.measure(measure)[position].mean()
         assert line[f"{stem}_mean"] == pytest.approx(mean)
         assert line[f"{stem}_ci_low"] <= mean <= line[f"{stem}_ci_high"]
+        if stem != "same_deliveries":
+            typical = interquartile_mean(comparison.measure(measure)[[position]])[0]
+            assert line[f"{stem}_iqm"] == pytest.approx(typical)
+            assert line[f"{stem}_iqm_ci_low"] <= typical <= line[f"{stem}_iqm_ci_high"]
+    assert "same_deliveries_iqm" not in line
     best = best_of(comparison, "continuing", SARSA, draws=2000)
     assert line["best_run_of"] == 16
     assert line["best_run_return_median"] == np.median(best.returns)
-    assert line["best_run_steps_high"] == pytest.approx(np.percentile(best.steps, 97.5))
+    assert line["best_run_steps_all_high"] == pytest.approx(np.percentile(best.steps, 97.5))
+    last = np.percentile(best.steps_last50, 97.5)
+    assert line["best_run_steps_last50_high"] == pytest.approx(last)
     assert line["best_run_return_paper_percentile"] == percentile_of(47.3, best.returns)
     chosen = held_out(comparison, comparison.positions("continuing", SARSA))
     assert line["held_out_configuration"] == chosen.hyperparameters.label
@@ -135,7 +145,8 @@ def test_what_is_missing_is_nan() -> None:
         for number, row in enumerate(full.rows)
         if row.learner == "mine" or row.hyperparameters != FIGURE_1
     ]
-    lines = table2(subset(full, rows, 1, 120), draws=100)
+    cut = subset(full, rows, 1, 120)
+    lines = table2(cut, draws=100)
     by_name = {line["learner"]: line for line in lines if line["planning_steps"] in (0, 2)}
     sarsa, mine, absent = by_name["sarsa"], by_name["mine"], by_name["q_learning"]
     assert (sarsa["seeds"], sarsa["best_run_of"], sarsa["held_out_seeds"]) == (0, 15, 0)
@@ -150,21 +161,22 @@ def test_what_is_missing_is_nan() -> None:
     assert absent["best_run_of"] == 0
     assert math.isnan(absent["best_run_return_median"])
     assert absent["paper_return"] == TABLE_2[Q_LEARNING].return_last50
-    text = table2_markdown(lines)
+    text = table2_markdown(lines, cut)
     assert "ours are not in this comparison" in text
     assert "| mine (p2) | absorbing | 16 |" in text
     assert "nan" not in text
 
 
 def test_another_world_has_nothing_of_the_paper(comparison: Comparison) -> None:
-    lines = table2(replace(comparison, world="garden.txt"), draws=200)
+    garden = replace(comparison, world="garden.txt")
+    lines = table2(garden, draws=200)
     assert len(lines) == 8
     assert {line["configuration"] for line in lines} == {""}
     assert {line["seeds"] for line in lines} == {0}
     assert all(math.isnan(line["paper_return"]) for line in lines)
-    assert all(math.isnan(line["best_run_steps_paper_percentile"]) for line in lines)
+    assert all(math.isnan(line["best_run_steps_all_paper_percentile"]) for line in lines)
     assert not any(math.isnan(line["held_out_return_mean"]) for line in lines)
-    text = table2_markdown(lines, "garden.txt")
+    text = table2_markdown(lines, garden)
     assert text.startswith("World: garden.txt.\n")
     assert "paper" not in text
     one = subset(replace(comparison, world="garden.txt"), [16], 2, 120)
@@ -188,15 +200,47 @@ def test_what_stands_for_a_learner(comparison: Comparison) -> None:
 
 def test_the_markdown_holds_the_numbers(comparison: Comparison) -> None:
     lines = table2(comparison, draws=2000)
-    text = table2_markdown(lines, conditions=comparison.conditions)
+    text = table2_markdown(lines, comparison)
     assert text.startswith("World: the paper's.\n\nTraining without evaporation of trails, greedy ")
-    assert "means over 8 seeds" in text
+    assert "(IQM, the typical run) over 8 seeds" in text
     row = next(line for line in text.splitlines() if line.startswith("| SARSA | continuing"))
     cells = [cell.strip() for cell in row.strip("|").split("|")]
     line = lines[1]
     assert cells[:4] == ["SARSA", "continuing", "0.01 / 0.9 / 0.3 / 0.995", "47.3"]
     assert cells[4].startswith(f"{line['same_return_mean']:.1f} [")
-    assert all(len(row.split("|")) in (8, 11) for row in text.splitlines() if row.startswith("|"))
+    assert cells[5].startswith(f"{line['same_return_iqm']:.1f} [")
+    widths = {len(row.split("|")) - 2 for row in text.splitlines() if row.startswith("|")}
+    assert widths == {7, 8, 10}
+
+
+def test_both_readings_of_steps_are_labelled_and_the_nearer_one_is_named() -> None:
+    """All episodes: 100 at first, then fewer; the paper's 73 to 138 lie nearer to their mean."""
+    comparison = build({"continuing": change(early_steps=100, late_steps=-30)}, seeds=8)
+    text = table2_markdown(table2(comparison, draws=50), comparison)
+    assert "| Steps, all, mean | Steps, all, IQM | Steps, last 50, mean |" in text
+    assert "ours come nearer over all." in text
+    late = build({"continuing": change(early_steps=500, late_steps=30)}, seeds=8)
+    text = table2_markdown(table2(late, draws=50), late)
+    assert "ours come nearer over the last 50." in text
+    short = subset(comparison, range(len(comparison.rows)), 8, 20)
+    text = table2_markdown(table2(short, draws=50), short)
+    assert "last 50," not in text
+    assert "Steps, all 20, mean" in text
+
+
+def test_a_mean_that_far_runs_have_moved_is_marked() -> None:
+    comparison = build({"continuing": unchanged}, seeds=40)
+    row = comparison.position("continuing", SARSA, FIGURE_1)
+    line = table2(comparison, draws=50)[1]
+    assert not apart(line, "same_return_")
+    comparison = build({"continuing": unchanged}, seeds=40)
+    comparison.returns[row, 7] = 4000
+    lines = table2(comparison, draws=50)
+    assert apart(lines[1], "same_return_")
+    text = table2_markdown(lines, comparison)
+    mean = f"{lines[1]['same_return_mean']:.1f} ! ["
+    assert mean in next(row for row in text.splitlines() if row.startswith("| SARSA"))
+    assert lines[1]["same_return_iqm"] == pytest.approx(line["same_return_iqm"], abs=0.5)
 
 
 def some_circle(comparison: Comparison) -> Comparison:
@@ -211,10 +255,10 @@ def test_means_of_runs_that_do_different_things_are_marked(comparison: Compariso
     mixed = [line for line in lines if line["same_behaviours"]]
     assert [(line["planning_steps"], line["delivery"]) for line in mixed] == [(3, "absorbing")]
     assert mixed[0]["same_behaviours"] == "delivers 5, circles beside the queen 3"
-    text = table2_markdown(lines)
+    text = table2_markdown(lines, comparison)
     assert f"Here {MIXED}" in text
     assert "Dyna-Q (p3), absorbing: delivers 5, circles beside the queen 3\n" in text
-    assert MIXED not in table2_markdown(table2(comparison, draws=10))
+    assert MIXED not in table2_markdown(table2(comparison, draws=10), comparison)
 
 
 def test_examples_show_each_behaviour_by_its_median_run(comparison: Comparison) -> None:

@@ -6,7 +6,8 @@ factor's effect is the mean difference over the 8 pairs of configurations that d
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import partial
 
 import numpy as np
 
@@ -33,7 +34,6 @@ from taichi_ants.analysis.paper import (
     TABLE_2,
     VARIANTS,
 )
-from taichi_ants.analysis.statistics import jackknife_values
 
 _DYNAS = (DYNA_P3, DYNA_P5)
 _OTHERS = (Q_LEARNING, *_DYNAS)
@@ -72,28 +72,34 @@ def _more_destabilised(first: Variant, second: Variant) -> Contrast:
 
 def _learning_rate_against(factor: str) -> Contrast:
     """Strength of the learning rate minus that of another factor, mean over learners."""
-
-    def strength(part: Slice, name: str) -> np.ndarray:
-        effects = [_effect(part, "return_last50", variant, name) for variant in VARIANTS]
-        return jackknife_values(lambda means: np.abs(means).mean(axis=0), np.stack(effects))
-
     return Contrast(
         f"learning rate minus {factor.replace('_', ' ')}",
-        lambda part: strength(part, "learning_rate") - strength(part, factor),
+        lambda part: np.stack(
+            [
+                _effect(part, "return_last50", variant, name)
+                for name in ("learning_rate", factor)
+                for variant in VARIANTS
+            ]
+        ),
+        lambda centres: _first_minus_second(np.abs(centres), np.mean),
     )
-
-
-def _discount_spread(part: Slice, variant: Variant) -> np.ndarray:
-    pairs = part.pairs("return_last50", variant, "discount")
-    return jackknife_values(lambda means: means.std(axis=0, ddof=1), pairs)
 
 
 def _more_dependent(first: Variant, second: Variant) -> Contrast:
     """How much more the discount's effect varies over configurations for the first learner."""
     return Contrast(
         f"{first.label} minus {second.label}",
-        lambda part: _discount_spread(part, first) - _discount_spread(part, second),
+        lambda part: np.concatenate(
+            [part.pairs("return_last50", variant, "discount") for variant in (first, second)]
+        ),
+        lambda centres: _first_minus_second(centres, partial(np.std, ddof=1)),
     )
+
+
+def _first_minus_second(centres: np.ndarray, statistic: Callable[..., np.ndarray]) -> np.ndarray:
+    """A statistic of the first half of the rows minus that of the second."""
+    first, second = np.split(centres, 2)
+    return statistic(first, axis=0) - statistic(second, axis=0)
 
 
 def _moderate_exploration_against(epsilon: int, decay: int) -> Contrast:

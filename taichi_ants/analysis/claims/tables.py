@@ -25,6 +25,7 @@ def claims_rows(findings: Sequence[Finding]) -> list[dict]:
             "delivery": finding.delivery,
             "scope": finding.scope,
             "contrast": finding.contrast,
+            "centre": _centre(finding),
             "effect": finding.effect,
             "ci_low": finding.low,
             "ci_high": finding.high,
@@ -32,11 +33,28 @@ def claims_rows(findings: Sequence[Finding]) -> list[dict]:
             "simultaneous_level": SIMULTANEOUS_LEVEL,
             "verdict": finding.verdict.value,
             "note": finding.note,
+            **_by_mean(finding),
             "seeds": finding.seeds,
             "configurations": finding.configurations,
         }
         for finding in findings
     ]
+
+
+def _centre(finding: Finding) -> str:
+    return "interquartile mean" if finding.claim.typical else "mean"
+
+
+def _by_mean(finding: Finding) -> dict:
+    """The other reading, of claims that rest on the typical run; "" and nan where there is none."""
+    other = finding.by_mean
+    return {
+        "mean_contrast": other.contrast if other else "",
+        "mean_effect": other.effect if other else math.nan,
+        "mean_ci_low": other.low if other else math.nan,
+        "mean_ci_high": other.high if other else math.nan,
+        "mean_verdict": other.verdict.value if other else "",
+    }
 
 
 def by_claim(findings: Sequence[Finding]) -> list[list[Finding]]:
@@ -66,7 +84,8 @@ def tally(findings: Sequence[Finding]) -> str:
     order = (
         Verdict.SUPPORTED,
         Verdict.CONTRADICTED,
-        Verdict.UNDISTINGUISHED,
+        Verdict.EQUIVALENT,
+        Verdict.UNDECIDED,
         Verdict.NOT_TESTED,
     )
     return ", ".join(f"{counts[verdict]} {verdict.value}" for verdict in order if counts[verdict])
@@ -96,14 +115,20 @@ def _explanation(findings: Sequence[Finding]) -> str:
     if math.isnan(level):
         return "No claim could be tested here.\n"
     return (
-        "Effects are means over seeds, paired by seed, with an interval at "
-        f"{number(100 * level, 3)} % each, so that all hold at once with "
-        f"{number(100 * SIMULTANEOUS_LEVEL, 0)} %. Of claims with several contrasts the weakest "
-        "is shown. A claim 'above 0' is supported if its interval lies above 0 and reaches past "
-        "the margin, contradicted if it lies below 0 and reaches past the negative margin; a "
-        "claim of a range is supported if the interval lies inside it, contradicted if it lies "
-        "outside. Margins are what is too small to matter: one reward is one step on a trail, two "
-        "steps are what the paper itself calls alike.\n"
+        "Effects are paired by seed. Claims in reward or steps rest on the typical run: the "
+        "interquartile mean over seeds (the mean of the middle half), as one run in hundreds that "
+        "does something else moves the mean. Where the mean gives another verdict, it stands "
+        "behind. Shares, deliveries and correlations rest on the mean: they are bounded, and the "
+        "middle half would hide that a quarter fails. Intervals are at "
+        f"{number(100 * level, 3)} % each, those of both readings counted, so that all hold at "
+        f"once with {number(100 * SIMULTANEOUS_LEVEL, 0)} %, as far as an interval of a mean with "
+        "heavy tails can.\n\n"
+        "Of claims with several contrasts the weakest is shown. A claim 'above 0' is equivalent if "
+        "its interval lies within the margin on either side of 0, so that what shall differ "
+        "differs by less than matters; else supported if it lies above 0, contradicted if it lies "
+        "below. A claim of a range is supported if the interval lies inside it, contradicted if it "
+        "lies outside. All others are undecided. Margins are what is too small to matter: one "
+        "reward is one step on a trail, two steps are what the paper itself calls alike.\n"
     )
 
 
@@ -122,7 +147,8 @@ def _verdict_table(findings: Sequence[Finding], settings: Sequence[str]) -> str:
 def _cell(finding: Finding) -> str:
     if finding.verdict is Verdict.NOT_TESTED:
         return verdict_text(finding)
-    return f"**{verdict_text(finding)}** {effect_text(finding)}, {finding.contrast}"
+    text = f"**{verdict_text(finding)}** {effect_text(finding)}, {finding.contrast}"
+    return f"{text}; by mean: {_cell(finding.by_mean)}" if finding.disagrees else text
 
 
 def _precise(finding: Finding) -> str:
@@ -130,5 +156,5 @@ def _precise(finding: Finding) -> str:
     contrasts = "; ".join(contrast.label for contrast in claim.contrasts)
     return (
         f"- **{claim.id}**: {claim.quantity}. Contrasts: {contrasts}. "
-        f"Criterion: {claim.criterion.words} {claim.unit}."
+        f"Criterion: {_centre(finding)} {claim.criterion.words} {claim.unit}."
     )
