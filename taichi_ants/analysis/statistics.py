@@ -48,6 +48,25 @@ def resampling_counts(n: int, resamples: int = RESAMPLES) -> np.ndarray:
     return counts
 
 
+def interquartile_mean(values: np.ndarray) -> np.ndarray:
+    """Mean over seeds of what remains without the lowest and the highest quarter of a row.
+
+    The centre of the typical runs: a few runs far away do not move it. A quarter of n seeds is
+    rounded down, as in rliable (Agarwal et al. 2021, "Deep reinforcement learning at the edge of
+    the statistical precipice"); so of fewer than four seeds it is the mean.
+
+    Args:
+        values: Float (rows, seeds).
+
+    Returns:
+        Float64 (rows,); nan for rows with a nan.
+    """
+    ordered = np.sort(np.asarray(values, float), axis=1)
+    cut = ordered.shape[1] // 4
+    middle = ordered[:, cut : ordered.shape[1] - cut].mean(axis=1)
+    return np.where(np.isnan(ordered[:, -1]), np.nan, middle)  # nan is sorted to the end
+
+
 def bootstrap_interval(
     values: np.ndarray, level: float = 0.95, resamples: int = RESAMPLES
 ) -> tuple[np.ndarray, np.ndarray]:

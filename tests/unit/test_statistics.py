@@ -15,6 +15,7 @@ from taichi_ants.analysis.statistics import (
     all_equal,
     bootstrap_interval,
     cautious_interval,
+    interquartile_mean,
     jackknife_values,
     resampling_counts,
     student_interval,
@@ -86,6 +87,20 @@ def test_bca_without_expansion_agrees_with_scipy() -> None:
         (values[0],), np.mean, confidence_level=level, n_resamples=40_000, rng=1
     ).confidence_interval
     np.testing.assert_allclose(ours, theirs, rtol=0.005)
+
+
+@pytest.mark.parametrize("n", [1, 3, 4, 10, 100])
+def test_the_interquartile_mean_is_that_of_scipy(n: int) -> None:
+    values = np.random.default_rng(n).normal(size=(5, n))
+    np.testing.assert_allclose(
+        interquartile_mean(values), stats.trim_mean(values, 0.25, axis=1), rtol=1e-14
+    )
+
+
+def test_the_interquartile_mean_ignores_few_far_runs_and_keeps_nan() -> None:
+    values = np.arange(8.0) + np.zeros((3, 1))
+    values[1, 7], values[2, 0] = 1e9, np.nan
+    np.testing.assert_array_equal(interquartile_mean(values), [3.5, 3.5, np.nan])
 
 
 def test_student_interval_by_hand() -> None:
