@@ -22,8 +22,8 @@ FAINT_INK = 0x6B737C
 RULE = 0xC9CED4  # bars of actions
 CHOSEN = 0x0072B2  # the bar of the chosen action, arrows of moves
 
-# Evenly darker from a pale green, close to the grey of an empty cell, to a deep blue: the stronger a
-# trail, the more it stands out, for everybody. Any darker, an ant would not stand out from it.
+# Evenly darker from a pale green, close to the grey of an empty cell, to a deep blue: the stronger
+# a trail, the more it stands out, for everybody. On a darker one no ant would stand out.
 _TRAIL_SAMPLES = "b6e0c8 99d1bb 7ac2b1 58b3aa 2ea4a4 11919e 007f96 006c8d 005983"
 
 

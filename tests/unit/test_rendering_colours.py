@@ -7,6 +7,9 @@ import itertools
 import numpy as np
 import pytest
 
+from taichi_ants.analysis.colony import figures
+from taichi_ants.analysis.paper import VARIANTS
+from taichi_ants.analysis.style import looks
 from taichi_ants.rendering import colours
 
 # Full strength, linear light: Machado, Oliveira and Fernandes (2009).
@@ -93,6 +96,17 @@ def test_things_stay_apart(deficiency) -> None:
     for name, word in things.items():
         apart = np.linalg.norm(ramp - lab(word, deficiency), axis=1).min()
         assert apart > least[name], (name, apart)
+
+
+@pytest.mark.parametrize("deficiency", DEFICIENCIES)
+def test_lines_of_the_figures_stay_apart(deficiency) -> None:
+    learners = [colour for colour, _ in looks(VARIANTS).values()]
+    ways = [look[0] for look in figures._WAY_LOOKS.values()]
+    trails = [look[0] for look in figures._PHEROMONE_LOOKS.values()]
+    for compared in (learners, ways, trails):
+        seen = lab([int(colour[1:], 16) for colour in compared], deficiency)
+        for first, second in itertools.combinations(seen, 2):
+            assert np.linalg.norm(first - second) > 24
 
 
 def test_text_can_be_read() -> None:
