@@ -9,7 +9,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from taichi_ants.constants import DEPOSIT_LEVEL, MAX_STEPS
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, checked_flag
 
 Evaporation = Literal["linear", "exponential", "none"]
 Deposit = Literal["set", "add", "none"]
@@ -121,12 +121,12 @@ class ColonyConfig:
                 )
         if not isinstance(self.pheromone, Pheromone):
             raise AntsError(f"pheromone is {self.pheromone!r}; it must be a Pheromone.")
-        _check_flag("births", self.births)
+        checked_flag("births", self.births)
         for name, least in (("lifespan", 1), ("regrowth", 0), ("wander", 1)):
             ticks = getattr(self, name)
             if ticks is not None:
                 _check_whole(name, ticks, least, MAX_STEPS, ", or None")
-        _check_flag("ends_at_delivery", self.ends_at_delivery)
+        checked_flag("ends_at_delivery", self.ends_at_delivery)
         if self.ends_at_delivery and (self.ants != 1 or self.births):
             raise AntsError(
                 f"ends_at_delivery is set with {self.ants} ants and births {self.births}; it is "
@@ -181,8 +181,3 @@ def _check_whole(name: str, value: object, least: int, most: int, otherwise: str
         raise AntsError(f"{name} is {value!r}; it must be a whole number{otherwise}.")
     if not least <= value <= most:
         raise AntsError(f"{name} is {value}; it must lie between {least} and {most}{otherwise}.")
-
-
-def _check_flag(name: str, value: object) -> None:
-    if not isinstance(value, (bool, np.bool_)):
-        raise AntsError(f"{name} is {value!r}; it must be True or False.")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 
 class AntsError(ValueError):
     """Something that the caller asked for cannot be done.
@@ -10,3 +12,14 @@ class AntsError(ValueError):
     lines print it on standard error and exit with status 2; library users catch it as a
     `ValueError`.
     """
+
+
+def checked_flag(name: str, value: object) -> bool:
+    """True or False as a Python bool; text such as "off" would count as True.
+
+    Raises:
+        AntsError: `value` is neither; names it `name`.
+    """
+    if not isinstance(value, (bool, np.bool_)):
+        raise AntsError(f"{name} is {value!r}; it must be True or False.")
+    return bool(value)

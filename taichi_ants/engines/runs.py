@@ -22,7 +22,7 @@ from taichi_ants.engines.checks import (
 )
 from taichi_ants.engines.results import LearnerCost, Rollouts, RunState, TrainingResult
 from taichi_ants.engines.run_engine import Progress, RunEngine
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, checked_flag
 from taichi_ants.randomness import stream_state
 from taichi_ants.worlds.world import World
 
@@ -69,7 +69,7 @@ def train(
         configs=configs,
         seeds=seeds,
         max_steps=checked_max_steps(max_steps),
-        evaporation=bool(evaporation),
+        evaporation=checked_flag("evaporation", evaporation),
         returns=none_yet,
         steps=none_yet,
         deliveries=none_yet,
@@ -175,9 +175,8 @@ def evaluate(
     rollouts = checked_count("rollouts", rollouts)
     epsilon = checked_share("epsilon", epsilon)
     max_steps = checked_max_steps(max_steps)
-    engine = RunEngine(
-        checked_world(world), max_steps, bool(evaporation), runtime.start(threads, arch)
-    )
+    evaporation = checked_flag("evaporation", evaporation)
+    engine = RunEngine(checked_world(world), max_steps, evaporation, runtime.start(threads, arch))
     outcomes = engine.run(
         None,
         run_seeds,

@@ -16,7 +16,7 @@ from taichi_ants.engines import checks
 from taichi_ants.engines.results import RunState
 from taichi_ants.engines.run_engine import RunEngine
 from taichi_ants.engines.runs import fixed_policy_state, fresh_state, rates_of, rollout_streams
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, checked_flag
 from taichi_ants.learners.registry import Learner
 from taichi_ants.worlds.world import World
 
@@ -134,7 +134,8 @@ def _trace(
         raise AntsError(
             f"episodes * max_steps is {capacity}; at most {most} steps can be traced, so lower one."
         )
-    engine = RunEngine(checks.checked_world(world), max_steps, bool(evaporation), runtime.start())
+    evaporation = checked_flag("evaporation", evaporation)
+    engine = RunEngine(checks.checked_world(world), max_steps, evaporation, runtime.start())
     before = state.q[0].copy()
     integers, errors, tables = engine.trace(learner, seeds, rates, state, episodes, streams)
     (episode, step, cell, heading, states, action, reward, seen, ended, delivered) = integers.T

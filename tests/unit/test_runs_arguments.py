@@ -7,6 +7,7 @@ import pytest
 
 from taichi_ants import (
     AntsError,
+    ColonyConfig,
     TrainingConfig,
     continue_training,
     evaluate,
@@ -16,6 +17,9 @@ from taichi_ants import (
 )
 from taichi_ants.engines.checks import checked_count, checked_seeds, checked_seeds_for
 from taichi_ants.engines.launches import plan_launches
+from taichi_ants.rendering import Episode, episode_picture
+from taichi_ants.rendering.learning import learning_stages
+from taichi_ants.rendering.replay import Replay
 from taichi_ants.worlds import World, paper
 
 CONFIG = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 0.99)
@@ -136,6 +140,29 @@ def test_counts_of_any_kind_of_integer():
     assert checked_count("n", np.int64(3)) == 3
     assert type(checked_count("n", np.uint8(3))) is int
     assert checked_count("n", 0, least=0) == 0
+
+
+@pytest.mark.parametrize("value", ["none", "off", 0, 1, None, 0.5, [True]])
+def test_flags(value):
+    """Text such as "none" would turn evaporation on."""
+    text = f"evaporation is {value!r}; it must be True or False"
+    says(text, train, paper(), CONFIG, 0, 1, 1, value)
+    says(text, evaluate, paper(), TABLE, evaporation=value)
+    says(text, rollout, paper(), TABLE, evaporation=value)
+    says(text, trace_training, paper(), CONFIG, evaporation=value)
+    trace = rollout(paper(), TABLE, max_steps=1)
+    says(text, Replay, paper(), trace, evaporation=value)
+    says(text, learning_stages, paper(), CONFIG, stages=(0,), evaporation=value)
+    for name in ("hud", "legend", "view"):
+        says(f"{name} is {value!r}", episode_picture, Episode(paper(), trace), 0, **{name: value})
+    for name in ("births", "ends_at_delivery"):
+        says(f"{name} is {value!r}", ColonyConfig, **{name: value})
+
+
+def test_flags_of_numpy_are_fine():
+    on, off = (train(paper(), CONFIG, 0, 1, 1, flag) for flag in (np.True_, np.False_))
+    assert (on.evaporation, off.evaporation) == (True, False)
+    assert type(on.evaporation) is bool
 
 
 @pytest.mark.parametrize("value", [-0.1, 1.1, float("nan"), "0.5", None, True, [0.5], 10**400])
