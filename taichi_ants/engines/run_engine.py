@@ -104,37 +104,41 @@ class RunEngine:
         episodes: int,
         streams: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Do the episodes of one run and record each of the n steps.
+        """Do the episodes of runs in one launch and record each of their n steps, run by run.
 
-        Args as in `run`, with arrays of one run.
+        Args as in `run`; with learning, arrays of one run.
 
         Returns:
-            int32 (n, 10) in the columns `TRACE`; TD errors float32 (n,) and Q-tables float32
-            (n, 128, 8) after each step, both empty without learning.
+            The run of each step, int64 (n,); int32 (n, 10) in the columns `TRACE`; TD errors
+            float32 (n,) and Q-tables float32 (n, 128, 8) after each step, both of no use without
+            learning.
         """
         # Taichi is imported once it is configured, see `runtime`.
         from taichi_ants.engines.run_kernels import EXTRA_CELLS, TRACE, run_kernel
 
-        capacity = episodes * self._max_steps
-        integers = np.zeros((capacity, len(TRACE)), dtype=np.int32)
+        n_runs, capacity = len(seeds), episodes * self._max_steps
+        integers = np.zeros((n_runs * capacity, len(TRACE)), dtype=np.int32)
         learned = capacity if learner is not None else 1
         errors = np.zeros(learned, dtype=np.float32)
         tables = np.empty((learned, *state.q.shape[1:]), dtype=np.float32)
-        outcomes = np.zeros((3, 1, episodes), dtype=np.int32)
+        outcomes = np.zeros((3, n_runs, episodes), dtype=np.int32)
         drawn = np.zeros(1, dtype=np.uint64) if streams is None else streams
         kernel = run_kernel(learner, traced=True)
         self._compile(kernel, learner)
         kernel(
-            *self._shared_arguments(1, episodes),
-            *_run_arguments(state, self._starts(seeds), rates, slice(0, 1), drawn),
-            np.empty(self._size + EXTRA_CELLS, dtype=np.int32),
+            *self._shared_arguments(n_runs, episodes),
+            *_run_arguments(state, self._starts(seeds), rates, slice(0, n_runs), drawn),
+            np.empty(n_runs * (self._size + EXTRA_CELLS), dtype=np.int32),
             *outcomes,
             integers,
             errors,
             tables.reshape(-1),
         )
-        n = int(outcomes[1].sum())
-        return integers[:n], errors[:n], tables[:n]
+        lengths = outcomes[1].sum(axis=1)
+        runs = np.repeat(np.arange(n_runs), lengths)
+        n = len(runs)
+        rows = np.arange(n) + (np.arange(n_runs) * capacity - (lengths.cumsum() - lengths))[runs]
+        return runs, integers[rows], errors[:n], tables[:n]
 
     def _shared_arguments(self, n_runs: int, n_episodes: int) -> tuple:
         """The kernel's arguments that all runs share."""

@@ -50,7 +50,7 @@ TRACE = (
 def run_kernel(learner: Learner | None, traced: bool = False) -> Callable[..., None]:
     """The kernel for one learner, or for a fixed policy (None); it is compiled on first use.
 
-    With `traced` each step is recorded too; such a kernel takes one run at a time.
+    With `traced` each step is recorded too, in `n_episodes * max_steps` rows for each run.
     """
     learns = learner is not None
     on_policy = learns and learner.draws_next_action
@@ -103,7 +103,7 @@ def run_kernel(learner: Learner | None, traced: bool = False) -> Callable[..., N
             base, table, model = i * (size + EXTRA_CELLS), i * TABLE, i * MODEL
             restore(cells, world, base, size, 0, size - 1)
             rng, epsilon = random_states[i], exploration[3 * i]
-            n_visited, n_recorded = settings[3 * i + 2], 0
+            n_visited, n_recorded = settings[3 * i + 2], i * n_episodes * max_steps
             for episode in range(n_episodes):
                 if ti.static(not learns):
                     rng = streams[i * n_episodes + episode]
@@ -154,7 +154,7 @@ def run_kernel(learner: Learner | None, traced: bool = False) -> Callable[..., N
                         if ti.static(traced):
                             trace_errors[n_recorded] = error
                             for k in range(TABLE):
-                                trace_tables[n_recorded * TABLE + k] = q[k]
+                                trace_tables[n_recorded * TABLE + k] = q[table + k]
                     if ti.static(traced):
                         record(
                             trace,
