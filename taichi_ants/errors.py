@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 
 class AntsError(ValueError):
     """Something that the caller asked for cannot be done.
@@ -20,6 +18,8 @@ def checked_flag(name: str, value: object) -> bool:
     Raises:
         AntsError: `value` is neither; names it `name`.
     """
+    import numpy as np  # not above: command lines show their help without it
+
     if not isinstance(value, (bool, np.bool_)):
         raise AntsError(f"{name} is {value!r}; it must be True or False.")
     return bool(value)

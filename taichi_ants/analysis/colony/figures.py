@@ -127,7 +127,7 @@ def joint_learning(study: ColonyStudy) -> Figure:
         frame(
             figure,
             "What other ways of sharing deliver, compared with copies of an ant trained alone",
-            f"Trails evaporate. Ratios of means, paired by seed. {_caption(study)}",
+            f"Trails evaporate. {_caption(study).replace('Means', 'Ratios of means')}",
             legend_entries(axes.flat),
         )
     return figure
