@@ -9,7 +9,7 @@ import numpy as np
 
 from taichi_ants.analysis.comparison import Comparison, Hyperparameters, Variant
 from taichi_ants.analysis.markdown import count
-from taichi_ants.analysis.statistics import interquartile_mean, resampling_counts
+from taichi_ants.analysis.statistics import bootstrap_interval, interquartile_mean
 from taichi_ants.analysis.style import GREY, INK, frame, looks, new_figure, styled
 
 if TYPE_CHECKING:
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _OFFSET = 0.19  # rows
-_RESAMPLES = 2000
 _NAMES = {
     "learning_rate": "Learning rate",
     "discount": "Discount",
@@ -134,12 +133,13 @@ def _draw(
     inside = np.clip(small, *limits) == small
     style = {"color": colour, "linestyle": "none", "alpha": 0.45, "markeredgewidth": 0}
     axis.plot(small[inside], np.full(inside.sum(), height), ".", markersize=5, **style)
-    seeds = pairs.mean(axis=0)
-    centre = float(interquartile_mean(seeds[None])[0])
-    low, high = np.clip(_interval(seeds), *limits)
+    seeds = pairs.mean(axis=0)[None]
+    centre = float(interquartile_mean(seeds)[0])
+    interval = np.concatenate(bootstrap_interval(seeds, iqm=True))  # nan for one seed
+    low, high = np.clip(interval, *limits)
     axis.plot([low, high], [height] * 2, color=colour, linewidth=1.6)
     arrows = {limits[0]: "<", limits[1]: ">"}
-    beyond = np.concatenate([small, _interval(seeds)])
+    beyond = np.concatenate([small, interval])
     for edge, arrow in arrows.items():
         if (beyond < edge if arrow == "<" else beyond > edge).any():
             axis.plot(edge, height, arrow, color=colour, markersize=5, clip_on=False)
@@ -159,15 +159,6 @@ def _draw(
         fontsize=7.5,
         bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8},
     )
-
-
-def _interval(seeds: np.ndarray) -> np.ndarray:
-    """The percentile bootstrap's 95 % interval of the interquartile mean of values (seeds,)."""
-    if len(seeds) < 2:
-        return np.repeat(seeds, 2)
-    counts = resampling_counts(len(seeds), _RESAMPLES)
-    drawn = [np.repeat(seeds, row) for row in counts]
-    return np.percentile(interquartile_mean(np.array(drawn)), (2.5, 97.5))
 
 
 def _settings(settings: Sequence[str]) -> dict[str, Artist]:

@@ -15,10 +15,13 @@ from taichi_ants.analysis.statistics import (
     all_equal,
     bootstrap_interval,
     cautious_interval,
+    centres,
     interquartile_mean,
+    interquartile_values,
     jackknife_values,
     resampling_counts,
     student_interval,
+    without_noise,
 )
 
 SAMPLES = arrays(float, (3, 8), elements=st.floats(-100, 100, width=32))
@@ -103,6 +106,72 @@ def test_the_interquartile_mean_ignores_few_far_runs_and_keeps_nan() -> None:
     np.testing.assert_array_equal(interquartile_mean(values), [3.5, 3.5, np.nan])
 
 
+def test_interquartile_values_have_the_centre_and_the_spread_of_the_iqm() -> None:
+    values = np.random.default_rng(0).standard_t(1.5, size=(3, 40))
+    moved = interquartile_values(values)
+    np.testing.assert_allclose(moved.mean(axis=1), interquartile_mean(values))
+    error = [stats.mstats.trimmed_stde(row, limits=(0.25, 0.25)) for row in values]
+    np.testing.assert_allclose(moved.std(axis=1, ddof=1) / np.sqrt(40), error)
+    # Seeds keep their places, so that rows stay paired.
+    assert (np.diff(np.take_along_axis(moved, values.argsort(axis=1), 1), axis=1) >= -1e-12).all()
+
+
+def test_the_t_interval_of_the_iqm_is_that_of_tukey_and_mclaughlin() -> None:
+    values = np.random.default_rng(1).standard_t(1.5, size=(4, 24))
+    ours = np.transpose(student_interval(values, 0.9, iqm=True))
+    theirs = [stats.mstats.trimmed_mean_ci(row, limits=(0.25, 0.25), alpha=0.1) for row in values]
+    np.testing.assert_allclose(ours, theirs)
+
+
+def test_the_bootstrap_of_the_iqm_agrees_with_scipy() -> None:
+    values = np.random.default_rng(5).standard_t(1.5, size=(1, 40))
+    ours = np.array(bootstrap_interval(values, 0.9, iqm=True)).ravel()
+    theirs = stats.bootstrap(
+        (values[0],),
+        lambda sample, axis: stats.trim_mean(sample, 0.25, axis=axis),
+        confidence_level=0.9,
+        n_resamples=40_000,
+        method="percentile",
+        rng=1,
+    ).confidence_interval
+    np.testing.assert_allclose(ours, theirs, atol=0.01)
+
+
+@pytest.mark.parametrize("n", [10, 30])
+def test_intervals_of_the_iqm_cover_what_they_say_where_those_of_the_mean_do_not(n: int) -> None:
+    """One run in fifty is far away: it moves the mean by 8 and the typical run hardly."""
+
+    def draw(random: np.random.Generator, shape: tuple[int, int]) -> np.ndarray:
+        return random.normal(45, 1, shape) + 400 * (random.random(shape) < 0.02)
+
+    truth = interquartile_mean(draw(np.random.default_rng(0), (1, 400_000)))[0]
+    assert truth == pytest.approx(45, abs=0.05)
+    assert coverage(draw, truth, n, partial(bootstrap, iqm=True)) > 0.925
+    assert coverage(draw, truth, n, partial(cautious, iqm=True)) > 0.95
+    assert coverage(draw, truth, n, partial(cautious, iqm=True), level=0.999) > 0.996
+    assert coverage(draw, 53.0, n, bootstrap) < 0.6
+
+
+def test_ties_in_the_middle_half_leave_an_interval_where_the_tails_are_near() -> None:
+    """Eight of ten agree: there the t interval is a point, but the truth may lie beyond."""
+    values = np.array([[45.0] * 8 + [50.0, 60.0], [45.0] * 10])
+    low, high = student_interval(values, iqm=True)
+    np.testing.assert_array_equal([low, high], 45.0)
+    low, high = cautious_interval(values, 0.95, iqm=True)
+    assert (low[0], low[1], high[1]) == (45.0, 45.0, 45.0)
+    assert high[0] > 46
+
+
+def test_columns_of_a_table_are_free_of_rounding_noise() -> None:
+    values = np.array([[0.1, 0.2, -0.3, 0.1, 0.2, -0.3], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]])
+    assert 0 < abs(values[0].mean()) < 1e-16
+    columns = centres(values)
+    assert columns["mean"].tolist() == [0.0, 3.5]
+    assert columns["iqm"].tolist() == [without_noise(interquartile_mean(values), values)[0], 3.5]
+    assert list(columns) == ["mean", "ci_low", "ci_high", "iqm", "iqm_ci_low", "iqm_ci_high"]
+    assert list(centres(values, typical=False)) == ["mean", "ci_low", "ci_high"]
+
+
 def test_student_interval_by_hand() -> None:
     # Mean 2, deviation 1, t quantile of 2 degrees of freedom 4.302653, sqrt(3) = 1.7320508.
     low, high = student_interval(np.array([[1.0, 2.0, 3.0]]))
@@ -112,7 +181,8 @@ def test_student_interval_by_hand() -> None:
 def test_equal_seeds_give_a_point_and_one_seed_gives_nothing() -> None:
     # 0.1 + 0.2 is not 0.3: equal up to rounding counts as equal.
     values = np.array([[7.0] * 20, [0.1 + 0.2] * 10 + [0.3] * 10])
-    for interval in (bootstrap_interval, student_interval, cautious_interval):
+    intervals = (bootstrap_interval, student_interval, cautious_interval)
+    for interval in (*intervals, *(partial(interval, iqm=True) for interval in intervals)):
         low, high = interval(values, 0.95)
         np.testing.assert_allclose(low, [7.0, 0.3])
         np.testing.assert_allclose(high, [7.0, 0.3])
@@ -169,9 +239,12 @@ def test_rows_are_paired_by_seed() -> None:
     assert high[0] > 11
 
 
-@given(SAMPLES)
-def test_the_interval_stays_within_the_seeds_and_around_the_middle(values: np.ndarray) -> None:
-    low, high = bootstrap_interval(values, resamples=2000)
+@pytest.mark.parametrize("iqm", [False, True])
+@given(values=SAMPLES)
+def test_the_interval_stays_within_the_seeds_and_around_the_middle(
+    iqm: bool, values: np.ndarray
+) -> None:
+    low, high = bootstrap_interval(values, resamples=2000, iqm=iqm)
     slack = 1e-6
     assert (values.min(axis=1) - slack <= low).all()
     assert (low <= high + slack).all()
