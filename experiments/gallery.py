@@ -1,17 +1,22 @@
-"""Makes the pictures of the README: a still, short animations and a policy sheet.
+"""Makes all pictures of the README and the docs anew: those of `renders/` and of `docs/figures/`.
 
-Each is made by `render.py`; the arguments below can be given to it by hand as well.
+Those of `renders/` are made by `render.py`; the arguments below can be given to it by hand as well.
+Those of `docs/figures/` are drawn from the finished studies in `results/compare` and
+`results/colony`; a study that is not there is run first, which takes about one minute for the
+comparison and five for the colony on two cores.
 """
 
 from __future__ import annotations
 
 import argparse
+import tempfile
 from pathlib import Path
 
 from taichi_ants.command_line import Parser, run_command
 from taichi_ants.commands import render
 
-_MAP = str(Path(__file__).parent / "maps" / "garden.txt")
+ROOT = Path(__file__).parents[1]
+_MAP = str(ROOT / "experiments" / "maps" / "garden.txt")
 
 _COLONY = [
     *("--show", "colony", "--world", "open", "--world-seed", "3", "--seed", "1"),
@@ -32,7 +37,7 @@ GALLERY: dict[str, list[str]] = {
     # pay, but not yet to give the food away, and circles beside her.
     "learning.gif": [
         *("--show", "learning", "--seed", "7", "--max-steps", "100"),
-        *("--size", "1200x420", "--fps", "12"),
+        *("--size", "1200x480", "--fps", "12"),
         *("--title", "SARSA: the same ant before and after learning"),
     ],
     "policy_sheet.png": [
@@ -42,19 +47,61 @@ GALLERY: dict[str, list[str]] = {
 }
 
 
+# Tracked figure -> the figure of a study that it is.
+COMPARISON = {
+    "learning_curves.png": "learning_curves.png",
+    "return_against_deliveries.png": "return_against_deliveries.png",
+}
+COLONY = {"colony_scaling.png": "scaling.png"}
+
+
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """The settings of the command line."""
-    parser = Parser(__doc__.split("\n", 1)[0])
-    default = Path(__file__).parents[1] / "renders"
-    parser.add_argument("--folder", type=Path, default=default, help="where to put them")
+    parser = Parser(__doc__.split("\n", 1)[0], epilog=__doc__.split("\n", 1)[1])
+    add = parser.add_argument
+    add("--folder", type=Path, default=ROOT, help="put renders/ and docs/figures/ there")
+    add("--no-figures", action="store_true", help="only renders/, which takes half a minute")
     return parser.parse_args(arguments)
 
 
-def make_gallery(folder: Path) -> None:
+def make_gallery(settings: argparse.Namespace) -> None:
     """Make all pictures; the ones that exist are replaced."""
     for name, arguments in GALLERY.items():
-        render.show(render.parse_arguments([*arguments, "--out", str(folder / name)]))
+        path = settings.folder / "renders" / name
+        render.show(render.parse_arguments([*arguments, "--out", str(path)]))
+    if not settings.no_figures:
+        make_figures(settings.folder / "docs" / "figures")
+
+
+def make_figures(folder: Path) -> None:
+    """Draw the figures of the docs from the two studies, which are run where they are missing."""
+    from taichi_ants import results
+    from taichi_ants.analysis.colony.figures import save_all
+    from taichi_ants.colony_study import from_arrays
+    from taichi_ants.commands import colony, compare
+
+    comparison = compare.parse_arguments(["--out", str(ROOT / "results" / "compare")])
+    compare.compare(comparison)
+    study = colony.parse_arguments(["--out", str(ROOT / "results" / "colony")])
+    colony.study(study)
+    with tempfile.TemporaryDirectory() as place:
+        compare.draw_figures(compare.build_sweep(comparison), comparison.out, Path(place))
+        keep(Path(place) / compare.FIGURES, COMPARISON, folder)
+        found = results.read_npz(study.out / colony.EPISODES)
+        save_all(from_arrays(colony.build_plan(study), found), Path(place) / colony.FIGURES)
+        keep(Path(place) / colony.FIGURES, COLONY, folder)
+
+
+def keep(drawn: Path, names: dict[str, str], folder: Path) -> None:
+    """Write figures to the docs, in 256 colours, so that their history stays small."""
+    from PIL import Image
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, source in names.items():
+        with Image.open(drawn / source) as image:
+            image.convert("RGB").quantize(256).save(folder / name, optimize=True)
+        print(f"{folder / name}: {(folder / name).stat().st_size // 1000} kB")
 
 
 if __name__ == "__main__":
-    run_command(lambda: make_gallery(parse_arguments().folder))
+    run_command(lambda: make_gallery(parse_arguments()))

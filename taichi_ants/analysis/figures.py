@@ -8,17 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, DELIVERS, counts
-from taichi_ants.analysis.best_of import best_of, best_position
+from taichi_ants.analysis.best_of import best_of, best_position, percentile_of
 from taichi_ants.analysis.comparison import Comparison, Variant
 from taichi_ants.analysis.markdown import count
 from taichi_ants.analysis.paper import FIGURE_1, TABLE_2
 from taichi_ants.analysis.sensitivity import sensitivity
-from taichi_ants.analysis.statistics import student_interval
+from taichi_ants.analysis.statistics import interquartile_mean
 from taichi_ants.analysis.style import (
     BEHAVIOUR_LOOKS,
     INK,
@@ -26,87 +26,76 @@ from taichi_ants.analysis.style import (
     frame,
     in_training,
     legend_entries,
+    logarithmic,
     looks,
     new_figure,
-    over_seeds,
     save,
     styled,
 )
 from taichi_ants.results import check_writable_folder
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SMOOTHING = 10  # episodes
+_COLUMNS = 4  # learners side by side
+_PER_DECADE = 12  # points of a learning curve between two powers of ten
 _CURVES = {
-    "returns": "Return\n(reward per episode)",
-    "steps": "Episode length\n(steps)",
+    "returns": "Return\n(reward)",
+    "steps": "Length\n(steps)",
     "deliveries": "Deliveries\n(per episode)",
 }
+_BEST = {"returns": "Return of the best run", "steps": "Its mean length (steps)"}
+_OUR_CHOICE = (
+    f"All learners have {FIGURE_1.label} (learning rate / discount / epsilon / decay). The paper's "
+    "figure 1 shares hyperparameters\ntoo, but does not name them: these are our choice, the only "
+    "ones that stand twice in its table 2."
+)
+_OTHERS = {"color": "#C4C4C4", "linewidth": 0.9, "zorder": 1, "label": "the other learners"}
+_DASHES = ((0, (2.5, 3)), (0, (1, 2)))
 # Delivery setting and learner -> row of the comparison.
 Shown = dict[tuple[str, Variant], int]
-_BINS = 160
-_HILLS = 10  # values from which on they are shown as a histogram
-_DROP = 0.16  # of the bar below its ridge, in rows
 
 
-def learning_curves(comparison: Comparison) -> Figure:
-    """Return, length and deliveries per episode, at the configuration of the paper's figure 1.
+def learning_curves(comparison: Comparison, baselines: Sequence[Mapping] = ()) -> Figure:
+    """Return, length and deliveries per episode, a column for each learner.
 
-    Where a learner lacks that one, or the world is not the paper's, each learner is shown at the
-    configuration with its highest mean return. Lines are moving averages over `SMOOTHING`
-    episodes, averaged over seeds; bands are pointwise 95 % Student intervals over seeds (none for
-    one seed), cut off where no mean can be. The axes are those of the lines: the bands of two seeds
-    would flatten all of them.
+    All are shown at the configuration that stands for the paper's figure 1. Where one of them lacks
+    it, or the world is not the paper's, each is shown at the configuration with its highest mean
+    return. A point is the mean over a span of episodes (`_spans`); lines are interquartile means
+    over seeds, bands the middle half of the seeds (none for one seed).
+
+    Args:
+        comparison: The comparison.
+        baselines: Rows of baselines.csv; of these the shortest delivery is drawn.
     """
-    settings = comparison.delivery_settings
-    style = looks(comparison.variants)
     shared = _at_figure_1(comparison)
     shown = shared or _at_best(comparison)
-    title, words = (
-        ("Learning at one shared configuration, the paper's figure 1", [f"{FIGURE_1.label}"])
-        if shared
-        else ("Learning, each learner at its configuration with the highest return", [])
-    )
-    words = words or _configurations(comparison, shown)
-    possible = {
-        "returns": (-np.inf, np.inf),
-        "steps": (0, comparison.max_steps),
-        "deliveries": (0, 1),
-    }
+    seeds = count(len(comparison.seeds), "seed")
+    title, words = "Learning at one configuration that all learners share", [_OUR_CHOICE]
+    if not shared:
+        title = "Learning, each learner at its configuration with the highest return"
+        words = ["Learning rate / discount / epsilon / decay:", *_configurations(comparison, shown)]
+    if len(comparison.seeds) > 1:
+        seeds = f"interquartile mean of {seeds}, of deliveries the mean; band: their middle half"
+    words = [f"Line: {seeds}. Episodes and lengths are on logarithmic axes.", *words]
     with styled():
-        figure = new_figure(7.0 + 0.15 * len(words))
-        axes = figure.subplots(
-            len(_CURVES), len(settings), sharex=True, sharey="row", squeeze=False
-        )
-        for column, setting in zip(axes.T, settings, strict=True):
-            column[0].set_title(f"{setting.capitalize()} delivery")
-            column[-1].set_xlabel("Episode")
-            for axis, name in zip(column, _CURVES, strict=True):
-                limits = possible[name]
-                for variant in comparison.variants:
-                    if (setting, variant) in shown:
-                        runs = getattr(comparison, name)[shown[setting, variant]]
-                        _curve(axis, runs, *_line(style, variant), limits)
-        for row, label in zip(axes, _CURVES.values(), strict=True):
-            row[0].set_ylabel(label)
-            _keep_to_lines(row)
-        axes[0, 0].margins(x=0.01)
-        figure.align_ylabels(axes[:, 0])
-        window = _window(comparison.episodes)
-        averaged = f"Moving average over {window} episodes, " if window > 1 else ""
-        spread = over_seeds(len(comparison.seeds), "95 % band")
-        caption = (
-            f"{averaged}{spread}. Learning rate / discount / epsilon / decay: ",
-            *words,
-        )
-        frame(
-            figure,
-            title,
-            "".join(caption) if shared else "\n".join(caption),
-            legend_entries(axes.flat),
-        )
+        figure, blocks = _blocks(comparison, [1.5] * len(_CURVES), 0.14 * len(words))
+        for block, variants in blocks:
+            for row, (name, label) in zip(block, _CURVES.items(), strict=True):
+                row[0].set_ylabel(label)
+                for axis, variant in zip(row, variants, strict=False):
+                    _curves(axis, comparison, shown, name, variant)
+                    _shortest_delivery(axis, baselines, name)
+                _keep_to_lines(row)
+                if name == "steps":
+                    logarithmic(row[0].yaxis, (1, 2, 5))
+            for axis in block[-1]:
+                axis.set_xlabel("Episode")
+                axis.set_xlim(0.9, 1.1 * comparison.episodes)
+                logarithmic(axis.xaxis, (1,) if comparison.episodes > 50 else (1, 2, 5))
+        frame(figure, title, "\n".join(words), _setting_lines(comparison, figure))
     return figure
 
 
@@ -114,20 +103,27 @@ def best_runs(comparison: Comparison) -> Figure:
     """What "train each configuration once, report the best" gives.
 
     For each learner the distribution over independent draws of seeds of the winner's return and
-    length, with its median and 95 % range; in the paper's world the figure that the paper reports.
+    length: a line's height is the share of draws that report no more. In the paper's world a
+    diamond marks the paper's figure, with the share of draws below it.
     """
     settings = comparison.delivery_settings
     with styled():
-        figure = new_figure(1.5 + 0.6 * len(comparison.variants) * len(settings))
-        axes = figure.subplots(len(settings), 2, sharey=True, squeeze=False)
-        for row, setting in zip(axes, settings, strict=True):
-            row[0].set_title(f"{setting.capitalize()} delivery")
-            _ridges(row, comparison, setting)
-            row[0].set_xlabel("Return of the best run (reward)")
-            row[1].set_xlabel("Its mean length (steps)")
-            for axis in row:
-                if axis.get_xscale() == "log":
-                    axis.set_xlabel(f"{axis.get_xlabel()}, logarithmic")
+        rows = [(setting, name) for setting in settings for name in _BEST]
+        figure, blocks = _blocks(comparison, [1.3] * len(rows), 0.2, sharex="row")
+        for block, variants in blocks:
+            for row, (setting, name) in zip(block, rows, strict=True):
+                row[0].set_ylabel(f"{setting.capitalize()}\nshare")
+                bests = {one: best_of(comparison, setting, one) for one in comparison.variants}
+                values = {one: getattr(best, name) for one, best in bests.items() if best}
+                for axis, variant in zip(row, variants, strict=False):
+                    axis.set_xlabel(_BEST[name])
+                    axis.tick_params(labelbottom=True)
+                    _distributions(axis, values, variant, comparison)
+                    if variant in TABLE_2 and variant in values and comparison.in_paper_world:
+                        _paper_mark(axis, variant, name, values[variant])
+                row[0].set_xlim(_span_of(values, name, comparison))
+                row[0].set_ylim(-0.06, 1.06)
+                row[0].set_yticks([0, 0.5, 1], ["0", "½", "1"])
         counts = {
             len(comparison.positions(setting, variant))
             for setting in settings
@@ -137,11 +133,11 @@ def best_runs(comparison: Comparison) -> Figure:
         frame(
             figure,
             f"What the best of {number} configurations with one run each reports",
-            "Each configuration is trained once, on a random one of "
-            f"{count(len(comparison.seeds), 'seed')}, and the run with the highest return is "
-            "reported.\n"
-            "Dot and bar: median and 95 % range; up to 2.5 % lie beyond either end of an axis.",
-            legend_entries(axes.flat),
+            "A draw trains each configuration once, on a random one of "
+            f"{count(len(comparison.seeds), 'seed')}, and reports the run with the highest return."
+            "\nA line's height is the share of draws that report no more. Up to 2.5 % of a "
+            "learner's draws lie beyond either end of an axis.",
+            legend_entries(figure.axes),
         )
     return figure
 
@@ -204,8 +200,8 @@ def save_all(
     """
     folder = check_writable_folder(folder)
     figures = {
-        "learning_curves": learning_curves(comparison),
-        "sensitivity": sensitivity(comparison, baselines),
+        "learning_curves": learning_curves(comparison, baselines),
+        "sensitivity": sensitivity(comparison),
         "best_runs": best_runs(comparison),
         "return_against_deliveries": return_against_deliveries(comparison, baselines),
     }
@@ -251,105 +247,158 @@ def _configurations(comparison: Comparison, shown: Shown) -> list[str]:
     return lines
 
 
-def _line(style: dict[Variant, tuple[str, str]], variant: Variant) -> tuple[str, str]:
-    return style[variant][0], variant.label
+def _blocks(
+    comparison: Comparison, heights: Sequence[float], words: float, sharex: str = "col"
+) -> tuple[Figure, list[tuple[np.ndarray, Sequence[Variant]]]]:
+    """A figure with a column of panels for each learner, in blocks of `_COLUMNS` learners.
+
+    Args:
+        comparison: The comparison.
+        heights: Of the rows of a block, in inches.
+        words: Height of the caption, in inches.
+        sharex: Which panels share their x-axes, as in matplotlib.
+
+    Returns:
+        The figure, and for each block its panels (rows, columns) and its learners. Panels of a row
+        share their y-axes; those without a learner are hidden.
+    """
+    variants, style = comparison.variants, looks(comparison.variants)
+    wide = min(_COLUMNS, len(variants))
+    chunks = [variants[start : start + wide] for start in range(0, len(variants), wide)]
+    figure = new_figure(0.9 + words + len(chunks) * sum(heights))
+    axes = figure.subplots(
+        len(chunks) * len(heights), wide, sharex=sharex, sharey="row", squeeze=False
+    )
+    blocks = [
+        (axes[start : start + len(heights)], chunk)
+        for start, chunk in zip(range(0, len(axes), len(heights)), chunks, strict=True)
+    ]
+    for block, chunk in blocks:
+        figure.align_ylabels(block[:, 0])
+        for column, variant in zip(block.T, chunk, strict=False):
+            column[0].set_title(variant.label, color=style[variant][0])
+        for axis in block[:, len(chunk) :].flat:
+            axis.set_visible(False)
+    return figure, blocks
 
 
-def _window(episodes: int) -> int:
-    return max(1, min(SMOOTHING, episodes // SMOOTHING))
+def _spans(episodes: int) -> np.ndarray:
+    """The first episodes, from 0, of the spans over which a learning curve averages, and the end.
+
+    Their lengths grow with the episode, so that points are evenly spaced on a logarithmic axis;
+    the first spans are single episodes.
+    """
+    n = max(2, round(_PER_DECADE * np.log10(episodes + 1)) + 1)
+    return np.unique(np.geomspace(1, episodes + 1, n).round().astype(int)) - 1
 
 
-def _curve(
-    axis: Axes, runs: np.ndarray, colour: str, label: str, limits: tuple[float, float]
-) -> None:
-    """One learner's line with its band within limits; runs are (seeds, episodes)."""
-    window = _window(runs.shape[1])
-    sums = np.cumsum(np.pad(runs, ((0, 0), (1, 0))), axis=1, dtype=float)
-    smooth = (sums[:, window:] - sums[:, :-window]) / window
-    # A value stands at the last episode that it averages.
-    episodes = np.arange(window, runs.shape[1] + 1)
-    marker = "o" if len(episodes) == 1 else ""
-    axis.plot(episodes, smooth.mean(axis=0), color=colour, label=label, marker=marker)
-    if len(runs) > 1:
-        low, high = np.clip(student_interval(smooth.T), *limits)
-        axis.fill_between(episodes, low, high, color=colour, alpha=0.2, linewidth=0)
+def _curves(axis: Axes, comparison: Comparison, shown: Shown, name: str, variant: Variant) -> None:
+    """A learner's lines with their bands, over the pale lines of the others."""
+    edges = _spans(comparison.episodes)
+    at = np.sqrt((edges[:-1] + 1) * edges[1:])  # the middle of a span on a logarithmic axis
+    marker = "o" if len(at) == 1 else ""
+    for (setting, other), row in shown.items():
+        place = comparison.delivery_settings.index(setting)
+        runs = getattr(comparison, name)[row].astype(float)
+        means = np.add.reduceat(runs, edges[:-1], axis=1) / np.diff(edges)
+        # One run of an episode delivers or does not: there is no typical half to average.
+        middle = means.mean(axis=0) if name == "deliveries" else interquartile_mean(means.T)
+        if other != variant:
+            if not place:
+                axis.plot(at, middle, marker=marker, **_OTHERS)
+            continue
+        colour = INK if place else looks(comparison.variants)[variant][0]
+        axis.plot(at, middle, marker=marker, ms=3, **_setting_look(place, colour))
+        if len(runs) > 1 and name != "deliveries":
+            low, high = np.percentile(means, (25, 75), axis=0)
+            axis.fill_between(at, low, high, color=colour, alpha=0.1 if place else 0.25, lw=0)
+
+
+def _setting_look(place: int, colour: str) -> dict[str, Any]:
+    """Of a line, by the place of its delivery setting: thick, or thin, dashed and above it."""
+    if not place:
+        return {"color": colour, "linewidth": 2.2, "zorder": 3}
+    dashes = _DASHES[(place - 1) % len(_DASHES)]
+    return {"color": INK, "linewidth": 1.0, "linestyle": dashes, "zorder": 4}
+
+
+def _setting_lines(comparison: Comparison, figure: Figure) -> dict[str, Artist]:
+    """The legend of the delivery settings, then that of what the panels of a figure label."""
+    from matplotlib.lines import Line2D
+
+    first, _ = looks(comparison.variants)[comparison.variants[0]]
+    lines = {
+        f"{setting} delivery": Line2D([], [], **_setting_look(place, first))
+        for place, setting in enumerate(comparison.delivery_settings)
+    }
+    return lines | legend_entries(figure.axes)
+
+
+def _shortest_delivery(axis: Axes, baselines: Sequence[Mapping], name: str) -> None:
+    """A dotted line at the return or the length of the shortest delivery, where it is known."""
+    shortest = [row for row in baselines if row["baseline"] == "shortest delivery"]
+    for place in in_training(shortest, ["return_mean", "steps_mean"]).values():
+        figures = dict(zip(("returns", "steps"), place, strict=True))
+        if name in figures:
+            label = f"shortest delivery: return {place[0]:g} in {place[1]:g} steps"
+            axis.axhline(figures[name], color=INK, linewidth=0.9, linestyle=":", label=label)
 
 
 def _keep_to_lines(row: Sequence[Axes]) -> None:
     """Let panels that share an axis show little beside what their lines span."""
     lines = np.concatenate([line.get_ydata() for axis in row for line in axis.get_lines()])
-    room = 0.25 * np.ptp(lines) or 1.0
-    low, high = row[0].get_ylim()
-    row[0].set_ylim(max(low, lines.min() - room), min(high, lines.max() + room))
+    low, high = lines.min(), lines.max()
+    room = 0.08 * (high - low) or 1.0
+    row[0].set_ylim(max(low / 1.15, low - room) if low > 0 else low - room, high + room)
 
 
-def _ridges(row: Sequence[Axes], comparison: Comparison, setting: str) -> None:
-    """A ridge for each learner in the panels for return and steps."""
-    style = looks(comparison.variants)
-    bests = {variant: best_of(comparison, setting, variant) for variant in comparison.variants}
-    for axis, name in zip(row, ("returns", "steps"), strict=True):
-        drawn = {variant: getattr(best, name) for variant, best in bests.items() if best}
-        paper = {
-            variant: figures.return_last50 if name == "returns" else figures.steps_all
-            for variant, figures in TABLE_2.items()
-            if variant in drawn and comparison.in_paper_world
-        }
-        edges = _edges([*drawn.values(), *paper.values()])
-        for height, variant in enumerate(reversed(comparison.variants)):
-            if variant in drawn:
-                _ridge(axis, drawn[variant], edges, height, style[variant][0])
-            if variant in paper:
-                place = paper[variant], height - _DROP
-                axis.plot(*place, "D", color=INK, ms=6, mec="white", label="the paper's figure")
-        names = [variant.label for variant in reversed(comparison.variants)]
-        axis.set_yticks(range(len(names)), names)
-        axis.tick_params(axis="y", length=0)
-        axis.set_ylim(-0.45, len(names) - 0.1)
-        axis.grid(axis="y", visible=False)
-        axis.set_xlim(edges[0], edges[-1])
-        if edges[0] > 0:
-            _logarithmic(axis)
+def _distributions(
+    axis: Axes, values: Mapping[Variant, np.ndarray], variant: Variant, comparison: Comparison
+) -> None:
+    """A learner's cumulated distribution, over the pale ones of the others."""
+    for other, drawn in values.items():
+        points, counts = np.unique(drawn, return_counts=True)
+        shares = np.cumsum(counts) / len(drawn)
+        # From 0 on the left edge to 1 on the right one.
+        line = np.concatenate([[-1e9], points, [1e9]]), np.concatenate([[0.0], shares, [1.0]])
+        look = {"color": looks(comparison.variants)[variant][0], "linewidth": 2.0, "zorder": 3}
+        axis.plot(*line, drawstyle="steps-post", **(look if other == variant else _OTHERS))
 
 
-def _edges(values: Sequence[np.ndarray | float]) -> np.ndarray:
-    """Bins from the lowest 2.5 % to the highest 97.5 % point of any, logarithmic if positive."""
-    ends = [np.percentile(one, (2.5, 97.5)) for one in values]
-    low, high = np.min(ends) - 0.5, np.max(ends) + 0.5
-    if low <= 0:
-        return np.linspace(low - 0.04 * (high - low), high + 0.04 * (high - low), _BINS + 1)
-    pad = (high / low) ** 0.04
-    return np.geomspace(low / pad, high * pad, _BINS + 1)
+def _paper_mark(axis: Axes, variant: Variant, name: str, drawn: np.ndarray) -> None:
+    figures = TABLE_2[variant]
+    place = figures.return_last50 if name == "returns" else figures.steps_all
+    below = percentile_of(place, drawn)
+    axis.plot(
+        place,
+        below / 100,
+        "D",
+        color=INK,
+        ms=6,
+        mec="white",
+        zorder=5,
+        label="the paper's figure, and how many draws lie below it",
+    )
+    axis.annotate(
+        f"{place:.1f}, {below:.0f} % below",
+        (0.97, 0.07),
+        xycoords="axes fraction",
+        ha="right",
+        fontsize=7.5,
+    )
 
 
-def _ridge(axis: Axes, values: np.ndarray, edges: np.ndarray, height: int, colour: str) -> None:
-    """Smoothed histogram above a bar of the 95 % range with a dot at the median.
-
-    So few values that a histogram would be a hill around each are dots.
-    """
-    low, median, high = np.percentile(values, (2.5, 50, 97.5))
-    kernel = np.exp(-0.5 * (np.arange(-6, 7) / 2) ** 2)
-    shares = np.convolve(np.histogram(values, edges)[0], kernel, mode="same")
-    if len(few := np.unique(values)) < _HILLS:
-        axis.plot(few, np.full(len(few), height), ".", color=colour, alpha=0.6)
-    elif shares.max() > 0:
-        top = height + 0.75 * shares / shares.max()
-        middles = (edges[1:] + edges[:-1]) / 2
-        axis.fill_between(middles, height, top, color=colour, alpha=0.35, linewidth=0)
-    axis.plot([low, high], [height - _DROP] * 2, color=colour, linewidth=2.5)
-    axis.plot(median, height - _DROP, "o", color=colour, ms=6, mec="white", mew=0.7)
-
-
-def _logarithmic(axis: Axes) -> None:
-    """A logarithmic axis with ticks at plain numbers, as many as its span has room for."""
-    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
-
-    low, high = axis.get_xlim()
-    axis.set_xscale("log")
-    steps = (1, 2, 3, 5, 7) if high > 4 * low else (1, 1.5, 2, 2.5, 3, 3.5, 4, 4.5, 5, 5.5, 6, 7, 8)
-    ticks = [step * 10.0**power for power in range(-3, 8) for step in steps]
-    axis.xaxis.set_major_locator(FixedLocator([tick for tick in ticks if low <= tick <= high]))
-    axis.xaxis.set_minor_locator(NullLocator())
-    axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+def _span_of(
+    values: Mapping[Variant, np.ndarray], name: str, comparison: Comparison
+) -> tuple[float, float]:
+    """The axis: all learners without the outermost 5 % of each, and the paper's figures."""
+    ends = [np.percentile(drawn, (2.5, 97.5)) for drawn in values.values()]
+    if comparison.in_paper_world:
+        papers = [TABLE_2[variant] for variant in values if variant in TABLE_2]
+        ends += [[row.return_last50 if name == "returns" else row.steps_all] for row in papers]
+    low, high = min(map(min, ends)), max(map(max, ends))
+    room = 0.05 * (high - low) or 1.0
+    return low - room, high + room
 
 
 def _who_else(comparison: Comparison, setting: str) -> str:

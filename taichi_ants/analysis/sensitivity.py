@@ -1,172 +1,172 @@
-"""The figure of all configurations: how much does which hyperparameter matter?"""
+"""The figure of the hyperparameters: how much does each change the return?"""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from taichi_ants.analysis.comparison import Comparison, Hyperparameters
-from taichi_ants.analysis.statistics import bootstrap_interval
-from taichi_ants.analysis.style import (
-    GREY,
-    INK,
-    for_setting,
-    frame,
-    in_training,
-    legend_entries,
-    looks,
-    new_figure,
-    over_seeds,
-    styled,
-)
+from taichi_ants.analysis.comparison import Comparison, Hyperparameters, Variant
+from taichi_ants.analysis.markdown import count
+from taichi_ants.analysis.statistics import bootstrap_interval, interquartile_mean
+from taichi_ants.analysis.style import GREY, INK, frame, looks, new_figure, styled
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_COLUMNS = 2
-_OFFSET = 0.17  # rows
-_DASHES = ((0, (4, 2)), (0, (1, 1.5)), (0, (6, 2, 1, 2)), (0, (2, 2)))
+_OFFSET = 0.19  # rows
+_NAMES = {
+    "learning_rate": "Learning rate",
+    "discount": "Discount",
+    "epsilon": "Epsilon",
+    "epsilon_decay": "Decay of epsilon",
+}
 
 
-def sensitivity(comparison: Comparison, baselines: Sequence[Mapping] = ()) -> Figure:
-    """Return of every configuration with its 95 % interval, a panel for each learner.
+def sensitivity(comparison: Comparison) -> Figure:
+    """What each hyperparameter changes in the return, a panel for each that takes several values.
 
-    Most configurations lie close together and a few far off, so the axis shows where most are;
-    what lies beyond is named at the edge. Of two delivery settings the first has filled marks.
-
-    Args:
-        comparison: The comparison.
-        baselines: Rows of baselines.csv; those of the training setting are drawn as lines where
-            they lie within the axis (optimal policies only if there is absorbing delivery, for
-            which they are optimal).
+    Pairs of configurations that differ in one hyperparameter alone, its lowest and its highest
+    value, are compared seed by seed. A small dot is the interquartile mean over seeds of such a
+    pair; the large mark is that of the seeds' means over all pairs, with a 95 % bootstrap interval.
+    Most effects are small and a few huge, so the axis shows where most are; what lies beyond is an
+    arrow, for a large mark with its number. Of two delivery settings the first has filled marks.
     """
-    configurations = sorted({row.hyperparameters for row in comparison.rows})
-    variants, style = comparison.variants, looks(comparison.variants)
-    means = comparison.measure("return_last50").mean(axis=1)
-    ends = bootstrap_interval(comparison.measure("return_last50"))
-    limits = _limits(means, *ends)
-    if "absorbing" not in comparison.delivery_settings:
-        baselines = for_setting(baselines, comparison.delivery_settings[0])
+    from matplotlib.ticker import MaxNLocator
+
+    settings, style = comparison.delivery_settings, looks(comparison.variants)
+    factors = {
+        name: (min(values), max(values))
+        for name in Hyperparameters._fields
+        if len(values := {getattr(row.hyperparameters, name) for row in comparison.rows}) > 1
+    }
+    effects = {
+        (name, setting, variant): _effects(comparison, name, ends, setting, variant)
+        for name, ends in factors.items()
+        for setting in settings
+        for variant in comparison.variants
+    }
+    effects = {key: pairs for key, pairs in effects.items() if len(pairs)}
+    limits = _limits([interquartile_mean(pairs) for pairs in effects.values()])
+    offsets = _OFFSET * np.linspace(-1, 1, len(settings)) if len(settings) > 1 else [0.0]
     with styled():
-        wide = min(_COLUMNS, len(variants))
-        deep = math.ceil(len(variants) / wide)
-        figure = new_figure(1.3 + deep * (0.55 + 0.19 * len(configurations)))
-        axes = figure.subplots(deep, wide, sharex=True, sharey=True, squeeze=False)
-        for axis in axes.flat[len(variants) :]:
-            axis.set_visible(False)
-        for axis, variant in zip(axes.flat, variants, strict=False):
-            axis.set_title(variant.label, color=style[variant][0])
-            axis.set_xlabel("Return (reward per episode, last 50)")
-            offsets = _OFFSET * np.linspace(-1, 1, len(comparison.delivery_settings))
-            for place, setting in enumerate(comparison.delivery_settings):
-                positions = comparison.positions(setting, variant)
-                rows = [
-                    configurations.index(comparison.rows[position].hyperparameters)
-                    for position in positions
-                ]
-                heights = np.array(rows) + offsets[place]
-                values = np.array([means, *ends])[:, positions]
-                _dots(axis, heights, values, limits, style[variant], filled=place == 0)
-            _lines(axis, baselines, limits)
-            axis.tick_params(labelbottom=True)
-        _rows(axes, configurations, limits)
+        figure = new_figure(1.7 + 0.5 * len(comparison.variants))
+        axes = figure.subplots(1, max(1, len(factors)), sharex=True, sharey=True, squeeze=False)[0]
+        for axis, (name, (low, high)) in zip(axes, factors.items(), strict=False):
+            axis.set_title(_NAMES[name])
+            axis.set_xlabel(f"Change of the return\nfrom {low:g} to {high:g}")
+            axis.xaxis.set_major_locator(MaxNLocator(4, prune="both"))
+            axis.axvline(0, color=INK, linewidth=0.8, zorder=1)
+            for row, variant in enumerate(comparison.variants):
+                for place, setting in enumerate(settings):
+                    if (name, setting, variant) in effects:
+                        pairs = effects[name, setting, variant]
+                        height, look = row + offsets[place], (*style[variant], place == 0)
+                        _draw(axis, pairs, height, limits, look)
+        axes[0].set_xlim(limits)
+        names = [variant.label for variant in comparison.variants]
+        axes[0].set_yticks(range(len(names)), names)
+        axes[0].set_ylim(len(names) - 0.5, -0.5)
+        for axis in axes:
+            axis.tick_params(axis="y", length=0, labelsize=9)
+            axis.grid(axis="y", visible=False)
+        interval = " with its 95 % interval" if len(comparison.seeds) > 1 else ""
         frame(
             figure,
-            "Every configuration: learning rate / discount / epsilon / decay",
-            f"Each mark: {over_seeds(len(comparison.seeds), '95 % interval')}. Marks with a number "
-            "lie beyond the axis, at that number.",
-            _settings(comparison.delivery_settings) | legend_entries(axes.flat),
+            "What each hyperparameter changes in the return (reward per episode, last 50)"
+            if factors
+            else "No hyperparameter takes more than one value, so there is nothing to compare",
+            f"Small dot: two configurations that differ in it alone, interquartile mean of "
+            f"{count(len(comparison.seeds), 'seed')}.\nLarge mark: over all such pairs{interval}. "
+            "Arrows point to what lies beyond the axis, numbers say where.",
+            _settings(settings),
         )
     return figure
 
 
-def _limits(means: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[float, float]:
-    """The axis: all if all lie close together, else three times the middle half to either side."""
-    first, third = np.percentile(means, (25, 75))
-    reach = 3 * max(third - first, 1.0)
-    low, high = np.fmin(low, means), np.fmax(high, means)
-    return max(first - reach, low.min() - 0.5), min(third + reach, high.max() + 0.5)
+def _effects(
+    comparison: Comparison, name: str, ends: tuple[float, float], setting: str, variant: Variant
+) -> np.ndarray:
+    """Return at the highest value of a hyperparameter minus that at the lowest, (pairs, seeds)."""
+    returns, low, high = comparison.measure("return_last50"), *ends
+    pairs = []
+    for position in comparison.positions(setting, variant):
+        here = comparison.rows[position].hyperparameters
+        there = comparison.position(setting, variant, here._replace(**{name: high}))
+        if getattr(here, name) == low and there is not None:
+            pairs.append(returns[there] - returns[position])
+    return np.array(pairs).reshape(len(pairs), len(comparison.seeds))
 
 
-def _dots(
+def _limits(centres: Sequence[np.ndarray]) -> tuple[float, float]:
+    """The axis, with 0: all if all lie close together, else four times the middle half."""
+    if not centres:
+        return -1.0, 1.0
+    values = np.concatenate(centres)
+    reach = 4 * max(np.subtract(*np.percentile(values, (75, 25))), 0.25)
+    low, high = min(values.min(), 0.0), max(values.max(), 0.0)
+    room = 0.05 * (high - low) + 0.05
+    return max(low - room, -reach), min(high + room, reach)
+
+
+def _draw(
     axis: Axes,
-    heights: np.ndarray,
-    values: np.ndarray,
+    pairs: np.ndarray,
+    height: float,
     limits: tuple[float, float],
-    look: tuple[str, str],
-    filled: bool,
+    look: tuple[str, str, bool],
 ) -> None:
-    """One delivery setting of one learner; values are (3, rows): means, lower and upper ends."""
-    colour, marker = look
-    means, low, high = values
-    at = np.clip(means, *limits)
-    near = at == means
-    axis.hlines(heights[near], low[near], high[near], color=colour, linewidth=1.2)
-    axis.plot(
-        at,
-        heights,
-        marker,
+    """One learner in one delivery setting.
+
+    Args:
+        axis: Where to.
+        pairs: Effects, float (pairs, seeds).
+        height: Its row.
+        limits: Of the axis.
+        look: Colour, marker, and whether the marker is filled.
+    """
+    colour, marker, filled = look
+    small = interquartile_mean(pairs)
+    inside = np.clip(small, *limits) == small
+    style = {"color": colour, "linestyle": "none", "alpha": 0.45, "markeredgewidth": 0}
+    axis.plot(small[inside], np.full(inside.sum(), height), ".", markersize=5, **style)
+    seeds = pairs.mean(axis=0)[None]
+    centre = float(interquartile_mean(seeds)[0])
+    interval = np.concatenate(bootstrap_interval(seeds, iqm=True))  # nan for one seed
+    low, high = np.clip(interval, *limits)
+    axis.plot([low, high], [height] * 2, color=colour, linewidth=1.6)
+    arrows = {limits[0]: "<", limits[1]: ">"}
+    beyond = np.concatenate([small, interval])
+    for edge, arrow in arrows.items():
+        if (beyond < edge if arrow == "<" else beyond > edge).any():
+            axis.plot(edge, height, arrow, color=colour, markersize=5, clip_on=False)
+    face = colour if filled else "white"
+    if limits[0] <= centre <= limits[1]:
+        axis.plot(centre, height, marker, color=colour, markersize=6, markerfacecolor=face)
+        return
+    left = centre < limits[0]
+    axis.annotate(
+        f"{centre:+.0f}" if abs(centre) >= 10 else f"{centre:+.1f}",
+        (limits[0] if left else limits[1], height),
+        xytext=(7 if left else -7, 0),
+        textcoords="offset points",
+        ha="left" if left else "right",
+        va="center",
         color=colour,
-        markersize=4.5,
-        markerfacecolor=colour if filled else "white",
-        clip_on=False,
+        fontsize=7.5,
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8},
     )
-    for mean, edge, height in zip(means[~near], at[~near], heights[~near], strict=True):
-        side = -1 if mean > edge else 1
-        axis.annotate(
-            f"{mean:.0f}",
-            (edge, height),
-            # Away from the number of the same configuration's other delivery setting.
-            xytext=(6 * side, 1.5 if filled else -1.5),
-            textcoords="offset points",
-            ha="right" if side < 0 else "left",
-            va="center",
-            color=colour,
-            fontsize=6.5,
-        )
-
-
-def _lines(axis: Axes, baselines: Sequence[Mapping], limits: tuple[float, float]) -> None:
-    places = in_training(baselines, ["return_mean"]).items()
-    shown = [(name, place) for name, (place,) in places if limits[0] <= place <= limits[1]]
-    for number, (name, place) in enumerate(shown):
-        axis.axvline(
-            place,
-            color=GREY,
-            linewidth=1.0,
-            linestyle=_DASHES[number % len(_DASHES)],
-            zorder=1,
-            label=f"{name} ({place:g})",
-        )
-
-
-def _rows(
-    axes: np.ndarray, configurations: Sequence[Hyperparameters], limits: tuple[float, float]
-) -> None:
-    """Names the rows, first one on top, with a line between learning rates."""
-    first = axes.flat[0]
-    first.set_yticks(range(len(configurations)), [one.label for one in configurations])
-    first.set_ylim(len(configurations) - 0.4, -0.6)
-    first.set_xlim(limits)
-    for axis in axes.flat:
-        axis.tick_params(axis="y", length=0, labelsize=7.5)
-        for number in range(1, len(configurations)):
-            before, after = configurations[number - 1 : number + 1]
-            if before.learning_rate != after.learning_rate:
-                axis.axhline(number - 0.5, color=GREY, linewidth=0.7)
 
 
 def _settings(settings: Sequence[str]) -> dict[str, Artist]:
     """The legend of the delivery settings: filled marks for the first, open ones for others."""
     from matplotlib.lines import Line2D
 
-    look = {"color": INK, "marker": "o", "linestyle": "none"}
+    look = {"color": GREY, "marker": "o", "linestyle": "none"}
     return {
-        f"{setting} delivery": Line2D([], [], **look, markerfacecolor="white" if place else INK)
+        f"{setting} delivery": Line2D([], [], **look, markerfacecolor="white" if place else GREY)
         for place, setting in enumerate(settings)
     }

@@ -17,26 +17,27 @@ from taichi_ants.results import write_atomically
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 # 9 inches are about 900 pixels where a README shows the figure; twice that for sharp screens.
 WIDTH = 9.0
 DPI = 180
 
-# Okabe and Ito's palette, which stays distinct for the colour-blind; yellow is too pale for lines.
-_BLUE, _ORANGE, _GREEN, _VERMILION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
-_PURPLE, _SKY = "#CC79A7", "#56B4E9"
+# Of Okabe and Ito's and Tol's colours those that stay furthest apart for people with any colour
+# deficiency, in this order: two, four or five of them.
+BLUE, ORANGE, RED, WINE, SKY = "#0072B2", "#E69F00", "#CC3311", "#882255", "#56B4E9"
 INK, GREY, PALE = "#222222", "#767676", "#E4E4E4"
 
-_COLOURS = {Q_LEARNING: _BLUE, SARSA: _ORANGE, DYNA_P3: _GREEN, DYNA_P5: _VERMILION}
+_COLOURS = {Q_LEARNING: BLUE, SARSA: ORANGE, DYNA_P3: RED, DYNA_P5: WINE}
 _MARKERS = {Q_LEARNING: "o", SARSA: "s", DYNA_P3: "^", DYNA_P5: "D"}
-# Then those of the paper's learners that are not compared, and Tol's wine and olive.
-_MORE_COLOURS = (_PURPLE, _SKY, INK, GREY)
-_LAST_COLOURS = ("#882255", "#999933")
+# Then those of the paper's learners that are not compared, a green and an olive.
+_MORE_COLOURS = (SKY, "#CC79A7", INK, GREY)
+_LAST_COLOURS = ("#009E73", "#999933")
 _MORE_MARKERS = ("v", "P", "X", "h")
 
 # By their places in `behaviour.BEHAVIOURS`.
-BEHAVIOUR_LOOKS = ((_BLUE, "o"), (_ORANGE, "^"), (_LAST_COLOURS[0], "s"), (INK, "x"))
+BEHAVIOUR_LOOKS = ((BLUE, "o"), (ORANGE, "^"), (WINE, "s"), (INK, "x"))
 
 _SETTINGS = {
     "font.size": 9,
@@ -134,6 +135,16 @@ def _columns(labels: Sequence[str]) -> int:
         if sum(0.6 + 0.068 * length for length in longest) <= WIDTH:  # inches at 9 points
             return columns
     return 1
+
+
+def logarithmic(axis: Axis, steps: Sequence[float]) -> None:
+    """Make an x- or y-axis logarithmic, with plain numbers at steps (1 to 9) of each decade."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+    axis.axes.set(**{f"{axis.axis_name}scale": "log"})
+    axis.set_major_locator(LogLocator(subs=steps, numticks=30))
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
 def legend_entries(axes: Iterable[Axes]) -> dict[str, Artist]:

@@ -29,19 +29,22 @@ if TYPE_CHECKING:
 
     from taichi_ants import Colony, World
     from taichi_ants.config import TrainingConfig
+    from taichi_ants.rendering import Stage
 
 DEFAULT_OUT = {
-    "episode": "renders/episode.gif",
-    "colony": "renders/colony.gif",
-    "learning": "renders/learning.gif",
-    "sheet": "renders/policy_sheet.png",
+    "episode": "results/renders/episode.gif",
+    "colony": "results/renders/colony.gif",
+    "learning": "results/renders/learning.gif",
+    "sheet": "results/renders/policy_sheet.png",
 }
 DEFAULT_MAX_STEPS = {"episode": 600, "colony": 600, "learning": 150}
-DEFAULT_SIZE = {"colony": (960, 540), "learning": (1280, 460)}  # all others: 1280 x 720
+DEFAULT_SIZE = {"colony": (960, 540), "learning": (1280, 520)}  # all others: 1280 x 720
 DEFAULT_EVERY = 4
 DEFAULT_EPISODES = {"colony": 60}  # all others: 500
 DEFAULT_PLANNING_STEPS = 5
 DEFAULT_WORLD = {"colony": "open"}  # all others: the paper's, with one food for them all
+
+_IN_WORDS = {"delivers": "delivered", "other": ""}  # all others speak for themselves
 
 # What is shown, and whether as a single picture or moving.
 _EPISODES, _COLONIES = {"a still episode", "an episode"}, {"a still colony", "a colony"}
@@ -51,6 +54,7 @@ _WHERE_IT_COUNTS: dict[str, set[str]] = {
     "policy": _EPISODES | _COLONIES | {"a sheet"},
     "episodes": _EPISODES | _COLONIES | {"a sheet"},
     "stages": {"learning"},
+    "all_states": {"a sheet"},
     "greedy": _ROLLOUTS,
     "epsilon": _ROLLOUTS,
     "number": _EPISODES,
@@ -170,7 +174,7 @@ def _add_picture(parser: argparse.ArgumentParser) -> None:
         "--size",
         type=_size,
         metavar="WxH",
-        help="in pixels, by default 1280x720, of learning 1280x460, of a moving colony 960x540",
+        help="in pixels, by default 1280x720, of learning 1280x520, of a moving colony 960x540",
     )
     add("--fps", type=number, default=8.0, metavar="X", help="steps per second")
     add("--title", help="a line above all")
@@ -184,8 +188,9 @@ def _add_picture(parser: argparse.ArgumentParser) -> None:
     )
     add("--no-hud", action="store_true", help="no head-up lines")
     add("--no-legend", action="store_true", help="no legend")
+    add("--all-states", action="store_true", help="a sheet of states that were not visited, too")
     add("--no-view", action="store_true", help="do not mark the cells in view")
-    add("--out", metavar="PATH", help="file or folder, by default in renders/")
+    add("--out", metavar="PATH", help="file or folder, by default in results/renders/")
 
 
 def _size(text: str) -> tuple[int, int]:
@@ -289,7 +294,26 @@ def show_step(settings: argparse.Namespace, world: World, q_values: np.ndarray, 
 
 def show_learning(settings: argparse.Namespace, world: World) -> None:
     """Write the same ant after more and more episodes, side by side."""
-    from taichi_ants.rendering import learning_stages, render_learning
+    from taichi_ants.rendering import render_learning
+
+    stages = noted_stages(settings, world)
+    title = settings.title or f"{settings.learner}: the same ant before and after learning"
+    with progress_bar("Rendering") as progress:
+        render_learning(
+            settings.out,
+            stages,
+            size=settings.size,
+            fps=settings.fps,
+            title=title,
+            progress=progress,
+        )
+    print(f"{settings.out}: {', '.join(stage.title for stage in stages)}")
+
+
+def noted_stages(settings: argparse.Namespace, world: World) -> list[Stage]:
+    """The stages of an ant that learns, each with what it does then in words."""
+    from taichi_ants.analysis.behaviour import BEHAVIOURS, classify
+    from taichi_ants.rendering import learning_stages
 
     with progress_bar("Training") as progress:
         stages = learning_stages(
@@ -302,17 +326,12 @@ def show_learning(settings: argparse.Namespace, world: World) -> None:
             epsilon=settings.epsilon,
             progress=progress,
         )
-    title = settings.title or f"{settings.learner}: the same ant before and after learning"
-    with progress_bar("Rendering") as progress:
-        render_learning(
-            settings.out,
-            stages,
-            size=settings.size,
-            fps=settings.fps,
-            title=title,
-            progress=progress,
-        )
-    print(f"{settings.out}: {', '.join(stage.title for stage in stages)}")
+    noted = []
+    for stage in stages:
+        (number,), _ = classify(world, stage.episode.trace, settings.max_steps)
+        behaviour = BEHAVIOURS[number]
+        noted.append(replace(stage, note=_IN_WORDS.get(behaviour, behaviour)))
+    return noted
 
 
 def show_colony(settings: argparse.Namespace, world: World) -> None:
@@ -372,7 +391,7 @@ def show_sheet(settings: argparse.Namespace, q_values: np.ndarray, title: str) -
     """Write what a policy does in each state."""
     from taichi_ants.rendering import policy_sheet, save_picture
 
-    save_picture(settings.out, policy_sheet(q_values, title))
+    save_picture(settings.out, policy_sheet(q_values, title, complete=settings.all_states))
     print(f"{settings.out}: the best action in each state")
 
 

@@ -40,7 +40,8 @@ class Trace(Record):
         rewards: int32 (n,).
         next_states: int32 (n,), what the ant sees after the step.
         terminated: bool (n,), whether the learner took the next state as terminal.
-        delivered: bool (n,), whether the food was given to the queen.
+        events: int32 (n,), what came of the action: ENTERED_EMPTY, ENTERED_LURE, FAILED, PICKED_UP or
+            DELIVERED, see `taichi_ants.constants`.
         q_values: float32 (n, 5), the action values of the state when the action was chosen.
         td_errors: float32 (n,), of the update after the step; None without learning.
         tables: float32 (n, 128, 5), the Q-table after the step; None without learning.
@@ -55,13 +56,18 @@ class Trace(Record):
     rewards: np.ndarray
     next_states: np.ndarray
     terminated: np.ndarray
-    delivered: np.ndarray
+    events: np.ndarray
     q_values: np.ndarray
     td_errors: np.ndarray | None = None
     tables: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.steps)
+
+    @property
+    def delivered(self) -> np.ndarray:
+        """Whether the food was given to the queen, bool (n,)."""
+        return self.events == DELIVERED
 
 
 def rollout(
@@ -193,7 +199,7 @@ def _trace(
         rewards=reward,
         next_states=seen,
         terminated=ended.astype(bool),
-        delivered=event == DELIVERED,
+        events=event,
         q_values=chosen_from[number, states, :N_ACTIONS],
         td_errors=None if learner is None else errors,
         tables=None if learner is None else tables[:, :, :N_ACTIONS],

@@ -9,6 +9,9 @@ import numpy as np
 
 from taichi_ants.constants import DEPOSIT_LEVEL
 from taichi_ants.errors import AntsError
+from taichi_ants.hexgrid import AxialGrid
+from taichi_ants.randomness import whole
+from taichi_ants.rendering.arguments import expect
 from taichi_ants.rendering.episodes import DEFAULT_FPS, Progress, with_pause
 from taichi_ants.rendering.panel import Status
 from taichi_ants.rendering.scene import DEFAULT_SIZE, Scene
@@ -47,9 +50,9 @@ def colony_frames(
     Raises:
         AntsError: `every` or `ticks` is below 1, or the size is not allowed.
     """
-    if every < 1 or ticks < 1:
+    grid = _grid_of(colony, world)
+    if whole("every", every) < 1 or whole("ticks", ticks) < 1:
         raise AntsError(f"every is {every} and ticks {ticks}; both must be at least 1.")
-    grid = colony.worlds[world].grid
     scene = Scene(grid, size, hud=hud, legend=legend, title=title, full_level=full_level)
     yield _drawn(scene, colony, world)
     for done in range(0, ticks, every):
@@ -61,7 +64,7 @@ def colony_picture(
     colony: Colony, size: tuple[int, int] = DEFAULT_SIZE, *, world: int = 0, **look: Any
 ) -> np.ndarray:
     """The picture of a colony as it is; other arguments as in `colony_frames`."""
-    return _drawn(Scene(colony.worlds[world].grid, size, **look), colony, world)
+    return _drawn(Scene(_grid_of(colony, world), size, **look), colony, world)
 
 
 def render_colony(
@@ -81,9 +84,22 @@ def render_colony(
 ) -> None:
     """Write what `colony_frames` draws as an animation; path, fps and errors: `render_episode`."""
     check_animation(path, fps)
+    every, ticks = whole("every", every), whole("ticks", ticks)
     look = {"hud": hud, "legend": legend, "title": title, "full_level": full_level}
     frames = colony_frames(colony, ticks, size, every=every, world=world, **look)
     save_animation(path, with_pause(frames, 1 + -(-ticks // every), fps, progress), fps)
+
+
+def _grid_of(colony: Colony, world: int) -> AxialGrid:
+    """The grid of one of a colony's worlds."""
+    from taichi_ants.engines.colony import Colony
+
+    expect("colony", colony, Colony)
+    if not 0 <= whole("world", world) < len(colony.worlds):
+        raise AntsError(
+            f"world is {world}, but the colony has {len(colony.worlds)}; count them from 0."
+        )
+    return colony.worlds[world].grid
 
 
 def _drawn(scene: Scene, colony: Colony, world: int) -> np.ndarray:

@@ -22,14 +22,9 @@ FAINT_INK = 0x6B737C
 RULE = 0xC9CED4  # bars of actions
 CHOSEN = 0x0072B2  # the bar of the chosen action, arrows of moves
 
-# Samples of matplotlib's perceptually uniform map "viridis", from its light end (1.0) down to 0.28,
-# evenly spaced. Below that it would be too dark for an ant to stand out.
-_TRAIL_SAMPLES = (
-    "fde725 ece51b d8e219 c2df23 b0dd2f 9bd93c 86d549 "
-    "75d054 63cb5f 52c569 44bf70 37b878 2cb17e 25ab82 "
-    "20a386 1e9c89 1f958b 218e8d 24868e 27808e 2a788e "
-    "2d718e 306a8e 33628d 375a8c"
-)
+# Evenly darker from a pale green, close to the grey of an empty cell, to a deep blue: the stronger
+# a trail, the more it stands out, for everybody. On a darker one no ant would stand out.
+_TRAIL_SAMPLES = "b6e0c8 99d1bb 7ac2b1 58b3aa 2ea4a4 11919e 007f96 006c8d 005983"
 
 
 def channels(colours: int | np.ndarray) -> np.ndarray:

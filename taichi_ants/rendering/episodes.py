@@ -11,6 +11,8 @@ import numpy as np
 
 from taichi_ants.engines.traces import Trace, rollout
 from taichi_ants.errors import AntsError, checked_flag
+from taichi_ants.randomness import whole
+from taichi_ants.rendering.arguments import expect
 from taichi_ants.rendering.panel import Status
 from taichi_ants.rendering.replay import Replay
 from taichi_ants.rendering.scene import DEFAULT_SIZE, Scene, check_size, range_with_zero
@@ -56,6 +58,7 @@ class Episode:
         epsilon: float = 0.0,
     ) -> Episode:
         """Roll a policy out; arguments and errors are those of `rollout`."""
+        expect("world", world, World)
         trace = rollout(world, q_values, seed, number, max_steps, evaporation, epsilon)
         name = "greedy" if epsilon == 0 else f"epsilon {epsilon:g}"
         return cls(world, trace, seed, number, evaporation, name)
@@ -122,6 +125,7 @@ def episode_frames(
     Raises:
         AntsError: The size is not allowed.
     """
+    expect("episode", episode, Episode)
     scene = _scene_of(episode, size, hud=hud, legend=legend, title=title)
     seen = checked_flag("view", view)
     for snapshot, status in episode.moments():
@@ -143,7 +147,8 @@ def episode_picture(
     Raises:
         AntsError: There is no such step, or the size is not allowed.
     """
-    if step not in range(len(episode)):
+    expect("episode", episode, Episode)
+    if whole("step", step) not in range(len(episode)):
         raise AntsError(f"there is no step {step!r}; the episode has 0 to {len(episode) - 1}.")
     scene = _scene_of(episode, size, hud=hud, legend=legend, title=title)
     snapshot, status = next(islice(episode.moments(), step, None))
@@ -199,6 +204,7 @@ def render_episode(
     """
     check_animation(path, fps)
     check_size(size)
+    expect("title", title, str)
     episode = Episode.play(
         world,
         q_values,

@@ -3,43 +3,89 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from taichi_ants.config import TrainingConfig
-from taichi_ants.constants import N_ACTIONS, N_STATES
+from taichi_ants.constants import (
+    DELIVERED,
+    DEPOSIT_LEVEL,
+    EMPTY,
+    FAILED,
+    FOOD,
+    N_ACTIONS,
+    N_STATES,
+    OBSTACLE,
+    PICKED_UP,
+    QUEEN,
+)
 from taichi_ants.engines.runs import continue_training, train
 from taichi_ants.errors import AntsError
 from taichi_ants.hexgrid import AxialGrid
+from taichi_ants.randomness import whole
 from taichi_ants.rendering import colours, text
+from taichi_ants.rendering.arguments import expect
 from taichi_ants.rendering.episodes import DEFAULT_FPS, Episode, Progress, with_pause, without_view
-from taichi_ants.rendering.panel import Status
+from taichi_ants.rendering.panel import Status, draw_swatch
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.rendering.scene import check_size
 from taichi_ants.rendering.viewport import Viewport
 from taichi_ants.rendering.writers import PathLike, check_animation, save_animation
+from taichi_ants.rewards import REWARDS
 from taichi_ants.worlds.world import World
 
 STAGES = (0, 10, 100, 500)
-DEFAULT_SIZE = (1280, 460)  # four worlds in a row fill it
-# In sizes of the text: the title of a tile, and all its text.
-_TITLE_LINES, _TILE_LINES = 1.7, 4.2
+DEFAULT_SIZE = (1280, 520)  # four worlds in a row fill it
+# In sizes of the text: the title of a tile, all its text, and the legend.
+_TITLE_LINES, _TILE_LINES, _LEGEND_LINES = 1.7, 5.6, 2.6
+# What earns or costs reward: its name in the account of a stage; the cell that stands for it in the
+# legend, with its trail and a letter on it; and its words.
+_SOURCES = (
+    ("T", EMPTY, DEPOSIT_LEVEL // 2, "", f"T onto a trail {REWARDS.lure:+}"),
+    ("S", EMPTY, 0, "S", f"S nearer to the queen, with food {REWARDS.lure:+}"),
+    ("F", FOOD, 0, "", f"F food {REWARDS.pick_up:+}"),
+    ("Q", QUEEN, 0, "", f"Q delivery {REWARDS.give:+}"),
+    ("X", OBSTACLE, 0, "", f"X blocked, in vain {REWARDS.failed:+}"),
+)
 
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """How an ant does after so many episodes of training."""
+    """How an ant does after so many episodes of training.
+
+    Attributes:
+        episodes: How many.
+        episode: What it does then.
+        note: What to say of it at its end, in place of whether it has delivered.
+    """
 
     episodes: int
     episode: Episode
+    note: str = ""
 
     @property
     def title(self) -> str:
         if self.episodes == 0:
             return "before learning"
         return f"after {self.episodes} episode{'s' if self.episodes > 1 else ''}"
+
+    def account(self) -> np.ndarray:
+        """What was earned until each moment, int (len(episode), 5); the sum is the return.
+
+        The columns are T, S, F, Q and X: steps onto a trail, steps nearer to the queen with food,
+        food picked up, food given to her, and what failed.
+        """
+        trace = self.episode.trace
+        carries = trace.states >= N_STATES // 2
+        events = trace.events
+        sources = np.select(
+            [events == FAILED, events == DELIVERED, events == PICKED_UP, carries], [4, 3, 2, 1], 0
+        )
+        earned = np.zeros((len(trace) + 1, len(_SOURCES)), dtype=np.int64)
+        earned[np.arange(1, len(earned)), sources] = trace.rewards
+        return earned.cumsum(axis=0)
 
 
 def learning_stages(
@@ -70,7 +116,10 @@ def learning_stages(
     Raises:
         AntsError: An argument is not allowed; the message names it.
     """
-    if not stages or list(stages) != sorted(stages) or stages[0] < 0:
+    if not isinstance(stages, Iterable):
+        raise AntsError(f"stages are {stages!r}; they must be several whole numbers.")
+    stages = [whole("a stage", stage) for stage in stages]
+    if not stages or stages != sorted(stages) or stages[0] < 0:
         raise AntsError(f"stages are {tuple(stages)!r}; they must ascend, from 0 or more.")
     played, result = [], None
     different = tuple(dict.fromkeys(stages))
@@ -112,7 +161,9 @@ def learning_frames(
     Raises:
         AntsError: The size is not allowed.
     """
+    stages = _checked(stages)
     width, height = check_size(size)
+    expect("title", title, str)
     canvas = np.empty((height, width, 3), dtype=np.uint8)
     canvas[:] = colours.channels(colours.PAGE)
     text_size = round(min(width / 60, height / 26))
@@ -124,10 +175,13 @@ def learning_frames(
         top = round(2.0 * text_size)
     grid = stages[0].episode.world.grid
     text_size = text_size if readable else 0
-    tiles = _tiles(grid, len(stages), (0, top, width, height - top), text_size)
+    bottom = height - round(_LEGEND_LINES * text_size)
+    tiles = _tiles(grid, len(stages), (0, top, width, bottom - top), text_size)
     panels = [
         _Panel(canvas, stage, tile, text_size) for stage, tile in zip(stages, tiles, strict=True)
     ]
+    if readable:
+        _draw_legend(canvas, bottom, text_size, panels[0].hexagon)
     for _ in range(max(len(stage.episode) for stage in stages)):
         for panel in panels:
             panel.go_on()
@@ -145,9 +199,22 @@ def render_learning(
 ) -> None:
     """Write the stages as an animation; arguments and errors as in `render_episode`."""
     check_animation(path, fps)
+    stages = _checked(stages)
     frames = learning_frames(stages, size, title)
     longest = max(len(stage.episode) for stage in stages)
     save_animation(path, with_pause(frames, longest, fps, progress), fps)
+
+
+def _checked(stages: Sequence[Stage]) -> list[Stage]:
+    """The stages, at least one."""
+    if isinstance(stages, Stage) or not isinstance(stages, Iterable):
+        raise AntsError(f"stages are {stages!r}; give a list of what learning_stages returned.")
+    stages = list(stages)
+    for stage in stages:
+        expect("a stage", stage, Stage)
+    if not stages:
+        raise AntsError("there are no stages; give at least one.")
+    return stages
 
 
 class _Panel:
@@ -171,8 +238,12 @@ class _Panel:
         grid = stage.episode.world.grid
         margin = max(2, round(min(width, height) / 60))
         room = (left, top + above, width, height - above - below)
-        self._rasteriser = Rasteriser(grid, Viewport.fit(grid, *room, margin=margin))
+        viewport = Viewport.fit(grid, *room, margin=margin)
+        self.hexagon = viewport.hexagon
+        self._rasteriser = Rasteriser(grid, viewport)
         self._moments = stage.episode.moments()
+        self._note = stage.note
+        self._account = stage.account()
         if text_size:
             text.write(
                 canvas,
@@ -192,28 +263,54 @@ class _Panel:
             return
         left = round(self._middle - self._width / 2)
         footer = self._canvas[self._footer :, left : left + self._width]
-        footer[: round(1.8 * self._text_size)] = colours.channels(colours.PAGE)
-        line = self._fitting_line(status)
-        baseline = self._footer + 1.2 * self._text_size
+        footer[: round(3.2 * self._text_size)] = colours.channels(colours.PAGE)
         ink = colours.INK if status.outcome else colours.FAINT_INK
-        text.write(self._canvas, line, self._middle, baseline, self._text_size, ink, align="middle")
+        for line, words in enumerate((_lines(status, self._note), self._sources(status.step))):
+            y = self._footer + (1.2 + 1.4 * line) * self._text_size
+            fitting = self._fitting(words)
+            text.write(self._canvas, fitting, self._middle, y, self._text_size, ink, align="middle")
 
-    def _fitting_line(self, status: Status) -> str:
+    def _sources(self, step: int) -> tuple[str, ...]:
+        """Where the return comes from, and nothing where there is no room for it."""
+        earned = zip(_SOURCES, self._account[step].tolist(), strict=True)
+        parts = [f"{'+' if n > 0 else '-'} {name} {abs(n)}" for (name, *_), n in earned if n]
+        return ("= " + " ".join(parts).removeprefix("+ ") if parts else "", "")
+
+    def _fitting(self, lines: tuple[str, ...]) -> str:
         room = self._width - self._text_size / 2
-        lines = _lines(status)
         return next((one for one in lines if text.width(one, self._text_size) <= room), lines[-1])
 
 
-def _lines(status: Status) -> tuple[str, ...]:
+def _lines(status: Status, note: str) -> tuple[str, ...]:
     """What stands below a world, the longest first; the return is in all of them."""
     result = f"return {status.episode_return}"
-    end = f", {status.outcome}" if status.outcome == "delivered" else ""
+    outcome = note or (status.outcome if status.outcome == "delivered" else "")
+    if not status.outcome or not outcome:
+        return (f"step {status.step}, {result}", result, str(status.episode_return))
     return (
-        f"step {status.step}, {result}{end}",
-        f"{result}{end}",
+        f"step {status.step}, {result}: {outcome}",
+        f"{result}: {outcome}",
         result,
         str(status.episode_return),
     )
+
+
+def _draw_legend(canvas: np.ndarray, top: int, size: int, hexagon: float) -> None:
+    """Draw what earns reward in a line across the canvas; shorter where there is little room."""
+    side, gap = round(1.4 * size), round(0.9 * size)
+    for words in ([source[-1] for source in _SOURCES], [source[0] for source in _SOURCES]):
+        width = sum(side + 0.5 * size + text.width(one, size) + gap for one in words) - gap
+        if width <= canvas.shape[1]:
+            break
+    x = (canvas.shape[1] - width) / 2
+    baseline = top + round(0.5 * side + 0.8 * size)
+    for (_, ground, trail, letter, _), label in zip(_SOURCES, words, strict=True):
+        y = top + round(0.45 * size)
+        draw_swatch(canvas, (round(x), y, side), ground, None, hexagon, trail)
+        text.write(canvas, letter, x + 0.59 * side, baseline, size, align="middle")
+        x += side + 0.5 * size
+        text.write(canvas, label, x, baseline, size, colours.FAINT_INK)
+        x += text.width(label, size) + gap
 
 
 def _tiles(

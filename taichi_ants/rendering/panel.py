@@ -149,7 +149,7 @@ def draw_legend(
     for row, (ground, carries, letter, label) in enumerate(_LEGEND):
         y = top + row * pitch
         baseline = y + round(0.5 * side + 0.36 * size)
-        _draw_swatch(frame, (left, y, side), ground, carries, hexagon)
+        draw_swatch(frame, (left, y, side), ground, carries, hexagon)
         text.write(frame, letter, left + 0.59 * side, baseline, size, align="middle")
         text.write(frame, label, left + round(2.1 * size), baseline, size)
     y = top + len(_LEGEND) * pitch + round(1.45 * size)
@@ -164,14 +164,24 @@ def draw_legend(
     text.write(frame, strongest, left + width, y, size, colours.FAINT_INK, align="right")
 
 
-def _draw_swatch(
+def draw_swatch(
     frame: np.ndarray,
     place: tuple[int, int, int],
     ground: int,
     carries: bool | None,
     hexagon: float,
+    trail: int = 0,
 ) -> None:
-    """A single cell as the world shows it, with an ant if `carries` says what it carries."""
+    """Draw a single cell as the world shows it, for a legend.
+
+    Args:
+        frame: uint8 (height, width, 3).
+        place: Left, top and height in pixels.
+        ground: What the cell holds.
+        carries: Whether the ant on it carries food; None draws no ant.
+        hexagon: Size of the world's hexagons in pixels, on which the look of its ants depends.
+        trail: Level of its trail.
+    """
     left, top, side = place
     grid = AxialGrid((1, 1, 1))
     held = np.full(grid.size, OBSTACLE, dtype=np.uint8)
@@ -181,7 +191,7 @@ def _draw_swatch(
     snapshot = Snapshot(
         grid=grid,
         ground=held,
-        trail=np.zeros(grid.size, dtype=np.int32),
+        trail=np.full(grid.size, trail, dtype=np.int32),
         ant_cells=np.full(n, cell, dtype=np.int32),
         ant_headings=np.full(n, 1, dtype=np.int32),
         ant_carries=np.full(n, bool(carries)),

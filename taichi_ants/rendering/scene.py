@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+from numbers import Real
+
 import numpy as np
 
 from taichi_ants.constants import DEPOSIT_LEVEL, FOOD, QUEEN
 from taichi_ants.errors import AntsError, checked_flag
 from taichi_ants.hexgrid import AxialGrid
 from taichi_ants.rendering import colours, panel, text
+from taichi_ants.rendering.arguments import expect, shown
 from taichi_ants.rendering.panel import Status
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.rendering.snapshot import Snapshot
@@ -28,13 +32,13 @@ def check_size(size: tuple[int, int]) -> tuple[int, int]:
     """
     try:
         width, height = (int(side) for side in size)
-        whole = (width, height) == tuple(size)
+        whole = [width, height] == list(size)
     except (TypeError, ValueError):
         whole = False
     if not whole or not all(SMALLEST_SIDE <= side <= LARGEST_SIDE for side in size):
         raise AntsError(
-            f"the size is {size!r}; it must be two whole numbers of pixels from {SMALLEST_SIDE} "
-            f"to {LARGEST_SIDE}."
+            f"the size is {shown(size)}; it must be two whole numbers of pixels from "
+            f"{SMALLEST_SIDE} to {LARGEST_SIDE}."
         )
     return width, height
 
@@ -55,7 +59,7 @@ class Scene:
         q_range: The action values at both ends of the bars; None takes those of each picture.
 
     Raises:
-        AntsError: The size is not allowed.
+        AntsError: An argument is of the wrong kind, or the size is not allowed.
     """
 
     def __init__(
@@ -69,7 +73,11 @@ class Scene:
         full_level: float = DEPOSIT_LEVEL,
         q_range: tuple[float, float] | None = None,
     ) -> None:
+        expect("grid", grid, AxialGrid)
         width, height = self.size = check_size(size)
+        expect("title", title, str)
+        if not isinstance(full_level, Real) or not 0 < full_level < math.inf:
+            raise AntsError(f"full_level is {shown(full_level)}; it must be a number above 0.")
         self._text_size = round(min(width, height) / 38)
         readable = self._text_size >= text.SMALLEST
         self._hud = checked_flag("hud", hud) and readable
@@ -92,6 +100,12 @@ class Scene:
         `snapshot` may be anything that `Snapshot.of` takes, for example `Colony.snapshot()`.
         """
         snapshot = Snapshot.of(snapshot)
+        expect("status", status, Status, type(None))
+        if snapshot.grid.ranges != self._rasteriser.grid.ranges:
+            raise AntsError(
+                f"the snapshot is of ranges {snapshot.grid.ranges}, the scene of "
+                f"{self._rasteriser.grid.ranges}; draw it with a Scene of its own grid."
+            )
         frame = self._background.copy()
         self._rasteriser.draw(frame, snapshot)
         if snapshot.letters is not None and self._rasteriser.has_room_for_letters:

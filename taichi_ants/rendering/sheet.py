@@ -1,11 +1,13 @@
-"""A policy on one sheet: what the ant does in each of the 100 states that it can come into.
+"""A policy on one sheet: what the ant does in each state.
 
-The states stand in two halves, foraging and carrying. Each half has four blocks, by the cell ahead;
-a block has a row for each cell to the left and a column for each cell to the right.
+The states stand in two halves, foraging and carrying, ordered by the cell ahead, then by the one to
+the left, then by the one to the right. A sheet shows the states in which something was learned, or
+all 100 that an ant can come into.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -23,34 +25,32 @@ from taichi_ants.constants import (
     SEES_LURE,
     SEES_OBSTACLE,
 )
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, checked_flag
 from taichi_ants.hexgrid import AxialGrid
+from taichi_ants.randomness import whole
 from taichi_ants.rendering import colours, text
+from taichi_ants.rendering.arguments import expect, shown
 from taichi_ants.rendering.panel import fill
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.rendering.scene import write_letter
 from taichi_ants.rendering.viewport import Viewport
-from taichi_ants.states import CELL_LETTERS, REACHABLE_STATES, State, state_index
+from taichi_ants.states import CELL_LETTERS, REACHABLE_STATES, State, state_from_index, state_index
 
-DEFAULT_WIDTH = 1920
+# Width in pixels and states side by side, of a sheet of what was learned and of all states. The
+# first is read at the width of a page, the second needs a screen of its own.
+DEFAULT_WIDTH, _COLUMNS = 1280, 9
+COMPLETE_WIDTH, _COMPLETE_COLUMNS = 1920, 16
+SMALLEST_WIDTH, LARGEST_WIDTH = 800, 4096
 HARDLY = 0.01
-SMALLEST_WIDTH, LARGEST_WIDTH = 1200, 4096
 
 _HALVES = ("Foraging (without food)", "Carrying (with food)")
-_AHEAD = (
-    ("ahead: empty", "ahead: obstacle", "ahead: trail", "ahead: food"),
-    ("ahead: empty", "ahead: obstacle", "ahead: nearer to the queen", "ahead: queen"),
-)
 _EXPLANATION = (
-    "Each picture shows what the ant sees: the cells to its left, ahead and to its right. "
-    "The arrow and the word below it are its best action.",
-    "The bar tells how clear the choice is: the gap from the best action value to the second best. "
-    "It is full where the gap is as large as the mean gap from best to worst, over all states.",
-    "Pale, hardly visited: the values differ by less than 1 % of that. Paler, not visited: "
-    "they are equal. Empty places are states that cannot occur.",
-    "E empty, O obstacle (also the outside and other ants), T trail, F food, "
-    "S nearer to the queen, Q queen.",
+    "A drawing is a state: what the ant sees to its left, ahead and to its right. "
+    "The arrow and the word are its best action.",
+    "The longer the bar, the worse the second best action; where the bar is empty, it is as good.",
+    "E empty, O obstacle (or the outside), T trail, F food, S nearer to the queen, Q queen.",
 )
+_NOTHING = "nothing was learned here"
 # How much of a picture's colours is left, by the words that stand below it.
 _NOT_VISITED, _HARDLY_VISITED = "not visited", "hardly visited"
 _PALE = {_NOT_VISITED: 0.35, _HARDLY_VISITED: 0.55}
@@ -65,6 +65,7 @@ _SQRT_3 = math.sqrt(3.0)
 
 def best_actions(values: np.ndarray) -> list[int]:
     """The actions of the highest value among values (5,); all five if all are equal."""
+    values = _numbers("values", values, (N_ACTIONS,))
     return np.flatnonzero(values == np.max(values)).tolist()
 
 
@@ -74,7 +75,8 @@ def usual_spread(q_values: np.ndarray) -> float:
     The mean of the gaps from the best to the worst, over the reachable states with values that
     differ; 0 where there are none.
     """
-    rows = np.asarray(q_values, dtype=np.float64)[list(REACHABLE_STATES)]
+    table = _numbers("q_values", q_values, (N_STATES, N_ACTIONS))
+    rows = table.astype(np.float64)[list(REACHABLE_STATES)]
     spreads = np.ptp(rows, axis=1)
     return float(spreads[spreads > 0].mean()) if spreads.any() else 0.0
 
@@ -86,7 +88,8 @@ def clarity(values: np.ndarray, spread: float) -> float:
     state's own values would make every hair's breadth look like a clear choice. NaN where all
     values are equal.
     """
-    worst, *_, second, best = np.sort(np.asarray(values, dtype=np.float64)).tolist()
+    values = _numbers("values", values, (N_ACTIONS,)).astype(np.float64)
+    worst, *_, second, best = np.sort(values).tolist()
     return min(1.0, (best - second) / spread) if best > worst else math.nan
 
 
@@ -96,106 +99,114 @@ def hardly_learned(values: np.ndarray, spread: float) -> bool:
 
 
 def policy_sheet(
-    q_values: np.ndarray, title: str = "Policy", width: int = DEFAULT_WIDTH
+    q_values: np.ndarray, title: str = "Policy", width: int | None = None, *, complete: bool = False
 ) -> np.ndarray:
     """The sheet of a policy, uint8 (height, width, 3).
 
     Args:
         q_values: float (128, 5), finite action values.
         title: Stands above it, in ASCII.
-        width: In pixels, 1200 to 4096.
+        width: In pixels, 800 to 4096; None takes 1280, of a complete sheet 1920.
+        complete: Whether to draw all 100 states that can occur, those not visited pale, and not
+            only those in which something was learned.
 
     Raises:
-        AntsError: The table is no policy, or the width is not allowed.
+        AntsError: The table is no policy, the title no text, or the width is not allowed.
     """
-    table = np.asarray(q_values)
-    if table.shape != (N_STATES, N_ACTIONS) or table.dtype.kind not in "fiu":
+    table = _numbers("q_values", q_values, (N_STATES, N_ACTIONS))
+    expect("title", title, str)
+    complete = checked_flag("complete", complete)
+    if width is None:
+        width = COMPLETE_WIDTH if complete else DEFAULT_WIDTH
+    if whole("the width", width) not in range(SMALLEST_WIDTH, LARGEST_WIDTH + 1):
         raise AntsError(
-            f"q_values is {table.dtype} {table.shape}; it must be numbers of shape "
-            f"({N_STATES}, {N_ACTIONS})."
-        )
-    if width not in range(SMALLEST_WIDTH, LARGEST_WIDTH + 1):
-        raise AntsError(
-            f"the width is {width!r}; it must be a whole number of pixels from {SMALLEST_WIDTH} to "
+            f"the width is {width}; it must be a whole number of pixels from {SMALLEST_WIDTH} to "
             f"{LARGEST_WIDTH}."
         )
-    return _Sheet(table, int(width)).draw(title)
+    return _Sheet(table, int(width), complete).draw(title)
+
+
+def _numbers(name: str, values: object, shape: tuple[int, ...]) -> np.ndarray:
+    """Values as an array of finite numbers of this shape."""
+    try:
+        array = np.asarray(values)
+    except ValueError:  # rows of different lengths
+        array = np.asarray(values, dtype=object)
+    if array.shape != shape or array.dtype.kind not in "fiu" or not np.isfinite(array).all():
+        raise AntsError(
+            f"{name} is {shown(array if array.ndim else values)}; it must be finite numbers of "
+            f"shape {shape}."
+        )
+    return array
 
 
 class _Sheet:
     """Where everything lies; all lengths follow from the width."""
 
-    def __init__(self, table: np.ndarray, width: int) -> None:
+    def __init__(self, table: np.ndarray, width: int, complete: bool) -> None:
         self._table = table
         self._spread = usual_spread(table)
         self._width = width
-        self._small = round(width / 150)  # sizes of text
-        self._large = round(width / 75)
+        self._columns = _COMPLETE_COLUMNS if complete else _COLUMNS
         self._margin = round(width / 64)
-        self._row_label = round(1.6 * self._small)
-        block_gap = round(width / 80)
-        self._block_pitch = (width - 2 * self._margin + block_gap) // 4
-        self._tile_width = (self._block_pitch - block_gap - self._row_label) // 4
-        hexagon = self._tile_width / 5.5
-        self._picture_height = round(3.55 * hexagon)
-        self._tile_height = self._picture_height + round(2.3 * self._small)
-        self._heading = round(3.9 * self._large)  # of a half, with the labels of its blocks
-        self._half_height = self._heading + 4 * self._tile_height + round(0.5 * self._large)
-        self._top = round(3.0 * self._large) + len(_EXPLANATION) * round(1.6 * self._small)
+        self._tile_width = (width - 2 * self._margin) // self._columns
+        self._small = round(min(width / 70, self._tile_width / 7))  # sizes of text
+        self._large = round(1.5 * self._small)
+        hexagon = self._tile_width / 5.7
+        self._picture_height = round(3.6 * hexagon)
+        self._tile_height = self._picture_height + round(2.6 * self._small)
+        self._heading = round(2.6 * self._large)  # of a half
+        self._top = round(2.6 * self._large) + len(_EXPLANATION) * round(1.5 * self._small)
+        self._halves = [self._states(carries, complete) for carries in (False, True)]
         self._picture = _Picture(self._tile_width, self._picture_height, hexagon)
 
+    def _states(self, carries: bool, complete: bool) -> list[State]:
+        """The states of a half that are drawn, in their order."""
+        views = itertools.product(range(4), repeat=3)
+        states = [State(carries, left, ahead, right) for ahead, left, right in views]
+        return [
+            state
+            for state in states
+            if (index := state_index(carries, *state.view)) in REACHABLE_STATES
+            and (complete or not self._doubt(self._table[index]))
+        ]
+
+    def _height(self, states: list[State]) -> int:
+        rows = max(1, math.ceil(len(states) / self._columns))
+        return self._heading + rows * self._tile_height
+
     def draw(self, title: str) -> np.ndarray:
-        height = self._top + 2 * self._half_height
+        height = self._top + sum(map(self._height, self._halves)) + self._margin // 2
         sheet = np.empty((height, self._width, 3), dtype=np.uint8)
         sheet[:] = colours.channels(colours.PAGE)
         y = self._margin + self._large
         title = text.shortened(title, self._large, self._width - 2 * self._margin)
         text.write(sheet, title, self._margin, y, self._large)
-        y += round(0.4 * self._large)
+        y += round(0.3 * self._large)
         for line in _EXPLANATION:
-            y += round(1.6 * self._small)
+            y += round(1.5 * self._small)
             text.write(sheet, line, self._margin, y, self._small, colours.FAINT_INK)
-        for carries in (False, True):
-            self._draw_half(sheet, carries, self._top + self._half_height * carries)
+        top = self._top
+        for carries, states in enumerate(self._halves):
+            self._draw_half(sheet, bool(carries), states, top)
+            top += self._height(states)
         return sheet
 
-    def _draw_half(self, sheet: np.ndarray, carries: bool, top: int) -> None:
-        y = top + round(1.6 * self._large)
+    def _draw_half(self, sheet: np.ndarray, carries: bool, states: list[State], top: int) -> None:
+        y = top + round(1.7 * self._large)
         text.write(sheet, _HALVES[carries], self._margin, y, self._large)
-        letters = CELL_LETTERS[carries]
-        for ahead, label in enumerate(_AHEAD[carries]):
-            left = self._margin + ahead * self._block_pitch
-            y = top + self._heading - round(0.35 * self._small)
-            tiles = left + self._row_label
-            text.write(sheet, label, tiles, y - round(1.5 * self._small), self._small)
-            for code, letter in enumerate(letters):
-                x = tiles + (code + 0.5) * self._tile_width
-                name = f"right {letter}"
-                text.write(sheet, name, x, y, self._small, colours.FAINT_INK, align="middle")
-                y_row = top + self._heading + (code + 0.4) * self._tile_height
-                self._write_upwards(sheet, f"left {letter}", left, y_row)
-            for on_left in range(4):
-                for on_right in range(4):
-                    state = State(carries, on_left, ahead, on_right)
-                    x = tiles + on_right * self._tile_width
-                    self._draw_tile(
-                        sheet, state, x, top + self._heading + on_left * self._tile_height
-                    )
-
-    def _write_upwards(self, sheet: np.ndarray, words: str, left: int, middle: float) -> None:
-        """Write words from below to above, their middle at a height."""
-        length = math.ceil(text.width(words, self._small)) + 2
-        strip = np.empty((self._row_label, length, 3), dtype=np.uint8)
-        strip[:] = colours.channels(colours.PAGE)
-        text.write(strip, words, 1, self._small, self._small, colours.FAINT_INK)
-        y = round(middle - length / 2)
-        sheet[y : y + length, left : left + self._row_label] = np.rot90(strip)
+        number = sum(not self._doubt(self._table[state_index(carries, *s.view)]) for s in states)
+        of_all = sum(state_from_index(index).carries == carries for index in REACHABLE_STATES)
+        right = self._width - self._margin
+        words = f"{number} of {of_all} states learned" if number else _NOTHING
+        text.write(sheet, words, right, y, self._small, colours.FAINT_INK, align="right")
+        for place, state in enumerate(states):
+            row, column = divmod(place, self._columns)
+            x = self._margin + column * self._tile_width
+            self._draw_tile(sheet, state, x, top + self._heading + row * self._tile_height)
 
     def _draw_tile(self, sheet: np.ndarray, state: State, left: int, top: int) -> None:
-        index = state_index(state.carries, *state.view)
-        if index not in REACHABLE_STATES:
-            return
-        values = self._table[index]
+        values = self._table[state_index(state.carries, *state.view)]
         best, clear = best_actions(values), clarity(values, self._spread)
         doubt = self._doubt(values)
         width, height = self._tile_width, self._picture_height
@@ -203,7 +214,7 @@ class _Sheet:
         if doubt:
             picture = (_PALE[doubt] * picture + (1 - _PALE[doubt]) * 255).astype(np.uint8)
         sheet[top : top + height, left : left + width] = picture
-        y = top + height + round(0.75 * self._small)
+        y = top + height + round(0.85 * self._small)
         middle = left + width / 2
         if doubt:
             text.write(sheet, doubt, middle, y, self._small, colours.FAINT_INK, align="middle")
@@ -213,7 +224,7 @@ class _Sheet:
         )
         colour = _ARROW_COLOURS.get(best[0], colours.CHOSEN)
         text.write(sheet, words, middle, y, self._small, colour, align="middle")
-        y += round(0.4 * self._small)
+        y += round(0.45 * self._small)
         length, thickness = round(0.72 * width), max(2, round(0.32 * self._small))
         fill(sheet, middle - length / 2, y, length, thickness, colours.CELL_EMPTY)
         fill(sheet, middle - length / 2, y, length * clear, thickness, colour)

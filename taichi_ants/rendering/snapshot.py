@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from taichi_ants.constants import N_HEADINGS
 from taichi_ants.errors import AntsError
 from taichi_ants.hexgrid import AxialGrid
+from taichi_ants.rendering.arguments import expect, shown
 from taichi_ants.worlds.world import World
 
 
@@ -43,6 +44,9 @@ class Snapshot:
     watched: int = 0
 
     def __post_init__(self) -> None:
+        expect("grid", self.grid, AxialGrid)
+        expect("ant_cells", self.ant_cells, np.ndarray)
+        expect("letters", self.letters, str, type(None))
         size, n = self.grid.size, len(self.ant_cells)
         _check("ground", self.ground, (size,), "u")
         _check("trail", self.trail, (size,), "iuf")
@@ -62,6 +66,7 @@ class Snapshot:
     @classmethod
     def at_start(cls, world: World, seed: int = 0, n: int = 1) -> Snapshot:
         """A world with n ants as an episode starts; raises as `World.start` does."""
+        expect("world", world, World)
         cells, headings = world.start(seed, n)
         return cls(
             grid=world.grid,
@@ -77,8 +82,20 @@ class Snapshot:
         """A snapshot of anything that has its attributes up to `ant_carries`, as colonies do.
 
         A `Snapshot` is returned as it is.
+
+        Raises:
+            AntsError: It is something else.
         """
-        return moment if isinstance(moment, cls) else cls(**vars(moment))
+        if isinstance(moment, cls):
+            return moment
+        parts = getattr(moment, "__dict__", {})
+        names = [field.name for field in fields(cls)]
+        if not set(names[:6]) <= parts.keys() <= set(names):
+            raise AntsError(
+                f"the moment is {shown(moment)}; it must be a Snapshot, or what Colony.snapshot() "
+                "returns."
+            )
+        return cls(**parts)
 
     def cells_in_view(self) -> np.ndarray:
         """Flat indices (3,) of the cells to the left, ahead and to the right of the watched ant."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from taichi_ants import hexgrid
 from taichi_ants.hexgrid import AxialGrid
+from taichi_ants.rendering.arguments import expect
 
 _SQRT_3 = math.sqrt(3.0)
 
@@ -44,6 +45,7 @@ class Viewport:
             left, top, width, height: The rectangle, in pixels.
             margin: Pixels to leave free at each side.
         """
+        expect("grid", grid, AxialGrid)
         low, high = _bounds(grid)
         room = np.array([max(width - 2 * margin, 1.0), max(height - 2 * margin, 1.0)])
         hexagon = float((room / (high - low)).min())

@@ -8,6 +8,7 @@ import secrets
 import shutil
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from numbers import Real
 from pathlib import Path
 from typing import BinaryIO
 
@@ -16,6 +17,7 @@ import numpy as np
 from taichi_ants import results
 from taichi_ants.errors import AntsError
 from taichi_ants.rendering import animated_files
+from taichi_ants.rendering.arguments import expect, shown
 
 PathLike = str | os.PathLike[str]
 
@@ -24,6 +26,8 @@ _ANIMATIONS: dict[str, Callable[[BinaryIO, Iterable[np.ndarray], float], None]] 
     ".webp": animated_files.write_webp,
     ".mp4": animated_files.write_mp4,
 }
+# The widest and highest picture that a kind of file can hold.
+_LARGEST = {".gif": 65_535, ".webp": 16_383, ".mp4": 16_384}
 # Viewers slow a GIF down whose frames are shorter than two hundredths of a second.
 _FASTEST = {".gif": 50.0}
 _MAX_FPS = 240.0
@@ -51,9 +55,15 @@ def check_animation(path: PathLike, fps: float) -> Path:
             f"{', '.join(_ANIMATIONS)}, or in nothing for a folder of PNG pictures."
         )
     fastest = _FASTEST.get(kind, _MAX_FPS)
-    if isinstance(fps, (bool, str)) or not 0.1 <= fps <= fastest or not math.isfinite(fps):
+    if (
+        isinstance(fps, bool)
+        or not isinstance(fps, Real)
+        or not 0.1 <= fps <= fastest
+        or not math.isfinite(fps)
+    ):
         raise AntsError(
-            f"fps is {fps!r}; it must be a number from 0.1 to {fastest:g} for {kind or 'pictures'}."
+            f"fps is {shown(fps)}; it must be a number from 0.1 to {fastest:g} for "
+            f"{kind or 'pictures'}."
         )
     if kind == ".mp4":
         animated_files.import_av()
@@ -76,12 +86,14 @@ def save_animation(path: PathLike, frames: Iterable[np.ndarray], fps: float) -> 
         fps: Frames per second.
     """
     target = check_animation(path, fps)
+    kind = target.suffix.lower()
+    checked = _checked(frames, kind)
     with _folder_of(target):
-        if target.suffix:
-            write = _ANIMATIONS[target.suffix.lower()]
-            results.write_atomically(target, lambda file: write(file, _checked(frames), fps))
+        if kind:
+            write = _ANIMATIONS[kind]
+            results.write_atomically(target, lambda file: write(file, checked, fps))
         else:
-            _save_pictures(target, _checked(frames))
+            _save_pictures(target, checked)
 
 
 def save_picture(path: PathLike, frame: np.ndarray) -> None:
@@ -91,6 +103,7 @@ def save_picture(path: PathLike, frame: np.ndarray) -> None:
         AntsError: The file does not end in .png, or cannot be written.
     """
     target = check_picture(path)
+    _check_frame(frame)
     with _folder_of(target):
         results.write_atomically(target, lambda file: _write_png(file, frame, optimize=True))
 
@@ -107,6 +120,7 @@ def check_picture(path: PathLike) -> Path:
 
 def _named_place(path: PathLike) -> Path:
     """The path, unless it ends both as a folder and as a file do."""
+    expect("path", path, str, os.PathLike)
     target, name = Path(path), os.fspath(path)
     if target.suffix and name.endswith(("/", os.sep)):
         raise AntsError(
@@ -140,19 +154,42 @@ def _save_pictures(folder: Path, frames: Iterable[np.ndarray]) -> None:
         shutil.rmtree(temporary, ignore_errors=True)
 
 
-def _checked(frames: Iterable[np.ndarray]) -> Iterator[np.ndarray]:
-    """The frames, which must be pictures of one size, and at least one."""
-    shape = None
+def _checked(frames: Iterable[np.ndarray], kind: str) -> Iterator[np.ndarray]:
+    """The frames, at least one, of a size that the kind of file holds; checks the first at once."""
+    if not isinstance(frames, Iterable):
+        raise AntsError(f"frames is {shown(frames)}; it must be several pictures.")
+    frames = iter(frames)
+    first = next(frames, None)
+    if first is None:
+        raise AntsError("there are no frames; an animation needs at least one.")
+    _check_frame(first)
+    height, width = first.shape[:2]
+    most = _LARGEST.get(kind, max(width, height))
+    if max(width, height) > most:
+        raise AntsError(
+            f"the frames are {width} x {height} pixels; a {kind} holds at most {most} in width and "
+            "height, draw them smaller."
+        )
+    return _of_one_size(first, frames)
+
+
+def _of_one_size(first: np.ndarray, frames: Iterator[np.ndarray]) -> Iterator[np.ndarray]:
+    yield first
     for frame in frames:
-        shape = shape or frame.shape
-        if frame.shape != shape or frame.dtype != np.uint8 or frame.shape[2:] != (3,):
+        _check_frame(frame)
+        if frame.shape != first.shape:
             raise AntsError(
-                f"a frame is {frame.dtype} {frame.shape}; all must be uint8 (height, width, 3), "
-                "of one size."
+                f"a frame is {frame.shape}, the first one {first.shape}; all must be of one size."
             )
         yield frame
-    if shape is None:
-        raise AntsError("there are no frames; an animation needs at least one.")
+
+
+def _check_frame(frame: np.ndarray) -> None:
+    expect("a frame", frame, np.ndarray)
+    if frame.dtype != np.uint8 or frame.shape[2:] != (3,) or 0 in frame.shape:
+        raise AntsError(
+            f"a frame is {frame.dtype} {frame.shape}; it must be uint8 (height, width, 3)."
+        )
 
 
 @contextmanager

@@ -15,9 +15,16 @@ from PIL import Image
 
 from taichi_ants.commands import render
 from taichi_ants.policies import save_policy, trail_follower
+from taichi_ants.rendering import colours, learning_frames, text
+from taichi_ants.worlds import paper
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = ROOT / "experiments" / "render.py"
+
+sys.path.insert(0, str(SCRIPT.parent))
+import gallery  # noqa: E402
+
+sys.path.remove(str(SCRIPT.parent))
 
 
 def environment(**changes: str) -> dict[str, str]:
@@ -76,8 +83,11 @@ def test_one_step_and_a_sheet(tmp_path, policy) -> None:
     assert "no step 35" in late.stderr
     done = run("--policy", policy, "--show", "sheet", "--out", tmp_path / "sheet.png")
     assert done.returncode == 0, done.stderr
-    assert Image.open(tmp_path / "sheet.png").width == 1920
+    assert Image.open(tmp_path / "sheet.png").width == 1280
     assert files_in(tmp_path) == ["a.png", "sheet.png"]
+    done = run("--policy", policy, "--show", "sheet", "--all-states", "--out", tmp_path / "all.png")
+    assert done.returncode == 0, done.stderr
+    assert Image.open(tmp_path / "all.png").width == 1920
 
 
 def test_learning_and_a_colony(tmp_path) -> None:
@@ -123,6 +133,7 @@ WRONG = {
         ["--step", "3"],
         "--step changes nothing in an episode, but in a still colony, a still episode; leave",
     ),
+    "states of an episode": (["--all-states"], "--all-states changes nothing in an episode"),
     "step of a sheet": (["--show", "sheet", "--step", "3"], "--step changes nothing in a sheet"),
     "ants of an episode": (["--ants", "80"], "--ants changes nothing in an episode"),
     "every of a still": (["--show", "colony", "--every", "4", "--out", "a.png"], "--every"),
@@ -212,13 +223,15 @@ def test_trails_of_a_colony_stay_without_evaporation(tmp_path, policy) -> None:
     pictures = []
     for more in ([], ["--no-evaporation"]):
         path = tmp_path / f"{len(more)}.png"
-        colony = ["--show", "colony", "--policy", policy, "--ants", 60, "--max-steps", 300]
+        colony = ["--show", "colony", "--policy", policy, "--ants", 60, "--max-steps", 150]
         done = run(*colony, "--no-hud", "--no-legend", "--world", "paper", *more, "--out", path)
         assert done.returncode == 0, done.stderr
         pictures.append(np.asarray(Image.open(path)).astype(int))
-    yellow = [((p[..., 0] > 200) & (p[..., 2] < 80)).sum() for p in pictures]
-    assert (pictures[0] != pictures[1]).any()
-    assert yellow[1] != yellow[0]
+    # A trail is as it was at the start, 25, or as an ant laid it, 250, unless it evaporates.
+    between = set(colours.TRAIL_RAMP[40:230].tolist())
+    evaporated = [between & set(colours.pack(picture).ravel().tolist()) for picture in pictures]
+    assert len(evaporated[0]) > 10
+    assert not evaporated[1]
 
 
 @pytest.mark.parametrize(
@@ -233,7 +246,7 @@ def test_default_worlds(arguments, world) -> None:
     ("arguments", "size"),
     [
         ([], (1280, 720)),
-        (["--show", "learning"], (1280, 460)),
+        (["--show", "learning"], (1280, 520)),
         (["--show", "colony"], (960, 540)),
         (["--show", "colony", "--out", "a.png"], (1280, 720)),
         (["--show", "colony", "--size", "320x200"], (320, 200)),
@@ -263,12 +276,27 @@ def test_help_is_quick_and_needs_little() -> None:
     assert loaded.stdout == "set()\n"
 
 
+def test_an_ant_that_circles_earns_more_than_a_delivery_and_the_picture_says_why(
+    monkeypatch,
+) -> None:
+    # What README says of the picture.
+    arguments = render.parse_arguments(gallery.GALLERY["learning.gif"])
+    stages = render.noted_stages(arguments, paper())
+    assert [stage.note for stage in stages] == [
+        *("", "circles beside the queen", "delivered", "delivered"),
+    ]
+    returns = [int(stage.episode.trace.rewards.sum()) for stage in stages]
+    assert returns[1] == 57 > returns[3] == 45
+    lines = []
+    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
+    list(learning_frames(stages, arguments.size))
+    assert "return 57: circles beside the queen" in lines
+    assert "= T 16 + S 38 + F 3" in lines
+    assert "= T 16 + S 16 + F 3 + Q 10" in lines
+    assert "S nearer to the queen, with food +1" in lines  # the legend
+
+
 def test_the_gallery_is_there_and_small() -> None:
-    sys.path.insert(0, str(SCRIPT.parent))
-    try:
-        import gallery
-    finally:
-        sys.path.remove(str(SCRIPT.parent))
     sizes = []
     for name, arguments in gallery.GALLERY.items():
         settings = render.parse_arguments([*arguments, "--out", name])
@@ -282,3 +310,49 @@ def test_the_gallery_is_there_and_small() -> None:
             assert np.asarray(image.convert("RGB")).std() > 5
     assert len(sizes) == 5
     assert sum(sizes) < 3_000_000
+    figures = [ROOT / "docs" / "figures" / name for name in (*gallery.COMPARISON, *gallery.COLONY)]
+    assert sum(path.stat().st_size for path in figures) < 600_000
+
+
+def test_the_tracked_pictures_are_those_of_the_gallery() -> None:
+    listed = subprocess.run(
+        ["git", "ls-files", "renders", "docs", "*.png", "*.gif", "*.webp", "*.mp4"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if listed.returncode:
+        pytest.skip("not a git repository")
+    pictures = {
+        path
+        for path in listed.stdout.split()
+        if Path(path).suffix in (".png", ".gif", ".webp", ".mp4") and not path.startswith("tests/")
+    }
+    figures = {f"docs/figures/{name}" for name in (*gallery.COMPARISON, *gallery.COLONY)}
+    assert pictures == figures | {f"renders/{name}" for name in gallery.GALLERY}
+
+
+@pytest.mark.parametrize("shown", ["episode", "colony", "learning", "sheet"])
+def test_by_default_no_tracked_picture_is_replaced(shown) -> None:
+    place = render.parse_arguments(["--show", shown]).out
+    ignored = subprocess.run(
+        ["git", "check-ignore", "--no-index", "-q", place],
+        cwd=ROOT,
+        capture_output=True,
+        check=False,
+    )
+    if ignored.returncode == 128:
+        pytest.skip("not a git repository")
+    assert ignored.returncode == 0
+
+
+def test_figures_of_the_docs_are_those_of_the_studies(tmp_path) -> None:
+    """As the gallery keeps them: the same picture in at most 256 colours."""
+    drawn = tmp_path / "drawn"
+    drawn.mkdir()
+    picture = np.random.default_rng(1).integers(0, 4, (90, 160, 3), dtype=np.uint8) * 60
+    Image.fromarray(picture).save(drawn / "scaling.png")
+    gallery.keep(drawn, gallery.COLONY, tmp_path / "docs")
+    with Image.open(tmp_path / "docs" / "colony_scaling.png") as kept:
+        assert (np.asarray(kept.convert("RGB")) == picture).all()

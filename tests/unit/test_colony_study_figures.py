@@ -90,14 +90,44 @@ def test_trails(study: ColonyStudy) -> None:
         np.testing.assert_allclose(points(found[PHEROMONES[OFF]])[1], means)
 
 
-def test_gains_are_shares_of_what_copies_deliver(study: ColonyStudy) -> None:
+def test_ratios_to_copies_lie_on_a_logarithmic_axis(study: ColonyStudy) -> None:
+    """A difference can be minus 160 % of what copies deliver, a ratio is never below 0."""
     axis = figures.joint_learning(study).axes[0]
+    assert axis.get_yscale() == "log"
     found = bars(axis)
     assert list(found) == [WAYS[way] for way in WAYS if way != COPIED]
     x, y = points(found[WAYS[JOINT]])
     np.testing.assert_allclose(x, SIZES[1:], rtol=0.25)
-    np.testing.assert_allclose(y, [100, 100, 100], atol=20)
-    np.testing.assert_allclose(points(found[WAYS[COPIED_LONG]])[1], [0, 0, 0], atol=10)
+    np.testing.assert_allclose(y, [2, 2, 2], rtol=0.1)
+    arena = study.arenas[0]
+    means = [[study.mean(arena, ON, way, n) for n in SIZES[1:]] for way in (JOINT, COPIED)]
+    np.testing.assert_allclose(y, np.divide(*means))
+    low, high = ends(found[WAYS[JOINT]]).T
+    assert (low > 0).all()
+    assert ((low < y) & (y < high)).all()
+    np.testing.assert_allclose(points(found[WAYS[COPIED_LONG]])[1], [1, 1, 1], rtol=0.1)
+
+
+def test_intervals_of_ratios() -> None:
+    """Worked by hand: equal seeds have one ratio; a resample of copies without any has none."""
+    centre, low, high = figures.ratios(np.full((1, 8), 6.0), np.full((1, 8), 4.0))
+    assert centre == low == high == 1.5
+    proportional = np.arange(1.0, 9.0)[None]
+    for value in figures.ratios(3 * proportional, proportional):  # paired by seed
+        assert value == pytest.approx(3)
+    centre, low, high = figures.ratios(np.array([[4.0, 2.0]]), np.array([[3.0, 0.0]]))
+    assert (centre, high) == (2.0, np.inf)
+    centre, low, high = figures.ratios(np.array([[4.0]]), np.array([[2.0]]))
+    assert centre == 2.0
+    assert np.isnan([low, high]).all()
+
+
+def test_a_way_that_delivers_nothing_is_an_arrow() -> None:
+    study = build(lambda pheromone, way, ants: 0.0 if way == OWN else 20.0, noise=0, seeds=3)
+    axis = figures.joint_learning(study).axes[0]
+    arrows = [line for line in axis.lines if line.get_transform() == axis.get_xaxis_transform()]
+    assert [line.get_marker() for line in arrows] == ["v"]
+    assert len(arrows[0].get_xdata()) == len(SIZES) - 1
 
 
 def test_colours_and_markers_differ() -> None:

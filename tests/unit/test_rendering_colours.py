@@ -7,6 +7,9 @@ import itertools
 import numpy as np
 import pytest
 
+from taichi_ants.analysis.colony import figures
+from taichi_ants.analysis.paper import VARIANTS
+from taichi_ants.analysis.style import looks
 from taichi_ants.rendering import colours
 
 # Full strength, linear light: Machado, Oliveira and Fernandes (2009).
@@ -68,6 +71,15 @@ def test_the_ramp_grows_evenly_darker(deficiency) -> None:
 
 
 @pytest.mark.parametrize("deficiency", DEFICIENCIES)
+def test_a_stronger_trail_is_more_striking(deficiency) -> None:
+    """Its colour lies further from that of an empty cell; the weakest is still seen."""
+    empty = lab(colours.CELL_EMPTY, deficiency)
+    striking = np.linalg.norm(lab(colours.TRAIL_RAMP, deficiency) - empty, axis=1)[::15]
+    assert (np.diff(striking) > 0.3).all()
+    assert 10 < striking[0] < striking[-1] / 2
+
+
+@pytest.mark.parametrize("deficiency", DEFICIENCIES)
 def test_things_stay_apart(deficiency) -> None:
     things = {
         "empty": colours.CELL_EMPTY,
@@ -80,10 +92,21 @@ def test_things_stay_apart(deficiency) -> None:
         apart = np.linalg.norm(lab(first, deficiency) - lab(second, deficiency))
         assert apart > 22, (one, other, apart)
     ramp = lab(colours.TRAIL_RAMP, deficiency)
-    least = {"empty": 12, "obstacle": 20, "food": 18, "queen": 30, "ant": 35}
+    least = {"empty": 10, "obstacle": 20, "food": 18, "queen": 30, "ant": 35}
     for name, word in things.items():
         apart = np.linalg.norm(ramp - lab(word, deficiency), axis=1).min()
         assert apart > least[name], (name, apart)
+
+
+@pytest.mark.parametrize("deficiency", DEFICIENCIES)
+def test_lines_of_the_figures_stay_apart(deficiency) -> None:
+    learners = [colour for colour, _ in looks(VARIANTS).values()]
+    ways = [look[0] for look in figures._WAY_LOOKS.values()]
+    trails = [look[0] for look in figures._PHEROMONE_LOOKS.values()]
+    for compared in (learners, ways, trails):
+        seen = lab([int(colour[1:], 16) for colour in compared], deficiency)
+        for first, second in itertools.combinations(seen, 2):
+            assert np.linalg.norm(first - second) > 24
 
 
 def test_text_can_be_read() -> None:

@@ -255,6 +255,30 @@ def test_a_folder_is_no_file(tmp_path, frames) -> None:
         save_animation(tmp_path / "a.gif", frames, 8)
 
 
+@pytest.mark.parametrize(("name", "most"), [("a.gif", 65_535), ("a.webp", 16_383)])
+@pytest.mark.parametrize("upright", [False, True])
+def test_pictures_that_a_kind_of_file_cannot_hold(tmp_path, name, most, upright) -> None:
+    """Refused before a file is begun, where the file's format ends."""
+
+    def frame(side: int) -> np.ndarray:
+        return np.zeros((side, 1, 3) if upright else (1, side, 3), np.uint8)
+
+    drawn = []
+
+    def many():
+        for number in range(3):
+            drawn.append(number)
+            yield frame(most + 1)
+
+    with pytest.raises(AntsError, match=f"{most} in width"):
+        save_animation(tmp_path / "new" / name, many(), 8)
+    assert drawn == [0]
+    assert leftovers(tmp_path) == []
+    save_animation(tmp_path / name, [frame(most)], 8)
+    with Image.open(tmp_path / name) as image:
+        assert max(image.size) == most
+
+
 def test_frames_must_fit(tmp_path, frames) -> None:
     for wrong in (
         [],

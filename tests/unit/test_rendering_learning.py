@@ -13,7 +13,9 @@ from taichi_ants import AntsError, Colony, ColonyConfig, TrainingConfig, train
 from taichi_ants.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT
 from taichi_ants.policies import random_policy, trail_follower
 from taichi_ants.rendering import (
+    Episode,
     Snapshot,
+    Stage,
     best_actions,
     clarity,
     colony_frames,
@@ -74,12 +76,26 @@ def test_the_return_stays_where_there_is_little_room(n, monkeypatch) -> None:
     monkeypatch.setattr(text, "write", noting)
     *_, last = learning_frames(stages, (600, 400))
     assert last.shape == (400, 600, 3)
-    captions = [line for line in written if not line.startswith(("bef", "aft", "..."))]
+    captions = [line for line in written if "return" in line or line.lstrip("-").isdecimal()]
     assert len(captions) == sum(len(stage.episode) for stage in stages)
     for line in captions:
         assert "..." not in line
-        number = line.split("return ")[-1].removesuffix(", delivered")
+        number = line.split("return ")[-1].removesuffix(": delivered")
         assert number.lstrip("-").isdecimal()
+
+
+def test_the_account_says_where_the_return_comes_from() -> None:
+    """The shortest delivery earns 16 on the trail, 16 on the way back, 3 for the food and 10."""
+    follower = Stage(500, Episode.play(paper(), trail_follower()))
+    account = follower.account()
+    assert account[-1].tolist() == [16, 16, 3, 10, 0]
+    assert account[0].tolist() == [0] * 5
+    for seed, stages in ((2, (0, 10)), (7, (10, 30))):
+        for stage in learning_stages(paper(), CONFIG, seed=seed, stages=stages, max_steps=80):
+            returns = np.concatenate([[0], stage.episode.trace.rewards.cumsum()])
+            assert (stage.account().sum(axis=1) == returns).all()
+            assert (stage.account()[:, :4] >= 0).all()
+            assert (stage.account()[:, 4] <= 0).all()
 
 
 @pytest.mark.parametrize("stages", [(), (3, 2), (5, 5, 2), (-1, 5)])
@@ -109,7 +125,9 @@ def test_all_stages_fit(size, tmp_path) -> None:
     with Image.open(tmp_path / "a.gif") as image:
         assert image.size == size
         picture = np.asarray(image.convert("RGB")).astype(int)
-    # The columns and the rows of worlds, told by their queens.
+    # The columns and the rows of worlds, told by their queens; there is one in the legend too.
+    letters = round(min(size[0] / 60, size[1] / 26))
+    picture = picture[: size[1] - round(2.6 * letters) * (letters >= text.SMALLEST)]
     purple = (picture[..., 0] - picture[..., 1] > 90) & (picture[..., 2] - picture[..., 1] > 90)
     groups = [(np.diff(np.flatnonzero(purple.any(axis=axis))) > 8).sum() + 1 for axis in (0, 1)]
     assert groups == {(1280, 720): [4, 1], (400, 900): [2, 2], (64, 64): [2, 2]}.get(size, [4, 1])
@@ -154,12 +172,12 @@ def test_a_hairline_is_no_clear_choice(values) -> None:
     assert not hardly_learned(np.array(values), 100 * 2.5e-6)
     table = random_policy()
     table[parse_state("foraging E F E")] = (0.0, 0.0, 0.0, 0.8, 0.0)
-    blank = policy_sheet(table)
+    blank = policy_sheet(table, complete=True)
     place = parse_state("foraging O O O")
     table[place] = values
-    hardly = policy_sheet(table)
+    hardly = policy_sheet(table, complete=True)
     table[place] = (0.0, 0.8, 0.0, 0.0, 0.0)
-    learned = policy_sheet(table)
+    learned = policy_sheet(table, complete=True)
     # Neither as if never visited, nor with a bar and an arrow of full strength.
     assert (hardly != blank).any()
     assert not coloured(hardly, CHOSEN).any()
@@ -168,53 +186,94 @@ def test_a_hairline_is_no_clear_choice(values) -> None:
 
 def test_a_sheet_without_any_visited_state() -> None:
     sheet = policy_sheet(random_policy())
-    assert sheet.shape[1] == 1920
+    assert sheet.shape[1] == 1280
+    assert policy_sheet(random_policy(), complete=True).shape[1] == 1920
     assert sheet.dtype == np.uint8
     assert not coloured(sheet, CHOSEN).any()
 
 
+def places(table: np.ndarray, blank: np.ndarray) -> list[int]:
+    """Left, right, top and bottom of what differs from another complete sheet, without counts."""
+    differs = (policy_sheet(table, complete=True) != blank).any(axis=2)
+    rows, columns = np.nonzero(differs[:, :1650])  # the counts stand at the right
+    return [columns.min(), columns.max(), rows.min(), rows.max()]
+
+
 def test_one_visited_state_has_a_bar_at_its_place() -> None:
-    blank = policy_sheet(random_policy())
-    places = {}
+    blank = policy_sheet(random_policy(), complete=True)
+    found = {}
     for name in ("foraging E E E", "foraging F E E", "foraging E E F", "foraging E F E"):
         table = random_policy()
         table[parse_state(name)] = (0.0, 4.0, 3.0, -1.0, 0.0)
-        sheet = policy_sheet(table)
-        rows, columns = np.nonzero((sheet != blank).any(axis=2))
-        places[name] = np.array([columns.mean(), rows.mean()])
-        assert np.ptp(columns) < 130
-        assert np.ptp(rows) < 130
-        bar = coloured(sheet, CHOSEN).sum(axis=1).max()
-        assert 10 <= bar < 30  # a fifth of about 76 pixels
-    # Left counts downwards, right to the right within a block, ahead from block to block.
-    first = places["foraging E E E"]
-    assert places["foraging F E E"][0] == pytest.approx(first[0], abs=12)
-    assert places["foraging F E E"][1] > first[1] + 200
-    assert places["foraging E E F"][1] == pytest.approx(first[1], abs=12)
-    assert 250 < places["foraging E E F"][0] - first[0] < 400
-    assert places["foraging E F E"][0] > first[0] + 1200
+        left, right, top, bottom = places(table, blank)
+        assert right - left < 118
+        assert bottom - top < 118
+        bar = coloured(policy_sheet(table, complete=True), CHOSEN).sum(axis=1).max()
+        assert 10 <= bar < 30  # a fifth of about 84 pixels
+        found[name] = np.array([left + right, top + bottom]) / 2
+    # By the cell ahead, a row each, then by the one to the left, then by the one to the right.
+    first = found["foraging E E E"]
+    assert found["foraging E E F"] - first == pytest.approx([3 * 116, 0], abs=12)
+    assert found["foraging F E E"] - first == pytest.approx([12 * 116, 0], abs=12)
+    assert found["foraging E F E"][0] == pytest.approx(first[0], abs=12)
+    assert found["foraging E F E"][1] > first[1] + 300
 
 
-def test_all_reachable_states_are_on_the_sheet() -> None:
+def test_all_reachable_states_are_on_the_complete_sheet() -> None:
     """Each of the 100 states that is visited changes the sheet, each of the others does not."""
-    blank = policy_sheet(random_policy(), width=1200)
+    blank = policy_sheet(random_policy(), complete=True)
     table = random_policy()
     table[[index for index in range(128) if index not in REACHABLE_STATES]] = (1, 0, 0, 0, 0)
-    assert (policy_sheet(table, width=1200) == blank).all()
+    assert (policy_sheet(table, complete=True) == blank).all()
     seen = set()
     for index in REACHABLE_STATES[::9]:
         table = random_policy()
         table[index, GIVE] = 1
-        rows, columns = np.nonzero((policy_sheet(table, width=1200) != blank).any(axis=2))
+        changed = (policy_sheet(table, complete=True) != blank).any(axis=2)
+        rows, columns = np.nonzero(changed[:, :1650] if changed[:, :1650].any() else changed)
         seen.add((int(rows.min()) // 20, int(columns.min()) // 20))
     assert len(seen) == len(REACHABLE_STATES[::9])
+
+
+def test_a_sheet_shows_what_was_learned_in_large_letters() -> None:
+    """Cropped to the states with a choice, so that it can be read at the width of a page."""
+    table = random_policy()
+    learned = REACHABLE_STATES[:30]
+    for index in learned:
+        table[index, RIGHT] = 1.0
+    sheet, complete = policy_sheet(table), policy_sheet(table, complete=True)
+
+    def bar(picture: np.ndarray) -> float:
+        """The length of a full bar as a share of the picture's width."""
+        runs = np.diff(np.flatnonzero(~coloured(picture, CHOSEN).reshape(-1))) - 1
+        return runs.max() / picture.shape[1]
+
+    assert bar(sheet) > 1.6 * bar(complete)
+    one = random_policy()
+    one[parse_state("foraging E F E"), PICK_UP] = 1.0
+    assert policy_sheet(one).shape[0] < sheet.shape[0]
+
+
+def test_text_on_a_sheet_says_what_it_shows(monkeypatch) -> None:
+    lines = []
+    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
+    table = random_policy()
+    table[parse_state("foraging E F E"), PICK_UP] = 1.0
+    policy_sheet(table, "a title")
+    assert lines[0] == "a title"
+    assert "1 of 64 states learned" in lines
+    assert "nothing was learned here" in lines  # with food
+    assert lines.count("pick up") == 1
+    assert max(map(len, lines)) < 125
 
 
 def test_sheets_that_are_refused() -> None:
     for wrong in (np.zeros((5, 128)), np.zeros((128, 5), bool), np.full((128, 5), "a")):
         with pytest.raises(AntsError, match="q_values"):
             policy_sheet(wrong)
-    for width in (100, 5000, 1920.5):
+    with pytest.raises(AntsError, match="finite numbers of shape"):
+        policy_sheet(np.full((128, 5), np.nan))
+    for width in (100, 5000, 1920.5, True):
         with pytest.raises(AntsError, match="width"):
             policy_sheet(random_policy(), width=width)
 

@@ -33,7 +33,7 @@ from taichi_ants.analysis.paper import (
     VARIANTS,
 )
 
-_AT_FIGURE_1 = f"at the shared configuration {FIGURE_1.label}"
+_AT_FIGURE_1 = f"at the shared configuration {FIGURE_1.label} (our choice, the paper names none)"
 _AT_TABLE_2 = "at the configurations in table 2"
 _OTHERS_AGAINST_SARSA = tuple((other, SARSA) for other in (Q_LEARNING, DYNA_P3, DYNA_P5))
 # Different algorithms only: the two planning depths are not compared with each other.

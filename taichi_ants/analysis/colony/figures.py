@@ -25,23 +25,37 @@ from taichi_ants.analysis.colony.study import (
     Arena,
     ColonyStudy,
 )
-from taichi_ants.analysis.statistics import bootstrap_interval
-from taichi_ants.analysis.style import GREY, INK, frame, legend_entries, new_figure, save, styled
+from taichi_ants.analysis.statistics import bootstrap_interval, resampling_counts
+from taichi_ants.analysis.style import (
+    BLUE,
+    GREY,
+    INK,
+    ORANGE,
+    RED,
+    SKY,
+    WINE,
+    frame,
+    legend_entries,
+    logarithmic,
+    new_figure,
+    save,
+    styled,
+)
 from taichi_ants.results import check_writable_folder
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Okabe and Ito's palette, distinct for the colour-blind; markers tell the lines apart without it.
+# Markers and dashes tell the lines apart without colours.
 _WAY_LOOKS = {
-    COPIED: ("#0072B2", "o", "-"),
-    COPIED_LONG: ("#56B4E9", "v", ":"),
-    JOINT: ("#D55E00", "s", "-"),
-    THEN_JOINT: ("#E69F00", "D", "--"),
-    OWN: ("#009E73", "^", "-"),
+    COPIED: (BLUE, "o", "-"),
+    COPIED_LONG: (SKY, "v", ":"),
+    JOINT: (RED, "s", "-"),
+    THEN_JOINT: (ORANGE, "D", "--"),
+    OWN: (WINE, "^", "-."),
 }
-_PHEROMONE_LOOKS = {ON: ("#D55E00", "s"), OFF: ("#0072B2", "o"), LASTING: ("#009E73", "^")}
+_PHEROMONE_LOOKS = {ON: (RED, "s", "-"), OFF: (BLUE, "o", "--"), LASTING: (ORANGE, "^", ":")}
 _SPREAD = 0.035  # of log10 of the number of ants, between lines, so that their bars stand apart
 
 
@@ -80,13 +94,13 @@ def trails(study: ColonyStudy) -> Figure:
         axes = figure.subplots(2, len(study.arenas), sharex="col", sharey="row", squeeze=False)
         for row, way in zip(axes, (COPIED, JOINT), strict=True):
             for axis, arena in zip(row, study.arenas, strict=True):
-                for number, (pheromone, (colour, marker)) in enumerate(_PHEROMONE_LOOKS.items()):
-                    style = {"color": colour, "marker": marker, "label": PHEROMONES[pheromone]}
+                for number, (pheromone, look) in enumerate(_PHEROMONE_LOOKS.items()):
+                    style = _style(look, PHEROMONES[pheromone])
                     line = (study, arena, pheromone, way, "deliveries")
                     _draw_line(axis, *line, number - 1, style)
             words = WAYS[way].replace(", ", ",\n")
             row[0].set_ylabel(f"{words[0].upper()}{words[1:]}\n(deliveries per 1000 ticks)")
-        _finish(figure, axes, study.arenas, logarithmic=(True, True))
+        _finish(figure, axes, study.arenas, by_powers=(True, True))
         frame(
             figure,
             "Do the trails help that ants lay themselves?",
@@ -97,23 +111,23 @@ def trails(study: ColonyStudy) -> Figure:
 
 
 def joint_learning(study: ColonyStudy) -> Figure:
-    """Paired differences from copies of an ant trained alone, as shares of what these deliver."""
+    """How many times as much other ways deliver as copies of an ant trained alone."""
     ways = [way for way in _WAY_LOOKS if way != COPIED]
     with styled():
-        figure = new_figure(3.6)
+        figure = new_figure(3.8)
         axes = figure.subplots(1, len(study.arenas), sharey=True, squeeze=False)
         for axis, arena in zip(axes[0], study.arenas, strict=True):
-            axis.axhline(0, color=INK, linewidth=0.8)
+            axis.set_yscale("log")
+            axis.axhline(1, color=INK, linewidth=0.8)
             for number, way in enumerate(ways):
-                colour, marker, line = _WAY_LOOKS[way]
-                style = {"color": colour, "marker": marker, "linestyle": line, "label": WAYS[way]}
-                _draw_gain(axis, study, arena, way, number - (len(ways) - 1) / 2, style)
-        axes[0, 0].set_ylabel("More deliveries than\ncopies (%)")
-        _finish(figure, axes, study.arenas, logarithmic=(False,))
+                style = _style(_WAY_LOOKS[way], WAYS[way])
+                _draw_ratios(axis, study, arena, way, number - (len(ways) - 1) / 2, style)
+        axes[0, 0].set_ylabel("Times the deliveries\nof copies (logarithmic)")
+        _finish(figure, axes, study.arenas, by_powers=(True,))
         frame(
             figure,
             "What other ways of sharing deliver, compared with copies of an ant trained alone",
-            f"Trails evaporate. Differences are paired by seed. {_caption(study)}",
+            f"Trails evaporate. {_caption(study).replace('Means', 'Ratios of means')}",
             legend_entries(axes.flat),
         )
     return figure
@@ -149,9 +163,8 @@ def _by_way(
         for row, (measure, label) in zip(axes, measures.items(), strict=True):
             row[0].set_ylabel(label)
             for axis, arena in zip(row, study.arenas, strict=True):
-                for number, (way, (colour, marker, line)) in enumerate(_WAY_LOOKS.items()):
-                    style = {"color": colour, "marker": marker, "linestyle": line}
-                    style["label"] = WAYS[way]
+                for number, (way, look) in enumerate(_WAY_LOOKS.items()):
+                    style = _style(look, WAYS[way])
                     _draw_line(axis, study, arena, ON, way, measure, number - 2, style)
                 if limits and arena.limits:
                     _draw_limit(axis, arena, each=measure == "per_ant")
@@ -180,16 +193,44 @@ def _draw_line(
     _errorbar(axis, sizes, values.mean(axis=1), *bootstrap_interval(values), place, style)
 
 
-def _draw_gain(
+def _style(look: tuple[str, str, str], label: str) -> dict[str, str]:
+    return dict(zip(("color", "marker", "linestyle", "label"), (*look, label), strict=True))
+
+
+def _draw_ratios(
     axis: Axes, study: ColonyStudy, arena: Arena, way: str, place: float, style: dict[str, str]
 ) -> None:
-    sizes = [n for n in study.sizes(arena, ON, way) if n > 1 and study.has(arena, ON, COPIED, [n])]
-    if not sizes:
-        return
-    copies = np.stack([study.values(arena, ON, COPIED, n) for n in sizes])
-    others = np.stack([study.values(arena, ON, way, n) for n in sizes])
-    gains = 100 * (others - copies) / np.maximum(copies.mean(axis=1, keepdims=True), 1e-9)
-    _errorbar(axis, sizes, gains.mean(axis=1), *bootstrap_interval(gains), place, style)
+    """A way's deliveries over those of copies; nothing where copies deliver nothing."""
+    sizes = [
+        n
+        for n in study.sizes(arena, ON, way)
+        if n > 1 and study.has(arena, ON, COPIED, [n]) and study.mean(arena, ON, COPIED, n) > 0
+    ]
+    if sizes:
+        copies = np.stack([study.values(arena, ON, COPIED, n) for n in sizes])
+        others = np.stack([study.values(arena, ON, way, n) for n in sizes])
+        _errorbar(axis, sizes, *ratios(others, copies), place, style)
+
+
+def ratios(others: np.ndarray, copies: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Ratios of means over seeds with 95 % intervals of the percentile bootstrap.
+
+    Args:
+        others: Float (rows, seeds), 0 or more.
+        copies: The same of what they are compared with; no row may be all 0.
+
+    Returns:
+        The ratios and the intervals' lower and upper ends, float64 (rows,) each; ends are nan for
+        one seed. Where resampled copies deliver nothing, the ratio is unbounded.
+    """
+    centre = others.mean(axis=1) / copies.mean(axis=1)
+    if others.shape[1] < 2:
+        return centre, np.full_like(centre, np.nan), np.full_like(centre, np.nan)
+    counts = resampling_counts(others.shape[1]).astype(float)
+    above, below = counts @ others.T, counts @ copies.T
+    drawn = np.divide(above, below, out=np.full_like(above, np.inf), where=below > 0)
+    low, high = np.percentile(drawn, (2.5, 97.5), axis=0, method="nearest")
+    return centre, low, high
 
 
 def _errorbar(
@@ -202,7 +243,12 @@ def _errorbar(
     style: dict[str, str],
 ) -> None:
     at = np.array(sizes) * 10 ** (place * _SPREAD)
-    below, above = (np.nan_to_num(np.abs(end - means)) for end in (low, high))
+    for beyond, edge, arrow in ((np.isinf(high), 1.0, "^"), (means <= 0, 0.0, "v")):
+        if axis.get_yscale() == "log" and beyond.any():  # an arrow at the edge of the panel
+            edges = np.full(beyond.sum(), edge)
+            look = {"color": style["color"], "transform": axis.get_xaxis_transform()}
+            axis.plot(at[beyond], edges, arrow, ms=5, clip_on=False, **look)
+    below, above = (np.nan_to_num(np.abs(end - means), posinf=0.0) for end in (low, high))
     axis.errorbar(
         at,
         means,
@@ -223,30 +269,24 @@ def _draw_limit(axis: Axes, arena: Arena, each: bool) -> None:
 
 
 def _finish(
-    figure: Figure, axes: np.ndarray, arenas: Sequence[Arena], logarithmic: Sequence[bool]
+    figure: Figure, axes: np.ndarray, arenas: Sequence[Arena], by_powers: Sequence[bool]
 ) -> None:
-    from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
+    from matplotlib.ticker import FixedLocator
 
-    plain = FuncFormatter(lambda value, _: f"{value:g}")
-    for row, by_powers in zip(axes, logarithmic, strict=True):
+    for row, logarithmic_row in zip(axes, by_powers, strict=True):
         for axis in row:
-            if by_powers and np.isfinite(axis.dataLim.minposy):  # something is above 0
+            if logarithmic_row and np.isfinite(axis.dataLim.minposy):  # something is above 0
                 axis.set_yscale("log")
                 low, high = axis.get_ylim()
-                subs = (1, 2, 5) if high < 1000 * low else (1,)
-                axis.yaxis.set_major_locator(LogLocator(subs=subs, numticks=30))
-                axis.yaxis.set_minor_locator(NullLocator())
+                logarithmic(axis.yaxis, (1, 2, 5) if high < 1000 * low else (1,))
             else:
                 axis.margins(y=0.08)
-            axis.yaxis.set_major_formatter(plain)
     for column, arena in zip(axes.T, arenas, strict=True):
         column[0].set_title(f"{arena.words[0].upper()}{arena.words[1:]}", fontsize=9)
         column[-1].set_xlabel("Ants")
         for axis in column:
-            axis.set_xscale("log")
+            logarithmic(axis.xaxis, (1,))
             axis.xaxis.set_major_locator(FixedLocator(arena.sizes))
-            axis.xaxis.set_minor_locator(NullLocator())
-            axis.xaxis.set_major_formatter(plain)
     figure.align_ylabels(axes[:, 0])
 
 
