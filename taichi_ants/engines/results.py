@@ -82,7 +82,7 @@ class RunState(Record):
 class TrainingResult(Record):
     """What `train` returns.
 
-    C configurations, S seeds, E episodes. Two results are equal if all but their costs is.
+    C configurations, S seeds, E episodes. Two results are equal if all but their costs are.
 
     Attributes:
         world: The world trained in.
