@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import math
+import operator
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 import numpy as np
 
 from taichi_ants.constants import DEPOSIT_LEVEL, MAX_STEPS
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, check_one_of, checked_flag, shown
 
 Evaporation = Literal["linear", "exponential", "none"]
 Deposit = Literal["set", "add", "none"]
 Sharing = Literal["shared", "own", "fixed"]
+Start = Literal["nest", "spread"]
 EVAPORATIONS: tuple[str, ...] = get_args(Evaporation)
 DEPOSITS: tuple[str, ...] = get_args(Deposit)
 # "shared": one table for all ants of a world. "own": one for each slot. "fixed": none learns.
 SHARINGS: tuple[str, ...] = get_args(Sharing)
+# "nest": on the free cells nearest to the queen. "spread": on any free cells.
+STARTS: tuple[str, ...] = get_args(Start)
 
 MAX_ANTS = 1 << 24
 MAX_DEPOSIT = 1_000_000
@@ -30,37 +34,53 @@ class Pheromone:
     Attributes:
         evaporation: "linear": a trail falls by 1 per tick, not below 0. "exponential": it halves
             every `half_life` ticks, and what falls below 1 becomes 0. "none": it stays.
-        half_life: In ticks, above 0; of exponential evaporation only.
+        half_life: In ticks, above 0; of exponential evaporation only, there 50 if None.
         diffusion: Share of a cell's trail that it gives to its six neighbours per tick, a sixth
             of it to each, in [0, 1]. The share aimed at an obstacle or out of the world stays.
         deposit: "set": a carrying ant sets the trail of a cell to `level`. "add": it adds `level`,
             up to `cap`. "none": it lays nothing.
         level: What a deposit sets or adds, in ticks of linear evaporation, 1 .. 1 000 000.
-        cap: No deposit that adds leaves a trail above this, 1 .. 1 000 000.
+        cap: No deposit that adds leaves a trail above this, 1 .. 1 000 000; of "add" only, there
+            1000 if None.
 
     Raises:
-        AntsError: A value is outside its range.
+        AntsError: A value is outside its range, or would change nothing.
     """
 
     evaporation: Evaporation = "linear"
-    half_life: float = 50.0
+    half_life: float | None = None
     diffusion: float = 0.0
     deposit: Deposit = "set"
     level: int = DEPOSIT_LEVEL
-    cap: int = 1000
+    cap: int | None = None
 
     def __post_init__(self) -> None:
-        _check_one_of("evaporation", self.evaporation, EVAPORATIONS)
-        half_life = _number(self.half_life)
-        if not 0 < half_life < math.inf:
+        check_one_of("evaporation", self.evaporation, EVAPORATIONS)
+        if self.half_life is not None and not 0 < _number(self.half_life) < math.inf:
             raise AntsError(
-                f"half_life is {self.half_life!r}; it must be a number of ticks above 0."
+                f"half_life is {shown(self.half_life)}; it must be a number of ticks above 0."
             )
         if not 0 <= _number(self.diffusion) <= 1:
-            raise AntsError(f"diffusion is {self.diffusion!r}; it must be a number from 0 to 1.")
-        _check_one_of("deposit", self.deposit, DEPOSITS)
+            raise AntsError(
+                f"diffusion is {shown(self.diffusion)}; it must be a number from 0 to 1."
+            )
+        check_one_of("deposit", self.deposit, DEPOSITS)
         _check_whole("level", self.level, 1, MAX_DEPOSIT)
-        _check_whole("cap", self.cap, 1, MAX_DEPOSIT)
+        if self.cap is not None:
+            _check_whole("cap", self.cap, 1, MAX_DEPOSIT)
+        self._settle("half_life", 50.0, "evaporation", "exponential")
+        self._settle("cap", 1000, "deposit", "add")
+
+    def _settle(self, name: str, usual: float, other: str, needed: str) -> None:
+        """Refuse an option where another one makes it mean nothing; fill it in where it is not."""
+        chosen = getattr(self, other)
+        if getattr(self, name) is None:
+            object.__setattr__(self, name, usual if chosen == needed else None)
+        elif chosen != needed:
+            raise AntsError(
+                f"{name} is {shown(getattr(self, name))}, but {other} is {chosen!r}; give "
+                f"{other}={needed!r} with it, or leave it out."
+            )
 
     @property
     def dense(self) -> bool:
@@ -69,8 +89,8 @@ class Pheromone:
 
     @property
     def decay(self) -> np.float32:
-        """The factor on every level per tick of exponential evaporation."""
-        return np.float32(0.5 ** (1.0 / float(self.half_life)))
+        """The factor on every level per tick of exponential evaporation, else 1."""
+        return np.float32(0.5 ** (1.0 / float(self.half_life)) if self.half_life else 1.0)
 
     @property
     def share(self) -> np.float32:
@@ -83,8 +103,8 @@ class ColonyConfig:
     """The life of a colony: how many ants, and what comes and goes.
 
     Attributes:
-        ants: How many start each episode: the listed ants of the World first, then ants placed as
-            `World.start` does. 1 .. `MAX_ANTS`.
+        ants: How many start each episode: the listed ants of the World first, then others on free
+            cells, see `start`. 1 .. `MAX_ANTS`.
         capacity: How many ants can live at once, at least `ants`. None: `ants` if none are born,
             else 2 * `ants` + 64. See `slots`.
         pheromone: How trails are laid, fall and spread.
@@ -96,6 +116,8 @@ class ColonyConfig:
             stays.
         ends_at_delivery: Whether an episode ends at its first delivery, as when an ant trains
             alone. Only for one ant, without births.
+        start: Where ants start that the World does not list: "nest", on the free cells nearest to
+            the queen; "spread", on free cells anywhere. The seed decides which, and the headings.
 
     Raises:
         AntsError: A value is outside its range, or does not fit the others.
@@ -109,6 +131,7 @@ class ColonyConfig:
     regrowth: int | None = None
     wander: int | None = None
     ends_at_delivery: bool = False
+    start: Start = "nest"
 
     def __post_init__(self) -> None:
         _check_whole("ants", self.ants, 1, MAX_ANTS)
@@ -120,13 +143,14 @@ class ColonyConfig:
                     f"at least {self.ants}, or None."
                 )
         if not isinstance(self.pheromone, Pheromone):
-            raise AntsError(f"pheromone is {self.pheromone!r}; it must be a Pheromone.")
-        _check_flag("births", self.births)
+            raise AntsError(f"pheromone is {shown(self.pheromone)}; it must be a Pheromone.")
+        checked_flag("births", self.births)
         for name, least in (("lifespan", 1), ("regrowth", 0), ("wander", 1)):
             ticks = getattr(self, name)
             if ticks is not None:
                 _check_whole(name, ticks, least, MAX_STEPS, ", or None")
-        _check_flag("ends_at_delivery", self.ends_at_delivery)
+        check_one_of("start", self.start, STARTS)
+        checked_flag("ends_at_delivery", self.ends_at_delivery)
         if self.ends_at_delivery and (self.ants != 1 or self.births):
             raise AntsError(
                 f"ends_at_delivery is set with {self.ants} ants and births {self.births}; it is "
@@ -171,18 +195,16 @@ def _number(value: object) -> float:
         return math.nan
 
 
-def _check_one_of(name: str, value: object, allowed: tuple[str, ...]) -> None:
-    if value not in allowed:
-        raise AntsError(f"{name} is {value!r}; it must be one of {', '.join(allowed)}.")
-
-
 def _check_whole(name: str, value: object, least: int, most: int, otherwise: str = "") -> None:
-    if isinstance(value, bool) or not hasattr(value, "__index__"):
-        raise AntsError(f"{name} is {value!r}; it must be a whole number{otherwise}.")
+    try:
+        if isinstance(value, (bool, np.bool_)):
+            raise TypeError
+        operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        raise AntsError(
+            f"{name} is {shown(value)}; it must be a whole number{otherwise}."
+        ) from None
     if not least <= value <= most:
-        raise AntsError(f"{name} is {value}; it must lie between {least} and {most}{otherwise}.")
-
-
-def _check_flag(name: str, value: object) -> None:
-    if not isinstance(value, (bool, np.bool_)):
-        raise AntsError(f"{name} is {value!r}; it must be True or False.")
+        raise AntsError(
+            f"{name} is {shown(value)}; it must lie between {least} and {most}{otherwise}."
+        )

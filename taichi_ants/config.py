@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from numbers import Real
 from typing import Literal, get_args
 
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, check_one_of, shown
 from taichi_ants.randomness import whole
 
 Delivery = Literal["absorbing", "continuing"]
@@ -48,7 +48,7 @@ class TrainingConfig:
 
     def __post_init__(self) -> None:
         if not isinstance(self.learner, str):
-            raise AntsError(f"learner is {self.learner!r}; it must be the name of a learner.")
+            raise AntsError(f"learner is {shown(self.learner)}; it must be the name of a learner.")
         self._check_number("learning_rate", "above 0 and at most 1", open_below=True)
         self._check_number("discount", "between 0 and 1")
         self._check_number("epsilon", "between 0 and 1")
@@ -57,19 +57,16 @@ class TrainingConfig:
         steps = whole("planning_steps", self.planning_steps)
         if not 0 <= steps <= MAX_PLANNING_STEPS:
             raise AntsError(
-                f"planning_steps is {steps}; it must lie between 0 and {MAX_PLANNING_STEPS}."
+                f"planning_steps is {shown(steps)}; it must lie between 0 and {MAX_PLANNING_STEPS}."
             )
         object.__setattr__(self, "planning_steps", steps)
-        if self.delivery not in DELIVERIES:
-            raise AntsError(
-                f"delivery is {self.delivery!r}; it must be one of {', '.join(DELIVERIES)}."
-            )
+        check_one_of("delivery", self.delivery, DELIVERIES)
 
     def _check_number(self, name: str, allowed: str, open_below: bool = False) -> None:
         """Check a field and store it as a Python float, so that equal settings are equal."""
         value = getattr(self, name)
         if not share_of_one(value) or (open_below and value == 0):
-            raise AntsError(f"{name} is {value!r}; it must be a number {allowed}.")
+            raise AntsError(f"{name} is {shown(value)}; it must be a number {allowed}.")
         object.__setattr__(self, name, float(value))
 
 

@@ -37,12 +37,13 @@ N_ACTIONS = 5
 # State = (carries, left, forward, right); index = 64 * carries + 16 * left + 4 * forward + right.
 N_STATES = 128
 
-# Rewards.
-REWARD_LURE = 1  # a move onto a cell seen as T or S
-REWARD_EMPTY = 0  # a move onto a cell seen as E
-REWARD_PICK_UP = 3
-REWARD_GIVE = 10
-REWARD_FAILED = -1  # a blocked move, a pick-up or give that cannot be done
+# Events, what came of an action. That of a move is how the entered cell looked. Rewards go by them,
+# see `rewards`.
+ENTERED_EMPTY = SEES_EMPTY
+FAILED = SEES_OBSTACLE  # a blocked move, or a pick-up or give that cannot be done
+ENTERED_LURE = SEES_LURE
+PICKED_UP = 3
+DELIVERED = 4
 
 # The trail level that a carrying ant sets.
 DEPOSIT_LEVEL = 250

@@ -3,21 +3,37 @@
 from __future__ import annotations
 
 import os
+import sys
 import tempfile
+import warnings
 from contextlib import suppress
 
 
 def prepare_for_taichi() -> None:
     """Set what Taichi reads from the environment when it is imported, unless the user has set it.
 
-    No banner on standard output, no thread that asks a server for newer versions. Without a HOME
-    Taichi aborts, with one that cannot be written it crashes at exit: then HOME becomes a temporary
-    folder for this process.
+    No banner on standard output, no thread that asks a server for newer versions, no warning about
+    an old function that Taichi calls. Without a HOME Taichi aborts, with one that cannot be written
+    it crashes at exit: then HOME becomes a temporary folder for this process.
     """
+    warnings.filterwarnings(
+        "ignore",
+        ".*getlocale",
+        DeprecationWarning,
+        r"taichi\._lib\.utils",
+    )
+    if hasattr(os, "register_at_fork"):
+        os.register_at_fork(after_in_child=_mark_forked_taichi)
     os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
     os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")
     if not is_writable_folder(os.environ.get("HOME", "")):
         os.environ["HOME"] = fallback_folder()
+
+
+def _mark_forked_taichi() -> None:
+    """In a forked process, mark a Taichi that runs in the parent: its threads are not here."""
+    with suppress(KeyError, AttributeError):  # Taichi is not imported, or not to its end
+        sys.modules["taichi"].lang.impl.get_runtime().is_forked = True
 
 
 def is_writable_folder(path: str) -> bool:

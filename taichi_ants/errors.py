@@ -1,6 +1,9 @@
-"""The one exception that speaks to users."""
+"""The one exception that speaks to users, and how its messages name values."""
 
 from __future__ import annotations
+
+import reprlib
+from collections.abc import Sequence
 
 
 class AntsError(ValueError):
@@ -10,3 +13,43 @@ class AntsError(ValueError):
     lines print it on standard error and exit with status 2; library users catch it as a
     `ValueError`.
     """
+
+
+class _Short(reprlib.Repr):
+    """Looks at the beginning of long texts and collections only, so that it is quick as well."""
+
+    def repr_ndarray(self, array: object, level: int) -> str:
+        """A large array by its form; its numbers would fill many lines."""
+        if array.size <= self.maxlist:  # type: ignore[attr-defined]
+            return repr(array)
+        return f"an array of shape {array.shape} and type {array.dtype}"  # type: ignore[attr-defined]
+
+
+def shown(value: object, most: int = 80) -> str:
+    """A value as a message names it: its `repr` in one line of at most so many characters."""
+    short = _Short()
+    short.maxstring = short.maxother = most
+    try:
+        text = " ".join(short.repr(value).split())
+    except ValueError:  # Python writes no integers of more than 4300 digits
+        text = "a huge number"
+    return text if len(text) <= most else text[: most - 3] + "..."
+
+
+def check_one_of(name: str, value: object, allowed: Sequence[str]) -> None:
+    """Raises AntsError, naming the value `name`, if it is not one of the allowed words."""
+    if not isinstance(value, str) or value not in allowed:
+        raise AntsError(f"{name} is {shown(value)}; it must be one of {', '.join(allowed)}.")
+
+
+def checked_flag(name: str, value: object) -> bool:
+    """True or False as a Python bool; text such as "off" would count as True.
+
+    Raises:
+        AntsError: `value` is neither; names it `name`.
+    """
+    import numpy as np  # not above: command lines show their help without it
+
+    if not isinstance(value, (bool, np.bool_)):
+        raise AntsError(f"{name} is {shown(value)}; it must be True or False.")
+    return bool(value)

@@ -199,20 +199,20 @@ def summary(colony: Colony, pace: Pace) -> str:
     places = colony.config.slots * len(colony.seeds)
     full = colony.config.births and outcome["living"] == places
     blocked = 100 * outcome["blocked"] / max(1, outcome["moves"])
-    changes = "".join(
-        f", {outcome[name]} {name}" for name in ("births", "deaths", "regrown") if outcome[name]
-    )
+    changes = [count(outcome[f"{one}s"], one) for one in ("birth", "death") if outcome[f"{one}s"]]
+    changes += [f"{outcome['regrown']} regrown"] if outcome["regrown"] else []
+    colonies = f" in {len(colony.seeds)} colonies" if len(colony.seeds) > 1 else ""
     return (
-        f"{count(outcome['living'], 'ant')}, {count(pace.ticks, 'tick')}: "
+        f"{count(outcome['living'], 'ant')}{colonies}, {count(pace.ticks, 'tick')}: "
         f"{pace.steps_per_second / 1e6:.2f} million ant-steps per second.\n"
         f"{count(outcome['deliveries'], 'delivery')} by tick {colony.ticks}, "
-        f"{blocked:.1f} % of the moves blocked{changes}."
+        f"{', '.join([f'{blocked:.1f} % of the moves blocked', *changes])}."
         + (_crowded(places, colony.waiting_foods) if full else "")
     )
 
 
 def _crowded(places: int, foods: int) -> str:
-    waiting = f"{foods} food{' waits' if foods == 1 else 's wait'}"
+    waiting = f"{count(foods, 'food')} {'waits' if foods == 1 else 'wait'}"
     return (
         f"\n{places} of {places} places are taken, {waiting} at the queen; --capacity gives more."
     )

@@ -26,7 +26,7 @@ from taichi_ants.constants import (
     SEES_GOAL,
     SEES_LURE,
 )
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, shown
 from taichi_ants.results import PathLike, read_npz, to_json, write_npz
 from taichi_ants.states import State, state_from_index
 
@@ -80,10 +80,21 @@ def save_policy(path: PathLike, q_values: npt.ArrayLike, metadata: Mapping[str, 
             `results.write_json` can write.
 
     Raises:
-        AntsError: The values are no policy, or the file cannot be written.
+        AntsError: The values are no policy, the metadata cannot be written as JSON, or the file
+            cannot be written.
     """
     table = _checked(q_values, "q_values")
-    write_npz(path, {"q_values": table, "metadata": np.array(to_json(dict(metadata)))})
+    if not isinstance(metadata, Mapping):
+        raise AntsError(f"metadata is {shown(metadata)}; it must be a mapping of names to values.")
+    try:
+        text = to_json(metadata)
+    except (TypeError, ValueError, RecursionError) as error:
+        reason = str(error) or type(error).__name__
+        raise AntsError(
+            f"metadata is {shown(metadata)}, which JSON cannot hold ({reason}); use numbers, text, "
+            "lists and mappings."
+        ) from error
+    write_npz(path, {"q_values": table, "metadata": np.array(text)})
 
 
 def load_policy(path: PathLike) -> tuple[Policy, dict[str, Any]]:
@@ -104,7 +115,7 @@ def load_policy(path: PathLike) -> tuple[Policy, dict[str, Any]]:
         )
     try:
         metadata = json.loads(str(arrays["metadata"][()]))
-    except ValueError:
+    except (ValueError, RecursionError):
         metadata = None
     if not isinstance(metadata, dict):
         raise AntsError(
@@ -116,7 +127,10 @@ def load_policy(path: PathLike) -> tuple[Policy, dict[str, Any]]:
 
 def _checked(q_values: npt.ArrayLike, what: str) -> Policy:
     """A float32 copy of action values, or an AntsError that says what is wrong with them."""
-    table = np.asarray(q_values)
+    try:
+        table = np.asarray(q_values)
+    except ValueError as error:  # rows of different lengths
+        raise AntsError(f"{what} is no array ({error}); it must hold real numbers.") from error
     if table.dtype.kind not in "fiu":
         raise AntsError(f"{what} has the type {table.dtype}; it must hold real numbers.")
     if table.shape != (N_STATES, N_ACTIONS):

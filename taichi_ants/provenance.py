@@ -31,6 +31,8 @@ def sweep_settings(sweep: Sweep) -> dict[str, Any]:
         "episodes": sweep.episodes,
         "max_steps": sweep.max_steps,
         "rollouts": sweep.rollouts,
+        "train_evaporation": sweep.train_evaporation,
+        "greedy_evaporation": sweep.greedy_evaporation,
     }
 
 

@@ -11,7 +11,7 @@ import operator
 
 import numpy as np
 
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, shown
 
 GAMMA = 0x9E3779B97F4A7C15
 _FACTOR_1 = 0xBF58476D1CE4E5B9
@@ -26,11 +26,11 @@ def whole(name: str, value: object) -> int:
         AntsError: `value` is not a whole number (booleans and floats are none); names it `name`.
     """
     if isinstance(value, (bool, np.bool_)):
-        raise AntsError(f"{name} is {value!r}; it must be a whole number.")
+        raise AntsError(f"{name} is {shown(value)}; it must be a whole number.")
     try:
         return operator.index(value)  # type: ignore[arg-type]
     except TypeError:
-        raise AntsError(f"{name} is {value!r}; it must be a whole number.") from None
+        raise AntsError(f"{name} is {shown(value)}; it must be a whole number.") from None
 
 
 def mix(words: int | np.ndarray) -> int | np.ndarray:
@@ -126,7 +126,7 @@ class Stream:
         """
         n = whole("n", n)
         if not 1 <= n <= 1 << 32:
-            raise AntsError(f"n is {n}; a choice needs between 1 and 2^32 possibilities.")
+            raise AntsError(f"n is {shown(n)}; a choice needs between 1 and 2^32 possibilities.")
         if size is None:
             return choose(self.bits() >> 32, n)
         return choose(self.bits(size) >> np.uint64(32), n)

@@ -16,9 +16,21 @@ from typing import Any, BinaryIO
 import numpy as np
 import numpy.typing as npt
 
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, shown
 
 PathLike = str | os.PathLike[str]
+
+
+def checked_path(path: PathLike) -> str:
+    """The name of a file. Numbers are none: they would be taken for files that are open already.
+
+    Raises:
+        AntsError: It is no text and no path.
+    """
+    name = os.fspath(path) if isinstance(path, os.PathLike) else path
+    if not isinstance(name, str):
+        raise AntsError(f"the path is {shown(path)}; it must be the name of a file.")
+    return name
 
 
 def write_atomically(path: PathLike, writer: Callable[[BinaryIO], None]) -> None:
@@ -32,15 +44,15 @@ def write_atomically(path: PathLike, writer: Callable[[BinaryIO], None]) -> None
     Raises:
         AntsError: The file cannot be written. Other exceptions of the writer pass through.
     """
-    name = os.fspath(path)
+    name = checked_path(path)
     if "\0" in name:
-        raise AntsError(f"{name!r} contains a null character; name a file to write to.")
+        raise AntsError(f"{_named(name)} contains a null character; name a file to write to.")
     temporary: Path | None = None
     try:
         target = Path(os.path.realpath(name))
         # Replacing a device, a pipe or a folder would destroy it or fail.
         if target.exists() and not target.is_file():
-            raise AntsError(f"{name!r} is not a regular file; name a file to write to.")
+            raise AntsError(f"{_named(name)} is not a regular file; name a file to write to.")
         # Not derived from the file's name: it fits even if that one has the greatest length.
         temporary = target.parent / f".{secrets.token_hex(8)}.tmp"
         with open(temporary, "xb") as file:
@@ -48,7 +60,7 @@ def write_atomically(path: PathLike, writer: Callable[[BinaryIO], None]) -> None
         os.replace(temporary, target)
     except (OSError, UnicodeError) as error:
         raise AntsError(
-            f"cannot write {name!r}: {_reason(error)}; choose another place."
+            f"cannot write {_named(name)}: {_reason(error)}; choose another place."
         ) from error
     finally:
         if temporary is not None:
@@ -72,7 +84,7 @@ def read_text(path: PathLike) -> str:
         AntsError: The file cannot be read, or holds no text.
     """
     try:
-        return Path(path).read_text("utf-8")
+        return Path(checked_path(path)).read_text("utf-8")
     except (OSError, UnicodeError) as error:
         raise AntsError(
             f"cannot read {os.fspath(path)!r}: {_reason(error)}; give --force to write it again."
@@ -139,21 +151,23 @@ def read_npz(path: PathLike) -> dict[str, np.ndarray]:
         AntsError: The file is missing, unreadable, damaged, or no .npz of plain arrays.
     """
     try:
-        with open(path, "rb") as file:
+        with open(checked_path(path), "rb") as file:
             archive = np.load(file, allow_pickle=False)
             if not isinstance(archive, np.lib.npyio.NpzFile):
                 raise ValueError("it holds a single array")
             with archive:
                 arrays = {name: archive[name] for name in archive.files}
     except OSError as error:
-        raise AntsError(f"cannot read {str(path)!r}: {_reason(error)}.") from error
+        raise AntsError(f"cannot read {_named(path)}: {_reason(error)}.") from error
+    except AntsError:
+        raise
     # A damaged archive fails in many ways (zipfile, zlib, struct, tokenize, memory ...).
     except Exception as error:
         raise AntsError(
-            f"{str(path)!r} is damaged or not an .npz file; write it again or name another file."
+            f"{_named(path)} is damaged or not an .npz file; write it again or name another file."
         ) from error
     if not all(isinstance(array, np.ndarray) for array in arrays.values()):
-        raise AntsError(f"{str(path)!r} holds more than arrays; name an .npz file.")
+        raise AntsError(f"{_named(path)} holds more than arrays; name an .npz file.")
     return arrays
 
 
@@ -169,7 +183,7 @@ def check_writable_folder(path: PathLike) -> Path:
     Raises:
         AntsError: The folder cannot be created or written to.
     """
-    folder = Path(path)
+    folder = Path(checked_path(path))
     created: list[Path] = []
     try:
         _create_folders(folder, created)
@@ -182,7 +196,7 @@ def check_writable_folder(path: PathLike) -> Path:
             for made in reversed(created):
                 made.rmdir()
         raise AntsError(
-            f"cannot write to the folder {str(path)!r}: {_reason(error)}; choose another folder."
+            f"cannot write to the folder {_named(path)}: {_reason(error)}; choose another folder."
         ) from error
     return folder
 
@@ -207,6 +221,11 @@ def _create_folder(folder: Path, created: list[Path]) -> None:
             raise
     else:
         created.append(folder)
+
+
+def _named(path: PathLike) -> str:
+    """A path for a message, whole unless it is longer than most systems allow."""
+    return shown(str(path), 400)
 
 
 def _reason(error: Exception) -> str:

@@ -6,6 +6,7 @@ Importing the package does not start Taichi; the first call that needs a kernel 
 from __future__ import annotations
 
 import contextlib
+import gc
 import io
 import os
 from collections.abc import Iterable, Iterator
@@ -14,11 +15,13 @@ from pathlib import Path
 from types import ModuleType
 
 from taichi_ants.environment import fallback_folder, is_writable_folder
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, check_one_of, shown
 from taichi_ants.randomness import whole
 
 ARCHITECTURES = ("cpu", "cuda")
 MAX_THREADS = 1024
+
+_kept: list[object] = []  # see start_for_trial
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,8 @@ def available_threads() -> int:
 def start(threads: int | None = None, arch: str | None = None) -> Runtime:
     """Start Taichi, or restart it if other settings are asked for.
 
-    A Taichi that the caller has started is used as it is, so that the caller's fields stay alive.
+    All that launches kernels calls this first, since the caller may have reset Taichi in between. A
+    Taichi that the caller has started, or that holds the caller's fields, is used as it is.
 
     Args:
         threads: CPU threads, 1 to 1024; None keeps what runs, or takes all that are available.
@@ -49,12 +53,13 @@ def start(threads: int | None = None, arch: str | None = None) -> Runtime:
         The settings in force.
 
     Raises:
-        AntsError: A setting is not allowed, "cuda" finds no device, or Taichi was started by
-            somebody else on other hardware, or with fast_math on, which would change results in
-            the last bit.
+        AntsError: A setting is not allowed, or "cuda" finds no device; the Taichi that runs has
+            other settings and is not ours alone to restart; it has fast_math on, which would change
+            results in the last bit, or runs on hardware that was never tried; or this process was
+            forked from one in which Taichi ran.
     """
-    if arch is not None and arch not in ARCHITECTURES:
-        raise AntsError(f"arch is {arch!r}; it must be one of {', '.join(ARCHITECTURES)}.")
+    if arch is not None:
+        check_one_of("arch", arch, ARCHITECTURES)
     threads = None if threads is None else _checked_threads(threads)
     import taichi as ti
 
@@ -64,21 +69,56 @@ def start(threads: int | None = None, arch: str | None = None) -> Runtime:
     else:
         wanted = Runtime(arch or running.arch, threads or running.threads)
     if wanted != running:
-        _init(ti, wanted)
+        _check_restart(ti, running, wanted)
+        _init(ti, wanted, running)
     return wanted
+
+
+def start_for_trial() -> None:
+    """Start a Taichi that checks the bounds of arrays, in a forked process.
+
+    The process must end by `os._exit`: the parent's Taichi can be left, but not be destroyed here.
+    """
+    import taichi as ti
+
+    _kept.append(ti.lang.impl.get_runtime().prog)
+    _init(ti, Runtime("cpu", 1), debug=True, offline_cache=False)
+
+
+def holds_data() -> bool:
+    """Whether the Taichi that runs holds fields or arrays; taichi_ants itself makes none."""
+    import taichi as ti
+
+    runtime, root = ti.lang.impl.get_runtime(), ti.lang.impl._root_fb
+    if runtime.prog is None:
+        return False
+    trees = range(runtime.prog.get_snode_tree_size())
+    return bool(
+        any(runtime.prog.get_snode_root(tree).get_num_ch() for tree in trees)
+        or runtime.global_vars  # fields that are declared, but have no place yet
+        or not root.empty
+        or len(runtime.unfinalized_fields_builder) > 1  # the root is one
+        or any(issubclass(type(one), (ti.Ndarray, ti.Texture)) for one in gc.get_objects())
+    )
 
 
 def _checked_threads(threads: int) -> int:
     threads = whole("threads", threads)
     if not 1 <= threads <= MAX_THREADS:
-        raise AntsError(f"threads is {threads}; it must lie between 1 and {MAX_THREADS}.")
+        raise AntsError(f"threads is {shown(threads)}; it must lie between 1 and {MAX_THREADS}.")
     return threads
 
 
 def _running(ti: ModuleType) -> Runtime | None:
     """What runs now, whoever has started it; None if nothing does."""
-    if ti.lang.impl.get_runtime().prog is None:
+    runtime = ti.lang.impl.get_runtime()
+    if runtime.prog is None:
         return None
+    if getattr(runtime, "is_forked", False):
+        raise AntsError(
+            "this process was forked from one in which Taichi runs, and would wait for its threads "
+            'for ever; make processes with multiprocessing.get_context("spawn") or "forkserver".'
+        )
     config = ti.lang.impl.current_cfg()
     arch = {ti.x64: "cpu", ti.arm64: "cpu", ti.cuda: "cuda"}.get(config.arch)
     if arch is None or config.fast_math:
@@ -91,19 +131,39 @@ def _running(ti: ModuleType) -> Runtime | None:
     return Runtime(arch, int(config.cpu_max_num_threads))
 
 
-def _init(ti: ModuleType, wanted: Runtime) -> None:
+def _check_restart(ti: ModuleType, running: Runtime | None, wanted: Runtime) -> None:
+    """Refuse to restart what somebody else has started, or what holds somebody else's data."""
+    if running is None:
+        return
+    ours = getattr(ti.lang.impl.get_runtime(), "is_ours", False)
+    if ours and not holds_data():
+        return
+    why = "holds fields or arrays" if ours else "was not started by taichi_ants"
+    raise AntsError(
+        f"arch {wanted.arch!r} with threads {wanted.threads} needs a restart of Taichi, which runs "
+        f"with {running.arch!r} and {running.threads} and {why}; leave out threads and arch, or "
+        "call ti.reset() first."
+    )
+
+
+def _init(ti: ModuleType, wanted: Runtime, before: Runtime | None = None, **others: object) -> None:
+    """Start Taichi; if that fails, what ran `before` runs again."""
     settings = {
         "fast_math": False,  # no reordering of floats: the same bits everywhere
         "cpu_max_num_threads": wanted.threads,
         "make_cpu_multithreading_loop": False,  # hand out runs one by one, they are uneven
         "offline_cache_file_path": str(_cache_folder()),
+        **others,
     }
     arch = ti.cuda if wanted.arch == "cuda" else ti.cpu
     hidden = _without_variables(["arch", "log_level", *settings])
     with hidden, contextlib.redirect_stdout(io.StringIO()):
         ti.init(arch=arch, log_level=ti.ERROR, **settings)
+    ti.lang.impl.get_runtime().is_ours = True
     if wanted.arch == "cuda" and ti.lang.impl.current_cfg().arch != ti.cuda:
         ti.reset()
+        if before is not None:
+            _init(ti, before)
         raise AntsError("arch is 'cuda', but no CUDA device can be used here; choose 'cpu'.")
 
 

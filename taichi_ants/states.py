@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
+from numbers import Integral
 
 from taichi_ants.constants import (
     HEADING_STEPS,
@@ -20,7 +21,7 @@ from taichi_ants.constants import (
     SEES_LURE,
     SEES_OBSTACLE,
 )
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, shown
 
 # Indexed by `carries`, then by code.
 TASK_NAMES: tuple[str, str] = ("foraging", "carrying")
@@ -56,8 +57,10 @@ def state_index(carries: bool, left: int, forward: int, right: int) -> int:
         AntsError: A code is not 0, 1, 2 or 3.
     """
     for name, code in (("left", left), ("forward", forward), ("right", right)):
-        if code not in (SEES_EMPTY, SEES_OBSTACLE, SEES_LURE, SEES_GOAL):
-            raise AntsError(f"the code of the cell {name} is {code!r}; it must be 0, 1, 2 or 3.")
+        if not isinstance(code, Integral) or not 0 <= code <= 3:
+            raise AntsError(
+                f"the code of the cell {name} is {shown(code)}; it must be 0, 1, 2 or 3."
+            )
     return 64 * bool(carries) + 16 * int(left) + 4 * int(forward) + int(right)
 
 
@@ -67,9 +70,10 @@ def state_from_index(index: int) -> State:
     Raises:
         AntsError: The index lies outside 0..127.
     """
-    if index not in range(N_STATES):
+    if not isinstance(index, Integral) or not 0 <= index < N_STATES:
         raise AntsError(
-            f"the state index is {index!r}; it must be a whole number from 0 to {N_STATES - 1}."
+            f"the state index is {shown(index)}; it must be a whole number from 0 to "
+            f"{N_STATES - 1}."
         )
     index = int(index)
     return State(bool(index >> 6), (index >> 4) & 3, (index >> 2) & 3, index & 3)
@@ -88,14 +92,14 @@ def parse_state(name: str) -> int:
     Raises:
         AntsError: The text is not the name of a state.
     """
-    words = name.split()
+    words = name.split() if isinstance(name, str) else []
     if len(words) == 4 and words[0].lower() in TASK_NAMES:
         carries = TASK_NAMES.index(words[0].lower())
         codes = [CELL_LETTERS[carries].find(word.upper()) for word in words[1:]]
         if all(len(word) == 1 for word in words[1:]) and -1 not in codes:
             return state_index(bool(carries), *codes)
     raise AntsError(
-        f"{name!r} is not a state; write the ant's task and the three cells it sees, left, "
+        f"{shown(name)} is not a state; write the ant's task and the three cells it sees, left, "
         "forward, right, as in 'foraging E T O' (letters E, O, T, F) or 'carrying S E O' "
         "(letters E, O, S, Q)."
     )

@@ -21,8 +21,9 @@ from taichi_ants import results
 from taichi_ants.config import TrainingConfig
 from taichi_ants.constants import N_ACTIONS, N_STATES
 from taichi_ants.engines import checks
+from taichi_ants.engines.records import Record
 from taichi_ants.engines.results import LearnerCost
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, checked_flag
 from taichi_ants.worlds.world import World
 
 _STEPS_OF_A_BLOCK = 100_000_000  # at most, if every episode used all its steps
@@ -40,9 +41,11 @@ class Sweep:
         world: The world of all runs.
         configs: C configurations.
         seeds: S seeds.
-        episodes: Training episodes of each run, without evaporation.
+        episodes: Training episodes of each run.
         max_steps: Step limit of episodes and rollouts.
-        rollouts: Greedy rollouts of each final policy, with evaporation.
+        rollouts: Greedy rollouts of each final policy.
+        train_evaporation: Whether trails fall by 1 with each step of training; not in the paper.
+        greedy_evaporation: Whether they do in the greedy rollouts; they do in the paper.
 
     Raises:
         AntsError: A value is not allowed, the world has no room for the ant, or the results would
@@ -55,6 +58,8 @@ class Sweep:
     episodes: int = 500
     max_steps: int = 600
     rollouts: int = 50
+    train_evaporation: bool = False
+    greedy_evaporation: bool = True
 
     def __post_init__(self) -> None:
         checks.checked_world(self.world).start(checks.checked_seeds(self.seeds)[0])
@@ -62,6 +67,8 @@ class Sweep:
         checks.checked_count("episodes", self.episodes)
         checks.checked_max_steps(self.max_steps)
         checks.checked_count("rollouts", self.rollouts)
+        for name in ("train_evaporation", "greedy_evaporation"):
+            object.__setattr__(self, name, checked_flag(name, getattr(self, name)))
         runs = len(self.configs) * len(self.seeds)
         figures = len(_ARRAYS) * (self.episodes + self.rollouts)
         needed = runs * (4 * figures + 4 * N_STATES * N_ACTIONS) * _COPIES
@@ -91,8 +98,8 @@ class Sweep:
         return self.configs[c].learner, self.configs[c].planning_steps
 
 
-@dataclass(frozen=True)
-class SweepResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class SweepResult(Record):
     """What came of it.
 
     Attributes:
@@ -174,12 +181,20 @@ def _do_block(
         chosen,
         sweep.episodes,
         sweep.max_steps,
+        sweep.train_evaporation,
         threads=threads,
         arch=arch,
     )
     tables = trained.q_values
     greedy = evaluate(
-        sweep.world, tables, sweep.rollouts, chosen, sweep.max_steps, threads=threads, arch=arch
+        sweep.world,
+        tables,
+        sweep.rollouts,
+        chosen,
+        sweep.max_steps,
+        sweep.greedy_evaporation,
+        threads=threads,
+        arch=arch,
     )
     block = {name: results.smallest(getattr(trained, name)) for name in _ARRAYS}
     block |= {f"greedy_{name}": results.smallest(getattr(greedy, name)) for name in _ARRAYS}

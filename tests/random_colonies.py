@@ -8,7 +8,7 @@ import numpy as np
 from random_worlds import random_world
 
 from taichi_ants import TrainingConfig
-from taichi_ants.colony_config import SHARINGS, ColonyConfig, Pheromone
+from taichi_ants.colony_config import SHARINGS, STARTS, ColonyConfig, Pheromone
 from taichi_ants.constants import EMPTY, GIVE, N_ACTIONS, N_STATES, PICK_UP
 from taichi_ants.worlds import World
 
@@ -34,14 +34,14 @@ def random_colony(
     rng = np.random.default_rng([seed, 2])
     world = random_world(seed, largest_range)
     room = int(np.count_nonzero(world.ground() == EMPTY))
-    drawn = str(rng.choice(SHARINGS))
+    sharing = str(rng.choice(SHARINGS)) if sharing is None else sharing
     return RandomColony(
         world=world,
         config=_config(rng, min(room, most_ants)),
         training=_training(rng),
         seed=int(rng.integers(-5, 2**40)),
-        sharing=sharing or drawn,
-        q_values=forager() if rng.random() < 0.6 else None,
+        sharing=sharing,
+        q_values=forager() if sharing == "fixed" or rng.random() < 0.6 else None,
     )
 
 
@@ -70,17 +70,22 @@ def _config(rng: np.random.Generator, most_ants: int) -> ColonyConfig:
         regrowth=int(rng.choice([0, 0, 1, 2, 7])) if rng.random() < 0.7 else None,
         wander=int(rng.choice([1, 2, 5])) if rng.random() < 0.5 else None,
         ends_at_delivery=ants == 1 and not births and bool(rng.random() < 0.5),
+        start=str(rng.choice(STARTS)),
     )
 
 
 def _pheromone(rng: np.random.Generator) -> Pheromone:
+    evaporation = str(rng.choice(["linear", "exponential", "none"]))
+    half_life = float(rng.choice([0.5, 3.0, 50.0]))
+    diffusion = float(rng.choice([0.0, 0.0, 0.05, 0.6, 1.0]))
+    deposit = str(rng.choice(["set", "add", "none"]))
     return Pheromone(
-        evaporation=str(rng.choice(["linear", "exponential", "none"])),
-        half_life=float(rng.choice([0.5, 3.0, 50.0])),
-        diffusion=float(rng.choice([0.0, 0.0, 0.05, 0.6, 1.0])),
-        deposit=str(rng.choice(["set", "add", "none"])),
+        evaporation=evaporation,
+        half_life=half_life if evaporation == "exponential" else None,
+        diffusion=diffusion,
+        deposit=deposit,
         level=int(rng.choice([1, 7, 250])),
-        cap=int(rng.choice([1, 10, 1000])),
+        cap=int(rng.choice([1, 10, 1000])) if deposit == "add" else None,
     )
 
 

@@ -48,7 +48,7 @@ def _draw(rng: np.random.Generator, largest_range: int) -> World | None:
         world.start(0)
     except AntsError:
         return None
-    return world
+    return world if len(world.foods) else None
 
 
 # Shares of empty cells, foods and rocks: open country, a pantry, a maze.

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from taichi_ants.analysis.behaviour import DELIVERS, WALKS
 from taichi_ants.analysis.comparison import Comparison, Hyperparameters, Row, Variant
 from taichi_ants.analysis.paper import DYNA_P3, GRID, Q_LEARNING, SARSA, VARIANTS
 
@@ -28,7 +29,8 @@ class Truth:
         early_steps, late_steps: Lengths of episodes.
         steps_swing: As `swing`.
         deliveries: Probability of a delivery in an episode.
-        greedy_return, greedy_steps, greedy_deliveries: Of every greedy rollout.
+        greedy_return, greedy_steps, greedy_deliveries: Of every greedy rollout; a run without
+            deliveries in them walks the trail.
         greedy_varies: Whether rollouts of one run differ.
     """
 
@@ -140,6 +142,7 @@ def build(
         greedy_steps,
         greedy_deliveries,
         600,
+        *_policies(greedy_returns, greedy_deliveries),
     )
 
 
@@ -171,6 +174,13 @@ def _rollouts(row: Truth, seeds: int, rollouts: int) -> np.ndarray:
     return values.astype(np.int32)
 
 
+def _policies(returns: np.ndarray, deliveries: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Behaviours and their returns (rows, seeds): of the first rollout, delivering without any."""
+    if not returns.shape[2]:
+        return np.full(returns.shape[:2], DELIVERS), np.full(returns.shape[:2], 45)
+    return np.where(deliveries[..., 0] > 0, DELIVERS, WALKS), returns[..., 0].copy()
+
+
 def subset(comparison: Comparison, rows: Sequence[int], seeds: int, episodes: int) -> Comparison:
     """Some rows, the first seeds and the first episodes of a comparison."""
     rows = list(rows)
@@ -185,4 +195,6 @@ def subset(comparison: Comparison, rows: Sequence[int], seeds: int, episodes: in
         *(cut(name, episodes) for name in ("returns", "steps", "deliveries")),
         *(cut(name) for name in ("greedy_returns", "greedy_steps", "greedy_deliveries")),
         comparison.max_steps,
+        comparison.behaviours[rows, :seeds],
+        comparison.policy_returns[rows, :seeds],
     )

@@ -10,7 +10,6 @@ ant's own action, may be to blame. Try it beside Q-learning:
 import taichi as ti
 
 from taichi_ants.learners import Learner, register
-from taichi_ants.rules.policy import best_value
 
 PATIENCE = 0.2  # the share of a bad surprise that is learned
 
@@ -18,7 +17,7 @@ PATIENCE = 0.2  # the share of a bad surprise that is learned
 @ti.func
 def td_error(value, reward, discount, next_values, next_action, epsilon):
     """The TD error of Q-learning, made smaller where it is negative."""
-    error = reward + discount * best_value(next_values) - value
+    error = reward + discount * max(next_values) - value
     return ti.select(error < 0, PATIENCE * error, error)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -24,8 +24,11 @@ BASELINE_COLUMNS: tuple[str, ...] = (
     "deliveries_mean",
     "note",
 )
+# In the paper's protocol; the first word tells what the rows are held against.
 TRAINING_SETTING = "training, no evaporation"
 GREEDY_SETTING = "greedy, evaporation"
+_CONDITIONS = ("no evaporation", "evaporation")
+_PAPER_SETTINGS: Mapping[str, bool] = {TRAINING_SETTING: False, GREEDY_SETTING: True}
 
 _ENDLESS = (
     "there is no optimal policy: without a discount below 1 the return of an episode without step "
@@ -59,6 +62,8 @@ def baseline_rows(
     rollouts: int = 50,
     discounts: Sequence[float] = (0.9, 0.99),
     max_steps: int = 600,
+    train_evaporation: bool = False,
+    greedy_evaporation: bool = True,
 ) -> list[BaselineRow]:
     """All baselines of a world, as rows with the columns BASELINE_COLUMNS.
 
@@ -69,16 +74,25 @@ def baseline_rows(
         rollouts: Rollouts for each seed.
         discounts: Discount factors whose optimal policies are wanted.
         max_steps: The step limit of an episode.
+        train_evaporation, greedy_evaporation: Whether trails evaporate in training and in the
+            greedy evaluation of what is compared.
 
     Returns:
-        The rows of `bound_rows`, or if the world is too large for them one row whose note says so;
-        then those of `policy_rows`.
+        The rows of `bound_rows`, or one row whose note says why there are none; then those of
+        `policy_rows`.
     """
+    training = f"training, {_CONDITIONS[train_evaporation]}"
     try:
+        if train_evaporation:
+            raise AntsError("exact bounds are known for worlds without evaporation only.")
         bounds = bound_rows(world, discounts, max_steps)
     except AntsError as error:
-        bounds = [_row("exact bounds", TRAINING_SETTING, note=str(error))]
-    return bounds + policy_rows(world, evaluate, seeds, rollouts, max_steps)
+        bounds = [_row("exact bounds", training, note=str(error))]
+    settings = {
+        training: train_evaporation,
+        f"greedy, {_CONDITIONS[greedy_evaporation]}": greedy_evaporation,
+    }
+    return bounds + policy_rows(world, evaluate, seeds, rollouts, max_steps, settings)
 
 
 def bound_rows(world: World, discounts: Sequence[float], max_steps: int) -> list[BaselineRow]:
@@ -112,13 +126,18 @@ def bound_rows(world: World, discounts: Sequence[float], max_steps: int) -> list
 
 
 def policy_rows(
-    world: World, evaluate: Evaluate, seeds: Sequence[int], rollouts: int, max_steps: int
+    world: World,
+    evaluate: Evaluate,
+    seeds: Sequence[int],
+    rollouts: int,
+    max_steps: int,
+    settings: Mapping[str, bool] = _PAPER_SETTINGS,
 ) -> list[BaselineRow]:
-    """The random policy and the trail follower, without and with evaporation, as rows."""
+    """The random policy and the trail follower as rows, in settings with or without evaporation."""
     note = f"mean over {len(seeds)} seeds of {rollouts} rollouts, 95 % interval over seeds (BCa)"
     rows = []
     for name, policy in (("random policy", random_policy()), ("trail follower", trail_follower())):
-        for setting, evaporation in ((TRAINING_SETTING, False), (GREEDY_SETTING, True)):
+        for setting, evaporation in settings.items():
             outcome = evaluate(
                 world,
                 np.repeat(policy[None], len(seeds), axis=0),

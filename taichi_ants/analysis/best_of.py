@@ -15,6 +15,7 @@ from enum import Enum
 
 import numpy as np
 
+from taichi_ants.analysis.behaviour import counts
 from taichi_ants.analysis.comparison import Comparison, Hyperparameters, Variant
 from taichi_ants.analysis.paper import TABLE_2
 from taichi_ants.analysis.statistics import RANDOM_SEED
@@ -158,3 +159,37 @@ def best_position(comparison: Comparison, positions: Sequence[int]) -> int:
     """The row with the highest mean return over all seeds; the first of equals."""
     returns = comparison.measure("return_last50")[list(positions)].mean(axis=1)
     return positions[int(returns.argmax())]
+
+
+def examples(comparison: Comparison) -> list[tuple[int, int]]:
+    """Runs to look at: for each delivery setting and learner one of each behaviour.
+
+    They are of the learner's configuration in the paper's table 2, or its best one. A behaviour
+    that occurs in other configurations only is shown once, by the configuration with most such
+    runs. Of the runs that behave alike, the one of median return is taken.
+
+    Returns:
+        Row and position of the seed of each.
+    """
+    cells: list[tuple[int, int]] = []  # of the configurations: row and behaviour
+    for setting in comparison.delivery_settings:
+        rows, shown = [], set()
+        for variant in comparison.variants:
+            if positions := comparison.positions(setting, variant):
+                rows += positions
+                row = paper_position(comparison, setting, variant)
+                row = best_position(comparison, positions) if row is None else row
+                found = counts(comparison.behaviours[row])
+                cells += [(row, code) for code in found]
+                shown |= found.keys()
+        all_of_them = comparison.behaviours[rows]
+        for code in counts(all_of_them).keys() - shown:
+            cells.append((rows[int((all_of_them == code).sum(axis=1).argmax())], code))
+    return [(row, _median_run(comparison, row, code)) for row, code in cells]
+
+
+def _median_run(comparison: Comparison, row: int, behaviour: int) -> int:
+    """The seed, by its position, of the median return among the runs that behave so."""
+    runs = np.flatnonzero(comparison.behaviours[row] == behaviour)
+    order = np.argsort(comparison.measure("return_last50")[row, runs], kind="stable")
+    return int(runs[order[(len(runs) - 1) // 2]])

@@ -29,6 +29,8 @@ _NAMES = {
 PAPER_WORLD = "the paper's"
 
 _PER_EPISODE = ("returns", "steps", "deliveries")
+_WAYS = ("without", "with")
+_PER_RUN = ("behaviours", "policy_returns")
 _PER_ROLLOUT = ("greedy_returns", "greedy_steps", "greedy_deliveries")
 
 
@@ -112,6 +114,12 @@ class Comparison:
         greedy_steps: Integer (rows, seeds, rollouts).
         greedy_deliveries: Integer (rows, seeds, rollouts).
         max_steps: Limit of an episode in steps.
+        behaviours: What each final policy does, places in `behaviour.BEHAVIOURS`, integer
+            (rows, seeds).
+        policy_returns: What the ant earned in the episode that told so, integer (rows, seeds).
+        train_evaporation: Whether trails evaporated in training, and in the episode of
+            `behaviours`.
+        greedy_evaporation: Whether they did in the greedy rollouts.
         world: Name of the world; only in `PAPER_WORLD` ours can be held against the paper.
 
     Raises:
@@ -127,6 +135,10 @@ class Comparison:
     greedy_steps: np.ndarray
     greedy_deliveries: np.ndarray
     max_steps: int
+    behaviours: np.ndarray
+    policy_returns: np.ndarray
+    train_evaporation: bool = False
+    greedy_evaporation: bool = True
     world: str = PAPER_WORLD
     _positions: dict = field(init=False, repr=False)
     _measured: dict = field(init=False, repr=False, default_factory=dict)
@@ -139,6 +151,10 @@ class Comparison:
             )
         self._check_shapes(_PER_EPISODE, smallest=1)
         self._check_shapes(_PER_ROLLOUT, smallest=0)
+        runs = (len(self.rows), len(self.seeds))
+        for name in _PER_RUN:
+            if (shape := getattr(self, name).shape) != runs:
+                raise AntsError(f"{name} has the shape {shape}; it must be {runs}.")
         positions = {
             (row.delivery, row.variant, row.hyperparameters.key()): number
             for number, row in enumerate(self.rows)
@@ -192,6 +208,17 @@ class Comparison:
     def variants(self) -> tuple[Variant, ...]:
         """The learners with their planning depths, in order of appearance."""
         return tuple(dict.fromkeys(row.variant for row in self.rows))
+
+    @property
+    def conditions(self) -> str:
+        """Where trails evaporated, as a sentence for readers."""
+        training, greedy = _WAYS[self.train_evaporation], _WAYS[self.greedy_evaporation]
+        return f"Training {training} evaporation of trails, greedy evaluation {greedy} it."
+
+    @property
+    def as_trained(self) -> str:
+        """Whether trails evaporated in the episodes of `behaviours`, in words."""
+        return f"{_WAYS[self.train_evaporation]} evaporation, as in training"
 
     def position(
         self, delivery: str, variant: Variant, hyperparameters: Hyperparameters

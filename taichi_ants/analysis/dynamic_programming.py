@@ -17,7 +17,7 @@ import numpy as np
 from taichi_ants.analysis.discounted import solve_phase
 from taichi_ants.analysis.transitions import Phase, Transitions, build_transitions
 from taichi_ants.constants import FORWARD, LEFT, MAX_STEPS, N_HEADINGS, RIGHT
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, shown
 from taichi_ants.worlds.world import World
 
 # Limits on the memory and the time that the bounds of a world may take, about a minute on one core.
@@ -95,12 +95,12 @@ def exact_bounds(world: World, discounts: Sequence[float], max_steps: int = 600)
     for discount in discounts:
         if not 0 <= discount < 1:
             raise AntsError(
-                f"the discount is {discount!r}; for a return without end it must be at least 0 "
-                "and below 1."
+                f"the discount is {shown(discount)}; for a return without end it must be at least "
+                "0 and below 1."
             )
     if not hasattr(max_steps, "__index__") or not 1 <= max_steps <= MAX_STEPS:
         raise AntsError(
-            f"max_steps is {max_steps!r}; it must be a whole number from 1 to {MAX_STEPS}."
+            f"max_steps is {shown(max_steps)}; it must be a whole number from 1 to {MAX_STEPS}."
         )
     _check_size(N_HEADINGS * world.grid.count, 0, max_steps)
     transitions = build_transitions(world)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from taichi_ants.analysis.behaviour import BEHAVIOURS, DELIVERS, counts
 from taichi_ants.analysis.best_of import best_of, best_position
 from taichi_ants.analysis.comparison import Comparison, Variant
 from taichi_ants.analysis.markdown import count
@@ -19,6 +20,7 @@ from taichi_ants.analysis.paper import FIGURE_1, TABLE_2
 from taichi_ants.analysis.sensitivity import sensitivity
 from taichi_ants.analysis.statistics import student_interval
 from taichi_ants.analysis.style import (
+    BEHAVIOUR_LOOKS,
     INK,
     for_setting,
     frame,
@@ -44,9 +46,7 @@ _CURVES = {
 }
 # Delivery setting and learner -> row of the comparison.
 Shown = dict[tuple[str, Variant], int]
-_FEW = 0.9  # deliveries per episode
 _BINS = 160
-_CIRCLES = " High returns with few deliveries come from\nwalking in circles on a trail."
 _HILLS = 10  # values from which on they are shown as a histogram
 _DROP = 0.16  # of the bar below its ridge, in rows
 
@@ -147,7 +147,7 @@ def best_runs(comparison: Comparison) -> Figure:
 
 
 def return_against_deliveries(comparison: Comparison, baselines: Sequence[Mapping] = ()) -> Figure:
-    """Who earns reward by delivering, and who by walking in circles on a trail.
+    """Who earns reward by delivering, and what the others do instead: a mark for each run.
 
     Args:
         comparison: The comparison.
@@ -155,7 +155,6 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Mappin
             policies, for which delivery is the end, only in the panel of absorbing delivery.
     """
     settings = comparison.delivery_settings
-    style = looks(comparison.variants)
     returns = comparison.measure("return_last50")
     deliveries = comparison.measure("deliveries_last50")
     if "absorbing" not in settings:
@@ -168,31 +167,25 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Mappin
         for axis, setting in zip(axes[0], settings, strict=True):
             axis.set_title(f"{setting.capitalize()} delivery")
             axis.set_xlabel("Deliveries per episode (last 50)")
-            for variant, (colour, marker) in style.items():
-                rows = comparison.positions(setting, variant)
-                cloud = {"color": colour, "marker": ".", "linestyle": "none"}
+            of_setting = np.array([row.delivery == setting for row in comparison.rows])[:, None]
+            for code in counts(comparison.behaviours):
+                runs = of_setting & (comparison.behaviours == code)
+                colour, marker = BEHAVIOUR_LOOKS[code]
                 axis.plot(
-                    deliveries[rows].ravel(), returns[rows].ravel(), **cloud, ms=2.5, alpha=0.25
-                )
-                axis.plot(
-                    deliveries[rows].mean(axis=1),
-                    returns[rows].mean(axis=1),
+                    *(deliveries[runs], returns[runs], marker),
                     color=colour,
-                    marker=marker,
-                    linestyle="none",
-                    markersize=6.5,
-                    markeredgecolor="white",
-                    markeredgewidth=0.7,
-                    zorder=4,
-                    label=variant.label,
+                    markersize=4,
+                    alpha=0.6,
+                    label=BEHAVIOURS[code],
                 )
             _baseline_marks(axis, marks, setting)
         axes[0, 0].set_ylabel("Return (reward per episode, last 50)")
         frame(
             figure,
-            "Return against deliveries",
-            "Filled marks: means of configurations. Small dots: single runs."
-            + (_CIRCLES if _circles(comparison, baselines) else ""),
+            "Return against deliveries in training, and what the final policies do",
+            "A mark is a run. Its look tells what an ant does that follows the final policy "
+            f"greedily, {comparison.as_trained}.\n"
+            + "\n".join(_who_else(comparison, setting) for setting in settings),
             legend_entries(axes.flat),
         )
     return figure
@@ -359,14 +352,14 @@ def _logarithmic(axis: Axes) -> None:
     axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
-def _circles(comparison: Comparison, baselines: Sequence[Mapping]) -> bool:
-    """Whether a configuration seldom delivers, yet returns more than the shortest delivery."""
-    known = [row["return_mean"] for row in baselines if row["baseline"] == "shortest delivery"]
-    if not known or known[0] is None:
-        return False
-    returns = comparison.measure("return_last50").mean(axis=1)
-    deliveries = comparison.measure("deliveries_last50").mean(axis=1)
-    return bool(((deliveries < _FEW) & (returns > known[0])).any())
+def _who_else(comparison: Comparison, setting: str) -> str:
+    """How many runs of each learner end with a policy that does not deliver, as a line."""
+    parts = []
+    for variant in comparison.variants:
+        behaviours = comparison.behaviours[comparison.positions(setting, variant)]
+        if others := int((behaviours != DELIVERS).sum()):
+            parts.append(f"{variant.label} {others} of {behaviours.size}")
+    return f"Runs that do not deliver, {setting} delivery: {', '.join(parts) or 'none'}."
 
 
 def _baseline_marks(axis: Axes, marks: Mapping[str, Sequence[float]], setting: str) -> None:

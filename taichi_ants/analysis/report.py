@@ -11,6 +11,9 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import IO, TYPE_CHECKING
 
+import numpy as np
+
+from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS, MIXED, counts, mixture
 from taichi_ants.analysis.best_of import Choice, Chosen, choice
 from taichi_ants.analysis.claims.assess import OTHER_WORLD, SIMULTANEOUS_LEVEL
 from taichi_ants.analysis.claims.model import WITHIN_MARGIN, Finding, Verdict
@@ -20,6 +23,7 @@ from taichi_ants.analysis.markdown import MISSING, baseline_name, count, interva
 from taichi_ants.analysis.measures import MEASURES
 from taichi_ants.analysis.paper import GREEDY_RETURN, GREEDY_STEPS, VARIANTS
 from taichi_ants.analysis.statistics import centres
+from taichi_ants.analysis.summary import mean_returns
 from taichi_ants.analysis.table2 import APART, apart, means, nearer_steps
 
 if TYPE_CHECKING:
@@ -107,6 +111,7 @@ def _print(
         f"{count(comparison.episodes, 'episode')} of at most {comparison.max_steps} steps, "
         f"{count(comparison.rollouts, 'greedy rollout')} a run."
     )
+    console.print(comparison.conditions)
     choices = {
         (setting, variant): chosen
         for setting in comparison.delivery_settings
@@ -116,6 +121,7 @@ def _print(
     sections = (
         *_table2(comparison, lines, choices),
         _greedy(comparison, choices),
+        *_behaviours(comparison, choices),
         _claims(findings) if comparison.in_paper_world else _no_claims(),
         _costs(costs),
         _baselines(baselines),
@@ -173,8 +179,8 @@ def _table2(comparison: Comparison, lines: Sequence[Mapping], choices: Choices) 
                     shown = (
                         text for name, text in figures.items() if of_paper or "paper" not in name
                     )
-                    table.add_row(_marked(variant, chosen), *shown)
-    notes = _table2_notes(comparison, lines, choices)
+                    table.add_row(_marked(comparison, variant, chosen), *shown)
+    notes = _table2_notes(comparison, lines, choices) + _mixed_note(comparison, choices)
     return [(table, notes if table is tables[-1] else "") for table in tables]
 
 
@@ -230,9 +236,23 @@ def _table2_notes(comparison: Comparison, lines: Sequence[Mapping], choices: Cho
     return "\n".join(notes)
 
 
-def _marked(variant: Variant, chosen: Choice) -> str:
-    """The learner's name, with a star if its configuration is not the paper's."""
-    return variant.label + ("" if chosen.why is Chosen.PAPER else " *")
+def _marked(comparison: Comparison, variant: Variant, *chosen: Choice | None) -> str:
+    """The learner's name, with a star if a configuration is not the paper's, a + if it is mixed."""
+    star = any(one is not None and one.why is not Chosen.PAPER for one in chosen)
+    plus = any(_mixed(comparison, one) for one in chosen)
+    return variant.label + (" *" if star else "") + (" +" if plus else "")
+
+
+def _mixed(comparison: Comparison, chosen: Choice | None) -> bool:
+    """Whether the runs that are shown do different things."""
+    return chosen is not None and bool(
+        mixture(comparison.behaviours[chosen.position, chosen.seeds])
+    )
+
+
+def _mixed_note(comparison: Comparison, choices: Choices) -> str:
+    mixed = any(_mixed(comparison, chosen) for chosen in choices.values())
+    return f"\n+ {MIXED}: see what the ants do" if mixed else ""
 
 
 def _centre(line: Mapping, stem: str) -> str:
@@ -273,14 +293,53 @@ def _greedy(comparison: Comparison, choices: Choices) -> Section:
             cells.append(number(line["mean"], digits) + (f" {APART}" if off else ""))
             if MEASURES[measure].typical:
                 cells.append(number(line["iqm"], digits))
-        table.add_row(_marked(variant, chosen), setting, *cells)
+        table.add_row(_marked(comparison, variant, chosen), setting, *cells)
     if not table.row_count:
         return table, ""
     notes = "Configurations and seeds as in the tables above."
     if comparison.in_paper_world:
         low, high = GREEDY_STEPS
         notes += f"\nThe paper: about {GREEDY_RETURN:g} reward in {low:g} to {high:g} steps."
-    return table, notes
+    return table, notes + _mixed_note(comparison, choices)
+
+
+def _behaviours(comparison: Comparison, choices: Choices) -> list[Section]:
+    """What the final policies do, one table for each delivery setting, explained after the last."""
+    headers = ("Learner", "Behaviour", "Runs", "Return\ntraining", "followed", "greedy", "All")
+    tables = []
+    for setting in comparison.delivery_settings:
+        title = f"What the ants do, {setting} delivery"
+        tables.append(_table(title, headers, text_columns=2, gap=1))
+        for variant in sorted(comparison.variants, key=_order(comparison)):
+            chosen = choices.get((setting, variant))
+            if chosen is None:
+                continue
+            label = _marked(comparison, variant, chosen)
+            positions = comparison.positions(setting, variant)
+            for code, number_of in counts(comparison.behaviours[positions]).items():
+                cells = _behaviour_cells(comparison, chosen, code)
+                tables[-1].add_row(label, BEHAVIOURS[code], *cells, str(number_of))
+                label = ""
+    notes = (
+        f"Each policy is followed greedily once, {comparison.as_trained}.",
+        *(f"{BEHAVIOURS[code]}: {DEFINITIONS[code]}" for code in counts(comparison.behaviours)),
+        "An episode without delivery is told by its second half.",
+        "runs and their mean returns: configurations and seeds as in the tables above",
+        f"training: {comparison.late} episodes; followed: the episode that tells the behaviour",
+        "greedy: the greedy evaluation above; all: runs in all configurations",
+    )
+    return [(table, "\n".join(notes) if table is tables[-1] else "") for table in tables]
+
+
+def _behaviour_cells(comparison: Comparison, chosen: Choice, code: int) -> list[str]:
+    """How many of the runs that are shown behave so, and what these return."""
+    shown = np.arange(len(comparison.seeds))[chosen.seeds]
+    alike = shown[comparison.behaviours[chosen.position, shown] == code]
+    if not alike.size:
+        return ["0", *[MISSING] * 3]
+    means = mean_returns(comparison, chosen.position, alike)
+    names = ("return_last50_mean", "policy_return_mean", "greedy_return_mean")
+    return [str(alike.size), *(number(means[name]) for name in names)]
 
 
 def _order(comparison: Comparison) -> Callable[[Variant], int]:

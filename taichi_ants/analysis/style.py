@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from taichi_ants.analysis.baselines import TRAINING_SETTING
 from taichi_ants.analysis.comparison import Variant
 from taichi_ants.analysis.markdown import baseline_name
 from taichi_ants.analysis.paper import DYNA_P3, DYNA_P5, Q_LEARNING, SARSA
@@ -35,6 +34,9 @@ _MARKERS = {Q_LEARNING: "o", SARSA: "s", DYNA_P3: "^", DYNA_P5: "D"}
 _MORE_COLOURS = (_PURPLE, _SKY, INK, GREY)
 _LAST_COLOURS = ("#882255", "#999933")
 _MORE_MARKERS = ("v", "P", "X", "h")
+
+# By their places in `behaviour.BEHAVIOURS`.
+BEHAVIOUR_LOOKS = ((_BLUE, "o"), (_ORANGE, "^"), (_LAST_COLOURS[0], "s"), (INK, "x"))
 
 _SETTINGS = {
     "font.size": 9,
@@ -146,7 +148,7 @@ def legend_entries(axes: Iterable[Axes]) -> dict[str, Artist]:
 def in_training(
     baselines: Iterable[Mapping], columns: Sequence[str]
 ) -> dict[str, tuple[float, ...]]:
-    """Where to draw the baselines that were measured as training is, without evaporation.
+    """Where to draw the baselines that were measured as training is.
 
     Args:
         baselines: Rows of baselines.csv.
@@ -157,7 +159,7 @@ def in_training(
     """
     names: dict[tuple[float, ...], list[str]] = {}
     for row in baselines:
-        if row["setting"] == TRAINING_SETTING and None not in (row[name] for name in columns):
+        if row["setting"].startswith("training") and None not in (row[name] for name in columns):
             place = tuple(round(float(row[name]), 2) for name in columns)
             names.setdefault(place, []).append(baseline_name(row))
     return {"; ".join(alike): place for place, alike in names.items()}

@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from taichi_ants.analysis.behaviour import MIXED, mixture
 from taichi_ants.analysis.best_of import DRAWS, best_of, held_out, paper_position, percentile_of
 from taichi_ants.analysis.comparison import Comparison, Variant
 from taichi_ants.analysis.markdown import MISSING, interval, number, table
@@ -88,8 +89,12 @@ def _held_out(comparison: Comparison, delivery: str, variant: Variant) -> dict:
 
 
 def means(comparison: Comparison, stem: str, position: int | None, seeds: slice) -> dict:
-    """Centres over seeds with 95 % intervals of one row of the comparison; nan without a row."""
-    columns = {}
+    """Centres over seeds with 95 % intervals of one row of the comparison; nan without a row.
+
+    Where its policies do different things, `behaviours` says how many do what, else it is "".
+    """
+    mixed = "" if position is None else mixture(comparison.behaviours[position, seeds])
+    columns: dict[str, float | str] = {f"{stem}_behaviours": mixed}
     for name, measure in FIGURES.items():
         values = np.full((1, 1), np.nan)
         if position is not None:
@@ -147,7 +152,7 @@ def table2_markdown(lines: list[dict], comparison: Comparison) -> str:
     """
     of_paper = comparison.in_paper_world
     late = comparison.late
-    parts = [f"World: {comparison.world}.\n"]
+    parts = [f"{line}\n" for line in (f"World: {comparison.world}.", comparison.conditions) if line]
     if of_paper:
         seeds = max((line["seeds"] for line in lines), default=0)
         ours = (
@@ -161,6 +166,7 @@ def table2_markdown(lines: list[dict], comparison: Comparison) -> str:
             f"The paper's configurations: returns and deliveries, {late} episodes. Its figures are "
             f"single runs; ours are {ours}.\n",
             _same_table(lines),
+            *_mixtures(lines, "same"),
             f"The same for the steps of an episode: {nearer_steps(lines)}.\n",
             _same_steps_table(lines, late),
         ]
@@ -180,6 +186,7 @@ def table2_markdown(lines: list[dict], comparison: Comparison) -> str:
             "the other half, with 95 % intervals: what choosing the best is worth without its "
             "luck.\n",
             _held_out_table(lines, late),
+            *_mixtures(lines, "held_out"),
         ]
     return "\n".join(parts)
 
@@ -208,6 +215,17 @@ def _steps(line: dict, stem: str) -> list[str]:
         for name in ("steps_all", "steps_last50")
         for centre in ("mean", "iqm")
     ]
+
+
+def _mixtures(lines: list[dict], stem: str) -> list[str]:
+    """A paragraph on the lines whose means are over runs that do different things, if any."""
+    mixed = [
+        f"{', '.join(_name(line))}: {line[f'{stem}_behaviours']}"
+        for line in lines
+        if line[f"{stem}_behaviours"]
+    ]
+    # Two blanks break the line in Markdown.
+    return ["  \n".join([f"Here {MIXED}:", *mixed]) + "\n"] if mixed else []
 
 
 def _same_table(lines: list[dict]) -> str:

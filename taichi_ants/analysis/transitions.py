@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from taichi_ants import rewards as reward_table
 from taichi_ants.constants import (
     EMPTY,
     FOOD,
@@ -24,11 +25,6 @@ from taichi_ants.constants import (
     N_HEADINGS,
     PICK_UP,
     QUEEN,
-    REWARD_EMPTY,
-    REWARD_FAILED,
-    REWARD_GIVE,
-    REWARD_LURE,
-    REWARD_PICK_UP,
 )
 from taichi_ants.worlds.world import World
 
@@ -52,7 +48,7 @@ class Phase:
     rewards: np.ndarray
     exits: np.ndarray
     exit_reward: int
-    failed_reward: int = REWARD_FAILED
+    failed_reward: int
 
     @property
     def n_states(self) -> int:
@@ -95,10 +91,11 @@ class Transitions:
         """The phase from the pick-up of a food, which leaves its cell empty, to the delivery."""
         around = self._surroundings
         can_enter = around.empty | (around.neighbours == self._food_cells[food])
-        lure = np.where(around.nearer, REWARD_LURE, REWARD_EMPTY)
-        rewards = _by_move(np.where(can_enter, lure, REWARD_FAILED))
+        paid = reward_table.REWARDS
+        lure = np.where(around.nearer, paid.lure, paid.empty)
+        rewards = _by_move(np.where(can_enter, lure, paid.failed))
         exits = np.flatnonzero(_by_move(around.queen).any(axis=0))
-        return _phase(around.neighbours, can_enter, rewards, GIVE, exits, REWARD_GIVE)
+        return _phase(around.neighbours, can_enter, rewards, GIVE, exits, paid.give)
 
     def pick_ups(self, food: int) -> tuple[np.ndarray, np.ndarray]:
         """The ends of `foraging` that can take a food, and the states in which it is carried."""
@@ -147,7 +144,7 @@ def build_transitions(world: World) -> Transitions:
             _foraging_rewards(around),
             PICK_UP,
             exits,
-            REWARD_PICK_UP,
+            reward_table.REWARDS.pick_up,
         ),
         after_pick_up=(heading + 3) % N_HEADINGS * len(cells) + cell,
         foods_in_view=foods_in_view,
@@ -193,10 +190,11 @@ def _phase(
     successors[:3] = _by_move(moved).reshape(3, -1)
     successors[[PICK_UP, GIVE]] = states
     successors[exit_action, exits] = states.size + np.arange(exits.size)
-    rewards = np.full((N_ACTIONS, states.size), REWARD_FAILED, np.int64)
+    paid = reward_table.REWARDS
+    rewards = np.full((N_ACTIONS, states.size), paid.failed, np.int64)
     rewards[:3] = move_rewards.reshape(3, -1)
     rewards[exit_action, exits] = exit_reward
-    return Phase(successors, rewards, exits, exit_reward)
+    return Phase(successors, rewards, exits, exit_reward, paid.failed)
 
 
 def _by_move(ahead: np.ndarray) -> np.ndarray:
@@ -209,8 +207,9 @@ def _foraging_rewards(around: _Surroundings) -> np.ndarray:
     # Only empty cells show a trail. 64 bits, because twice the greatest level needs them.
     levels = _by_move(np.where(around.empty, around.trail, 0).astype(np.int64))
     is_trail = (levels >= 1) & (2 * levels >= levels.max(axis=0))
-    rewards = np.where(is_trail, REWARD_LURE, REWARD_EMPTY)
-    return np.where(_by_move(around.empty), rewards, REWARD_FAILED)
+    paid = reward_table.REWARDS
+    rewards = np.where(is_trail, paid.lure, paid.empty)
+    return np.where(_by_move(around.empty), rewards, paid.failed)
 
 
 def _reachable(around: _Surroundings, start: int) -> np.ndarray:

@@ -2,7 +2,8 @@
 
 Without --ants or --resume: from 1 to 1000 ants, ways of sharing a policy and pheromones are trained
 and evaluated in the paper's world and in open ones, over many seeds; tables, figures and findings
-go to a folder. With --ants: one colony lives for a while; it can be saved, resumed and drawn.
+go to a folder. With --ants: a colony, or many side by side, lives for a while; it can be saved,
+resumed and drawn.
 """
 
 from __future__ import annotations
@@ -139,6 +140,12 @@ def _add_colony(parser: argparse.ArgumentParser) -> list[argparse.Action]:
     group = parser.add_argument_group("one colony")
     add = group.add_argument
     add("--ants", type=whole_number(1), metavar="N", help="how many start")
+    add("--colonies", type=whole_number(1), metavar="N", help="side by side, by seed (default: 1)")
+    add(
+        "--start",
+        choices=("nest", "spread"),
+        help="of ants, by the queen or anywhere (default: nest)",
+    )
     add("--ranges", type=whole_number(1), nargs=3, metavar=("X", "Y", "Z"), help="of an open world")
     add("--world", metavar="NAME", help="paper, open, or the path of a map file (default: open)")
     add("--sharing", choices=("shared", "own", "fixed"), help="of tables (default: shared)")
@@ -320,14 +327,12 @@ def one_colony(settings: argparse.Namespace) -> None:
 
 def new_colony(settings: argparse.Namespace) -> Colony:
     """A colony at the start of its episode."""
-    from taichi_ants import AntsError, Colony, ColonyConfig, Pheromone, load_policy
+    from taichi_ants import Colony, ColonyConfig, Pheromone, load_policy
 
     names = ("evaporation", "half_life", "diffusion", "deposit", "level", "cap")
     given = {name: getattr(settings, name) for name in names if getattr(settings, name) is not None}
-    if "half_life" in given and given.setdefault("evaporation", "exponential") != "exponential":
-        raise AntsError("--half-life is for exponential evaporation; leave one of the two out.")
-    if "cap" in given and given.get("deposit") != "add":
-        raise AntsError("--cap is for deposits that add up; give --deposit add, or leave it out.")
+    if "half_life" in given:
+        given.setdefault("evaporation", "exponential")
     life = ColonyConfig(
         settings.ants,
         settings.capacity,
@@ -336,12 +341,13 @@ def new_colony(settings: argparse.Namespace) -> Colony:
         settings.lifespan,
         settings.regrowth,
         settings.wander,
+        start=settings.start or "nest",
     )
     colony = Colony(
         build_world(settings),
         life,
         training_config(settings, settings.epsilon),
-        settings.seed,
+        range(settings.seed, settings.seed + (settings.colonies or 1)),
         settings.sharing or "shared",
         load_policy(settings.policy)[0] if settings.policy else None,
         settings.threads,

@@ -38,7 +38,7 @@ QUICK_SEEDS = 10
 MOST_SEEDS = 10_000
 REPORT, EPISODES, BASELINES = "report.txt", "episodes.npz", "baselines.csv"
 FIGURES, POLICIES, RENDERS = "figures", "policies", "renders"
-RENDERED_STEPS = 150  # at most; an ant that has learned needs 34
+RENDERED_STEPS = 80  # at most; a delivery takes 34, to and fro on the trail 38
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -76,6 +76,11 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
         metavar="N",
         help="one or more, for learners that plan",
     )
+    switch = {"choices": ("on", "off"), "metavar": "on|off"}
+    words = "evaporation of trails in training; off in the paper"
+    add("--train-evaporation", default="off", help=words, **switch)
+    words = "evaporation in the greedy evaluation; on in the paper"
+    add("--greedy-evaporation", default="on", help=words, **switch)
     add("--world", default="paper", help="paper, open, or the path of a map file")
     add("--world-seed", type=whole_number(), default=0, metavar="N", help="seed of an open world")
     add("--plugin", metavar="FILE", help="a Python file that registers learners or worlds")
@@ -136,7 +141,16 @@ def build_sweep(settings: argparse.Namespace) -> Sweep:
             "open a way or choose another world."
         )
     seeds = tuple(range(settings.seed, settings.seed + settings.seeds))
-    return Sweep(world, configs, seeds, settings.episodes, settings.max_steps, ROLLOUTS)
+    return Sweep(
+        world,
+        configs,
+        seeds,
+        settings.episodes,
+        settings.max_steps,
+        ROLLOUTS,
+        settings.train_evaporation == "on",
+        settings.greedy_evaporation == "on",
+    )
 
 
 def world_name(settings: argparse.Namespace) -> str:
@@ -148,7 +162,9 @@ def world_name(settings: argparse.Namespace) -> str:
     return Path(settings.world).name
 
 
-def to_comparison(sweep: Sweep, result: SweepResult, world: str) -> Comparison:
+def to_comparison(
+    sweep: Sweep, result: SweepResult, behaviours: Any, policy_returns: Any, world: str
+) -> Comparison:
     """What the analysis reads; the world's name counts where it is not the paper's."""
     from taichi_ants import worlds
     from taichi_ants.analysis.comparison import PAPER_WORLD, Comparison, Row
@@ -163,8 +179,32 @@ def to_comparison(sweep: Sweep, result: SweepResult, world: str) -> Comparison:
         greedy_steps=result.greedy_steps,
         greedy_deliveries=result.greedy_deliveries,
         max_steps=sweep.max_steps,
+        behaviours=behaviours,
+        policy_returns=policy_returns,
+        train_evaporation=sweep.train_evaporation,
+        greedy_evaporation=sweep.greedy_evaporation,
         world=PAPER_WORLD if sweep.world == worlds.paper() else world,
     )
+
+
+def what_policies_do(sweep: Sweep, q_values: Any) -> tuple[Any, Any]:
+    """What an ant does that follows each final policy, and what it earns; integer (C, S) both."""
+    import numpy as np
+
+    from taichi_ants.analysis.behaviour import classify
+    from taichi_ants.engines.traces import MAX_ROLLOUT_STEPS, trace_policies
+
+    runs = q_values.shape[:2]
+    tables = q_values.reshape(-1, *q_values.shape[2:])
+    max_steps = min(sweep.max_steps, MAX_ROLLOUT_STEPS)
+    pieces = [
+        classify(sweep.world, trace, max_steps)
+        for trace in trace_policies(
+            sweep.world, tables, sweep.seeds * runs[0], max_steps, sweep.train_evaporation
+        )
+    ]
+    behaviours, returns = zip(*pieces, strict=True)
+    return np.concatenate(behaviours).reshape(runs), np.concatenate(returns).reshape(runs)
 
 
 def write_tables(
@@ -177,6 +217,8 @@ def write_tables(
 
     lines = summary.summarise(comparison)
     results.write_csv(folder / "summary.csv", lines, summary.SUMMARY_COLUMNS)
+    lines = summary.summarise_behaviours(comparison)
+    results.write_csv(folder / "behaviours.csv", lines, summary.BEHAVIOUR_COLUMNS)
     table = table2.table2(comparison)
     results.write_csv(folder / "table2.csv", table, list(table[0]))
     results.write_text(folder / "table2.md", table2.table2_markdown(table, comparison))
@@ -190,41 +232,39 @@ def write_tables(
 
 
 def write_episodes(folder: Path, comparison: Comparison) -> None:
-    """Write what each episode and rollout gave, in the order of summary.csv."""
+    """Write what each episode and rollout gave, and what each policy does, as in summary.csv."""
     from taichi_ants import results
 
     names = ("returns", "steps", "deliveries", "greedy_returns", "greedy_steps")
-    arrays = {name: getattr(comparison, name) for name in (*names, "greedy_deliveries")}
+    names += ("greedy_deliveries", "behaviours", "policy_returns")
+    arrays = {name: getattr(comparison, name) for name in names}
     results.write_npz(
         folder / EPISODES, {name: results.smallest(array) for name, array in arrays.items()}
     )
 
 
 def write_policies(folder: Path, sweep: Sweep, comparison: Comparison, tables: Any) -> None:
-    """Write the final Q-table of a median run per learner, in the first delivery setting."""
+    """Write the final Q-tables of some runs, with what an ant that follows them does."""
     from dataclasses import asdict
 
-    import numpy as np
-
     from taichi_ants import save_policy
-    from taichi_ants.analysis.best_of import best_position, paper_position
+    from taichi_ants.analysis.behaviour import BEHAVIOURS, NAMES
+    from taichi_ants.analysis.best_of import examples
 
-    setting = comparison.delivery_settings[0]
-    returns = comparison.measure("return_last50")
-    for variant in comparison.variants:
-        row = paper_position(comparison, setting, variant)
-        if row is None:  # not of the paper: its best configuration here
-            row = best_position(comparison, comparison.positions(setting, variant))
-        run = int(np.argsort(returns[row], kind="stable")[(len(sweep.seeds) - 1) // 2])
+    for row, run in examples(comparison):
+        config, behaviour = sweep.configs[row], comparison.behaviours[row, run]
+        depth = f"_p{config.planning_steps}" if config.planning_steps else ""
+        name = f"{config.delivery}_{config.learner}{depth}_{NAMES[behaviour]}"
         metadata = {
-            "config": asdict(sweep.configs[row]),
+            "config": asdict(config),
             "seed": sweep.seeds[run],
             "episodes": sweep.episodes,
             "max_steps": sweep.max_steps,
-            "return_last50": returns[row, run],
+            "evaporation": sweep.train_evaporation,
+            "return_last50": comparison.measure("return_last50")[row, run],
+            "behaviour": BEHAVIOURS[behaviour],
         }
-        depth = f"_p{variant.planning_steps}" if variant.planning_steps else ""
-        save_policy(folder / f"{variant.learner}{depth}.npz", tables[row, run], metadata)
+        save_policy(folder / f"{name}.npz", tables[row, run], metadata)
 
 
 def compare(settings: argparse.Namespace) -> None:
@@ -264,7 +304,9 @@ def do_comparison(
     with progress_bar("training") as report_progress:
         result = run_sweep(sweep, blocks, settings.threads, settings.arch, report_progress)
     laps["training and evaluation"] = time.perf_counter()
-    comparison = to_comparison(sweep, result, world_name(settings))
+    behaviours = what_policies_do(sweep, result.q_values)
+    comparison = to_comparison(sweep, result, *behaviours, world_name(settings))
+    laps["behaviours"] = time.perf_counter()
     baselines = baseline_rows(
         sweep.world,
         partial(evaluate, threads=settings.threads, arch=settings.arch),
@@ -272,6 +314,8 @@ def do_comparison(
         ROLLOUTS,
         settings.discounts,
         sweep.max_steps,
+        sweep.train_evaporation,
+        sweep.greedy_evaporation,
     )
     laps["baselines"] = time.perf_counter()
     costs = [cost.as_row() for cost in result.costs]
@@ -300,9 +344,12 @@ def draw_figures(sweep: Sweep, results: Path, folder: Path) -> None:
 
 
 def render_policies(sweep: Sweep, policies: Path, folder: Path) -> None:
-    """Show a greedy episode of each policy that was written, in the folder `renders`."""
+    """Show what each policy that was written does, in the folder `renders`.
+
+    Each picture is the beginning of the episode that told the behaviour: with evaporation as in
+    training, not as in the greedy evaluation.
+    """
     from taichi_ants import load_policy, results
-    from taichi_ants.analysis.comparison import Variant
     from taichi_ants.rendering import render_episode
 
     place = results.check_writable_folder(folder / RENDERS)
@@ -310,16 +357,15 @@ def render_policies(sweep: Sweep, policies: Path, folder: Path) -> None:
         paths = sorted(policies.glob("*.npz"))
         for done, path in enumerate(paths):
             q_values, metadata = load_policy(path)
-            config = metadata["config"]
-            variant = Variant(config["learner"], config["planning_steps"])
             render_episode(
                 place / f"{path.stem}.gif",
                 sweep.world,
                 q_values,
                 seed=metadata["seed"],
                 max_steps=min(sweep.max_steps, RENDERED_STEPS),
+                evaporation=sweep.train_evaporation,
                 size=(720, 480),
-                title=f"{variant.label}, {config['delivery']}, seed {metadata['seed']}",
+                title=metadata["behaviour"],
             )
             report_progress((done + 1) / len(paths))
 
@@ -369,7 +415,9 @@ def read_back(folder: Path, sweep: Sweep) -> tuple[Comparison, list[dict[str, An
     try:
         arrays = results.read_npz(folder / EPISODES)
         arrays = {name: array.astype(int) for name, array in arrays.items()}
-        comparison = to_comparison(sweep, SweepResult(**arrays, q_values=None, costs=()), "another")
+        done = arrays.pop("behaviours"), arrays.pop("policy_returns")
+        result = SweepResult(**arrays, q_values=None, costs=())
+        comparison = to_comparison(sweep, result, *done, "another")
         with open(folder / BASELINES, newline="", encoding="utf-8") as file:
             lines = csv.DictReader(file)
             baselines = [read_baseline(line) for line in lines]

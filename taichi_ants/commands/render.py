@@ -342,9 +342,9 @@ def show_colony(settings: argparse.Namespace, world: World) -> None:
                 progress=progress,
                 **look,
             )
-    delivered = int(colony.outcome().deliveries.sum())
-    numbers = ((settings.ants, "ant"), (colony.ticks, "tick"), (delivered, "delivery"))
-    print(f"{settings.out}: {', '.join(count(*number) for number in numbers)}")
+    delivered = count(int(colony.outcome().deliveries.sum()), "delivery")
+    ants, ticks = count(settings.ants, "ant"), count(colony.ticks, "tick")
+    print(f"{settings.out}: {ants}, {ticks}, {delivered}")
 
 
 def settled_colony(settings: argparse.Namespace, world: World) -> tuple[Colony, str]:

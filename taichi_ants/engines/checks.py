@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from taichi_ants import learners
+from taichi_ants import learners, rewards
 from taichi_ants.config import TrainingConfig, share_of_one
 from taichi_ants.constants import MAX_STEPS, N_ACTIONS, N_STATES
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, shown
 from taichi_ants.randomness import whole
 from taichi_ants.worlds.world import World
 
@@ -17,8 +17,24 @@ from taichi_ants.worlds.world import World
 def checked_world(world: World) -> World:
     """The world, if it is one."""
     if not isinstance(world, World):
-        raise AntsError(f"world is {world!r}; it must be a World, for example worlds.paper().")
+        raise AntsError(f"world is {shown(world)}; it must be a World, for example worlds.paper().")
     return world
+
+
+def checked_task(world: World) -> World:
+    """The world, if it is one to learn in: it has food, or nothing could ever be delivered."""
+    if not len(checked_world(world).foods):
+        raise AntsError("the world has no food, so there is nothing to learn; give it some.")
+    return world
+
+
+def checked_progress(progress: Callable[[float], None] | None) -> Callable[[float], None] | None:
+    """What is called with the share of the work that is done, or None."""
+    if progress is not None and not callable(progress):
+        raise AntsError(
+            f"progress is {shown(progress)}; it must be a function of a share, or None."
+        )
+    return progress
 
 
 def checked_configs(configs: TrainingConfig | Sequence[TrainingConfig]) -> tuple:
@@ -26,21 +42,23 @@ def checked_configs(configs: TrainingConfig | Sequence[TrainingConfig]) -> tuple
     if isinstance(configs, TrainingConfig):
         configs = (configs,)
     elif not isinstance(configs, Iterable):
-        raise AntsError(f"configs is {configs!r}; it must be one TrainingConfig or several.")
+        raise AntsError(f"configs is {shown(configs)}; it must be one TrainingConfig or several.")
     several = tuple(configs)
     if not several:
         raise AntsError("configs is empty; give at least one TrainingConfig.")
     for config in several:
         if not isinstance(config, TrainingConfig):
-            raise AntsError(f"configs holds {config!r}; it must hold TrainingConfig objects only.")
+            raise AntsError(
+                f"configs holds {shown(config)}; it must hold TrainingConfig objects only."
+            )
         plans = learners.get(config.learner).plans
         if plans and config.planning_steps == 0:
             raise AntsError(
-                f"planning_steps is 0, but learner {config.learner!r} plans; give 1 or more."
+                f"planning_steps is 0, but learner {shown(config.learner)} plans; give 1 or more."
             )
         if not plans and config.planning_steps != 0:
             raise AntsError(
-                f"planning_steps is {config.planning_steps}, but learner {config.learner!r} "
+                f"planning_steps is {config.planning_steps}, but learner {shown(config.learner)} "
                 "does not plan; leave it at 0."
             )
     return several
@@ -58,7 +76,7 @@ def checked_seeds(seeds: int | Sequence[int]) -> tuple[int, ...]:
     taken: dict[int, int] = {}
     for seed in several:
         if not -(2**63) <= seed < 2**64:
-            raise AntsError(f"seeds holds {seed}; a seed must fit into 64 bits.")
+            raise AntsError(f"seeds holds {shown(seed)}; a seed must fit into 64 bits.")
         if (word := seed % 2**64) in taken:
             same = taken[word]
             reason = "more than once" if same == seed else f"and {same}, which are one in 64 bits"
@@ -82,20 +100,33 @@ def checked_count(name: str, value: int, most: int = 2**31 - 1, least: int = 1) 
     """A whole number from `least` to `most`."""
     value = whole(name, value)
     if not least <= value <= most:
-        raise AntsError(f"{name} is {value}; it must lie between {least} and {most}.")
+        raise AntsError(f"{name} is {shown(value)}; it must lie between {least} and {most}.")
     return value
 
 
 def checked_max_steps(value: int) -> int:
-    """The step limit of an episode."""
-    return checked_count("max_steps", value, MAX_STEPS)
+    """The step limit of an episode, whose return must fit into 32 bits."""
+    most = (2**31 - 1) // max(1, rewards.REWARDS.largest)
+    return checked_count("max_steps", value, min(MAX_STEPS, most))
 
 
 def checked_share(name: str, value: float) -> float:
     """A number from 0 to 1."""
     if not share_of_one(value):
-        raise AntsError(f"{name} is {value!r}; it must be a number between 0 and 1.")
+        raise AntsError(f"{name} is {shown(value)}; it must be a number between 0 and 1.")
     return float(value)
+
+
+def check_finite(
+    tables: np.ndarray, configs: Sequence[TrainingConfig], seeds: Sequence[int]
+) -> None:
+    """Refuse what a learner has made if it is not finite, tables (configurations * seeds, ...)."""
+    finite = np.isfinite(tables).reshape(len(configs), len(seeds), -1).all(axis=-1)
+    for c, s in np.argwhere(~finite)[:1]:
+        raise AntsError(
+            f"learner {configs[c].learner!r} made action values that are not finite, with "
+            f"{configs[c]} and seed {seeds[s]}; mend its TD error."
+        )
 
 
 def checked_q_values(q_values: np.ndarray) -> np.ndarray:
@@ -104,7 +135,7 @@ def checked_q_values(q_values: np.ndarray) -> np.ndarray:
         if np.iscomplexobj(q_values):
             raise TypeError
         tables = np.asarray(q_values, dtype=np.float32)
-    except (TypeError, ValueError):
+    except (OverflowError, TypeError, ValueError):
         raise AntsError(
             "q_values is not an array of numbers; give a float (..., 128, 5) array."
         ) from None

@@ -10,9 +10,10 @@ import numpy as np
 from taichi_ants import learners, runtime
 from taichi_ants.colony_config import SHARINGS, ColonyConfig
 from taichi_ants.config import TrainingConfig
-from taichi_ants.constants import EMPTY, N_ACTIONS, N_STATES
+from taichi_ants.constants import EMPTY, MAX_STEPS, N_ACTIONS, N_STATES
 from taichi_ants.engines import checks, colony_files, colony_memory
-from taichi_ants.errors import AntsError
+from taichi_ants.engines.records import Record
+from taichi_ants.errors import AntsError, check_one_of, shown
 from taichi_ants.hexgrid import AxialGrid
 from taichi_ants.results import PathLike
 from taichi_ants.worlds.world import World
@@ -27,8 +28,8 @@ _TICK_NS = 150  # of an ant, on a slow core, planning left out
 _LAUNCH_SECONDS = 0.4
 
 
-@dataclass(frozen=True)
-class ColonyEpisodes:
+@dataclass(frozen=True, eq=False, repr=False)
+class ColonyEpisodes(Record):
     """What episodes gave, arrays of shape (episodes, worlds).
 
     Attributes:
@@ -55,8 +56,8 @@ class ColonyEpisodes:
     living: np.ndarray
 
 
-@dataclass(frozen=True)
-class ColonySnapshot:
+@dataclass(frozen=True, eq=False, repr=False)
+class ColonySnapshot(Record):
     """One world of a colony at one moment, as `taichi_ants.rendering` draws it.
 
     Attributes:
@@ -89,8 +90,8 @@ class Colony:
         seeds: One seed for each of the W worlds.
         sharing: "shared": one table for all ants of a world. "own": one for each slot. "fixed":
             nobody learns.
-        q_values: Action values to start from, float (128, 5) or (W, 128, 5); None: zeros. If tables
-            are not shared, (W, slots, 128, 5) too, also for ants that do not learn.
+        q_values: Action values to start from, float (128, 5) or (W, 128, 5); None: zeros, but if
+            nobody learns they must be given. If tables are not shared, (W, slots, 128, 5) too.
         threads: CPU threads; None keeps what runs, or takes all.
         arch: "cpu" or "cuda"; None keeps what runs, or takes the CPU.
         schedule: "by_world" hands worlds to threads, "by_chunk" groups of ants; None chooses by
@@ -114,28 +115,35 @@ class Colony:
         schedule: str | None = None,
     ) -> None:
         if not isinstance(config, ColonyConfig):
-            raise AntsError(f"config is {config!r}; it must be a ColonyConfig.")
+            raise AntsError(f"config is {shown(config)}; it must be a ColonyConfig.")
         if not isinstance(training, TrainingConfig):
-            raise AntsError(f"training is {training!r}; it must be one TrainingConfig.")
+            raise AntsError(f"training is {shown(training)}; it must be one TrainingConfig.")
         (self.training,) = checks.checked_configs(training)
+        check_one_of("sharing", sharing, SHARINGS)
+        if sharing == "fixed" and q_values is None:
+            raise AntsError(
+                "sharing is 'fixed', but q_values is None; nobody learns, so give the action "
+                "values that the ants follow."
+            )
+        table = None if q_values is None else checks.checked_q_values(q_values)
         self.config = config
         self.seeds = checks.checked_seeds(seeds)
-        self.sharing = _one_of("sharing", sharing, SHARINGS)
+        self.sharing = sharing
         self._learner = learners.get(training.learner)
         self._settings = runtime.start(threads, arch)
         one = isinstance(world, (str, World)) or not isinstance(world, Iterable)
         several = (world,) * len(self.seeds) if one else tuple(world)
         if len(several) != len(self.seeds):
             raise AntsError(f"there are {len(several)} worlds for {len(self.seeds)} seeds.")
+        check_world = checks.checked_world if sharing == "fixed" else checks.checked_task
         self.layout = colony_memory.Layout(
-            [checks.checked_world(one) for one in several], config, self.seeds
+            [check_world(one) for one in several], config, self.seeds
         )
         options = (config.births, config.lifespan, config.regrowth, config.wander)
         self._lively = any(option is not None and option is not False for option in options)
         large = config.slots >= _LARGE_COLONY
-        self.schedule = _one_of(
-            "schedule", schedule or ("by_chunk" if large else "by_world"), ("by_world", "by_chunk")
-        )
+        self.schedule = ("by_chunk" if large else "by_world") if schedule is None else schedule
+        check_one_of("schedule", self.schedule, ("by_world", "by_chunk"))
         chunks = 1
         if self.schedule == "by_chunk":
             chunks = min(_MOST_CHUNKS, -(-config.slots // _ANTS_PER_CHUNK))
@@ -145,9 +153,10 @@ class Colony:
         self.arrays = colony_memory.allocate(
             self.layout, config, self.training, words, sharing, plans, chunks
         )
-        table = None if q_values is None else checks.checked_q_values(q_values)
-        self._own = sharing == "own" or (sharing == "fixed" and np.ndim(table) == 4)
-        tables = colony_memory.allocate_tables(len(self.seeds), config.slots, self._own, table)
+        self.one_a_slot = sharing == "own" or (sharing == "fixed" and np.ndim(table) == 4)
+        tables = colony_memory.allocate_tables(
+            len(self.seeds), config.slots, self.one_a_slot, table
+        )
         self.arrays["q"] = tables
         self.epsilon = float(self.training.epsilon)
         self.episode = -1
@@ -184,7 +193,11 @@ class Colony:
             self.ticks += 1
 
     def end_episode(self) -> None:
-        """Keep the streams of the ants that start an episode, and let epsilon decay."""
+        """Keep the streams of the ants that start an episode, and let epsilon decay.
+
+        Raises:
+            AntsError: The learner has made action values that are not finite.
+        """
         from taichi_ants.engines import colony_arrays as names
 
         ants = self.arrays["ants"]
@@ -193,6 +206,8 @@ class Colony:
         slots = self.config.slots
         places = columns // slots * slots + ants[names.NUMBER, columns]
         self.arrays["first_streams"][places] = self.arrays["streams"][columns]
+        tables = self.arrays["q"].reshape(len(self.seeds), -1)
+        checks.check_finite(tables, [self.training], self.seeds)
         decayed = self.epsilon * float(self.training.epsilon_decay)
         self.epsilon = max(float(self.training.min_epsilon), decayed)
 
@@ -205,7 +220,8 @@ class Colony:
             progress: Called now and then with the share of the work that is done.
         """
         episodes = checks.checked_count("episodes", episodes)
-        ticks = checks.checked_max_steps(ticks)
+        ticks = checks.checked_count("ticks", ticks, MAX_STEPS)
+        progress = checks.checked_progress(progress)
         outcomes = []
         for episode in range(episodes):
             self.begin_episode()
@@ -226,7 +242,7 @@ class Colony:
 
         rows = {
             "ticks": names.TICKS,
-            "deliveries": names.DELIVERED,
+            "deliveries": names.DELIVERIES,
             "first_delivery": names.FIRST_DELIVERY,
             "moves": names.MOVES,
             "blocked": names.BLOCKED,
@@ -241,9 +257,9 @@ class Colony:
     @property
     def q_values(self) -> np.ndarray:
         """The action values, float32 (W, 128, 5), or (W, slots, 128, 5) with own tables; a copy."""
-        n = self.config.slots if self._own else 1
+        n = self.config.slots if self.one_a_slot else 1
         tables = self.arrays["q"].reshape(len(self.seeds), n, N_STATES, -1)[..., :N_ACTIONS]
-        return (tables if self._own else tables[:, 0]).copy()
+        return (tables if self.one_a_slot else tables[:, 0]).copy()
 
     @property
     def waiting_foods(self) -> int:
@@ -266,8 +282,7 @@ class Colony:
         from taichi_ants.engines import colony_arrays as names
 
         self._check_begun()
-        if not 0 <= world < len(self.seeds):
-            raise AntsError(f"world is {world}; it must be from 0 to {len(self.seeds) - 1}.")
+        world = checks.checked_count("world", world, len(self.seeds) - 1, least=0)
         cells = slice(world * self.layout.size, (world + 1) * self.layout.size)
         slots = slice(world * self.config.slots, (world + 1) * self.config.slots)
         ants = self.arrays["ants"][:, slots]
@@ -301,6 +316,28 @@ class Colony:
         """
         return colony_files.load_colony(cls, path, threads, arch)
 
+    def __eq__(self, other: object) -> bool:
+        """Whether both are at the same point of the same life, so that they go on alike."""
+        if not isinstance(other, Colony):
+            return NotImplemented
+        return colony_files.same_colony(self, other)
+
+    __hash__ = None  # type: ignore[assignment]  # it changes with each tick
+
+    def __repr__(self) -> str:
+        others = len(dict.fromkeys(self.worlds)) - 1
+        more = f" and {others} more" if others else ""
+        lines = [f"world: {self.worlds[0]}{more}", f"config: {self.config}"]
+        lines += [f"training: {self.training}", f"seeds: {shown(self.seeds)}"]
+        lines += [f"sharing: {self.sharing!r}, epsilon: {self.epsilon:.4g}"]
+        if self.episode >= 0:
+            now = self.outcome()
+            lines += [
+                f"episode: {self.episode}, ticks: {self.ticks}, living: {now.living.sum()}, "
+                f"deliveries: {now.deliveries.sum()}"
+            ]
+        return "\n    ".join(["Colony(", *lines]) + "\n)"
+
     def _check_begun(self) -> None:
         if self.episode < 0:
             raise AntsError("no episode has begun; call begin_episode first.")
@@ -324,7 +361,7 @@ class Colony:
         from taichi_ants.engines import colony_arrays as names
 
         config = self.config
-        if config.births or config.lifespan or self._own or config.slots > config.ants:
+        if config.births or config.lifespan or self.one_a_slot or config.slots > config.ants:
             return
         ants = self.arrays["ants"]
         cells = ants[names.CELL].reshape(len(self.seeds), -1)
@@ -338,15 +375,17 @@ class Colony:
         from taichi_ants.engines.colony_arrays import Arrays, Settings
         from taichi_ants.engines.colony_kernels import colony_kernel
 
+        self._settings = runtime.start()  # the caller may have reset Taichi, or forked
         dense = self.config.pheromone.dense
-        kernel = colony_kernel(self._learner, self.sharing, self._own, dense, self._lively, what)
+        kernel = colony_kernel(
+            self._learner, self.sharing, self.one_a_slot, dense, self._lively, what
+        )
         numbers = Settings(**self._numbers())
         kernel(tick, n, *numbers, *Arrays(**self.arrays))
 
     def _numbers(self) -> dict[str, int | float]:
         config, pheromone = self.config, self.config.pheromone
         off = -1
-        decay = {"linear": -1.0, "none": 1.0}.get(pheromone.evaporation, pheromone.decay)
         return {
             "worlds": len(self.seeds),
             "ants": config.ants,
@@ -358,8 +397,8 @@ class Colony:
             "evaporates": int(pheromone.evaporation == "linear"),
             "adds": {"add": 1, "set": 0, "none": -1}[pheromone.deposit],
             "level": pheromone.level,
-            "cap": pheromone.cap,
-            "decay": float(decay),
+            "cap": pheromone.cap or 0,
+            "decay": -1.0 if pheromone.evaporation == "linear" else float(pheromone.decay),
             "share": float(pheromone.share) if pheromone.diffusion else 0.0,
             "births": int(config.births),
             "lifespan": config.lifespan or off,
@@ -369,9 +408,3 @@ class Colony:
             "planning_steps": self.training.planning_steps,
             "continuing": int(self.training.delivery == "continuing"),
         }
-
-
-def _one_of(name: str, value: str, allowed: Sequence[str]) -> str:
-    if value not in allowed:
-        raise AntsError(f"{name} is {value!r}; it must be one of {', '.join(allowed)}.")
-    return value

@@ -14,7 +14,7 @@ from taichi_ants.constants import OBSTACLE
 ANT_GROUND = OBSTACLE  # what the cell of an ant that wants nothing holds
 
 # Rows of `ants`, one column for each slot.
-CELL, HEADING, CARRIES, LIFE, AGE, NUMBER, STATE, ACTION, WANT, REWARD, VISITED = range(11)
+CELL, HEADING, CARRIES, LIFE, AGE, NUMBER, STATE, ACTION, WANT, EVENT, VISITED = range(11)
 ANT_ROWS = 11
 # Values of LIFE: an empty slot, an ant, one that dies in this tick, one born in it.
 VACANT, LIVING, DYING, NEWBORN = range(4)
@@ -28,7 +28,7 @@ VACANT, LIVING, DYING, NEWBORN = range(4)
     NEXT_NUMBER,  # of the next ant that is born
     STORE,  # foods that the queen has not turned into ants yet
     MODEL_SIZE,  # visited pairs of the shared model
-    DELIVERED,
+    DELIVERIES,
     FIRST_DELIVERY,  # ticks until then, -1
     BORN,
     DIED,
@@ -114,6 +114,7 @@ class Arrays(NamedTuple):
         worlds: i32 (WORLD_ROWS, W).
         queen_streams: u64 (W,).
         seeds: u64 (W,).
+        rewards: i32 (5,), by event.
         returns: i64 (W,), rewards of all ants in this episode.
         tallies: i32 (TALLY_ROWS, W * chunks).
         homes: i32 (HOME_ROWS, W * homes).
@@ -144,6 +145,7 @@ class Arrays(NamedTuple):
     worlds: Any
     queen_streams: Any
     seeds: Any
+    rewards: Any
     returns: Any
     tallies: Any
     homes: Any

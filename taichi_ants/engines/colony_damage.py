@@ -6,7 +6,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from taichi_ants.constants import EMPTY, FOOD, N_ACTIONS, N_HEADINGS, N_STATES, OBSTACLE, QUEEN
+from taichi_ants.constants import (
+    DELIVERED,
+    EMPTY,
+    FOOD,
+    N_ACTIONS,
+    N_HEADINGS,
+    N_STATES,
+    OBSTACLE,
+    QUEEN,
+)
 
 if TYPE_CHECKING:
     from taichi_ants.engines.colony import Colony
@@ -47,6 +56,7 @@ def _check_ants(colony: Colony) -> None:
     _check_range("the heading of an ant", ants[names.HEADING], N_HEADINGS - 1)
     _check_range("what an ant carries", ants[names.CARRIES], 1)
     _check_range("the life of an ant", ants[names.LIFE], names.LIVING)
+    _check_range("the event of an ant", ants[names.EVENT], DELIVERED)
     _check_range("the age of an ant", ants[names.AGE], _MANY)
     _check_range("the number of an ant", ants[names.NUMBER], _MANY, least=-1)
     _check_range("the state of an ant", ants[names.STATE], N_STATES - 1)
@@ -103,7 +113,8 @@ def _check_models(colony: Colony) -> None:
 
     entries, slots_of = colony.arrays["entries"], colony.arrays["slots_of"]
     _check_range("a pair of a model", slots_of, _PAIRS)
-    _check_range("an entry of a model", entries, (1 << 22) - 1)
+    _check_range("an entry of a model", entries, (1 << 21) - 1)
+    _check_range("the event of an entry", entries >> 17 & 7, DELIVERED)
     _check_range("the action of an entry", entries & 7, N_ACTIONS - 1)
     _check_range("the size of a model", colony.arrays["worlds"][names.MODEL_SIZE], _PAIRS)
     if len(slots_of) > 1:

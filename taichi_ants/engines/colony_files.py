@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -14,48 +13,56 @@ from taichi_ants.config import TrainingConfig
 from taichi_ants.constants import N_ACTIONS, N_STATES
 from taichi_ants.engines import checks
 from taichi_ants.engines.colony_damage import check_contents
-from taichi_ants.errors import AntsError
-from taichi_ants.worlds.world import World
+from taichi_ants.engines.records import same
+from taichi_ants.engines.stored import FileKind, world_arrays, world_facts, world_from
 
 if TYPE_CHECKING:
     from taichi_ants.engines.colony import Colony
 
-_FORMAT = "taichi-ants colony 1"
+_KIND = FileKind("taichi-ants colony 2", "colony", "Colony.save")
 # What the worlds and configurations determine is not stored.
-_DERIVED = frozenset({"walls", "closer", "compass", "weights", "spare", "seeds"})
-# What numbers, texts and arrays that mean nothing lead to while a colony is built from them.
-_SIGNS_OF_DAMAGE = (
-    *(AntsError, ArithmeticError, AttributeError, LookupError, RecursionError, TypeError),
-    ValueError,
-)
-_WORLD_PARTS = ("foods", "obstacles", "trails", "ants")
+_DERIVED = frozenset({"walls", "closer", "compass", "rewards", "weights", "spare", "seeds"})
 
 
 def save_colony(colony: Colony, path: results.PathLike) -> None:
     """Write a colony, uncompressed; raises as `results.write_atomically` does."""
+    facts, arrays = _contents(colony)
+    _KIND.write(path, facts, arrays, compress=False)
+
+
+def same_colony(one: Colony, other: Colony) -> bool:
+    """Whether two colonies would be written alike, so that they go on alike."""
+    (facts, arrays), (other_facts, other_arrays) = _contents(one), _contents(other)
+    return (
+        facts == other_facts
+        and arrays.keys() == other_arrays.keys()
+        and all(same(array, other_arrays[name]) for name, array in arrays.items())
+    )
+
+
+def _contents(colony: Colony) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """All that a file of a colony holds: facts and arrays."""
     arrays: dict[str, np.ndarray] = {
         f"array_{name}": array for name, array in colony.arrays.items() if name not in _DERIVED
     }
-    distinct = list(dict.fromkeys(colony.worlds))
-    for number, world in enumerate(distinct):
-        for part in _WORLD_PARTS:
-            arrays[f"world{number}_{part}"] = getattr(world, part)
+    numbers = {world: number for number, world in enumerate(dict.fromkeys(colony.worlds))}
+    for world, number in numbers.items():
+        arrays |= world_arrays(world, f"world{number}")
     facts = {
-        "format": _FORMAT,
         "config": asdict(colony.config),
         "training": asdict(colony.training),
         "sharing": colony.sharing,
+        "one_a_slot": colony.one_a_slot,
         "seeds": list(colony.seeds),
-        "worlds": [{"ranges": world.ranges, "queen": world.queen} for world in distinct],
-        "world_of": [distinct.index(world) for world in colony.worlds],
+        "worlds": [world_facts(world) for world in numbers],
+        "world_of": [numbers[world] for world in colony.worlds],
         "chunks": colony.chunks,
         "schedule": colony.schedule,
         "epsilon": colony.epsilon,
         "episode": colony.episode,
         "ticks": colony.ticks,
     }
-    arrays["facts"] = np.array(results.to_json(facts))
-    results.write_npz(path, arrays, compress=False)
+    return facts, arrays
 
 
 def load_colony(
@@ -67,14 +74,14 @@ def load_colony(
         AntsError: The file is missing, damaged, or holds no colony; or its learner is not
             registered.
     """
-    stored = results.read_npz(path)
-    facts = _facts(stored, path)
+    stored, facts = _KIND.read(path)
     runtime.start(threads, arch)  # what is wrong with these says nothing about the file
-    try:
-        learners.get(facts["training"]["learner"])
-    except (KeyError, TypeError) as error:
-        raise _damaged(path, "its learner is missing") from error
-    try:
+    with _KIND.rebuilding(path):
+        training = facts["training"] or {}
+        if not isinstance(training.get("learner"), str):
+            raise ValueError("its learner is missing")
+    learners.get(training["learner"])
+    with _KIND.rebuilding(path):
         colony = _rebuild(cls, stored, facts, threads, arch)
         colony.epsilon = checks.checked_share("epsilon", facts["epsilon"])
         colony.episode = checks.checked_count("episode", facts["episode"], least=-1)
@@ -86,33 +93,7 @@ def load_colony(
                     raise ValueError(f"{name} has another shape or type")
                 colony.arrays[name] = np.ascontiguousarray(kept)
         check_contents(colony)
-    except _SIGNS_OF_DAMAGE as error:
-        raise _damaged(path, _reason(error)) from error
     return colony
-
-
-def _facts(stored: dict[str, np.ndarray], path: results.PathLike) -> dict[str, Any]:
-    try:
-        facts = json.loads(str(stored["facts"][()]))
-        if facts["format"] != _FORMAT:
-            raise ValueError(facts["format"])
-    except (KeyError, ValueError, TypeError, RecursionError) as error:
-        raise AntsError(
-            f"{str(path)!r} holds no colony of this version; name a file that Colony.save wrote."
-        ) from error
-    return facts
-
-
-def _damaged(path: results.PathLike, reason: str) -> AntsError:
-    return AntsError(
-        f"the colony in {str(path)!r} is damaged ({reason}); name a file that Colony.save wrote."
-    )
-
-
-def _reason(error: Exception) -> str:
-    if isinstance(error, KeyError):
-        return f"{error} is missing"
-    return " ".join(str(error).rstrip(".").split()) or type(error).__name__
 
 
 def _rebuild(
@@ -123,31 +104,21 @@ def _rebuild(
     arch: str | None,
 ) -> Colony:
     worlds = [
-        World(
-            tuple(facts["worlds"][number]["ranges"]),
-            tuple(facts["worlds"][number]["queen"]),
-            **{part: stored[f"world{number}_{part}"] for part in _WORLD_PARTS},
-        )
-        for number in range(len(facts["worlds"]))
+        world_from(stored, f"world{number}", one) for number, one in enumerate(facts["worlds"])
     ]
     pheromone = Pheromone(**facts["config"].pop("pheromone"))
+    config = ColonyConfig(pheromone=pheromone, **facts["config"])
+    # A colony that does not learn needs tables of the right shape, until its own are put in.
+    leading = (len(facts["seeds"]), config.slots) if facts["one_a_slot"] else ()
+    fixed = facts["sharing"] == "fixed"
     return cls(
         [worlds[number] for number in facts["world_of"]],
-        ColonyConfig(pheromone=pheromone, **facts["config"]),
+        config,
         TrainingConfig(**facts["training"]),
         facts["seeds"],
         facts["sharing"],
-        q_values=_own_tables(stored, facts),
+        q_values=np.zeros((*leading, N_STATES, N_ACTIONS), np.float32) if fixed else None,
         threads=threads,
         arch=arch,
         schedule=facts["schedule"],
     )
-
-
-def _own_tables(stored: dict[str, np.ndarray], facts: dict[str, Any]) -> np.ndarray | None:
-    """Any tables of the right shape, if a colony that does not learn has one a slot."""
-    slots = stored["array_ants"].shape[1] // len(facts["seeds"])
-    one_a_slot = stored["array_q"].size == len(facts["seeds"]) * slots * N_STATES * 8
-    if facts["sharing"] != "fixed" or not one_a_slot:
-        return None
-    return np.zeros((len(facts["seeds"]), slots, N_STATES, N_ACTIONS), np.float32)

@@ -8,15 +8,15 @@ in turn towards one target would give. Every chunk of ants sums for itself; noth
 
 import taichi as ti
 
-from taichi_ants.constants import N_ACTIONS, REWARD_GIVE
+from taichi_ants.constants import DELIVERED, N_ACTIONS
 from taichi_ants.engines.colony_arrays import (
     ACTION,
     COUNT,
+    EVENT,
     LATEST,
     MODEL_SIZE,
     NUMBER,
     OUTCOME,
-    REWARD,
     STATE,
     VISITED,
 )
@@ -26,9 +26,9 @@ from taichi_ants.engines.run_learning import (
     TABLE,
     Rates,
     entry_ended,
+    entry_event,
     entry_next_state,
     entry_pair,
-    entry_reward,
     pack_entry,
     plan,
     remember,
@@ -39,6 +39,7 @@ from taichi_ants.rules.policy import choose
 from taichi_ants.rules.random_bits import advance, below, bits_of, high_word
 
 _ONE = 4294967296.0  # fixed-point numbers have 32 binary places
+_LARGEST = 2147483648.0  # and an error must lie below this
 
 
 @ti.func
@@ -60,35 +61,47 @@ def learn_alone(
     next_action,
 ):  # fmt: skip
     """Update the ant's own table, as an ant that is alone does."""
-    rates, reward = rates_of(c, w), c.ants[REWARD, ant]
-    ended = ti.cast(reward == REWARD_GIVE, ti.i32) & (1 - k.continuing)
+    rates, event = rates_of(c, w), c.ants[EVENT, ant]
+    ended = ti.cast(event == DELIVERED, ti.i32) & (1 - k.continuing)
     table, model = ant * TABLE, ant * MODEL
     pair = c.ants[STATE, ant] * ROW + c.ants[ACTION, ant]
-    update(td_error, c.q, table, rates, pair, reward, ended, seen, next_action)
+    update(td_error, c.q, table, rates, pair, c.rewards[event], ended, seen, next_action)
     if ti.static(plans):
         known = c.ants[VISITED, ant]
-        known = remember(c.entries, c.slots_of, model, known, pair, reward, ended, seen)
+        known = remember(c.entries, c.slots_of, model, known, pair, event, ended, seen)
         c.ants[VISITED, ant] = known
         c.streams[ant] = plan(
-            td_error, c.q, c.entries, table, model, rates, known, k.planning_steps, c.streams[ant]
+            td_error,
+            c.q,
+            c.entries,
+            c.rewards,
+            table,
+            model,
+            rates,
+            known,
+            k.planning_steps,
+            c.streams[ant],
         )
 
 
 @ti.func
-def error_of(td_error: ti.template(), c: ti.template(), w, pair, reward, ended, seen, next_action):
+def error_of(td_error: ti.template(), c: ti.template(), w, pair, event, ended, seen, next_action):
     """The TD error of a pair (its offset in the table) by the shared table of a world."""
     rates, table = rates_of(c, w), w * TABLE
     discount = rates.discount
     if ended == 1:
         discount = 0.0
-    return td_error(
+    error = td_error(
         c.q[table + pair],
-        ti.cast(reward, ti.f32),
+        ti.cast(c.rewards[event], ti.f32),
         discount,
         values_of(c.q, table, seen),
         next_action,
         rates.epsilon,
     )
+    if not ti.abs(error) < _LARGEST:
+        c.q[table + pair] = ti.math.nan  # a fixed-point number would hide it
+    return error
 
 
 @ti.func
@@ -97,15 +110,15 @@ def share_error(
     ant, seen, next_action,
 ):  # fmt: skip
     """Add the TD error of an ant to the sums of its chunk, and what it saw."""
-    reward = c.ants[REWARD, ant]
-    ended = ti.cast(reward == REWARD_GIVE, ti.i32) & (1 - k.continuing)
+    event = c.ants[EVENT, ant]
+    ended = ti.cast(event == DELIVERED, ti.i32) & (1 - k.continuing)
     state, action = c.ants[STATE, ant], c.ants[ACTION, ant]
     pair = state * ROW + action
-    error = error_of(td_error, c, w, pair, reward, ended, seen, next_action)
+    error = error_of(td_error, c, w, pair, event, ended, seen, next_action)
     place = chunk * MODEL + state * N_ACTIONS + action
     add_to_sums(c, chunk, state * N_ACTIONS + action, error, fixed(error), 1)
     if ti.static(plans):
-        note_outcome(c, place, c.ants[NUMBER, ant], pack_entry(pair, reward, ended, seen))
+        note_outcome(c, place, c.ants[NUMBER, ant], pack_entry(pair, event, ended, seen))
 
 
 @ti.func
@@ -222,7 +235,7 @@ def price_draws(td_error: ti.template(), c: ti.template(), k: ti.template(), w):
             c,
             w,
             entry_pair(entry),
-            entry_reward(entry),
+            entry_event(entry),
             entry_ended(entry),
             entry_next_state(entry),
             -1,

@@ -13,7 +13,7 @@ from taichi_ants.engines.colony_arrays import (
     BORN,
     CARRIES,
     CELL,
-    DELIVERED,
+    DELIVERIES,
     DIED,
     FIRST_DELIVERY,
     FIRST_VACANT,
@@ -67,7 +67,7 @@ def count_gives(c: ti.template(), k: ti.template(), w, tick):
         c.tallies[T_GIVES, chunk] = 0
         c.tallies[T_MOVES, chunk] = 0
         c.tallies[T_BLOCKED, chunk] = 0
-    c.worlds[DELIVERED, w] += gives
+    c.worlds[DELIVERIES, w] += gives
     c.worlds[TICKS, w] = tick + 1
     if gives > 0 and c.worlds[FIRST_DELIVERY, w] < 0:
         c.worlds[FIRST_DELIVERY, w] = tick + 1

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from taichi_ants import rewards
 from taichi_ants.colony_config import ColonyConfig, update_weights
 from taichi_ants.config import TrainingConfig
 from taichi_ants.constants import N_ACTIONS, N_STATES, STREAM_ANT, STREAM_QUEEN
@@ -28,19 +29,27 @@ class Layout:
         self.worlds = tuple(worlds)
         self.grid = worlds[0].grid
         self.size = self.grid.size
-        self.ground = np.stack([world.ground() for world in worlds])
-        self.levels = np.stack([world.trail_levels() for world in worlds])
-        self.walls = np.stack([self._walls(world) for world in worlds]).astype(np.uint8)
-        self.closer = np.stack([world.closer() for world in worlds])
+        self.ground = np.stack(self._of_each(World.ground))
+        self.levels = np.stack(self._of_each(World.trail_levels))
+        self.walls = np.stack(self._of_each(self._walls)).astype(np.uint8)
+        self.closer = np.stack(self._of_each(World.closer))
         self.compass = compass_of(self.grid)
         self.queens = np.array([int(self.grid.index(world.queen)) for world in worlds], np.int32)
-        starts = [world.start(seed, config.ants) for world, seed in zip(worlds, seeds, strict=True)]
+        starts = [
+            world.start(seed, config.ants, config.start)
+            for world, seed in zip(worlds, seeds, strict=True)
+        ]
         self.start_cells = np.stack([cells for cells, _ in starts])
         self.start_headings = np.stack([headings for _, headings in starts])
         moving = config.regrowth is not None or config.wander is not None
         self.homes = max((len(world.foods) for world in worlds), default=0) if moving else 0
-        self.home_cells = [self.grid.index(world.foods).astype(np.int32) for world in worlds]
-        self.home_piles = [self._piles(cells) for cells in self.home_cells]
+        self.home_cells = self._of_each(lambda world: self.grid.index(world.foods))
+        self.home_piles = self._of_each(lambda world: self._piles(self.grid.index(world.foods)))
+
+    def _of_each(self, make: Callable[[World], np.ndarray]) -> list[np.ndarray]:
+        """An array for each world, made once for those that are equal."""
+        made = {world: make(world) for world in dict.fromkeys(self.worlds)}
+        return [made[world] for world in self.worlds]
 
     def _walls(self, world: World) -> np.ndarray:
         walls = ~self.grid.exists
@@ -102,6 +111,7 @@ def allocate(
         "worlds": np.zeros((names.WORLD_ROWS, n_worlds), np.int32),
         "queen_streams": np.atleast_1d(stream_state(seeds, STREAM_QUEEN, 0)).astype(np.uint64),
         "seeds": seeds.copy(),
+        "rewards": rewards.REWARDS.by_event(),
         "returns": np.zeros(n_worlds, np.int64),
         "tallies": np.zeros((names.TALLY_ROWS, n_worlds * chunks), np.int32),
         "homes": np.zeros((names.HOME_ROWS, max(1, n_worlds * homes)), np.int32),

@@ -8,17 +8,17 @@ from types import SimpleNamespace
 
 import taichi as ti
 
-from taichi_ants.constants import REWARD_GIVE
+from taichi_ants.constants import DELIVERED
 from taichi_ants.engines.colony_arrays import (
     ACTION,
-    DELIVERED,
+    DELIVERIES,
     DYING,
+    EVENT,
     FIRST_VACANT,
     LIFE,
     LIVING,
     NEWBORN,
     NUMBER,
-    REWARD,
     RUNNING,
     STATE,
     TOP,
@@ -44,6 +44,7 @@ from taichi_ants.engines.colony_life import (
 from taichi_ants.engines.colony_steps import commit, grow_old, observe, resolve, want
 from taichi_ants.engines.colony_trail import diffused, evaporate
 from taichi_ants.engines.run_learning import TABLE
+from taichi_ants.engines.trial import tried
 from taichi_ants.learners.registry import Learner
 
 
@@ -77,7 +78,7 @@ def phases(learner: Learner, sharing: str, own: bool, dense: bool, lively: bool)
     on_policy = learns and learner.draws_next_action
     plans = learns and learner.plans
     shared_plans = plans and not alone
-    td_error = learner.td_error
+    td_error = tried(learner) if learns else None
 
     @ti.func
     def choose_all(c: ti.template(), k: ti.template(), chunk):
@@ -100,11 +101,11 @@ def phases(learner: Learner, sharing: str, own: bool, dense: bool, lively: bool)
     @ti.func
     def commit_all(c: ti.template(), k: ti.template(), chunk, tick):
         w, first, last = ants_of(c, k, chunk)
-        total = 0
+        total = ti.cast(0, ti.i64)
         for ant in range(first, last):
             if c.worlds[RUNNING, w] == 1 and c.ants[LIFE, ant] == LIVING:
-                total += commit(c, k, dense, w * k.size, ant, chunk, tick)
-        c.returns[w] += ti.cast(total, ti.i64)  # atomic, and integer: the order does not matter
+                total += c.rewards[commit(c, k, dense, w * k.size, ant, chunk, tick)]
+        c.returns[w] += total  # atomic, and integer: the order does not matter
 
     @ti.func
     def grow_old_all(c: ti.template(), k: ti.template(), chunk):
@@ -143,7 +144,7 @@ def phases(learner: Learner, sharing: str, own: bool, dense: bool, lively: bool)
                 next_action = -1
                 if life != NEWBORN:
                     if ti.static(on_policy):
-                        gave = c.ants[REWARD, ant] == REWARD_GIVE
+                        gave = c.ants[EVENT, ant] == DELIVERED
                         if not gave or k.continuing == 1:
                             table = (ant if ti.static(alone) else w) * TABLE
                             next_action = draw_action(c, w, table, ant, seen)
@@ -183,7 +184,7 @@ def phases(learner: Learner, sharing: str, own: bool, dense: bool, lively: bool)
 
     @ti.func
     def stop_at_delivery(c: ti.template(), k: ti.template(), w):
-        if k.ends_at_delivery == 1 and c.worlds[DELIVERED, w] > 0:
+        if k.ends_at_delivery == 1 and c.worlds[DELIVERIES, w] > 0:
             c.worlds[RUNNING, w] = 0
 
     @ti.func

@@ -10,7 +10,9 @@ import taichi as ti
 from taichi.math import popcnt
 
 from taichi_ants.constants import (
+    DELIVERED,
     EMPTY,
+    FAILED,
     FOOD,
     FORWARD,
     GIVE,
@@ -18,9 +20,7 @@ from taichi_ants.constants import (
     N_HEADINGS,
     OBSTACLE,
     PICK_UP,
-    REWARD_FAILED,
-    REWARD_GIVE,
-    REWARD_PICK_UP,
+    PICKED_UP,
     RIGHT,
 )
 from taichi_ants.engines.colony_arrays import (
@@ -29,11 +29,11 @@ from taichi_ants.engines.colony_arrays import (
     CARRIES,
     CELL,
     DYING,
+    EVENT,
     HEADING,
     HOME_TAKEN,
     LIFE,
     LIVING,
-    REWARD,
     STATE,
     T_BLOCKED,
     T_DIED,
@@ -44,7 +44,7 @@ from taichi_ants.engines.colony_arrays import (
 from taichi_ants.engines.colony_trail import deposit, level_in_view
 from taichi_ants.rules.actions import (
     is_open,
-    move_reward,
+    move_event,
     step_towards,
     turn_round,
     turned_by,
@@ -165,14 +165,14 @@ def wins(c: ti.template(), base, cell, wanted, kind, tick):
 
 @ti.func
 def commit(c: ti.template(), k: ti.template(), dense: ti.template(), base, ant, chunk, tick):
-    """Do what was won: move, take, give, deposit; the reward."""
+    """Do what was won: move, take, give, deposit; the event."""
     clock = tick * k.evaporates
     action, cell, wanted = c.ants[ACTION, ant], c.ants[CELL, ant], c.ants[WANT, ant]
     moves = action <= RIGHT
     enters = moves and wanted >= 0
     destination = ti.select(enters, wanted, cell)
     code = code_in_view(c.ants[STATE, ant], ti.min(action, RIGHT))
-    reward = ti.select(enters, move_reward(code), REWARD_FAILED)
+    event = ti.select(enters, move_event(code), FAILED)
     c.ground[base + cell] = EMPTY
     c.ground[base + destination] = OBSTACLE  # and nothing wanted any more
     c.ants[CELL, ant] = destination
@@ -182,19 +182,19 @@ def commit(c: ti.template(), k: ti.template(), dense: ti.template(), base, ant, 
         if enters:
             deposit(c, k, dense, base + destination, clock)
         elif action == GIVE and goals_in_view(c.ants[STATE, ant]) != 0:
-            reward = REWARD_GIVE
+            event = DELIVERED
             c.ants[CARRIES, ant] = 0
             c.tallies[T_GIVES, chunk] += 1
     elif action == PICK_UP and wanted >= 0:
-        reward = REWARD_PICK_UP
+        event = PICKED_UP
         c.ground[base + wanted] = EMPTY
         take_from_home(c, k, base, wanted, tick)
         deposit(c, k, dense, base + wanted, clock)
         deposit(c, k, dense, base + cell, clock)
         c.ants[HEADING, ant] = turn_round(c.ants[HEADING, ant])
         c.ants[CARRIES, ant] = 1
-    c.ants[REWARD, ant] = reward
-    return reward
+    c.ants[EVENT, ant] = event
+    return event
 
 
 @ti.func

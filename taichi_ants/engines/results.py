@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from taichi_ants import results
 from taichi_ants.config import TrainingConfig
-from taichi_ants.constants import N_ACTIONS
+from taichi_ants.constants import N_ACTIONS, N_STATES
+from taichi_ants.engines import training_files
+from taichi_ants.engines.records import Record
+from taichi_ants.errors import AntsError, shown
 from taichi_ants.worlds.world import World
+
+# What the arrays of a result come from.
+_MAKERS = ("world", "configs", "seeds", "max_steps", "evaporation")
+_PAIRS = N_STATES * N_ACTIONS
+_SUMMED_UP, _LISTED = 50, 6  # episodes and configurations that a result shows
 
 
 @dataclass(frozen=True)
@@ -38,8 +47,8 @@ class LearnerCost:
         return {**vars(self), "nanoseconds_per_step": self.nanoseconds_per_step}
 
 
-@dataclass(frozen=True)
-class RunState:
+@dataclass(frozen=True, eq=False, repr=False)
+class RunState(Record):
     """Where runs stopped; training goes on from it bit for bit.
 
     Attributes (leading axes: the runs, for example (configurations, seeds)):
@@ -69,11 +78,11 @@ class RunState:
             array[index] = getattr(part, name)
 
 
-@dataclass(frozen=True)
-class TrainingResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class TrainingResult(Record):
     """What `train` returns.
 
-    C configurations, S seeds, E episodes.
+    C configurations, S seeds, E episodes. Two results are equal if all but their costs is.
 
     Attributes:
         world: The world trained in.
@@ -86,6 +95,10 @@ class TrainingResult:
         deliveries: int32 (C, S, E), 1 where the food was given to the queen.
         costs: What the learners took, one entry for each learner and number of planning steps.
         state: Where the runs stopped, leading axes (C, S).
+
+    Raises:
+        AntsError: The arrays do not belong to the configurations and seeds; or a copy by
+            `dataclasses.replace` claims to be of another training.
     """
 
     world: World
@@ -96,8 +109,22 @@ class TrainingResult:
     returns: np.ndarray
     steps: np.ndarray
     deliveries: np.ndarray
-    costs: tuple[LearnerCost, ...]
+    costs: tuple[LearnerCost, ...] = field(compare=False)
     state: RunState
+    # What the arrays come from; a copy keeps it, so that it cannot claim to be something else.
+    _made_by: tuple = field(default=(), compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        for name, was in zip(_MAKERS, self._made_by, strict=False):
+            if getattr(self, name) != was:
+                raise AntsError(
+                    f"{name} cannot be replaced in a result, whose arrays come from others; train "
+                    "anew with the ones that you want."
+                )
+        object.__setattr__(self, "_made_by", tuple(getattr(self, name) for name in _MAKERS))
+        if not isinstance(self.state, RunState):
+            raise AntsError(f"state of a result is {shown(self.state)}; it must be a RunState.")
+        self.check()
 
     @property
     def episodes(self) -> int:
@@ -109,9 +136,97 @@ class TrainingResult:
         """The action values at the end, float32 (C, S, 128, 5), a copy."""
         return self.state.q[..., :N_ACTIONS].copy()
 
+    def save(self, path: results.PathLike) -> None:
+        """Write the result; training goes on from what `load` reads, bit for bit.
 
-@dataclass(frozen=True)
-class Rollouts:
+        Raises:
+            AntsError: The file cannot be written.
+        """
+        training_files.save_training(self, path)
+
+    @classmethod
+    def load(cls, path: results.PathLike) -> TrainingResult:
+        """Read a result that `save` wrote.
+
+        Raises:
+            AntsError: The file is missing, damaged, or holds no training result.
+        """
+        return training_files.load_training(cls, path)
+
+    def __repr__(self) -> str:
+        last = slice(-_SUMMED_UP, None)
+        lines = [
+            f"world: {self.world}",
+            f"seeds: {len(self.seeds)}, from {min(self.seeds)} to {max(self.seeds)}",
+            f"episodes: {self.episodes}, of at most {self.max_steps} steps each",
+            f"evaporation: {self.evaporation}",
+            f"means over seeds and the last {min(_SUMMED_UP, self.episodes)} episodes:",
+        ]
+        for c, config in enumerate(self.configs[:_LISTED]):
+            means = (array[c, :, last].mean() for array in self._outcomes)
+            line = "    {}\n        return {:.4g}, steps {:.4g}, deliveries {:.3g}"
+            lines.append(line.format(config, *means))
+        if len(self.configs) > _LISTED:
+            lines.append(f"    and {len(self.configs) - _LISTED} more configurations")
+        return "\n    ".join(["TrainingResult(", *lines]) + "\n)"
+
+    @property
+    def _outcomes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return self.returns, self.steps, self.deliveries
+
+    def _check_forms(self) -> None:
+        """Raises AntsError if an array has not the type and shape that it must have."""
+        runs = (len(self.configs), len(self.seeds))
+        plans = any(config.planning_steps for config in self.configs)
+        model = (*runs, _PAIRS if plans or np.shape(self.state.slots)[2:] == (_PAIRS,) else 1)
+        episodes = np.shape(self.returns)[2] if np.ndim(self.returns) == 3 else 0
+        outcome = ("int32", (*runs, episodes))
+        forms = {
+            **dict.fromkeys(("returns", "steps", "deliveries"), outcome),
+            "q": ("float32", (*runs, N_STATES, 8)),
+            "random_states": ("uint64", runs),
+            "exploration": ("float64", (*runs, 3)),
+            "settings": ("int32", (*runs, 3)),
+            **dict.fromkeys(("entries", "slots"), ("int32", model)),
+        }
+        arrays = {**vars(self), **vars(self.state)}
+        for name, (kind, shape) in forms.items():
+            array = arrays[name]
+            if not isinstance(array, np.ndarray) or (array.dtype, array.shape) != (kind, shape):
+                raise AntsError(
+                    f"{name} of a result is {shown(array)}; for {runs[0]} configurations and "
+                    f"{runs[1]} seeds it must be an array of shape {shape} and type {kind}."
+                )
+
+    def check(self) -> None:
+        """Make sure that training can go on from the arrays, which kernels believe.
+
+        Raises:
+            AntsError: It cannot.
+        """
+        self._check_forms()
+        state = self.state
+        given = [
+            [(c.epsilon_decay, c.min_epsilon, c.planning_steps, c.delivery == "continuing")]
+            for c in self.configs
+        ]
+        kept = np.concatenate([state.exploration[..., 1:], state.settings[..., :2]], axis=2)
+        epsilon, visited = state.exploration[..., 0], state.settings[..., 2]
+        seen = np.count_nonzero(state.slots, axis=2)
+        if not (
+            (kept == given).all()
+            and ((epsilon >= 0) & (epsilon <= 1)).all()
+            and (visited == seen).all()
+            and ((state.slots >= 0) & (state.slots <= seen[..., None])).all()
+        ):
+            raise AntsError(
+                "the state of a result does not go with its configurations, or its models do not "
+                "add up; leave the arrays of a result as they are."
+            )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Rollouts(Record):
     """What `evaluate` returns: int32 arrays of shape q_values.shape[:-2] + (rollouts,)."""
 
     returns: np.ndarray

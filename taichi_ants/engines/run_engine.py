@@ -7,11 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from taichi_ants import runtime
+from taichi_ants import rewards, runtime
 from taichi_ants.engines.launches import Launch, plan_launches
 from taichi_ants.engines.packing import compass_of, pack_cells
 from taichi_ants.engines.results import RunState
-from taichi_ants.errors import AntsError
 from taichi_ants.learners.registry import Learner
 from taichi_ants.worlds.world import World
 
@@ -37,7 +36,12 @@ class RunEngine:
         self._evaporation = evaporation
         self._settings = settings
         self._size = world.grid.size
-        self._shared = (pack_cells(world), world.closer().copy(), compass_of(world.grid))
+        self._shared = (
+            pack_cells(world),
+            world.closer().copy(),
+            compass_of(world.grid),
+            rewards.REWARDS.by_event(),
+        )
 
     def run(
         self,
@@ -67,7 +71,7 @@ class RunEngine:
         from taichi_ants.engines.run_kernels import EXTRA_CELLS, run_kernel
 
         kernel = run_kernel(learner)
-        self._compile(kernel, learner)
+        self._compile(kernel)
         per_run = self._size + EXTRA_CELLS
         on_cpu = self._settings.arch == "cpu"
         workers = self._settings.threads if on_cpu else _PARALLEL_RUNS_ON_GPU
@@ -103,60 +107,53 @@ class RunEngine:
         state: RunState,
         episodes: int,
         streams: np.ndarray | None = None,
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Do the episodes of one run and record each of the n steps.
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Do the episodes of runs in one launch and record each of their n steps, run by run.
 
-        Args as in `run`, with arrays of one run.
+        Args as in `run`; with learning, arrays of one run.
 
         Returns:
-            int32 (n, 10) in the columns `TRACE`; TD errors float32 (n,) and Q-tables float32
-            (n, 128, 8) after each step, both empty without learning.
+            The run of each step, int64 (n,); int32 (n, 10) in the columns `TRACE`; TD errors
+            float32 (n,) and Q-tables float32 (n, 128, 8) after each step, both of no use without
+            learning.
         """
         # Taichi is imported once it is configured, see `runtime`.
         from taichi_ants.engines.run_kernels import EXTRA_CELLS, TRACE, run_kernel
 
-        capacity = episodes * self._max_steps
-        integers = np.zeros((capacity, len(TRACE)), dtype=np.int32)
+        n_runs, capacity = len(seeds), episodes * self._max_steps
+        integers = np.zeros((n_runs * capacity, len(TRACE)), dtype=np.int32)
         learned = capacity if learner is not None else 1
         errors = np.zeros(learned, dtype=np.float32)
         tables = np.empty((learned, *state.q.shape[1:]), dtype=np.float32)
-        outcomes = np.zeros((3, 1, episodes), dtype=np.int32)
+        outcomes = np.zeros((3, n_runs, episodes), dtype=np.int32)
         drawn = np.zeros(1, dtype=np.uint64) if streams is None else streams
         kernel = run_kernel(learner, traced=True)
-        self._compile(kernel, learner)
+        self._compile(kernel)
         kernel(
-            *self._shared_arguments(1, episodes),
-            *_run_arguments(state, self._starts(seeds), rates, slice(0, 1), drawn),
-            np.empty(self._size + EXTRA_CELLS, dtype=np.int32),
+            *self._shared_arguments(n_runs, episodes),
+            *_run_arguments(state, self._starts(seeds), rates, slice(0, n_runs), drawn),
+            np.empty(n_runs * (self._size + EXTRA_CELLS), dtype=np.int32),
             *outcomes,
             integers,
             errors,
             tables.reshape(-1),
         )
-        n = int(outcomes[1].sum())
-        return integers[:n], errors[:n], tables[:n]
+        lengths = outcomes[1].sum(axis=1)
+        runs = np.repeat(np.arange(n_runs), lengths)
+        n = len(runs)
+        rows = np.arange(n) + (np.arange(n_runs) * capacity - (lengths.cumsum() - lengths))[runs]
+        return runs, integers[rows], errors[:n], tables[:n]
 
     def _shared_arguments(self, n_runs: int, n_episodes: int) -> tuple:
         """The kernel's arguments that all runs share."""
         sizes = (n_runs, n_episodes, self._max_steps, int(self._evaporation), self._size)
         return (*sizes, *self._shared)
 
-    def _compile(self, kernel: Callable[..., None], learner: Learner | None) -> None:
+    def _compile(self, kernel: Callable[..., None]) -> None:
         """Launch a kernel on nothing, so that its compilation is not counted as work."""
-        import taichi as ti
-
         nothing = [np.zeros(1, kind) for kind in _RUN_DTYPES]
         outcomes = np.zeros((3, 1, 1), dtype=np.int32)
-        try:
-            kernel(*self._shared_arguments(0, 0), *nothing, *outcomes, *_NO_TRACE)
-        except (ti.TaichiCompilationError, RuntimeError) as error:
-            if learner is None:
-                raise
-            reason = str(error).strip().splitlines()[-1].rstrip(".")
-            raise AntsError(
-                f"the TD error of learner {learner.name!r} does not compile: {reason}; see "
-                "taichi_ants.learners.Learner for what it takes and returns."
-            ) from error
+        kernel(*self._shared_arguments(0, 0), *nothing, *outcomes, *_NO_TRACE)
 
     def _clock(self) -> float:
         """Seconds of all threads of this process on the CPU, which other processes do not slow."""

@@ -9,6 +9,7 @@ from functools import cache
 
 import taichi as ti
 
+from taichi_ants.constants import DELIVERED
 from taichi_ants.engines.run_learning import (
     MODEL,
     ROW,
@@ -20,6 +21,7 @@ from taichi_ants.engines.run_learning import (
     values_of,
 )
 from taichi_ants.engines.run_step import EXTRA_CELLS, Ant, act, observe, restore
+from taichi_ants.engines.trial import tried
 from taichi_ants.learners.registry import Learner
 from taichi_ants.rules.policy import choose
 from taichi_ants.rules.random_bits import advance, bits_of
@@ -42,7 +44,7 @@ TRACE = (
     "reward",
     "next_state",
     "terminated",
-    "delivered",
+    "event",
 )
 
 
@@ -50,12 +52,12 @@ TRACE = (
 def run_kernel(learner: Learner | None, traced: bool = False) -> Callable[..., None]:
     """The kernel for one learner, or for a fixed policy (None); it is compiled on first use.
 
-    With `traced` each step is recorded too; such a kernel takes one run at a time.
+    With `traced` each step is recorded too, in `n_episodes * max_steps` rows for each run.
     """
     learns = learner is not None
     on_policy = learns and learner.draws_next_action
     plans = learns and learner.plans
-    td_error = learner.td_error if learns else None
+    td_error = tried(learner) if learns else None
 
     @ti.func
     def decide(q: ti.template(), table, ant, state, explore_below):
@@ -64,12 +66,14 @@ def run_kernel(learner: Learner | None, traced: bool = False) -> Callable[..., N
         return choose(values_of(q, table, state), bits_of(rng), explore_below), rng
 
     @ti.func
-    def record(trace: ti.template(), row, episode, step, before, state, action, after, seen, ended):
+    def record(
+        trace: ti.template(), row, episode, step, before, state, action, reward, seen, ended, event
+    ):
         """Write the integers of a step."""
         trace[row, 0], trace[row, 1] = episode, step
         trace[row, 2], trace[row, 3] = before.cell, before.heading
-        trace[row, 4], trace[row, 5], trace[row, 6] = state, action, after.reward
-        trace[row, 7], trace[row, 8], trace[row, 9] = seen, ended, after.delivered
+        trace[row, 4], trace[row, 5], trace[row, 6] = state, action, reward
+        trace[row, 7], trace[row, 8], trace[row, 9] = seen, ended, event
 
     @ti.kernel
     def run(
@@ -81,6 +85,7 @@ def run_kernel(learner: Learner | None, traced: bool = False) -> Callable[..., N
         world: _I32,
         closer: _U8,
         compass: _I32,
+        rewards: _I32,
         starts: _I32,
         rates_of: _F32,
         exploration: _F64,
@@ -103,7 +108,7 @@ def run_kernel(learner: Learner | None, traced: bool = False) -> Callable[..., N
             base, table, model = i * (size + EXTRA_CELLS), i * TABLE, i * MODEL
             restore(cells, world, base, size, 0, size - 1)
             rng, epsilon = random_states[i], exploration[3 * i]
-            n_visited, n_recorded = settings[3 * i + 2], 0
+            n_visited, n_recorded = settings[3 * i + 2], i * n_episodes * max_steps
             for episode in range(n_episodes):
                 if ti.static(not learns):
                     rng = streams[i * n_episodes + episode]
@@ -114,16 +119,17 @@ def run_kernel(learner: Learner | None, traced: bool = False) -> Callable[..., N
                 state = observe(cells, closer, compass, base, ant, clock)
                 if ti.static(on_policy):
                     next_action, ant.random_state = decide(q, table, ant, state, explore_below)
-                while step < max_steps and ant.delivered == 0:
+                while step < max_steps and ant.event != DELIVERED:
                     action = next_action
                     if ti.static(not on_policy):
                         action, ant.random_state = decide(q, table, ant, state, explore_below)
                     before = ant
                     ant = act(cells, compass, base, size, ant, state, action, clock)
                     clock += evaporation
-                    total += ant.reward
+                    reward = rewards[ant.event]
+                    total += reward
                     seen = observe(cells, closer, compass, base, ant, clock)
-                    ended = ant.delivered & (1 - settings[3 * i + 1])
+                    ended = ti.cast(ant.event == DELIVERED, ti.i32) & (1 - settings[3 * i + 1])
                     if ti.static(on_policy):
                         next_action = -1
                         if ended == 0:
@@ -132,18 +138,18 @@ def run_kernel(learner: Learner | None, traced: bool = False) -> Callable[..., N
                             )
                     if ti.static(learns):
                         pair = state * ROW + action
-                        reward = ant.reward
                         error = update(
                             td_error, q, table, rates, pair, reward, ended, seen, next_action
                         )
                         if ti.static(plans):
                             n_visited = remember(
-                                entries, slots, model, n_visited, pair, reward, ended, seen
+                                entries, slots, model, n_visited, pair, ant.event, ended, seen
                             )
                             ant.random_state = plan(
                                 td_error,
                                 q,
                                 entries,
+                                rewards,
                                 table,
                                 model,
                                 rates,
@@ -154,7 +160,7 @@ def run_kernel(learner: Learner | None, traced: bool = False) -> Callable[..., N
                         if ti.static(traced):
                             trace_errors[n_recorded] = error
                             for k in range(TABLE):
-                                trace_tables[n_recorded * TABLE + k] = q[k]
+                                trace_tables[n_recorded * TABLE + k] = q[table + k]
                     if ti.static(traced):
                         record(
                             trace,
@@ -164,16 +170,17 @@ def run_kernel(learner: Learner | None, traced: bool = False) -> Callable[..., N
                             before,
                             state,
                             action,
-                            ant,
+                            reward,
                             seen,
                             ended,
+                            ant.event,
                         )
                         n_recorded += 1
                     state = seen
                     step += 1
                 rng = ant.random_state
                 returns[i, episode], steps[i, episode] = total, step
-                deliveries[i, episode] = ant.delivered
+                deliveries[i, episode] = ti.cast(ant.event == DELIVERED, ti.i32)
                 first, last = cells[base + size], cells[base + size + 1]
                 restore(cells, world, base, size, first, last)
                 epsilon = ti.max(exploration[3 * i + 2], epsilon * exploration[3 * i + 1])

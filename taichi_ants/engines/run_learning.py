@@ -10,7 +10,7 @@ TABLE = N_STATES * ROW
 MODEL = N_STATES * N_ACTIONS
 
 # A model entry packs a visited pair (its offset in the table) and its last seen outcome.
-_NEXT_AT, _REWARD_AT, _ENDED_AT = 10, 17, 21
+_NEXT_AT, _EVENT_AT, _ENDED_AT = 10, 17, 20
 
 # What an update needs to know of the run: f32 all.
 Rates = ti.types.struct(learning_rate=ti.f32, discount=ti.f32, epsilon=ti.f32)
@@ -43,9 +43,9 @@ def update(
 
 
 @ti.func
-def pack_entry(pair, reward, ended, state):
+def pack_entry(pair, event, ended, state):
     """A model entry: what was seen last of a pair."""
-    return pair | state << _NEXT_AT | (reward + 1) << _REWARD_AT | ended << _ENDED_AT
+    return pair | state << _NEXT_AT | event << _EVENT_AT | ended << _ENDED_AT
 
 
 @ti.func
@@ -61,9 +61,9 @@ def entry_next_state(entry):
 
 
 @ti.func
-def entry_reward(entry):
-    """The reward of a model entry."""
-    return (entry >> _REWARD_AT & 15) - 1
+def entry_event(entry):
+    """The event of a model entry."""
+    return entry >> _EVENT_AT & 7
 
 
 @ti.func
@@ -74,7 +74,7 @@ def entry_ended(entry):
 
 @ti.func
 def remember(
-    entries: ti.template(), slots: ti.template(), model, n_visited, pair, reward, ended, state
+    entries: ti.template(), slots: ti.template(), model, n_visited, pair, event, ended, state
 ):
     """Store what was seen last of a pair, new pairs in visiting order; the number of them."""
     count = n_visited
@@ -82,7 +82,7 @@ def remember(
     if slots[key] == 0:
         count += 1
         slots[key] = count
-    entries[model + slots[key] - 1] = pack_entry(pair, reward, ended, state)
+    entries[model + slots[key] - 1] = pack_entry(pair, event, ended, state)
     return count
 
 
@@ -91,6 +91,7 @@ def plan(
     td_error: ti.template(),
     q: ti.template(),
     entries: ti.template(),
+    rewards: ti.template(),
     table,
     model,
     rates,
@@ -109,7 +110,7 @@ def plan(
             table,
             rates,
             entry_pair(entry),
-            entry_reward(entry),
+            rewards[entry_event(entry)],
             entry_ended(entry),
             entry_next_state(entry),
             -1,

@@ -4,18 +4,18 @@ import taichi as ti
 from taichi.math import popcnt
 
 from taichi_ants.constants import (
+    DELIVERED,
     DEPOSIT_LEVEL,
+    FAILED,
     FORWARD,
     GIVE,
     LEFT,
     N_HEADINGS,
     PICK_UP,
-    REWARD_FAILED,
-    REWARD_GIVE,
-    REWARD_PICK_UP,
+    PICKED_UP,
     RIGHT,
 )
-from taichi_ants.rules.actions import is_open, move_reward, step_towards, turn, turn_round
+from taichi_ants.rules.actions import is_open, move_event, step_towards, turn, turn_round
 from taichi_ants.rules.policy import bit_number, lowest_bit_number
 from taichi_ants.rules.random_bits import advance, below, bits_of, high_word
 from taichi_ants.rules.vision import (
@@ -26,13 +26,12 @@ from taichi_ants.rules.vision import (
     state_index,
 )
 
-# An ant, and what its last action brought.
+# An ant, and what came of its last action.
 Ant = ti.types.struct(
     cell=ti.i32,
     heading=ti.i32,
     carries=ti.i32,
-    reward=ti.i32,
-    delivered=ti.i32,
+    event=ti.i32,
     random_state=ti.u64,
 )
 
@@ -97,13 +96,13 @@ def observe(cells: ti.template(), closer: ti.template(), compass: ti.template(),
 
 @ti.func
 def act(cells: ti.template(), compass: ti.template(), base, size, ant, state, action, clock):
-    """The ant after its action, with the reward; the cells it changes are changed."""
+    """The ant after its action, with the event; the cells it changes are changed."""
     after = ant
-    after.reward = REWARD_FAILED
+    after.event = FAILED
     if action <= RIGHT:
         after.heading = turn(compass, ant.heading, action)
         code = code_in_view(state, action)
-        after.reward = move_reward(code)
+        after.event = move_event(code)
         if is_open(code):
             after.cell += step_towards(compass, after.heading, FORWARD)
             if ant.carries == 1:
@@ -121,9 +120,8 @@ def act(cells: ti.template(), compass: ti.template(), base, size, ant, state, ac
             deposit(cells, base, size, ant.cell, clock)
             after.heading = turn_round(ant.heading)
             after.carries = 1
-            after.reward = REWARD_PICK_UP
+            after.event = PICKED_UP
         elif goals != 0 and action == GIVE and ant.carries == 1:
             after.carries = 0
-            after.delivered = 1
-            after.reward = REWARD_GIVE
+            after.event = DELIVERED
     return after

@@ -11,18 +11,21 @@ from taichi_ants import learners, runtime
 from taichi_ants.config import TrainingConfig
 from taichi_ants.constants import N_ACTIONS, N_STATES, STREAM_ANT, STREAM_ROLLOUT
 from taichi_ants.engines.checks import (
+    check_finite,
     checked_configs,
     checked_count,
     checked_max_steps,
+    checked_progress,
     checked_q_values,
     checked_seeds,
     checked_seeds_for,
     checked_share,
+    checked_task,
     checked_world,
 )
 from taichi_ants.engines.results import LearnerCost, Rollouts, RunState, TrainingResult
 from taichi_ants.engines.run_engine import Progress, RunEngine
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, checked_flag, shown
 from taichi_ants.randomness import stream_state
 from taichi_ants.worlds.world import World
 
@@ -63,13 +66,14 @@ def train(
     """
     configs = checked_configs(configs)
     seeds = checked_seeds(seeds)
+    checked_task(world)
     none_yet = np.zeros((len(configs), len(seeds), 0), dtype=np.int32)
     start = TrainingResult(
-        world=checked_world(world),
+        world=world,
         configs=configs,
         seeds=seeds,
         max_steps=checked_max_steps(max_steps),
-        evaporation=bool(evaporation),
+        evaporation=checked_flag("evaporation", evaporation),
         returns=none_yet,
         steps=none_yet,
         deliveries=none_yet,
@@ -104,8 +108,11 @@ def continue_training(
         AntsError: An argument is not allowed; the message names it.
     """
     if not isinstance(result, TrainingResult):
-        raise AntsError(f"result is {result!r}; give what train has returned.")
+        raise AntsError(f"result is {shown(result)}; give what train has returned.")
+    result.check()
+    checked_configs(result.configs)
     episodes = checked_count("episodes", episodes)
+    progress = checked_progress(progress)
     settings = runtime.start(threads, arch)
     state = result.state.take(...)
     shape = (len(result.configs), len(result.seeds))
@@ -124,6 +131,8 @@ def continue_training(
             episodes,
             progress=work.part(group),
         ).reshape(3, len(group), shape[1], episodes)
+        trained = [result.configs[c] for c in group]
+        check_finite(runs.q, trained, result.seeds)
         state.put(group, _shaped(runs, (len(group), shape[1])))
         steps = int(outcomes[1, group].sum(dtype=np.int64))
         costs.append(LearnerCost(config.learner, config.planning_steps, steps, engine.seconds))
@@ -175,9 +184,9 @@ def evaluate(
     rollouts = checked_count("rollouts", rollouts)
     epsilon = checked_share("epsilon", epsilon)
     max_steps = checked_max_steps(max_steps)
-    engine = RunEngine(
-        checked_world(world), max_steps, bool(evaporation), runtime.start(threads, arch)
-    )
+    evaporation = checked_flag("evaporation", evaporation)
+    progress = checked_progress(progress)
+    engine = RunEngine(checked_world(world), max_steps, evaporation, runtime.start(threads, arch))
     outcomes = engine.run(
         None,
         run_seeds,

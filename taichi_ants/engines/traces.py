@@ -5,18 +5,20 @@ The kernel is the one that trains and evaluates, compiled once more so that it r
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from taichi_ants import learners, runtime
 from taichi_ants.config import TrainingConfig
-from taichi_ants.constants import N_ACTIONS, N_STATES
+from taichi_ants.constants import DELIVERED, N_ACTIONS
 from taichi_ants.engines import checks
+from taichi_ants.engines.records import Record
 from taichi_ants.engines.results import RunState
 from taichi_ants.engines.run_engine import RunEngine
 from taichi_ants.engines.runs import fixed_policy_state, fresh_state, rates_of, rollout_streams
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, checked_flag
 from taichi_ants.learners.registry import Learner
 from taichi_ants.worlds.world import World
 
@@ -24,12 +26,12 @@ MAX_ROLLOUT_STEPS = 1_000_000
 MAX_TRAINING_STEPS = 100_000  # each keeps a Q-table of 4 KiB
 
 
-@dataclass(frozen=True)
-class Trace:
+@dataclass(frozen=True, eq=False, repr=False)
+class Trace(Record):
     """What happened in each of n steps; position, heading and state are those before the action.
 
     Attributes:
-        episodes: int32 (n,), number of the episode, from 0.
+        episodes: int32 (n,), number of the episode, from 0; of `trace_policies`, of the policy.
         steps: int32 (n,), number of the step in its episode, from 0.
         cells: int32 (n, 3), cube coordinates in normal form.
         headings: int32 (n,), 0 to 5.
@@ -96,6 +98,41 @@ def rollout(
     return _trace(world, None, seeds, rates, state, 1, max_steps, evaporation, streams)
 
 
+def trace_policies(
+    world: World,
+    q_values: np.ndarray,
+    seeds: Sequence[int],
+    max_steps: int = 600,
+    evaporation: bool = True,
+) -> Iterator[Trace]:
+    """Rollout 0 of each of many policies, some policies at a time.
+
+    Args:
+        world: The world.
+        q_values: float (n, 128, 5), action values of each policy.
+        seeds: Their seeds (n,); a seed may come several times.
+        max_steps, evaporation: As in `rollout`.
+
+    Yields:
+        The steps of the first policies, of the next ones, and so on, in order.
+
+    Raises:
+        AntsError: An argument is not allowed; the message names it.
+    """
+    tables = checks.checked_q_values(q_values)
+    checks.checked_world(world)
+    # A step takes ten times as much memory as a cell of the world.
+    per_policy = max(checks.checked_max_steps(max_steps), world.grid.size // 10)
+    for first in range(0, len(tables), size := max(1, MAX_ROLLOUT_STEPS // per_policy)):
+        some = tables[first : first + size]
+        words = np.array(seeds[first : first + size], dtype=object)
+        state = fixed_policy_state(some, epsilon=0.0)
+        streams = rollout_streams(words, np.zeros(1, dtype=int))
+        rates = np.zeros((len(some), 2), dtype=np.float32)
+        trace = _trace(world, None, words, rates, state, 1, max_steps, evaporation, streams)
+        yield replace(trace, episodes=trace.episodes + first)
+
+
 def trace_training(
     world: World,
     config: TrainingConfig,
@@ -108,7 +145,11 @@ def trace_training(
 
     Args and errors as in `train`; episodes * max_steps may not exceed 100 000.
     """
-    (config,) = checks.checked_configs(config)
+    checks.checked_task(world)
+    several = checks.checked_configs(config)
+    if len(several) > 1:
+        raise AntsError(f"config holds {len(several)} configurations; a trace is of one.")
+    (config,) = several
     seeds = checks.checked_seeds_for(seed, ())
     state = fresh_state((config,), seeds.tolist()).take(0)
     episodes = checks.checked_count("episodes", episodes)
@@ -134,16 +175,16 @@ def _trace(
         raise AntsError(
             f"episodes * max_steps is {capacity}; at most {most} steps can be traced, so lower one."
         )
-    engine = RunEngine(checks.checked_world(world), max_steps, bool(evaporation), runtime.start())
-    before = state.q[0].copy()
-    integers, errors, tables = engine.trace(learner, seeds, rates, state, episodes, streams)
-    (episode, step, cell, heading, states, action, reward, seen, ended, delivered) = integers.T
-    rows = np.arange(len(states))
-    chosen_from = np.broadcast_to(before, (len(states), N_STATES, before.shape[-1]))
+    evaporation = checked_flag("evaporation", evaporation)
+    engine = RunEngine(checks.checked_world(world), max_steps, evaporation, runtime.start())
+    before = state.q.copy()
+    runs, integers, errors, tables = engine.trace(learner, seeds, rates, state, episodes, streams)
+    (episode, step, cell, heading, states, action, reward, seen, ended, event) = integers.T
+    chosen_from, number = before, runs
     if learner is not None:
-        chosen_from = np.concatenate([before[None], tables[:-1]])
+        chosen_from, number = np.concatenate([before, tables[:-1]]), np.arange(len(states))
     return Trace(
-        episodes=episode,
+        episodes=runs.astype(np.int32) * episodes + episode,
         steps=step,
         cells=world.grid.cells(cell),
         headings=heading,
@@ -152,8 +193,8 @@ def _trace(
         rewards=reward,
         next_states=seen,
         terminated=ended.astype(bool),
-        delivered=delivered.astype(bool),
-        q_values=chosen_from[rows, states, :N_ACTIONS].copy(),
+        delivered=event == DELIVERED,
+        q_values=chosen_from[number, states, :N_ACTIONS],
         td_errors=None if learner is None else errors,
         tables=None if learner is None else tables[:, :, :N_ACTIONS],
     )

@@ -3,15 +3,13 @@
 import taichi as ti
 
 from taichi_ants.learners.registry import Learner
-from taichi_ants.rules.policy import best_value
 
 
 @ti.func
 def td_error(value, reward, discount, next_values, next_action, epsilon):
     """reward + discount * E Q(s', a') - Q(s, a) under the epsilon-greedy policy."""
-    total = next_values[0] + next_values[1] + next_values[2] + next_values[3] + next_values[4]
-    best = best_value(next_values)
-    expected = best + epsilon * (total * ti.f32(0.2) - best)
+    best = max(next_values)
+    expected = best + epsilon * (sum(next_values) * ti.f32(0.2) - best)
     return reward + discount * expected - value
 
 

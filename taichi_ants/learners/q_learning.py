@@ -3,13 +3,12 @@
 import taichi as ti
 
 from taichi_ants.learners.registry import Learner
-from taichi_ants.rules.policy import best_value
 
 
 @ti.func
 def td_error(value, reward, discount, next_values, next_action, epsilon):
     """reward + discount * max Q(s', .) - Q(s, a)."""
-    return reward + discount * best_value(next_values) - value
+    return reward + discount * max(next_values) - value
 
 
 Q_LEARNING = Learner("q_learning", td_error, summary="off-policy, towards the best next action")

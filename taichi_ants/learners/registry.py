@@ -6,8 +6,11 @@ a file beside this one and a line in `__init__.py`; or call `register` from a fi
 
 from __future__ import annotations
 
+import dis
+import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
+from types import FunctionType
 
 from taichi_ants.errors import AntsError
 
@@ -18,15 +21,18 @@ class Learner:
 
     Attributes:
         name: The name by which configurations call it.
-        td_error: A `ti.func` (value, reward, discount, next_values, next_action, epsilon) -> f32:
+        td_error: A `ti.func` (value, reward, discount, next_values, next_action, epsilon) -> float:
             the value of the state-action pair that is updated, the reward, the discount (0 where
             the transition terminated), the five action values of the next state, the next action
-            (-1 where none was drawn) and the current epsilon; all f32 but next_action (i32). The
-            engine adds learning_rate times the error to the value.
+            and the current epsilon; all f32 but next_action (i32). The engine adds learning_rate
+            times the error to the value. Python's max, min, sum and len work on next_values, and
+            next_values[a] takes any action a; all else is what Taichi allows in a `ti.func`.
         draws_next_action: The next action is drawn before the update and then taken (on-policy
-            learners that look at it).
+            learners); only then may td_error look at next_action, which is 0 to 4, and 0 where the
+            transition terminated.
         plans: The learner keeps a model of the last seen outcome of each visited pair and updates
-            from it `planning_steps` times after each step.
+            from it `planning_steps` times after each step. These updates have no next action, so
+            td_error may not look at it.
         summary: One line for listings.
     """
 
@@ -45,7 +51,8 @@ def register(learner: Learner) -> Learner:
 
     Raises:
         AntsError: The name is taken, or is not usable in files and on command lines; or the TD
-            error is no `ti.func`.
+            error is no `ti.func`, does not take six arguments, or looks at a next action that is
+            not drawn. What it computes is tried when it is first used.
     """
     if not isinstance(learner, Learner):
         raise AntsError(f"{learner!r} is not a Learner; wrap the TD error in Learner(name, ...).")
@@ -60,8 +67,29 @@ def register(learner: Learner) -> Learner:
         )
     if learner.name in _LEARNERS:
         raise AntsError(f"a learner named {learner.name!r} exists already; choose another name.")
+    _check_arguments(learner, learner.td_error.func.func)
     _LEARNERS[learner.name] = learner
     return learner
+
+
+def _check_arguments(learner: Learner, td_error: FunctionType) -> None:
+    arguments = list(inspect.signature(td_error).parameters)
+    if len(arguments) != 6:
+        raise AntsError(
+            f"the TD error of {learner.name!r} has {len(arguments)} arguments; it needs 6: value, "
+            "reward, discount, next_values, next_action and epsilon."
+        )
+    # Some instructions load two variables at once.
+    loaded = [i.argval for i in dis.get_instructions(td_error) if i.opname.startswith("LOAD")]
+    looks = any(arguments[4] in (one if isinstance(one, tuple) else (one,)) for one in loaded)
+    if looks and (learner.plans or not learner.draws_next_action):
+        advice = "register it with draws_next_action=True"
+        if learner.plans:
+            advice = "a learner that plans has none in its updates from the model"
+        raise AntsError(
+            f"the TD error of {learner.name!r} looks at {arguments[4]}, but no next action is "
+            f"drawn; {advice}."
+        )
 
 
 def get(name: str) -> Learner:

@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+import taichi_ants.rewards as rewards
 from taichi_ants.constants import (
     EMPTY,
     FOOD,
@@ -16,11 +17,6 @@ from taichi_ants.constants import (
     N_HEADINGS,
     PICK_UP,
     QUEEN,
-    REWARD_EMPTY,
-    REWARD_FAILED,
-    REWARD_GIVE,
-    REWARD_LURE,
-    REWARD_PICK_UP,
     SEES_EMPTY,
     SEES_GOAL,
     SEES_LURE,
@@ -147,11 +143,12 @@ def _move(world: WorldState, ant: Ant, codes: tuple[int, ...], action: int) -> t
     # The turn is made even if the way is blocked: so an ant gets out of a dead end.
     ant.heading = (ant.heading + action - 1) % N_HEADINGS
     if world.content(target) != EMPTY:
-        return REWARD_FAILED, Event.BLOCKED
+        return rewards.REWARDS.failed, Event.BLOCKED
     ant.cell = target
     if ant.carries:
         world.deposit(target)
-    return (REWARD_LURE if codes[action] == SEES_LURE else REWARD_EMPTY), Event.MOVED
+    table = rewards.REWARDS
+    return (table.lure if codes[action] == SEES_LURE else table.empty), Event.MOVED
 
 
 def _pick_up(
@@ -161,7 +158,7 @@ def _pick_up(
         cell for cell, code in zip(cells_in_view(ant), codes, strict=True) if code == SEES_GOAL
     ]
     if ant.carries or not foods:
-        return REWARD_FAILED, Event.FAILED
+        return rewards.REWARDS.failed, Event.FAILED
     chosen = foods[0]
     if len(foods) > 1:
         high, _ = stream.draw()
@@ -171,11 +168,11 @@ def _pick_up(
     world.deposit(ant.cell)
     ant.carries = True
     ant.heading = (ant.heading + 3) % N_HEADINGS
-    return REWARD_PICK_UP, Event.PICKED_UP
+    return rewards.REWARDS.pick_up, Event.PICKED_UP
 
 
 def _give(ant: Ant, codes: tuple[int, ...]) -> tuple[int, Event]:
     if not ant.carries or SEES_GOAL not in codes:
-        return REWARD_FAILED, Event.FAILED
+        return rewards.REWARDS.failed, Event.FAILED
     ant.carries = False
-    return REWARD_GIVE, Event.DELIVERED
+    return rewards.REWARDS.give, Event.DELIVERED

@@ -79,7 +79,7 @@ class ReferenceColony:
             raise AntsError(f"sharing is {sharing!r}; it must be one of {', '.join(SHARING)}.")
         self._start_world, self._config, self._training = world, config, training
         self._seed, self._sharing = seed, sharing
-        self._starts = start(world, seed, config.ants)
+        self._starts = start(world, seed, config.ants, config.start)
         self._initial_streams = [
             RandomStream(stream_state(seed, STREAM_ANT, number)) for number in range(config.ants)
         ]

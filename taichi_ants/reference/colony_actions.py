@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import taichi_ants.rewards as rewards
 from taichi_ants.constants import (
     GIVE,
     N_HEADINGS,
     PICK_UP,
-    REWARD_EMPTY,
-    REWARD_FAILED,
-    REWARD_GIVE,
-    REWARD_LURE,
-    REWARD_PICK_UP,
     SEES_EMPTY,
     SEES_GOAL,
     SEES_LURE,
@@ -111,12 +107,12 @@ def carry_out(
 def _commit(world: ColonyWorld, intent: Intent, wins: bool) -> Event:
     ant = intent.ant
     ant.action = intent.action
-    ant.reward = REWARD_FAILED
+    ant.reward = rewards.REWARDS.failed
     if intent.action == GIVE:
         if not intent.gives:
             return Event.FAILED
         ant.carries = False
-        ant.reward = REWARD_GIVE
+        ant.reward = rewards.REWARDS.give
         return Event.DELIVERED
     if intent.action == PICK_UP:
         if not wins:
@@ -124,7 +120,7 @@ def _commit(world: ColonyWorld, intent: Intent, wins: bool) -> Event:
         world.take_food(intent.target)
         ant.carries = True
         ant.heading = (ant.heading + 3) % N_HEADINGS
-        ant.reward = REWARD_PICK_UP
+        ant.reward = rewards.REWARDS.pick_up
         return Event.PICKED_UP
     # The turn is made even if the way is blocked: so an ant gets out of a dead end.
     ant.heading = intent.heading
@@ -133,5 +129,5 @@ def _commit(world: ColonyWorld, intent: Intent, wins: bool) -> Event:
     world.occupied.remove(ant.cell)
     world.occupied.add(intent.target)
     ant.cell = intent.target
-    ant.reward = REWARD_LURE if intent.lured else REWARD_EMPTY
+    ant.reward = rewards.REWARDS.lure if intent.lured else rewards.REWARDS.empty
     return Event.MOVED

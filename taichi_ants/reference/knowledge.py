@@ -77,7 +77,7 @@ class Knowledge:
             np.float32(reward),
             np.float32(0) if terminated else self._discount,
             self.rows[next_state],
-            -1 if next_action is None else next_action,
+            0 if next_action is None else next_action,
             np.float32(epsilon),
         )
 

@@ -17,7 +17,7 @@ from taichi_ants.errors import AntsError
 #   reward       of the step
 #   discount     0 where the transition terminated
 #   next_values  Q(s', .), 5 values
-#   next_action  a', an int; -1 where none was drawn
+#   next_action  a', an int; 0 where none was drawn
 #   epsilon      the present one
 # All numbers but next_action are np.float32, and so is the result.
 TdError = Callable[
@@ -79,7 +79,6 @@ def _td_error_q_learning(value, reward, discount, next_values, next_action, epsi
 
 
 def _td_error_sarsa(value, reward, discount, next_values, next_action, epsilon):
-    # a' is -1 only where the discount is 0: it does not matter which value it then takes.
     return (reward + discount * next_values[next_action]) - value
 
 

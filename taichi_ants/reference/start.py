@@ -14,11 +14,12 @@ if TYPE_CHECKING:
     from taichi_ants.worlds.world import World
 
 
-def start(world: World, seed: int, n: int = 1) -> list[tuple[Cell, int]]:
+def start(world: World, seed: int, n: int = 1, where: str = "nest") -> list[tuple[Cell, int]]:
     """Return cell and heading of each of n ants.
 
-    The ants that the world lists come first. The others take the free cells nearest to the queen,
-    ties in an order that depends on the seed, and a heading that depends on the seed.
+    The ants that the world lists come first. The others take free cells, those nearest to the
+    queen if `where` is "nest", any if it is "spread", otherwise in an order that depends on the
+    seed; and a heading that depends on the seed.
 
     Raises:
         AntsError: The world has too few free cells.
@@ -29,7 +30,11 @@ def start(world: World, seed: int, n: int = 1) -> list[tuple[Cell, int]]:
     state = WorldState(world, evaporation=False)
     taken = {cell for cell, _ in listed}
     free = [
-        (distance(cell, state.queen), stream_state(seed, STREAM_START_CELL, number), cell)
+        (
+            distance(cell, state.queen) if where == "nest" else 0,
+            stream_state(seed, STREAM_START_CELL, number),
+            cell,
+        )
         for number, cell in enumerate(existing_cells(state.ranges))
         if state.content(cell) == EMPTY and cell not in taken
     ]
@@ -39,8 +44,8 @@ def start(world: World, seed: int, n: int = 1) -> list[tuple[Cell, int]]:
             f"n is {n}; the world lists {len(listed)} ants and has {len(free)} free cells, "
             "so take fewer ants or a larger world."
         )
-    nearest = [cell for _, _, cell in sorted(free)[:missing]]
+    first = [cell for _, _, cell in sorted(free)[:missing]]
     return listed + [
         (cell, pick(stream_state(seed, STREAM_START_HEADING, ant) >> 32, N_HEADINGS))
-        for ant, cell in enumerate(nearest, start=len(listed))
+        for ant, cell in enumerate(first, start=len(listed))
     ]

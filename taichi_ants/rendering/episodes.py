@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants.engines.traces import Trace, rollout
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, checked_flag
 from taichi_ants.rendering.panel import Status
 from taichi_ants.rendering.replay import Replay
 from taichi_ants.rendering.scene import DEFAULT_SIZE, Scene, check_size, range_with_zero
@@ -123,8 +123,9 @@ def episode_frames(
         AntsError: The size is not allowed.
     """
     scene = _scene_of(episode, size, hud=hud, legend=legend, title=title)
+    seen = checked_flag("view", view)
     for snapshot, status in episode.moments():
-        yield scene.draw(snapshot if view else without_view(snapshot), status)
+        yield scene.draw(snapshot if seen else without_view(snapshot), status)
 
 
 def episode_picture(
@@ -146,7 +147,8 @@ def episode_picture(
         raise AntsError(f"there is no step {step!r}; the episode has 0 to {len(episode) - 1}.")
     scene = _scene_of(episode, size, hud=hud, legend=legend, title=title)
     snapshot, status = next(islice(episode.moments(), step, None))
-    return scene.draw(snapshot if view else without_view(snapshot), status)
+    seen = checked_flag("view", view)
+    return scene.draw(snapshot if seen else without_view(snapshot), status)
 
 
 def _scene_of(episode: Episode, size: tuple[int, int], **look: Any) -> Scene:

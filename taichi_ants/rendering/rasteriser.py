@@ -60,9 +60,16 @@ class Rasteriser:
         self._full_level = full_level
         self._ants_like = viewport.hexagon if ants_like is None else ants_like
         self._shown = (grid.exists if shown is None else shown).view(np.uint8)
-        self.kernels = _kernels()
         self._colours = np.zeros(grid.size, dtype=np.uint32)
         self._map = self._map_pixels() if self.has_hexagons else None
+
+    @property
+    def kernels(self) -> ModuleType:
+        """The kernels, with Taichi started: it has to be configured before it is imported."""
+        runtime.start()
+        from taichi_ants.rendering import raster_kernels
+
+        return raster_kernels
 
     @property
     def has_hexagons(self) -> bool:
@@ -234,11 +241,3 @@ class Rasteriser:
 
     def _layout(self) -> tuple[int, int, int]:
         return self.grid.width, self.grid.height, self.grid.ranges[2]
-
-
-def _kernels() -> ModuleType:
-    """The kernels, with Taichi started: it has to be configured before it is imported."""
-    runtime.start()
-    from taichi_ants.rendering import raster_kernels
-
-    return raster_kernels

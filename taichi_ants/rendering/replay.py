@@ -18,6 +18,7 @@ from taichi_ants.constants import (
     STREAM_ROLLOUT,
 )
 from taichi_ants.engines.traces import Trace
+from taichi_ants.errors import checked_flag
 from taichi_ants.randomness import Stream
 from taichi_ants.rendering.snapshot import Snapshot
 from taichi_ants.states import CELL_LETTERS, state_from_index
@@ -43,7 +44,7 @@ class Replay:
         self._cells = world.grid.index(trace.cells)
         self._ground = world.ground()
         self._trail = world.trail_levels()
-        self._evaporation = evaporation
+        self._evaporation = checked_flag("evaporation", evaporation)
         self._stream = Stream(seed, STREAM_ROLLOUT, number)
 
     def snapshots(self) -> Iterator[Snapshot]:

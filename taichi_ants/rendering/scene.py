@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from taichi_ants.constants import DEPOSIT_LEVEL, FOOD, QUEEN
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, checked_flag
 from taichi_ants.hexgrid import AxialGrid
 from taichi_ants.rendering import colours, panel, text
 from taichi_ants.rendering.panel import Status
@@ -72,8 +72,8 @@ class Scene:
         width, height = self.size = check_size(size)
         self._text_size = round(min(width, height) / 38)
         readable = self._text_size >= text.SMALLEST
-        self._hud = hud and readable
-        self._legend = legend and readable
+        self._hud = checked_flag("hud", hud) and readable
+        self._legend = checked_flag("legend", legend) and readable
         self._q_range = q_range
         margin = max(2, round(min(width, height) / 60))
         room = self._world_room(margin)

@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from taichi_ants.constants import LEFT, N_HEADINGS, REWARD_FAILED, RIGHT
+from taichi_ants.constants import FAILED, LEFT, N_HEADINGS, RIGHT
 
 # A compass is an i32 array of 38: the index steps to the left, forward and right cell of heading h
 # at h, h + 1 and h + 2, then the heading after each of the five actions, by action and heading
@@ -50,6 +50,6 @@ def is_open(code):
 
 
 @ti.func
-def move_reward(code):
-    """The reward of a move to a cell that looks like this: +1 for T and S, 0 for E, else -1."""
-    return ti.select(is_open(code), code >> 1, REWARD_FAILED)
+def move_event(code):
+    """What comes of a move to a cell that looks like this: ENTERED_EMPTY, ENTERED_LURE, FAILED."""
+    return ti.select(is_open(code), code, FAILED)

@@ -14,6 +14,12 @@ def larger(a, b):
 
 
 @ti.func
+def smaller(a, b):
+    """The smaller of two floats."""
+    return ti.select(a < b, a, b)
+
+
+@ti.func
 def best_value(values):
     """The largest of five action values (f32)."""
     return larger(larger(larger(values[0], values[1]), larger(values[2], values[3])), values[4])
@@ -46,9 +52,10 @@ def choose(values, bits, explore_below):
         action = below(low_word(bits), N_ACTIONS)
     else:
         best = best_value(values)
-        mask = 0
+        mask = (1 << N_ACTIONS) - 1
         for a in ti.static(range(N_ACTIONS)):
-            mask |= ti.cast(values[a] == best, ti.i32) << a
+            # Not `values[a] == best`: with values that are no numbers none would be left.
+            mask ^= ti.cast(values[a] < best, ti.i32) << a
         if mask & (mask - 1) == 0:  # one best action: nearly always, and well predicted
             action = lowest_bit_number(mask)
         else:

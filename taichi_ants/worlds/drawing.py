@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_ants.constants import MAX_TRAIL_LEVEL
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, shown
 from taichi_ants.hexgrid import axial
 
 EMPTY, OBSTACLE, FOOD, QUEEN, TRAIL = ".#FQt"
@@ -139,15 +139,15 @@ def _read_setting(where: str, name: str, text: str) -> tuple[str, list[int]]:
     if name == "trail":
         if len(values) != 1 or not 1 <= values[0] <= MAX_TRAIL_LEVEL:
             raise AntsError(
-                f"{where} sets trail to {text.strip()!r}; it must be a whole number "
+                f"{where} sets trail to {shown(text.strip())}; it must be a whole number "
                 f"from 1 to {MAX_TRAIL_LEVEL}."
             )
     elif name == "ants":
         if sorted(values) != list(range(len(values))) or not values:
             raise AntsError(
-                f"{where} sets ants to {text.strip()!r}; it must be the numbers of the drawn "
+                f"{where} sets ants to {shown(text.strip())}; it must be the numbers of the drawn "
                 "ants in reading order, each from 0 to their number less 1 once."
             )
     else:
-        raise AntsError(f"{where} sets {name!r}; the settings are trail and ants.")
+        raise AntsError(f"{where} sets {shown(name)}; the settings are trail and ants.")
     return name, values

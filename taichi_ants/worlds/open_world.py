@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, shown
 from taichi_ants.hexgrid import AxialGrid, axial, cube
-from taichi_ants.randomness import Stream, choose
+from taichi_ants.randomness import Stream, choose, whole
 from taichi_ants.worlds.validation import parse_ranges
 from taichi_ants.worlds.world import World
 
@@ -50,6 +50,7 @@ def open_world(
         AntsError: A share is not a number, below 0 or both above 0.9 together; the ranges are not
             allowed; or no food could be reached from the queen in 100 worlds drawn.
     """
+    seed = whole("seed", seed)
     rock_share = _share("rock_share", rock_share)
     food_share = _share("food_share", food_share)
     if rock_share + food_share > MAX_SHARE:
@@ -73,10 +74,10 @@ def open_world(
 def _share(name: str, value: object) -> float:
     try:
         share = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
+    except (OverflowError, TypeError, ValueError):
         share = np.nan
     if isinstance(value, (bool, str)) or not 0 <= share <= MAX_SHARE:
-        raise AntsError(f"{name} is {value!r}; it must be a number between 0 and {MAX_SHARE}.")
+        raise AntsError(f"{name} is {shown(value)}; it must be a number between 0 and {MAX_SHARE}.")
     return share
 
 

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, shown
 from taichi_ants.randomness import whole
 from taichi_ants.worlds.text_map import load_map
 from taichi_ants.worlds.world import World
@@ -27,11 +27,13 @@ def register(name: str, builder: Builder) -> None:
         AntsError: The name is taken or no name, or the builder cannot be called.
     """
     if not isinstance(name, str) or not name.strip():
-        raise AntsError(f"the world name {name!r} is not allowed; it must be text.")
+        raise AntsError(f"the world name {shown(name)} is not allowed; it must be text.")
     if name in _BUILDERS:
-        raise AntsError(f"a world named {name!r} is already registered; choose another name.")
+        raise AntsError(f"a world named {shown(name)} is already registered; choose another name.")
     if not callable(builder):
-        raise AntsError(f"the builder of {name!r} is {builder!r}; it must be a function of a seed.")
+        raise AntsError(
+            f"the builder of {shown(name)} is {shown(builder)}; it must be a function of a seed."
+        )
     _BUILDERS[name] = builder
 
 
@@ -55,14 +57,14 @@ def build(name_or_path: str | os.PathLike[str], seed: int = 0) -> World:
         world = _build(name_or_path, seed)
         if not isinstance(world, World):
             raise AntsError(
-                f"the builder of {name_or_path!r} returned a {type(world).__name__}; "
+                f"the builder of {shown(name_or_path)} returned a {type(world).__name__}; "
                 "it must return a World."
             )
         return world
     if not isinstance(name_or_path, (str, os.PathLike)):
-        raise AntsError(f"the world is {name_or_path!r}; {_known()}")
+        raise AntsError(f"the world is {shown(name_or_path)}; {_known()}")
     if isinstance(name_or_path, str) and not _looks_like_a_path(name_or_path):
-        raise AntsError(f"there is no world named {name_or_path!r}; {_known()}")
+        raise AntsError(f"there is no world named {shown(name_or_path)}; {_known()}")
     return load_map(name_or_path)
 
 
@@ -73,7 +75,7 @@ def _build(name: str, seed: int) -> object:
         raise
     except Exception as error:
         reason = " ".join(f"{type(error).__name__}: {error}".split())
-        raise AntsError(f"the builder of {name!r} failed with {reason}; mend it.") from error
+        raise AntsError(f"the builder of {shown(name)} failed with {reason}; mend it.") from error
 
 
 def _known() -> str:

@@ -6,24 +6,26 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from taichi_ants.colony_config import STARTS
 from taichi_ants.constants import EMPTY, N_HEADINGS, STREAM_START_CELL, STREAM_START_HEADING
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, check_one_of, shown
 from taichi_ants.randomness import choose, stream_state, whole
 
 if TYPE_CHECKING:
     from taichi_ants.worlds.world import World
 
 
-def place(world: World, seed: int, n: int) -> tuple[np.ndarray, np.ndarray]:
+def place(world: World, seed: int, n: int, where: str) -> tuple[np.ndarray, np.ndarray]:
     """Flat indices and headings, both int32 (n,), see `World.start`."""
     seed, n = whole("seed", seed), whole("n", n)
     if n < 1:
-        raise AntsError(f"n is {n}; there must be at least 1 ant.")
+        raise AntsError(f"n is {shown(n)}; there must be at least 1 ant.")
+    check_one_of("where", where, STARTS)
     listed = world.grid.index(world.ants[:n, :3])
     headings = world.ants[:n, 3]
     wanted = n - len(listed)
     if wanted:
-        placed = _nearest_free_cells(world, seed, wanted, listed)
+        placed = _free_cells(world, seed, wanted, listed, where)
         numbers = np.arange(len(listed), n)
         words = stream_state(seed, STREAM_START_HEADING, numbers) >> np.uint64(32)
         listed = np.concatenate([listed, placed])
@@ -31,19 +33,28 @@ def place(world: World, seed: int, n: int) -> tuple[np.ndarray, np.ndarray]:
     return listed.astype(np.int32), headings.astype(np.int32)
 
 
-def _nearest_free_cells(world: World, seed: int, n: int, taken: np.ndarray) -> np.ndarray:
-    """The n free cells nearest to the queen, flat indices; ties in the order of a hash."""
+def _free_cells(world: World, seed: int, n: int, taken: np.ndarray, where: str) -> np.ndarray:
+    """The first n free cells by their distance to the queen ("nest" only), then by a hash.
+
+    Returns:
+        Flat indices, in this order.
+    """
     free = world.ground() == EMPTY
     free[taken] = False
     index = np.flatnonzero(free)
     if n > len(index):
         raise AntsError(
-            f"{n + len(taken)} ants are asked for; this world has room for "
+            f"{shown(n + len(taken))} ants are asked for; this world has room for "
             f"{len(index) + len(taken)}, so ask for fewer ants or choose a larger world."
         )
-    distance = world.distances()[index]
-    # Only the cells up to the distance at which n are complete need a hash and an order.
-    last = np.searchsorted(np.cumsum(np.bincount(distance)), n)
-    index, distance = index[distance <= last], distance[distance <= last]
-    ties = stream_state(seed, STREAM_START_CELL, world.grid.number(world.grid.cells(index)))
-    return index[np.lexsort((ties, distance))[:n]]
+    if where == "nest":
+        distance = world.distances()[index]
+        # Only the cells up to the distance at which n are complete need a hash and an order.
+        last = np.searchsorted(np.cumsum(np.bincount(distance)), n)
+        index, distance = index[distance <= last], distance[distance <= last]
+    words = stream_state(seed, STREAM_START_CELL, world.grid.number(world.grid.cells(index)))
+    if where == "nest":
+        return index[np.lexsort((words, distance))[:n]]
+    # The cells of the n smallest words are a sample without replacement.
+    first = np.argpartition(words, n - 1)[:n]
+    return index[first[np.argsort(words[first])]]

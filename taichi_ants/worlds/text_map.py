@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, shown
 from taichi_ants.hexgrid import AxialGrid, cube
 from taichi_ants.worlds import drawing as marks
 from taichi_ants.worlds.map_fit import smallest_world
@@ -43,12 +43,12 @@ def load_map(path: str | os.PathLike[str]) -> World:
             raise AntsError(f"{file} {what}; give the path of a map file.")
         if file.stat().st_size > MAX_MAP_CHARACTERS:
             raise AntsError(_too_long(str(file), file.stat().st_size))
-        text = file.read_bytes().decode("utf-8-sig")
+        text = file.read_bytes().decode("utf-8")
     except UnicodeDecodeError:
         raise AntsError(f"{path} is no text file; give the path of a map file.") from None
     except (OSError, TypeError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise AntsError(f"the map file {path!r} cannot be read: {reason}.") from None
+        raise AntsError(f"the map file {shown(path)} cannot be read: {reason}.") from None
     if "\0" in text:
         raise AntsError(f"{path} is no text file; give the path of a map file.")
     return from_text(text, str(path))
@@ -71,6 +71,7 @@ def from_text(text: str, source: str = "the map") -> World:
         raise AntsError(f"{source} is {type(text).__name__}; it must be text.")
     if len(text) > MAX_MAP_CHARACTERS:
         raise AntsError(_too_long(source, len(text)))
+    text = text.removeprefix("\ufeff")  # the byte-order mark with which some editors begin a file
     settings, drawing = marks.read(text, source)
     axials = drawing.axials()
     ranges, origin = smallest_world(axials)
@@ -110,6 +111,8 @@ def to_text(world: World) -> str:
         AntsError: The world has trails of several levels, or under food or the queen, which a map
             cannot show; or its map would have more than `MAX_MAP_CHARACTERS` characters.
     """
+    if not isinstance(world, World):
+        raise AntsError(f"world is {shown(world)}; it must be a World.")
     grid = world.grid
     if grid.count > MAX_MAP_CHARACTERS:
         raise AntsError(_too_long("the map", grid.count))

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from taichi_ants.constants import MAX_TRAIL_LEVEL, N_HEADINGS
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, shown
 from taichi_ants.hexgrid import MAX_ARRAY_CELLS, AxialGrid
 from taichi_ants.randomness import whole
 
@@ -25,7 +25,7 @@ def parse_ranges(ranges: object) -> tuple[int, int, int]:
     values = _whole_numbers(ranges)
     if len(values) != 3 or min(values) < 1 or max(values) > MAX_ARRAY_CELLS:
         raise AntsError(
-            f"ranges are {_shown(ranges)}; they must be three whole numbers (X, Y, Z) "
+            f"ranges are {shown(ranges)}; they must be three whole numbers (X, Y, Z) "
             f"from 1 to {MAX_ARRAY_CELLS}."
         )
     return values[0], values[1], values[2]
@@ -139,7 +139,7 @@ def _as_rows(name: str, values: object, form: str, columns: int) -> np.ndarray:
         return _rows_of_array(name, values, form, columns)
     entries = _entries(values)
     if entries is None:
-        raise AntsError(f"{name} is {_shown(values)}; it must be a sequence of {form}.")
+        raise AntsError(f"{name} is {shown(values)}; it must be a sequence of {form}.")
     rows = [_row(f"{name}[{i}]", entry, form, columns) for i, entry in enumerate(entries)]
     return np.array(rows, dtype=np.int64).reshape(-1, columns)
 
@@ -166,7 +166,7 @@ def _row(name: str, entry: object, form: str, columns: int) -> list[int]:
         values = [*(_entries(values[0]) or []), values[1]]
     numbers = _whole_numbers(values)
     if len(numbers) != columns:
-        raise AntsError(f"{name} is {_shown(entry)}; it must be {form} in whole numbers.")
+        raise AntsError(f"{name} is {shown(entry)}; it must be {form} in whole numbers.")
     if max(map(abs, numbers)) > _FAR:
         raise AntsError(_too_far(name, numbers))
     return numbers
@@ -191,7 +191,7 @@ def _entries(values: object) -> list | None:
 
 
 def _too_far(name: str, numbers: list[int]) -> str:
-    return f"{name} is {_shown(tuple(numbers))}; every number must lie between {-_FAR} and {_FAR}."
+    return f"{name} is {shown(tuple(numbers))}; every number must lie between {-_FAR} and {_FAR}."
 
 
 def _listed(name: str, rows: np.ndarray, bad: np.ndarray) -> str:
@@ -209,11 +209,3 @@ def _joined(named: list[str], total: int) -> str:
     more = [f"{total - len(named)} more"] if total > len(named) else []
     *first, last = named + more
     return f"{', '.join(first)} and {last}" if first else last
-
-
-def _shown(value: object) -> str:
-    try:
-        text = repr(value)
-    except ValueError:  # Python writes no integers of more than 4300 digits
-        text = "a huge number"
-    return text if len(text) <= 80 else text[:77] + "..."

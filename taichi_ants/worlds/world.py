@@ -91,20 +91,22 @@ class World:
         """
         return geometry.reachable(self.grid, self.ground(), self.queen, self.foods)
 
-    def start(self, seed: int, n: int = 1) -> tuple[np.ndarray, np.ndarray]:
-        """Where n ants start: the listed ants first, then free cells nearest to the queen.
+    def start(self, seed: int, n: int = 1, where: str = "nest") -> tuple[np.ndarray, np.ndarray]:
+        """Where n ants start: the listed ants first, then ants placed on free cells.
 
         Args:
-            seed: Any whole number; decides ties of distance, and the headings of placed ants.
+            seed: Any whole number; decides cells (ties of distance), and headings of placed ants.
             n: Number of ants, at least 1. If fewer than the listed ants, the first of these.
+            where: "nest": on the free cells nearest to the queen. "spread": on any free cells.
 
         Returns:
             Flat indices int32 (n,) and headings int32 (n,), in the order of the ant numbers.
 
         Raises:
-            AntsError: n or seed is not whole, n is below 1, or too few cells are free.
+            AntsError: n or seed is not whole, n is below 1, too few cells are free, or there is no
+                such `where`.
         """
-        return starts.place(self, seed, n)
+        return starts.place(self, seed, n, where)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, World):

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from random_rewards import put_in_force, random_rewards
 from random_worlds import random_world
 
 from taichi_ants import Colony, ColonyConfig, Pheromone, TrainingConfig
+from taichi_ants.colony_config import STARTS
 from taichi_ants.constants import EMPTY
 from taichi_ants.engines import colony_arrays as names
+from taichi_ants.policies import random_policy
 from taichi_ants.reference import ReferenceColony
 
 # Each entry is a kernel of its own, so that there are few; all options occur in each.
@@ -36,23 +39,25 @@ def random_colony(seed: int, dense: bool):
     free = int((world.ground() == EMPTY).sum())
     ants = int(min(free, rng.choice([1, 2, 3, 5, 8, 13, 20, 30])))
     births, lifespan = bool(rng.random() < 0.5), rng.choice([0, 0, 3, 9, 25])
+    evaporations = ["exponential", "linear", "none"] if dense else ["linear", "none"]
+    evaporation, deposit = str(rng.choice(evaporations)), str(rng.choice(["set", "add", "none"]))
+    half_life, cap = float(rng.choice([0.7, 3.0, 40.0])), int(rng.choice([200, 600]))
     config = ColonyConfig(
         ants=ants,
         capacity=ants + int(rng.integers(0, 6)) if births else None,
         pheromone=Pheromone(
-            evaporation=str(
-                rng.choice(["exponential", "linear", "none"] if dense else ["linear", "none"])
-            ),
-            half_life=float(rng.choice([0.7, 3.0, 40.0])),
+            evaporation=evaporation,
+            half_life=half_life if evaporation == "exponential" else None,
             diffusion=float(rng.choice([0.05, 0.5, 1.0])) if dense else 0.0,
-            deposit=str(rng.choice(["set", "add", "none"])),
+            deposit=deposit,
             level=int(rng.choice([3, 250])),
-            cap=int(rng.choice([200, 600])),
+            cap=cap if deposit == "add" else None,
         ),
         births=births,
         lifespan=int(lifespan) or None,
         regrowth=[None, 0, 1, 4][rng.integers(4)],
         wander=int(rng.choice([1, 2, 5, 1000])),
+        start=str(rng.choice(STARTS)),
     )
     return world, config
 
@@ -85,7 +90,7 @@ def assert_equal(colony: Colony, plain: ReferenceColony) -> None:
         assert (mine[names.HEADING], mine[names.CARRIES]) == (ant.heading, ant.carries)
         assert (mine[names.NUMBER], mine[names.AGE]) == (ant.number, ant.age)
         assert (mine[names.STATE], int(arrays["streams"][slot])) == (ant.state, ant.rng_state)
-        assert ant.action < 0 or mine[names.REWARD] == ant.reward
+        assert ant.action < 0 or arrays["rewards"][mine[names.EVENT]] == ant.reward
     existing = np.array(list(theirs.ground), dtype=np.int64).reshape(-1, 3)
     places = grid.index(existing)
     assert ours.ground[places].tolist() == list(theirs.ground.values())
@@ -115,13 +120,15 @@ def assert_equal_records(colony: Colony, theirs) -> None:
 
 
 @pytest.mark.parametrize(("learner", "planning_steps", "sharing", "dense"), KERNELS)
-def test_every_tick_in_crowded_micro_worlds(learner, planning_steps, sharing, dense):
+def test_every_tick_in_crowded_micro_worlds(learner, planning_steps, sharing, dense, monkeypatch):
     """More than 1000 micro-worlds in all, two episodes each: something goes on between them."""
     happened = np.zeros(5, dtype=int)
     for seed in range(86):
         world, config = random_colony(seed, dense)
         training = random_training(seed, learner, planning_steps)
-        colony = Colony(world, config, training, seed - 3, sharing)
+        put_in_force(monkeypatch, random_rewards(seed))
+        table = random_policy() if sharing == "fixed" else None
+        colony = Colony(world, config, training, seed - 3, sharing, table)
         plain = ReferenceColony(world, config, training, seed - 3, sharing)
         for ticks in (12, 9):
             colony.begin_episode()

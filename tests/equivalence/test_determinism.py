@@ -118,7 +118,7 @@ def test_training_that_is_continued_is_longer_training():
 
 
 def test_continued_training_with_evaporation():
-    world = random_world(5, 7)
+    world = random_world(6, 7)
     whole = train(world, CONFIGS, SEEDS[:2], 30, 60, evaporation=True)
     result = continue_training(train(world, CONFIGS, SEEDS[:2], 11, 60, evaporation=True), 19)
     assert_same(result, whole)

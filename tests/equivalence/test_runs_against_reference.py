@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from random_rewards import TELLING, put_in_force, random_rewards
 from random_worlds import random_world
 
 from taichi_ants import TrainingConfig, evaluate, reference, rollout, trace_training, train
+from taichi_ants.rewards import Rewards
 from taichi_ants.worlds import World, paper
 
 LEARNERS = [("q_learning", 0), ("sarsa", 0), ("expected_sarsa", 0), ("dyna_q", 3)]
@@ -59,19 +61,22 @@ def test_every_step_in_the_papers_world(learner, planning_steps, delivery, evapo
 
 @pytest.mark.parametrize("delivery", DELIVERIES)
 @pytest.mark.parametrize(("learner", "planning_steps"), LEARNERS)
-def test_every_step_in_random_worlds(learner, planning_steps, delivery):
+def test_every_step_in_random_worlds(learner, planning_steps, delivery, monkeypatch):
     """Several foods, rocks, trails of all strengths; deliveries and choices among foods occur."""
     delivered = 0
     for seed in range(60):
         config = random_config(seed, learner, planning_steps, delivery)
         world = random_world(seed)
+        put_in_force(monkeypatch, random_rewards(seed))
         plain = assert_equal_steps(world, config, seed - 7, 4, 25, seed % 2 == 0)
         delivered += sum(plain.deliveries)
     assert delivered > 20
 
 
-def test_whole_trainings_of_a_mixed_sweep():
+@pytest.mark.parametrize("table", [Rewards(), *TELLING])
+def test_whole_trainings_of_a_mixed_sweep(table, monkeypatch):
     """The kernel that trains equals the reference too, and runs do not disturb each other."""
+    put_in_force(monkeypatch, table)
     configs = [
         random_config(seed, *LEARNERS[seed % 4], DELIVERIES[seed // 4 % 2]) for seed in range(16)
     ]

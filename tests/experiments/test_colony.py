@@ -184,7 +184,7 @@ def test_stopped_and_killed_it_goes_on_to_the_same_results(finished, kernels, tm
         (["--resume", "x", "--births"], "--births cannot change a colony"),
         (["--every", 2], "--every is for one colony"),
         (["--ants", 2, "--capacity", 5], "--capacity is for colonies in which ants are born"),
-        (["--ants", 2, "--cap", 5], "--cap is for deposits that add up"),
+        (["--ants", 2, "--cap", 5], "cap is 5, but deposit is 'set'"),
         (["--ants", 2, "--save", "x.png", "--render", "x.png"], "are one place"),
         (["--resume", "x"], "cannot read 'x'"),
         (["--arenas", "moon"], "'moon' is no arena, choose of paper, open, large"),
@@ -202,8 +202,9 @@ def test_stopped_and_killed_it_goes_on_to_the_same_results(finished, kernels, tm
         (["--ants", 2, "--diffusion", 2], "diffusion is 2.0"),
         (
             ["--ants", 2, "--half-life", 5, "--evaporation", "none"],
-            "--half-life is for exponential",
+            "half_life is 5.0, but evaporation is 'none'",
         ),
+        (["--ants", 2, "--sharing", "fixed"], "sharing is 'fixed', but q_values is None"),
         (["--ants", 2, "--policy", "x.npz"], "cannot read 'x.npz'"),
         (["--ants", 2, "--plugin", "x.py"], "cannot read the plugin"),
     ],
@@ -288,6 +289,29 @@ def test_a_colony_starts_from_a_policy(finished, capsys):
     policy = finished[1] / "policies" / "paper_alone.npz"
     fixed = ["--ants", 2, "--world", "paper", "--ticks", 60, "--sharing", "fixed"]
     assert call("colony", [*fixed, "--policy", policy, "--regrowth", 0], capsys)[0] == 0
+
+
+def test_colonies_live_side_by_side_and_can_start_spread(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    where = ["--ranges", 20, 20, 20, "--regrowth", 0, "--ticks", 60, "--seed", 3, "--save", "x.npz"]
+    for place in ("nest", "spread"):
+        many = ["--ants", 9, "--colonies", 5, "--start", place]
+        status, out, err = call("colony", [*many, *where], capsys)
+        assert (status, err) == (0, "")
+        assert out.startswith("45 ants in 5 colonies, 60 ticks: ")
+        colony = Colony.load("x.npz")
+        assert colony.config == ColonyConfig(9, regrowth=0, start=place)
+        assert colony.seeds == (3, 4, 5, 6, 7)
+        world = worlds.open_world(3, (20, 20, 20))
+        assert set(colony.worlds) == {world}
+        training = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0, 0.1, delivery="continuing")
+        alone = Colony(world, colony.config, training, 5)
+        alone.begin_episode()
+        alone.tick(60)
+        assert alone.outcome().deliveries[0, 0] == colony.outcome().deliveries[0, 2]
+        assert np.array_equal(alone.q_values[0], colony.q_values[2])
+        cells, _ = world.start(5, 9, place)
+        assert np.array_equal(colony.layout.start_cells[2], cells)
 
 
 def test_help_is_quick_and_needs_no_taichi(tmp_path):

@@ -21,7 +21,9 @@ from taichi_ants import (
     train,
     worlds,
 )
+from taichi_ants.analysis.behaviour import DELIVERS
 from taichi_ants.analysis.statistics import bootstrap_interval
+from taichi_ants.rendering import render_episode
 
 SEEDS, EPISODES, MAX_STEPS, ROLLOUTS = (7, 8, 9), 60, 45, 50
 SMALL = [
@@ -29,6 +31,11 @@ SMALL = [
     *("--max-steps", MAX_STEPS, "--learners", "q_learning", "sarsa", "dyna_q"),
     *("--planning-steps", 2, "--learning-rates", 0.01, "--discounts", 0.9, 0.99),
     *("--epsilons", 0.3, "--epsilon-decays", 0.995),
+]
+TINY = [
+    *("--seeds", 1, "--episodes", 2, "--max-steps", 30, "--learners", "q_learning"),
+    *("--learning-rates", 0.1, "--discounts", 0.9, "--epsilons", 0.3, "--epsilon-decays", 0.9),
+    *("--delivery", "absorbing", "--no-figures", "--no-render"),
 ]
 COLUMNS = [
     *("learner", "planning_steps", "learning_rate", "discount", "epsilon", "epsilon_decay"),
@@ -41,15 +48,27 @@ for measure in (
     COLUMNS += [f"{measure}_{name}" for name in ("mean", "ci_low", "ci_high")]
     if not measure.startswith(("deliveries", "greedy_deliveries")):
         COLUMNS += [f"{measure}_{name}" for name in ("iqm", "iqm_ci_low", "iqm_ci_high")]
+COLUMNS += [
+    f"runs_{name}" for name in ("delivers", "walks_the_trail", "circles_beside_the_queen", "other")
+]
 FIGURES = {
     *("figures/best_runs.png", "figures/learning_curves.png"),
     *("figures/return_against_deliveries.png", "figures/sensitivity.png"),
 }
-RENDERS = {"renders/dyna_q_p2.gif", "renders/q_learning.gif", "renders/sarsa.gif"}
+LEARNERS = {"q_learning": ("q_learning", 0), "sarsa": ("sarsa", 0), "dyna_q_p2": ("dyna_q", 2)}
+# Within 45 steps some deliver and some do not, in all of these.
+SHOWN = [
+    f"{delivery}_{learner}_{behaviour}"
+    for delivery in ("continuing", "absorbing")
+    for learner in LEARNERS
+    for behaviour in ("delivers", "other")
+]
+POLICY = f"policies/{SHOWN[0]}.npz"
+RENDERS = {f"renders/{name}.gif" for name in SHOWN}
 FILES = {
-    *("baselines.csv", "claims.csv", "claims.md", "episodes.npz", "manifest.json", "report.txt"),
-    *("summary.csv", "table2.csv", "table2.md"),
-    *("policies/dyna_q_p2.npz", "policies/q_learning.npz", "policies/sarsa.npz"),
+    *("baselines.csv", "behaviours.csv", "claims.csv", "claims.md", "episodes.npz"),
+    *("manifest.json", "report.txt", "summary.csv", "table2.csv", "table2.md"),
+    *(f"policies/{name}.npz" for name in SHOWN),
     *FIGURES,
     *RENDERS,
 }
@@ -122,6 +141,7 @@ def test_episodes_are_what_the_library_gives_in_the_order_of_the_summary(finishe
     runs = (len(rows), len(SEEDS))
     shapes = dict.fromkeys(("returns", "steps", "deliveries"), (*runs, EPISODES))
     shapes |= {f"greedy_{name}": (*runs, ROLLOUTS) for name in list(shapes)}
+    shapes |= {"behaviours": runs, "policy_returns": runs}
     assert {name: array.shape for name, array in arrays.items()} == shapes
     assert all(array.dtype.kind in "iu" for array in arrays.values())
 
@@ -138,7 +158,9 @@ def test_summary_figures_are_those_of_the_episodes(finished):
     rows = read_csv(finished / "summary.csv")
     with np.load(finished / "episodes.npz") as archive:
         arrays = {name: archive[name].astype(float) for name in archive.files}
-    last = {name: array[:, :, -50:].mean(axis=2) for name, array in arrays.items()}
+    last = {
+        name: array[..., -50:].mean(axis=2) for name, array in arrays.items() if array.ndim == 3
+    }
     low, high = bootstrap_interval(last["returns"])
     expected = {
         "return_last50_mean": last["returns"].mean(axis=1),
@@ -185,13 +207,16 @@ def test_baselines(finished):
         assert float(row["steps_mean"]) == pytest.approx(outcome.steps.mean())
 
 
-def test_policies_are_those_of_median_runs(finished):
+def test_policies_are_those_of_median_runs_of_each_behaviour(finished):
     rows = read_csv(finished / "summary.csv")
-    for learner, planning_steps in (("q_learning", 0), ("sarsa", 0), ("dyna_q", 2)):
-        suffix = f"_p{planning_steps}" if planning_steps else ""
-        q_values, metadata = load_policy(finished / "policies" / f"{learner}{suffix}.npz")
+    for name in SHOWN:
+        q_values, metadata = load_policy(finished / "policies" / f"{name}.npz")
+        delivery, learner = name.rsplit("_", 1)[0].split("_", 1)
         mine = [
-            row for row in rows if row["learner"] == learner and row["delivery"] == "continuing"
+            row
+            for row in rows
+            if (row["learner"], int(row["planning_steps"])) == LEARNERS[learner]
+            and row["delivery"] == delivery
         ]
         if learner == "sarsa":  # its configuration in the paper's table 2 is one of these
             (chosen,) = [row for row in mine if row["discount"] == "0.9"]
@@ -202,7 +227,73 @@ def test_policies_are_those_of_median_runs(finished):
         number = SEEDS.index(metadata["seed"])
         assert np.array_equal(q_values, trained.q_values[0, number])
         returns = trained.returns[0, :, -50:].mean(axis=1)
-        assert metadata["return_last50"] == returns[number] == np.median(returns)
+        assert metadata["return_last50"] == returns[number]
+        # What it does was seen as in training: without evaporation.
+        once = evaluate(worlds.paper(), trained.q_values[0], 1, SEEDS, MAX_STEPS, evaporation=False)
+        alike = once.deliveries[:, 0] == (metadata["behaviour"] == "delivers")
+        assert alike[number]
+        assert int(chosen[f"runs_{metadata['behaviour']}"]) == alike.sum()
+        assert (returns[alike] < returns[number]).sum() == (alike.sum() - 1) // 2
+        assert metadata["evaporation"] is False
+
+
+def test_behaviours_are_those_of_the_policies(finished):
+    rows = read_csv(finished / "summary.csv")
+    with np.load(finished / "episodes.npz") as archive:
+        behaviours, returns = archive["behaviours"], archive["policy_returns"]
+    trained = train(worlds.paper(), [config_of(row) for row in rows], SEEDS, EPISODES, MAX_STEPS)
+    once = evaluate(worlds.paper(), trained.q_values, 1, SEEDS, MAX_STEPS, evaporation=False)
+    assert np.array_equal(returns, once.returns[..., 0])
+    assert np.array_equal(behaviours == DELIVERS, once.deliveries[..., 0] == 1)
+    lines = read_csv(finished / "behaviours.csv")
+    assert sum(int(line["runs"]) for line in lines) == behaviours.size
+    for number, row in enumerate(rows):
+        assert int(row["runs_delivers"]) == (behaviours[number] == DELIVERS).sum()
+        assert sum(int(row[name]) for name in COLUMNS[-4:]) == len(SEEDS)
+        mine = [line for line in lines if config_of(line) == config_of(row)]
+        mean = sum(float(line["policy_return_mean"]) * int(line["runs"]) for line in mine)
+        assert mean == pytest.approx(returns[number].sum())
+
+
+@pytest.mark.parametrize(("training", "greedy"), [("on", "off"), ("off", "off")])
+def test_evaporation_is_chosen_told_and_kept_apart(training, greedy, tmp_path, compare):
+    flags = ["--train-evaporation", training, "--greedy-evaporation", greedy]
+    out = tmp_path / "out"
+    assert compare(*TINY, "--episodes", 30, *flags, "--out", out)[0] == 0
+    (row,) = read_csv(out / "summary.csv")
+    trained = train(worlds.paper(), config_of(row), 0, 30, 30, training == "on")
+    rollouts = evaluate(worlds.paper(), trained.q_values, ROLLOUTS, [0], 30, greedy == "on")
+    once = evaluate(worlds.paper(), trained.q_values, 1, [0], 30, training == "on")
+    with np.load(out / "episodes.npz") as archive:
+        assert np.array_equal(archive["returns"], trained.returns)
+        assert np.array_equal(archive["greedy_returns"], rollouts.returns)
+        assert np.array_equal(archive["policy_returns"], once.returns[..., 0])
+    manifest = json.loads((out / "manifest.json").read_text("utf-8"))
+    assert manifest["settings"]["train_evaporation"] is (training == "on")
+    assert manifest["settings"]["greedy_evaporation"] is (greedy == "on")
+    words = f"Training {'with' if training == 'on' else 'without'} evaporation of trails, greedy"
+    for name in ("report.txt", "table2.md"):
+        assert words in (out / name).read_text("utf-8")
+    settings = {line["setting"] for line in read_csv(out / "baselines.csv")}
+    first = "evaporation" if training == "on" else "no evaporation"
+    assert settings == {f"training, {first}", "greedy, no evaporation"}
+    status, _, err = compare(*TINY, "--episodes", 30, "--out", out)
+    assert status == 2
+    assert "greedy_evaporation differ)" in err
+    assert ("train_evaporation," in err) == (training == "on")
+
+
+def test_pictures_show_the_episode_that_told_the_behaviour(finished, tmp_path):
+    """Without evaporation, as in training."""
+    name = "continuing_sarsa_other"
+    q_values, metadata = load_policy(finished / "policies" / f"{name}.npz")
+    shown = (finished / "renders" / f"{name}.gif").read_bytes()
+    look = {"size": (720, 480), "title": "other"}
+    for evaporation in (False, True):
+        path = tmp_path / f"{evaporation}.gif"
+        more = {"seed": metadata["seed"], "max_steps": MAX_STEPS, "evaporation": evaporation}
+        render_episode(path, worlds.paper(), q_values, **more, **look)
+        assert (path.read_bytes() == shown) == (not evaporation)
 
 
 def test_manifest(finished):
@@ -253,7 +344,12 @@ def test_force_runs_again_and_leaves_no_old_pictures(copy, compare):
     assert status == 0
     assert "already" not in out
     assert set(after) == FILES - FIGURES - RENDERS | {"notes.txt"}
-    for name in ("summary.csv", "episodes.npz", "claims.csv", "policies/sarsa.npz"):
+    for name in (
+        "summary.csv",
+        "episodes.npz",
+        "claims.csv",
+        POLICY,
+    ):
         assert after[name] == before[name], name
     assert after["manifest.json"] != before["manifest.json"]
 
@@ -294,14 +390,18 @@ def test_figures_cannot_be_drawn_from_damaged_files(name, damage, copy, compare)
     assert not list(copy.glob(".*"))
 
 
-@pytest.mark.parametrize("damage", ["figures/sensitivity.png", "renders/sarsa.gif"])
+@pytest.mark.parametrize("damage", ["figures/sensitivity.png", f"renders/{SHOWN[0]}.gif"])
 def test_a_picture_that_is_gone_is_drawn_again(damage, finished, copy, compare):
     (copy / damage).unlink()
     assert compare(*SMALL, "--out", copy)[0] == 0
     assert contents(copy) == contents(finished)
 
 
-GONE = [("summary.csv", None), ("policies/sarsa.npz", b""), ("report.txt", b"\xff")]
+GONE = [
+    ("summary.csv", None),
+    (POLICY, b""),
+    ("report.txt", b"\xff"),
+]
 
 
 @pytest.mark.parametrize(("name", "content"), GONE)
@@ -336,13 +436,6 @@ def test_other_settings_do_not_mix_with_results(change, named, copy, compare):
     assert re.search(rf"\(.*\b{named}\b.* differ\)", err)
     assert "--force" in err
     assert contents(copy) == before
-
-
-TINY = [
-    *("--seeds", 1, "--episodes", 2, "--max-steps", 30, "--learners", "q_learning"),
-    *("--learning-rates", 0.1, "--discounts", 0.9, "--epsilons", 0.3, "--epsilon-decays", 0.9),
-    *("--delivery", "absorbing", "--no-figures", "--no-render"),
-]
 
 
 def test_lists_take_blanks_and_commas_and_drop_what_is_said_twice(tmp_path, compare):

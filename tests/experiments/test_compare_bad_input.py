@@ -170,13 +170,19 @@ def test_plugins(name, place, capsys):
 LEARNERS = {
     "too few arguments": (
         "@ti.func\ndef error(value, reward):\n    return reward - value\n",
-        ["'mine'", "Too many arguments"],
+        ["'mine'", "has 2 arguments"],
     ),
     "an unknown name": (
         "@ti.func\n"
         "def error(value, reward, discount, next_values, next_action, epsilon):\n"
         "    return reward + lost - value\n",
         ["'mine'", "lost"],
+    ),
+    "a vector": (
+        "@ti.func\n"
+        "def error(value, reward, discount, next_values, next_action, epsilon):\n"
+        "    return next_values - value\n",
+        ["'mine'", "returns a vector"],
     ),
     "no Taichi function": (
         "def error(value, reward, discount, next_values, next_action, epsilon):\n"

@@ -19,7 +19,7 @@ import taichi_ants
 LAYERS = (
     {"constants", "errors", "environment"},
     {"randomness", "hexgrid", "states", "results", "colony_config", "command_line", "rules"},
-    {"config", "runtime", "policies", "result_folder", "worlds", "learners"},
+    {"config", "rewards", "runtime", "policies", "result_folder", "worlds", "learners"},
     {"engines", "reference"},
     {"analysis", "rendering", "envs", "sweeps"},
     {"provenance"},

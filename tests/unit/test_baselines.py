@@ -115,6 +115,22 @@ def test_policies_are_evaluated_in_both_settings_with_one_table_for_each_seed() 
         assert 1 <= row["return_ci_low"] < 3 < row["return_ci_high"] <= 6
 
 
+def test_settings_say_where_trails_evaporate() -> None:
+    calls = []
+
+    def record(*arguments: Any, **options: Any) -> SimpleNamespace:
+        calls.append(options["evaporation"])
+        return evaluate(*arguments, **options)
+
+    rows = baseline_rows(paper(), record, [0], 1, (0.9,), 40, True, False)
+    assert rows[0]["note"] == "exact bounds are known for worlds without evaporation only."
+    assert [row["setting"] for row in rows] == [
+        "training, evaporation",
+        *("training, evaporation", "greedy, no evaporation") * 2,
+    ]
+    assert calls == [True, False] * 2
+
+
 def test_one_seed_has_no_interval() -> None:
     rows = policy_rows(paper(), evaluate, seeds=[0], rollouts=1, max_steps=40)
     assert [(row["return_ci_low"], row["return_ci_high"]) for row in rows] == [(None, None)] * 4

@@ -14,7 +14,7 @@ from taichi_ants.errors import AntsError
 
 def test_the_defaults_are_the_rules_of_the_world():
     config = ColonyConfig()
-    assert dataclasses.astuple(config.pheromone) == ("linear", 50.0, 0.0, "set", 250, 1000)
+    assert dataclasses.astuple(config.pheromone) == ("linear", None, 0.0, "set", 250, None)
     assert (config.ants, config.slots, config.births, config.ends_at_delivery) == (
         1,
         1,
@@ -55,6 +55,7 @@ def test_slots(settings, slots):
         ({"regrowth": -1}, "regrowth is -1; it must lie between 0"),
         ({"wander": 0}, "wander is 0"),
         ({"wander": "daily"}, "wander is 'daily'"),
+        ({"start": "queen"}, "start is 'queen'; it must be one of nest, spread"),
         ({"ends_at_delivery": None}, "ends_at_delivery is None"),
         ({"ends_at_delivery": True, "ants": 2}, "ends_at_delivery is set with 2 ants"),
         ({"ends_at_delivery": True, "births": True}, "births True"),
@@ -80,6 +81,9 @@ def test_a_colony_that_cannot_be(settings, message):
         ({"level": 0}, "level is 0; it must lie between 1 and 1000000"),
         ({"level": 2.5}, "level is 2.5"),
         ({"cap": 1_000_001}, "cap is 1000001"),
+        ({"half_life": 10}, "half_life is 10, but evaporation is 'linear'; give evaporation='expo"),
+        ({"half_life": 10, "evaporation": "none"}, "half_life is 10, but evaporation is 'none'"),
+        ({"cap": 10}, "cap is 10, but deposit is 'set'; give deposit='add' with it, or leave"),
     ],
 )
 def test_a_pheromone_that_cannot_be(settings, message):
@@ -91,6 +95,13 @@ def test_the_limits_are_allowed():
     ColonyConfig(ants=1, capacity=1, lifespan=1, regrowth=0, wander=1, ends_at_delivery=True)
     ColonyConfig(ants=np.int64(3), capacity=np.int32(3), births=np.bool_(True))
     Pheromone("exponential", 1e-300, 1, "add", 1, 1_000_000)
+
+
+def test_what_is_left_out_is_filled_in_where_it_means_something():
+    assert Pheromone("exponential").half_life == 50
+    assert Pheromone(deposit="add").cap == 1000
+    for option in ({"half_life": 7, "evaporation": "exponential"}, {"cap": 7, "deposit": "add"}):
+        assert dataclasses.replace(Pheromone(**option), level=3) == Pheromone(**option, level=3)
 
 
 def test_the_numbers_that_kernels_take():

@@ -8,6 +8,7 @@ import pytest
 from taichi_ants import Colony, ColonyConfig, TrainingConfig, World
 from taichi_ants.constants import EMPTY, FOOD, FORWARD, GIVE, LEFT, PICK_UP, RIGHT
 from taichi_ants.engines import colony_arrays as names
+from taichi_ants.policies import random_policy
 from taichi_ants.randomness import GAMMA, mix
 
 TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 0.0, 1.0)
@@ -15,7 +16,9 @@ TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 0.0, 1.0)
 
 def act(world: World, actions: list[int], **config: object) -> Colony:
     """One tick in which the listed ants do these actions."""
-    colony = Colony(world, ColonyConfig(ants=len(actions), **config), TRAINING, 0)
+    colony = Colony(
+        world, ColonyConfig(ants=len(actions), **config), TRAINING, 0, "fixed", random_policy()
+    )
     colony.begin_episode()
     colony.arrays["ants"][names.ACTION] = actions
     colony.tick()
@@ -26,7 +29,8 @@ def ants(colony: Colony) -> list[tuple[tuple[int, ...], int, int, int]]:
     """Cell, heading, carries and reward of each ant."""
     table = colony.arrays["ants"]
     cells = colony.snapshot().grid.cells(table[names.CELL]).tolist()
-    rows = (table[names.HEADING], table[names.CARRIES], table[names.REWARD])
+    rewards = colony.arrays["rewards"][table[names.EVENT]]
+    rows = (table[names.HEADING], table[names.CARRIES], rewards)
     return [(tuple(cell), *map(int, row)) for cell, *row in zip(cells, *rows, strict=True)]
 
 
@@ -99,7 +103,7 @@ def test_six_ants_around_the_queen_all_give_in_one_tick():
     steps = [(1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1), (1, 0, 1)]
     around = [(tuple((queen + step).tolist()), (h + 3) % 6) for h, step in enumerate(steps)]
     world = World((8, 8, 1), tuple(queen.tolist()), ants=around)
-    colony = Colony(world, ColonyConfig(ants=6), TRAINING, 0)
+    colony = Colony(world, ColonyConfig(ants=6), TRAINING, 0, "fixed", random_policy())
     colony.begin_episode()
     table = colony.arrays["ants"]
     table[names.CARRIES] = 1
@@ -119,7 +123,7 @@ def test_a_blocked_move_turns_the_ant():
 
 def test_ants_look_like_obstacles_to_each_other():
     world = World((8, 8, 1), (0, 7, 0), ants=[((2, 2, 0), 0), ((3, 2, 0), 0)])
-    colony = Colony(world, ColonyConfig(ants=2), TRAINING, 0)
+    colony = Colony(world, ColonyConfig(ants=2), TRAINING, 0, "fixed", random_policy())
     colony.begin_episode()
     assert colony.arrays["ants"][names.STATE, 0] >> 2 & 3 == 1
     colony.arrays["ants"][names.ACTION] = [PICK_UP, RIGHT]  # the second moves away

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from taichi_ants import AntsError, Colony, ColonyConfig, Pheromone, TrainingConfig, World, worlds
 from taichi_ants.constants import FOOD
 from taichi_ants.engines import colony_arrays as names
+from taichi_ants.policies import random_policy
 from taichi_ants.rendering import colony_picture
 
 TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 1.0, 1.0)
@@ -26,7 +27,8 @@ def levels_after(pheromone: Pheromone, ticks: int, level: int = 400) -> np.ndarr
         ants=[((0, 0, 11), 0)],
     )
     training = TrainingConfig("q_learning", 0.1, 0.9, 0.0, 1.0)
-    colony = Colony(world, ColonyConfig(ants=1, pheromone=pheromone), training, 0, "fixed")
+    life = ColonyConfig(ants=1, pheromone=pheromone)
+    colony = Colony(world, life, training, 0, "fixed", random_policy())
     colony.begin_episode()
     colony.tick(ticks)
     return colony.snapshot().trail
@@ -112,6 +114,8 @@ def test_births_fill_the_slots_and_no_more():
         ({"config": ColonyConfig(ants=5000)}, "5000"),
         ({"config": 3}, "config is 3"),
         ({"sharing": "some"}, "'some'"),
+        ({"sharing": "fixed"}, "sharing is 'fixed', but q_values is None; nobody learns"),
+        ({"world": World((3, 3, 3), (0, 0, 0))}, "the world has no food"),
         ({"seeds": []}, "seeds"),
         ({"seeds": [1, 1]}, "1"),
         ({"world": [worlds.paper()] * 2, "seeds": [1]}, "2 worlds"),

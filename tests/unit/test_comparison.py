@@ -23,7 +23,7 @@ def single_run(returns: list[int], steps: list[int], deliveries: list[int]) -> C
     """One configuration, one seed, two rollouts."""
     runs = (np.array(values)[None, None] for values in (returns, steps, deliveries))
     greedy = (np.array([[[45, 45]]]), np.array([[[34, 36]]]), np.array([[[1, 0]]]))
-    return Comparison((ROW,), (0,), *runs, *greedy, 600)
+    return Comparison((ROW,), (0,), *runs, *greedy, 600, *np.zeros((2, 1, 1), int))
 
 
 def measured(comparison: Comparison, name: str) -> float:

@@ -12,6 +12,7 @@ import pytest
 
 from taichi_ants import AntsError, TrainingConfig
 from taichi_ants.config import share_of_one
+from taichi_ants.errors import shown
 
 GOOD = {
     **{"learner": "dyna_q", "learning_rate": 0.1, "discount": 0.9, "epsilon": 0.3},
@@ -48,7 +49,7 @@ NO_SHARES = [-1e-9, 1.0000001, float("nan"), float("inf"), 10**400, True, "0.5",
 def test_numbers_out_of_bounds(name, value):
     with pytest.raises(AntsError, match=rf"^{name} is .*; it must be a number .*1\.$") as caught:
         TrainingConfig(**{**GOOD, name: value})
-    assert repr(value) in str(caught.value)
+    assert shown(value) in str(caught.value)
 
 
 @pytest.mark.parametrize("name", ["learning_rate", "epsilon_decay"])

@@ -17,6 +17,7 @@ from PIL import Image
 from synthetic_comparison import build, change, level_truth, subset, unchanged
 
 from taichi_ants.analysis.baselines import GREEDY_SETTING, TRAINING_SETTING
+from taichi_ants.analysis.behaviour import BEHAVIOURS, CIRCLES, OTHER
 from taichi_ants.analysis.best_of import best_of
 from taichi_ants.analysis.comparison import Comparison, Variant
 from taichi_ants.analysis.figures import (
@@ -29,7 +30,7 @@ from taichi_ants.analysis.figures import (
 from taichi_ants.analysis.paper import DYNA_P5, FIGURE_1, SARSA, TABLE_2, VARIANTS
 from taichi_ants.analysis.sensitivity import sensitivity
 from taichi_ants.analysis.statistics import bootstrap_interval, student_interval
-from taichi_ants.analysis.style import in_training, looks
+from taichi_ants.analysis.style import BEHAVIOUR_LOOKS, in_training, looks
 
 BASELINES = [
     {
@@ -51,7 +52,8 @@ BASELINES = [
 
 @pytest.fixture(scope="module")
 def comparison() -> Comparison:
-    circles = change(DYNA_P5, lambda point: point.discount == 0.99, late_return=200, deliveries=-1)
+    amounts = {"late_return": 200, "deliveries": -1, "greedy_deliveries": -1}
+    circles = change(DYNA_P5, lambda point: point.discount == 0.99, **amounts)
     return build({"continuing": unchanged, "absorbing": circles}, seeds=6, noise=5.0)
 
 
@@ -127,10 +129,14 @@ def test_the_captions_say_only_what_is_true(comparison: Comparison) -> None:
     assert "oving average over 10 episodes" in words_of(learning_curves(comparison))
     short = subset(comparison, range(128), 2, 5)
     assert "average" not in words_of(learning_curves(short))
-    assert "in circles" in words_of(return_against_deliveries(comparison, BASELINES))
-    assert "in circles" not in words_of(return_against_deliveries(comparison))
-    direct = subset(comparison, range(64), 6, 120)
-    assert "in circles" not in words_of(return_against_deliveries(direct, BASELINES))
+    words = words_of(return_against_deliveries(comparison, BASELINES))
+    assert "do not deliver, continuing delivery: none." in words
+    assert "do not deliver, absorbing delivery: Dyna-Q (p5) 48 of 96." in words
+    assert "greedily, without evaporation, as in training." in words
+    falling = replace(comparison, train_evaporation=True)
+    assert "greedily, with evaporation, as in training." in words_of(
+        return_against_deliveries(falling)
+    )
 
 
 def test_other_worlds_have_none_of_the_papers_figures(comparison: Comparison) -> None:
@@ -210,28 +216,31 @@ def test_best_runs_shows_the_distribution_and_the_papers_figures(comparison: Com
                 assert max(bar.get_xdata()[1], figure) < right
 
 
-def test_returns_against_deliveries_shows_configurations_runs_and_baselines(
+def test_returns_against_deliveries_shows_what_runs_do_and_baselines(
     comparison: Comparison,
 ) -> None:
+    behaviours = comparison.behaviours.copy()
+    behaviours[-1, :2], behaviours[3, 4] = CIRCLES, OTHER
+    comparison = replace(comparison, behaviours=behaviours)
     axes = panels(return_against_deliveries(comparison, BASELINES))
     returns = comparison.measure("return_last50")
     deliveries = comparison.measure("deliveries_last50")
     for axis, setting in zip(axes, ("continuing", "absorbing"), strict=True):
         lines = labelled(axis)
-        rows = comparison.positions(setting, DYNA_P5)
-        marks = lines[DYNA_P5.label]
-        np.testing.assert_allclose(marks.get_xdata(), deliveries[rows].mean(axis=1))
-        np.testing.assert_allclose(marks.get_ydata(), returns[rows].mean(axis=1))
-        runs = sum(len(line.get_xdata()) for line in axis.lines if line.get_marker() == ".")
-        assert runs == 64 * 6
+        of_setting = np.array([row.delivery == setting for row in comparison.rows])[:, None]
+        for code, name in enumerate(BEHAVIOURS):
+            marks, runs = lines[name], of_setting & (behaviours == code)
+            # One mark for each run, and none for a mean over runs.
+            assert sorted(zip(*marks.get_data(), strict=True)) == sorted(
+                zip(deliveries[runs], returns[runs], strict=True)
+            )
+            assert (marks.get_color(), marks.get_marker()) == BEHAVIOUR_LOOKS[code]
         # Optimal policies are optimal where delivery is the end.
         absorbing = setting == "absorbing"
         name = "shortest delivery; optimal policy, discount 0.9"
         assert (lines[name].get_xdata()[0], lines[name].get_ydata()[0]) == (1.0, 45.0)
         assert any(line.startswith("optimal") for line in lines) == absorbing
-        # Means stay visible on baselines at the same place.
-        assert marks.get_zorder() > lines[name].get_zorder()
-        assert marks.get_markersize() < lines[name].get_markersize()
+        assert lines["delivers"].get_markersize() < lines[name].get_markersize()
         if absorbing:
             assert lines["optimal policy, discount 0.99"].get_ydata()[0] == 476.0
         assert "random policy" not in lines
@@ -248,6 +257,12 @@ def test_baselines_at_one_place_share_a_name() -> None:
         "shortest delivery; optimal policy, discount 0.9": (45.0,),
         "optimal policy, discount 0.99": (476.0,),
     }
+
+
+def test_behaviours_look_different() -> None:
+    assert len(BEHAVIOUR_LOOKS) == len(BEHAVIOURS)
+    for looks_of in zip(*BEHAVIOUR_LOOKS, strict=True):  # colours, and marks without colours
+        assert len(set(looks_of)) == len(BEHAVIOURS)
 
 
 def test_learners_look_different() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from taichi_ants import AntsError, Colony, ColonyConfig, TrainingConfig, worlds
+from taichi_ants.engines import colony_arrays as names
 from taichi_ants.one_colony import Outputs, Pace, let_time_pass, live, stop_requests, summary
 from taichi_ants.policies import trail_follower
 from taichi_ants.rendering import writers
@@ -108,6 +109,23 @@ def test_a_stopped_colony_says_by_which_signal(tmp_path) -> None:
     assert (pace.ticks, number) == (2, signal.SIGTERM)
     assert Colony.load(outputs.save).ticks == 2
     assert (tmp_path / "a.gif").exists()
+
+
+def test_the_summary_counts_in_words() -> None:
+    def summed(**counts: int) -> str:
+        colony = begun(ants=1)
+        colony.tick(1)
+        rows = {"deliveries": names.DELIVERIES, "births": names.BORN, "deaths": names.DIED}
+        for name, count in counts.items():
+            colony.arrays["worlds"][rows[name]] = count
+        return summary(colony, Pace(ticks=1))
+
+    one, two = summed(deliveries=1, births=1), summed(deliveries=2, births=2, deaths=1)
+    assert one.startswith("1 ant, 1 tick: ")
+    assert "\n1 delivery by tick 1, " in one
+    assert one.endswith(" % of the moves blocked, 1 birth.")
+    assert "\n2 deliveries by tick 1, " in two
+    assert two.endswith(" % of the moves blocked, 2 births, 1 death.")
 
 
 def test_the_summary_says_when_all_places_are_taken() -> None:

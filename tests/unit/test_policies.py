@@ -175,6 +175,43 @@ def test_a_foreign_archive_is_refused(tmp_path: Path, arrays: dict, missing: str
         load_policy(path)
 
 
+@pytest.mark.parametrize("deep", ["[" * 100_000, '{"a":' * 100_000])
+def test_metadata_nested_beyond_reason_is_damaged(tmp_path: Path, deep: str) -> None:
+    path = tmp_path / "policy.npz"
+    np.savez(path, q_values=random_policy(), metadata=np.array(deep))
+    with pytest.raises(AntsError, match="not a JSON object"):
+        load_policy(path)
+
+
+@pytest.mark.parametrize(
+    ("path", "q_values", "metadata", "message"),
+    [
+        (1, random_policy(), {}, "the path is 1; it must be the name of a file"),
+        (None, random_policy(), {}, "the path is None"),
+        (b"p.npz", random_policy(), {}, "the path is b'p.npz'"),
+        ("p.npz", [[1, 2], [3]], {}, "q_values is no array"),
+        ("p.npz", None, {}, "q_values has the type object"),
+        ("p.npz", random_policy(), None, "metadata is None; it must be a mapping"),
+        ("p.npz", random_policy(), {"a": object}, "which JSON cannot hold"),
+    ],
+)
+def test_what_cannot_be_a_policy_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, path, q_values, metadata, message
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(AntsError, match=message):
+        save_policy(path, q_values, metadata)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_number_is_no_file_and_nothing_is_closed(capfd: pytest.CaptureFixture) -> None:
+    for number in (0, 1, 2):
+        with pytest.raises(AntsError, match=f"the path is {number}"):
+            load_policy(number)
+    print("still open", flush=True)
+    assert capfd.readouterr().out == "still open\n"
+
+
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(AntsError, match=r"none\.npz.*no such file"):
         load_policy(tmp_path / "none.npz")

@@ -13,6 +13,7 @@ ALLOWED = {
     "taichi_ants.constants",
     "taichi_ants.errors",
     "taichi_ants.config",
+    "taichi_ants.rewards",
     "taichi_ants.worlds.world",
 }
 OUTSIDE = {"__future__", "collections", "dataclasses", "enum", "numpy", "typing"}

@@ -11,6 +11,8 @@ import pytest
 from synthetic_comparison import build, change, subset, unchanged
 
 from taichi_ants.analysis.baselines import TRAINING_SETTING
+from taichi_ants.analysis.behaviour import CIRCLES, OTHER, WALKS
+from taichi_ants.analysis.best_of import paper_position
 from taichi_ants.analysis.claims import CLAIMS, Verdict, assess
 from taichi_ants.analysis.comparison import PAPER_WORLD, Comparison, Variant
 from taichi_ants.analysis.markdown import count, interval, number, table
@@ -106,6 +108,61 @@ def test_greedy_claims_costs_and_baselines(text: str) -> None:
     assert row(text, "Dyna-Q (p5)", after="Cost per step")[-2:] == ["42.0", "3.50"]
     assert row(text, "SARSA", after="Cost per step")[-2:] == ["-", "-"]
     assert row(text, "optimal policy, discount 0.99")[-3:] == ["476.0", "600.0", "-"]
+
+
+def section(text: str, start: str) -> str:
+    return text[text.index(start) :].split("\n\n")[0]
+
+
+@pytest.mark.parametrize("training", [False, True])
+@pytest.mark.parametrize("greedy", [False, True])
+def test_it_says_where_trails_evaporate(
+    comparison: Comparison, training: bool, greedy: bool
+) -> None:
+    changed = replace(comparison, train_evaporation=training, greedy_evaporation=greedy)
+    ways = ("without", "with")
+    text = render(changed, [], [])
+    assert (
+        f"\nTraining {ways[training]} evaporation of trails, greedy evaluation {ways[greedy]} it.\n"
+    ) in text
+    assert f"greedily once, {ways[training]} evaporation, as in training." in text
+
+
+def test_it_counts_what_the_ants_do(comparison: Comparison) -> None:
+    behaviours = comparison.behaviours.copy()
+    policy_returns = comparison.policy_returns.copy()
+    shown = paper_position(comparison, "absorbing", DYNA_P5)
+    behaviours[shown, 4:], policy_returns[shown, 4:] = CIRCLES, 220
+    behaviours[shown - 1, :3] = WALKS
+    mixed = replace(comparison, behaviours=behaviours, policy_returns=policy_returns)
+    text = render(mixed, table2(mixed, 10), assess(mixed))
+    absorbing = section(text, "What the ants do, absorbing")
+    trained = mixed.measure("return_last50")[shown]
+    lines = absorbing[absorbing.index("Dyna-Q (p5)") :].splitlines()
+    delivers, walks, circles = (line.split() for line in lines[:3])
+    first, rest = f"{trained[:4].mean():.1f}", f"{trained[4:].mean():.1f}"
+    assert delivers == ["Dyna-Q", "(p5)", "+", "delivers", "4", first, "45.0", "45.0", "241"]
+    assert walks == ["walks", "the", "trail", "0", "-", "-", "-", "3"]
+    assert circles[4:] == ["12", rest, "220.0", "45.0", "12"]
+    assert row(absorbing, "SARSA")[1:3] == ["delivers", "16"]
+    assert "circles beside the queen: with food, at most 3 cells from her" in text
+    assert "other:" not in text  # nobody does
+    continuing = section(text, "What the ants do, continuing")
+    assert [line.split()[-1] for line in continuing.splitlines()[-4:]] == ["256"] * 4
+
+
+def test_means_that_no_run_has_are_marked(comparison: Comparison, text: str) -> None:
+    assert " +" not in text
+    behaviours = comparison.behaviours.copy()
+    behaviours[paper_position(comparison, "absorbing", DYNA_P5), 0] = OTHER
+    mixed = replace(comparison, behaviours=behaviours)
+    marked = render(mixed, table2(mixed, 10), [])
+    for start in ("Table 2, absorbing", "Greedy evaluation", "What the ants do, absorbing"):
+        rows = [line for line in section(marked, start).splitlines() if "Dyna-Q" in line]
+        assert [line.startswith("Dyna-Q (p5) +") for line in rows][-1], start
+        assert sum(line.startswith("Dyna-Q (p5) +") for line in rows) == 1, start
+    assert "Dyna-Q (p5) +" not in section(marked, "Table 2, continuing")
+    assert marked.count("\n+ the runs do different things, and no run has their mean") == 2
 
 
 def test_a_terminal_gets_colours(comparison: Comparison, monkeypatch: pytest.MonkeyPatch) -> None:

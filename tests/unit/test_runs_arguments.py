@@ -7,15 +7,22 @@ import pytest
 
 from taichi_ants import (
     AntsError,
+    Colony,
+    ColonyConfig,
     TrainingConfig,
     continue_training,
     evaluate,
     rollout,
     trace_training,
     train,
+    worlds,
 )
 from taichi_ants.engines.checks import checked_count, checked_seeds, checked_seeds_for
 from taichi_ants.engines.launches import plan_launches
+from taichi_ants.errors import shown
+from taichi_ants.rendering import Episode, episode_picture
+from taichi_ants.rendering.learning import learning_stages
+from taichi_ants.rendering.replay import Replay
 from taichi_ants.worlds import World, paper
 
 CONFIG = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 0.99)
@@ -138,10 +145,33 @@ def test_counts_of_any_kind_of_integer():
     assert checked_count("n", 0, least=0) == 0
 
 
+@pytest.mark.parametrize("value", ["none", "off", 0, 1, None, 0.5, [True]])
+def test_flags(value):
+    """Text such as "none" would turn evaporation on."""
+    text = f"evaporation is {value!r}; it must be True or False"
+    says(text, train, paper(), CONFIG, 0, 1, 1, value)
+    says(text, evaluate, paper(), TABLE, evaporation=value)
+    says(text, rollout, paper(), TABLE, evaporation=value)
+    says(text, trace_training, paper(), CONFIG, evaporation=value)
+    trace = rollout(paper(), TABLE, max_steps=1)
+    says(text, Replay, paper(), trace, evaporation=value)
+    says(text, learning_stages, paper(), CONFIG, stages=(0,), evaporation=value)
+    for name in ("hud", "legend", "view"):
+        says(f"{name} is {value!r}", episode_picture, Episode(paper(), trace), 0, **{name: value})
+    for name in ("births", "ends_at_delivery"):
+        says(f"{name} is {value!r}", ColonyConfig, **{name: value})
+
+
+def test_flags_of_numpy_are_fine():
+    on, off = (train(paper(), CONFIG, 0, 1, 1, flag) for flag in (np.True_, np.False_))
+    assert (on.evaporation, off.evaporation) == (True, False)
+    assert type(on.evaporation) is bool
+
+
 @pytest.mark.parametrize("value", [-0.1, 1.1, float("nan"), "0.5", None, True, [0.5], 10**400])
 def test_epsilon(value):
     for function in (evaluate, rollout):
-        says(f"epsilon is {value!r}", function, paper(), TABLE, epsilon=value)
+        says(f"epsilon is {shown(value)}", function, paper(), TABLE, epsilon=value)
 
 
 @pytest.mark.parametrize(
@@ -255,6 +285,41 @@ def test_progress_rises_to_one():
     shares.clear()
     evaluate(paper(), TABLE, 3, progress=shares.append)
     assert shares[-1] == pytest.approx(1)
+
+
+@pytest.mark.parametrize("progress", [3, "yes", True])
+def test_progress_can_be_called(progress):
+    text = f"progress is {progress!r}; it must be a function"
+    says(text, train, paper(), CONFIG, 0, 1, 1, progress=progress)
+    says(text, evaluate, paper(), TABLE, 1, progress=progress)
+    says(text, Colony(paper(), ColonyConfig(), CONFIG).run, 1, 1, progress)
+
+
+def test_a_world_to_learn_in_has_food():
+    bare = World((4, 4, 4), (0, 0, 0))
+    text = "the world has no food, so there is nothing to learn"
+    says(text, train, bare, CONFIG, 0, 1, 1)
+    says(text, trace_training, bare, CONFIG)
+    assert evaluate(bare, TABLE, 2, max_steps=3).deliveries.sum() == 0
+    assert len(rollout(bare, TABLE, max_steps=3)) == 3
+
+
+@pytest.mark.parametrize(
+    "value",
+    [[0] * 10**6, "x" * 10**7, np.zeros(10**6), 10**5000],
+    ids=["list", "text", "array", "number"],
+)
+def test_messages_stay_short_whatever_they_name(value):
+    for function, arguments in (
+        *((train, (value, CONFIG, 0, 1, 1)), (train, (paper(), [value], 0, 1, 1))),
+        *((train, (paper(), CONFIG, [value], 1, 1)), (train, (paper(), CONFIG, 0, value, 1))),
+        *((evaluate, (paper(), TABLE, value)), (World, ((3, 3, 3), value))),
+        *((worlds.build, (value,)), (worlds.register, (value, None)), (ColonyConfig, (value,))),
+        *((continue_training, (value, 1)), (Colony, (paper(), value, CONFIG))),
+    ):
+        with pytest.raises(AntsError) as caught:
+            function(*arguments)
+        assert len(str(caught.value)) < 300
 
 
 @pytest.mark.parametrize("workers", [1, 2, 64, 4096])

@@ -121,7 +121,15 @@ field.fill(7)
 assert same()
 assert field.to_numpy().tolist() == [7] * 4  # not restarted
 assert runtime.start().threads == 3
-assert runtime.start(threads=1).threads == 1
+for other in ({"threads": 1}, {"arch": "cuda"}):
+    try:
+        runtime.start(**other)
+    except AntsError as error:
+        assert "with 'cpu' and 3 and was not started by taichi_ants; leave" in str(error), error
+    else:
+        raise AssertionError("it was restarted")
+assert field.to_numpy().tolist() == [7] * 4
+assert runtime.start(threads=3, arch="cpu").threads == 3
 assert same()
 
 init(fast_math=True)
@@ -133,6 +141,105 @@ init(default_fp=ti.f64)
 assert same()
 """
     python(BEGINNING + script, tmp_path, PYTHONWARNINGS="ignore")
+
+
+def test_what_the_caller_keeps_in_our_taichi_is_not_destroyed(tmp_path):
+    script = """
+import taichi as ti
+
+def kept(read):
+    before = read()
+    try:
+        train(paper(), config, 1, 2, 20, threads=1)
+    except AntsError as error:
+        assert "holds fields or arrays; leave out threads" in str(error), error
+    else:
+        raise AssertionError("Taichi was restarted")
+    assert read() == before
+    trained()
+    ti.reset()
+    assert runtime.start(threads=2).threads == 2
+
+runtime.start(threads=2)
+trained()
+field = ti.field(ti.i32, 4)
+field.fill(7)
+kept(lambda: field.to_numpy().tolist())
+declared = ti.field(ti.i32, 4)  # but not yet given its place
+kept(lambda: None)
+array = ti.ndarray(ti.f32, 3)
+array.fill(2.5)
+kept(lambda: array.to_numpy().tolist())
+del array
+assert runtime.start(threads=1).threads == 1
+"""
+    python(BEGINNING + script, tmp_path)
+
+
+def test_a_failed_request_for_cuda_leaves_what_ran(tmp_path):
+    script = """
+import taichi as ti
+for before in (None, runtime.Runtime("cpu", 2)):
+    if before:
+        runtime.start(before.threads)
+        expected = trained()
+    try:
+        runtime.start(arch="cuda")
+    except AntsError as error:
+        assert "no CUDA device" in str(error), error
+    else:
+        sys.exit()  # there is one
+    running = ti.lang.impl.get_runtime().prog is not None
+    assert running == bool(before)
+assert int(ti.lang.impl.current_cfg().cpu_max_num_threads) == 2
+assert np.array_equal(trained().q_values, expected.q_values)
+"""
+    python(BEGINNING + script, tmp_path)
+
+
+def test_all_goes_on_after_a_reset_of_the_callers(tmp_path):
+    """With kernels, colonies and pictures made before; a colony goes on bit for bit."""
+    script = """
+import contextlib
+import io
+import taichi as ti
+from taichi_ants import Colony, ColonyConfig
+from taichi_ants.rendering import Scene
+
+def quietly(init, **settings):
+    with contextlib.redirect_stdout(io.StringIO()):
+        init(**settings)
+
+def colony():
+    made = Colony(paper(), ColonyConfig(4), config, threads=2)
+    made.begin_episode()
+    made.tick(40)
+    return made
+
+def finished(colony):
+    colony.tick(40)
+    return colony.q_values, picture(colony)
+
+def picture(colony):
+    return scene.draw(colony.snapshot())
+
+scene = Scene(paper().grid, (200, 160))
+expected, (values, pixels) = trained(), finished(colony())
+changes = (
+    ti.reset,
+    lambda: runtime.start(threads=1),
+    lambda: quietly(ti.init, arch=ti.cpu, fast_math=False, log_level=ti.ERROR),
+)
+for change in changes:
+    made = colony()
+    change()
+    now_values, now_pixels = finished(made)
+    assert np.array_equal(now_values, values)
+    assert np.array_equal(now_pixels, pixels)
+    change()
+    assert np.array_equal(trained().q_values, expected.q_values)
+"""
+    python(BEGINNING + script, tmp_path)
 
 
 def test_it_is_restarted_only_for_other_settings(tmp_path):
@@ -147,6 +254,68 @@ for threads, count in ((2, 1), (None, 1), (2, 1), (1, 2), (None, 2), (2, 3)):
 assert {settings["fast_math"] for settings in starts} == {False}
 """
     python(BEGINNING + script, tmp_path)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="nothing is forked here")
+def test_a_forked_process_is_told_to_be_spawned(tmp_path):
+    """All that launches kernels, also what was made before; a fork before the start is fine."""
+    script = """
+import multiprocessing
+from taichi_ants import Colony, ColonyConfig, evaluate, rollout, trace_training
+from taichi_ants.rendering import Scene
+
+def in_a_fork(work):
+    context = multiprocessing.get_context("fork")
+    reader, writer = context.Pipe()
+    process = context.Process(target=lambda: writer.send(said_by(work)))
+    process.start()
+    process.join(60)
+    assert process.exitcode == 0
+    return reader.recv()
+
+def said_by(work):
+    try:
+        work()
+    except AntsError as error:
+        return str(error)
+    return "done"
+
+assert in_a_fork(trained) == "done"
+table = trained().q_values[0, 0]
+colony = Colony(paper(), ColonyConfig(4), config)
+colony.begin_episode()
+colony.tick()
+scene = Scene(paper().grid, (200, 160))
+snapshot = colony.snapshot()
+colony.save("colony.npz")
+for work in (
+    trained,
+    lambda: evaluate(paper(), table),
+    lambda: rollout(paper(), table),
+    lambda: trace_training(paper(), config),
+    lambda: Colony(paper(), ColonyConfig(4), config),
+    lambda: Colony.load("colony.npz"),
+    lambda: colony.tick(),
+    lambda: colony.run(1, 10),
+    lambda: scene.draw(snapshot),
+    lambda: Scene(paper().grid, (200, 160)).draw(snapshot),
+):
+    said = in_a_fork(work)
+    assert said.startswith("this process was forked") and '"spawn"' in said, said
+    assert said.count("forked") == 1
+colony.tick()
+trained()
+"""
+    python(BEGINNING + script, tmp_path, PYTHONWARNINGS="ignore")
+
+
+def test_the_import_of_taichi_warns_of_nothing(tmp_path):
+    """Python 3.11 and later have a warning for a function that Taichi calls."""
+    for first in (
+        "from taichi_ants import learners",
+        "from taichi_ants import runtime as r; r.start()",
+    ):
+        python(first, tmp_path, PYTHONWARNINGS="default")
 
 
 @pytest.mark.parametrize(

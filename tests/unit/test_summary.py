@@ -1,4 +1,4 @@
-"""The rows of summary.csv."""
+"""The rows of summary.csv and behaviours.csv."""
 
 from __future__ import annotations
 
@@ -8,9 +8,15 @@ import numpy as np
 import pytest
 from synthetic_comparison import build, subset, unchanged
 
+from taichi_ants.analysis.behaviour import CIRCLES, WALKS
 from taichi_ants.analysis.paper import FIGURE_1, SARSA
 from taichi_ants.analysis.statistics import bootstrap_interval
-from taichi_ants.analysis.summary import SUMMARY_COLUMNS, summarise
+from taichi_ants.analysis.summary import (
+    BEHAVIOUR_COLUMNS,
+    SUMMARY_COLUMNS,
+    summarise,
+    summarise_behaviours,
+)
 
 
 def test_a_line_by_hand() -> None:
@@ -18,6 +24,7 @@ def test_a_line_by_hand() -> None:
     comparison.returns[0, :, -50:] = np.array([40, 50, 60])[:, None]
     comparison.steps[0, :, :70] = 100
     comparison.steps[0, :, 70:] = np.array([30, 40, 50])[:, None]
+    comparison.behaviours[0, 1] = CIRCLES
     (line,) = summarise(comparison)
     assert tuple(line) == SUMMARY_COLUMNS
     low, high = bootstrap_interval(np.array([[40.0, 50.0, 60.0]]))
@@ -34,6 +41,7 @@ def test_a_line_by_hand() -> None:
     }
     assert (line["return_last50_ci_low"], line["return_last50_ci_high"]) == (low[0], high[0])
     centres = {name: value for name, value in line.items() if name.endswith(("mean", "iqm"))}
+    runs = {name: value for name, value in line.items() if name.startswith("runs_")}
     assert centres == {
         "return_last50_mean": 50.0,
         "return_last50_iqm": 50.0,
@@ -47,6 +55,12 @@ def test_a_line_by_hand() -> None:
         "greedy_steps_mean": 35.0,
         "greedy_steps_iqm": 35.0,
         "greedy_deliveries_mean": 1.0,
+    }
+    assert runs == {
+        "runs_delivers": 2,
+        "runs_walks_the_trail": 0,
+        "runs_circles_beside_the_queen": 1,
+        "runs_other": 0,
     }
 
 
@@ -78,3 +92,42 @@ def test_one_seed_without_rollouts_has_means_only() -> None:
     assert missing == ends | {name for name in SUMMARY_COLUMNS if name.startswith("greedy")}
     assert line["return_last50_iqm"] == line["return_last50_mean"]
     assert math.isfinite(line["return_last50_mean"])
+
+
+def test_runs_that_act_alike_have_means_of_their_own() -> None:
+    comparison = build({"absorbing": unchanged}, seeds=5, variants=[SARSA], grid=[FIGURE_1])
+    comparison.behaviours[0, [1, 4]] = CIRCLES
+    comparison.policy_returns[0] = [45, 210, 45, 45, 220]
+    comparison.returns[0, :, -50:] = np.array([40, 150, 41, 45, 160])[:, None]
+    comparison.greedy_steps[0, 4] = 600
+    delivering, circling = summarise_behaviours(comparison)
+    assert tuple(delivering) == tuple(circling) == BEHAVIOUR_COLUMNS
+    assert {**delivering, **circling} == {
+        "learner": "sarsa",
+        "planning_steps": 0,
+        "learning_rate": 0.01,
+        "discount": 0.9,
+        "epsilon": 0.3,
+        "epsilon_decay": 0.995,
+        "delivery": "absorbing",
+        "behaviour": "circles beside the queen",
+        "runs": 2,
+        "return_last50_mean": 155.0,
+        "policy_return_mean": 215.0,
+        "greedy_return_mean": 45.0,
+        "greedy_steps_mean": (35 + 600) / 2,
+        "greedy_deliveries_mean": 1.0,
+    }
+    assert (delivering["behaviour"], delivering["runs"]) == ("delivers", 3)
+    assert delivering["return_last50_mean"] == 42.0
+
+
+def test_each_run_is_counted_once() -> None:
+    comparison = build({"continuing": unchanged, "absorbing": unchanged}, seeds=4)
+    comparison.behaviours[::3, 2:] = WALKS
+    runs = sum(line["runs"] for line in summarise_behaviours(comparison))
+    assert runs == comparison.behaviours.size
+    lines = summarise(comparison)
+    assert [line["runs_walks_the_trail"] for line in lines] == [2, 0, 0] * 42 + [2, 0]
+    names = [name for name in SUMMARY_COLUMNS if name.startswith("runs_")]
+    assert all(sum(line[name] for name in names) == line["seeds"] for line in lines)

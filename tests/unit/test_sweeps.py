@@ -75,6 +75,17 @@ def test_a_sweep_is_training_and_evaluation(sweep, tmp_path):
     assert len(shares) == 1 + len(list(sweep.blocks())) == 1 + len(list(tmp_path.iterdir()))
 
 
+@pytest.mark.parametrize(("training", "greedy"), [(True, True), (True, False), (False, False)])
+def test_evaporation_is_a_setting_of_each(training, greedy, tmp_path):
+    sweep = Sweep(paper(), CONFIGS[:2], (0, 1), 20, 80, 2, training, greedy)
+    result = run_sweep(sweep, tmp_path)
+    trained = train(paper(), CONFIGS[:2], (0, 1), 20, 80, evaporation=training)
+    rollouts = evaluate(paper(), trained.q_values, 2, (0, 1), 80, evaporation=greedy)
+    for name in NAMES:
+        assert np.array_equal(getattr(result, name), getattr(trained, name))
+        assert np.array_equal(getattr(result, f"greedy_{name}"), getattr(rollouts, name))
+
+
 def test_a_sweep_goes_on_from_any_blocks(sweep, tmp_path, monkeypatch):
     first = run_sweep(sweep, tmp_path)
     files = sorted(tmp_path.iterdir())
@@ -148,6 +159,8 @@ def test_an_interruption_loses_one_block_at_most(sweep, tmp_path):
         ({"episodes": 0}, "episodes is 0"),
         ({"max_steps": 10**8}, "max_steps is 100000000"),
         ({"rollouts": 0}, "rollouts is 0"),
+        ({"train_evaporation": "off"}, "train_evaporation is 'off'"),
+        ({"greedy_evaporation": 1}, "greedy_evaporation is 1"),
         ({"episodes": 2 * 10**9, "seeds": tuple(range(1000))}, "5000 runs of 2000000000 episodes"),
     ],
 )
@@ -170,6 +183,7 @@ def test_settings_tell_all_that_determines_results(sweep):
     others = {
         "world": World((3, 3, 3), (0, 0, 0), foods=[(2, 0, 0)]),
         **{"configs": CONFIGS[:2], "seeds": (1,), "episodes": 7, "max_steps": 81, "rollouts": 4},
+        **{"train_evaporation": True, "greedy_evaporation": False},
     }
     for name, value in others.items():
         assert sweep_settings(replace(sweep, **{name: value})) != settings, name

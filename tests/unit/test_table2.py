@@ -9,7 +9,16 @@ import numpy as np
 import pytest
 from synthetic_comparison import build, change, subset, unchanged
 
-from taichi_ants.analysis.best_of import Chosen, best_of, choice, held_out, percentile_of
+from taichi_ants.analysis.behaviour import CIRCLES, DELIVERS, MIXED, OTHER, WALKS
+from taichi_ants.analysis.best_of import (
+    Chosen,
+    best_of,
+    choice,
+    examples,
+    held_out,
+    paper_position,
+    percentile_of,
+)
 from taichi_ants.analysis.comparison import Comparison, Variant
 from taichi_ants.analysis.paper import DYNA_P3, FIGURE_1, Q_LEARNING, SARSA, TABLE_2, VARIANTS
 from taichi_ants.analysis.statistics import interquartile_mean
@@ -192,7 +201,7 @@ def test_what_stands_for_a_learner(comparison: Comparison) -> None:
 def test_the_markdown_holds_the_numbers(comparison: Comparison) -> None:
     lines = table2(comparison, draws=2000)
     text = table2_markdown(lines, comparison)
-    assert text.startswith("World: the paper's.\n")
+    assert text.startswith("World: the paper's.\n\nTraining without evaporation of trails, greedy ")
     assert "(IQM, the typical run) over 8 seeds" in text
     row = next(line for line in text.splitlines() if line.startswith("| SARSA | continuing"))
     cells = [cell.strip() for cell in row.strip("|").split("|")]
@@ -232,3 +241,54 @@ def test_a_mean_that_far_runs_have_moved_is_marked() -> None:
     mean = f"{lines[1]['same_return_mean']:.1f} ! ["
     assert mean in next(row for row in text.splitlines() if row.startswith("| SARSA"))
     assert lines[1]["same_return_iqm"] == pytest.approx(line["same_return_iqm"], abs=0.5)
+
+
+def some_circle(comparison: Comparison) -> Comparison:
+    """In the paper's configuration of absorbing Dyna-Q (p3) three of eight runs circle."""
+    behaviours = comparison.behaviours.copy()
+    behaviours[paper_position(comparison, "absorbing", DYNA_P3), [1, 2, 5]] = CIRCLES
+    return replace(comparison, behaviours=behaviours)
+
+
+def test_means_of_runs_that_do_different_things_are_marked(comparison: Comparison) -> None:
+    lines = table2(some_circle(comparison), draws=10)
+    mixed = [line for line in lines if line["same_behaviours"]]
+    assert [(line["planning_steps"], line["delivery"]) for line in mixed] == [(3, "absorbing")]
+    assert mixed[0]["same_behaviours"] == "delivers 5, circles beside the queen 3"
+    text = table2_markdown(lines, comparison)
+    assert f"Here {MIXED}" in text
+    assert "Dyna-Q (p3), absorbing: delivers 5, circles beside the queen 3\n" in text
+    assert MIXED not in table2_markdown(table2(comparison, draws=10), comparison)
+
+
+def test_examples_show_each_behaviour_by_its_median_run(comparison: Comparison) -> None:
+    changed = some_circle(comparison)
+    shown = paper_position(comparison, "absorbing", DYNA_P3)
+    elsewhere, more = comparison.positions("absorbing", Q_LEARNING)[:2]
+    assert paper_position(comparison, "absorbing", Q_LEARNING) not in (elsewhere, more)
+    changed.behaviours[elsewhere, 3] = WALKS
+    changed.behaviours[more, [0, 3, 4]] = WALKS
+    changed.behaviours[elsewhere, 6] = OTHER
+    changed.behaviours[more, 7] = CIRCLES  # shown already
+    returns = changed.measure("return_last50")
+    found = examples(changed)
+    whats = [(row, int(changed.behaviours[row, run])) for row, run in found]
+    expected = []
+    for setting in ("continuing", "absorbing"):
+        for variant in comparison.variants:
+            row = paper_position(comparison, setting, variant)
+            expected += [(row, DELIVERS)] + [(row, CIRCLES)] * (row == shown)
+    assert whats == [*expected, (more, WALKS), (elsewhere, OTHER)]
+    for row, run in found:
+        alike = changed.behaviours[row] == changed.behaviours[row, run]
+        below = (returns[row, alike] < returns[row, run]).sum()
+        assert below == (alike.sum() - 1) // 2
+
+
+def test_examples_of_learners_outside_of_the_paper(comparison: Comparison) -> None:
+    few = subset(comparison, comparison.positions("absorbing", SARSA)[:2], 3, 120)
+    assert paper_position(few, "absorbing", SARSA) is None
+    ((row, run),) = examples(few)
+    means = few.measure("return_last50")
+    assert row == means.mean(axis=1).argmax()
+    assert means[row, run] == np.median(means[row])

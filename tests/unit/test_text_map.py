@@ -1,6 +1,7 @@
 """Maps in text: what they mean, what is refused, and that drawing undoes reading."""
 
 import os
+import re
 from pathlib import Path
 
 import pytest
@@ -203,8 +204,28 @@ def test_damaged_files(tmp_path: Path, content: bytes, message: str) -> None:
 
 def test_a_byte_order_mark_is_no_character(tmp_path: Path) -> None:
     file = tmp_path / "map.txt"
-    file.write_text(RING, encoding="utf-8-sig")
-    assert load_map(file) == from_text(RING)
+    for text in (RING, f"; a comment\ntrail = 7\n{RING}"):
+        file.write_text(text, encoding="utf-8-sig")
+        assert load_map(file) == from_text("\ufeff" + text) == from_text(text)
+    with pytest.raises(AntsError, match="line 2, column 1 of the map has 'x'"):
+        from_text("\ufeff; a comment\nx")
+
+
+@pytest.mark.parametrize("above", ["; c\n", "\ufeff; c\n;; d\n", "; c\ntrail = 3\n;\n", "\n;\n"])
+def test_errors_name_the_line_of_the_file_whatever_stands_above(above: str) -> None:
+    for text in ("Q   .\n  x\n", "Q\n; between\n\n .", "Q   .\n  .\ntrail = 4\n"):
+        lines = []
+        for whole in (text, above + text):
+            with pytest.raises(AntsError) as caught:
+                from_text(whole)
+            lines.append(int(re.search(r"line (\d+)", str(caught.value))[1]))
+        assert lines[1] == lines[0] + above.count("\n")
+
+
+@pytest.mark.parametrize("world", [None, 3, "paper", RING])
+def test_only_worlds_are_drawn(world: object) -> None:
+    with pytest.raises(AntsError, match=r"world is .*; it must be a World"):
+        to_text(world)
 
 
 def test_files_that_cannot_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

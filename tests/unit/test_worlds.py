@@ -7,7 +7,8 @@ import pickle
 import numpy as np
 import pytest
 
-from taichi_ants import hexgrid, worlds
+from taichi_ants import hexgrid, reference, worlds
+from taichi_ants.colony_config import STARTS as WHERE
 from taichi_ants.constants import (
     EMPTY,
     FOOD,
@@ -203,6 +204,27 @@ def test_starts_depend_on_the_seed_alone() -> None:
     assert (first[1] != other[1]).any()
     # Fewer ants are the first of more ants.
     assert (world.start(1, 20)[0] == first[0][:20]).all()
+
+
+@pytest.mark.parametrize("seed", [0, -3, 2**70])
+def test_ants_that_are_spread_start_on_any_free_cells_by_the_seed(seed: int) -> None:
+    for world in (worlds.open_world(4, (9, 8, 7)), worlds.paper()):
+        free = int((world.ground() == EMPTY).sum())
+        for n in (1, 2, 40, free):
+            cells, headings = world.start(seed, n, "spread")
+            plain = reference.start(world, seed, n, "spread")
+            assert world.grid.cells(cells).tolist() == [list(cell) for cell, _ in plain]
+            assert headings.tolist() == [heading for _, heading in plain]
+            assert len(set(cells.tolist())) == n
+            assert (world.ground()[cells] == EMPTY).all()
+        with pytest.raises(AntsError, match=f"room for {free}"):
+            world.start(seed, free + 1, "spread")
+    world = World((60, 60, 60), (0, 0, 0))
+    near, far = (world.distances()[world.start(seed, 300, where)[0]] for where in WHERE)
+    assert near.max() == 10
+    assert far.mean() == pytest.approx(world.distances()[world.grid.exists].mean(), rel=0.1)
+    with pytest.raises(AntsError, match="where is 'moon'; it must be one of nest, spread"):
+        world.start(seed, 2, "moon")
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,116 @@
+"""What an ant does that follows its final policy: deliver, or collect small rewards without end.
+
+The step onto a trail (T), and with food the step nearer to the queen (S), are paid. A policy can
+live on them: walk to and fro on the trail, or carry the food in a circle beside the queen and come
+nearer to her again and again. Returns of such runs and of runs that deliver have no common mean
+that means anything, so that runs are counted by what they do.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from taichi_ants.constants import N_STATES, RIGHT, SEES_LURE
+from taichi_ants.worlds.world import World
+
+# What an ant does is a number, its place in this list.
+BEHAVIOURS: tuple[str, ...] = (
+    "delivers",
+    "walks the trail",
+    "circles beside the queen",
+    "other",
+)
+DELIVERS, WALKS, CIRCLES, OTHER = range(len(BEHAVIOURS))
+
+NAMES: tuple[str, ...] = tuple(name.replace(" ", "_") for name in BEHAVIOURS)  # of columns, files
+
+# What each of them means, for reports; of an episode without delivery its second half counts.
+DEFINITIONS: tuple[str, ...] = (
+    "the episode ends with a delivery",
+    "without food, at least every fourth step leads onto a trail",
+    "with food, at most 3 cells from her, at least every fourth step leads nearer",
+    "none of these",
+)
+_PAID_SHARE = 0.25
+_BESIDE = 3  # a circle of six cells that touches the queen reaches that far
+
+
+# What to say of means over runs that are not alike.
+MIXED = "the runs do different things, and no run has their mean"
+
+
+class Steps(Protocol):
+    """Steps of one or more episodes in order, as `taichi_ants.rollout` and `trace_policies` give.
+
+    Arrays (n,): the number of the episode, the step in it, the state before the action, the action,
+    the reward, whether the step delivered; and cells (n, 3), where the ant stood.
+    """
+
+    @property
+    def episodes(self) -> np.ndarray: ...
+    @property
+    def steps(self) -> np.ndarray: ...
+    @property
+    def states(self) -> np.ndarray: ...
+    @property
+    def actions(self) -> np.ndarray: ...
+    @property
+    def rewards(self) -> np.ndarray: ...
+    @property
+    def delivered(self) -> np.ndarray: ...
+    @property
+    def cells(self) -> np.ndarray: ...
+
+
+def classify(world: World, trace: Steps, max_steps: int) -> tuple[np.ndarray, np.ndarray]:
+    """What the ant does in each episode of a trace, see `DEFINITIONS`, and what it earns.
+
+    Rewards play no part in it, so it holds whatever the steps are paid.
+
+    Args:
+        world: The world of the episodes.
+        trace: The steps of m episodes; an episode without delivery uses all of its steps.
+        max_steps: The step limit of an episode.
+
+    Returns:
+        Places in `BEHAVIOURS`, int8 (m,), and returns, int64 (m,).
+    """
+    episode = np.asarray(trace.episodes) - trace.episodes[0]
+    late = np.asarray(trace.steps) >= max_steps // 2
+
+    def count(which: np.ndarray) -> np.ndarray:
+        return np.bincount(episode[which], minlength=episode[-1] + 1)
+
+    carries = trace.states >= N_STATES // 2
+    paid = late & _enters_lure(trace.states, trace.actions)
+    distance = world.distances()[world.grid.index(trace.cells)]
+    steps, with_food = count(late), count(late & carries)
+    often = count(paid) >= _PAID_SHARE * steps
+    nearby = count(late & (distance > _BESIDE)) == 0
+    walks, circles = often & (with_food == 0), often & (with_food == steps) & nearby
+    delivers = count(trace.delivered) > 0
+    behaviours = np.select([delivers, walks, circles], [DELIVERS, WALKS, CIRCLES], OTHER)
+    returns = np.bincount(episode, weights=trace.rewards).astype(np.int64)
+    return behaviours.astype(np.int8), returns
+
+
+def counts(behaviours: np.ndarray) -> dict[int, int]:
+    """How many runs do what, without what nobody does, in the order of `BEHAVIOURS`."""
+    number_of = np.bincount(np.ravel(behaviours), minlength=len(BEHAVIOURS)).tolist()
+    return {code: number for code, number in enumerate(number_of) if number}
+
+
+def mixture(behaviours: np.ndarray) -> str:
+    """The counts in words where runs do different things, "" where all do the same."""
+    found = counts(behaviours)
+    if len(found) < 2:
+        return ""
+    return ", ".join(f"{BEHAVIOURS[code]} {number}" for code, number in found.items())
+
+
+def _enters_lure(states: np.ndarray, actions: np.ndarray) -> np.ndarray:
+    """bool (n,): whether the action is a move onto a cell that looks T or S, which succeeds."""
+    codes = states >> (4 - 2 * np.minimum(actions, RIGHT)) & 3
+    return (actions <= RIGHT) & (codes == SEES_LURE)

@@ -1,0 +1,95 @@
+"""What the files of colonies and of training results have in common."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from taichi_ants import results
+from taichi_ants.errors import AntsError
+from taichi_ants.worlds.world import World
+
+_WORLD_PARTS = ("foods", "obstacles", "trails", "ants")
+# What numbers, texts and arrays that mean nothing lead to while an object is built from them.
+_SIGNS_OF_DAMAGE = (
+    *(AntsError, ArithmeticError, AttributeError, LookupError, RecursionError, TypeError),
+    ValueError,
+)
+
+
+@dataclass(frozen=True)
+class FileKind:
+    """A kind of .npz file: arrays, and the facts about them as JSON.
+
+    Attributes:
+        mark: What its facts hold under "format"; another version has another one.
+        what: What it holds, for messages.
+        writer: What writes it, for messages.
+    """
+
+    mark: str
+    what: str
+    writer: str
+
+    def write(
+        self,
+        path: results.PathLike,
+        facts: Mapping[str, Any],
+        arrays: Mapping[str, np.ndarray],
+        compress: bool,
+    ) -> None:
+        """Write a file; raises as `results.write_atomically` does."""
+        text = results.to_json({"format": self.mark, **facts})
+        results.write_npz(path, {**arrays, "facts": np.array(text)}, compress=compress)
+
+    def read(self, path: results.PathLike) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+        """The arrays and the facts of a file.
+
+        Raises:
+            AntsError: The file is missing, damaged, or of another kind.
+        """
+        stored = results.read_npz(path)
+        try:
+            facts = json.loads(str(stored["facts"][()]))
+            if facts["format"] != self.mark:
+                raise ValueError(facts["format"])
+        except (KeyError, ValueError, TypeError, RecursionError) as error:
+            raise AntsError(
+                f"{str(path)!r} holds no {self.what} of this version; name a file that "
+                f"{self.writer} wrote."
+            ) from error
+        return stored, facts
+
+    @contextmanager
+    def rebuilding(self, path: results.PathLike) -> Iterator[None]:
+        """Turns what goes wrong while an object is built from a file into one AntsError."""
+        try:
+            yield
+        except _SIGNS_OF_DAMAGE as error:
+            missing = isinstance(error, KeyError)
+            text = f"{error} is missing" if missing else " ".join(str(error).rstrip(".").split())
+            raise AntsError(
+                f"the {self.what} in {str(path)!r} is damaged ({text or type(error).__name__}); "
+                f"name a file that {self.writer} wrote."
+            ) from error
+
+
+def world_arrays(world: World, name: str) -> dict[str, np.ndarray]:
+    """The arrays of a world, to be written under names that begin with `name`."""
+    return {f"{name}_{part}": getattr(world, part) for part in _WORLD_PARTS}
+
+
+def world_facts(world: World) -> dict[str, Any]:
+    """What a world is besides its arrays."""
+    return {"ranges": world.ranges, "queen": world.queen}
+
+
+def world_from(stored: Mapping[str, np.ndarray], name: str, facts: Mapping[str, Any]) -> World:
+    """The world of `world_arrays` and `world_facts`; raises AntsError, KeyError or TypeError."""
+    parts = {part: stored[f"{name}_{part}"] for part in _WORLD_PARTS}
+    return World(tuple(facts["ranges"]), tuple(facts["queen"]), **parts)

@@ -1,0 +1,256 @@
+"""What may stand in a TD error that a user writes, and how the rest is refused."""
+
+import numpy as np
+import pytest
+import taichi as ti
+
+from taichi_ants import AntsError, Colony, ColonyConfig, TrainingConfig, trace_training, train
+from taichi_ants.engines import trial
+from taichi_ants.learners import Learner, register, registry
+from taichi_ants.worlds import paper
+
+NUMBERS = np.arange(5, dtype=np.float32)
+
+
+@pytest.fixture(autouse=True)
+def _no_learner_stays(monkeypatch):
+    monkeypatch.setattr(registry, "_LEARNERS", dict(registry._LEARNERS))
+
+
+def config(name="mine"):
+    return TrainingConfig(name, 0.1, 0.9, 0.3, 0.97)
+
+
+def in_runs(name="mine"):
+    return train(paper(), config(name), range(3), 20, 200).q_values
+
+
+def in_a_colony(name="mine", sharing="shared"):
+    colony = Colony(paper(), ColonyConfig(5), config(name), sharing=sharing)
+    colony.run(2, 100)
+    return colony.q_values
+
+
+ENGINES = (in_runs, in_a_colony)
+
+
+@ti.func
+def natural_q_learning(value, reward, discount, next_values, next_action, epsilon):
+    return reward + discount * max(next_values) - value
+
+
+@ti.func
+def natural_sarsa(value, reward, discount, next_values, next_action, epsilon):
+    return reward + discount * next_values[next_action] - value
+
+
+@ti.func
+def natural_expected_sarsa(value, reward, discount, next_values, next_action, epsilon):
+    mean = sum(next_values) * ti.f32(1 / len(next_values))
+    best = -min(-next_values)
+    return reward + discount * (best + epsilon * (mean - best)) - value
+
+
+@ti.func
+def of_lists_and_several(value, reward, discount, next_values, next_action, epsilon):
+    best = max(next_values[0], next_values[1], next_values[2:].max())
+    best = max([best, min((best, next_values[0]))])
+    return sum([reward, discount * best], 0.0) - value
+
+
+NATURAL = {
+    "q_learning": natural_q_learning,
+    "sarsa": natural_sarsa,
+    "expected_sarsa": natural_expected_sarsa,
+}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(
+    ("like", "td_error"), [*NATURAL.items(), ("q_learning", of_lists_and_several)]
+)
+def test_what_is_natural_in_python_works(like, td_error, engine):
+    """To the bit what the package's own learners do, which equal the reference."""
+    model = registry.get(like)
+    register(Learner("mine", td_error, model.draws_next_action))
+    values = engine()
+    assert np.abs(values).max() > 0.5
+    assert np.array_equal(values, engine(like))
+
+
+@ti.func
+def checks_the_next_action(value, reward, discount, next_values, next_action, epsilon):
+    valid = ti.cast(next_action >= 0, ti.f32) * ti.cast(next_action < 5, ti.f32)
+    return 1.0 - valid
+
+
+def test_the_next_action_is_always_a_valid_index():
+    """Also after a delivery, where none is drawn."""
+    register(Learner("mine", checks_the_next_action, draws_next_action=True))
+    result = train(paper(), config(), range(5), 30)
+    assert result.deliveries.any()
+    assert not result.q_values.any()
+    colony = Colony(paper(), ColonyConfig(5), config())
+    assert colony.run(5, 600).deliveries.any()
+    assert not colony.q_values.any()
+
+
+@ti.func
+def of_a_vector(value, reward, discount, next_values, next_action, epsilon):
+    return reward + discount * next_values - value
+
+
+@ti.func
+def of_taichis_max(value, reward, discount, next_values, next_action, epsilon):
+    return reward + discount * ti.max(next_values) - value
+
+
+@ti.func
+def of_a_tuple(value, reward, discount, next_values, next_action, epsilon):
+    return reward, value
+
+
+@ti.func
+def of_nothing(value, reward, discount, next_values, next_action, epsilon):
+    reward + value
+
+
+@ti.func
+def of_an_integer(value, reward, discount, next_values, next_action, epsilon):
+    return 1
+
+
+@ti.func
+def of_an_expression_in_integers(value, reward, discount, next_values, next_action, epsilon):
+    return ti.cast(reward, ti.i32)
+
+
+@ti.func
+def of_a_constant_too_far(value, reward, discount, next_values, next_action, epsilon):
+    return next_values[5]
+
+
+@ti.func
+def of_an_action_too_far(value, reward, discount, next_values, next_action, epsilon):
+    return next_values[next_action + 1]
+
+
+@ti.func
+def of_one_too_low(value, reward, discount, next_values, next_action, epsilon):
+    return next_values[next_action - 1]
+
+
+@ti.func
+def of_a_division_by_zero(value, reward, discount, next_values, next_action, epsilon):
+    return reward * (5 // next_action)
+
+
+@ti.func
+def of_itself(value, reward, discount, next_values, next_action, epsilon):
+    return of_itself(value, reward, discount, next_values, 0, epsilon)
+
+
+@ti.func
+def of_a_global_array(value, reward, discount, next_values, next_action, epsilon):
+    return NUMBERS[next_action]
+
+
+@ti.func
+def of_round(value, reward, discount, next_values, next_action, epsilon):
+    return round(reward)
+
+
+@ti.func
+def of_a_lost_name(value, reward, discount, next_values, next_action, epsilon):
+    return lost  # noqa: F821
+
+
+REFUSED = [
+    (of_a_vector, "returns a vector or matrix of the shape (5,) where one float"),
+    (of_taichis_max, "returns a vector"),
+    (of_a_tuple, "returns a tuple"),
+    (of_nothing, "returns nothing"),
+    (of_an_integer, "returns a int"),
+    (of_an_expression_in_integers, "returns a number of the type i32"),
+    (of_a_constant_too_far, "it ends the process"),
+    (of_an_action_too_far, "Out of bound access to a [5] matrix with index [5]"),
+    (of_one_too_low, "Out of bound access to a [5] matrix with index [-1]"),
+    (of_a_division_by_zero, "it ends the process"),
+    (of_itself, "recursion"),
+    (of_a_global_array, "valid indices"),
+    (of_round, "round"),
+    (of_a_lost_name, '"lost" is not defined'),
+]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(("td_error", "says"), REFUSED)
+def test_what_cannot_work_is_refused_and_the_process_lives(td_error, says, engine, capfd):
+    register(Learner("mine", td_error, draws_next_action=True))
+    with pytest.raises(AntsError) as caught:
+        engine()
+    message = str(caught.value)
+    assert message.startswith("the TD error of learner 'mine' cannot be used: ")
+    assert says in message
+    assert "\n" not in message
+    assert message.endswith(".")
+    assert capfd.readouterr() == ("", "")
+    assert in_runs("q_learning").any()  # Taichi goes on
+
+
+@ti.func
+def that_never_ends(value, reward, discount, next_values, next_action, epsilon):
+    error = reward - value
+    while error < 1000:
+        error *= 0.5
+    return error
+
+
+def test_one_that_never_ends_is_stopped(monkeypatch):
+    monkeypatch.setattr(trial, "_SECONDS", 2)
+    register(Learner("mine", that_never_ends))
+    with pytest.raises(AntsError, match="'mine' cannot be used: it does not come to an end within"):
+        in_runs()
+
+
+@ti.func
+def of_three(value, reward, discount):
+    return reward - value
+
+
+@pytest.mark.parametrize(
+    ("learner", "says"),
+    [
+        (Learner("mine", of_three), "has 3 arguments; it needs 6"),
+        (Learner("mine", natural_sarsa), "register it with draws_next_action=True"),
+        (Learner("mine", natural_sarsa, True, True), "has none in its updates from the model"),
+    ],
+)
+def test_what_is_refused_when_it_is_registered(learner, says):
+    with pytest.raises(AntsError, match="the TD error of 'mine' ") as caught:
+        register(learner)
+    assert says in str(caught.value)
+    assert "mine" not in registry.names()
+
+
+@ti.func
+def of_a_logarithm(value, reward, discount, next_values, next_action, epsilon):
+    return reward - ti.log(value - 0.5)
+
+
+@ti.func
+def that_explodes(value, reward, discount, next_values, next_action, epsilon):
+    return (reward - value) * 1e30
+
+
+@pytest.mark.parametrize("td_error", [of_a_logarithm, that_explodes])
+def test_values_that_are_not_finite_are_named(td_error):
+    register(Learner("mine", td_error))
+    named = r"^learner 'mine' made action values that are not finite, with .*rate=0\.1.* seed 0; "
+    with pytest.raises(AntsError, match=named):
+        in_runs()
+    for sharing in ("shared", "own"):
+        with pytest.raises(AntsError, match=named):
+            in_a_colony(sharing=sharing)
+    actions = trace_training(paper(), config(), 0, 3).actions  # a trace shows what happens
+    assert (actions.min(), actions.max()) == (0, 4)

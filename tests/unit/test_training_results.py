@@ -1,0 +1,234 @@
+"""What training returns: kept in files, compared, printed, and not mixed up."""
+
+from __future__ import annotations
+
+import copy
+import json
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from taichi_ants import (
+    AntsError,
+    Colony,
+    ColonyConfig,
+    TrainingConfig,
+    TrainingResult,
+    World,
+    continue_training,
+    evaluate,
+    rollout,
+    trace_training,
+    train,
+    worlds,
+)
+from taichi_ants.engines.records import same
+
+CONFIGS = (
+    TrainingConfig("sarsa", 0.1, 0.9, 0.5, 0.99),
+    TrainingConfig("dyna_q", 0.1, 0.95, 0.3, 0.995, planning_steps=3, delivery="continuing"),
+)
+SEEDS = (4, -1, 2**63)
+
+
+@pytest.fixture(scope="module")
+def result() -> TrainingResult:
+    return train(worlds.paper(), CONFIGS, SEEDS, episodes=6, max_steps=80, evaporation=True)
+
+
+@pytest.fixture(scope="module")
+def stored(result, tmp_path_factory) -> dict[str, np.ndarray]:
+    path = tmp_path_factory.mktemp("stored") / "result.npz"
+    result.save(path)
+    with np.load(path) as archive:
+        return dict(archive)
+
+
+def test_what_was_loaded_goes_on_bit_for_bit(result, tmp_path):
+    result.save(tmp_path / "half.npz")
+    loaded = TrainingResult.load(tmp_path / "half.npz")
+    assert loaded == result
+    assert loaded.costs == result.costs
+    assert continue_training(loaded, 5) == continue_training(result, 5)
+    whole = train(worlds.paper(), CONFIGS, SEEDS, 11, 80, True)
+    assert continue_training(loaded, 5) == whole
+
+
+@pytest.mark.parametrize("configs", CONFIGS)
+def test_worlds_of_any_kind_are_kept(configs, tmp_path):
+    world = worlds.open_world(3, (12, 11, 10))
+    once = train(world, configs, 7, 2, 50)
+    once.save(tmp_path / "one.npz")
+    assert TrainingResult.load(tmp_path / "one.npz").world == world
+    assert TrainingResult.load(tmp_path / "one.npz") == once
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("returns", np.zeros(3, np.int32), "returns of a result is array([0, 0, 0]"),
+        ("returns", np.zeros((2, 3), np.int32), "it must be an array of shape (2, 3, 0)"),
+        ("steps", np.zeros((2, 3, 6)), "and type float64"),
+        ("state_q", np.zeros((2, 3, 128, 5), np.float32), "q of a result"),
+        ("state_slots", np.full((2, 3, 640), 10**6, np.int32), "its models do not add up"),
+        ("state_slots", np.zeros((2, 3, 1), np.int32), "slots of a result"),
+        ("state_settings", np.zeros((2, 3, 3), np.int32), "does not go with its configurations"),
+        ("state_exploration", np.full((2, 3, 3), np.nan), "does not go with its configurations"),
+        ("world_foods", np.zeros((1, 3), float), "foods is an array"),
+        ("returns", None, "'returns' is missing"),
+        ("state_entries", None, "'state_entries' is missing"),
+    ],
+)
+def test_damaged_arrays(stored, tmp_path, name, value, said):
+    arrays = {key: array for key, array in stored.items() if key != name}
+    assert said in refused(arrays if value is None else {**arrays, name: value}, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"configs": []}, ""),
+        ({"configs": [{"learner": "sarsa"}]}, ""),
+        ({"seeds": [1]}, ""),
+        ({"seeds": [1, 1, 2]}, "more than once"),
+        ({"max_steps": 0}, "max_steps is 0"),
+        ({"evaporation": "linear"}, "evaporation is neither true nor false"),
+        ({"world": {"ranges": [0, 1, 2], "queen": [0, 0, 0]}}, "ranges are"),
+        ({"world": None}, ""),
+        ({"costs": [{"learner": 3}]}, ""),
+    ],
+)
+def test_damaged_facts(stored, tmp_path, changes, said):
+    facts = {**json.loads(str(stored["facts"][()])), **changes}
+    assert said in refused({**stored, "facts": np.array(json.dumps(facts))}, tmp_path)
+
+
+def refused(arrays: dict[str, np.ndarray], folder) -> str:
+    np.savez(folder / "x.npz", **arrays)
+    with pytest.raises(AntsError, match=r"[.]$") as caught:
+        TrainingResult.load(folder / "x.npz")
+    text = str(caught.value)
+    assert text.startswith(f"the training result in {str(folder / 'x.npz')!r} is damaged (")
+    assert text.endswith("); name a file that TrainingResult.save wrote.")
+    assert "\n" not in text
+    return text
+
+
+def test_foreign_files(tmp_path):
+    colony = Colony(worlds.paper(), ColonyConfig(), CONFIGS[0])
+    colony.save(tmp_path / "colony.npz")
+    deep = {"facts": np.array("[" * 100_000 + "]" * 100_000)}
+    np.savez(tmp_path / "deep.npz", **deep)
+    for name in ("colony.npz", "deep.npz"):
+        with pytest.raises(AntsError, match=f"{name}' holds no training result of this version"):
+            TrainingResult.load(tmp_path / name)
+    (tmp_path / "text.npz").write_text("text")
+    with pytest.raises(AntsError, match=r"text\.npz' is damaged or not an \.npz file"):
+        TrainingResult.load(tmp_path / "text.npz")
+    with pytest.raises(AntsError, match="the path is 1; it must be the name of a file"):
+        TrainingResult.load(1)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"configs": (replace(CONFIGS[0], learning_rate=0.5), CONFIGS[1])},
+        {"configs": CONFIGS[:1]},
+        {"seeds": (1, 2, 3)},
+        {"world": worlds.open_world(0, (10, 10, 10))},
+        {"max_steps": 81},
+        {"evaporation": False},
+    ],
+)
+def test_a_result_does_not_claim_to_be_of_another_training(result, changes):
+    (name,) = changes
+    with pytest.raises(AntsError, match=f"^{name} cannot be replaced in a result"):
+        replace(result, **changes)
+
+
+def test_arrays_that_do_not_belong_to_a_result_are_refused(result):
+    with pytest.raises(AntsError, match=r"returns of a result is \[\]"):
+        replace(result, returns=[])
+    with pytest.raises(AntsError, match="state of a result is None"):
+        replace(result, state=None)
+    spoilt = copy.deepcopy(result)
+    spoilt.state.slots[:] = 10**6  # kernels would write there
+    with pytest.raises(AntsError, match="its models do not add up"):
+        continue_training(spoilt, 1)
+    assert replace(result, costs=()) == result
+
+
+def test_results_compare_by_content(result):
+    assert result == copy.deepcopy(result) == pickle.loads(pickle.dumps(result))
+    again = train(worlds.paper(), CONFIGS, SEEDS, 6, 80, True)
+    assert (result == again, result != again) == (True, False)
+    assert result.costs != again.costs  # seconds are no outcome
+    assert (result == continue_training(result, 1)) is False
+    assert (result.state == again.state, result == 3) == (True, False)
+
+    tables = result.q_values[0]
+    greedy = evaluate(worlds.paper(), tables, 2)
+    assert (greedy == evaluate(worlds.paper(), tables, 2)) is True
+    assert (greedy == evaluate(worlds.paper(), tables, 3)) is False
+    followed = rollout(worlds.paper(), tables[0])
+    assert (followed == rollout(worlds.paper(), tables[0])) is True
+    assert followed != trace_training(worlds.paper(), CONFIGS[0], max_steps=5)
+    for record in (result, result.state, greedy, followed):
+        with pytest.raises(TypeError, match="unhashable"):
+            hash(record)
+
+
+def test_nan_equals_nan_and_types_count():
+    values = np.array([1.0, np.nan])
+    assert same(values, values.copy())
+    assert not same(values, values.astype(np.float32))
+    assert not same(values, [1.0, np.nan])
+    assert not same(None, values)
+    assert not same(True, 1)
+
+
+def test_colonies_compare_by_content(tmp_path):
+    def begun(seed: int = 3) -> Colony:
+        colony = Colony(worlds.paper(), ColonyConfig(ants=4), CONFIGS[1], (seed, 9))
+        colony.begin_episode()
+        colony.tick(20)
+        return colony
+
+    one = begun()
+    assert (one == begun(), one == begun(4), one == 3) == (True, False, False)
+    one.save(tmp_path / "x.npz")
+    assert Colony.load(tmp_path / "x.npz") == one
+    assert one.outcome() == begun().outcome()
+    assert one.snapshot() == begun().snapshot()
+    one.tick()
+    assert one != begun()
+    with pytest.raises(TypeError, match="unhashable"):
+        hash(one)
+
+
+def test_everything_prints_on_one_screen(result):
+    many = [replace(CONFIGS[0], learning_rate=0.01 + 0.01 * k) for k in range(20)]
+    colony = Colony([worlds.open_world(s, (9, 9, 9)) for s in range(3)], ColonyConfig(), CONFIGS[0],
+                    range(3))  # fmt: skip
+    colony.begin_episode()
+    shown = [
+        *(result, result.state, train(worlds.paper(), many, range(40), 2, 20)),
+        *(
+            evaluate(worlds.paper(), result.q_values),
+            rollout(worlds.paper(), result.q_values[0, 0]),
+        ),
+        *(trace_training(worlds.paper(), CONFIGS[0], max_steps=5), colony, colony.outcome()),
+        *(colony.snapshot(), World((3, 3, 3), (0, 0, 0))),
+    ]
+    for value in shown:
+        lines = repr(value).splitlines()
+        assert len(lines) <= 24
+        assert max(map(len, lines)) <= 400
+        assert lines[0].startswith(type(value).__name__ + "(")
+    assert f"return {result.returns[0].mean():.4g}, steps" in repr(result)
+    assert "and 14 more configurations" in repr(shown[2])
+    assert "returns: int32 (2, 3, 50), mean" in repr(shown[3])
+    assert "World(ranges=(9, 9, 9)" in repr(colony)
+    assert "and 2 more" in repr(colony)
