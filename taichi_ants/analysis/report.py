@@ -382,7 +382,9 @@ def _claims(findings: Sequence[Finding]) -> Section:
     if any(finding.disagrees for finding in shown):
         notes.append("mean: the verdict by the mean, where it is not that on the typical run (IQM)")
     if shown:
-        notes.append(f"All intervals behind the verdicts hold at once with {_LEVEL} %.")
+        notes.append(
+            f"All intervals behind the verdicts hold at once with {_LEVEL} % (docs/statistics.md)."
+        )
         notes.append("claims.md holds effects, intervals and what each claim was tested on.")
     return table, "\n".join([*notes, *_untested(findings)])
 

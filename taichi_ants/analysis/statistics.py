@@ -23,9 +23,9 @@ where the t interval goes on; where ties fill the middle half, the t interval is
 the bootstrap knows how near the tails are.
 
 What they cover is measured on thousands of training runs, see `docs/statistics.md`. The IQM's
-cover what they say from 10 seeds on. The mean's do for shares and for bounded quantities; for
-returns with heavy tails a 95 % interval may hold the mean in two of five cases with 10 to 20
-seeds, and in seven of ten with 100. No interval knows of events so rare that no seed has met them.
+cover what they say from 10 seeds on. The mean's do where no run is far off; where one in a hundred
+is, a 95 % interval of the mean holds it in as few as two of five cases with 10 to 50 seeds, and in
+seven of ten with 100. No interval knows of events so rare that no seed has met them.
 
 The resampling weights are drawn once per number of seeds from a fixed generator and serve all
 rows, so that results are reproducible.
