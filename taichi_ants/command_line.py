@@ -13,13 +13,12 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from types import FrameType
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from taichi_ants.errors import AntsError
+from taichi_ants.interruption import stop_if_noted, stoppable
 
 EXIT_BAD_INPUT = 2
-EXIT_INTERRUPTED = 130
 _LEFT_OUT = object()
 
 
@@ -38,8 +37,11 @@ class _HelpFormatter(argparse.HelpFormatter):
 class Parser(argparse.ArgumentParser):
     """A parser whose errors are one sentence on standard error."""
 
-    def __init__(self, description: str, **settings: object) -> None:
+    program: str | None = None  # what --help calls it; None: the name of the script
+
+    def __init__(self, description: str, **settings: Any) -> None:
         super().__init__(
+            self.program,
             description=description,
             formatter_class=_HelpFormatter,
             allow_abbrev=False,
@@ -129,12 +131,12 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
 
     Args:
         command: The work.
-        interrupted: What Ctrl-C says.
+        interrupted: What is said after Ctrl-C or SIGTERM.
     """
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="replace")  # a terminal that lacks a character shows "?"
     try:
-        with _noting_interruption():
+        with stoppable(interrupted):
             command()
         if sys.stdout is not None:  # it is None if the caller has closed it
             sys.stdout.flush()
@@ -145,9 +147,6 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
     except MemoryError:
         _complain("error: this needs more memory than there is; ask for less at once.")
         status = EXIT_BAD_INPUT
-    except KeyboardInterrupt:
-        _complain(interrupted)
-        status = EXIT_INTERRUPTED
     except BrokenPipeError:  # the reader of our output has gone, for example `| head`
         _discard_output()
         status = 0
@@ -185,10 +184,10 @@ def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
 
     Yields:
         To be called with the share of the work that is done, 0 to 1. It raises KeyboardInterrupt
-        if Ctrl-C was pressed, but a library has swallowed it.
+        if a signal to stop came, but a library has swallowed it.
     """
     if sys.stderr is None or not sys.stderr.isatty():
-        yield lambda share: _stop_if_interrupted()
+        yield lambda share: stop_if_noted()
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -203,7 +202,7 @@ def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
         task = bar.add_task(title, total=1.0)
 
         def update(share: float) -> None:
-            _stop_if_interrupted()
+            stop_if_noted()
             bar.update(task, completed=share)
 
         yield update
@@ -243,50 +242,21 @@ def _work_apart(work: Callable[..., None], arguments: Sequence[object]) -> None:
 def _end_with_parent() -> None:
     """A parent that was killed cannot end this process, which would write where others now work."""
     multiprocessing.parent_process().join()
-    os._exit(EXIT_INTERRUPTED)
+    os._exit(EXIT_BAD_INPUT)
 
 
 @contextmanager
 def _interruptions_for_this_process_only() -> Iterator[None]:
-    """A process that is started inside never sees Ctrl-C, which a terminal sends to all."""
+    """A process that is started inside never sees Ctrl-C or SIGTERM, which can be sent to all."""
     if not hasattr(signal, "pthread_sigmask"):  # on Windows
         yield
         return
-    multiprocessing.resource_tracker.ensure_running()  # starting it would unblock the signal
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    multiprocessing.resource_tracker.ensure_running()  # starting it would unblock signals
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-_interruptions: list[int] = []
-
-
-@contextmanager
-def _noting_interruption() -> Iterator[None]:
-    """Note Ctrl-C besides raising KeyboardInterrupt: Taichi swallows it at some moments."""
-
-    def note(number: int, frame: FrameType | None) -> NoReturn:
-        _interruptions.append(number)
-        raise KeyboardInterrupt
-
-    _interruptions.clear()
-    before = signal.getsignal(signal.SIGINT)
-    ours = threading.current_thread() is threading.main_thread()
-    if not ours or before is not signal.default_int_handler:  # it may be ignored on purpose
-        yield
-        return
-    signal.signal(signal.SIGINT, note)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-def _stop_if_interrupted() -> None:
-    if _interruptions:
-        raise KeyboardInterrupt
 
 
 def _complain(text: str) -> None:
