@@ -7,6 +7,7 @@ import importlib.util
 import multiprocessing
 import multiprocessing.resource_tracker
 import os
+import re
 import signal
 import sys
 import threading
@@ -67,6 +68,40 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         text = _on_one_line(message).removeprefix("argument ").rstrip(".")
         self.exit(EXIT_BAD_INPUT, f"error: {text}; see --help.\n")
+
+
+_NOT_IN_NAMES = ("out", "threads", "force", "no_figures", "no_render")  # they change no results
+_NAMED_BY_VALUE = ("world", "plugin")  # without the flag
+
+
+def default_folder(
+    parser: Parser, command: str, settings: argparse.Namespace, **usual: Any
+) -> Path:
+    """Where the results of a command go by default: one folder for each way to call it.
+
+    Args:
+        parser: Knows the defaults, and the order of flags.
+        command: The folder of the defaults is results/COMMAND.
+        settings: What counts; behind the name comes what differs from the defaults.
+        usual: Other defaults than the parser's.
+
+    Returns:
+        As results/compare-garden-quick or results/compare-seeds-20-discounts-0.8-0.9.
+    """
+    parts = [command]
+    for action in parser._actions:
+        value = getattr(settings, action.dest, argparse.SUPPRESS)
+        default = usual.get(action.dest, action.default)
+        if value in (argparse.SUPPRESS, default) or action.dest in _NOT_IN_NAMES:
+            continue
+        if action.dest in _NAMED_BY_VALUE:
+            parts.append(Path(value).stem)
+        elif value is True:
+            parts.append(action.option_strings[0].removeprefix("--"))
+        else:
+            values = value if isinstance(value, tuple) else (value,)
+            parts += [action.option_strings[0].removeprefix("--"), *map(str, values)]
+    return Path("results", re.sub(r"[^\w.+-]+", "_", "-".join(parts)))
 
 
 def whole_number(least: int | None = None, most: int | None = None) -> Callable[[str], int]:
@@ -142,10 +177,10 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
             sys.stdout.flush()
         status = 0
     except AntsError as error:
-        _complain(f"error: {error}")
+        notice(f"error: {error}")
         status = EXIT_BAD_INPUT
     except MemoryError:
-        _complain("error: this needs more memory than there is; ask for less at once.")
+        notice("error: this needs more memory than there is; ask for less at once.")
         status = EXIT_BAD_INPUT
     except BrokenPipeError:  # the reader of our output has gone, for example `| head`
         _discard_output()
@@ -153,7 +188,7 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
     except OSError as error:
         _discard_output()
         place = "the output" if error.filename is None else repr(str(error.filename))
-        _complain(f"error: cannot read or write {place}: {error.strerror or error}.")
+        notice(f"error: cannot read or write {place}: {error.strerror or error}.")
         status = EXIT_BAD_INPUT
     sys.exit(status)
 
@@ -259,7 +294,8 @@ def _interruptions_for_this_process_only() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _complain(text: str) -> None:
+def notice(text: str) -> None:
+    """Say something on one line of standard error."""
     if sys.stderr is not None:
         with suppress(OSError):
             print(_on_one_line(text), file=sys.stderr)

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
+import taichi_ants
 from taichi_ants.interruption import stoppable
 
 COMMANDS = {  # modules beside this one, and what they do
@@ -33,9 +34,7 @@ def main() -> None:
         elif name in ("-h", "--help"):
             print(_help())
         elif name == "--version":
-            from taichi_ants import __version__
-
-            print(f"taichi-ants {__version__}")
+            print(f"taichi-ants {taichi_ants.__version__}")
         else:
             known = ", ".join(COMMANDS)
             print(f"error: there is no command {name!r}; choose one of {known}.", file=sys.stderr)

@@ -18,7 +18,9 @@ from typing import TYPE_CHECKING, Any
 from taichi_ants.command_line import (
     ListAction,
     Parser,
+    default_folder,
     load_plugin,
+    notice,
     number,
     process_beside,
     progress_bar,
@@ -81,17 +83,22 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--plugin", metavar="FILE", help="a Python file that registers learners or worlds")
     add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
     add("--arch", choices=("cpu", "cuda"), default="cpu", help="where kernels run")
-    out = "for the results (default: results/compare, with --quick results/compare-quick)"
+    out = (
+        "for the results (default: results/compare, and behind it what differs from the defaults, "
+        "as in results/compare-garden-quick)"
+    )
     add("--out", type=Path, metavar="FOLDER", help=out)
     add("--quick", action="store_true", help=f"at most {QUICK_SEEDS} seeds")
     add("--force", action="store_true", help="replace what FOLDER holds")
     add("--no-figures", action="store_true", help="draw no figures")
     add("--no-render", action="store_true", help="show no episodes of the learned policies")
-    settings = parser.parse_args(arguments)
+    settings, settings.given = parser.parse_given(arguments)
+    usual = {}
     if settings.quick:
         settings.seeds = min(settings.seeds, QUICK_SEEDS)
+        usual = {"seeds": QUICK_SEEDS}
     if settings.out is None:
-        settings.out = Path("results/compare-quick" if settings.quick else "results/compare")
+        settings.out = default_folder(parser, "compare", settings, **usual)
     return settings
 
 
@@ -124,6 +131,7 @@ def build_sweep(settings: argparse.Namespace) -> Sweep:
 
     if settings.plugin:
         load_plugin(settings.plugin)
+    _refuse_what_changes_nothing(settings)
     configs = configurations(settings)
     # The tables find configurations by six digits of their numbers.
     rows = [Row.of(config) for config in configs]
@@ -137,6 +145,19 @@ def build_sweep(settings: argparse.Namespace) -> Sweep:
         )
     seeds = tuple(range(settings.seed, settings.seed + settings.seeds))
     return Sweep(world, configs, seeds, settings.episodes, settings.max_steps, ROLLOUTS)
+
+
+def _refuse_what_changes_nothing(settings: argparse.Namespace) -> None:
+    from taichi_ants import AntsError, learners, worlds
+
+    if "world_seed" in settings.given:
+        worlds.check_seed_counts(settings.world)
+    plan = [name for name in settings.learners if learners.get(name).plans]
+    if "planning_steps" in settings.given and not plan:
+        raise AntsError(
+            "--planning-steps is for learners that plan, and none of "
+            f"{', '.join(settings.learners)} does; leave it out, or add dyna_q to --learners."
+        )
 
 
 def world_name(settings: argparse.Namespace) -> str:
@@ -227,8 +248,9 @@ def write_policies(folder: Path, sweep: Sweep, comparison: Comparison, tables: A
 
 def compare(settings: argparse.Namespace) -> None:
     """Run the comparison, or show the finished one."""
-    from taichi_ants.provenance import file_hash, provenance, sweep_settings
+    from taichi_ants.provenance import provenance, sweep_settings
     from taichi_ants.result_folder import ResultFolder
+    from taichi_ants.results import file_hash
 
     sweep = build_sweep(settings)
     plugin = file_hash(settings.plugin) if settings.plugin else None
@@ -259,7 +281,7 @@ def do_comparison(
 
     laps = {"start": time.perf_counter()}
     with progress_bar("training") as report_progress:
-        result = run_sweep(sweep, blocks, settings.threads, settings.arch, report_progress)
+        result = run_sweep(sweep, blocks, settings.threads, settings.arch, report_progress, notice)
     laps["training and evaluation"] = time.perf_counter()
     comparison = to_comparison(sweep, result, world_name(settings))
     baselines = baseline_rows(

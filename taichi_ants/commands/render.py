@@ -84,6 +84,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     _add_episode(parser)
     _add_picture(parser)
     settings, given = parser.parse_given(arguments)
+    settings.world_seed_given = "world_seed" in given
     settings.out = settings.out or DEFAULT_OUT[settings.show]
     _refuse_what_changes_nothing(parser, settings, given)
     settings.world = settings.world or DEFAULT_WORLD.get(settings.show, "paper")
@@ -208,6 +209,8 @@ def show(settings: argparse.Namespace) -> None:
         check_animation(settings.out, settings.fps)
     if settings.plugin:
         load_plugin(settings.plugin)
+    if settings.world_seed_given:
+        worlds.check_seed_counts(settings.world)
     world = worlds.build(settings.world, settings.world_seed)
     if settings.show == "learning":
         show_learning(settings, world)
