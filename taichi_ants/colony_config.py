@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -176,7 +176,7 @@ def _check_one_of(name: str, value: object, allowed: tuple[str, ...]) -> None:
         raise AntsError(f"{name} is {value!r}; it must be one of {', '.join(allowed)}.")
 
 
-def _check_whole(name: str, value: object, least: int, most: int, otherwise: str = "") -> None:
+def _check_whole(name: str, value: Any, least: int, most: int, otherwise: str = "") -> None:
     if isinstance(value, bool) or not hasattr(value, "__index__"):
         raise AntsError(f"{name} is {value!r}; it must be a whole number{otherwise}.")
     if not least <= value <= most:

@@ -144,9 +144,8 @@ def run_study(
         path = folder / f"{_name(condition)}.npz"
         block = read_block(path, notice)
         if block is None:
-            before, share = done / total, weight / total
             runner = _Runner(plan, arena, condition, threads, arch)
-            block = runner.run(tables, lambda part, b=before, s=share: progress(b + s * part))
+            block = runner.run(tables, _part(progress, done / total, weight / total))
             results.write_sealed_npz(path, block)
         records[condition] = Record(**{name: block[name].astype(np.int64) for name in _ARRAYS})
         if "q_values" in block:
@@ -154,6 +153,11 @@ def run_study(
         done += weight
         progress(done / total)
     return _joined(plan, records), tables
+
+
+def _part(progress: Progress, begin: float, share: float) -> Progress:
+    """The progress of a part of the work, as that of all."""
+    return lambda done: progress(begin + share * done)
 
 
 def settings_of(plan: StudyPlan) -> dict[str, Any]:
@@ -246,7 +250,7 @@ class _Runner:
         arch: str | None,
     ) -> None:
         self._plan, self._arena, self._condition = plan, arena, condition
-        self._where = {"threads": threads, "arch": arch}
+        self._where: dict[str, Any] = {"threads": threads, "arch": arch}
         self._life = ColonyConfig(
             ants=condition.ants, pheromone=PHEROMONES[condition.pheromone], regrowth=REGROWTH
         )

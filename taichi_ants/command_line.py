@@ -136,12 +136,12 @@ class ListAction(argparse.Action):
 
     def __init__(
         self,
-        *args: object,
+        *args: Any,
         item: Callable[[str], object] = str,
         unique: bool = True,
-        **settings: object,
+        **settings: Any,
     ):
-        super().__init__(*args, nargs="+", **settings)
+        super().__init__(*args, **{**settings, "nargs": "+"})
         self.item, self.unique = item, unique
 
     def __call__(
@@ -263,7 +263,7 @@ def process_beside(work: Callable[..., None], *arguments: object) -> Iterator[No
     finally:
         process.kill()
         process.join()
-    if process.exitcode < 0:
+    if process.exitcode is not None and process.exitcode < 0:
         raise AntsError("the system has stopped a process that worked here; make room, try again.")
     if process.exitcode:
         sys.exit(process.exitcode)
@@ -276,7 +276,9 @@ def _work_apart(work: Callable[..., None], arguments: Sequence[object]) -> None:
 
 def _end_with_parent() -> None:
     """A parent that was killed cannot end this process, which would write where others now work."""
-    multiprocessing.parent_process().join()
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
     os._exit(EXIT_BAD_INPUT)
 
 

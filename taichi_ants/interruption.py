@@ -12,6 +12,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
+from typing import Any
 
 _noted: list[int] = []
 _holds = 0
@@ -39,7 +40,10 @@ def stoppable(message: str = "Stopped.") -> Iterator[None]:
     Args:
         message: What to say on standard error.
     """
-    usual = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
+    usual: dict[int, Any] = {
+        signal.SIGINT: signal.default_int_handler,
+        signal.SIGTERM: signal.SIG_DFL,
+    }
     watched = [number for number, handler in usual.items() if signal.getsignal(number) is handler]
     hook = sys.unraisablehook
     with suppress(ValueError):  # not the main thread

@@ -138,7 +138,7 @@ def write_npz(path: PathLike, arrays: Mapping[str, npt.ArrayLike], compress: boo
     for name, array in converted.items():
         if array.dtype.hasobject:
             raise ValueError(f"array {name!r} holds Python objects")
-    save = np.savez_compressed if compress else np.savez
+    save: Callable[..., None] = np.savez_compressed if compress else np.savez
     write_atomically(path, lambda file: save(file, **converted))
 
 

@@ -98,7 +98,7 @@ class SweepResult:
     Attributes:
         returns, steps, deliveries: integer (C, S, episodes), of training.
         greedy_returns, greedy_steps, greedy_deliveries: integer (C, S, rollouts).
-        q_values: float32 (C, S, 128, 5), the final policies.
+        q_values: float32 (C, S, 128, 5), the final policies; None where they were not kept.
         costs: What each learner's training took, over all its blocks.
     """
 
@@ -108,7 +108,7 @@ class SweepResult:
     greedy_returns: np.ndarray
     greedy_steps: np.ndarray
     greedy_deliveries: np.ndarray
-    q_values: np.ndarray
+    q_values: np.ndarray | None
     costs: tuple[LearnerCost, ...]
 
 

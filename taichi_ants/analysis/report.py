@@ -9,7 +9,7 @@ import io
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, Literal
 
 from taichi_ants.analysis.best_of import Choice, Chosen, choice
 from taichi_ants.analysis.claims.assess import OTHER_WORLD, SIMULTANEOUS_LEVEL
@@ -99,7 +99,7 @@ def print_report(
 def render(*arguments: Any, **options: Any) -> str:
     """The report as plain text of at most `WIDTH` columns; arguments as for `print_report`."""
     text = io.StringIO()
-    print_report(*arguments, **options, file=text)
+    print_report(*arguments, **{**options, "file": text})
     return "".join(f"{line.rstrip()}\n" for line in text.getvalue().splitlines())
 
 
@@ -116,7 +116,7 @@ def _table(title: str, columns: Iterable[str], text_columns: int = 1, gap: int =
         title_style="bold",
     )
     for position, column in enumerate(columns):
-        justify = "left" if position < text_columns else "right"
+        justify: Literal["left", "right"] = "left" if position < text_columns else "right"
         table.add_column(column, justify=justify, overflow="fold")
     return table
 
@@ -124,7 +124,15 @@ def _table(title: str, columns: Iterable[str], text_columns: int = 1, gap: int =
 def _table2(comparison: Comparison, lines: Sequence[Mapping], choices: Choices) -> list[Section]:
     """One table for each delivery setting, explained after the last."""
     of_paper = comparison.in_paper_world
-    headers = ("Learner", "Return\npaper", "ours", "best run", "below", "Steps\npaper", "ours")
+    headers: tuple[str, ...] = (
+        "Learner",
+        "Return\npaper",
+        "ours",
+        "best run",
+        "below",
+        "Steps\npaper",
+        "ours",
+    )
     headers += ("Food\npaper", "ours")
     if not of_paper:
         headers = ("Learner", "Return", "best run", "Steps", "Deliveries")

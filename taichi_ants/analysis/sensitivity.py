@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -165,7 +165,7 @@ def _settings(settings: Sequence[str]) -> dict[str, Artist]:
     """The legend of the delivery settings: filled marks for the first, open ones for others."""
     from matplotlib.lines import Line2D
 
-    look = {"color": INK, "marker": "o", "linestyle": "none"}
+    look: dict[str, Any] = {"color": INK, "marker": "o", "linestyle": "none"}
     return {
         f"{setting} delivery": Line2D([], [], **look, markerfacecolor="white" if place else INK)
         for place, setting in enumerate(settings)

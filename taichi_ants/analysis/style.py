@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -36,7 +36,7 @@ _MORE_COLOURS = (_PURPLE, _SKY, INK, GREY)
 _LAST_COLOURS = ("#882255", "#999933")
 _MORE_MARKERS = ("v", "P", "X", "h")
 
-_SETTINGS = {
+_SETTINGS: Any = {
     "font.size": 9,
     "axes.titlesize": 10,
     "axes.titleweight": "bold",
@@ -93,10 +93,10 @@ def styled() -> AbstractContextManager:
 def new_figure(height: float) -> Figure:
     """An empty figure of full width and the height in inches, outside of any global state."""
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    figure = Figure(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
-    figure.get_layout_engine().set(w_pad=0.06, h_pad=0.05, wspace=0.03, hspace=0.03)
-    return figure
+    layout = ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.05, wspace=0.03, hspace=0.03)
+    return Figure(figsize=(WIDTH, height), dpi=DPI, layout=layout)
 
 
 def frame(figure: Figure, title: str, caption: str, entries: Mapping[str, Artist]) -> None:

@@ -97,7 +97,7 @@ def means(comparison: Comparison, stem: str, position: int | None, seeds: slice)
 
 def _best_run(comparison: Comparison, delivery: str, variant: Variant, draws: int) -> dict:
     best = best_of(comparison, delivery, variant, draws)
-    columns = {"best_run_of": best.configurations if best else 0}
+    columns: dict[str, float] = {"best_run_of": best.configurations if best else 0}
     drawn = (best.returns, best.steps, best.deliveries) if best else (None,) * 3
     for (name, figure), values in zip(_paper_figures(comparison, variant), drawn, strict=True):
         low = median = high = percentile = math.nan

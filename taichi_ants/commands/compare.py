@@ -92,7 +92,8 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--force", action="store_true", help="replace what FOLDER holds")
     add("--no-figures", action="store_true", help="draw no figures")
     add("--no-render", action="store_true", help="show no episodes of the learned policies")
-    settings, settings.given = parser.parse_given(arguments)
+    settings, given = parser.parse_given(arguments)
+    settings.given = given
     usual = {}
     if settings.quick:
         settings.seeds = min(settings.seeds, QUICK_SEEDS)
@@ -116,8 +117,12 @@ def configurations(settings: argparse.Namespace) -> tuple[TrainingConfig, ...]:
         settings.learning_rates, settings.discounts, settings.epsilons, settings.epsilon_decays
     )
     return tuple(
-        TrainingConfig(name, *values, planning_steps=planning_steps, delivery=delivery)
-        for delivery, (name, planning_steps), values in itertools.product(
+        TrainingConfig(
+            *(name, rate, discount, epsilon, decay),
+            planning_steps=planning_steps,
+            delivery=delivery,
+        )
+        for delivery, (name, planning_steps), (rate, discount, epsilon, decay) in itertools.product(
             deliveries, variants, tuple(grid)
         )
     )

@@ -12,7 +12,7 @@ import signal
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from taichi_ants.command_line import (
     ListAction,
@@ -377,7 +377,7 @@ def show_sheet(settings: argparse.Namespace, q_values: np.ndarray, title: str) -
     print(f"{settings.out}: the best action in each state")
 
 
-def _rollout(settings: argparse.Namespace) -> dict[str, object]:
+def _rollout(settings: argparse.Namespace) -> dict[str, Any]:
     return {
         "seed": settings.seed,
         "number": settings.number,
@@ -387,7 +387,7 @@ def _rollout(settings: argparse.Namespace) -> dict[str, object]:
     }
 
 
-def _look(settings: argparse.Namespace, title: str) -> dict[str, object]:
+def _look(settings: argparse.Namespace, title: str) -> dict[str, Any]:
     return {
         "size": settings.size,
         "hud": not settings.no_hud,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -124,7 +125,8 @@ class Colony:
         self._learner = learners.get(training.learner)
         self._settings = runtime.start(threads, arch)
         one = isinstance(world, (str, World)) or not isinstance(world, Iterable)
-        several = (world,) * len(self.seeds) if one else tuple(world)
+        given: Any = (world,) * len(self.seeds) if one else world
+        several = tuple(given)
         if len(several) != len(self.seeds):
             raise AntsError(f"there are {len(several)} worlds for {len(self.seeds)} seeds.")
         self.layout = colony_memory.Layout(
@@ -146,7 +148,9 @@ class Colony:
             self.layout, config, self.training, words, sharing, plans, chunks
         )
         table = None if q_values is None else checks.checked_q_values(q_values)
-        self._own = sharing == "own" or (sharing == "fixed" and np.ndim(table) == 4)
+        self._own = sharing == "own" or (
+            sharing == "fixed" and table is not None and table.ndim == 4
+        )
         tables = colony_memory.allocate_tables(len(self.seeds), config.slots, self._own, table)
         self.arrays["q"] = tables
         self.epsilon = float(self.training.epsilon)

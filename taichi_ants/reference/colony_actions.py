@@ -99,6 +99,8 @@ def carry_out(
     events = [_commit(world, intent, intent.ant.slot in winning) for intent in intents]
     taken = []
     for intent, event in zip(intents, events, strict=True):
+        if intent.target is None:
+            continue
         if event is Event.PICKED_UP:
             world.trail.deposit(intent.target)
             world.trail.deposit(intent.ant.cell)
@@ -119,7 +121,7 @@ def _commit(world: ColonyWorld, intent: Intent, wins: bool) -> Event:
         ant.reward = REWARD_GIVE
         return Event.DELIVERED
     if intent.action == PICK_UP:
-        if not wins:
+        if not wins or intent.target is None:
             return Event.FAILED
         world.take_food(intent.target)
         ant.carries = True
@@ -128,7 +130,7 @@ def _commit(world: ColonyWorld, intent: Intent, wins: bool) -> Event:
         return Event.PICKED_UP
     # The turn is made even if the way is blocked: so an ant gets out of a dead end.
     ant.heading = intent.heading
-    if not wins:
+    if not wins or intent.target is None:
         return Event.BLOCKED
     world.occupied.remove(ant.cell)
     world.occupied.add(intent.target)

@@ -81,8 +81,17 @@ def render_colony(
 ) -> None:
     """Write what `colony_frames` draws as an animation; path, fps and errors: `render_episode`."""
     check_animation(path, fps)
-    look = {"hud": hud, "legend": legend, "title": title, "full_level": full_level}
-    frames = colony_frames(colony, ticks, size, every=every, world=world, **look)
+    frames = colony_frames(
+        colony,
+        ticks,
+        size,
+        every=every,
+        world=world,
+        hud=hud,
+        legend=legend,
+        title=title,
+        full_level=full_level,
+    )
     save_animation(path, with_pause(frames, 1 + -(-ticks // every), fps, progress), fps)
 
 

@@ -7,6 +7,7 @@ factor's effect is the mean difference over the 8 pairs of configurations that d
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import partial
 
 import numpy as np
 
@@ -113,6 +114,10 @@ def _high_epsilon_at_best_p5(part: Slice) -> np.ndarray:
         part.at("return_last50", DYNA_P5, best._replace(epsilon=epsilon)) for epsilon in (0.5, 0.3)
     )
     return high - low
+
+
+def _improvement(variant: Variant, part: Slice) -> np.ndarray:
+    return part.mean("return_last50", variant) - part.mean("return_first50", variant)
 
 
 LEARNING_RATE_CLAIMS = (
@@ -316,9 +321,7 @@ GENERAL_CLAIMS = (
         tuple(
             Contrast(
                 variant.label,
-                lambda part, variant=variant: (
-                    part.mean("return_last50", variant) - part.mean("return_first50", variant)
-                ),
+                partial(_improvement, variant),
             )
             for variant in VARIANTS
         ),

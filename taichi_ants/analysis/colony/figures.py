@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -140,7 +140,7 @@ def _by_way(
     study: ColonyStudy, measures: dict[str, str], title: str, caption: str, limits: bool = False
 ) -> Figure:
     """A row of panels for each measure, a line for each way, trails evaporating."""
-    share = False if limits else "row"  # limits already set the scale
+    share: Literal[False, "row"] = False if limits else "row"  # limits already set the scale
     with styled():
         figure = new_figure(5.6)
         axes = figure.subplots(
@@ -170,7 +170,7 @@ def _draw_line(
     way: str,
     measure: str,
     place: float,
-    style: dict[str, str],
+    style: dict[str, Any],
 ) -> None:
     """Means over seeds with their intervals, against the number of ants."""
     sizes = study.sizes(arena, pheromone, way)
@@ -181,7 +181,7 @@ def _draw_line(
 
 
 def _draw_gain(
-    axis: Axes, study: ColonyStudy, arena: Arena, way: str, place: float, style: dict[str, str]
+    axis: Axes, study: ColonyStudy, arena: Arena, way: str, place: float, style: dict[str, Any]
 ) -> None:
     sizes = [n for n in study.sizes(arena, ON, way) if n > 1 and study.has(arena, ON, COPIED, [n])]
     if not sizes:
@@ -199,7 +199,7 @@ def _errorbar(
     low: np.ndarray,
     high: np.ndarray,
     place: float,
-    style: dict[str, str],
+    style: dict[str, Any],
 ) -> None:
     at = np.array(sizes) * 10 ** (place * _SPREAD)
     below, above = (np.nan_to_num(np.abs(end - means)) for end in (low, high))
