@@ -123,6 +123,10 @@ WRONG = {
         ["--step", "3"],
         "--step changes nothing in an episode, but in a still colony, a still episode; leave",
     ),
+    "world seed of the paper": (
+        ["--world-seed", "3"],
+        "--world-seed is for a world drawn at random",
+    ),
     "step of a sheet": (["--show", "sheet", "--step", "3"], "--step changes nothing in a sheet"),
     "ants of an episode": (["--ants", "80"], "--ants changes nothing in an episode"),
     "every of a still": (["--show", "colony", "--every", "4", "--out", "a.png"], "--every"),
