@@ -5,7 +5,7 @@ and evaluated in the paper's world and in open ones, over many seeds; tables, fi
 go to a folder. With --ants: one colony lives for a while; it can be saved, resumed and drawn.
 """
 
-from taichi_ants.commands.colony import main
+from taichi_ants.commands import run
 
 if __name__ == "__main__":
-    main()
+    run("colony")

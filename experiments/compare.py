@@ -4,7 +4,7 @@ Trains every configuration with every seed, follows the final policies greedily,
 against the paper and against exact bounds, and writes tables, figures and policies to a folder.
 """
 
-from taichi_ants.commands.compare import main
+from taichi_ants.commands import run
 
 if __name__ == "__main__":
-    main()
+    run("compare")

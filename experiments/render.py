@@ -5,7 +5,7 @@ Follows a policy from a file, or trains one on the spot (a colony learns togethe
 a folder of PNG pictures.
 """
 
-from taichi_ants.commands.render import main
+from taichi_ants.commands import run
 
 if __name__ == "__main__":
-    main()
+    run("render")

@@ -8,7 +8,6 @@ where it was.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -35,6 +34,7 @@ from taichi_ants.colony_config import ColonyConfig, Pheromone
 from taichi_ants.config import TrainingConfig
 from taichi_ants.errors import AntsError
 from taichi_ants.provenance import world_facts
+from taichi_ants.sweeps import read_block
 from taichi_ants.worlds.world import World
 
 PHEROMONES: dict[str, Pheromone] = {
@@ -118,6 +118,7 @@ def run_study(
     threads: int | None = None,
     arch: str | None = None,
     progress: Progress = lambda share: None,
+    notice: Callable[[str], None] = lambda text: None,
 ) -> tuple[ColonyStudy, dict[Condition, np.ndarray]]:
     """Do the blocks that the folder does not hold yet, and join all.
 
@@ -126,6 +127,7 @@ def run_study(
         folder: Where finished blocks are kept; it must belong to this plan alone.
         threads, arch: As in `Colony`.
         progress: Called now and then with the share of the work that is done.
+        notice: As in `run_sweep`.
 
     Returns:
         The study, and the tables float32 (seeds, 128, 5) of the ways that share one.
@@ -140,18 +142,22 @@ def run_study(
     tables: dict[Condition, np.ndarray] = {}
     for (arena, condition), weight in zip(work, weights, strict=True):
         path = folder / f"{_name(condition)}.npz"
-        block = _read_block(path, arena)
+        block = read_block(path, notice)
         if block is None:
-            before, share = done / total, weight / total
             runner = _Runner(plan, arena, condition, threads, arch)
-            block = runner.run(tables, lambda part, b=before, s=share: progress(b + s * part))
-            results.write_npz(path, block, compress=False)
+            block = runner.run(tables, _part(progress, done / total, weight / total))
+            results.write_sealed_npz(path, block)
         records[condition] = Record(**{name: block[name].astype(np.int64) for name in _ARRAYS})
         if "q_values" in block:
             tables[condition] = block["q_values"]
         done += weight
         progress(done / total)
     return _joined(plan, records), tables
+
+
+def _part(progress: Progress, begin: float, share: float) -> Progress:
+    """The progress of a part of the work, as that of all."""
+    return lambda done: progress(begin + share * done)
 
 
 def settings_of(plan: StudyPlan) -> dict[str, Any]:
@@ -244,7 +250,7 @@ class _Runner:
         arch: str | None,
     ) -> None:
         self._plan, self._arena, self._condition = plan, arena, condition
-        self._where = {"threads": threads, "arch": arch}
+        self._where: dict[str, Any] = {"threads": threads, "arch": arch}
         self._life = ColonyConfig(
             ants=condition.ants, pheromone=PHEROMONES[condition.pheromone], regrowth=REGROWTH
         )
@@ -332,19 +338,6 @@ def _copy_single_ants(arena: ArenaPlan, records: dict[Condition, Record]) -> Non
         for way in ways:
             if alone in records:
                 records.setdefault(replace(alone, way=way), records[alone])
-
-
-def _read_block(path: Path, arena: ArenaPlan) -> dict[str, np.ndarray] | None:
-    """A finished block, None if there is none or it is damaged."""
-    if not path.exists():
-        return None
-    with suppress(AntsError, KeyError):
-        block = results.read_npz(path)
-        shape = (len(arena.seeds), arena.rollouts)
-        tables = block.get("q_values", np.zeros((len(arena.seeds), 128, 5)))
-        if all(block[name].shape == shape for name in _ARRAYS):
-            return block if tables.shape == (len(arena.seeds), 128, 5) else None
-    return None
 
 
 def _arena(plan: ArenaPlan) -> Arena:

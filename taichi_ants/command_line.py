@@ -7,19 +7,19 @@ import importlib.util
 import multiprocessing
 import multiprocessing.resource_tracker
 import os
+import re
 import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from types import FrameType
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from taichi_ants.errors import AntsError
+from taichi_ants.interruption import stop_if_noted, stoppable
 
 EXIT_BAD_INPUT = 2
-EXIT_INTERRUPTED = 130
 _LEFT_OUT = object()
 
 
@@ -38,8 +38,11 @@ class _HelpFormatter(argparse.HelpFormatter):
 class Parser(argparse.ArgumentParser):
     """A parser whose errors are one sentence on standard error."""
 
-    def __init__(self, description: str, **settings: object) -> None:
+    program: str | None = None  # what --help calls it; None: the name of the script
+
+    def __init__(self, description: str, **settings: Any) -> None:
         super().__init__(
+            self.program,
             description=description,
             formatter_class=_HelpFormatter,
             allow_abbrev=False,
@@ -65,6 +68,40 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         text = _on_one_line(message).removeprefix("argument ").rstrip(".")
         self.exit(EXIT_BAD_INPUT, f"error: {text}; see --help.\n")
+
+
+_NOT_IN_NAMES = ("out", "threads", "force", "no_figures", "no_render")  # they change no results
+_NAMED_BY_VALUE = ("world", "plugin")  # without the flag
+
+
+def default_folder(
+    parser: Parser, command: str, settings: argparse.Namespace, **usual: Any
+) -> Path:
+    """Where the results of a command go by default: one folder for each way to call it.
+
+    Args:
+        parser: Knows the defaults, and the order of flags.
+        command: The folder of the defaults is results/COMMAND.
+        settings: What counts; behind the name comes what differs from the defaults.
+        usual: Other defaults than the parser's.
+
+    Returns:
+        As results/compare-garden-quick or results/compare-seeds-20-discounts-0.8-0.9.
+    """
+    parts = [command]
+    for action in parser._actions:
+        value = getattr(settings, action.dest, argparse.SUPPRESS)
+        default = usual.get(action.dest, action.default)
+        if value in (argparse.SUPPRESS, default) or action.dest in _NOT_IN_NAMES:
+            continue
+        if action.dest in _NAMED_BY_VALUE:
+            parts.append(Path(value).stem)
+        elif value is True:
+            parts.append(action.option_strings[0].removeprefix("--"))
+        else:
+            values = value if isinstance(value, tuple) else (value,)
+            parts += [action.option_strings[0].removeprefix("--"), *map(str, values)]
+    return Path("results", re.sub(r"[^\w.+-]+", "_", "-".join(parts)))
 
 
 def whole_number(least: int | None = None, most: int | None = None) -> Callable[[str], int]:
@@ -99,12 +136,12 @@ class ListAction(argparse.Action):
 
     def __init__(
         self,
-        *args: object,
+        *args: Any,
         item: Callable[[str], object] = str,
         unique: bool = True,
-        **settings: object,
+        **settings: Any,
     ):
-        super().__init__(*args, nargs="+", **settings)
+        super().__init__(*args, **{**settings, "nargs": "+"})
         self.item, self.unique = item, unique
 
     def __call__(
@@ -129,32 +166,29 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
 
     Args:
         command: The work.
-        interrupted: What Ctrl-C says.
+        interrupted: What is said after Ctrl-C or SIGTERM.
     """
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="replace")  # a terminal that lacks a character shows "?"
     try:
-        with _noting_interruption():
+        with stoppable(interrupted):
             command()
         if sys.stdout is not None:  # it is None if the caller has closed it
             sys.stdout.flush()
         status = 0
     except AntsError as error:
-        _complain(f"error: {error}")
+        notice(f"error: {error}")
         status = EXIT_BAD_INPUT
     except MemoryError:
-        _complain("error: this needs more memory than there is; ask for less at once.")
+        notice("error: this needs more memory than there is; ask for less at once.")
         status = EXIT_BAD_INPUT
-    except KeyboardInterrupt:
-        _complain(interrupted)
-        status = EXIT_INTERRUPTED
     except BrokenPipeError:  # the reader of our output has gone, for example `| head`
         _discard_output()
         status = 0
     except OSError as error:
         _discard_output()
         place = "the output" if error.filename is None else repr(str(error.filename))
-        _complain(f"error: cannot read or write {place}: {error.strerror or error}.")
+        notice(f"error: cannot read or write {place}: {error.strerror or error}.")
         status = EXIT_BAD_INPUT
     sys.exit(status)
 
@@ -185,10 +219,10 @@ def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
 
     Yields:
         To be called with the share of the work that is done, 0 to 1. It raises KeyboardInterrupt
-        if Ctrl-C was pressed, but a library has swallowed it.
+        if a signal to stop came, but a library has swallowed it.
     """
     if sys.stderr is None or not sys.stderr.isatty():
-        yield lambda share: _stop_if_interrupted()
+        yield lambda share: stop_if_noted()
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -203,7 +237,7 @@ def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
         task = bar.add_task(title, total=1.0)
 
         def update(share: float) -> None:
-            _stop_if_interrupted()
+            stop_if_noted()
             bar.update(task, completed=share)
 
         yield update
@@ -229,7 +263,7 @@ def process_beside(work: Callable[..., None], *arguments: object) -> Iterator[No
     finally:
         process.kill()
         process.join()
-    if process.exitcode < 0:
+    if process.exitcode is not None and process.exitcode < 0:
         raise AntsError("the system has stopped a process that worked here; make room, try again.")
     if process.exitcode:
         sys.exit(process.exitcode)
@@ -242,54 +276,28 @@ def _work_apart(work: Callable[..., None], arguments: Sequence[object]) -> None:
 
 def _end_with_parent() -> None:
     """A parent that was killed cannot end this process, which would write where others now work."""
-    multiprocessing.parent_process().join()
-    os._exit(EXIT_INTERRUPTED)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+    os._exit(EXIT_BAD_INPUT)
 
 
 @contextmanager
 def _interruptions_for_this_process_only() -> Iterator[None]:
-    """A process that is started inside never sees Ctrl-C, which a terminal sends to all."""
+    """A process that is started inside never sees Ctrl-C or SIGTERM, which can be sent to all."""
     if not hasattr(signal, "pthread_sigmask"):  # on Windows
         yield
         return
-    multiprocessing.resource_tracker.ensure_running()  # starting it would unblock the signal
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    multiprocessing.resource_tracker.ensure_running()  # starting it would unblock signals
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-_interruptions: list[int] = []
-
-
-@contextmanager
-def _noting_interruption() -> Iterator[None]:
-    """Note Ctrl-C besides raising KeyboardInterrupt: Taichi swallows it at some moments."""
-
-    def note(number: int, frame: FrameType | None) -> NoReturn:
-        _interruptions.append(number)
-        raise KeyboardInterrupt
-
-    _interruptions.clear()
-    before = signal.getsignal(signal.SIGINT)
-    ours = threading.current_thread() is threading.main_thread()
-    if not ours or before is not signal.default_int_handler:  # it may be ignored on purpose
-        yield
-        return
-    signal.signal(signal.SIGINT, note)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-def _stop_if_interrupted() -> None:
-    if _interruptions:
-        raise KeyboardInterrupt
-
-
-def _complain(text: str) -> None:
+def notice(text: str) -> None:
+    """Say something on one line of standard error."""
     if sys.stderr is not None:
         with suppress(OSError):
             print(_on_one_line(text), file=sys.stderr)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from numbers import Real
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from taichi_ants.errors import AntsError, check_one_of, shown
 from taichi_ants.randomness import whole
@@ -70,6 +70,7 @@ class TrainingConfig:
         object.__setattr__(self, name, float(value))
 
 
-def share_of_one(value: object) -> bool:
+def share_of_one(value: Any) -> bool:
     """Whether a value is a number from 0 to 1; booleans, text and arrays are none."""
-    return isinstance(value, Real) and not isinstance(value, bool) and 0 <= value <= 1
+    number = isinstance(value, Real) and not isinstance(value, bool)
+    return number and bool(0 <= value <= 1)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import tempfile
 import warnings
 from contextlib import suppress
 
@@ -43,6 +42,11 @@ def is_writable_folder(path: str) -> bool:
     """
     if not path:
         return False
+    with suppress(AttributeError, OSError, ValueError):  # on Linux at once, without `tempfile`
+        os.close(os.open(path, os.O_TMPFILE | os.O_WRONLY))
+        return True
+    import tempfile
+
     try:
         with tempfile.TemporaryFile(dir=path):
             return True
@@ -52,6 +56,8 @@ def is_writable_folder(path: str) -> bool:
 
 def fallback_folder() -> str:
     """A folder among the temporary files that belongs to this user."""
+    import tempfile
+
     user = os.getuid() if hasattr(os, "getuid") else "user"
     folder = os.path.join(tempfile.gettempdir(), f"taichi_ants-{user}")
     with suppress(OSError):

@@ -189,7 +189,7 @@ class AxialGrid:
 
     def contains(self, cells: object) -> np.ndarray:
         """bool (...): whether cells (..., 3) in any form exist in the world."""
-        return (normal_form(cells) < np.array(self.ranges)).all(axis=-1)
+        return np.all(normal_form(cells) < np.array(self.ranges), axis=-1)
 
     def index(self, cells: object) -> np.ndarray:
         """Flat indices, int32 (...), of cells (..., 3) in any form.

@@ -72,7 +72,7 @@ class Outputs:
         """
         from taichi_ants.rendering import check_animation, check_picture
 
-        if self.animated:
+        if self.render and self.animated:
             check_animation(self.render, FRAMES_PER_SECOND)
         elif self.render:
             check_picture(self.render)
@@ -80,8 +80,8 @@ class Outputs:
             if Path(self.save).is_dir():
                 raise AntsError(f"{self.save!r} is a folder; name a file to save to.")
             results.check_writable_folder(Path(self.save).parent)
-        both = self.save and self.render
-        if both and os.path.realpath(self.save) == os.path.realpath(self.render):
+        places = [os.path.realpath(path) for path in (self.save, self.render) if path]
+        if len(places) > len(set(places)):
             raise AntsError(
                 f"{self.save!r} and {self.render!r} are one place, to save the colony in and for "
                 "its picture; name two."
@@ -112,8 +112,8 @@ def live(
         passing = let_time_pass(colony, ticks, pace, stop, outputs.every * outputs.animated)
         shown = _with_progress(passing, ticks, progress)
         try:
-            if outputs.animated:
-                _save_animation(outputs, colony, shown)
+            if outputs.render and outputs.animated:
+                _save_animation(outputs.render, colony, shown)
             for _ in shown:  # what the animation has left, all without one
                 pass
         except Exception as error:
@@ -122,7 +122,7 @@ def live(
             _report(error, outputs, colony)
         _save(outputs, colony)
         if outputs.render and not outputs.animated:
-            _save_picture(outputs, colony)
+            _save_picture(outputs.render, outputs, colony)
     return pace, stop() if pace.ticks < ticks else 0
 
 
@@ -226,7 +226,7 @@ def _with_progress(
         progress(passed / ticks)
 
 
-def _save_animation(outputs: Outputs, colony: Colony, passing: Iterator[int]) -> None:
+def _save_animation(path: str, colony: Colony, passing: Iterator[int]) -> None:
     from taichi_ants.rendering import colony_picture, save_animation
 
     def frames() -> Iterator[np.ndarray]:
@@ -234,14 +234,14 @@ def _save_animation(outputs: Outputs, colony: Colony, passing: Iterator[int]) ->
         for _ in passing:
             yield colony_picture(colony)
 
-    save_animation(outputs.render, frames(), FRAMES_PER_SECOND)
+    save_animation(path, frames(), FRAMES_PER_SECOND)
 
 
-def _save_picture(outputs: Outputs, colony: Colony) -> None:
+def _save_picture(path: str, outputs: Outputs, colony: Colony) -> None:
     from taichi_ants.rendering import colony_picture, save_picture
 
     try:
-        save_picture(outputs.render, colony_picture(colony))
+        save_picture(path, colony_picture(colony))
     except Exception as error:
         _report(error, outputs, colony)
 

@@ -53,11 +53,6 @@ def world_facts(world: World) -> dict[str, Any]:
     }
 
 
-def file_hash(path: str | Path) -> str:
-    """The SHA-256 of a file's bytes, in hexadecimal; OSError if it cannot be read."""
-    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
-
-
 def provenance(arguments: Sequence[str]) -> dict[str, Any]:
     """What made results: command, versions, machine, time and commit."""
     return {

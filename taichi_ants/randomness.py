@@ -8,6 +8,7 @@ version of NumPy. All arithmetic is modulo 2^64.
 from __future__ import annotations
 
 import operator
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +34,7 @@ def whole(name: str, value: object) -> int:
         raise AntsError(f"{name} is {shown(value)}; it must be a whole number.") from None
 
 
-def mix(words: int | np.ndarray) -> int | np.ndarray:
+def mix(words: int | np.ndarray) -> Any:
     """The output function of splitmix64, a bijection of the 64-bit words.
 
     Args:
@@ -48,13 +49,13 @@ def mix(words: int | np.ndarray) -> int | np.ndarray:
         z = ((z ^ (z >> 27)) * _FACTOR_2) & _MASK
         return z ^ (z >> 31)
     # In place on a copy: ten million words at once are usual when a large world is drawn.
-    z = np.array(words, dtype=np.uint64, ndmin=1)
-    z ^= z >> np.uint64(30)
-    z *= np.uint64(_FACTOR_1)
-    z ^= z >> np.uint64(27)
-    z *= np.uint64(_FACTOR_2)
-    z ^= z >> np.uint64(31)
-    return z.reshape(np.shape(words))
+    mixed = np.array(words, dtype=np.uint64, ndmin=1)
+    mixed ^= mixed >> np.uint64(30)
+    mixed *= np.uint64(_FACTOR_1)
+    mixed ^= mixed >> np.uint64(27)
+    mixed *= np.uint64(_FACTOR_2)
+    mixed ^= mixed >> np.uint64(31)
+    return mixed.reshape(np.shape(words))
 
 
 def _words(name: str, values: object) -> int | np.ndarray:
@@ -76,9 +77,7 @@ def _xor(left: int | np.ndarray, right: int | np.ndarray) -> int | np.ndarray:
     return np.bitwise_xor(np.asarray(left, np.uint64), np.asarray(right, np.uint64))
 
 
-def stream_state(
-    seed: int | np.ndarray, purpose: int, number: int | np.ndarray
-) -> int | np.ndarray:
+def stream_state(seed: int | np.ndarray, purpose: int, number: int | np.ndarray) -> Any:
     """The state at which the stream of (seed, purpose, number) starts.
 
     Args:
@@ -107,7 +106,7 @@ class Stream:
         """Starts the stream of (seed, purpose, number), see `stream_state`."""
         self.state = int(stream_state(seed, purpose, number))
 
-    def bits(self, size: int | None = None) -> int | np.ndarray:
+    def bits(self, size: int | None = None) -> Any:
         """64 random bits as an integer, or, with `size`, a uint64 array of shape (size,)."""
         if size is None:
             self.state = (self.state + GAMMA) & _MASK
@@ -118,7 +117,7 @@ class Stream:
         self.state = (self.state + size * GAMMA) & _MASK
         return mix(states)
 
-    def below(self, n: int, size: int | None = None) -> int | np.ndarray:
+    def below(self, n: int, size: int | None = None) -> Any:
         """A whole number in [0, n), or, with `size`, an int64 array of shape (size,).
 
         Raises:
@@ -132,7 +131,7 @@ class Stream:
         return choose(self.bits(size) >> np.uint64(32), n)
 
 
-def choose(words: int | np.ndarray, n: int) -> int | np.ndarray:
+def choose(words: int | np.ndarray, n: int) -> Any:
     """Maps 32-bit words evenly to [0, n), n <= 2^32: `(word * n) >> 32`; int64 for arrays."""
     if isinstance(words, int):
         return (words * n) >> 32

@@ -10,13 +10,14 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from taichi_ants import results
 from taichi_ants.errors import AntsError
+from taichi_ants.interruption import held
 
 try:
     import fcntl
@@ -54,20 +55,32 @@ class ResultFolder:
         return not listed or any(self._is_gone(path) for path in listed)
 
     def check_whole(self, apart_from: Collection[str] = ()) -> None:
-        """Make sure that finished results are still all there.
+        """Make sure that finished results are still what they were, and clean up behind a kill.
 
         Args:
             apart_from: Files and folders that may be gone.
 
         Raises:
-            AntsError: A file is gone or empty.
+            AntsError: A file is gone or empty, or was altered.
         """
-        for path in self._published():
-            if path.parts[0] not in apart_from and self._is_gone(path):
+        published = self._published()
+        if not published:
+            raise AntsError(
+                f"{str(self.path / MANIFEST)!r} is damaged; give --force to run all again."
+            )
+        for path, facts in published.items():
+            gone = self._is_gone(path)
+            if gone and path.parts[0] in apart_from:
+                continue
+            if gone or _facts(self.path / path) != facts:
+                what = "is gone or empty" if gone else "was altered since they were finished"
                 raise AntsError(
-                    f"{str(self.path / path)!r}, a part of the results, is gone or empty; "
+                    f"{str(self.path / path)!r}, a part of the results, {what}; put it back, or "
                     "give --force to run all again."
                 )
+        if os.path.exists(self._unfinished):  # left by a kill; or another process adds something
+            with suppress(AntsError), self._locked():
+                pass
 
     def _is_gone(self, path: Path) -> bool:
         file = self.path / path
@@ -92,25 +105,31 @@ class ResultFolder:
         if not replace:
             self._check_nothing_else()
         with self._locked():
-            try:
-                yield self._prepare(replace)
-            finally:
-                self._drop_work_without_blocks()
+            yield self._prepare(replace)
 
     @contextmanager
     def _locked(self) -> Iterator[None]:
-        """Make the folders that are missing and keep others away; empty folders go again."""
+        """Make the folders that are missing and keep others away.
+
+        At the end all goes again that is of no use: empty folders, work without blocks, and what a
+        killed process has left.
+        """
         new = [part for part in (self.path, *self.path.parents) if not os.path.exists(part)]
+        lock = None
         try:
-            results.check_writable_folder(self.path)
-            results.check_writable_folder(self._unfinished)
-            with open(self._unfinished / _LOCK, "w") as lock:
-                self._lock(lock)
-                yield
+            with held():
+                results.check_writable_folder(self.path)
+                results.check_writable_folder(self._unfinished)
+                lock = self._lock()
+            yield
         finally:
-            for folder in (self._unfinished, *new):
-                with suppress(OSError, ValueError):  # it is not empty, or was never made
-                    folder.rmdir()
+            with held():
+                if lock is not None:
+                    self._drop_what_is_of_no_use()
+                    lock.close()
+                for folder in (self._unfinished, *new):
+                    with suppress(OSError, ValueError):  # it is not empty, or was never made
+                        folder.rmdir()
 
     def publish(self, manifest: Mapping[str, Any]) -> None:
         """Move what is ready into the folder, and write the manifest with the settings in it.
@@ -118,16 +137,10 @@ class ResultFolder:
         What an older manifest lists is replaced or removed; other files stay.
         """
         files = _files_in(self._unfinished / READY)
-        try:
-            for name in {path.parts[0] for path in self._published()}:
-                _remove(self.path / name)
-            (self.path / MANIFEST).unlink(missing_ok=True)
-            self._move_up()
-        except OSError as error:
-            raise _cannot_write(self.path, error) from error
         contents = {**manifest, "files": files, "settings": self._settings}
-        results.write_json(self.path / MANIFEST, contents)
-        (self._unfinished / _SETTINGS).unlink(missing_ok=True)  # now the work is finished
+        with held():
+            self._move_up(self._published(), contents)
+            (self._unfinished / _SETTINGS).unlink(missing_ok=True)  # now the work is finished
         shutil.rmtree(self._unfinished, ignore_errors=True)
 
     @contextmanager
@@ -138,25 +151,56 @@ class ResultFolder:
             AntsError: The folder cannot be written, or another process works in it.
         """
         with self._locked():
-            try:
-                shutil.rmtree(self._unfinished / READY, ignore_errors=True)
-                yield results.check_writable_folder(self._unfinished / READY)
-                files = _files_in(self._unfinished / READY)
-                added = {Path(file).parts[0] for file in files}
-                kept = [str(file) for file in self._published() if file.parts[0] not in added]
-                manifest = json.loads((self.path / MANIFEST).read_text("utf-8"))
-                results.write_json(
-                    self.path / MANIFEST, {**manifest, "files": sorted([*kept, *files])}
+            shutil.rmtree(self._unfinished / READY, ignore_errors=True)
+            yield results.check_writable_folder(self._unfinished / READY)
+            files = _files_in(self._unfinished / READY)
+            added = {Path(file).parts[0] for file in files}
+            old = self._published()
+            replaced = [file for file in old if file.parts[0] in added]
+            kept = {file.as_posix(): old[file] for file in old if file not in replaced}
+            manifest = json.loads((self.path / MANIFEST).read_text("utf-8"))
+            with held():
+                self._move_up(
+                    replaced, {**manifest, "files": dict(sorted({**kept, **files}.items()))}
                 )
-                self._move_up()
-            finally:
-                shutil.rmtree(self._unfinished, ignore_errors=True)
 
-    def _move_up(self) -> None:
-        """Put what is ready in its place, instead of what is there."""
-        for item in sorted((self._unfinished / READY).iterdir()):
-            _remove(self.path / item.name)
-            item.replace(self.path / item.name)
+    def _move_up(self, old: Iterable[Path], manifest: Mapping[str, Any]) -> None:
+        """Put what is ready, and the manifest, in the place of old files.
+
+        The manifest comes before the files: what a kill leaves is noticed as gone, never as ours.
+        """
+        ready = self._unfinished / READY
+        try:
+            for file in old:
+                self._remove(file)
+            results.write_json(self.path / MANIFEST, manifest)
+            for name in _files_in(ready):
+                target = self._make_way(Path(name))
+                (ready / name).replace(target)
+        except OSError as error:
+            raise _cannot_write(error.filename or self.path, error) from error
+
+    def _remove(self, file: Path) -> None:
+        """Remove a file of ours, and folders that are empty then; behind a link nothing is ours."""
+        folders = [self.path / folder for folder in file.parents[:-1]]
+        if any(folder.is_symlink() for folder in folders):
+            return
+        with suppress(FileNotFoundError, NotADirectoryError, IsADirectoryError):
+            (self.path / file).unlink()
+        for folder in folders:
+            with suppress(OSError):  # it holds something else
+                folder.rmdir()
+
+    def _make_way(self, file: Path) -> Path:
+        """The place of a file, in folders of its own; OSError if a folder that is full is there."""
+        for folder in reversed([self.path / folder for folder in file.parents[:-1]]):
+            if folder.is_symlink() or not folder.is_dir():
+                folder.unlink(missing_ok=True)
+                folder.mkdir()
+        target = self.path / file
+        if target.is_dir() and not target.is_symlink():
+            target.rmdir()
+        return target
 
     def _prepare(self, replace: bool) -> tuple[Path, Path]:
         """Folders for blocks and for what is ready; blocks of other settings are removed."""
@@ -168,12 +212,12 @@ class ResultFolder:
         results.write_json(self._unfinished / _SETTINGS, {"settings": self._settings})
         return blocks, ready
 
-    def _published(self) -> list[Path]:
-        """The files that the manifest lists, relative to the folder, if there is one."""
-        with suppress(OSError, ValueError, TypeError, KeyError):
-            files = json.loads((self.path / MANIFEST).read_text("utf-8"))["files"]
-            return [path for path in map(Path, files) if _lies_below(path)]
-        return []
+    def _published(self) -> dict[Path, Any]:
+        """The files that the manifest lists, relative to the folder, with their facts."""
+        with suppress(OSError, ValueError, TypeError, KeyError, AttributeError):
+            files = json.loads((self.path / MANIFEST).read_text("utf-8"))["files"].items()
+            return {Path(file): facts for file, facts in files if _lies_below(Path(file))}
+        return {}
 
     def _check_nothing_else(self) -> None:
         begun = _settings_in(self._unfinished / _SETTINGS)
@@ -193,7 +237,8 @@ class ResultFolder:
     def _has_foreign_files(self) -> bool:
         if not os.path.isdir(self.path):
             return False
-        return any(item.name != _UNFINISHED for item in self.path.iterdir())
+        left = (_UNFINISHED, *(item.name for item in results.left_overs(self.path)))
+        return any(item.name not in left for item in self.path.iterdir())
 
     def _holds(self, what: str, other: Mapping[str, Any]) -> str:
         if not other:
@@ -208,20 +253,29 @@ class ResultFolder:
             "choose another --out, or give --force to replace them."
         )
 
-    def _lock(self, lock: Any) -> None:
-        if fcntl is None:
-            return
+    def _lock(self) -> IO[str]:
+        """The file whose lock keeps other processes away."""
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock = open(self._unfinished / _LOCK, "w")  # noqa: SIM115 - closed by `_locked`
+        except OSError as error:
+            raise _cannot_write(self.path, error) from error
+        try:
+            if fcntl is not None:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
+            lock.close()
             raise AntsError(
                 f"another process is writing to {str(self.path)!r}; wait for it, or choose "
                 "another --out."
             ) from None
+        return lock
 
-    def _drop_work_without_blocks(self) -> None:
+    def _drop_what_is_of_no_use(self) -> None:
+        for left in results.left_overs(self.path):
+            left.unlink(missing_ok=True)
         blocks = self._unfinished / BLOCKS
-        if not blocks.is_dir() or not any(blocks.iterdir()):
+        done = blocks.is_dir() and len(list(blocks.iterdir())) > len(results.left_overs(blocks))
+        if not done or not os.path.exists(self._unfinished / _SETTINGS):
             shutil.rmtree(self._unfinished, ignore_errors=True)
 
 
@@ -234,24 +288,21 @@ def _settings_in(path: Path) -> dict[str, Any] | None:
     return {}  # damaged: of other settings than any
 
 
-def _files_in(folder: Path) -> list[str]:
-    """All files below a folder, relative to it."""
+def _files_in(folder: Path) -> dict[str, dict[str, Any]]:
+    """All files below a folder, relative to it, with their facts."""
     paths = sorted(path for path in folder.rglob("*") if not path.is_dir())
-    return [path.relative_to(folder).as_posix() for path in paths]
+    return {path.relative_to(folder).as_posix(): _facts(path) for path in paths}
+
+
+def _facts(path: Path) -> dict[str, Any]:
+    return {"bytes": path.stat().st_size, "sha256": results.file_hash(path)}
 
 
 def _lies_below(path: Path) -> bool:
     return bool(path.parts) and not path.is_absolute() and ".." not in path.parts
 
 
-def _remove(path: Path) -> None:
-    if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path)
-    else:
-        path.unlink(missing_ok=True)
-
-
-def _cannot_write(path: Path, error: OSError) -> AntsError:
+def _cannot_write(path: str | Path, error: OSError) -> AntsError:
     reason = (error.strerror or str(error)).lower()
     return AntsError(
         f"cannot write to {str(path)!r}: {reason}; make room for it or choose another."

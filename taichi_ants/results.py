@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import io
 import json
 import math
 import os
 import secrets
+import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -19,6 +21,9 @@ import numpy.typing as npt
 from taichi_ants.errors import AntsError, shown
 
 PathLike = str | os.PathLike[str]
+
+_TOKEN = 8  # bytes in the name of a file that is being written
+_SEAL = "sha256"  # the array that holds the hash of the others
 
 
 def checked_path(path: PathLike) -> str:
@@ -54,7 +59,7 @@ def write_atomically(path: PathLike, writer: Callable[[BinaryIO], None]) -> None
         if target.exists() and not target.is_file():
             raise AntsError(f"{_named(name)} is not a regular file; name a file to write to.")
         # Not derived from the file's name: it fits even if that one has the greatest length.
-        temporary = target.parent / f".{secrets.token_hex(8)}.tmp"
+        temporary = target.parent / f".{secrets.token_hex(_TOKEN)}.tmp"
         with open(temporary, "xb") as file:
             writer(file)
         os.replace(temporary, target)
@@ -66,6 +71,17 @@ def write_atomically(path: PathLike, writer: Callable[[BinaryIO], None]) -> None
         if temporary is not None:
             with suppress(OSError):
                 temporary.unlink()
+
+
+def left_overs(folder: Path) -> list[Path]:
+    """Files in a folder that `write_atomically` has not completed, since the process was killed."""
+    digits = "[0-9a-f]" * (2 * _TOKEN)
+    return list(folder.glob(f".{digits}.tmp"))
+
+
+def file_hash(path: PathLike) -> str:
+    """The SHA-256 of a file's bytes, in hexadecimal; OSError if it cannot be read."""
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 
 def write_text(path: PathLike, text: str) -> None:
@@ -134,8 +150,35 @@ def write_npz(path: PathLike, arrays: Mapping[str, npt.ArrayLike], compress: boo
     for name, array in converted.items():
         if array.dtype.hasobject:
             raise ValueError(f"array {name!r} holds Python objects")
-    save = np.savez_compressed if compress else np.savez
+    save: Callable[..., None] = np.savez_compressed if compress else np.savez
     write_atomically(path, lambda file: save(file, **converted))
+
+
+def write_sealed_npz(path: PathLike, arrays: Mapping[str, np.ndarray]) -> None:
+    """Write named arrays, and the hash of them all, as an .npz for `read_sealed_npz`."""
+    write_npz(path, {**arrays, _SEAL: _seal(path, arrays)}, compress=False)
+
+
+def read_sealed_npz(path: PathLike) -> dict[str, np.ndarray]:
+    """Read what `write_sealed_npz` has written.
+
+    Raises:
+        AntsError: As `read_npz`, or these are not the arrays that were written to this file.
+    """
+    arrays = read_npz(path)
+    seal = arrays.pop(_SEAL, None)
+    if seal is None or not np.array_equal(seal, _seal(path, arrays)):
+        raise AntsError(f"{str(path)!r} was altered since it was written; remove it.")
+    return arrays
+
+
+def _seal(path: PathLike, arrays: Mapping[str, np.ndarray]) -> np.ndarray:
+    """The SHA-256 of named arrays and of the name of their file, uint8 (32,)."""
+    digest = hashlib.sha256(Path(path).name.encode())
+    for name, array in sorted(arrays.items()):
+        digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return np.frombuffer(digest.digest(), dtype=np.uint8)
 
 
 def smallest(array: np.ndarray) -> np.ndarray:
@@ -174,8 +217,9 @@ def read_npz(path: PathLike) -> dict[str, np.ndarray]:
 def check_writable_folder(path: PathLike) -> Path:
     """Make sure that a folder exists and that files can be written to it, creating it if needed.
 
-    It writes and removes a small file, since permission bits alone do not tell (root passes them,
-    a read-only mount does not). If the check fails, folders that it created are removed.
+    It makes a file without a name, of which nothing can be left, since permission bits alone do not
+    tell (root passes them, a read-only mount does not). If the check fails, folders that it created
+    are removed.
 
     Returns:
         The folder.
@@ -187,10 +231,8 @@ def check_writable_folder(path: PathLike) -> Path:
     created: list[Path] = []
     try:
         _create_folders(folder, created)
-        probe = folder / f".{secrets.token_hex(8)}.tmp"
-        with open(probe, "xb"):
+        with tempfile.TemporaryFile(dir=folder):
             pass
-        probe.unlink()
     except (OSError, ValueError) as error:
         with suppress(OSError):
             for made in reversed(created):

@@ -105,7 +105,7 @@ class SweepResult(Record):
     Attributes:
         returns, steps, deliveries: integer (C, S, episodes), of training.
         greedy_returns, greedy_steps, greedy_deliveries: integer (C, S, rollouts).
-        q_values: float32 (C, S, 128, 5), the final policies.
+        q_values: float32 (C, S, 128, 5), the final policies; None where they were not kept.
         costs: What each learner's training took, over all its blocks.
     """
 
@@ -115,7 +115,7 @@ class SweepResult(Record):
     greedy_returns: np.ndarray
     greedy_steps: np.ndarray
     greedy_deliveries: np.ndarray
-    q_values: np.ndarray
+    q_values: np.ndarray | None
     costs: tuple[LearnerCost, ...]
 
 
@@ -137,6 +137,7 @@ def run_sweep(
     threads: int | None = None,
     arch: str | None = None,
     progress: Callable[[float], None] = lambda share: None,
+    notice: Callable[[str], None] = lambda text: None,
 ) -> SweepResult:
     """Do the blocks that the folder does not hold yet, and join all.
 
@@ -145,6 +146,7 @@ def run_sweep(
         folder: Where finished blocks are kept; it must belong to this sweep alone.
         threads, arch: As in `train`.
         progress: Called at first and after each block with the share of the work that is done.
+        notice: Called with what a person should know, as that a block is damaged.
 
     Raises:
         AntsError: A block cannot be written, or an argument is not allowed.
@@ -157,10 +159,10 @@ def run_sweep(
     progress(0.0)
     for (configs, seeds), weight in zip(blocks, weights, strict=True):
         path = folder / f"block-{configs.start:04d}-{seeds.start:06d}.npz"
-        block = _read_block(path, sweep, configs, seeds)
+        block = read_block(path, notice)
         if block is None:
             block = _do_block(sweep, configs, seeds, threads, arch)
-            results.write_npz(path, block, compress=False)
+            results.write_sealed_npz(path, block)
         for name, array in joined.items():
             array[configs, seeds] = block[name]
         _add_cost(costs, sweep.cost_of(configs.start), block)
@@ -202,21 +204,15 @@ def _do_block(
     return block | {"q_values": tables, "cost": np.array([cost.steps, cost.seconds])}
 
 
-def _read_block(
-    path: Path, sweep: Sweep, configs: slice, seeds: slice
-) -> dict[str, np.ndarray] | None:
-    """A finished block, None if there is none or it is damaged."""
+def read_block(path: Path, notice: Callable[[str], None]) -> dict[str, np.ndarray] | None:
+    """A finished block; None if there is none, or, with a word on it, if it is damaged."""
     if not path.exists():
         return None
-    with suppress(AntsError, KeyError):
-        block = results.read_npz(path)
-        runs = (configs.stop - configs.start, seeds.stop - seeds.start)
-        fits = all(block[name].shape == (*runs, sweep.episodes) for name in _ARRAYS)
-        fits = fits and all(block[name].shape == (*runs, sweep.rollouts) for name in _GREEDY)
-        fits = fits and block["q_values"].shape == (*runs, N_STATES, N_ACTIONS)
-        if fits and block["cost"].shape == (2,):
-            return block
-    return None
+    try:
+        return results.read_sealed_npz(path)
+    except AntsError:
+        notice(f"{str(path)!r} is damaged, so this part is done again.")
+        return None
 
 
 def _empty_result(sweep: Sweep) -> dict[str, np.ndarray]:

@@ -220,8 +220,8 @@ def _at_figure_1(comparison: Comparison) -> Shown:
         for variant in comparison.variants
         if comparison.positions(setting, variant)
     }
-    complete = comparison.in_paper_world and None not in found.values()
-    return found if complete else {}
+    complete = {key: row for key, row in found.items() if row is not None}
+    return complete if comparison.in_paper_world and len(complete) == len(found) else {}
 
 
 def _at_best(comparison: Comparison) -> Shown:

@@ -1,1 +1,52 @@
-"""The command lines: one file each, run by the script of that name in `experiments/`."""
+"""The command lines: one file each, run as `taichi-ants NAME`, or by a script in `experiments/`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+import taichi_ants
+from taichi_ants.interruption import stoppable
+
+COMMANDS = {  # modules beside this one, and what they do
+    "compare": "the paper's comparison of learners, over many seeds",
+    "colony": "the scaling study of the colony, or one colony of any size",
+    "render": "pictures of ants: an episode, a colony, learning, a policy",
+}
+
+
+def run(name: str, arguments: Sequence[str] | None = None) -> None:
+    """Run a command to its exit; it can be stopped while it is imported, too."""
+    with stoppable():
+        import_module(f"{__name__}.{name}").main(arguments)
+
+
+def main() -> None:
+    """The command line `taichi-ants`."""
+    name, *arguments = sys.argv[1:] or ["--help"]
+    with stoppable():
+        if name in COMMANDS:
+            from taichi_ants.command_line import Parser
+
+            Parser.program = f"taichi-ants {name}"
+            run(name, arguments)
+        elif name in ("-h", "--help"):
+            print(_help())
+        elif name == "--version":
+            print(f"taichi-ants {taichi_ants.__version__}")
+        else:
+            known = ", ".join(COMMANDS)
+            print(f"error: there is no command {name!r}; choose one of {known}.", file=sys.stderr)
+            sys.exit(2)
+
+
+def _help() -> str:
+    lines = "\n".join(f"  {name:9} {summary}" for name, summary in COMMANDS.items())
+    return f"""usage: taichi-ants COMMAND ...
+
+Ants on a hexagonal grid that lay pheromone trails and learn by reinforcement.
+
+{lines}
+
+`taichi-ants COMMAND --help` tells the rest."""

@@ -18,7 +18,9 @@ from typing import TYPE_CHECKING
 from taichi_ants.command_line import (
     ListAction,
     Parser,
+    default_folder,
     load_plugin,
+    notice,
     number,
     progress_bar,
     run_command,
@@ -84,11 +86,11 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
         refuse("is for one colony, give --ants", [*life, *files])
     if "capacity" in given and not settings.births:
         parser.error("--capacity is for colonies in which ants are born, give --births too")
-    _fill_in(settings)
+    _fill_in(parser, settings)
     return settings
 
 
-def _fill_in(settings: argparse.Namespace) -> None:
+def _fill_in(parser: Parser, settings: argparse.Namespace) -> None:
     """What was not given: for the study its defaults, or those of --quick."""
     if settings.single:
         settings.ticks = settings.ticks or DEFAULTS["ticks"]
@@ -100,7 +102,8 @@ def _fill_in(settings: argparse.Namespace) -> None:
     settings.epsilon = 0.3 if settings.epsilon is None else settings.epsilon
     settings.sizes = tuple(sorted({1, *settings.sizes}))
     if settings.out is None:
-        settings.out = Path("results/colony-quick" if settings.quick else "results/colony")
+        usual = {"epsilon": 0.3, **(QUICK if settings.quick else DEFAULTS)}
+        settings.out = default_folder(parser, "colony", settings, **usual)
 
 
 def _add_learning(parser: argparse.ArgumentParser) -> list[argparse.Action]:
@@ -128,7 +131,10 @@ def _add_study(parser: argparse.ArgumentParser) -> list[argparse.Action]:
     add("--seeds", type=whole_number(1, 1000), metavar="N", help="how many (default: 20)")
     add("--episodes", type=whole_number(1), metavar="N", help="of training (default: 50)")
     add("--rollouts", type=whole_number(1), metavar="N", help="evaluation episodes (default: 4)")
-    out = "for the results (default: results/colony, with --quick results/colony-quick)"
+    out = (
+        "for the results (default: results/colony, and behind it what differs from the defaults, "
+        "as in results/colony-sizes-1-8-quick)"
+    )
     add("--out", type=Path, metavar="FOLDER", help=out)
     add("--quick", action="store_true", help="fewer seeds, sizes and ticks, no large worlds")
     add("--force", action="store_true", help="replace what FOLDER holds")
@@ -240,8 +246,9 @@ def plan_arena(name: str, settings: argparse.Namespace) -> ArenaPlan:
 def study(settings: argparse.Namespace) -> None:
     """Run the study, or show the finished one."""
     from taichi_ants.colony_study import settings_of
-    from taichi_ants.provenance import file_hash, provenance
+    from taichi_ants.provenance import provenance
     from taichi_ants.result_folder import ResultFolder
+    from taichi_ants.results import file_hash
 
     plan = build_plan(settings)
     plugin = file_hash(settings.plugin) if settings.plugin else None
@@ -267,7 +274,7 @@ def do_study(settings: argparse.Namespace, plan: StudyPlan, blocks: Path, ready:
     from taichi_ants.colony_study import median_policies, run_study, to_arrays
 
     with progress_bar("study") as progress:
-        found, tables = run_study(plan, blocks, settings.threads, settings.arch, progress)
+        found, tables = run_study(plan, blocks, settings.threads, settings.arch, progress, notice)
     write_tables(found, ready)
     results.write_npz(ready / EPISODES, to_arrays(found.records))
     policies = results.check_writable_folder(ready / "policies")

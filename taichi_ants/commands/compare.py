@@ -18,7 +18,9 @@ from typing import TYPE_CHECKING, Any
 from taichi_ants.command_line import (
     ListAction,
     Parser,
+    default_folder,
     load_plugin,
+    notice,
     number,
     process_beside,
     progress_bar,
@@ -86,17 +88,23 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--plugin", metavar="FILE", help="a Python file that registers learners or worlds")
     add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
     add("--arch", choices=("cpu", "cuda"), default="cpu", help="where kernels run")
-    out = "for the results (default: results/compare, with --quick results/compare-quick)"
+    out = (
+        "for the results (default: results/compare, and behind it what differs from the defaults, "
+        "as in results/compare-garden-quick)"
+    )
     add("--out", type=Path, metavar="FOLDER", help=out)
     add("--quick", action="store_true", help=f"at most {QUICK_SEEDS} seeds")
     add("--force", action="store_true", help="replace what FOLDER holds")
     add("--no-figures", action="store_true", help="draw no figures")
     add("--no-render", action="store_true", help="show no episodes of the learned policies")
-    settings = parser.parse_args(arguments)
+    settings, given = parser.parse_given(arguments)
+    settings.given = given
+    usual = {}
     if settings.quick:
         settings.seeds = min(settings.seeds, QUICK_SEEDS)
+        usual = {"seeds": QUICK_SEEDS}
     if settings.out is None:
-        settings.out = Path("results/compare-quick" if settings.quick else "results/compare")
+        settings.out = default_folder(parser, "compare", settings, **usual)
     return settings
 
 
@@ -114,8 +122,12 @@ def configurations(settings: argparse.Namespace) -> tuple[TrainingConfig, ...]:
         settings.learning_rates, settings.discounts, settings.epsilons, settings.epsilon_decays
     )
     return tuple(
-        TrainingConfig(name, *values, planning_steps=planning_steps, delivery=delivery)
-        for delivery, (name, planning_steps), values in itertools.product(
+        TrainingConfig(
+            *(name, rate, discount, epsilon, decay),
+            planning_steps=planning_steps,
+            delivery=delivery,
+        )
+        for delivery, (name, planning_steps), (rate, discount, epsilon, decay) in itertools.product(
             deliveries, variants, tuple(grid)
         )
     )
@@ -129,6 +141,7 @@ def build_sweep(settings: argparse.Namespace) -> Sweep:
 
     if settings.plugin:
         load_plugin(settings.plugin)
+    _refuse_what_changes_nothing(settings)
     configs = configurations(settings)
     # The tables find configurations by six digits of their numbers.
     rows = [Row.of(config) for config in configs]
@@ -151,6 +164,19 @@ def build_sweep(settings: argparse.Namespace) -> Sweep:
         settings.train_evaporation == "on",
         settings.greedy_evaporation == "on",
     )
+
+
+def _refuse_what_changes_nothing(settings: argparse.Namespace) -> None:
+    from taichi_ants import AntsError, learners, worlds
+
+    if "world_seed" in settings.given:
+        worlds.check_seed_counts(settings.world)
+    plan = [name for name in settings.learners if learners.get(name).plans]
+    if "planning_steps" in settings.given and not plan:
+        raise AntsError(
+            "--planning-steps is for learners that plan, and none of "
+            f"{', '.join(settings.learners)} does; leave it out, or add dyna_q to --learners."
+        )
 
 
 def world_name(settings: argparse.Namespace) -> str:
@@ -270,8 +296,9 @@ def write_policies(folder: Path, sweep: Sweep, comparison: Comparison, tables: A
 def compare(settings: argparse.Namespace) -> None:
     """Run the comparison, or show the finished one."""
     from taichi_ants.analysis.report import print_report
-    from taichi_ants.provenance import file_hash, provenance, sweep_settings
+    from taichi_ants.provenance import provenance, sweep_settings
     from taichi_ants.result_folder import ResultFolder
+    from taichi_ants.results import file_hash
 
     sweep = build_sweep(settings)
     plugin = file_hash(settings.plugin) if settings.plugin else None
@@ -302,7 +329,7 @@ def do_comparison(
 
     laps = {"start": time.perf_counter()}
     with progress_bar("training") as report_progress:
-        result = run_sweep(sweep, blocks, settings.threads, settings.arch, report_progress)
+        result = run_sweep(sweep, blocks, settings.threads, settings.arch, report_progress, notice)
     laps["training and evaluation"] = time.perf_counter()
     behaviours = what_policies_do(sweep, result.q_values)
     comparison = to_comparison(sweep, result, *behaviours, world_name(settings))

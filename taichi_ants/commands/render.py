@@ -12,7 +12,7 @@ import signal
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from taichi_ants.command_line import (
     ListAction,
@@ -88,6 +88,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     _add_episode(parser)
     _add_picture(parser)
     settings, given = parser.parse_given(arguments)
+    settings.world_seed_given = "world_seed" in given
     settings.out = settings.out or DEFAULT_OUT[settings.show]
     _refuse_what_changes_nothing(parser, settings, given)
     settings.world = settings.world or DEFAULT_WORLD.get(settings.show, "paper")
@@ -213,6 +214,8 @@ def show(settings: argparse.Namespace) -> None:
         check_animation(settings.out, settings.fps)
     if settings.plugin:
         load_plugin(settings.plugin)
+    if settings.world_seed_given:
+        worlds.check_seed_counts(settings.world)
     world = worlds.build(settings.world, settings.world_seed)
     if settings.show == "learning":
         show_learning(settings, world)
@@ -395,7 +398,7 @@ def show_sheet(settings: argparse.Namespace, q_values: np.ndarray, title: str) -
     print(f"{settings.out}: the best action in each state")
 
 
-def _rollout(settings: argparse.Namespace) -> dict[str, object]:
+def _rollout(settings: argparse.Namespace) -> dict[str, Any]:
     return {
         "seed": settings.seed,
         "number": settings.number,
@@ -405,7 +408,7 @@ def _rollout(settings: argparse.Namespace) -> dict[str, object]:
     }
 
 
-def _look(settings: argparse.Namespace, title: str) -> dict[str, object]:
+def _look(settings: argparse.Namespace, title: str) -> dict[str, Any]:
     return {
         "size": settings.size,
         "hud": not settings.no_hud,

@@ -69,8 +69,10 @@ def checked_seeds(seeds: int | Sequence[int]) -> tuple[int, ...]:
     if isinstance(seeds, np.ndarray):
         seeds = seeds.ravel().tolist()
     # Text can be iterated over too, but is no sequence of numbers.
-    one = isinstance(seeds, (str, bytes)) or not isinstance(seeds, Iterable)
-    several = tuple(whole("a seed", seed) for seed in ((seeds,) if one else seeds))
+    given = (
+        seeds if isinstance(seeds, Iterable) and not isinstance(seeds, (str, bytes)) else (seeds,)
+    )
+    several = tuple(whole("a seed", seed) for seed in given)
     if not several:
         raise AntsError("seeds is empty; give at least one whole number.")
     taken: dict[int, int] = {}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -132,7 +133,8 @@ class Colony:
         self._learner = learners.get(training.learner)
         self._settings = runtime.start(threads, arch)
         one = isinstance(world, (str, World)) or not isinstance(world, Iterable)
-        several = (world,) * len(self.seeds) if one else tuple(world)
+        given: Any = (world,) * len(self.seeds) if one else world
+        several = tuple(given)
         if len(several) != len(self.seeds):
             raise AntsError(f"there are {len(several)} worlds for {len(self.seeds)} seeds.")
         check_world = checks.checked_world if sharing == "fixed" else checks.checked_task

@@ -134,8 +134,8 @@ def continue_training(
         trained = [result.configs[c] for c in group]
         check_finite(runs.q, trained, result.seeds)
         state.put(group, _shaped(runs, (len(group), shape[1])))
-        steps = int(outcomes[1, group].sum(dtype=np.int64))
-        costs.append(LearnerCost(config.learner, config.planning_steps, steps, engine.seconds))
+        spent = int(outcomes[1, group].sum(dtype=np.int64))
+        costs.append(LearnerCost(config.learner, config.planning_steps, spent, engine.seconds))
     before = (result.returns, result.steps, result.deliveries)
     returns, steps, deliveries = (
         np.concatenate(pair, axis=2) for pair in zip(before, outcomes, strict=True)
@@ -280,8 +280,9 @@ class _Work:
 
     def part(self, group: Sequence[int]) -> Progress | None:
         """The progress of one group, to be used after that of the groups before it."""
-        if self._progress is None:
+        progress = self._progress
+        if progress is None:
             return None
         begin, share = self._done, sum(self._weights[c] for c in group) / sum(self._weights)
         self._done += share
-        return lambda part: self._progress(begin + share * part)
+        return lambda part: progress(begin + share * part)

@@ -40,8 +40,8 @@ class Trace(Record):
         rewards: int32 (n,).
         next_states: int32 (n,), what the ant sees after the step.
         terminated: bool (n,), whether the learner took the next state as terminal.
-        events: int32 (n,), what came of the action: ENTERED_EMPTY, ENTERED_LURE, FAILED, PICKED_UP or
-            DELIVERED, see `taichi_ants.constants`.
+        events: int32 (n,), what came of the action: ENTERED_EMPTY, ENTERED_LURE, FAILED, PICKED_UP
+            or DELIVERED, see `taichi_ants.constants`.
         q_values: float32 (n, 5), the action values of the state when the action was chosen.
         td_errors: float32 (n,), of the update after the step; None without learning.
         tables: float32 (n, 128, 5), the Q-table after the step; None without learning.

@@ -95,6 +95,8 @@ def carry_out(
     events = [_commit(world, intent, intent.ant.slot in winning) for intent in intents]
     taken = []
     for intent, event in zip(intents, events, strict=True):
+        if intent.target is None:
+            continue
         if event is Event.PICKED_UP:
             world.trail.deposit(intent.target)
             world.trail.deposit(intent.ant.cell)
@@ -115,7 +117,7 @@ def _commit(world: ColonyWorld, intent: Intent, wins: bool) -> Event:
         ant.reward = rewards.REWARDS.give
         return Event.DELIVERED
     if intent.action == PICK_UP:
-        if not wins:
+        if not wins or intent.target is None:
             return Event.FAILED
         world.take_food(intent.target)
         ant.carries = True
@@ -124,7 +126,7 @@ def _commit(world: ColonyWorld, intent: Intent, wins: bool) -> Event:
         return Event.PICKED_UP
     # The turn is made even if the way is blocked: so an ant gets out of a dead end.
     ant.heading = intent.heading
-    if not wins:
+    if not wins or intent.target is None:
         return Event.BLOCKED
     world.occupied.remove(ant.cell)
     world.occupied.add(intent.target)

@@ -163,4 +163,8 @@ class OwnTables:
         ]
 
 
-SHARING = {"shared": SharedTable, "own": OwnTables, "fixed": FixedTable}
+SHARING: dict[str, type[FixedTable | OwnTables]] = {
+    "shared": SharedTable,
+    "own": OwnTables,
+    "fixed": FixedTable,
+}

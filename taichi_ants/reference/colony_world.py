@@ -26,8 +26,8 @@ class ColonyWorld:
     """
 
     def __init__(self, world: World, pheromone: Pheromone) -> None:
-        self._ranges = tuple(int(size) for size in world.ranges)
-        self.queen: Cell = tuple(int(value) for value in world.queen)
+        self._ranges = world.ranges
+        self.queen: Cell = world.queen
         self.ground: dict[Cell, int] = dict.fromkeys(existing_cells(self._ranges), EMPTY)
         self.ground[self.queen] = QUEEN
         for x, y, z in world.foods.tolist():

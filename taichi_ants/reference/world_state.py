@@ -22,8 +22,8 @@ class WorldState:
     """
 
     def __init__(self, world: World, evaporation: bool) -> None:
-        self.ranges = tuple(int(size) for size in world.ranges)
-        self.queen: Cell = tuple(int(value) for value in world.queen)
+        self.ranges = world.ranges
+        self.queen: Cell = world.queen
         self.evaporation = evaporation
         self.clock = 0
         # Cells that are not named here are empty, if they exist.

@@ -207,18 +207,17 @@ def _changes(
         A picture, the box outside of which it equals the one before, that one (None for the
         first), and its duration in whole ticks. Durations are rounded so that their sum is right.
     """
-    previous, current, box = None, None, None
-    shown, ticks = 0, 0
-    for number, picture in enumerate(pictures):
-        changed = _changed_box(current, picture, align) if number else _whole_box(picture)
+    waiting = iter(pictures)
+    previous, current = None, next(waiting)
+    box, shown, number = _whole_box(current), 0, 1
+    for picture in waiting:
+        changed = _changed_box(current, picture, align)
         if changed is not None:
-            if number:
-                ticks = round(number * ticks_each)
-                yield current, box, previous, ticks - shown
-                shown = ticks
-            previous, current, box = current, picture, changed
-        last = number + 1
-    yield current, box, previous, round(last * ticks_each) - shown
+            ticks = round(number * ticks_each)
+            yield current, box, previous, ticks - shown
+            previous, current, box, shown = current, picture, changed, ticks
+        number += 1
+    yield current, box, previous, round(number * ticks_each) - shown
 
 
 def _whole_box(picture: np.ndarray) -> Box:

@@ -84,7 +84,8 @@ def draw_status(
     if status.q_values is not None:
         y += round(0.8 * size)
         text.write(frame, "action values Q", left, y, size, colours.FAINT_INK)
-        _draw_bars(frame, status, (left, y + round(0.5 * size), width), size, q_range)
+        place = left, y + round(0.5 * size), width
+        _draw_bars(frame, status.q_values, status.action, place, size, q_range)
 
 
 def _lines(status: Status) -> list[tuple[str, str]]:
@@ -105,7 +106,8 @@ def _lines(status: Status) -> list[tuple[str, str]]:
 
 def _draw_bars(
     frame: np.ndarray,
-    status: Status,
+    q_values: np.ndarray,
+    taken: int | None,
     place: tuple[int, int, int],
     size: int,
     q_range: tuple[float, float],
@@ -119,15 +121,15 @@ def _draw_bars(
     pitch, thickness = round(1.4 * size), round(0.75 * size)
     for action in range(N_ACTIONS):
         y = top + action * pitch
-        value = float(np.clip(status.q_values[action], low, high))
+        value = float(np.clip(q_values[action], low, high))
         ends = sorted((zero, zero + value * pixels))
-        chosen = action == status.action
+        chosen = action == taken
         colour = colours.CHOSEN if chosen else colours.RULE
         fill(frame, ends[0], y + 0.35 * size, ends[1] - ends[0], thickness, colour)
         ink = colours.CHOSEN if chosen else colours.INK
         baseline = y + round(1.05 * size)
         text.write(frame, ACTION_NAMES[action], left, baseline, size, ink)
-        number = f"{round(float(status.q_values[action]), 2) + 0.0:.2f}"  # no minus zero
+        number = f"{round(float(q_values[action]), 2) + 0.0:.2f}"  # no minus zero
         text.write(frame, number, left + width, baseline, size, ink, align="right")
     fill(frame, zero - 1, top + 0.1 * size, 1, N_ACTIONS * pitch - 0.1 * size, colours.FAINT_INK)
 

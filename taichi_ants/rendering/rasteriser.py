@@ -6,6 +6,7 @@ import math
 from types import ModuleType
 
 import numpy as np
+import numpy.typing as npt
 
 from taichi_ants import runtime
 from taichi_ants.constants import DEPOSIT_LEVEL, EMPTY, FOOD, OBSTACLE, QUEEN
@@ -133,7 +134,11 @@ class Rasteriser:
         )
 
     def shapes(
-        self, cells: np.ndarray, shape: int | np.ndarray, headings: object = 0, fill: float = _FILL
+        self,
+        cells: np.ndarray,
+        shape: int | np.ndarray,
+        headings: npt.ArrayLike = 0,
+        fill: float = _FILL,
     ) -> np.ndarray:
         """A table of shapes on cells (flat indices (n,)), float32 (n, 6)."""
         table = np.empty((len(cells), 6), dtype=np.float32)

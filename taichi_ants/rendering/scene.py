@@ -121,7 +121,7 @@ class Scene:
         centres = self.viewport.centres(self._rasteriser.grid.cells(cells)).tolist()
         floors = self._rasteriser.colour_of(cells).tolist()
         taken = np.isin(snapshot.ground[cells], (FOOD, QUEEN)).tolist()  # by their drawings
-        for number, letter in enumerate(snapshot.letters):
+        for number, letter in enumerate(snapshot.letters or ""):
             if not taken[number]:
                 hexagon = self.viewport.hexagon
                 write_letter(frame, letter, centres[number], hexagon, floor=floors[number])

@@ -11,7 +11,7 @@ import numpy as np
 from taichi_ants.rendering.colours import INK, channels
 
 if TYPE_CHECKING:
-    from PIL.ImageFont import FreeTypeFont
+    from PIL.ImageFont import FreeTypeFont, ImageFont
 
 SMALLEST = 9  # pixels; smaller text cannot be read
 
@@ -66,10 +66,10 @@ def _plain(text: str) -> str:
 
 
 @lru_cache(maxsize=64)
-def _font(size: int) -> FreeTypeFont:
-    from PIL import ImageFont
+def _font(size: int) -> FreeTypeFont | ImageFont:
+    from PIL.ImageFont import load_default
 
-    return ImageFont.load_default(size)
+    return load_default(size)
 
 
 @lru_cache(maxsize=4096)

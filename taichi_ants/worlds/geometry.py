@@ -52,7 +52,7 @@ def reachable(
     regions = regions.reshape(-1)
     home = regions[grid.index(start) + grid.offsets]
     around = regions[grid.index(targets)[:, None] + grid.offsets]
-    return np.isin(around, home[home > 0]).any(axis=1)
+    return np.any(np.isin(around, home[home > 0]), axis=1)
 
 
 def _distances_with_border(grid: AxialGrid, cell: tuple[int, int, int]) -> np.ndarray:

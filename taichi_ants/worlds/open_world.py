@@ -83,7 +83,8 @@ def _share(name: str, value: object) -> float:
 
 def _draw_ranges(stream: Stream) -> tuple[int, int, int]:
     drawn = SMALLEST_RANGE + stream.below(LARGEST_RANGE - SMALLEST_RANGE + 1, 3)
-    return tuple(drawn.tolist())
+    x, y, z = drawn.tolist()
+    return x, y, z
 
 
 def _draw(

@@ -68,7 +68,8 @@ def parse_contents(
 
 def _parse_queen(queen: object, grid: AxialGrid) -> tuple[int, int, int]:
     given = _row("queen", queen, "one cell (x, y, z)", 3)
-    normal = tuple(value - min(given) for value in given)
+    x, y, z = (value - min(given) for value in given)
+    normal = x, y, z
     if any(value >= end for value, end in zip(normal, grid.ranges, strict=True)):
         raise AntsError(f"queen is {tuple(given)}, {_outside(grid)}")
     return normal
@@ -83,7 +84,7 @@ def _parse_cells(
     rows = given.copy()
     if len(given):
         rows[:, :3] -= given[:, :3].min(axis=1, keepdims=True)
-    outside = (rows[:, :3] >= np.array(grid.ranges)).any(axis=1)
+    outside = np.any(rows[:, :3] >= np.array(grid.ranges), axis=1)
     if outside.any():
         raise AntsError(f"{_listed(name, given, outside)}, {_outside(grid)}")
     if number:

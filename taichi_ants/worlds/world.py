@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from taichi_ants.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 from taichi_ants.hexgrid import AxialGrid
@@ -42,6 +45,18 @@ class World:
     obstacles: np.ndarray = ()  # type: ignore[assignment]
     trails: np.ndarray = ()  # type: ignore[assignment]
     ants: np.ndarray = ()  # type: ignore[assignment]
+
+    if TYPE_CHECKING:  # what is given may be any sequence, what is stored is an array
+
+        def __init__(
+            self,
+            ranges: Sequence[int],
+            queen: Sequence[int],
+            foods: npt.ArrayLike = (),
+            obstacles: npt.ArrayLike = (),
+            trails: npt.ArrayLike = (),
+            ants: npt.ArrayLike = (),
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         ranges = validation.parse_ranges(self.ranges)

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from command_lines import (
     call,
     contents,
     environment,
+    load,
     run,
     start,
 )
@@ -124,6 +126,20 @@ def test_a_finished_study_is_shown_and_nothing_is_lost(finished, tmp_path, kerne
     assert contents(folder) == before
 
 
+@pytest.mark.parametrize(
+    ("arguments", "folder"),
+    [
+        ("", "colony"),
+        ("--seeds 20 --epsilon 0.3 --threads 1 --no-figures", "colony"),
+        ("--quick --seeds 8", "colony-quick"),
+        ("--sizes 1 8 --quick", "colony-sizes-1-8-quick"),
+        ("--learner dyna_q --arenas paper", "colony-learner-dyna_q-arenas-paper"),
+    ],
+)
+def test_default_folders_tell_what_is_run(arguments, folder):
+    assert load("colony").parse_arguments(arguments.split()).out == Path("results", folder)
+
+
 def blocks_in(folder):
     """Finished blocks with the time at which they were written."""
     found = (folder / "unfinished" / "blocks").glob("*.npz")
@@ -154,11 +170,13 @@ def test_stopped_and_killed_it_goes_on_to_the_same_results(finished, kernels, tm
     process, *_ = stop_after_blocks(arguments, kernels, tmp_path, signal.SIGKILL, len(kept) + 2)
     assert process.returncode == -signal.SIGKILL
     assert kept.items() < blocks_in(folder).items()  # none of them was done again
-    # A block that was damaged meanwhile is done again.
-    (folder / "unfinished" / "blocks" / next(iter(kept))).write_bytes(b"nothing")
+    # A block that was damaged meanwhile is done again, with a word on it.
+    damaged = next(iter(kept))
+    (folder / "unfinished" / "blocks" / damaged).write_bytes(b"nothing")
 
     done = run("colony", [*arguments, "--no-figures"], kernels, tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
+    said = f"'out/unfinished/blocks/{damaged}' is damaged, so this part is done again.\n"
+    assert (done.returncode, done.stderr) == (0, said)
     after, expected = contents(folder), contents(finished[1])
     assert set(after) == {name for name in FILES if not name.startswith("figures")}
     for name in set(after) - {"manifest.json"}:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_lines import assert_one_sentence, call, contents, run
+from command_lines import EXPERIMENTS, assert_one_sentence, call, contents, load, run
 
 from taichi_ants import (
     TrainingConfig,
@@ -25,6 +25,7 @@ from taichi_ants.analysis.behaviour import DELIVERS
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.rendering import render_episode
 
+GARDEN = EXPERIMENTS / "maps" / "garden.txt"
 SEEDS, EPISODES, MAX_STEPS, ROLLOUTS = (7, 8, 9), 60, 45, 50
 SMALL = [
     *("--seeds", len(SEEDS), "--seed", SEEDS[0], "--episodes", EPISODES),
@@ -418,6 +419,30 @@ def test_results_that_are_gone_are_not_passed_over(name, content, copy, compare)
     assert not (copy / "renders").exists()
 
 
+def test_files_of_ones_own_stay_when_pictures_are_drawn_again(copy, compare):
+    own = [copy / "figures" / "mine.png", copy / "policies" / "mine.npz"]
+    for path in own:
+        path.write_text("mine")
+    (copy / "figures" / "sensitivity.png").unlink()
+    assert compare(*SMALL, "--out", copy)[0] == 0
+    assert (copy / "figures" / "sensitivity.png").exists()
+    assert compare(*SMALL, "--out", copy, "--force", "--no-figures", "--no-render")[0] == 0
+    assert [path.read_text() for path in own] == ["mine", "mine"]
+
+
+@pytest.mark.parametrize("name", ["summary.csv", "episodes.npz", "policies/sarsa.npz"])
+def test_altered_results_are_not_shown_as_if_whole(name, copy, compare):
+    content = bytearray((copy / name).read_bytes())
+    content[len(content) // 2] ^= 1
+    (copy / name).write_bytes(content)
+    status, out, err = compare(*SMALL, "--out", copy)
+    assert (status, out) == (2, "")
+    assert_one_sentence(err)
+    assert f"{copy / name}" in err
+    assert "was altered" in err
+    assert "--force" in err
+
+
 @pytest.mark.parametrize(
     ("change", "named"),
     [
@@ -450,18 +475,47 @@ def test_lists_take_blanks_and_commas_and_drop_what_is_said_twice(tmp_path, comp
 
 def test_quick_takes_few_seeds_and_a_folder_of_its_own(tmp_path, compare, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert compare(*TINY, "--quick", "--seeds", 50)[0] == 0
-    rows = read_csv(tmp_path / "results" / "compare-quick" / "summary.csv")
-    assert {row["seeds"] for row in rows} == {"10"}
-    assert compare(*TINY, "--quick", "--seeds", 2, "--out", "results/compare")[0] == 0
-    rows = read_csv(tmp_path / "results" / "compare" / "summary.csv")
-    assert {row["seeds"] for row in rows} == {"2"}
+    for seeds, taken in ((50, 10), (2, 2)):
+        assert compare(*TINY, "--quick", "--seeds", seeds)[0] == 0
+        (folder,) = (tmp_path / "results").glob("compare-*-quick")
+        assert ("seeds-2" in folder.name) == (taken == 2)
+        assert {row["seeds"] for row in read_csv(folder / "summary.csv")} == {str(taken)}
+        shutil.rmtree(folder)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "folder"),
+    [
+        ("", "compare"),
+        ("--seeds 100 --world paper --threads 1 --no-figures --no-render --force", "compare"),
+        ("--quick", "compare-quick"),
+        ("--quick --seeds 10", "compare-quick"),
+        ("--world experiments/maps/garden.txt --quick", "compare-garden-quick"),
+        ("--world open --world-seed 7", "compare-open-world-seed-7"),
+        ("--learners sarsa --discounts 0.8 0.9", "compare-learners-sarsa-discounts-0.8-0.9"),
+        ("--plugin my/own.py --learners q_learning,mine", "compare-learners-q_learning-mine-own"),
+        ("--delivery absorbing --quick", "compare-delivery-absorbing-quick"),
+        ("--learners ../mine", "compare-learners-.._mine"),
+        ("--quick --out here", "here"),
+    ],
+)
+def test_default_folders_tell_what_is_run(arguments, folder):
+    out = load("compare").parse_arguments(arguments.split()).out
+    assert out == (Path(folder) if folder == "here" else Path("results", folder))
+
+
+def test_the_sequence_of_the_readme(tmp_path, compare, monkeypatch):
+    """One way to call it after another, each without --out."""
+    monkeypatch.chdir(tmp_path)
+    for world in ([], ["--world", GARDEN], ["--world", "open"]):
+        status, _, err = compare(*TINY, "--quick", *world)
+        assert (status, err) == (0, "")
+    assert len(list((tmp_path / "results").iterdir())) == 3
 
 
 @pytest.mark.parametrize("world", ["open", "garden"])
 def test_other_worlds(world, tmp_path, compare):
-    garden = Path(__file__).parents[2] / "experiments" / "maps" / "garden.txt"
-    chosen = ["--world", garden if world == "garden" else "open", "--world-seed", 5]
+    chosen = ["--world", GARDEN] if world == "garden" else ["--world", "open", "--world-seed", 5]
     status, _, err = compare(*TINY, *chosen, "--out", tmp_path / "out")
     assert (status, err) == (0, "")
     name = "garden.txt" if world == "garden" else "open, world seed 5"
@@ -472,7 +526,7 @@ def test_other_worlds(world, tmp_path, compare):
     verdicts = read_csv(tmp_path / "out" / "claims.csv")
     assert {row["note"] for row in verdicts} == {"the claims are about the paper's world"}
     (row,) = read_csv(tmp_path / "out" / "summary.csv")
-    built = worlds.load_map(garden) if world == "garden" else worlds.open_world(5)
+    built = worlds.load_map(GARDEN) if world == "garden" else worlds.open_world(5)
     expected = train(built, config_of(row), 0, 2, 30)
     with np.load(tmp_path / "out" / "episodes.npz") as archive:
         assert np.array_equal(archive["returns"], expected.returns)

@@ -62,6 +62,7 @@ def assert_refused(arguments, named, place, capsys):
         (["--learners", "dyna_q", "--planning-steps", "0"], ["--planning-steps", "0"]),
         (["--learners", "dyna_q", "--planning-steps", "1001"], ["planning_steps", "1001"]),
         (["--discounts", "0.9", "0.90000001"], ["six digits"]),
+        (["--planning-steps", "3"], ["--planning-steps", "q_learning", "dyna_q"]),
     ],
 )
 def test_learners_and_their_settings(arguments, named, place, capsys):
@@ -107,6 +108,8 @@ def test_sizes_and_switches(arguments, named, place, capsys):
         (["--world", "bytes.txt"], ["bytes.txt", "no text"]),
         (["--world", "no_way.txt"], ["no_way.txt", "reached"]),
         (["--world", "no_room.txt"], []),
+        (["--world-seed", "0"], ["--world-seed", "'paper'", "open"]),
+        (["--world", "no_room.txt", "--world-seed", "5"], ["--world-seed", "no_room.txt"]),
         (["--world-seed", "x"], ["--world-seed", "'x'"]),
     ],
 )

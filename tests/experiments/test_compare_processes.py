@@ -103,16 +103,32 @@ def test_stopped_and_killed_it_goes_on_to_the_same_results(uninterrupted, kernel
         assert after[name] == uninterrupted[name], name
 
 
-def test_an_interruption_before_the_first_block_leaves_nothing(kernels, tmp_path):
+@pytest.mark.parametrize(("stop", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_an_interruption_before_the_first_block_leaves_nothing(stop, status, kernels, tmp_path):
     process = start("compare", [*LONG, "--out", "new/folder"], kernels, tmp_path)
     while process.poll() is None and not (tmp_path / "new").exists():
         time.sleep(0.002)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(stop)
     out, err = process.communicate(timeout=60)
-    assert (process.returncode, out) == (130, "")
+    assert (process.returncode, out) == (status, "")
     assert err.startswith("Stopped")
     assert err.count("\n") == 1
-    assert list(tmp_path.iterdir()) == []
+    if not blocks_in(tmp_path / "new" / "folder"):  # under load the first may be done by now
+        assert list(tmp_path.iterdir()) == []
+
+
+def test_a_damaged_block_is_done_again_with_a_word_on_it(kernels, tmp_path):
+    process = start("compare", [*MANY, "--out", "out"], kernels, tmp_path)
+    stop_after_a_block(process, tmp_path / "out", signal.SIGTERM, 1)
+    assert process.returncode == 143
+    name = min(blocks_in(tmp_path / "out"))
+    path = tmp_path / "out" / "unfinished" / "blocks" / name
+    path.write_bytes(path.read_bytes()[:-100])
+    process = start("compare", [*MANY, "--out", "out"], kernels, tmp_path)
+    _, err, _ = stop_after_a_block(process, tmp_path / "out", signal.SIGINT, 2)
+    damaged, stopped = err.splitlines()
+    assert damaged == f"'out/unfinished/blocks/{name}' is damaged, so this part is done again."
+    assert stopped.startswith("Stopped")
 
 
 @pytest.mark.parametrize("seconds", [0.05, 0.6])

@@ -134,6 +134,10 @@ WRONG = {
         "--step changes nothing in an episode, but in a still colony, a still episode; leave",
     ),
     "states of an episode": (["--all-states"], "--all-states changes nothing in an episode"),
+    "world seed of the paper": (
+        ["--world-seed", "3"],
+        "--world-seed is for a world drawn at random",
+    ),
     "step of a sheet": (["--show", "sheet", "--step", "3"], "--step changes nothing in a sheet"),
     "ants of an episode": (["--ants", "80"], "--ants changes nothing in an episode"),
     "every of a still": (["--show", "colony", "--every", "4", "--out", "a.png"], "--every"),

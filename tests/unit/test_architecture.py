@@ -17,7 +17,7 @@ import taichi_ants
 
 # From the ground up: a part imports parts of lower layers only. What is not listed is on top.
 LAYERS = (
-    {"constants", "errors", "environment"},
+    {"constants", "errors", "environment", "interruption"},
     {"randomness", "hexgrid", "states", "results", "colony_config", "command_line", "rules"},
     {"config", "rewards", "runtime", "policies", "result_folder", "worlds", "learners"},
     {"engines", "reference"},

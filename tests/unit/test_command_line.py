@@ -199,17 +199,6 @@ def test_an_interruption_that_a_library_swallows_is_found_later(capsys):
     assert end.value.code == 0
 
 
-def test_interruptions_that_are_ignored_on_purpose_stay_ignored(monkeypatch):
-    """As of `nohup`, or of a shell for its background processes."""
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        with pytest.raises(SystemExit) as end:
-            run_command(lambda: signal.raise_signal(signal.SIGINT))
-    finally:
-        signal.signal(signal.SIGINT, before)
-    assert end.value.code == 0
-
-
 def test_commands_run_in_other_threads_too():
     """Where Python lets nobody watch signals."""
     statuses = []

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
+import signal
 
 import numpy as np
 import pytest
 
+from taichi_ants import results
 from taichi_ants.errors import AntsError
+from taichi_ants.interruption import stoppable
 from taichi_ants.result_folder import ResultFolder
 
 SETTINGS = {"seeds": (0, 1), "rate": np.float32(0.5), "world": {"ranges": [3, 3, 3]}}
@@ -53,7 +57,7 @@ def test_finished_work(tmp_path):
     manifest = json.loads((path / "manifest.json").read_text())
     assert manifest == {
         "made": "result",
-        "files": ["table.csv"],
+        "files": {"table.csv": {"bytes": 6, "sha256": hashlib.sha256(b"result").hexdigest()}},
         "settings": {"seeds": [0, 1], "rate": 0.5, "world": {"ranges": [3, 3, 3]}},
     }
     assert ResultFolder(path, SETTINGS).is_finished()
@@ -228,7 +232,7 @@ def test_only_files_of_the_folder_itself_are_replaced(tmp_path):
     finish(tmp_path / "out")
     (tmp_path / "precious").write_text("mine")
     manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
-    files = ["../precious", str(tmp_path / "precious"), "..", ".", "table.csv"]
+    files = dict.fromkeys(["../precious", str(tmp_path / "precious"), "..", ".", "table.csv"])
     (tmp_path / "out" / "manifest.json").write_text(json.dumps({**manifest, "files": files}))
     finish(tmp_path / "out", replace=True, files=("new.csv",))
     assert names(tmp_path) == ["out", "precious"]
@@ -244,7 +248,7 @@ def test_additions(tmp_path):
     assert names(tmp_path) == ["figures", "manifest.json", "table.csv"]
     assert folder.is_finished()
     manifest = json.loads((tmp_path / "manifest.json").read_text())
-    assert manifest["files"] == ["figures/one.png", "table.csv"]
+    assert set(manifest["files"]) == {"figures/one.png", "table.csv"}
     assert manifest["made"] == "result"
     finish(tmp_path, replace=True)  # what was added goes with the results
     assert names(tmp_path) == ["manifest.json", "table.csv"]
@@ -272,6 +276,125 @@ def test_what_is_gone_is_noticed(tmp_path):
     (tmp_path / "policy.npz").write_text("")
     with pytest.raises(AntsError, match=r"policy\.npz', .* give --force"):
         folder.check_whole(apart_from={"figures"})
+
+
+ALTERED = {
+    "longer": lambda path: path.write_text("result, improved"),
+    "as long": lambda path: path.write_text("resuLt"),
+    "a folder": lambda path: (path.unlink(), path.mkdir()),
+}
+
+
+@pytest.mark.parametrize("change", ALTERED)
+def test_what_was_altered_is_noticed(change, tmp_path):
+    folder = finish(tmp_path, files=("policy.npz", "table.csv"))
+    folder.check_whole()
+    ALTERED[change](tmp_path / "table.csv")
+    before = names(tmp_path)
+    with pytest.raises(
+        AntsError, match=r"table\.csv', a part of the results, (was altered|is gone)"
+    ):
+        folder.check_whole()
+    assert names(tmp_path) == before
+
+
+def test_a_manifest_that_lists_nothing_is_damaged(tmp_path):
+    folder = finish(tmp_path)
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    (tmp_path / "manifest.json").write_text(json.dumps({**manifest, "files": ["table.csv"]}))
+    with pytest.raises(AntsError, match=r"manifest\.json' is damaged; give --force"):
+        folder.check_whole()
+
+
+def add_a_picture(folder, name="one.png"):
+    with folder.addition() as place:
+        (place / "figures").mkdir()
+        (place / "figures" / name).write_text("drawn")
+
+
+def test_files_of_ones_own_among_ours_stay(tmp_path):
+    """In folders of ours, too, and whether pictures are drawn again or all is replaced."""
+    folder = finish(tmp_path)
+    add_a_picture(folder)
+    (tmp_path / "figures" / "mine.png").write_text("mine")
+    add_a_picture(folder, "two.png")
+    assert names(tmp_path / "figures") == ["mine.png", "two.png"]
+    folder.check_whole()
+    finish(tmp_path, replace=True)
+    assert names(tmp_path) == ["figures", "manifest.json", "table.csv"]
+    assert names(tmp_path / "figures") == ["mine.png"]
+
+
+def test_a_folder_of_ones_own_in_the_way_stays(tmp_path):
+    (tmp_path / "table.csv").mkdir()
+    (tmp_path / "table.csv" / "mine").write_text("mine")
+    with pytest.raises(AntsError, match=r"cannot write to .*table\.csv': directory not empty"):
+        finish(tmp_path, replace=True)
+    assert (tmp_path / "table.csv" / "mine").exists()
+    assert not ResultFolder(tmp_path, SETTINGS).is_finished()
+    (tmp_path / "table.csv").rename(tmp_path / "elsewhere")
+    finish(tmp_path)
+    assert ResultFolder(tmp_path, SETTINGS).is_finished()
+
+
+def test_what_lies_behind_a_link_is_not_ours(tmp_path):
+    folder = finish(tmp_path / "out")
+    add_a_picture(folder)
+    (tmp_path / "out" / "figures").rename(tmp_path / "figures")
+    (tmp_path / "out" / "figures").symlink_to(tmp_path / "figures")
+    finish(tmp_path / "out", replace=True)
+    assert names(tmp_path / "figures") == ["one.png"]
+
+
+def test_what_a_kill_has_left_of_a_clean_up_goes(tmp_path):
+    folder = finish(tmp_path)
+    (tmp_path / "unfinished" / "blocks").mkdir(parents=True)
+    (tmp_path / "unfinished" / "blocks" / "block").write_text("done")
+    folder.check_whole()
+    assert names(tmp_path) == ["manifest.json", "table.csv"]
+
+
+def test_what_another_process_adds_is_no_left_over(tmp_path):
+    folder = finish(tmp_path)
+    with folder.addition() as place:
+        folder.check_whole()
+        assert place.is_dir()
+
+
+def test_files_that_a_kill_or_a_full_disk_has_left_half_written_do_not_matter(tmp_path):
+    (tmp_path / ".0123456789abcdef.tmp").write_text("half")
+    finish(tmp_path)
+    assert names(tmp_path) == ["manifest.json", "table.csv"]
+    for theirs in (".0123456789abcdeg.tmp", ".vimrc.tmp"):
+        (tmp_path / "other" / theirs).mkdir(parents=True)
+        with pytest.raises(AntsError, match="no finished results"):
+            ResultFolder(tmp_path / "other", SETTINGS).work().__enter__()
+        (tmp_path / "other" / theirs).rmdir()
+
+
+@pytest.mark.parametrize(
+    ("owner", "name"),
+    [
+        *((results, "check_writable_folder"), (ResultFolder, "_lock")),
+        *((ResultFolder, "_prepare"), (results, "write_json")),
+    ],
+)
+def test_ctrl_c_while_folders_are_made_leaves_nothing(owner, name, tmp_path, monkeypatch):
+    real = getattr(owner, name)
+
+    def interrupted(*arguments):
+        value = real(*arguments)
+        signal.raise_signal(signal.SIGINT)
+        return value
+
+    monkeypatch.setattr(owner, name, interrupted)
+    with (
+        pytest.raises(SystemExit),
+        stoppable(),
+        ResultFolder(tmp_path / "a" / "b", SETTINGS).work(),
+    ):
+        pytest.fail("the work has begun")
+    assert names(tmp_path) == []
 
 
 def test_an_addition_that_was_killed_leaves_nothing_for_ever(tmp_path):

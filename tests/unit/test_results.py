@@ -295,10 +295,10 @@ def test_a_failing_check_removes_only_the_folders_that_it_made(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Folders can be made but no files, as with a quota.
-    def no_files(path: Path, mode: str) -> None:
+    def no_files(dir: Path) -> None:
         raise OSError(errno.EDQUOT, "Disk quota exceeded")
 
-    monkeypatch.setattr(results, "open", no_files, raising=False)
+    monkeypatch.setattr("tempfile.TemporaryFile", no_files)
     (tmp_path / "old").mkdir()
     with pytest.raises(AntsError, match="disk quota exceeded"):
         results.check_writable_folder(tmp_path / "old" / "new" / "newer")

@@ -78,13 +78,14 @@ class Slice:
             self._comparison.position(self._delivery, variant, hyperparameters)
             for hyperparameters in GRID
         ]
-        missing = positions.count(None)
+        found = [position for position in positions if position is not None]
+        missing = len(positions) - len(found)
         if missing:
             raise NotTestedError(
                 f"{missing} of the paper's {len(GRID)} configurations of {variant.label} missing"
             )
-        self.used.update(positions)
-        return positions
+        self.used.update(found)
+        return found
 
     def _read(self, measure: str, positions: list[int]) -> np.ndarray:
         lacks = MEASURES[measure].lacks(self._comparison)

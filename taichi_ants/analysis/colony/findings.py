@@ -6,7 +6,7 @@ tell no difference from chance, the sentence says so. Another outcome gives anot
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from taichi_ants.analysis.colony.contrasts import (
@@ -109,7 +109,7 @@ def _copies(scene: _Scene) -> Iterator[str]:
             yield f"{who} {_growth(totals, scene.verdicts[name])}"
 
 
-def _growth(totals: dict[int, float], verdicts: dict[Sizes, Difference]) -> str:
+def _growth(totals: dict[int, float], verdicts: Mapping[Sizes, Difference]) -> str:
     top, first, last = peak(verdicts), min(totals), max(totals)
     if top == first:
         falls = decline(verdicts)
@@ -124,9 +124,9 @@ def _growth(totals: dict[int, float], verdicts: dict[Sizes, Difference]) -> str:
         f"deliver more the more there are, up to {ants(top)}: {figure(totals[first])} per 1000 "
         f"ticks with {first}, {figure(totals[top])} with {top}, {figure(times)} times as many"
     )
-    falls = [n for n in totals if n > top and verdicts[n, top].sign < 0]
-    if falls:
-        return f"{text}; with {falls[0]} it is less again, {figure(totals[falls[0]])}"
+    fewer = [n for n in totals if n > top and verdicts[n, top].sign < 0]
+    if fewer:
+        return f"{text}; with {fewer[0]} it is less again, {figure(totals[fewer[0]])}"
     if top == last:
         return f"{text}, and it still grows there"
     rest = f"beyond that no growth can be told from chance ({figure(totals[last])} with {last})"

@@ -69,7 +69,7 @@ def comparison(
         firsts, seconds: Their deliveries per 1000 ticks.
     """
     sizes = list(judged)
-    parts = []
+    parts: list[str] = []
     for sign, word in ((1, "more"), (-1, "less")):
         those = [n for n in sizes if judged[n].sign == sign]
         if those:

@@ -1,0 +1,89 @@
+"""Ctrl-C and SIGTERM: they end a command in one line, whatever it is doing.
+
+A signal is noted besides raising KeyboardInterrupt, since libraries swallow that at some moments,
+and turn it into errors of their own at others. The imports are few, so that a command can be
+stopped from its first moment on.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from types import FrameType
+from typing import Any
+
+_noted: list[int] = []
+_holds = 0
+
+
+def _note(number: int, frame: FrameType | None) -> None:
+    _noted.append(number)
+    if not _holds:
+        raise KeyboardInterrupt
+
+
+def _forget(unraisable: sys.UnraisableHookArgs) -> None:
+    """An interruption that cannot be raised where it comes, as in a callback, is noted at least."""
+    if not issubclass(unraisable.exc_type, KeyboardInterrupt):
+        sys.__unraisablehook__(unraisable)
+
+
+@contextmanager
+def stoppable(message: str = "Stopped.") -> Iterator[None]:
+    """Ctrl-C and SIGTERM end what is done inside, and the process with status 128 + their number.
+
+    What the parent process ignores, as nohup does, stays ignored. Outside the main thread Python
+    lets nobody watch signals.
+
+    Args:
+        message: What to say on standard error.
+    """
+    usual: dict[int, Any] = {
+        signal.SIGINT: signal.default_int_handler,
+        signal.SIGTERM: signal.SIG_DFL,
+    }
+    watched = [number for number, handler in usual.items() if signal.getsignal(number) is handler]
+    hook = sys.unraisablehook
+    with suppress(ValueError):  # not the main thread
+        for number in watched:
+            signal.signal(number, _note)
+        sys.unraisablehook = _forget
+    try:
+        yield
+    except BaseException as error:
+        stopped = _noted or isinstance(error, KeyboardInterrupt)
+        if isinstance(error, SystemExit) or not stopped:
+            raise
+        if sys.stderr is not None:
+            with suppress(OSError):
+                print(message, file=sys.stderr)
+        sys.exit(128 + (_noted[0] if _noted else signal.SIGINT))
+    finally:
+        sys.unraisablehook = hook
+        with suppress(ValueError):
+            for number in watched:
+                signal.signal(number, usual[number])
+        if watched:  # this is the outermost
+            _noted.clear()
+
+
+@contextmanager
+def held() -> Iterator[None]:
+    """A signal waits until what is inside is done; for what takes a moment and must be whole."""
+    global _holds
+    before = len(_noted)
+    _holds += 1
+    try:
+        yield
+    finally:
+        _holds -= 1
+    if len(_noted) > before and not _holds:
+        raise KeyboardInterrupt
+
+
+def stop_if_noted() -> None:
+    """Raise KeyboardInterrupt if a signal came, but a library has swallowed it."""
+    if _noted:
+        raise KeyboardInterrupt

@@ -1,0 +1,138 @@
+"""What is handed on: the wheel, the source distribution, the editable install, the command."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tarfile
+import time
+import zipfile
+from pathlib import Path
+
+import pytest
+from command_lines import ROOT, assert_one_sentence, environment
+
+from taichi_ants.commands import COMMANDS
+
+BUILD = """
+import sys
+from hatchling import build
+for kind in ("wheel", "sdist", "editable"):
+    print(getattr(build, f"build_{kind}")(f"{sys.argv[1]}/{kind}"))
+"""
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """The three by their kind."""
+    place = tmp_path_factory.mktemp("built")
+    done = subprocess.run(
+        [sys.executable, "-c", BUILD, str(place)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return {
+        kind: place / kind / name
+        for kind, name in zip(("wheel", "sdist", "editable"), done.stdout.split(), strict=True)
+    }
+
+
+def sources(folder):
+    return {str(path.relative_to(ROOT)) for path in (ROOT / folder).rglob("*.py")}
+
+
+def test_the_wheel_holds_the_package_and_nothing_else(built):
+    with zipfile.ZipFile(built["wheel"]) as wheel:
+        names = [name for name in wheel.namelist() if ".dist-info/" not in name]
+        (entries,) = [name for name in wheel.namelist() if name.endswith("entry_points.txt")]
+        assert "taichi-ants = taichi_ants.commands:main" in wheel.read(entries).decode()
+    assert set(names) == sources("taichi_ants") | {"taichi_ants/py.typed"}
+
+
+def test_the_source_distribution_can_run_the_tests(built):
+    with tarfile.open(built["sdist"]) as archive:
+        names = {name.split("/", 1)[1] for name in archive.getnames()}
+    for folder in ("taichi_ants", "tests", "experiments", "benchmarks"):
+        assert sources(folder) <= names
+    others = ("pyproject.toml", "README.md", "LICENSE", "experiments/maps/garden.txt")
+    assert {*others, "renders/episode.gif", ".ci/run"} <= names
+
+
+def test_an_editable_install_is_a_path(built):
+    """Which type checkers follow; they do not run a finder of modules."""
+    with zipfile.ZipFile(built["editable"]) as wheel:
+        (path,) = [name for name in wheel.namelist() if name.endswith(".pth")]
+        assert wheel.read(path).decode().strip() == str(ROOT)
+        assert not [name for name in wheel.namelist() if name.endswith(".py")]
+
+
+def call(arguments, folder):
+    return subprocess.run(
+        [sys.executable, "-m", "taichi_ants", *arguments],
+        cwd=folder,
+        env=environment(folder),
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+
+
+@pytest.mark.parametrize("arguments", [[], ["--help"], ["-h"]])
+def test_help_lists_the_commands_in_a_line_each(arguments, tmp_path):
+    done = call(arguments, tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    lines = [line.split()[0] for line in done.stdout.splitlines() if line.startswith("  ")]
+    assert lines == list(COMMANDS)
+    files = {path.stem for path in (ROOT / "taichi_ants" / "commands").glob("[a-z]*.py")}
+    assert files == set(COMMANDS)
+    assert max(map(len, done.stdout.splitlines())) < 80
+
+
+def test_help_is_quick(tmp_path):
+    def fastest(command):
+        times = []
+        for _ in range(5):
+            began = time.perf_counter()
+            subprocess.run(command, env=environment(tmp_path), check=True, capture_output=True)
+            times.append(time.perf_counter() - began)
+        return min(times)
+
+    empty = fastest([sys.executable, "-c", ""])
+    assert fastest([sys.executable, "-m", "taichi_ants", "--help"]) - empty < 0.1
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_commands_have_help_of_their_own(name, tmp_path):
+    done = call([name, "--help"], tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith(f"usage: taichi-ants {name} [-h]")
+
+
+def test_an_unknown_command_is_one_sentence(tmp_path):
+    done = call(["comparre"], tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert_one_sentence(done.stderr)
+    for word in ("'comparre'", *COMMANDS):
+        assert word in done.stderr
+
+
+def test_the_version(tmp_path):
+    done = call(["--version"], tmp_path)
+    assert (done.returncode, done.stdout) == (0, "taichi-ants 0.1.0\n")
+
+
+def test_a_command_by_its_name(tmp_path):
+    """What it works with lies in the package: it runs in a folder of its own."""
+    tiny = [
+        *("--seeds", "1", "--episodes", "2", "--max-steps", "30", "--learners", "q_learning"),
+        *("--learning-rates", "0.1", "--discounts", "0.9", "--epsilons", "0.3"),
+        *("--epsilon-decays", "0.9", "--delivery", "absorbing", "--no-render"),
+    ]
+    done = call(["compare", *tiny], tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    (folder,) = Path(tmp_path, "results").iterdir()
+    assert folder.name.startswith("compare-seeds-1-episodes-2-")
+    assert (folder / "figures" / "sensitivity.png").exists()
+    assert '"command": "' in (folder / "manifest.json").read_text()
