@@ -199,12 +199,12 @@ def _check_whole(name: str, value: object, least: int, most: int, otherwise: str
     try:
         if isinstance(value, (bool, np.bool_)):
             raise TypeError
-        operator.index(value)  # type: ignore[arg-type]
+        number = operator.index(value)  # type: ignore[arg-type]
     except TypeError:
         raise AntsError(
             f"{name} is {shown(value)}; it must be a whole number{otherwise}."
         ) from None
-    if not least <= value <= most:
+    if not least <= number <= most:
         raise AntsError(
             f"{name} is {shown(value)}; it must lie between {least} and {most}{otherwise}."
         )

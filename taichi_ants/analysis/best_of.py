@@ -173,7 +173,8 @@ def examples(comparison: Comparison) -> list[tuple[int, int]]:
     """
     cells: list[tuple[int, int]] = []  # of the configurations: row and behaviour
     for setting in comparison.delivery_settings:
-        rows, shown = [], set()
+        rows: list[int] = []
+        shown: set[int] = set()
         for variant in comparison.variants:
             if positions := comparison.positions(setting, variant):
                 rows += positions

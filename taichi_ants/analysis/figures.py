@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -52,7 +52,12 @@ _OUR_CHOICE = (
     "figure 1 shares hyperparameters\ntoo, but does not name them: these are our choice, the only "
     "ones that stand twice in its table 2."
 )
-_OTHERS = {"color": "#C4C4C4", "linewidth": 0.9, "zorder": 1, "label": "the other learners"}
+_OTHERS: dict[str, Any] = {
+    "color": "#C4C4C4",
+    "linewidth": 0.9,
+    "zorder": 1,
+    "label": "the other learners",
+}
 _DASHES = ((0, (2.5, 3)), (0, (1, 2)))
 # Delivery setting and learner -> row of the comparison.
 Shown = dict[tuple[str, Variant], int]
@@ -248,8 +253,11 @@ def _configurations(comparison: Comparison, shown: Shown) -> list[str]:
 
 
 def _blocks(
-    comparison: Comparison, heights: Sequence[float], words: float, sharex: str = "col"
-) -> tuple[Figure, list[tuple[np.ndarray, Sequence[Variant]]]]:
+    comparison: Comparison,
+    heights: Sequence[float],
+    words: float,
+    sharex: Literal["col", "row"] = "col",
+) -> tuple[Figure, list[tuple[np.ndarray, tuple[Variant, ...]]]]:
     """A figure with a column of panels for each learner, in blocks of `_COLUMNS` learners.
 
     Args:
@@ -361,7 +369,8 @@ def _distributions(
         shares = np.cumsum(counts) / len(drawn)
         # From 0 on the left edge to 1 on the right one.
         line = np.concatenate([[-1e9], points, [1e9]]), np.concatenate([[0.0], shares, [1.0]])
-        look = {"color": looks(comparison.variants)[variant][0], "linewidth": 2.0, "zorder": 3}
+        colour = looks(comparison.variants)[variant][0]
+        look: dict[str, Any] = {"color": colour, "linewidth": 2.0, "zorder": 3}
         axis.plot(*line, drawstyle="steps-post", **(look if other == variant else _OTHERS))
 
 

@@ -9,7 +9,7 @@ import io
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -148,7 +148,7 @@ def _table(title: str, columns: Iterable[str], text_columns: int = 1, gap: int =
         title_style="bold",
     )
     for position, column in enumerate(columns):
-        justify = "left" if position < text_columns else "right"
+        justify: Literal["left", "right"] = "left" if position < text_columns else "right"
         least = len("Q-learning") if column == "Learner" else None  # no name breaks within a word
         table.add_column(column, justify=justify, overflow="fold", min_width=least)
     return table
@@ -157,9 +157,10 @@ def _table(title: str, columns: Iterable[str], text_columns: int = 1, gap: int =
 def _table2(comparison: Comparison, lines: Sequence[Mapping], choices: Choices) -> list[Section]:
     """Two tables for each delivery setting, returns and steps, explained after the last."""
     of_paper, late = comparison.in_paper_world, comparison.late
-    headers = ("Learner", "Return\npaper", "mean", "IQM", "best run", "below")
+    headers: tuple[str, ...] = ("Learner", "Return\npaper", "mean", "IQM", "best run", "below")
     headers += ("Food\npaper", "mean")
-    steps_headers = ("Learner", "Steps\npaper", "all\nmean", "IQM", f"{late}\nmean", "IQM")
+    steps_headers: tuple[str, ...] = ("Learner", "Steps\npaper", "all\nmean", "IQM")
+    steps_headers += (f"{late}\nmean", "IQM")
     if not of_paper:
         headers = ("Learner", "Return\nmean", "IQM", "best run", "Deliveries")
         steps_headers = tuple(name for name in steps_headers if "paper" not in name)
@@ -403,7 +404,9 @@ def _untested(findings: Sequence[Finding]) -> list[str]:
 
 def _verdict(finding: Finding) -> str:
     text = finding.verdict.value + (" ~" if finding.note == WITHIN_MARGIN else "")
-    return f"{text}\nmean: {finding.by_mean.verdict.value}" if finding.disagrees else text
+    if finding.by_mean is not None and finding.disagrees:
+        text += f"\nmean: {finding.by_mean.verdict.value}"
+    return text
 
 
 def _no_claims() -> Section:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -131,8 +131,9 @@ def _draw(
     colour, marker, filled = look
     small = interquartile_mean(pairs)
     inside = np.clip(small, *limits) == small
-    style = {"color": colour, "linestyle": "none", "alpha": 0.45, "markeredgewidth": 0}
-    axis.plot(small[inside], np.full(inside.sum(), height), ".", markersize=5, **style)
+    faint: dict[str, Any] = {"linestyle": "none", "alpha": 0.45, "markeredgewidth": 0}
+    heights = np.full(inside.sum(), height)
+    axis.plot(small[inside], heights, ".", markersize=5, color=colour, **faint)
     seeds = pairs.mean(axis=0)[None]
     centre = float(interquartile_mean(seeds)[0])
     interval = np.concatenate(bootstrap_interval(seeds, iqm=True))  # nan for one seed
@@ -165,7 +166,7 @@ def _settings(settings: Sequence[str]) -> dict[str, Artist]:
     """The legend of the delivery settings: filled marks for the first, open ones for others."""
     from matplotlib.lines import Line2D
 
-    look = {"color": GREY, "marker": "o", "linestyle": "none"}
+    look: dict[str, Any] = {"color": GREY, "marker": "o", "linestyle": "none"}
     return {
         f"{setting} delivery": Line2D([], [], **look, markerfacecolor="white" if place else GREY)
         for place, setting in enumerate(settings)

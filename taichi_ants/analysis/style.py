@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from taichi_ants.results import write_atomically
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.axis import Axis
+    from matplotlib.axis import XAxis, YAxis
     from matplotlib.figure import Figure
 
 # 9 inches are about 900 pixels where a README shows the figure; twice that for sharp screens.
@@ -39,7 +39,7 @@ _MORE_MARKERS = ("v", "P", "X", "h")
 # By their places in `behaviour.BEHAVIOURS`.
 BEHAVIOUR_LOOKS = ((BLUE, "o"), (ORANGE, "^"), (WINE, "s"), (INK, "x"))
 
-_SETTINGS = {
+_SETTINGS: dict[Any, Any] = {
     "font.size": 9,
     "axes.titlesize": 10,
     "axes.titleweight": "bold",
@@ -96,10 +96,10 @@ def styled() -> AbstractContextManager:
 def new_figure(height: float) -> Figure:
     """An empty figure of full width and the height in inches, outside of any global state."""
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    figure = Figure(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
-    figure.get_layout_engine().set(w_pad=0.06, h_pad=0.05, wspace=0.03, hspace=0.03)
-    return figure
+    layout = ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.05, wspace=0.03, hspace=0.03)
+    return Figure(figsize=(WIDTH, height), dpi=DPI, layout=layout)
 
 
 def frame(figure: Figure, title: str, caption: str, entries: Mapping[str, Artist]) -> None:
@@ -137,7 +137,7 @@ def _columns(labels: Sequence[str]) -> int:
     return 1
 
 
-def logarithmic(axis: Axis, steps: Sequence[float]) -> None:
+def logarithmic(axis: XAxis | YAxis, steps: Sequence[float]) -> None:
     """Make an x- or y-axis logarithmic, with plain numbers at steps (1 to 9) of each decade."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 

@@ -124,8 +124,8 @@ def nearer_steps(lines: Sequence[Mapping]) -> str:
 
 def _best_run(comparison: Comparison, delivery: str, variant: Variant, draws: int) -> dict:
     best = best_of(comparison, delivery, variant, draws)
-    columns = {"best_run_of": best.configurations if best else 0}
-    drawn = (None,) * len(FIGURES)
+    columns: dict[str, float] = {"best_run_of": best.configurations if best else 0}
+    drawn: tuple[np.ndarray | None, ...] = (None,) * len(FIGURES)
     if best:
         drawn = (best.returns, best.steps, best.steps_last50, best.deliveries)
     paper = _paper(comparison, variant)

@@ -78,7 +78,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
         metavar="N",
         help="one or more, for learners that plan",
     )
-    switch = {"choices": ("on", "off"), "metavar": "on|off"}
+    switch: dict[str, Any] = {"choices": ("on", "off"), "metavar": "on|off"}
     words = "evaporation of trails in training; off in the paper"
     add("--train-evaporation", default="off", help=words, **switch)
     words = "evaporation in the greedy evaluation; on in the paper"
@@ -261,7 +261,7 @@ def write_episodes(folder: Path, comparison: Comparison) -> None:
     """Write what each episode and rollout gave, and what each policy does, as in summary.csv."""
     from taichi_ants import results
 
-    names = ("returns", "steps", "deliveries", "greedy_returns", "greedy_steps")
+    names: tuple[str, ...] = ("returns", "steps", "deliveries", "greedy_returns", "greedy_steps")
     names += ("greedy_deliveries", "behaviours", "policy_returns")
     arrays = {name: getattr(comparison, name) for name in names}
     results.write_npz(

@@ -155,7 +155,9 @@ class Colony:
         self.arrays = colony_memory.allocate(
             self.layout, config, self.training, words, sharing, plans, chunks
         )
-        self.one_a_slot = sharing == "own" or (sharing == "fixed" and np.ndim(table) == 4)
+        self.one_a_slot = sharing == "own" or (
+            sharing == "fixed" and table is not None and table.ndim == 4
+        )
         tables = colony_memory.allocate_tables(
             len(self.seeds), config.slots, self.one_a_slot, table
         )

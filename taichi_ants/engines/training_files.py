@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -49,13 +49,14 @@ def load_training(cls: type[TrainingResult], path: results.PathLike) -> Training
         costs = tuple(LearnerCost(**cost) for cost in facts["costs"])
         for cost in costs:
             checked_count("steps", cost.steps, most=2**63 - 1, least=0)
+        outcomes: dict[str, Any] = {name: np.ascontiguousarray(stored[name]) for name in _OUTCOMES}
         return cls(
             world=world_from(stored, "world", facts["world"]),
             configs=tuple(TrainingConfig(**config) for config in facts["configs"]),
             seeds=checked_seeds(facts["seeds"]),
             max_steps=checked_max_steps(facts["max_steps"]),
             evaporation=facts["evaporation"],
-            **{name: np.ascontiguousarray(stored[name]) for name in _OUTCOMES},
+            **outcomes,
             costs=costs,
             state=RunState(
                 **{

@@ -97,7 +97,7 @@ def _fault(td_error: Callable[..., object]) -> str:
     f32 = ti.types.ndarray(dtype=ti.f32, ndim=1)
 
     @ti.kernel
-    def try_updates(q: f32, updates: ti.i32):
+    def try_updates(q: f32, updates: ti.i32):  # type: ignore[no-untyped-def, valid-type]
         ti.loop_config(serialize=True)
         for i in range(updates):
             pair, reward, ended = (

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import dis
 import inspect
-from collections.abc import Callable
 from dataclasses import dataclass
 from types import FunctionType
+from typing import Any
 
 from taichi_ants.errors import AntsError
 
@@ -37,7 +37,7 @@ class Learner:
     """
 
     name: str
-    td_error: Callable[..., object]
+    td_error: Any
     draws_next_action: bool = False
     plans: bool = False
     summary: str = ""

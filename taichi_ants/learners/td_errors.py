@@ -4,6 +4,7 @@ import functools
 import operator
 from collections.abc import Callable
 from types import FunctionType
+from typing import Any
 
 import taichi as ti
 from taichi.lang.expr import Expr
@@ -38,7 +39,7 @@ def guarded(learner: Learner) -> Callable[..., object]:
     return td_error
 
 
-def _runs_while_compiling(function: Callable[..., object]) -> Callable[..., object]:
+def _runs_while_compiling(function: Any) -> Callable[..., object]:
     """Mark a Python function that is meant to be called in Taichi's scope, on expressions."""
     function._is_taichi_function = False  # to have it at all is what Taichi asks for
     return function
@@ -62,11 +63,11 @@ def _as_f32(result: object) -> object:
 
 
 @ti.func
-def _entry(vector: ti.template(), i: ti.template()):
+def _entry(vector: ti.template(), i: ti.template()):  # type: ignore[no-untyped-def, valid-type]
     return vector[i]
 
 
-def _entries(values: object) -> list:
+def _entries(values: Any) -> list:
     """What max, min or sum is asked about: the entries of a vector, or of a tuple or list."""
     if isinstance(values, Expr) and values.is_tensor():
         return [_entry(values, i) for i in range(values.get_shape()[0])]

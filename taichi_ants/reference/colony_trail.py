@@ -45,7 +45,7 @@ class IntegerTrail:
         level = self._pheromone.level
         if self._pheromone.deposit == "set":
             self._until[cell] = self._clock + level
-        elif self._pheromone.deposit == "add":
+        elif self._pheromone.cap is not None:  # of "add" only
             added = min(self.level(cell) + level, self._pheromone.cap)
             self._until[cell] = self._clock + added
 

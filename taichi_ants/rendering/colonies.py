@@ -85,7 +85,7 @@ def render_colony(
     """Write what `colony_frames` draws as an animation; path, fps and errors: `render_episode`."""
     check_animation(path, fps)
     every, ticks = whole("every", every), whole("ticks", ticks)
-    look = {"hud": hud, "legend": legend, "title": title, "full_level": full_level}
+    look: dict[str, Any] = {"hud": hud, "legend": legend, "title": title, "full_level": full_level}
     frames = colony_frames(colony, ticks, size, every=every, world=world, **look)
     save_animation(path, with_pause(frames, 1 + -(-ticks // every), fps, progress), fps)
 

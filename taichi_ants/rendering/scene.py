@@ -76,7 +76,7 @@ class Scene:
         expect("grid", grid, AxialGrid)
         width, height = self.size = check_size(size)
         expect("title", title, str)
-        if not isinstance(full_level, Real) or not 0 < full_level < math.inf:
+        if not isinstance(full_level, (float, Real)) or not 0 < full_level < math.inf:
             raise AntsError(f"full_level is {shown(full_level)}; it must be a number above 0.")
         self._text_size = round(min(width, height) / 38)
         readable = self._text_size >= text.SMALLEST

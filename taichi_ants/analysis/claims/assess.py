@@ -22,7 +22,7 @@ from taichi_ants.analysis.statistics import cautious_interval, interquartile_mea
 
 SIMULTANEOUS_LEVEL = 0.95
 OTHER_WORLD = "the claims are about the paper's world"
-_BY_OBJECTION = [verdict for verdict in Verdict if verdict is not Verdict.NOT_TESTED]
+_BY_OBJECTION: list[Verdict] = [verdict for verdict in Verdict if verdict is not Verdict.NOT_TESTED]
 
 
 def assess(comparison: Comparison, claims: Sequence[Claim] = CLAIMS) -> list[Finding]:

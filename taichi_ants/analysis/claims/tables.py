@@ -148,7 +148,9 @@ def _cell(finding: Finding) -> str:
     if finding.verdict is Verdict.NOT_TESTED:
         return verdict_text(finding)
     text = f"**{verdict_text(finding)}** {effect_text(finding)}, {finding.contrast}"
-    return f"{text}; by mean: {_cell(finding.by_mean)}" if finding.disagrees else text
+    if finding.by_mean is not None and finding.disagrees:
+        text += f"; by mean: {_cell(finding.by_mean)}"
+    return text
 
 
 def _precise(finding: Finding) -> str:

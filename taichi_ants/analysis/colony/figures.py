@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -154,7 +154,7 @@ def _by_way(
     study: ColonyStudy, measures: dict[str, str], title: str, caption: str, limits: bool = False
 ) -> Figure:
     """A row of panels for each measure, a line for each way, trails evaporating."""
-    share = False if limits else "row"  # limits already set the scale
+    share: Literal["row"] | bool = False if limits else "row"  # limits already set the scale
     with styled():
         figure = new_figure(5.6)
         axes = figure.subplots(
@@ -240,14 +240,14 @@ def _errorbar(
     low: np.ndarray,
     high: np.ndarray,
     place: float,
-    style: dict[str, str],
+    style: dict[str, Any],
 ) -> None:
     at = np.array(sizes) * 10 ** (place * _SPREAD)
     for beyond, edge, arrow in ((np.isinf(high), 1.0, "^"), (means <= 0, 0.0, "v")):
         if axis.get_yscale() == "log" and beyond.any():  # an arrow at the edge of the panel
             edges = np.full(beyond.sum(), edge)
-            look = {"color": style["color"], "transform": axis.get_xaxis_transform()}
-            axis.plot(at[beyond], edges, arrow, ms=5, clip_on=False, **look)
+            across, colour = axis.get_xaxis_transform(), style["color"]
+            axis.plot(at[beyond], edges, arrow, ms=5, clip_on=False, color=colour, transform=across)
     below, above = (np.nan_to_num(np.abs(end - means), posinf=0.0) for end in (low, high))
     axis.errorbar(
         at,
