@@ -402,7 +402,7 @@ def show_finished(settings: argparse.Namespace, sweep: Sweep, folder: ResultFold
     from taichi_ants import results
 
     folder.check_whole(apart_from=(FIGURES, RENDERS))
-    if sys.stdout.isatty():  # as wide as it is now
+    if sys.stdout is not None and sys.stdout.isatty():  # as wide as it is now
         show_report(settings, sweep)
     else:
         print(results.read_text(settings.out / REPORT))

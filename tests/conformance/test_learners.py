@@ -65,7 +65,7 @@ def config_for(name, delivery="absorbing", **changes):
 
 def test_the_registry_lists_them():
     assert {"q_learning", "sarsa", "expected_sarsa", "dyna_q"} < set(NAMES)
-    assert learners.names() == NAMES
+    assert set(NAMES) <= set(learners.names())
     assert learners.get("clipped_sarsa") is CLIPPED
 
 
@@ -153,10 +153,11 @@ def plain_function(value, reward, discount, next_values, next_action, epsilon):
     ],
 )
 def test_what_cannot_be_registered(learner, says):
+    before = learners.names()
     with pytest.raises(AntsError) as caught:
         learners.register(learner)
     assert says in str(caught.value)
-    assert learners.names() == NAMES
+    assert learners.names() == before
 
 
 def test_an_unknown_name_is_answered_with_the_known_ones():

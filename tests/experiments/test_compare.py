@@ -430,7 +430,7 @@ def test_files_of_ones_own_stay_when_pictures_are_drawn_again(copy, compare):
     assert [path.read_text() for path in own] == ["mine", "mine"]
 
 
-@pytest.mark.parametrize("name", ["summary.csv", "episodes.npz", "policies/sarsa.npz"])
+@pytest.mark.parametrize("name", ["summary.csv", "episodes.npz", POLICY])
 def test_altered_results_are_not_shown_as_if_whole(name, copy, compare):
     content = bytearray((copy / name).read_bytes())
     content[len(content) // 2] ^= 1
