@@ -393,7 +393,9 @@ def _claims(findings: Sequence[Finding]) -> Section:
 def _untested(findings: Sequence[Finding]) -> list[str]:
     """Why claims were not tested, the three most frequent reasons and a count of the others."""
     reasons = Counter(f.note for f in findings if f.verdict is Verdict.NOT_TESTED)
-    notes = [f"not tested ({times}): {reason}" for reason, times in reasons.most_common(3)]
+    settings = {finding.delivery for finding in findings}
+    notes = ["Why not tested, both settings together:"] if reasons and len(settings) > 1 else []
+    notes += [f"not tested ({times}): {reason}" for reason, times in reasons.most_common(3)]
     others = [times for _, times in reasons.most_common()[3:]]
     if others:
         notes.append(

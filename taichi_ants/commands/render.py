@@ -81,8 +81,20 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add = parser.add_argument
     add("--show", choices=tuple(DEFAULT_OUT), default="episode", help="what to show")
     add("--world", help="paper, open, or the path of a map file (default: paper, of a colony open)")
-    add("--world-seed", type=whole_number(), default=0, help="seed of a world drawn at random")
-    add("--seed", type=whole_number(), default=0, help="seed of training and of the episode")
+    add(
+        "--world-seed",
+        type=whole_number(),
+        default=0,
+        metavar="N",
+        help="seed of a world drawn at random",
+    )
+    add(
+        "--seed",
+        type=whole_number(),
+        default=0,
+        metavar="N",
+        help="seed of training and of the episode",
+    )
     add("--plugin", metavar="FILE", help="a Python file that registers learners or worlds")
     _add_policy(parser)
     _add_episode(parser)
@@ -106,7 +118,7 @@ def _refuse_what_changes_nothing(
         counts = _WHERE_IT_COUNTS.get(name, {shown})
         if shown not in counts:
             places = ", ".join(sorted(counts))
-            parser.error(f"{flag} changes nothing in {shown}, but in {places}; leave it out")
+            parser.error(f"{flag} changes nothing in {shown}; leave it out (it is for {places})")
         if name in _OF_TRAINING and settings.policy:
             parser.error(f"{flag} is for training, but --policy is given; leave out one of the two")
 
@@ -157,7 +169,13 @@ def _add_episode(parser: argparse.ArgumentParser) -> None:
         "--epsilon", type=number, default=0.0, metavar="X", help="probability of a random action"
     )
     add = group.add_argument
-    add("--number", type=whole_number(0), default=0, help="which of the seed's rollouts")
+    add(
+        "--number",
+        type=whole_number(0),
+        default=0,
+        metavar="N",
+        help="which of the seed's rollouts",
+    )
     add(
         "--max-steps",
         type=whole_number(1, 100_000),

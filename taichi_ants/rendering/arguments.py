@@ -6,7 +6,7 @@ import os
 
 import numpy as np
 
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, shown
 
 
 def expect(name: str, value: object, *kinds: type) -> None:
@@ -16,16 +16,12 @@ def expect(name: str, value: object, *kinds: type) -> None:
         AntsError: It is not; the message names it and says what it must be.
     """
     if not isinstance(value, kinds):
-        words = " or ".join(_NAMES.get(kind, f"a {kind.__name__}") for kind in kinds)
+        words = " or ".join(_NAMES.get(kind) or _with_article(kind.__name__) for kind in kinds)
         raise AntsError(f"{name} is {shown(value)}; it must be {words}.")
 
 
-def shown(value: object) -> str:
-    """A value in a message: arrays by their type and shape, other long ones by their beginning."""
-    if isinstance(value, np.ndarray):
-        return f"an array of {value.dtype} {value.shape}"
-    words = repr(value)
-    return words if len(words) <= 60 else f"{words[:57]}..."
+def _with_article(noun: str) -> str:
+    return f"{'an' if noun[0] in 'AEIOU' else 'a'} {noun}"
 
 
 _NAMES = {str: "text", type(None): "None", np.ndarray: "an array", os.PathLike: "a path"}

@@ -51,8 +51,7 @@ def colony_frames(
         AntsError: `every` or `ticks` is below 1, or the size is not allowed.
     """
     grid = _grid_of(colony, world)
-    if whole("every", every) < 1 or whole("ticks", ticks) < 1:
-        raise AntsError(f"every is {every} and ticks {ticks}; both must be at least 1.")
+    every, ticks = _checked_ticks(every, ticks)
     scene = Scene(grid, size, hud=hud, legend=legend, title=title, full_level=full_level)
     yield _drawn(scene, colony, world)
     for done in range(0, ticks, every):
@@ -84,10 +83,17 @@ def render_colony(
 ) -> None:
     """Write what `colony_frames` draws as an animation; path, fps and errors: `render_episode`."""
     check_animation(path, fps)
-    every, ticks = whole("every", every), whole("ticks", ticks)
+    every, ticks = _checked_ticks(every, ticks)
     look: dict[str, Any] = {"hud": hud, "legend": legend, "title": title, "full_level": full_level}
     frames = colony_frames(colony, ticks, size, every=every, world=world, **look)
     save_animation(path, with_pause(frames, 1 + -(-ticks // every), fps, progress), fps)
+
+
+def _checked_ticks(every: int, ticks: int) -> tuple[int, int]:
+    """Ticks from one picture to the next, and in all."""
+    if whole("every", every) < 1 or whole("ticks", ticks) < 1:
+        raise AntsError(f"every is {every} and ticks {ticks}; both must be at least 1.")
+    return int(every), int(ticks)
 
 
 def _grid_of(colony: Colony, world: int) -> AxialGrid:

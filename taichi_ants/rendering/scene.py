@@ -8,10 +8,10 @@ from numbers import Real
 import numpy as np
 
 from taichi_ants.constants import DEPOSIT_LEVEL, FOOD, QUEEN
-from taichi_ants.errors import AntsError, checked_flag
+from taichi_ants.errors import AntsError, checked_flag, shown
 from taichi_ants.hexgrid import AxialGrid
 from taichi_ants.rendering import colours, panel, text
-from taichi_ants.rendering.arguments import expect, shown
+from taichi_ants.rendering.arguments import expect
 from taichi_ants.rendering.panel import Status
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.rendering.snapshot import Snapshot

@@ -25,11 +25,11 @@ from taichi_ants.constants import (
     SEES_LURE,
     SEES_OBSTACLE,
 )
-from taichi_ants.errors import AntsError, checked_flag
+from taichi_ants.errors import AntsError, checked_flag, shown
 from taichi_ants.hexgrid import AxialGrid
 from taichi_ants.randomness import whole
 from taichi_ants.rendering import colours, text
-from taichi_ants.rendering.arguments import expect, shown
+from taichi_ants.rendering.arguments import expect
 from taichi_ants.rendering.panel import fill
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.rendering.scene import write_letter

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_ants import hexgrid
+from taichi_ants.errors import AntsError, shown
 from taichi_ants.hexgrid import AxialGrid
 from taichi_ants.rendering.arguments import expect
 
@@ -66,8 +67,16 @@ class Viewport:
         """The cells, normal forms int64 (..., 3), at pixel coordinates (..., 2).
 
         They may lie outside the world; see `AxialGrid.contains`.
+
+        Raises:
+            AntsError: They are no such coordinates.
         """
-        return hexgrid.cell_at(np.asarray(pixels) - np.array(self.origin), self.hexagon)
+        places = np.asarray(pixels)
+        if places.dtype.kind not in "iuf" or places.shape[-1:] != (2,):
+            raise AntsError(
+                f"pixels is {shown(pixels)}; give coordinates (x, y), or an array of them."
+            )
+        return hexgrid.cell_at(places - np.array(self.origin), self.hexagon)
 
     def index_at(self, grid: AxialGrid, pixels: object) -> np.ndarray:
         """Flat indices, int32 (...), of the world's cells at pixel coordinates (..., 2).

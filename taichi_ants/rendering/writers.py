@@ -15,9 +15,9 @@ from typing import BinaryIO
 import numpy as np
 
 from taichi_ants import results
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, shown
 from taichi_ants.rendering import animated_files
-from taichi_ants.rendering.arguments import expect, shown
+from taichi_ants.rendering.arguments import expect
 
 PathLike = str | os.PathLike[str]
 

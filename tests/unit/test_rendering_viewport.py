@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from taichi_ants.errors import AntsError
 from taichi_ants.hexgrid import AxialGrid
 from taichi_ants.rendering import Viewport
 from taichi_ants.rendering.rasteriser import Rasteriser
@@ -94,3 +95,9 @@ def test_the_picture_agrees_with_the_mapping(ranges, size) -> None:
     assert share_that_agrees(frame[::-1]) < 0.6
     assert share_that_agrees(frame[:, ::-1]) < 0.6
     assert share_that_agrees(frame[::-1, ::-1]) < 0.6
+
+
+@pytest.mark.parametrize("pixels", ["x", (1,), None, [["a", "b"]]])
+def test_what_are_no_coordinates_is_refused(pixels):
+    with pytest.raises(AntsError, match=r"pixels is .*give coordinates"):
+        Viewport.fit(AxialGrid((4, 4, 4)), 0, 0, 90, 90).cell_at(pixels)
