@@ -126,12 +126,12 @@ WRONG = {
     "policy": (["--policy", "nope.npz", "--out", "{}/a.gif"], "nope.npz"),
     "policy and learning": (
         ["--show", "learning", "--policy", "a.npz"],
-        "--policy changes nothing in learning; leave it out (it is for a colony, a sheet, a still colony",
+        "--policy changes nothing in learning; leave it out (it is for a colony, a",
     ),
     "episodes of learning": (["--show", "learning", "--episodes", "500"], "--episodes changes"),
     "step of a GIF": (
         ["--step", "3"],
-        "--step changes nothing in an episode; leave it out (it is for a still colony, a still episode; leave",
+        "--step changes nothing in an episode; leave it out (it is for a still colony, a",
     ),
     "states of an episode": (["--all-states"], "--all-states changes nothing in an episode"),
     "world seed of the paper": (

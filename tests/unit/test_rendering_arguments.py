@@ -148,3 +148,9 @@ def test_a_snapshot_of_another_grid_is_refused() -> None:
 
     with pytest.raises(AntsError, match="ranges"):
         Scene(WORLD.grid).draw(Snapshot.at_start(open_world(1)), Status(0))
+
+
+def test_pictures_are_at_least_a_tick_apart():
+    for wrong in (0, -3):
+        with pytest.raises(AntsError, match=f"every is {wrong}"):
+            rendering.render_colony("a.gif", colony(), 3, every=wrong)
