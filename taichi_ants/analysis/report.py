@@ -76,6 +76,7 @@ def print_report(
 
     console = Console(file=file, highlight=False, markup=False)
     if console.is_terminal:
+        console.width = max(console.width, WIDTH)  # a narrower one breaks lines, but no number
         _print(console, comparison, lines, findings, baselines, costs)
     else:
         print(render(comparison, lines, findings, baselines, costs), end="", file=file)

@@ -165,11 +165,12 @@ def test_means_that_no_run_has_are_marked(comparison: Comparison, text: str) -> 
     assert marked.count("\n+ the runs do different things, and no run has their mean") == 2
 
 
-def test_a_terminal_gets_colours(comparison: Comparison, monkeypatch: pytest.MonkeyPatch) -> None:
-    class Terminal(io.StringIO):
-        def isatty(self) -> bool:
-            return True
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
 
+
+def test_a_terminal_gets_colours(comparison: Comparison, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("NO_COLOR", "FORCE_COLOR", "TTY_COMPATIBLE"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("TERM", "xterm-256color")
@@ -180,6 +181,16 @@ def test_a_terminal_gets_colours(comparison: Comparison, monkeypatch: pytest.Mon
     assert CLAIMS[0].statement.removesuffix(".") in terminal.getvalue()
     assert "\x1b[32msupported" in terminal.getvalue()
     assert "\x1b[31mcontradicted" in terminal.getvalue()
+
+
+def test_a_narrow_terminal_breaks_no_number(
+    comparison: Comparison, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "50")
+    monkeypatch.setenv("NO_COLOR", "1")
+    terminal = Terminal()
+    print_report(comparison, table2(comparison, 50), assess(comparison), file=terminal)
+    assert max(map(len, terminal.getvalue().splitlines())) >= WIDTH - 5
 
 
 def test_what_is_no_terminal_gets_the_plain_text(comparison: Comparison) -> None:
