@@ -1,8 +1,8 @@
 """What an ant does that follows its final policy: deliver, or collect small rewards without end.
 
 The step onto a trail (T), and with food the step nearer to the queen (S), are paid. A policy can
-live on them: walk to and fro on the trail, or carry the food in a circle beside the queen and come
-nearer to her again and again. Returns of such runs and of runs that deliver have no common mean
+live on them: walk to and fro on the trail, or carry the food in a circle, often beside the queen,
+and come nearer to her again and again. Returns of such runs and of runs that deliver have no common mean
 that means anything, so that runs are counted by what they do.
 """
 
@@ -13,13 +13,12 @@ from typing import Protocol
 import numpy as np
 
 from taichi_ants.constants import N_STATES, RIGHT, SEES_LURE
-from taichi_ants.worlds.world import World
 
 # What an ant does is a number, its place in this list.
 BEHAVIOURS: tuple[str, ...] = (
     "delivers",
     "walks the trail",
-    "circles beside the queen",
+    "circles with food",
     "other",
 )
 DELIVERS, WALKS, CIRCLES, OTHER = range(len(BEHAVIOURS))
@@ -30,12 +29,10 @@ NAMES: tuple[str, ...] = tuple(name.replace(" ", "_") for name in BEHAVIOURS)  #
 DEFINITIONS: tuple[str, ...] = (
     "the episode ends with a delivery",
     "without food, at least every fourth step leads onto a trail",
-    "with food, at most 3 cells from her, at least every fourth step leads nearer",
+    "with food, at least every fourth step leads nearer to the queen",
     "none of these",
 )
 _PAID_SHARE = 0.25
-_BESIDE = 3  # a circle of six cells that touches the queen reaches that far
-
 
 # What to say of means over runs that are not alike.
 MIXED = "the runs do different things, and no run has their mean"
@@ -45,7 +42,7 @@ class Steps(Protocol):
     """Steps of one or more episodes in order, as `taichi_ants.rollout` and `trace_policies` give.
 
     Arrays (n,): the number of the episode, the step in it, the state before the action, the action,
-    the reward, whether the step delivered; and cells (n, 3), where the ant stood.
+    the reward, whether the step delivered.
     """
 
     @property
@@ -60,17 +57,14 @@ class Steps(Protocol):
     def rewards(self) -> np.ndarray: ...
     @property
     def delivered(self) -> np.ndarray: ...
-    @property
-    def cells(self) -> np.ndarray: ...
 
 
-def classify(world: World, trace: Steps, max_steps: int) -> tuple[np.ndarray, np.ndarray]:
+def classify(trace: Steps, max_steps: int) -> tuple[np.ndarray, np.ndarray]:
     """What the ant does in each episode of a trace, see `DEFINITIONS`, and what it earns.
 
     Rewards play no part in it, so it holds whatever the steps are paid.
 
     Args:
-        world: The world of the episodes.
         trace: The steps of m episodes; an episode without delivery uses all of its steps.
         max_steps: The step limit of an episode.
 
@@ -85,11 +79,9 @@ def classify(world: World, trace: Steps, max_steps: int) -> tuple[np.ndarray, np
 
     carries = trace.states >= N_STATES // 2
     paid = late & _enters_lure(trace.states, trace.actions)
-    distance = world.distances()[world.grid.index(trace.cells)]
     steps, with_food = count(late), count(late & carries)
     often = count(paid) >= _PAID_SHARE * steps
-    nearby = count(late & (distance > _BESIDE)) == 0
-    walks, circles = often & (with_food == 0), often & (with_food == steps) & nearby
+    walks, circles = often & (with_food == 0), often & (with_food == steps)
     delivers = count(trace.delivered) > 0
     behaviours = np.select([delivers, walks, circles], [DELIVERS, WALKS, CIRCLES], OTHER)
     returns = np.bincount(episode, weights=trace.rewards).astype(np.int64)

@@ -224,7 +224,7 @@ def what_policies_do(sweep: Sweep, q_values: Any) -> tuple[Any, Any]:
     tables = q_values.reshape(-1, *q_values.shape[2:])
     max_steps = min(sweep.max_steps, MAX_ROLLOUT_STEPS)
     pieces = [
-        classify(sweep.world, trace, max_steps)
+        classify(trace, max_steps)
         for trace in trace_policies(
             sweep.world, tables, sweep.seeds * runs[0], max_steps, sweep.train_evaporation
         )

@@ -349,7 +349,7 @@ def noted_stages(settings: argparse.Namespace, world: World) -> list[Stage]:
         )
     noted = []
     for stage in stages:
-        (number,), _ = classify(world, stage.episode.trace, settings.max_steps)
+        (number,), _ = classify(stage.episode.trace, settings.max_steps)
         behaviour = BEHAVIOURS[number]
         noted.append(replace(stage, note=_IN_WORDS.get(behaviour, behaviour)))
     return noted

@@ -50,7 +50,7 @@ for measure in (
     if not measure.startswith(("deliveries", "greedy_deliveries")):
         COLUMNS += [f"{measure}_{name}" for name in ("iqm", "iqm_ci_low", "iqm_ci_high")]
 COLUMNS += [
-    f"runs_{name}" for name in ("delivers", "walks_the_trail", "circles_beside_the_queen", "other")
+    f"runs_{name}" for name in ("delivers", "walks_the_trail", "circles_with_food", "other")
 ]
 FIGURES = {
     *("figures/best_runs.png", "figures/learning_curves.png"),

@@ -287,14 +287,14 @@ def test_an_ant_that_circles_earns_more_than_a_delivery_and_the_picture_says_why
     arguments = render.parse_arguments(gallery.GALLERY["learning.gif"])
     stages = render.noted_stages(arguments, paper())
     assert [stage.note for stage in stages] == [
-        *("", "circles beside the queen", "delivered", "delivered"),
+        *("", "circles with food", "delivered", "delivered"),
     ]
     returns = [int(stage.episode.trace.rewards.sum()) for stage in stages]
     assert returns[1] == 57 > returns[3] == 45
     lines = []
     monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
     list(learning_frames(stages, arguments.size))
-    assert "return 57: circles beside the queen" in lines
+    assert "return 57: circles with food" in lines
     assert "= T 16 + S 38 + F 3" in lines
     assert "= T 16 + S 16 + F 3 + Q 10" in lines
     assert "S nearer to the queen, with food +1" in lines  # the legend

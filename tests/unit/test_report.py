@@ -143,9 +143,9 @@ def test_it_counts_what_the_ants_do(comparison: Comparison) -> None:
     first, rest = f"{trained[:4].mean():.1f}", f"{trained[4:].mean():.1f}"
     assert delivers == ["Dyna-Q", "(p5)", "+", "delivers", "4", first, "45.0", "45.0", "241"]
     assert walks == ["walks", "the", "trail", "0", "-", "-", "-", "3"]
-    assert circles[4:] == ["12", rest, "220.0", "45.0", "12"]
+    assert circles[3:] == ["12", rest, "220.0", "45.0", "12"]
     assert row(absorbing, "SARSA")[1:3] == ["delivers", "16"]
-    assert "circles beside the queen: with food, at most 3 cells from her" in text
+    assert "circles with food: with food, at least every fourth step leads nearer" in text
     assert "other:" not in text  # nobody does
     continuing = section(text, "What the ants do, continuing")
     assert [line.split()[-1] for line in continuing.splitlines()[-4:]] == ["256"] * 4

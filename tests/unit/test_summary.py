@@ -59,7 +59,7 @@ def test_a_line_by_hand() -> None:
     assert runs == {
         "runs_delivers": 2,
         "runs_walks_the_trail": 0,
-        "runs_circles_beside_the_queen": 1,
+        "runs_circles_with_food": 1,
         "runs_other": 0,
     }
 
@@ -110,7 +110,7 @@ def test_runs_that_act_alike_have_means_of_their_own() -> None:
         "epsilon": 0.3,
         "epsilon_decay": 0.995,
         "delivery": "absorbing",
-        "behaviour": "circles beside the queen",
+        "behaviour": "circles with food",
         "runs": 2,
         "return_last50_mean": 155.0,
         "policy_return_mean": 215.0,

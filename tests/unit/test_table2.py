@@ -254,10 +254,10 @@ def test_means_of_runs_that_do_different_things_are_marked(comparison: Compariso
     lines = table2(some_circle(comparison), draws=10)
     mixed = [line for line in lines if line["same_behaviours"]]
     assert [(line["planning_steps"], line["delivery"]) for line in mixed] == [(3, "absorbing")]
-    assert mixed[0]["same_behaviours"] == "delivers 5, circles beside the queen 3"
+    assert mixed[0]["same_behaviours"] == "delivers 5, circles with food 3"
     text = table2_markdown(lines, comparison)
     assert f"Here {MIXED}" in text
-    assert "Dyna-Q (p3), absorbing: delivers 5, circles beside the queen 3\n" in text
+    assert "Dyna-Q (p3), absorbing: delivers 5, circles with food 3\n" in text
     assert MIXED not in table2_markdown(table2(comparison, draws=10), comparison)
 
 
