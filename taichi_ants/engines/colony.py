@@ -402,7 +402,8 @@ class Colony:
             self._learner, self.sharing, self.one_a_slot, dense, self._lively, what
         )
         numbers = Settings(**self._numbers())
-        kernel(tick, n, *numbers, *Arrays(**self.arrays))
+        with runtime.quiet():
+            kernel(tick, n, *numbers, *Arrays(**self.arrays))
 
     def _numbers(self) -> dict[str, int | float]:
         config, pheromone = self.config, self.config.pheromone
