@@ -102,6 +102,26 @@ def holds_data() -> bool:
     )
 
 
+@contextlib.contextmanager
+def quiet() -> Iterator[None]:
+    """Leave out Taichi's warnings while a kernel of ours compiles, whatever the caller has set.
+
+    Numbers are narrowed there on purpose; a Taichi that the caller has started warns of each.
+    """
+    from taichi._lib import core
+
+    levels = ("trace", "debug", "info", "warn")
+    before = next((level for level in levels if core.logging_effective(level)), None)
+    if before is None:  # quieter already
+        yield
+        return
+    core.set_logging_level("error")
+    try:
+        yield
+    finally:
+        core.set_logging_level(before)
+
+
 def _checked_threads(threads: int) -> int:
     threads = whole("threads", threads)
     if not 1 <= threads <= MAX_THREADS:
@@ -126,7 +146,7 @@ def _running(ti: ModuleType) -> Runtime | None:
         how = how if arch else f"on {config.arch}, where the kernels were never tried"
         raise AntsError(
             f"Taichi is running {how}; call ti.init(arch=ti.cpu, fast_math=False), or ti.reset() "
-            "and let taichi_ants start Taichi."
+            "and let taichi_ants start Taichi; both destroy the fields and arrays that it holds."
         )
     return Runtime(arch, int(config.cpu_max_num_threads))
 
@@ -142,7 +162,7 @@ def _check_restart(ti: ModuleType, running: Runtime | None, wanted: Runtime) -> 
     raise AntsError(
         f"arch {wanted.arch!r} with threads {wanted.threads} needs a restart of Taichi, which runs "
         f"with {running.arch!r} and {running.threads} and {why}; leave out threads and arch, or "
-        "call ti.reset() first."
+        "call ti.reset() first, which destroys all fields and arrays."
     )
 
 

@@ -210,8 +210,7 @@ class Colony:
         slots = self.config.slots
         places = columns // slots * slots + ants[names.NUMBER, columns]
         self.arrays["first_streams"][places] = self.arrays["streams"][columns]
-        tables = self.arrays["q"].reshape(len(self.seeds), -1)
-        checks.check_finite(tables, [self.training], self.seeds)
+        self._check_finite()
         decayed = self.epsilon * float(self.training.epsilon_decay)
         self.epsilon = max(float(self.training.min_epsilon), decayed)
 
@@ -241,7 +240,15 @@ class Colony:
         )  # fmt: skip
 
     def outcome(self) -> ColonyEpisodes:
-        """What the episode has given so far, arrays (1, W)."""
+        """What the episode has given so far, arrays (1, W).
+
+        Raises:
+            AntsError: The learner has made action values that are not finite.
+        """
+        self._check_finite()
+        return self._counted()
+
+    def _counted(self) -> ColonyEpisodes:
         from taichi_ants.engines import colony_arrays as names
 
         rows = {
@@ -308,7 +315,13 @@ class Colony:
         )
 
     def save(self, path: PathLike) -> None:
-        """Write the colony as it is now; `load` goes on from it, bit for bit."""
+        """Write the colony as it is now; `load` goes on from it, bit for bit.
+
+        Raises:
+            AntsError: The learner has made action values that are not finite, so that `load` would
+                refuse the file; or it cannot be written.
+        """
+        self._check_finite()
         colony_files.save_colony(self, path)
 
     @classmethod
@@ -335,7 +348,7 @@ class Colony:
         lines += [f"training: {self.training}", f"seeds: {shown(self.seeds)}"]
         lines += [f"sharing: {self.sharing!r}, epsilon: {self.epsilon:.4g}"]
         if self.episode >= 0:
-            now = self.outcome()
+            now = self._counted()
             lines += [
                 f"episode: {self.episode}, ticks: {self.ticks}, living: {now.living.sum()}, "
                 f"deliveries: {now.deliveries.sum()}"
@@ -345,6 +358,10 @@ class Colony:
     def _check_begun(self) -> None:
         if self.episode < 0:
             raise AntsError("no episode has begun; call begin_episode first.")
+
+    def _check_finite(self) -> None:
+        tables = self.arrays["q"].reshape(len(self.seeds), -1)
+        checks.check_finite(tables, [self.training], self.seeds)
 
     def _ticks_per_launch(self) -> int:
         if self.schedule == "by_chunk":
@@ -385,7 +402,8 @@ class Colony:
             self._learner, self.sharing, self.one_a_slot, dense, self._lively, what
         )
         numbers = Settings(**self._numbers())
-        kernel(tick, n, *numbers, *Arrays(**self.arrays))
+        with runtime.quiet():
+            kernel(tick, n, *numbers, *Arrays(**self.arrays))
 
     def _numbers(self) -> dict[str, int | float]:
         config, pheromone = self.config, self.config.pheromone

@@ -129,6 +129,7 @@ class RunEngine:
         drawn = np.zeros(1, dtype=np.uint64) if streams is None else streams
         kernel = run_kernel(learner, traced=True)
         self._compile(kernel)
+        self._compile(kernel)
         kernel(
             *self._shared_arguments(n_runs, episodes),
             *_run_arguments(state, self._starts(seeds), rates, slice(0, n_runs), drawn),
@@ -153,7 +154,8 @@ class RunEngine:
         """Launch a kernel on nothing, so that its compilation is not counted as work."""
         nothing = [np.zeros(1, kind) for kind in _RUN_DTYPES]
         outcomes = np.zeros((3, 1, 1), dtype=np.int32)
-        kernel(*self._shared_arguments(0, 0), *nothing, *outcomes, *_NO_TRACE)
+        with runtime.quiet():
+            kernel(*self._shared_arguments(0, 0), *nothing, *outcomes, *_NO_TRACE)
 
     def _clock(self) -> float:
         """Seconds of all threads of this process on the CPU, which other processes do not slow."""

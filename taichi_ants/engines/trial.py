@@ -7,6 +7,7 @@ process first.
 
 import faulthandler
 import os
+import re
 import signal
 import sys
 import warnings
@@ -82,14 +83,20 @@ def _try_in_child(td_error: Callable[..., object], writer: int) -> None:
         for stream in (1, 2):
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
         runtime.start_for_trial()
-        os.write(writer, _fault(td_error).encode())
+        os.write(writer, (_fault(td_error) or _fault(td_error, wide=True)).encode())
         os._exit(0)
     finally:
         os._exit(1)
 
 
-def _fault(td_error: Callable[..., object]) -> str:
-    """What is wrong with a TD error, in this process and the Taichi that runs; may end it."""
+def _fault(td_error: Callable[..., object], wide: bool = False) -> str:
+    """What is wrong with a TD error, in this process and the Taichi that runs; may end it.
+
+    Args:
+        td_error: As `guarded` returns it.
+        wide: Start from action values up to ten thousand of either sign, not from zeros, to find
+            an index that depends on them and is right only while they are small.
+    """
     import taichi as ti
 
     from taichi_ants.engines.run_learning import ROW, TABLE, Rates, update
@@ -109,8 +116,12 @@ def _fault(td_error: Callable[..., object]) -> str:
             rates = Rates(0.1, 0.9, 0.3)
             update(td_error, q, 0, rates, pair, reward, ended, i * 7 % 128, action)
 
+    values = np.zeros(TABLE, np.float32)
+    if wide:
+        signs = np.where(np.arange(TABLE) % 3, 1, -1)
+        values[:] = signs * 10.0 ** (np.arange(TABLE) % 13 / 2 - 2)
     try:
-        try_updates(np.zeros(TABLE, np.float32), _UPDATES)
+        try_updates(values, _UPDATES)
     except Exception as error:
         # Assertions of the learner's own hold in Taichi's debug mode only, not where it trains.
         theirs = isinstance(error, ti.TaichiAssertionError) and "Out of bound" not in str(error)
@@ -121,6 +132,13 @@ def _fault(td_error: Callable[..., object]) -> str:
 def _last_line(error: Exception) -> str:
     """What Taichi says, without the place in the source around it."""
     lines = str(error).splitlines()
-    out_of_bound = [line for line in lines if "Out of bound" in line]
-    said = out_of_bound or [line for line in lines if line.strip()] or [type(error).__name__]
+    for line in lines:
+        outside = re.search(
+            r"Out of bound access to a \[(\d+)\] matrix with index \[(-?\d+)\]", line
+        )
+        if outside:
+            return "it takes entry {1} of a vector of {0}".format(*outside.groups())
+        if "Out of bound" in line:
+            return "it uses an index outside of an array"
+    said = [line for line in lines if line.strip()] or [type(error).__name__]
     return said[-1].strip().rstrip(".?").rsplit("Error: ", 1)[-1]

@@ -49,10 +49,10 @@ def _runs_while_compiling(function: Any) -> Callable[..., object]:
 def _as_f32(result: object) -> object:
     if result is None:
         what = "nothing"
-    elif isinstance(result, float):
-        return ti.f32(result)
+    elif isinstance(result, (int, float)) and not isinstance(result, bool):
+        return ti.cast(float(result), ti.f32)
     elif not isinstance(result, Expr):
-        what = f"a {type(result).__name__}"
+        what = f"a value of the type {type(result).__name__}"
     elif result.is_tensor():
         what = f"a vector or matrix of the shape {tuple(result.get_shape())}"
     elif result.ptr.get_rvalue_type() not in _FLOATS:

@@ -79,6 +79,44 @@ def test_what_is_natural_in_python_works(like, td_error, engine):
 
 
 @ti.func
+def of_zero(value, reward, discount, next_values, next_action, epsilon):
+    return 0.0
+
+
+@ti.func
+def of_one(value, reward, discount, next_values, next_action, epsilon):
+    return 1
+
+
+@ti.func
+def of_infinity(value, reward, discount, next_values, next_action, epsilon):
+    return ti.exp(1000.0)
+
+
+@ti.func
+def of_its_own_value_kept_inside(value, reward, discount, next_values, next_action, epsilon):
+    return reward + next_values[min(max(int(value), 0), 4)] - value
+
+
+@pytest.mark.filterwarnings("ignore:overflow encountered in exp")
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_number_of_pythons_is_a_td_error(engine):
+    register(Learner("mine", of_zero))
+    assert not engine().any()
+    register(Learner("ones", of_one))
+    values = engine("ones")
+    assert np.isclose(values[values != 0].min(), 0.1)  # one update at the learning rate of 0.1
+    register(Learner("infinite", of_infinity))
+    with pytest.raises(AntsError, match="'infinite' made action values that are not finite"):
+        engine("infinite")
+
+
+def test_an_index_that_is_kept_inside_passes():
+    register(Learner("mine", of_its_own_value_kept_inside))
+    assert in_runs().any()
+
+
+@ti.func
 def checks_the_next_action(value, reward, discount, next_values, next_action, epsilon):
     valid = ti.cast(next_action >= 0, ti.f32) * ti.cast(next_action < 5, ti.f32)
     return 1.0 - valid
@@ -116,8 +154,8 @@ def of_nothing(value, reward, discount, next_values, next_action, epsilon):
 
 
 @ti.func
-def of_an_integer(value, reward, discount, next_values, next_action, epsilon):
-    return 1
+def of_a_truth(value, reward, discount, next_values, next_action, epsilon):
+    return True
 
 
 @ti.func
@@ -138,6 +176,16 @@ def of_an_action_too_far(value, reward, discount, next_values, next_action, epsi
 @ti.func
 def of_one_too_low(value, reward, discount, next_values, next_action, epsilon):
     return next_values[next_action - 1]
+
+
+@ti.func
+def of_its_own_value(value, reward, discount, next_values, next_action, epsilon):
+    return reward + next_values[int(value)] - value
+
+
+@ti.func
+def of_a_large_next_value(value, reward, discount, next_values, next_action, epsilon):
+    return reward + next_values[max(0, int(max(next_values) * 0.001))] - value
 
 
 @ti.func
@@ -168,13 +216,15 @@ def of_a_lost_name(value, reward, discount, next_values, next_action, epsilon):
 REFUSED = [
     (of_a_vector, "returns a vector or matrix of the shape (5,) where one float"),
     (of_taichis_max, "returns a vector"),
-    (of_a_tuple, "returns a tuple"),
+    (of_a_tuple, "returns a value of the type tuple where"),
     (of_nothing, "returns nothing"),
-    (of_an_integer, "returns a int"),
+    (of_a_truth, "returns a value of the type bool where"),
     (of_an_expression_in_integers, "returns a number of the type i32"),
     (of_a_constant_too_far, "it ends the process"),
-    (of_an_action_too_far, "Out of bound access to a [5] matrix with index [5]"),
-    (of_one_too_low, "Out of bound access to a [5] matrix with index [-1]"),
+    (of_an_action_too_far, "used: it takes entry 5 of a vector of 5; see"),
+    (of_one_too_low, "used: it takes entry -1 of a vector of 5; see"),
+    (of_its_own_value, "as an index outside of an array does"),
+    (of_a_large_next_value, "of a vector of 5; see"),
     (of_a_division_by_zero, "it ends the process"),
     (of_itself, "recursion"),
     (of_a_global_array, "valid indices"),
@@ -254,3 +304,19 @@ def test_values_that_are_not_finite_are_named(td_error):
             in_a_colony(sharing=sharing)
     actions = trace_training(paper(), config(), 0, 3).actions  # a trace shows what happens
     assert (actions.min(), actions.max()) == (0, 4)
+
+
+def test_values_that_are_not_finite_are_named_while_a_colony_is_stepped(tmp_path):
+    register(Learner("mine", of_a_logarithm))
+    for sharing in ("shared", "own"):
+        colony = Colony(paper(), ColonyConfig(5), config(), sharing=sharing)
+        colony.begin_episode()
+        colony.tick(100)
+        path = tmp_path / "colony.npz"
+        named = "^learner 'mine' made action values that are not finite"
+        with pytest.raises(AntsError, match=named):
+            colony.outcome()
+        with pytest.raises(AntsError, match=named):
+            colony.save(path)
+        assert not path.exists()
+        assert "ticks: 100" in repr(colony)

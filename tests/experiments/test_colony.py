@@ -25,6 +25,7 @@ from command_lines import (
 )
 
 from taichi_ants import Colony, ColonyConfig, Pheromone, TrainingConfig, load_policy, worlds
+from taichi_ants.learners import registry
 
 SEEDS, EPISODES, TICKS, ROLLOUTS = (3, 4), 4, 80, 2
 SMALL = [
@@ -234,6 +235,32 @@ def test_mistakes_end_in_one_sentence(arguments, expected, capsys, tmp_path, mon
     assert_one_sentence(err)
     assert expected in err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_learner_that_makes_no_numbers_is_named(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(registry, "_LEARNERS", dict(registry._LEARNERS))
+    lines = [
+        "import taichi as ti",
+        "from taichi_ants.learners import Learner, register",
+        "@ti.func",
+        "def td_error(value, reward, discount, next_values, next_action, epsilon):",
+        "    return reward - ti.log(value - 0.5)",
+        'register(Learner("lost", td_error))',
+    ]
+    Path("lost.py").write_text("\n".join(lines), "utf-8")
+    arguments = ["--ants", 10, "--plugin", "lost.py", "--learner", "lost", "--ticks", 100]
+    for more in ([], ["--save", "lost.npz"]):
+        status, out, err = call("colony", [*arguments, *more], capsys)
+        assert (status, out) == (2, "")
+        assert_one_sentence(err)
+        assert "learner 'lost' made action values that are not finite" in err
+        monkeypatch.setattr(
+            registry,
+            "_LEARNERS",
+            {name: one for name, one in registry._LEARNERS.items() if name != "lost"},
+        )
+    assert not Path("lost.npz").exists()
 
 
 LIFE = [

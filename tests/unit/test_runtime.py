@@ -133,12 +133,37 @@ assert runtime.start(threads=3, arch="cpu").threads == 3
 assert same()
 
 init(fast_math=True)
-refused("fast_math")
+refused("destroy the fields and arrays")
 ti.reset()
 assert same()
 
 init(default_fp=ti.f64)
 assert same()
+"""
+    python(BEGINNING + script, tmp_path, PYTHONWARNINGS="ignore")
+
+
+def test_a_loud_taichi_of_the_callers_is_no_louder_for_our_kernels(tmp_path):
+    """And is as loud as before afterwards; `python` demands that nothing is on stderr."""
+    script = """
+import contextlib
+import io
+import taichi as ti
+from taichi_ants import Colony, ColonyConfig, trace_training
+from taichi_ants.rendering import Scene
+
+for settings in ({}, {"default_fp": ti.f64}, {"log_level": ti.CRITICAL}):
+    with contextlib.redirect_stdout(io.StringIO()):
+        ti.init(arch=ti.cpu, fast_math=False, offline_cache=False, **settings)
+    loud = [ti.is_logging_effective(level) for level in ("debug", "info", "warn", "error")]
+    trained()
+    trace_training(paper(), config, 0, 2)
+    colony = Colony(paper(), ColonyConfig(4), config)
+    colony.run(1, 20)
+    Scene(paper().grid, (200, 160)).draw(colony.snapshot())
+    after = [ti.is_logging_effective(level) for level in ("debug", "info", "warn", "error")]
+    assert after == loud, (settings, after)
+    assert loud == [False, not settings.get("log_level")] + [not settings.get("log_level")] * 2
 """
     python(BEGINNING + script, tmp_path, PYTHONWARNINGS="ignore")
 
