@@ -2,8 +2,8 @@
 
 The step onto a trail (T), and with food the step nearer to the queen (S), are paid. A policy can
 live on them: walk to and fro on the trail, or carry the food in a circle, often beside the queen,
-and come nearer to her again and again. Returns of such runs and of runs that deliver have no common mean
-that means anything, so that runs are counted by what they do.
+and come nearer to her again and again. Returns of such runs and of runs that deliver have no common
+mean that means anything, so that runs are counted by what they do.
 """
 
 from __future__ import annotations
