@@ -374,26 +374,37 @@ def render_policies(sweep: Sweep, policies: Path, folder: Path) -> None:
     """Show what each policy that was written does, in the folder `renders`.
 
     Each picture is the beginning of the episode that told the behaviour: with evaporation as in
-    training, not as in the greedy evaluation.
+    training, not as in the greedy evaluation. The title names learner and delivery, the first of
+    the head-up lines what the ant does.
     """
+    from dataclasses import replace
+
     from taichi_ants import load_policy, results
-    from taichi_ants.rendering import render_episode
+    from taichi_ants.analysis.comparison import Variant
+    from taichi_ants.rendering import Episode, episode_frames, save_animation
+    from taichi_ants.rendering.episodes import DEFAULT_FPS, with_pause
 
     place = results.check_writable_folder(folder / RENDERS)
     with progress_bar("rendering") as report_progress:
         paths = sorted(policies.glob("*.npz"))
         for done, path in enumerate(paths):
             q_values, metadata = load_policy(path)
-            render_episode(
-                place / f"{path.stem}.gif",
+            config = metadata["config"]
+            learner = Variant(config["learner"], config["planning_steps"]).label
+            episode = Episode.play(
                 sweep.world,
                 q_values,
                 seed=metadata["seed"],
                 max_steps=min(sweep.max_steps, RENDERED_STEPS),
                 evaporation=sweep.train_evaporation,
-                size=(720, 480),
-                title=metadata["behaviour"],
             )
+            whole = episode.delivered or len(episode.trace) == sweep.max_steps
+            episode = replace(episode, name=metadata["behaviour"], whole=whole)
+            title = f"{learner}, {config['delivery']}"
+            frames = with_pause(
+                episode_frames(episode, (720, 480), title=title), len(episode), DEFAULT_FPS
+            )
+            save_animation(place / f"{path.stem}.gif", frames, DEFAULT_FPS)
             report_progress((done + 1) / len(paths))
 
 

@@ -36,6 +36,7 @@ class Episode:
         seed, number: Of the rollout.
         evaporation: Whether trails fell by 1 with each step.
         name: What the head-up lines call it.
+        whole: Whether it ended with its last step; the beginning of an episode has no outcome.
     """
 
     world: World
@@ -44,6 +45,7 @@ class Episode:
     number: int = 0
     evaporation: bool = True
     name: str = ""
+    whole: bool = True
 
     @classmethod
     def play(
@@ -76,6 +78,7 @@ class Episode:
         """The world before each step with what the ant is about to do, and the world at the end."""
         trace = self.trace
         returns = np.concatenate([[0], np.cumsum(trace.rewards)]).tolist()
+        outcome = "delivered" if self.delivered else "step limit"
         replay = Replay(self.world, trace, self.seed, self.number, self.evaporation)
         for step, snapshot in enumerate(replay.snapshots()):
             if step < len(trace):
@@ -98,7 +101,7 @@ class Episode:
                         episode_return=returns[step],
                         episode=self.name,
                         state=int(trace.next_states[-1]),
-                        outcome="delivered" if self.delivered else "step limit",
+                        outcome=outcome if self.whole else "",
                     ),
                 )
 

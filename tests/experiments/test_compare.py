@@ -7,6 +7,7 @@ import json
 import re
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,9 @@ from taichi_ants import (
 )
 from taichi_ants.analysis.behaviour import DELIVERS
 from taichi_ants.analysis.statistics import bootstrap_interval
-from taichi_ants.rendering import render_episode
+from taichi_ants.commands import compare as commands
+from taichi_ants.rendering import Episode, episode_frames, save_animation, text
+from taichi_ants.rendering.episodes import DEFAULT_FPS, with_pause
 
 GARDEN = EXPERIMENTS / "maps" / "garden.txt"
 SEEDS, EPISODES, MAX_STEPS, ROLLOUTS = (7, 8, 9), 60, 45, 50
@@ -289,12 +292,28 @@ def test_pictures_show_the_episode_that_told_the_behaviour(finished, tmp_path):
     name = "continuing_sarsa_other"
     q_values, metadata = load_policy(finished / "policies" / f"{name}.npz")
     shown = (finished / "renders" / f"{name}.gif").read_bytes()
-    look = {"size": (720, 480), "title": "other"}
     for evaporation in (False, True):
         path = tmp_path / f"{evaporation}.gif"
         more = {"seed": metadata["seed"], "max_steps": MAX_STEPS, "evaporation": evaporation}
-        render_episode(path, worlds.paper(), q_values, **more, **look)
+        episode = replace(Episode.play(worlds.paper(), q_values, **more), name="other")
+        frames = episode_frames(episode, (720, 480), title="SARSA, continuing")
+        save_animation(path, with_pause(frames, len(episode), DEFAULT_FPS), DEFAULT_FPS)
         assert (path.read_bytes() == shown) == (not evaporation)
+
+
+@pytest.mark.parametrize("limit", [40, MAX_STEPS])
+def test_pictures_name_learner_delivery_and_behaviour(limit, finished, tmp_path, monkeypatch):
+    """What stops before the episode ends has no outcome."""
+    monkeypatch.setattr(commands, "RENDERED_STEPS", limit)
+    lines = []
+    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
+    sweep = commands.build_sweep(commands.parse_arguments([str(one) for one in SMALL]))
+    commands.render_policies(sweep, finished / "policies", tmp_path)
+    for delivery in ("continuing", "absorbing"):
+        assert {f"{name}, {delivery}" for name in ("SARSA", "Dyna-Q (p2)")} <= set(lines)
+    assert {"delivers", "other", "delivered"} <= set(lines)
+    assert ("step limit" in lines) == (limit == MAX_STEPS)
+    assert not [line for line in lines if line.endswith("...")]
 
 
 def test_manifest(finished):

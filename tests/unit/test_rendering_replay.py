@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from random_worlds import random_world
@@ -90,6 +92,8 @@ def test_what_the_head_up_lines_say() -> None:
     lost = Episode.play(paper(), random_policy(), max_steps=5)
     assert not lost.delivered
     assert [status.outcome for _, status in lost.moments()][-1] == "step limit"
+    begun = replace(lost, whole=False)
+    assert [status.outcome for _, status in begun.moments()][-1] == ""
 
 
 def test_a_picture_of_one_step_is_that_frame() -> None:
