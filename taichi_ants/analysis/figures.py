@@ -84,7 +84,12 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Mapping] = ()) -
         words = ["Learning rate / discount / epsilon / decay:", *_configurations(comparison, shown)]
     if len(comparison.seeds) > 1:
         seeds = f"interquartile mean of {seeds}, of deliveries the mean; band: their middle half"
-    words = [f"Line: {seeds}. Episodes and lengths are on logarithmic axes.", *words]
+    words = [
+        f"Line: {seeds}.",
+        "A point is the mean over a span of episodes; later spans are longer. Episodes and lengths "
+        "are on logarithmic axes.",
+        *words,
+    ]
     with styled():
         figure, blocks = _blocks(comparison, [1.5] * len(_CURVES), 0.14 * len(words))
         for block, variants in blocks:

@@ -128,6 +128,8 @@ def _draw(
         limits: Of the axis.
         look: Colour, marker, and whether the marker is filled.
     """
+    from matplotlib.markers import CARETLEFT, CARETRIGHT  # their tips are where they stand
+
     colour, marker, filled = look
     small = interquartile_mean(pairs)
     inside = np.clip(small, *limits) == small
@@ -139,11 +141,14 @@ def _draw(
     interval = np.concatenate(bootstrap_interval(seeds, iqm=True))  # nan for one seed
     low, high = np.clip(interval, *limits)
     axis.plot([low, high], [height] * 2, color=colour, linewidth=1.6)
-    arrows = {limits[0]: "<", limits[1]: ">"}
     beyond = np.concatenate([small, interval])
-    for edge, arrow in arrows.items():
-        if (beyond < edge if arrow == "<" else beyond > edge).any():
-            axis.plot(edge, height, arrow, color=colour, markersize=5, clip_on=False)
+    arrows = {
+        CARETLEFT: (limits[0], beyond < limits[0]),
+        CARETRIGHT: (limits[1], beyond > limits[1]),
+    }
+    for arrow, (edge, outside) in arrows.items():
+        if outside.any():
+            axis.plot(edge, height, marker=arrow, color=colour, markersize=6, markeredgewidth=0)
     face = colour if filled else "white"
     if limits[0] <= centre <= limits[1]:
         axis.plot(centre, height, marker, color=colour, markersize=6, markerfacecolor=face)

@@ -65,7 +65,7 @@ SHOWN = [
     f"{delivery}_{learner}_{behaviour}"
     for delivery in ("continuing", "absorbing")
     for learner in LEARNERS
-    for behaviour in ("delivers", "other")
+    for behaviour in ("delivers", "circles_with_food")
 ]
 POLICY = f"policies/{SHOWN[0]}.npz"
 RENDERS = {f"renders/{name}.gif" for name in SHOWN}
@@ -215,7 +215,8 @@ def test_policies_are_those_of_median_runs_of_each_behaviour(finished):
     rows = read_csv(finished / "summary.csv")
     for name in SHOWN:
         q_values, metadata = load_policy(finished / "policies" / f"{name}.npz")
-        delivery, learner = name.rsplit("_", 1)[0].split("_", 1)
+        behaviour = metadata["behaviour"].replace(" ", "_")
+        delivery, learner = name.removesuffix(f"_{behaviour}").split("_", 1)
         mine = [
             row
             for row in rows
@@ -236,7 +237,7 @@ def test_policies_are_those_of_median_runs_of_each_behaviour(finished):
         once = evaluate(worlds.paper(), trained.q_values[0], 1, SEEDS, MAX_STEPS, evaporation=False)
         alike = once.deliveries[:, 0] == (metadata["behaviour"] == "delivers")
         assert alike[number]
-        assert int(chosen[f"runs_{metadata['behaviour']}"]) == alike.sum()
+        assert int(chosen[f"runs_{behaviour}"]) == alike.sum()
         assert (returns[alike] < returns[number]).sum() == (alike.sum() - 1) // 2
         assert metadata["evaporation"] is False
 
@@ -289,13 +290,13 @@ def test_evaporation_is_chosen_told_and_kept_apart(training, greedy, tmp_path, c
 
 def test_pictures_show_the_episode_that_told_the_behaviour(finished, tmp_path):
     """Without evaporation, as in training."""
-    name = "continuing_sarsa_other"
+    name = "continuing_sarsa_circles_with_food"
     q_values, metadata = load_policy(finished / "policies" / f"{name}.npz")
     shown = (finished / "renders" / f"{name}.gif").read_bytes()
     for evaporation in (False, True):
         path = tmp_path / f"{evaporation}.gif"
         more = {"seed": metadata["seed"], "max_steps": MAX_STEPS, "evaporation": evaporation}
-        episode = replace(Episode.play(worlds.paper(), q_values, **more), name="other")
+        episode = replace(Episode.play(worlds.paper(), q_values, **more), name="circles with food")
         frames = episode_frames(episode, (720, 480), title="SARSA, continuing")
         save_animation(path, with_pause(frames, len(episode), DEFAULT_FPS), DEFAULT_FPS)
         assert (path.read_bytes() == shown) == (not evaporation)
@@ -311,7 +312,7 @@ def test_pictures_name_learner_delivery_and_behaviour(limit, finished, tmp_path,
     commands.render_policies(sweep, finished / "policies", tmp_path)
     for delivery in ("continuing", "absorbing"):
         assert {f"{name}, {delivery}" for name in ("SARSA", "Dyna-Q (p2)")} <= set(lines)
-    assert {"delivers", "other", "delivered"} <= set(lines)
+    assert {"delivers", "circles with food", "delivered"} <= set(lines)
     assert ("step limit" in lines) == (limit == MAX_STEPS)
     assert not [line for line in lines if line.endswith("...")]
 

@@ -12,6 +12,7 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.markers import CARETLEFT, CARETRIGHT, MarkerStyle
 from PIL import Image
 from synthetic_comparison import build, change, level_truth, subset, unchanged
 
@@ -30,6 +31,7 @@ from taichi_ants.analysis.sensitivity import sensitivity
 from taichi_ants.analysis.statistics import interquartile_mean
 from taichi_ants.analysis.style import BEHAVIOUR_LOOKS, in_training, looks
 
+ARROWS = (CARETLEFT, CARETRIGHT)
 BASELINES = [
     {
         "baseline": name,
@@ -120,6 +122,7 @@ def test_the_settings_of_delivery_are_told_apart_without_colour(comparison: Comp
 def test_the_caption_says_whose_choice_the_configuration_is(comparison: Comparison) -> None:
     """The paper's figure 1 does not name its hyperparameters."""
     words = words_of(learning_curves(comparison)).replace("\n", " ")
+    assert "A point is the mean over a span of episodes; later spans are longer." in words
     assert FIGURE_1.label in words
     assert "does not name them: these are our choice" in words
 
@@ -198,7 +201,7 @@ def test_sensitivity_shows_the_effect_of_each_hyperparameter() -> None:
                 assert len(pairs) == 8
                 here = [line for line in axis.lines if np.allclose(line.get_ydata(), row + offset)]
                 centre = interquartile_mean(np.mean(pairs, axis=0)[None])[0]
-                large = [line for line in here if line.get_marker() in "os^D"]
+                large = [line for line in here if line.get_marker() in tuple("os^D")]
                 dots = next(line for line in here if line.get_marker() == ".").get_xdata()
                 small = interquartile_mean(np.array(pairs))
                 np.testing.assert_allclose(dots, small[(left <= small) & (small <= right)])
@@ -208,7 +211,7 @@ def test_sensitivity_shows_the_effect_of_each_hyperparameter() -> None:
                     assert bar.get_xdata()[0] <= centre <= bar.get_xdata()[1]
                 else:
                     assert not large
-                    assert [line.get_marker() for line in here][-1] in "<>"
+                    assert here[-1].get_marker() in ARROWS
     numbers = [text.get_text() for axis in axes for text in axis.texts]
     assert numbers == ["+200"]
 
@@ -216,15 +219,22 @@ def test_sensitivity_shows_the_effect_of_each_hyperparameter() -> None:
 def test_intervals_that_leave_the_axis_end_in_arrows(comparison: Comparison) -> None:
     noisy = subset(comparison, range(128), 6, 120)
     noisy.returns[3, :3] += 30
-    for axis in panels(sensitivity(noisy)):
+    figure = sensitivity(noisy)
+    arrows = []
+    for axis in panels(figure):
         left, right = axis.get_xlim()
         for line in axis.lines:
-            if line.get_marker() in "<>":
-                edge = left if line.get_marker() == "<" else right
+            if line.get_marker() in ARROWS:
+                arrows.append(line.get_marker())
+                edge = left if line.get_marker() == CARETLEFT else right
                 assert list(line.get_xdata()) == [edge]
+                look = MarkerStyle(line.get_marker())
+                head = look.get_path().transformed(look.get_transform()).vertices[:, 0]
+                inwards = head if edge == left else -head
+                assert -1e-9 < inwards.min() < inwards.max()  # it lies inside
             elif len(line.get_xdata()) == 2 and line.get_xdata()[0] != line.get_xdata()[1]:
                 assert left <= min(line.get_xdata()) <= max(line.get_xdata()) <= right
-    assert any(line.get_marker() == ">" for a in panels(sensitivity(noisy)) for line in a.lines)
+    assert CARETRIGHT in arrows
 
 
 def test_without_two_values_there_is_no_effect(comparison: Comparison) -> None:
