@@ -20,9 +20,9 @@ import numpy as np
 
 from taichi_ants import TrainingConfig, World, train, worlds
 from taichi_ants.analysis.paper import GRID
-from taichi_ants.command_line import Parser, run_command, whole_number
-from taichi_ants.constants import STREAM_ANT
-from taichi_ants.randomness import stream_state
+from taichi_ants.grid.constants import STREAM_ANT
+from taichi_ants.grid.randomness import stream_state
+from taichi_ants.studies.command_line import Parser, run_command, whole_number
 
 SOURCE = Path(__file__).with_name("ant.c")
 FLAGS = ("-O3", "-march=native", "-std=c11", "-ffp-contract=off", "-shared", "-fPIC")

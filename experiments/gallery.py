@@ -12,8 +12,8 @@ import argparse
 import tempfile
 from pathlib import Path
 
-from taichi_ants.command_line import Parser, run_command
 from taichi_ants.commands import render
+from taichi_ants.studies.command_line import Parser, run_command
 
 ROOT = Path(__file__).parents[1]
 _MAP = str(ROOT / "experiments" / "maps" / "garden.txt")
@@ -75,10 +75,10 @@ def make_gallery(settings: argparse.Namespace) -> None:
 
 def make_figures(folder: Path) -> None:
     """Draw the figures of the docs from the two studies, which are run where they are missing."""
-    from taichi_ants import results
+    from taichi_ants import files
     from taichi_ants.analysis.colony.figures import save_all
-    from taichi_ants.colony_study import from_arrays
     from taichi_ants.commands import colony, compare
+    from taichi_ants.studies.colony_study import from_arrays
 
     comparison = compare.parse_arguments(["--out", str(ROOT / "results" / "compare")])
     compare.compare(comparison)
@@ -87,7 +87,7 @@ def make_figures(folder: Path) -> None:
     with tempfile.TemporaryDirectory() as place:
         compare.draw_figures(compare.build_sweep(comparison), comparison.out, Path(place))
         keep(Path(place) / compare.FIGURES, COMPARISON, folder)
-        found = results.read_npz(study.out / colony.EPISODES)
+        found = files.read_npz(study.out / colony.EPISODES)
         save_all(from_arrays(colony.build_plan(study), found), Path(place) / colony.FIGURES)
         keep(Path(place) / colony.FIGURES, COLONY, folder)
 

@@ -10,40 +10,45 @@ from typing import TYPE_CHECKING
 from taichi_ants.environment import prepare_for_taichi
 
 if TYPE_CHECKING:
-    from taichi_ants import analysis, learners, reference, rendering, states, worlds
-    from taichi_ants.colony_config import ColonyConfig, Pheromone
-    from taichi_ants.config import TrainingConfig
-    from taichi_ants.engines.colony import Colony, ColonyEpisodes
-    from taichi_ants.engines.results import LearnerCost, Rollouts, TrainingResult
-    from taichi_ants.engines.runs import continue_training, evaluate, train
-    from taichi_ants.engines.traces import Trace, rollout, trace_training
+    from taichi_ants import analysis, learners, reference, rendering, worlds
+    from taichi_ants.engines.colony.colony import Colony, ColonyEpisodes
+    from taichi_ants.engines.runs.results import LearnerCost, Rollouts, TrainingResult
+    from taichi_ants.engines.runs.traces import Trace, rollout, trace_training
+    from taichi_ants.engines.runs.training import continue_training, evaluate, train
     from taichi_ants.errors import AntsError
-    from taichi_ants.policies import load_policy, save_policy
+    from taichi_ants.learners.config import TrainingConfig
+    from taichi_ants.learners.policies import load_policy, save_policy
+    from taichi_ants.task import states
+    from taichi_ants.task.colony import ColonyConfig, Pheromone
     from taichi_ants.worlds import World
 
 __version__ = "0.1.0"
 
 _HOMES = {
     "AntsError": "taichi_ants.errors",
-    "Colony": "taichi_ants.engines.colony",
-    "ColonyConfig": "taichi_ants.colony_config",
-    "ColonyEpisodes": "taichi_ants.engines.colony",
-    "Pheromone": "taichi_ants.colony_config",
-    "LearnerCost": "taichi_ants.engines.results",
-    "Rollouts": "taichi_ants.engines.results",
-    "Trace": "taichi_ants.engines.traces",
-    "TrainingConfig": "taichi_ants.config",
-    "TrainingResult": "taichi_ants.engines.results",
+    "Colony": "taichi_ants.engines.colony.colony",
+    "ColonyConfig": "taichi_ants.task.colony",
+    "ColonyEpisodes": "taichi_ants.engines.colony.colony",
+    "Pheromone": "taichi_ants.task.colony",
+    "LearnerCost": "taichi_ants.engines.runs.results",
+    "Rollouts": "taichi_ants.engines.runs.results",
+    "Trace": "taichi_ants.engines.runs.traces",
+    "TrainingConfig": "taichi_ants.learners.config",
+    "TrainingResult": "taichi_ants.engines.runs.results",
     "World": "taichi_ants.worlds",
-    "continue_training": "taichi_ants.engines.runs",
-    "evaluate": "taichi_ants.engines.runs",
-    "load_policy": "taichi_ants.policies",
-    "rollout": "taichi_ants.engines.traces",
-    "save_policy": "taichi_ants.policies",
-    "trace_training": "taichi_ants.engines.traces",
-    "train": "taichi_ants.engines.runs",
+    "continue_training": "taichi_ants.engines.runs.training",
+    "evaluate": "taichi_ants.engines.runs.training",
+    "load_policy": "taichi_ants.learners.policies",
+    "rollout": "taichi_ants.engines.runs.traces",
+    "save_policy": "taichi_ants.learners.policies",
+    "trace_training": "taichi_ants.engines.runs.traces",
+    "train": "taichi_ants.engines.runs.training",
 }
-_MODULES = ("analysis", "learners", "reference", "rendering", "states", "worlds")
+_MODULES = {
+    **{name: f"taichi_ants.{name}" for name in ("analysis", "learners", "reference", "rendering")},
+    "states": "taichi_ants.task.states",
+    "worlds": "taichi_ants.worlds",
+}
 
 __all__ = [
     "AntsError",
@@ -82,7 +87,7 @@ def __getattr__(name: str) -> object:
         globals()[name] = value
         return value
     if name in _MODULES:
-        return import_module(f"taichi_ants.{name}")
+        return import_module(_MODULES[name])
     raise AttributeError(f"module 'taichi_ants' has no attribute {name!r}")
 
 

@@ -1,14 +1,18 @@
-"""What tests share: the folder of helpers, and hypothesis without time limits."""
+"""What tests share: compiled kernels, and hypothesis without time limits."""
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
+import pytest
 from hypothesis import settings
-
-sys.path.insert(0, str(Path(__file__).parent))
 
 # Machines are shared and noisy: no limit on the time of an example, the same examples each time.
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")
+
+
+@pytest.fixture(scope="session")
+def kernels(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder in which processes keep compiled kernels, so that only the first one compiles."""
+    return tmp_path_factory.mktemp("kernels")

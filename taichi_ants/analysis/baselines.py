@@ -10,7 +10,7 @@ import numpy as np
 from taichi_ants.analysis.dynamic_programming import Outcome, exact_bounds
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.errors import AntsError
-from taichi_ants.policies import random_policy, trail_follower
+from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.worlds.world import World
 
 BASELINE_COLUMNS: tuple[str, ...] = (

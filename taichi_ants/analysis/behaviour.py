@@ -12,7 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from taichi_ants.constants import N_STATES, RIGHT, SEES_LURE
+from taichi_ants.task.constants import N_STATES, RIGHT, SEES_LURE
 
 # What an ant does is a number, its place in this list.
 BEHAVIOURS: tuple[str, ...] = (

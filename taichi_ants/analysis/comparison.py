@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from taichi_ants.analysis.measures import MEASURES, WINDOW
-from taichi_ants.config import TrainingConfig
 from taichi_ants.errors import AntsError
+from taichi_ants.learners.config import TrainingConfig
 
 # The order in which the delivery settings are reported; others follow in order of appearance.
 DELIVERY_ORDER: tuple[str, ...] = ("continuing", "absorbing")

@@ -16,8 +16,9 @@ import numpy as np
 
 from taichi_ants.analysis.discounted import solve_phase
 from taichi_ants.analysis.transitions import Phase, Transitions, build_transitions
-from taichi_ants.constants import FORWARD, LEFT, MAX_STEPS, N_HEADINGS, RIGHT
 from taichi_ants.errors import AntsError, shown
+from taichi_ants.grid.constants import N_HEADINGS
+from taichi_ants.task.constants import FORWARD, LEFT, MAX_STEPS, RIGHT
 from taichi_ants.worlds.world import World
 
 # Limits on the memory and the time that the bounds of a world may take, about a minute on one core.

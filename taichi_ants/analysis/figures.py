@@ -32,7 +32,7 @@ from taichi_ants.analysis.style import (
     save,
     styled,
 )
-from taichi_ants.results import check_writable_folder
+from taichi_ants.files import check_writable_folder
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

@@ -12,7 +12,7 @@ import numpy as np
 from taichi_ants.analysis.comparison import Variant
 from taichi_ants.analysis.markdown import baseline_name
 from taichi_ants.analysis.paper import DYNA_P3, DYNA_P5, Q_LEARNING, SARSA
-from taichi_ants.results import write_atomically
+from taichi_ants.files import write_atomically
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

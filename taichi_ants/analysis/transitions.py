@@ -16,16 +16,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from taichi_ants import rewards as reward_table
-from taichi_ants.constants import (
-    EMPTY,
-    FOOD,
-    GIVE,
-    N_ACTIONS,
-    N_HEADINGS,
-    PICK_UP,
-    QUEEN,
-)
+from taichi_ants.grid.constants import N_HEADINGS
+from taichi_ants.task import rewards as reward_table
+from taichi_ants.task.constants import EMPTY, FOOD, GIVE, N_ACTIONS, PICK_UP, QUEEN
 from taichi_ants.worlds.world import World
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from importlib import import_module
 
 import taichi_ants
-from taichi_ants.interruption import stoppable
+from taichi_ants.studies.interruption import stoppable
 
 COMMANDS = {  # modules beside this one, and what they do
     "compare": "the paper's comparison of learners, over many seeds",
@@ -27,7 +27,7 @@ def main() -> None:
     name, *arguments = sys.argv[1:] or ["--help"]
     with stoppable():
         if name in COMMANDS:
-            from taichi_ants.command_line import Parser
+            from taichi_ants.studies.command_line import Parser
 
             Parser.program = f"taichi-ants {name}"
             run(name, arguments)

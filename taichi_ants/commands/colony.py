@@ -15,7 +15,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from taichi_ants.command_line import (
+from taichi_ants.studies.command_line import (
     ListAction,
     Parser,
     default_folder,
@@ -30,9 +30,9 @@ from taichi_ants.command_line import (
 if TYPE_CHECKING:
     from taichi_ants import Colony, World
     from taichi_ants.analysis.colony import ColonyStudy
-    from taichi_ants.colony_study import ArenaPlan, StudyPlan
-    from taichi_ants.config import TrainingConfig
-    from taichi_ants.result_folder import ResultFolder
+    from taichi_ants.learners.config import TrainingConfig
+    from taichi_ants.studies.colony_study import ArenaPlan, StudyPlan
+    from taichi_ants.studies.result_folder import ResultFolder
 
 ARENAS = ("paper", "open", "large")
 OPEN_RANGES, LARGE_RANGES = (30, 30, 30), (100, 100, 100)
@@ -205,7 +205,7 @@ def training_config(settings: argparse.Namespace, least: float) -> TrainingConfi
 
 def build_plan(settings: argparse.Namespace) -> StudyPlan:
     """The work, checked as a whole before any of it is done."""
-    from taichi_ants.colony_study import StudyPlan
+    from taichi_ants.studies.colony_study import StudyPlan
 
     training = training_config(settings, EVALUATION_EPSILON)
     return StudyPlan(tuple(plan_arena(name, settings) for name in settings.arenas), training)
@@ -215,7 +215,7 @@ def plan_arena(name: str, settings: argparse.Namespace) -> ArenaPlan:
     """One kind of world; the large ones get fewer conditions and shorter training."""
     from taichi_ants import worlds
     from taichi_ants.analysis.colony import study as names
-    from taichi_ants.colony_study import ArenaPlan
+    from taichi_ants.studies.colony_study import ArenaPlan
 
     seeds = tuple(range(settings.seed, settings.seed + settings.seeds))
     trained = (names.JOINT, names.THEN_JOINT, names.OWN)
@@ -245,10 +245,10 @@ def plan_arena(name: str, settings: argparse.Namespace) -> ArenaPlan:
 
 def study(settings: argparse.Namespace) -> None:
     """Run the study, or show the finished one."""
-    from taichi_ants.colony_study import settings_of
-    from taichi_ants.provenance import provenance
-    from taichi_ants.result_folder import ResultFolder
-    from taichi_ants.results import file_hash
+    from taichi_ants.files import file_hash
+    from taichi_ants.studies.colony_study import settings_of
+    from taichi_ants.studies.provenance import provenance
+    from taichi_ants.studies.result_folder import ResultFolder
 
     plan = build_plan(settings)
     plugin = file_hash(settings.plugin) if settings.plugin else None
@@ -269,15 +269,15 @@ def study(settings: argparse.Namespace) -> None:
 
 def do_study(settings: argparse.Namespace, plan: StudyPlan, blocks: Path, ready: Path) -> None:
     """All the work, and all files but the manifest."""
-    from taichi_ants import results, save_policy
+    from taichi_ants import files, save_policy
     from taichi_ants.analysis.colony import figures
-    from taichi_ants.colony_study import median_policies, run_study, to_arrays
+    from taichi_ants.studies.colony_study import median_policies, run_study, to_arrays
 
     with progress_bar("study") as progress:
         found, tables = run_study(plan, blocks, settings.threads, settings.arch, progress, notice)
     write_tables(found, ready)
-    results.write_npz(ready / EPISODES, to_arrays(found.records))
-    policies = results.check_writable_folder(ready / "policies")
+    files.write_npz(ready / EPISODES, to_arrays(found.records))
+    policies = files.check_writable_folder(ready / "policies")
     for name, q_values, metadata in median_policies(plan, found, tables):
         save_policy(policies / f"{name}.npz", q_values, metadata)
     if not settings.no_figures:
@@ -286,29 +286,29 @@ def do_study(settings: argparse.Namespace, plan: StudyPlan, blocks: Path, ready:
 
 def write_tables(found: ColonyStudy, folder: Path) -> None:
     """Write tables, findings and the report."""
-    from taichi_ants import results
+    from taichi_ants import files
     from taichi_ants.analysis.colony import find, judge_all, report, tables
 
     rows, judged = tables.condition_rows(found), judge_all(found)
     findings = find(found, judged)
-    results.write_csv(folder / "conditions.csv", rows, tables.CONDITION_COLUMNS)
+    files.write_csv(folder / "conditions.csv", rows, tables.CONDITION_COLUMNS)
     differences = tables.difference_rows(judged)
-    results.write_csv(folder / "differences.csv", differences, tables.DIFFERENCE_COLUMNS)
-    results.write_text(folder / "table.md", tables.table_markdown(found, rows))
-    results.write_text(folder / "findings.md", tables.findings_markdown(findings))
-    results.write_text(folder / REPORT, report.report_text(found, rows, findings))
+    files.write_csv(folder / "differences.csv", differences, tables.DIFFERENCE_COLUMNS)
+    files.write_text(folder / "table.md", tables.table_markdown(found, rows))
+    files.write_text(folder / "findings.md", tables.findings_markdown(findings))
+    files.write_text(folder / REPORT, report.report_text(found, rows, findings))
 
 
 def show_finished(settings: argparse.Namespace, plan: StudyPlan, folder: ResultFolder) -> None:
     """Print the report of a finished study; draw figures that were left out."""
-    from taichi_ants import results
+    from taichi_ants import files
     from taichi_ants.analysis.colony import figures
-    from taichi_ants.colony_study import from_arrays
+    from taichi_ants.studies.colony_study import from_arrays
 
     folder.check_whole(apart_from=(FIGURES,))
-    print(results.read_text(settings.out / REPORT))
+    print(files.read_text(settings.out / REPORT))
     if not settings.no_figures and folder.lacks(FIGURES):
-        found = from_arrays(plan, results.read_npz(settings.out / EPISODES))
+        found = from_arrays(plan, files.read_npz(settings.out / EPISODES))
         with folder.addition() as place:
             figures.save_all(found, place / FIGURES)
     print(f"{settings.out}/ holds this study already; --force runs it again.")
@@ -316,7 +316,7 @@ def show_finished(settings: argparse.Namespace, plan: StudyPlan, folder: ResultF
 
 def one_colony(settings: argparse.Namespace) -> None:
     """Let one colony live, then say what it did."""
-    from taichi_ants.one_colony import Outputs, live, summary
+    from taichi_ants.studies.one_colony import Outputs, live, summary
 
     outputs = Outputs(settings.save, settings.render, settings.every)
     outputs.check()

@@ -15,7 +15,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from taichi_ants.command_line import (
+from taichi_ants.studies.command_line import (
     ListAction,
     Parser,
     default_folder,
@@ -30,9 +30,9 @@ from taichi_ants.command_line import (
 
 if TYPE_CHECKING:
     from taichi_ants.analysis.comparison import Comparison
-    from taichi_ants.config import TrainingConfig
-    from taichi_ants.result_folder import ResultFolder
-    from taichi_ants.sweeps import Sweep, SweepResult
+    from taichi_ants.learners.config import TrainingConfig
+    from taichi_ants.studies.result_folder import ResultFolder
+    from taichi_ants.studies.sweeps import Sweep, SweepResult
 
 DELIVERIES = ("continuing", "absorbing")
 ROLLOUTS = 50
@@ -137,7 +137,7 @@ def build_sweep(settings: argparse.Namespace) -> Sweep:
     """The work, checked as a whole before any of it is done."""
     from taichi_ants import AntsError, worlds
     from taichi_ants.analysis.comparison import Row
-    from taichi_ants.sweeps import Sweep
+    from taichi_ants.studies.sweeps import Sweep
 
     if settings.plugin:
         load_plugin(settings.plugin)
@@ -218,7 +218,7 @@ def what_policies_do(sweep: Sweep, q_values: Any) -> tuple[Any, Any]:
     import numpy as np
 
     from taichi_ants.analysis.behaviour import classify
-    from taichi_ants.engines.traces import MAX_ROLLOUT_STEPS, trace_policies
+    from taichi_ants.engines.runs.traces import MAX_ROLLOUT_STEPS, trace_policies
 
     runs = q_values.shape[:2]
     tables = q_values.reshape(-1, *q_values.shape[2:])
@@ -237,35 +237,35 @@ def write_tables(
     folder: Path, comparison: Comparison, baselines: list[dict[str, Any]], costs: list[dict]
 ) -> tuple[Any, ...]:
     """Write all tables and the report; what `report.print_report` needs to show it."""
-    from taichi_ants import results
+    from taichi_ants import files
     from taichi_ants.analysis import report, summary, table2
     from taichi_ants.analysis.claims import assess, claims_markdown, claims_rows
 
     lines = summary.summarise(comparison)
-    results.write_csv(folder / "summary.csv", lines, summary.SUMMARY_COLUMNS)
+    files.write_csv(folder / "summary.csv", lines, summary.SUMMARY_COLUMNS)
     lines = summary.summarise_behaviours(comparison)
-    results.write_csv(folder / "behaviours.csv", lines, summary.BEHAVIOUR_COLUMNS)
+    files.write_csv(folder / "behaviours.csv", lines, summary.BEHAVIOUR_COLUMNS)
     table = table2.table2(comparison)
-    results.write_csv(folder / "table2.csv", table, list(table[0]))
-    results.write_text(folder / "table2.md", table2.table2_markdown(table, comparison))
+    files.write_csv(folder / "table2.csv", table, list(table[0]))
+    files.write_text(folder / "table2.md", table2.table2_markdown(table, comparison))
     findings = assess(comparison)
     rows = claims_rows(findings)
-    results.write_csv(folder / "claims.csv", rows, list(rows[0]))
-    results.write_text(folder / "claims.md", claims_markdown(findings, comparison.world))
+    files.write_csv(folder / "claims.csv", rows, list(rows[0]))
+    files.write_text(folder / "claims.md", claims_markdown(findings, comparison.world))
     shown = (comparison, table, findings, baselines, costs)
-    results.write_text(folder / REPORT, report.render(*shown))
+    files.write_text(folder / REPORT, report.render(*shown))
     return shown
 
 
 def write_episodes(folder: Path, comparison: Comparison) -> None:
     """Write what each episode and rollout gave, and what each policy does, as in summary.csv."""
-    from taichi_ants import results
+    from taichi_ants import files
 
     names: tuple[str, ...] = ("returns", "steps", "deliveries", "greedy_returns", "greedy_steps")
     names += ("greedy_deliveries", "behaviours", "policy_returns")
     arrays = {name: getattr(comparison, name) for name in names}
-    results.write_npz(
-        folder / EPISODES, {name: results.smallest(array) for name, array in arrays.items()}
+    files.write_npz(
+        folder / EPISODES, {name: files.smallest(array) for name, array in arrays.items()}
     )
 
 
@@ -296,9 +296,9 @@ def write_policies(folder: Path, sweep: Sweep, comparison: Comparison, tables: A
 def compare(settings: argparse.Namespace) -> None:
     """Run the comparison, or show the finished one."""
     from taichi_ants.analysis.report import print_report
-    from taichi_ants.provenance import provenance, sweep_settings
-    from taichi_ants.result_folder import ResultFolder
-    from taichi_ants.results import file_hash
+    from taichi_ants.files import file_hash
+    from taichi_ants.studies.provenance import provenance, sweep_settings
+    from taichi_ants.studies.result_folder import ResultFolder
 
     sweep = build_sweep(settings)
     plugin = file_hash(settings.plugin) if settings.plugin else None
@@ -322,10 +322,10 @@ def do_comparison(
     """All the work; what the manifest says of it, and what the report shows."""
     from functools import partial
 
-    from taichi_ants import results
+    from taichi_ants import files
     from taichi_ants.analysis.baselines import BASELINE_COLUMNS, baseline_rows
-    from taichi_ants.engines.runs import evaluate
-    from taichi_ants.sweeps import run_sweep
+    from taichi_ants.engines.runs.training import evaluate
+    from taichi_ants.studies.sweeps import run_sweep
 
     laps = {"start": time.perf_counter()}
     with progress_bar("training") as report_progress:
@@ -347,12 +347,12 @@ def do_comparison(
     laps["baselines"] = time.perf_counter()
     costs = [cost.as_row() for cost in result.costs]
     write_episodes(ready, comparison)
-    results.write_csv(ready / BASELINES, baselines, BASELINE_COLUMNS)
+    files.write_csv(ready / BASELINES, baselines, BASELINE_COLUMNS)
     with ExitStack() as beside:  # figures take one core and need no more than these two files
         if not settings.no_figures:
             beside.enter_context(process_beside(draw_figures, sweep, ready, ready))
         shown = write_tables(ready, comparison, baselines, costs)
-        policies = results.check_writable_folder(ready / POLICIES)
+        policies = files.check_writable_folder(ready / POLICIES)
         write_policies(policies, sweep, comparison, result.q_values)
         laps["tables"] = time.perf_counter()
         if not settings.no_render:
@@ -379,12 +379,12 @@ def render_policies(sweep: Sweep, policies: Path, folder: Path) -> None:
     """
     from dataclasses import replace
 
-    from taichi_ants import load_policy, results
+    from taichi_ants import files, load_policy
     from taichi_ants.analysis.comparison import Variant
     from taichi_ants.rendering import Episode, episode_frames, save_animation
     from taichi_ants.rendering.episodes import DEFAULT_FPS, with_pause
 
-    place = results.check_writable_folder(folder / RENDERS)
+    place = files.check_writable_folder(folder / RENDERS)
     with progress_bar("rendering") as report_progress:
         paths = sorted(policies.glob("*.npz"))
         for done, path in enumerate(paths):
@@ -410,13 +410,13 @@ def render_policies(sweep: Sweep, policies: Path, folder: Path) -> None:
 
 def show_finished(settings: argparse.Namespace, sweep: Sweep, folder: ResultFolder) -> None:
     """Print the summary of a finished comparison; add figures and episodes that were left out."""
-    from taichi_ants import results
+    from taichi_ants import files
 
     folder.check_whole(apart_from=(FIGURES, RENDERS))
     if sys.stdout is not None and sys.stdout.isatty():  # as wide as it is now
         show_report(settings, sweep)
     else:
-        print(results.read_text(settings.out / REPORT))
+        print(files.read_text(settings.out / REPORT))
     if not settings.no_render and folder.lacks(RENDERS):
         with folder.addition() as place:
             render_policies(sweep, settings.out / POLICIES, place)
@@ -431,27 +431,27 @@ def show_report(settings: argparse.Namespace, sweep: Sweep) -> None:
     import json
     from dataclasses import replace
 
-    from taichi_ants import results
+    from taichi_ants import files
     from taichi_ants.analysis import report, table2
     from taichi_ants.analysis.claims import assess
-    from taichi_ants.result_folder import MANIFEST
+    from taichi_ants.studies.result_folder import MANIFEST
 
     comparison, baselines = read_back(settings.out, sweep)
     if not comparison.in_paper_world:
         comparison = replace(comparison, world=world_name(settings))
-    costs = json.loads(results.read_text(settings.out / MANIFEST))["cost_per_step"]
+    costs = json.loads(files.read_text(settings.out / MANIFEST))["cost_per_step"]
     lines, findings = table2.table2(comparison), assess(comparison)
     report.print_report(comparison, lines, findings, baselines, costs)
 
 
 def read_back(folder: Path, sweep: Sweep) -> tuple[Comparison, list[dict[str, Any]]]:
     """The comparison and the baselines that a folder holds."""
-    from taichi_ants import AntsError, results
+    from taichi_ants import AntsError, files
     from taichi_ants.analysis.baselines import BASELINE_COLUMNS
-    from taichi_ants.sweeps import SweepResult
+    from taichi_ants.studies.sweeps import SweepResult
 
     try:
-        arrays = results.read_npz(folder / EPISODES)
+        arrays = files.read_npz(folder / EPISODES)
         arrays = {name: array.astype(int) for name, array in arrays.items()}
         done = arrays.pop("behaviours"), arrays.pop("policy_returns")
         result = SweepResult(**arrays, q_values=None, costs=())

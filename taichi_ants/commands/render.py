@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from taichi_ants.command_line import (
+from taichi_ants.studies.command_line import (
     ListAction,
     Parser,
     load_plugin,
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from taichi_ants import Colony, World
-    from taichi_ants.config import TrainingConfig
+    from taichi_ants.learners.config import TrainingConfig
     from taichi_ants.rendering import Stage
 
 DEFAULT_OUT = {

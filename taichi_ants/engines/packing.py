@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from taichi_ants.constants import EMPTY, N_HEADINGS
-from taichi_ants.hexgrid import AxialGrid
+from taichi_ants.grid.constants import N_HEADINGS
+from taichi_ants.grid.hexgrid import AxialGrid
+from taichi_ants.task.constants import EMPTY
 from taichi_ants.worlds.world import World
 
 _OCCUPIED = 16

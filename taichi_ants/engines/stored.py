@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants import results
+from taichi_ants import files
 from taichi_ants.errors import AntsError
 from taichi_ants.worlds.world import World
 
@@ -38,22 +38,22 @@ class FileKind:
 
     def write(
         self,
-        path: results.PathLike,
+        path: files.PathLike,
         facts: Mapping[str, Any],
         arrays: Mapping[str, np.ndarray],
         compress: bool,
     ) -> None:
-        """Write a file; raises as `results.write_atomically` does."""
-        text = results.to_json({"format": self.mark, **facts})
-        results.write_npz(path, {**arrays, "facts": np.array(text)}, compress=compress)
+        """Write a file; raises as `files.write_atomically` does."""
+        text = files.to_json({"format": self.mark, **facts})
+        files.write_npz(path, {**arrays, "facts": np.array(text)}, compress=compress)
 
-    def read(self, path: results.PathLike) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    def read(self, path: files.PathLike) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         """The arrays and the facts of a file.
 
         Raises:
             AntsError: The file is missing, damaged, or of another kind.
         """
-        stored = results.read_npz(path)
+        stored = files.read_npz(path)
         try:
             facts = json.loads(str(stored["facts"][()]))
             if facts["format"] != self.mark:
@@ -66,7 +66,7 @@ class FileKind:
         return stored, facts
 
     @contextmanager
-    def rebuilding(self, path: results.PathLike) -> Iterator[None]:
+    def rebuilding(self, path: files.PathLike) -> Iterator[None]:
         """Turns what goes wrong while an object is built from a file into one AntsError."""
         try:
             yield

@@ -99,7 +99,7 @@ def _fault(td_error: Callable[..., object], wide: bool = False) -> str:
     """
     import taichi as ti
 
-    from taichi_ants.engines.run_learning import ROW, TABLE, Rates, update
+    from taichi_ants.engines.runs.learning import ROW, TABLE, Rates, update
 
     f32 = ti.types.ndarray(dtype=ti.f32, ndim=1)
 

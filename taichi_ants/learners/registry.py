@@ -1,7 +1,7 @@
 """The one place where learners are registered.
 
 A learner is a pure function that returns a TD error, and what it needs besides. To add one, write
-a file beside this one and a line in `__init__.py`; or call `register` from a file of your own.
+a file beside this one and add its name to `BUILT_IN`; or call `register` from a file of your own.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import dis
 import inspect
 from dataclasses import dataclass
+from importlib import import_module
 from types import FunctionType
 from typing import Any
 
@@ -43,6 +44,9 @@ class Learner:
     summary: str = ""
 
 
+# The package's own: NAME in the file `name.py`, imported when it is asked for, since that starts
+# to import Taichi.
+BUILT_IN = ("q_learning", "sarsa", "expected_sarsa", "dyna_q")
 _LEARNERS: dict[str, Learner] = {}
 
 
@@ -65,7 +69,7 @@ def register(learner: Learner) -> Learner:
         raise AntsError(
             f"the TD error of {learner.name!r} is no Taichi function; mark it @ti.func."
         )
-    if learner.name in _LEARNERS:
+    if learner.name in names():
         raise AntsError(f"a learner named {learner.name!r} exists already; choose another name.")
     _check_arguments(learner, learner.td_error.func.func)
     _LEARNERS[learner.name] = learner
@@ -98,6 +102,8 @@ def get(name: str) -> Learner:
     Raises:
         AntsError: There is none; the message lists those that exist.
     """
+    if name in BUILT_IN:
+        return getattr(import_module(f"taichi_ants.learners.{name}"), name.upper())
     if name not in _LEARNERS:
         raise AntsError(f"there is no learner {name!r}; choose one of {', '.join(names())}.")
     return _LEARNERS[name]
@@ -105,4 +111,4 @@ def get(name: str) -> Learner:
 
 def names() -> tuple[str, ...]:
     """The names of all registered learners, in the order of registration."""
-    return tuple(_LEARNERS)
+    return (*BUILT_IN, *_LEARNERS)

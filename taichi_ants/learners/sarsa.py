@@ -2,8 +2,8 @@
 
 import taichi as ti
 
-from taichi_ants.constants import N_ACTIONS
 from taichi_ants.learners.registry import Learner
+from taichi_ants.task.constants import N_ACTIONS
 
 
 @ti.func

@@ -10,7 +10,7 @@ import taichi as ti
 from taichi.lang.expr import Expr
 
 from taichi_ants.learners.registry import Learner
-from taichi_ants.rules.policy import larger, smaller
+from taichi_ants.task.rules.policy import larger, smaller
 
 _FLOATS = (ti.f16, ti.f32, ti.f64)
 

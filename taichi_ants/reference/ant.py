@@ -8,13 +8,16 @@ from typing import Protocol
 
 import numpy as np
 
-import taichi_ants.rewards as rewards
-from taichi_ants.constants import (
+import taichi_ants.task.rewards as rewards
+from taichi_ants.grid.constants import N_HEADINGS
+from taichi_ants.reference.geometry import Cell, distance, neighbour
+from taichi_ants.reference.random_stream import RandomStream, pick
+from taichi_ants.reference.world_state import WorldState
+from taichi_ants.task.constants import (
     EMPTY,
     FOOD,
     GIVE,
     N_ACTIONS,
-    N_HEADINGS,
     PICK_UP,
     QUEEN,
     SEES_EMPTY,
@@ -22,9 +25,6 @@ from taichi_ants.constants import (
     SEES_LURE,
     SEES_OBSTACLE,
 )
-from taichi_ants.reference.geometry import Cell, distance, neighbour
-from taichi_ants.reference.random_stream import RandomStream, pick
-from taichi_ants.reference.world_state import WorldState
 
 
 @dataclass(slots=True)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from taichi_ants.constants import PICK_UP, STREAM_ANT, STREAM_BORN, STREAM_QUEEN
 from taichi_ants.errors import AntsError
+from taichi_ants.grid.constants import STREAM_ANT, STREAM_BORN, STREAM_QUEEN
 from taichi_ants.reference.ant import Event, observe
 from taichi_ants.reference.colony_actions import carry_out, intend
 from taichi_ants.reference.colony_homes import Homes
@@ -26,10 +26,11 @@ from taichi_ants.reference.learning import decayed_epsilon
 from taichi_ants.reference.policy import choose_action
 from taichi_ants.reference.random_stream import RandomStream, stream_state
 from taichi_ants.reference.start import start
+from taichi_ants.task.constants import PICK_UP
 
 if TYPE_CHECKING:
-    from taichi_ants.colony_config import ColonyConfig
-    from taichi_ants.config import TrainingConfig
+    from taichi_ants.learners.config import TrainingConfig
+    from taichi_ants.task.colony import ColonyConfig
     from taichi_ants.worlds.world import World
 
 

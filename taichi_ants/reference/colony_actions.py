@@ -4,21 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import taichi_ants.rewards as rewards
-from taichi_ants.constants import (
-    GIVE,
-    N_HEADINGS,
-    PICK_UP,
-    SEES_EMPTY,
-    SEES_GOAL,
-    SEES_LURE,
-)
+import taichi_ants.task.rewards as rewards
+from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.ant import Event
 from taichi_ants.reference.colony_conflicts import Claim, winners
 from taichi_ants.reference.colony_records import ColonyAnt
 from taichi_ants.reference.colony_world import ColonyWorld
 from taichi_ants.reference.geometry import Cell, neighbour
 from taichi_ants.reference.random_stream import pick
+from taichi_ants.task.constants import GIVE, PICK_UP, SEES_EMPTY, SEES_GOAL, SEES_LURE
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from taichi_ants.constants import EMPTY, HEADING_STEPS, N_HEADINGS, OBSTACLE, QUEEN
+from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
 from taichi_ants.reference.colony_world import ColonyWorld
 from taichi_ants.reference.geometry import Cell, neighbour
 from taichi_ants.reference.random_stream import RandomStream, pick
+from taichi_ants.task.constants import EMPTY, OBSTACLE, QUEEN
 
 
 @dataclass(slots=True)

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from taichi_ants.colony_config import update_weights
-from taichi_ants.constants import N_ACTIONS, N_STATES
 from taichi_ants.reference.colony_records import Transition
 from taichi_ants.reference.knowledge import Knowledge
 from taichi_ants.reference.learning import learn_alone
 from taichi_ants.reference.random_stream import RandomStream
 from taichi_ants.reference.records import Pair
+from taichi_ants.task.colony import update_weights
+from taichi_ants.task.constants import N_ACTIONS, N_STATES
 
 if TYPE_CHECKING:
-    from taichi_ants.config import TrainingConfig
+    from taichi_ants.learners.config import TrainingConfig
 
 _ONE = 1 << 32  # TD errors are summed in units of 2**-32
 

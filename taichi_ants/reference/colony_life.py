@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from taichi_ants.constants import EMPTY, FOOD, N_HEADINGS
+from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.colony_records import ColonyAnt
 from taichi_ants.reference.colony_world import ColonyWorld
 from taichi_ants.reference.geometry import Cell, neighbour
 from taichi_ants.reference.random_stream import RandomStream, pick
+from taichi_ants.task.constants import EMPTY, FOOD
 
 
 class Queen:

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from taichi_ants.constants import N_HEADINGS
+from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.geometry import Cell, existing_cells, neighbour
 
 if TYPE_CHECKING:
-    from taichi_ants.colony_config import Pheromone
+    from taichi_ants.task.colony import Pheromone
     from taichi_ants.worlds.world import World
 
 

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from taichi_ants.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 from taichi_ants.reference.colony_trail import make_trail
 from taichi_ants.reference.geometry import Cell, existing_cells
+from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
 if TYPE_CHECKING:
-    from taichi_ants.colony_config import Pheromone
+    from taichi_ants.task.colony import Pheromone
     from taichi_ants.worlds.world import World
 
 

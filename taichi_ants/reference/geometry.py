@@ -6,7 +6,7 @@ what all functions return and what dictionaries are keyed by.
 
 from __future__ import annotations
 
-from taichi_ants.constants import HEADING_STEPS, N_HEADINGS
+from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
 
 Cell = tuple[int, int, int]
 

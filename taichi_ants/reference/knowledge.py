@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from taichi_ants.constants import N_ACTIONS, N_STATES
 from taichi_ants.errors import AntsError
 from taichi_ants.reference.learners import learner_named
 from taichi_ants.reference.random_stream import RandomStream, pick
 from taichi_ants.reference.records import Model, Outcome, Pair
+from taichi_ants.task.constants import N_ACTIONS, N_STATES
 
 if TYPE_CHECKING:
-    from taichi_ants.config import TrainingConfig
+    from taichi_ants.learners.config import TrainingConfig
 
 
 class Knowledge:

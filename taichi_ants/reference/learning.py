@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from taichi_ants.constants import STREAM_ANT
+from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.reference.knowledge import Knowledge
 from taichi_ants.reference.policy import choose_action
 from taichi_ants.reference.random_stream import RandomStream, stream_state
 from taichi_ants.reference.records import Model, Outcome, Pair, Run, Step
 
 if TYPE_CHECKING:
-    from taichi_ants.config import TrainingConfig
+    from taichi_ants.learners.config import TrainingConfig
 
 
 def decayed_epsilon(epsilon: float, config: TrainingConfig) -> float:

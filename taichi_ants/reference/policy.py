@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from taichi_ants.constants import N_ACTIONS
 from taichi_ants.reference.random_stream import RandomStream, pick
+from taichi_ants.task.constants import N_ACTIONS
 
 
 def choose_action(values: Sequence[np.float32], epsilon: float, stream: RandomStream) -> int:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from taichi_ants.constants import STREAM_ROLLOUT
+from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.reference.episode import Episode
 from taichi_ants.reference.learning import Learning
 from taichi_ants.reference.policy import choose_action
@@ -15,7 +15,7 @@ from taichi_ants.reference.records import LearningStep, Rollout, Run, Step
 from taichi_ants.reference.start import start
 
 if TYPE_CHECKING:
-    from taichi_ants.config import TrainingConfig
+    from taichi_ants.learners.config import TrainingConfig
     from taichi_ants.worlds.world import World
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from taichi_ants.constants import EMPTY, N_HEADINGS, STREAM_START_CELL, STREAM_START_HEADING
 from taichi_ants.errors import AntsError
+from taichi_ants.grid.constants import N_HEADINGS, STREAM_START_CELL, STREAM_START_HEADING
 from taichi_ants.reference.geometry import Cell, distance, existing_cells
 from taichi_ants.reference.random_stream import pick, stream_state
 from taichi_ants.reference.world_state import WorldState
+from taichi_ants.task.constants import EMPTY
 
 if TYPE_CHECKING:
     from taichi_ants.worlds.world import World

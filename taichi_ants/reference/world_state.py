@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from taichi_ants.constants import DEPOSIT_LEVEL, EMPTY, FOOD, OBSTACLE, QUEEN
 from taichi_ants.reference.geometry import Cell, exists
+from taichi_ants.task.constants import DEPOSIT_LEVEL, EMPTY, FOOD, OBSTACLE, QUEEN
 
 if TYPE_CHECKING:
     from taichi_ants.worlds.world import World

@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taichi_ants.constants import DEPOSIT_LEVEL
 from taichi_ants.errors import AntsError
-from taichi_ants.hexgrid import AxialGrid
-from taichi_ants.randomness import whole
+from taichi_ants.grid.hexgrid import AxialGrid
+from taichi_ants.grid.randomness import whole
 from taichi_ants.rendering.arguments import expect
 from taichi_ants.rendering.episodes import DEFAULT_FPS, Progress, with_pause
 from taichi_ants.rendering.panel import Status
 from taichi_ants.rendering.scene import DEFAULT_SIZE, Scene
 from taichi_ants.rendering.snapshot import Snapshot
 from taichi_ants.rendering.writers import PathLike, check_animation, save_animation
+from taichi_ants.task.constants import DEPOSIT_LEVEL
 
 if TYPE_CHECKING:
-    from taichi_ants.engines.colony import Colony
+    from taichi_ants.engines.colony.colony import Colony
 
 
 def colony_frames(
@@ -98,7 +98,7 @@ def _checked_ticks(every: int, ticks: int) -> tuple[int, int]:
 
 def _grid_of(colony: Colony, world: int) -> AxialGrid:
     """The grid of one of a colony's worlds."""
-    from taichi_ants.engines.colony import Colony
+    from taichi_ants.engines.colony.colony import Colony
 
     expect("colony", colony, Colony)
     if not 0 <= whole("world", world) < len(colony.worlds):

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants.engines.traces import Trace, rollout
+from taichi_ants.engines.runs.traces import Trace, rollout
 from taichi_ants.errors import AntsError, checked_flag
-from taichi_ants.randomness import whole
+from taichi_ants.grid.randomness import whole
 from taichi_ants.rendering.arguments import expect
 from taichi_ants.rendering.panel import Status
 from taichi_ants.rendering.replay import Replay

@@ -8,8 +8,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_ants.config import TrainingConfig
-from taichi_ants.constants import (
+from taichi_ants.engines.runs.training import continue_training, train
+from taichi_ants.errors import AntsError
+from taichi_ants.grid.hexgrid import AxialGrid
+from taichi_ants.grid.randomness import whole
+from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.rendering import colours, text
+from taichi_ants.rendering.arguments import expect
+from taichi_ants.rendering.episodes import DEFAULT_FPS, Episode, Progress, with_pause, without_view
+from taichi_ants.rendering.panel import Status, draw_swatch
+from taichi_ants.rendering.rasteriser import Rasteriser
+from taichi_ants.rendering.scene import check_size
+from taichi_ants.rendering.viewport import Viewport
+from taichi_ants.rendering.writers import PathLike, check_animation, save_animation
+from taichi_ants.task.constants import (
     DELIVERED,
     DEPOSIT_LEVEL,
     EMPTY,
@@ -21,19 +33,7 @@ from taichi_ants.constants import (
     PICKED_UP,
     QUEEN,
 )
-from taichi_ants.engines.runs import continue_training, train
-from taichi_ants.errors import AntsError
-from taichi_ants.hexgrid import AxialGrid
-from taichi_ants.randomness import whole
-from taichi_ants.rendering import colours, text
-from taichi_ants.rendering.arguments import expect
-from taichi_ants.rendering.episodes import DEFAULT_FPS, Episode, Progress, with_pause, without_view
-from taichi_ants.rendering.panel import Status, draw_swatch
-from taichi_ants.rendering.rasteriser import Rasteriser
-from taichi_ants.rendering.scene import check_size
-from taichi_ants.rendering.viewport import Viewport
-from taichi_ants.rendering.writers import PathLike, check_animation, save_animation
-from taichi_ants.rewards import REWARDS
+from taichi_ants.task.rewards import REWARDS
 from taichi_ants.worlds.world import World
 
 STAGES = (0, 10, 100, 500)

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_ants.constants import ACTION_NAMES, EMPTY, FOOD, N_ACTIONS, OBSTACLE, QUEEN
-from taichi_ants.hexgrid import AxialGrid
+from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import colours, text
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.rendering.snapshot import Snapshot
 from taichi_ants.rendering.viewport import Viewport
-from taichi_ants.states import CELL_LETTERS, TASK_NAMES, state_from_index
+from taichi_ants.task.constants import ACTION_NAMES, EMPTY, FOOD, N_ACTIONS, OBSTACLE, QUEEN
+from taichi_ants.task.states import CELL_LETTERS, TASK_NAMES, state_from_index
 
 # What a cell holds, what an ant on it carries, a letter on it, and what it is called.
 _LEGEND = (

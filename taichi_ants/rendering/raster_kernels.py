@@ -10,7 +10,7 @@ import math
 import taichi as ti
 from taichi.math import clamp, mix, vec2, vec3
 
-from taichi_ants.constants import HEADING_STEPS, N_HEADINGS
+from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
 from taichi_ants.rendering import shapes
 from taichi_ants.rendering.colours import CELL_FOOD, PAGE
 

@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from taichi_ants import runtime
-from taichi_ants.constants import DEPOSIT_LEVEL, EMPTY, FOOD, OBSTACLE, QUEEN
-from taichi_ants.hexgrid import AxialGrid
+from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import colours
 from taichi_ants.rendering.snapshot import Snapshot
 from taichi_ants.rendering.viewport import Viewport
+from taichi_ants.task.constants import DEPOSIT_LEVEL, EMPTY, FOOD, OBSTACLE, QUEEN
 
 # Hexagons of fewer pixels are drawn by the mean of what a pixel covers.
 _SMALLEST_HEXAGON = 2.5

@@ -6,22 +6,21 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from taichi_ants.constants import (
+from taichi_ants.engines.runs.traces import Trace
+from taichi_ants.errors import checked_flag
+from taichi_ants.grid.constants import N_HEADINGS, STREAM_ROLLOUT
+from taichi_ants.grid.randomness import Stream
+from taichi_ants.rendering.snapshot import Snapshot
+from taichi_ants.task.constants import (
     DEPOSIT_LEVEL,
     EMPTY,
-    N_HEADINGS,
     PICK_UP,
     RIGHT,
     SEES_EMPTY,
     SEES_GOAL,
     SEES_LURE,
-    STREAM_ROLLOUT,
 )
-from taichi_ants.engines.traces import Trace
-from taichi_ants.errors import checked_flag
-from taichi_ants.randomness import Stream
-from taichi_ants.rendering.snapshot import Snapshot
-from taichi_ants.states import CELL_LETTERS, state_from_index
+from taichi_ants.task.states import CELL_LETTERS, state_from_index
 from taichi_ants.worlds.world import World
 
 

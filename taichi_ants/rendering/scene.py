@@ -7,15 +7,15 @@ from numbers import Real
 
 import numpy as np
 
-from taichi_ants.constants import DEPOSIT_LEVEL, FOOD, QUEEN
 from taichi_ants.errors import AntsError, checked_flag, shown
-from taichi_ants.hexgrid import AxialGrid
+from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import colours, panel, text
 from taichi_ants.rendering.arguments import expect
 from taichi_ants.rendering.panel import Status
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.rendering.snapshot import Snapshot
 from taichi_ants.rendering.viewport import Viewport
+from taichi_ants.task.constants import DEPOSIT_LEVEL, FOOD, QUEEN
 
 SMALLEST_SIDE, LARGEST_SIDE = 64, 4096
 DEFAULT_SIZE = (1280, 720)

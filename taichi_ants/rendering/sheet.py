@@ -12,7 +12,16 @@ import math
 
 import numpy as np
 
-from taichi_ants.constants import (
+from taichi_ants.errors import AntsError, checked_flag, shown
+from taichi_ants.grid.hexgrid import AxialGrid
+from taichi_ants.grid.randomness import whole
+from taichi_ants.rendering import colours, text
+from taichi_ants.rendering.arguments import expect
+from taichi_ants.rendering.panel import fill
+from taichi_ants.rendering.rasteriser import Rasteriser
+from taichi_ants.rendering.scene import write_letter
+from taichi_ants.rendering.viewport import Viewport
+from taichi_ants.task.constants import (
     ACTION_NAMES,
     GIVE,
     LEFT,
@@ -25,16 +34,13 @@ from taichi_ants.constants import (
     SEES_LURE,
     SEES_OBSTACLE,
 )
-from taichi_ants.errors import AntsError, checked_flag, shown
-from taichi_ants.hexgrid import AxialGrid
-from taichi_ants.randomness import whole
-from taichi_ants.rendering import colours, text
-from taichi_ants.rendering.arguments import expect
-from taichi_ants.rendering.panel import fill
-from taichi_ants.rendering.rasteriser import Rasteriser
-from taichi_ants.rendering.scene import write_letter
-from taichi_ants.rendering.viewport import Viewport
-from taichi_ants.states import CELL_LETTERS, REACHABLE_STATES, State, state_from_index, state_index
+from taichi_ants.task.states import (
+    CELL_LETTERS,
+    REACHABLE_STATES,
+    State,
+    state_from_index,
+    state_index,
+)
 
 # Width in pixels and states side by side, of a sheet of what was learned and of all states. The
 # first is read at the width of a page, the second needs a screen of its own.

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants.constants import N_HEADINGS
 from taichi_ants.errors import AntsError, shown
-from taichi_ants.hexgrid import AxialGrid
+from taichi_ants.grid.constants import N_HEADINGS
+from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering.arguments import expect
 from taichi_ants.worlds.world import World
 

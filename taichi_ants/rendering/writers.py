@@ -14,7 +14,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from taichi_ants import results
+from taichi_ants import files
 from taichi_ants.errors import AntsError, shown
 from taichi_ants.rendering import animated_files
 from taichi_ants.rendering.arguments import expect
@@ -91,7 +91,7 @@ def save_animation(path: PathLike, frames: Iterable[np.ndarray], fps: float) -> 
     with _folder_of(target):
         if kind:
             write = _ANIMATIONS[kind]
-            results.write_atomically(target, lambda file: write(file, checked, fps))
+            files.write_atomically(target, lambda file: write(file, checked, fps))
         else:
             _save_pictures(target, checked)
 
@@ -105,7 +105,7 @@ def save_picture(path: PathLike, frame: np.ndarray) -> None:
     target = check_picture(path)
     _check_frame(frame)
     with _folder_of(target):
-        results.write_atomically(target, lambda file: _write_png(file, frame, optimize=True))
+        files.write_atomically(target, lambda file: _write_png(file, frame, optimize=True))
 
 
 def check_picture(path: PathLike) -> Path:
@@ -198,7 +198,7 @@ def _folder_of(target: Path, keep: bool = True) -> Iterator[None]:
     missing = [folder for folder in target.parents if not folder.exists()]
     done = False
     try:
-        results.check_writable_folder(target.parent)
+        files.check_writable_folder(target.parent)
         yield
         done = keep
     finally:

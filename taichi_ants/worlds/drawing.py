@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_ants.constants import MAX_TRAIL_LEVEL
 from taichi_ants.errors import AntsError, shown
-from taichi_ants.hexgrid import axial
+from taichi_ants.grid.hexgrid import axial
+from taichi_ants.task.constants import MAX_TRAIL_LEVEL
 
 EMPTY, OBSTACLE, FOOD, QUEEN, TRAIL = ".#FQt"
 ANTS = "012345"  # by heading

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from taichi_ants.constants import EMPTY, HEADING_STEPS
-from taichi_ants.hexgrid import AxialGrid, axial
+from taichi_ants.grid.constants import HEADING_STEPS
+from taichi_ants.grid.hexgrid import AxialGrid, axial
+from taichi_ants.task.constants import EMPTY
 
 # Which cells of a 3 x 3 window (rows r, columns q) are neighbours on the hexagonal grid.
 _NEIGHBOURS = np.array([[1, 1, 0], [1, 1, 1], [0, 1, 1]])

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from taichi_ants.colony_config import STARTS
-from taichi_ants.constants import EMPTY, N_HEADINGS, STREAM_START_CELL, STREAM_START_HEADING
 from taichi_ants.errors import AntsError, check_one_of, shown
-from taichi_ants.randomness import choose, stream_state, whole
+from taichi_ants.grid.constants import N_HEADINGS, STREAM_START_CELL, STREAM_START_HEADING
+from taichi_ants.grid.randomness import choose, stream_state, whole
+from taichi_ants.task.colony import STARTS
+from taichi_ants.task.constants import EMPTY
 
 if TYPE_CHECKING:
     from taichi_ants.worlds.world import World

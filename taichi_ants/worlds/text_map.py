@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from taichi_ants.errors import AntsError, shown
-from taichi_ants.hexgrid import AxialGrid, cube
+from taichi_ants.grid.hexgrid import AxialGrid, cube
 from taichi_ants.worlds import drawing as marks
 from taichi_ants.worlds.map_fit import smallest_world
 from taichi_ants.worlds.world import World

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from taichi_ants.constants import EMPTY, FOOD, OBSTACLE, QUEEN
-from taichi_ants.hexgrid import AxialGrid
+from taichi_ants.grid.hexgrid import AxialGrid
+from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 from taichi_ants.worlds import geometry, starts, validation
 
 

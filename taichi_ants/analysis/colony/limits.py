@@ -27,7 +27,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_ants.constants import EMPTY, FOOD, N_HEADINGS, QUEEN
+from taichi_ants.grid.constants import N_HEADINGS
+from taichi_ants.task.constants import EMPTY, FOOD, QUEEN
 from taichi_ants.worlds.world import World
 
 TICKS_A_CELL = 3

@@ -1,0 +1,154 @@
+"""Checks of what callers pass to the engines; kernels assume valid input."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+
+from taichi_ants import learners
+from taichi_ants.errors import AntsError, shown
+from taichi_ants.grid.randomness import whole
+from taichi_ants.learners.config import TrainingConfig, share_of_one
+from taichi_ants.task import rewards
+from taichi_ants.task.constants import MAX_STEPS, N_ACTIONS, N_STATES
+from taichi_ants.worlds.world import World
+
+
+def checked_world(world: World) -> World:
+    """The world, if it is one."""
+    if not isinstance(world, World):
+        raise AntsError(f"world is {shown(world)}; it must be a World, for example worlds.paper().")
+    return world
+
+
+def checked_task(world: World) -> World:
+    """The world, if it is one to learn in: it has food, or nothing could ever be delivered."""
+    if not len(checked_world(world).foods):
+        raise AntsError("the world has no food, so there is nothing to learn; give it some.")
+    return world
+
+
+def checked_progress(progress: Callable[[float], None] | None) -> Callable[[float], None] | None:
+    """What is called with the share of the work that is done, or None."""
+    if progress is not None and not callable(progress):
+        raise AntsError(
+            f"progress is {shown(progress)}; it must be a function of a share, or None."
+        )
+    return progress
+
+
+def checked_configs(configs: TrainingConfig | Sequence[TrainingConfig]) -> tuple:
+    """One configuration or several as a tuple; their learners exist and plan as they say."""
+    if isinstance(configs, TrainingConfig):
+        configs = (configs,)
+    elif not isinstance(configs, Iterable):
+        raise AntsError(f"configs is {shown(configs)}; it must be one TrainingConfig or several.")
+    several = tuple(configs)
+    if not several:
+        raise AntsError("configs is empty; give at least one TrainingConfig.")
+    for config in several:
+        if not isinstance(config, TrainingConfig):
+            raise AntsError(
+                f"configs holds {shown(config)}; it must hold TrainingConfig objects only."
+            )
+        plans = learners.get(config.learner).plans
+        if plans and config.planning_steps == 0:
+            raise AntsError(
+                f"planning_steps is 0, but learner {shown(config.learner)} plans; give 1 or more."
+            )
+        if not plans and config.planning_steps != 0:
+            raise AntsError(
+                f"planning_steps is {config.planning_steps}, but learner {shown(config.learner)} "
+                "does not plan; leave it at 0."
+            )
+    return several
+
+
+def checked_seeds(seeds: int | Sequence[int]) -> tuple[int, ...]:
+    """One seed or several different ones as a tuple."""
+    if isinstance(seeds, np.ndarray):
+        seeds = seeds.ravel().tolist()
+    # Text can be iterated over too, but is no sequence of numbers.
+    given = (
+        seeds if isinstance(seeds, Iterable) and not isinstance(seeds, (str, bytes)) else (seeds,)
+    )
+    several = tuple(whole("a seed", seed) for seed in given)
+    if not several:
+        raise AntsError("seeds is empty; give at least one whole number.")
+    taken: dict[int, int] = {}
+    for seed in several:
+        if not -(2**63) <= seed < 2**64:
+            raise AntsError(f"seeds holds {shown(seed)}; a seed must fit into 64 bits.")
+        if (word := seed % 2**64) in taken:
+            same = taken[word]
+            reason = "more than once" if same == seed else f"and {same}, which are one in 64 bits"
+            raise AntsError(f"seeds holds {seed} {reason}; each seed must differ.")
+        taken[word] = seed
+    return several
+
+
+def checked_seeds_for(seeds: int | Sequence[int], shape: tuple[int, ...]) -> np.ndarray:
+    """A seed for each table of the given leading shape, as flat Python integers (object array)."""
+    several = checked_seeds(seeds)
+    if len(several) != 1 and (not shape or shape[-1] != len(several)):
+        raise AntsError(
+            f"there are {len(several)} seeds for tables of leading shape {shape}; give one seed, "
+            "or as many as the last leading axis is long."
+        )
+    return np.broadcast_to(np.array(several, dtype=object), shape or (1,)).ravel()
+
+
+def checked_count(name: str, value: int, most: int = 2**31 - 1, least: int = 1) -> int:
+    """A whole number from `least` to `most`."""
+    value = whole(name, value)
+    if not least <= value <= most:
+        raise AntsError(f"{name} is {shown(value)}; it must lie between {least} and {most}.")
+    return value
+
+
+def checked_max_steps(value: int) -> int:
+    """The step limit of an episode, whose return must fit into 32 bits."""
+    most = (2**31 - 1) // max(1, rewards.REWARDS.largest)
+    return checked_count("max_steps", value, min(MAX_STEPS, most))
+
+
+def checked_share(name: str, value: float) -> float:
+    """A number from 0 to 1."""
+    if not share_of_one(value):
+        raise AntsError(f"{name} is {shown(value)}; it must be a number between 0 and 1.")
+    return float(value)
+
+
+def check_finite(
+    tables: np.ndarray, configs: Sequence[TrainingConfig], seeds: Sequence[int]
+) -> None:
+    """Refuse what a learner has made if it is not finite, tables (configurations * seeds, ...)."""
+    with np.errstate(all="ignore"):
+        if np.isfinite(tables.sum()):  # one pass without a copy; tables of a colony can be large
+            return
+    finite = np.isfinite(tables).reshape(len(configs), len(seeds), -1).all(axis=-1)
+    for c, s in np.argwhere(~finite)[:1]:
+        raise AntsError(
+            f"learner {configs[c].learner!r} made action values that are not finite, with "
+            f"{configs[c]} and seed {seeds[s]}; mend its TD error."
+        )
+
+
+def checked_q_values(q_values: np.ndarray) -> np.ndarray:
+    """Action values as float32 (..., 128, 5), finite."""
+    try:
+        if np.iscomplexobj(q_values):
+            raise TypeError
+        tables = np.asarray(q_values, dtype=np.float32)
+    except (OverflowError, TypeError, ValueError):
+        raise AntsError(
+            "q_values is not an array of numbers; give a float (..., 128, 5) array."
+        ) from None
+    if tables.shape[-2:] != (N_STATES, N_ACTIONS) or tables.size == 0:
+        raise AntsError(
+            f"q_values has shape {tables.shape}; it must end in ({N_STATES}, {N_ACTIONS})."
+        )
+    if not np.isfinite(tables).all():
+        raise AntsError("q_values holds numbers that are not finite; action values must be finite.")
+    return tables

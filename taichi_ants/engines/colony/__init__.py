@@ -1,0 +1,1 @@
+"""Worlds of many ants that act and learn in lockstep, tick by tick."""

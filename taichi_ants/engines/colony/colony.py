@@ -1,0 +1,433 @@
+"""The colony: many ants in one world, in many worlds at once; the lockstep engine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from taichi_ants import checks, learners, runtime
+from taichi_ants.engines.colony import files as colony_files
+from taichi_ants.engines.colony import memory as colony_memory
+from taichi_ants.engines.records import Record
+from taichi_ants.errors import AntsError, check_one_of, shown
+from taichi_ants.files import PathLike
+from taichi_ants.grid.hexgrid import AxialGrid
+from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.task.colony import SHARINGS, ColonyConfig
+from taichi_ants.task.constants import EMPTY, MAX_STEPS, N_ACTIONS, N_STATES
+from taichi_ants.worlds.world import World
+
+Progress = Callable[[float], None]
+
+_LARGE_COLONY = 16_384  # slots from which ants, not worlds, are handed to threads
+_ANTS_PER_CHUNK = 2048
+_MOST_CHUNKS = 256
+_TICKS_BETWEEN_SORTS = 32
+_TICK_NS = 150  # of an ant, on a slow core, planning left out
+_LAUNCH_SECONDS = 0.4
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ColonyEpisodes(Record):
+    """What episodes gave, arrays of shape (episodes, worlds).
+
+    Attributes:
+        returns: int64, rewards of all ants.
+        ticks: int32, length.
+        deliveries: int32, foods given to the queen.
+        first_delivery: int32, ticks until the first delivery; -1 if there was none.
+        moves: int32, moves that ants tried.
+        blocked: int32, moves that failed.
+        births, deaths: int32, ants.
+        regrown: int32, foods that grew back.
+        living: int32, ants at the end.
+    """
+
+    returns: np.ndarray
+    ticks: np.ndarray
+    deliveries: np.ndarray
+    first_delivery: np.ndarray
+    moves: np.ndarray
+    blocked: np.ndarray
+    births: np.ndarray
+    deaths: np.ndarray
+    regrown: np.ndarray
+    living: np.ndarray
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ColonySnapshot(Record):
+    """One world of a colony at one moment, as `taichi_ants.rendering` draws it.
+
+    Attributes:
+        grid: Where the cells lie in the arrays.
+        ground: uint8 (grid.size,), EMPTY, OBSTACLE, FOOD or QUEEN; EMPTY under ants.
+        trail: int32 or float32 (grid.size,), trail levels.
+        ant_cells: int32 (n,), flat indices of the living ants.
+        ant_headings: int32 (n,), 0 to 5.
+        ant_carries: bool (n,).
+    """
+
+    grid: AxialGrid
+    ground: np.ndarray
+    trail: np.ndarray
+    ant_cells: np.ndarray
+    ant_headings: np.ndarray
+    ant_carries: np.ndarray
+
+
+class Colony:
+    """Colonies of ants, one in each of W worlds, that act and learn in lockstep.
+
+    A colony depends on its world, its configurations and its seed alone: not on the other worlds,
+    the number of threads or the schedule.
+
+    Args:
+        world: One world for all seeds, or one for each, of the same ranges.
+        config: How many ants, their pheromone, and what comes and goes.
+        training: The learner and its settings.
+        seeds: One seed for each of the W worlds.
+        sharing: "shared": one table for all ants of a world. "own": one for each slot. "fixed":
+            nobody learns.
+        q_values: Action values to start from, float (128, 5) or (W, 128, 5); None: zeros, but if
+            nobody learns they must be given. If tables are not shared, (W, slots, 128, 5) too.
+        threads: CPU threads; None keeps what runs, or takes all.
+        arch: "cpu" or "cuda"; None keeps what runs, or takes the CPU.
+        schedule: "by_world" hands worlds to threads, "by_chunk" groups of ants; None chooses by
+            size. Both give the same numbers.
+
+    Raises:
+        AntsError: An argument is not allowed, or a world has too few free cells for the ants.
+    """
+
+    def __init__(
+        self,
+        world: World | Sequence[World],
+        config: ColonyConfig,
+        training: TrainingConfig,
+        seeds: int | Sequence[int] = 0,
+        sharing: str = "shared",
+        q_values: np.ndarray | None = None,
+        threads: int | None = None,
+        *,
+        arch: str | None = None,
+        schedule: str | None = None,
+    ) -> None:
+        if not isinstance(config, ColonyConfig):
+            raise AntsError(f"config is {shown(config)}; it must be a ColonyConfig.")
+        if not isinstance(training, TrainingConfig):
+            raise AntsError(f"training is {shown(training)}; it must be one TrainingConfig.")
+        (self.training,) = checks.checked_configs(training)
+        check_one_of("sharing", sharing, SHARINGS)
+        if sharing == "fixed" and q_values is None:
+            raise AntsError(
+                "sharing is 'fixed', but q_values is None; nobody learns, so give the action "
+                "values that the ants follow."
+            )
+        table = None if q_values is None else checks.checked_q_values(q_values)
+        self.config = config
+        self.seeds = checks.checked_seeds(seeds)
+        self.sharing = sharing
+        self._learner = learners.get(training.learner)
+        self._settings = runtime.start(threads, arch)
+        one = isinstance(world, (str, World)) or not isinstance(world, Iterable)
+        given: Any = (world,) * len(self.seeds) if one else world
+        several = tuple(given)
+        if len(several) != len(self.seeds):
+            raise AntsError(f"there are {len(several)} worlds for {len(self.seeds)} seeds.")
+        check_world = checks.checked_world if sharing == "fixed" else checks.checked_task
+        self.layout = colony_memory.Layout(
+            [check_world(one) for one in several], config, self.seeds
+        )
+        options = (config.births, config.lifespan, config.regrowth, config.wander)
+        self._lively = any(option is not None and option is not False for option in options)
+        large = config.slots >= _LARGE_COLONY
+        self.schedule = ("by_chunk" if large else "by_world") if schedule is None else schedule
+        check_one_of("schedule", self.schedule, ("by_world", "by_chunk"))
+        chunks = 1
+        if self.schedule == "by_chunk":
+            chunks = min(_MOST_CHUNKS, -(-config.slots // _ANTS_PER_CHUNK))
+        self.chunks = chunks
+        words = np.array([seed % 2**64 for seed in self.seeds], dtype=np.uint64)
+        plans = self._learner.plans and sharing != "fixed"
+        self.arrays = colony_memory.allocate(
+            self.layout, config, self.training, words, sharing, plans, chunks
+        )
+        self.one_a_slot = sharing == "own" or (
+            sharing == "fixed" and table is not None and table.ndim == 4
+        )
+        tables = colony_memory.allocate_tables(
+            len(self.seeds), config.slots, self.one_a_slot, table
+        )
+        self.arrays["q"] = tables
+        self.epsilon = float(self.training.epsilon)
+        self.episode = -1
+        self.ticks = 0
+
+    def begin_episode(self) -> None:
+        """Set worlds and ants to their start; the ants look around."""
+        from taichi_ants.engines.colony.kernels import BEGIN
+
+        self.episode += 1
+        self.ticks = 0
+        colony_memory.fill_episode(self.arrays, self.layout, self.config, self.epsilon)
+        self._launch(BEGIN, 0, 1)
+
+    def tick(self, n: int = 1) -> None:
+        """Let n ticks pass; worlds whose episode has ended stand still."""
+        from taichi_ants.engines.colony.kernels import BY_CHUNK, BY_WORLD, END, PLAN
+
+        self._check_begun()
+        n = checks.checked_count("n", n)
+        if self.schedule == "by_world":
+            self._launch(BY_WORLD, self.ticks, n)
+            self.ticks += n
+            return
+        for _ in range(n):
+            if self.ticks % _TICKS_BETWEEN_SORTS == 0:
+                self._sort_ants()
+            self._launch(BY_CHUNK, self.ticks, 1)
+            if self._learner.plans and self.sharing == "shared":
+                for _ in range(self.training.planning_steps):
+                    self._launch(PLAN, self.ticks, 1)
+            if self._lively or self.config.ends_at_delivery:
+                self._launch(END, self.ticks, 1)
+            self.ticks += 1
+
+    def end_episode(self) -> None:
+        """Keep the streams of the ants that start an episode, and let epsilon decay.
+
+        Raises:
+            AntsError: The learner has made action values that are not finite.
+        """
+        from taichi_ants.engines.colony import arrays as names
+
+        ants = self.arrays["ants"]
+        first = (ants[names.LIFE] != names.VACANT) & (ants[names.NUMBER] < self.config.ants)
+        (columns,) = np.nonzero(first & (ants[names.NUMBER] >= 0))
+        slots = self.config.slots
+        places = columns // slots * slots + ants[names.NUMBER, columns]
+        self.arrays["first_streams"][places] = self.arrays["streams"][columns]
+        self._check_finite()
+        decayed = self.epsilon * float(self.training.epsilon_decay)
+        self.epsilon = max(float(self.training.min_epsilon), decayed)
+
+    def run(self, episodes: int, ticks: int, progress: Progress | None = None) -> ColonyEpisodes:
+        """Whole episodes of a fixed number of ticks.
+
+        Args:
+            episodes: How many.
+            ticks: Ticks of each.
+            progress: Called now and then with the share of the work that is done.
+        """
+        episodes = checks.checked_count("episodes", episodes)
+        ticks = checks.checked_count("ticks", ticks, MAX_STEPS)
+        progress = checks.checked_progress(progress)
+        outcomes = []
+        for episode in range(episodes):
+            self.begin_episode()
+            while self.ticks < ticks and self.arrays["worlds"][0].any():
+                self.tick(min(self._ticks_per_launch(), ticks - self.ticks))
+                if progress is not None:
+                    progress((episode + self.ticks / ticks) / episodes)
+            outcomes.append(self.outcome())
+            self.end_episode()
+        return ColonyEpisodes(
+            **{name: np.stack([vars(one)[name][0] for one in outcomes])
+               for name in vars(outcomes[0])}
+        )  # fmt: skip
+
+    def outcome(self) -> ColonyEpisodes:
+        """What the episode has given so far, arrays (1, W).
+
+        Raises:
+            AntsError: The learner has made action values that are not finite.
+        """
+        self._check_finite()
+        return self._counted()
+
+    def _counted(self) -> ColonyEpisodes:
+        from taichi_ants.engines.colony import arrays as names
+
+        rows = {
+            "ticks": names.TICKS,
+            "deliveries": names.DELIVERIES,
+            "first_delivery": names.FIRST_DELIVERY,
+            "moves": names.MOVES,
+            "blocked": names.BLOCKED,
+            "births": names.BORN,
+            "deaths": names.DIED,
+            "regrown": names.REGROWN,
+            "living": names.LIVING_ANTS,
+        }
+        counts = {name: self.arrays["worlds"][row][None].copy() for name, row in rows.items()}
+        return ColonyEpisodes(returns=self.arrays["returns"][None].copy(), **counts)
+
+    @property
+    def q_values(self) -> np.ndarray:
+        """The action values, float32 (W, 128, 5), or (W, slots, 128, 5) with own tables; a copy."""
+        n = self.config.slots if self.one_a_slot else 1
+        tables = self.arrays["q"].reshape(len(self.seeds), n, N_STATES, -1)[..., :N_ACTIONS]
+        return (tables if self.one_a_slot else tables[:, 0]).copy()
+
+    @property
+    def waiting_foods(self) -> int:
+        """Foods that the queens have been given, but could not turn into ants yet."""
+        from taichi_ants.engines.colony import arrays as names
+
+        return int(self.arrays["worlds"][names.STORE].sum())
+
+    @property
+    def worlds(self) -> tuple[World, ...]:
+        """The worlds as they are at the start of an episode."""
+        return self.layout.worlds
+
+    def snapshot(self, world: int = 0) -> ColonySnapshot:
+        """World number `world` as it is now; arrays are copies.
+
+        Raises:
+            AntsError: There is no such world, or no episode has begun.
+        """
+        from taichi_ants.engines.colony import arrays as names
+
+        self._check_begun()
+        world = checks.checked_count("world", world, len(self.seeds) - 1, least=0)
+        cells = slice(world * self.layout.size, (world + 1) * self.layout.size)
+        slots = slice(world * self.config.slots, (world + 1) * self.config.slots)
+        ants = self.arrays["ants"][:, slots]
+        ants = ants[:, ants[names.LIFE] == names.LIVING]
+        ground = self.arrays["ground"][cells].copy()
+        ground[ants[names.CELL]] = EMPTY
+        if self.config.pheromone.dense:
+            trail = self.arrays["level"][cells].copy()
+        else:
+            clock = self.ticks if self.config.pheromone.evaporation == "linear" else 0
+            trail = np.maximum(self.arrays["trail"][cells] - clock, 0)
+        return ColonySnapshot(
+            self.layout.grid,
+            ground,
+            trail,
+            ants[names.CELL].copy(),
+            ants[names.HEADING].copy(),
+            ants[names.CARRIES].astype(bool),
+        )
+
+    def save(self, path: PathLike) -> None:
+        """Write the colony as it is now; `load` goes on from it, bit for bit.
+
+        Raises:
+            AntsError: The learner has made action values that are not finite, so that `load` would
+                refuse the file; or it cannot be written.
+        """
+        self._check_finite()
+        colony_files.save_colony(self, path)
+
+    @classmethod
+    def load(cls, path: PathLike, threads: int | None = None, *, arch: str | None = None) -> Colony:
+        """Read a colony that `save` wrote.
+
+        Raises:
+            AntsError: The file is missing, damaged, or holds no colony.
+        """
+        return colony_files.load_colony(cls, path, threads, arch)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both are at the same point of the same life, so that they go on alike."""
+        if not isinstance(other, Colony):
+            return NotImplemented
+        return colony_files.same_colony(self, other)
+
+    __hash__ = None  # type: ignore[assignment]  # it changes with each tick
+
+    def __repr__(self) -> str:
+        others = len(dict.fromkeys(self.worlds)) - 1
+        more = f" and {others} more" if others else ""
+        lines = [f"world: {self.worlds[0]}{more}", f"config: {self.config}"]
+        lines += [f"training: {self.training}", f"seeds: {shown(self.seeds)}"]
+        lines += [f"sharing: {self.sharing!r}, epsilon: {self.epsilon:.4g}"]
+        if self.episode >= 0:
+            now = self._counted()
+            lines += [
+                f"episode: {self.episode}, ticks: {self.ticks}, living: {now.living.sum()}, "
+                f"deliveries: {now.deliveries.sum()}"
+            ]
+        return "\n    ".join(["Colony(", *lines]) + "\n)"
+
+    def _check_begun(self) -> None:
+        if self.episode < 0:
+            raise AntsError("no episode has begun; call begin_episode first.")
+
+    def _check_finite(self) -> None:
+        tables = self.arrays["q"].reshape(len(self.seeds), -1)
+        checks.check_finite(tables, [self.training], self.seeds)
+
+    def _ticks_per_launch(self) -> int:
+        if self.schedule == "by_chunk":
+            return 1
+        rounds = -(-len(self.seeds) // self._settings.threads)
+        cost = _TICK_NS * (1 + self.training.planning_steps)
+        if self.config.pheromone.dense:
+            cost += 2 * self.layout.size / self.config.slots
+        return max(1, int(_LAUNCH_SECONDS * 1e9 / (rounds * self.config.slots * cost)))
+
+    def _sort_ants(self) -> None:
+        """Store the ants of a world in the order of their cells, so that neighbours share caches.
+
+        Their order changes nothing but the speed: ants have numbers. Slots do matter where ants are
+        born or have tables of their own, and vacant ones stay behind the others; there the order
+        stays.
+        """
+        from taichi_ants.engines.colony import arrays as names
+
+        config = self.config
+        if config.births or config.lifespan or self.one_a_slot or config.slots > config.ants:
+            return
+        ants = self.arrays["ants"]
+        cells = ants[names.CELL].reshape(len(self.seeds), -1)
+        first = np.arange(len(self.seeds))[:, None] * config.slots
+        order = (np.argsort(cells, axis=1) + first).ravel()
+        for row in ants:
+            row[:] = row[order]
+        self.arrays["streams"][:] = self.arrays["streams"][order]
+
+    def _launch(self, what: str, tick: int, n: int) -> None:
+        from taichi_ants.engines.colony.arrays import Arrays, Settings
+        from taichi_ants.engines.colony.kernels import colony_kernel
+
+        self._settings = runtime.start()  # the caller may have reset Taichi, or forked
+        dense = self.config.pheromone.dense
+        kernel = colony_kernel(
+            self._learner, self.sharing, self.one_a_slot, dense, self._lively, what
+        )
+        numbers = Settings(**self._numbers())
+        with runtime.quiet():
+            kernel(tick, n, *numbers, *Arrays(**self.arrays))
+
+    def _numbers(self) -> dict[str, int | float]:
+        config, pheromone = self.config, self.config.pheromone
+        off = -1
+        return {
+            "worlds": len(self.seeds),
+            "ants": config.ants,
+            "slots": config.slots,
+            "chunks": self.chunks,
+            "size": self.layout.size,
+            "homes": self.layout.homes,
+            "episode": self.episode,
+            "evaporates": int(pheromone.evaporation == "linear"),
+            "adds": {"add": 1, "set": 0, "none": -1}[pheromone.deposit],
+            "level": pheromone.level,
+            "cap": pheromone.cap or 0,
+            "decay": -1.0 if pheromone.evaporation == "linear" else float(pheromone.decay),
+            "share": float(pheromone.share) if pheromone.diffusion else 0.0,
+            "births": int(config.births),
+            "lifespan": config.lifespan or off,
+            "regrowth": off if config.regrowth is None else config.regrowth,
+            "wander": config.wander or off,
+            "ends_at_delivery": int(config.ends_at_delivery),
+            "planning_steps": self.training.planning_steps,
+            "continuing": int(self.training.delivery == "continuing"),
+        }

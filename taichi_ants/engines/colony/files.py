@@ -1,0 +1,123 @@
+"""Colonies in files: everything that is needed to go on, bit for bit."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from taichi_ants import checks, files, learners, runtime
+from taichi_ants.engines.colony.damage import check_contents
+from taichi_ants.engines.records import same
+from taichi_ants.engines.stored import FileKind, world_arrays, world_facts, world_from
+from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.task.colony import ColonyConfig, Pheromone
+from taichi_ants.task.constants import N_ACTIONS, N_STATES
+
+if TYPE_CHECKING:
+    from taichi_ants.engines.colony.colony import Colony
+
+_KIND = FileKind("taichi-ants colony 2", "colony", "Colony.save")
+# What the worlds and configurations determine is not stored.
+_DERIVED = frozenset({"walls", "closer", "compass", "rewards", "weights", "spare", "seeds"})
+
+
+def save_colony(colony: Colony, path: files.PathLike) -> None:
+    """Write a colony, uncompressed; raises as `files.write_atomically` does."""
+    facts, arrays = _contents(colony)
+    _KIND.write(path, facts, arrays, compress=False)
+
+
+def same_colony(one: Colony, other: Colony) -> bool:
+    """Whether two colonies would be written alike, so that they go on alike."""
+    (facts, arrays), (other_facts, other_arrays) = _contents(one), _contents(other)
+    return (
+        facts == other_facts
+        and arrays.keys() == other_arrays.keys()
+        and all(same(array, other_arrays[name]) for name, array in arrays.items())
+    )
+
+
+def _contents(colony: Colony) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """All that a file of a colony holds: facts and arrays."""
+    arrays: dict[str, np.ndarray] = {
+        f"array_{name}": array for name, array in colony.arrays.items() if name not in _DERIVED
+    }
+    numbers = {world: number for number, world in enumerate(dict.fromkeys(colony.worlds))}
+    for world, number in numbers.items():
+        arrays |= world_arrays(world, f"world{number}")
+    facts = {
+        "config": asdict(colony.config),
+        "training": asdict(colony.training),
+        "sharing": colony.sharing,
+        "one_a_slot": colony.one_a_slot,
+        "seeds": list(colony.seeds),
+        "worlds": [world_facts(world) for world in numbers],
+        "world_of": [numbers[world] for world in colony.worlds],
+        "chunks": colony.chunks,
+        "schedule": colony.schedule,
+        "epsilon": colony.epsilon,
+        "episode": colony.episode,
+        "ticks": colony.ticks,
+    }
+    return facts, arrays
+
+
+def load_colony(
+    cls: type[Colony], path: files.PathLike, threads: int | None, arch: str | None
+) -> Colony:
+    """Read a colony that `save_colony` wrote.
+
+    Raises:
+        AntsError: The file is missing, damaged, or holds no colony; or its learner is not
+            registered.
+    """
+    stored, facts = _KIND.read(path)
+    runtime.start(threads, arch)  # what is wrong with these says nothing about the file
+    with _KIND.rebuilding(path):
+        training = facts["training"] or {}
+        if not isinstance(training.get("learner"), str):
+            raise ValueError("its learner is missing")
+    learners.get(training["learner"])
+    with _KIND.rebuilding(path):
+        colony = _rebuild(cls, stored, facts, threads, arch)
+        colony.epsilon = checks.checked_share("epsilon", facts["epsilon"])
+        colony.episode = checks.checked_count("episode", facts["episode"], least=-1)
+        colony.ticks = checks.checked_count("ticks", facts["ticks"], least=0)
+        for name, array in colony.arrays.items():
+            if name not in _DERIVED:
+                kept = stored[f"array_{name}"]
+                if kept.shape != array.shape or kept.dtype != array.dtype:
+                    raise ValueError(f"{name} has another shape or type")
+                colony.arrays[name] = np.ascontiguousarray(kept)
+        check_contents(colony)
+    return colony
+
+
+def _rebuild(
+    cls: type[Colony],
+    stored: dict[str, np.ndarray],
+    facts: dict[str, Any],
+    threads: int | None,
+    arch: str | None,
+) -> Colony:
+    worlds = [
+        world_from(stored, f"world{number}", one) for number, one in enumerate(facts["worlds"])
+    ]
+    pheromone = Pheromone(**facts["config"].pop("pheromone"))
+    config = ColonyConfig(pheromone=pheromone, **facts["config"])
+    # A colony that does not learn needs tables of the right shape, until its own are put in.
+    leading = (len(facts["seeds"]), config.slots) if facts["one_a_slot"] else ()
+    fixed = facts["sharing"] == "fixed"
+    return cls(
+        [worlds[number] for number in facts["world_of"]],
+        config,
+        TrainingConfig(**facts["training"]),
+        facts["seeds"],
+        facts["sharing"],
+        q_values=np.zeros((*leading, N_STATES, N_ACTIONS), np.float32) if fixed else None,
+        threads=threads,
+        arch=arch,
+        schedule=facts["schedule"],
+    )

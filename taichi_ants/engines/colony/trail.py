@@ -1,0 +1,69 @@
+"""Trails of a colony: levels, deposits, evaporation and diffusion.
+
+Integer mode stores the clock at which a trail has evaporated, so that evaporation costs nothing.
+Dense mode (exponential evaporation, diffusion) stores levels as f32 and walks over all cells.
+"""
+
+import taichi as ti
+
+from taichi_ants.grid.constants import N_HEADINGS
+from taichi_ants.task.constants import EMPTY
+
+LINEAR = -1.0  # the value of `decay` that stands for linear evaporation in dense mode
+
+
+@ti.func
+def level_in_view(c: ti.template(), k: ti.template(), dense: ti.template(), place, clock):
+    """The trail that an ant can see in a cell: 0 unless the cell is empty. i32, or f32 if dense."""
+    # Always read, never branch: most cells are empty, and nobody can predict which.
+    is_empty = c.ground[place] & 15 == EMPTY
+    level = 0.0 if ti.static(dense) else 0
+    if ti.static(dense):
+        level = ti.select(is_empty, c.level[place], 0.0)
+    else:
+        level = ti.select(is_empty, ti.max(c.trail[place] - clock, 0), 0)
+    return level
+
+
+@ti.func
+def deposit(c: ti.template(), k: ti.template(), dense: ti.template(), place, clock):
+    """Lay a trail on a cell, as the configuration says."""
+    if ti.static(dense):
+        if k.adds == 1:
+            laid = c.level[place] + ti.cast(k.level, ti.f32)
+            c.level[place] = ti.min(laid, ti.cast(k.cap, ti.f32))
+        elif k.adds == 0:
+            c.level[place] = ti.cast(k.level, ti.f32)
+    elif k.adds == 1:
+        c.trail[place] = clock + ti.min(ti.max(c.trail[place] - clock, 0) + k.level, k.cap)
+    elif k.adds == 0:
+        c.trail[place] = clock + k.level
+
+
+@ti.func
+def evaporate(c: ti.template(), k: ti.template(), place):
+    """One tick of evaporation of a cell in dense mode."""
+    level = c.level[place]
+    if k.decay == LINEAR:
+        level = ti.max(level - 1.0, 0.0)
+    elif k.decay < 1.0:
+        level *= k.decay
+        if level < 1.0:
+            level = 0.0
+    c.level[place] = level
+
+
+@ti.func
+def diffused(c: ti.template(), k: ti.template(), place):
+    """The level of a cell after one tick of diffusion; the share aimed at a wall stays."""
+    level = c.level[place]
+    if c.walls[place] == 0:
+        n_open, received = 0.0, 0.0
+        for heading in ti.static(range(N_HEADINGS)):
+            neighbour = place + c.compass[heading + 1]
+            if c.walls[neighbour] == 0:
+                n_open += 1.0
+                received += c.level[neighbour] * k.share
+        # At rate 1 all is given away, and rounding could leave less than nothing.
+        level = ti.max(level - level * k.share * n_open + received, 0.0)
+    return level

@@ -1,0 +1,1 @@
+"""Many independent runs: one parallel task a run, whole episodes inside it."""

@@ -1,0 +1,234 @@
+"""What training and evaluation return: NumPy arrays and what is needed to go on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from taichi_ants import files
+from taichi_ants.engines.records import Record
+from taichi_ants.engines.runs import files as training_files
+from taichi_ants.errors import AntsError, shown
+from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.task.constants import N_ACTIONS, N_STATES
+from taichi_ants.worlds.world import World
+
+# What the arrays of a result come from.
+_MAKERS = ("world", "configs", "seeds", "max_steps", "evaporation")
+_PAIRS = N_STATES * N_ACTIONS
+_SUMMED_UP, _LISTED = 50, 6  # episodes and configurations that a result shows
+
+
+@dataclass(frozen=True)
+class LearnerCost:
+    """What the runs of one learner took.
+
+    Attributes:
+        learner: Its name.
+        planning_steps: Model updates after each step.
+        steps: Environment steps that were taken, learning included.
+        seconds: CPU seconds of all threads together, without compilation; wall-clock seconds on a
+            GPU.
+    """
+
+    learner: str
+    planning_steps: int
+    steps: int
+    seconds: float
+
+    @property
+    def nanoseconds_per_step(self) -> float:
+        """CPU time of one environment step with its learning, in nanoseconds."""
+        return self.seconds * 1e9 / self.steps if self.steps else float("nan")
+
+    def as_row(self) -> dict[str, object]:
+        """For tables and manifests."""
+        return {**vars(self), "nanoseconds_per_step": self.nanoseconds_per_step}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RunState(Record):
+    """Where runs stopped; training goes on from it bit for bit.
+
+    Attributes (leading axes: the runs, for example (configurations, seeds)):
+        q: float32 (..., 128, 8), 5 action values and 3 unused.
+        random_states: uint64 (...,), the ants' random streams.
+        exploration: float64 (..., 3): epsilon of the next episode, its decay, its minimum.
+        settings: int32 (..., 3): planning steps, whether delivery continues, visited pairs.
+        entries: int32 (..., 640), the packed model; (..., 1) where nobody plans.
+        slots: int32 (..., 640), where a pair stands in the model, from 1, 0 if it does not;
+            (..., 1) where nobody plans.
+    """
+
+    q: np.ndarray
+    random_states: np.ndarray
+    exploration: np.ndarray
+    settings: np.ndarray
+    entries: np.ndarray
+    slots: np.ndarray
+
+    def take(self, index: object) -> RunState:
+        """A copy of the runs at an index of the leading axes."""
+        return RunState(**{name: array[index].copy() for name, array in vars(self).items()})
+
+    def put(self, index: object, part: RunState) -> None:
+        """Overwrite the runs at an index."""
+        for name, array in vars(self).items():
+            array[index] = getattr(part, name)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TrainingResult(Record):
+    """What `train` returns.
+
+    C configurations, S seeds, E episodes. Two results are equal if all but their costs are.
+
+    Attributes:
+        world: The world trained in.
+        configs: The configurations, in the order of the arrays' first axis.
+        seeds: The seeds, in the order of the second axis.
+        max_steps: The step limit of an episode.
+        evaporation: Whether trails evaporated.
+        returns: int32 (C, S, E), undiscounted sum of the rewards of each episode.
+        steps: int32 (C, S, E), length of each episode.
+        deliveries: int32 (C, S, E), 1 where the food was given to the queen.
+        costs: What the learners took, one entry for each learner and number of planning steps.
+        state: Where the runs stopped, leading axes (C, S).
+
+    Raises:
+        AntsError: The arrays do not belong to the configurations and seeds; or a copy by
+            `dataclasses.replace` claims to be of another training.
+    """
+
+    world: World
+    configs: tuple[TrainingConfig, ...]
+    seeds: tuple[int, ...]
+    max_steps: int
+    evaporation: bool
+    returns: np.ndarray
+    steps: np.ndarray
+    deliveries: np.ndarray
+    costs: tuple[LearnerCost, ...] = field(compare=False)
+    state: RunState
+    # What the arrays come from; a copy keeps it, so that it cannot claim to be something else.
+    _made_by: tuple = field(default=(), compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        for name, was in zip(_MAKERS, self._made_by, strict=False):
+            if getattr(self, name) != was:
+                raise AntsError(
+                    f"{name} cannot be replaced in a result, whose arrays come from others; train "
+                    "anew with the ones that you want."
+                )
+        object.__setattr__(self, "_made_by", tuple(getattr(self, name) for name in _MAKERS))
+        if not isinstance(self.state, RunState):
+            raise AntsError(f"state of a result is {shown(self.state)}; it must be a RunState.")
+        self.check()
+
+    @property
+    def episodes(self) -> int:
+        """The number of episodes of each run so far."""
+        return self.returns.shape[2]
+
+    @property
+    def q_values(self) -> np.ndarray:
+        """The action values at the end, float32 (C, S, 128, 5), a copy."""
+        return self.state.q[..., :N_ACTIONS].copy()
+
+    def save(self, path: files.PathLike) -> None:
+        """Write the result; training goes on from what `load` reads, bit for bit.
+
+        Raises:
+            AntsError: The file cannot be written.
+        """
+        training_files.save_training(self, path)
+
+    @classmethod
+    def load(cls, path: files.PathLike) -> TrainingResult:
+        """Read a result that `save` wrote.
+
+        Raises:
+            AntsError: The file is missing, damaged, or holds no training result.
+        """
+        return training_files.load_training(cls, path)
+
+    def __repr__(self) -> str:
+        last = slice(-_SUMMED_UP, None)
+        lines = [
+            f"world: {self.world}",
+            f"seeds: {len(self.seeds)}, from {min(self.seeds)} to {max(self.seeds)}",
+            f"episodes: {self.episodes}, of at most {self.max_steps} steps each",
+            f"evaporation: {self.evaporation}",
+            f"means over seeds and the last {min(_SUMMED_UP, self.episodes)} episodes:",
+        ]
+        for c, config in enumerate(self.configs[:_LISTED]):
+            means = (array[c, :, last].mean() for array in self._outcomes)
+            line = "    {}\n        return {:.4g}, steps {:.4g}, deliveries {:.3g}"
+            lines.append(line.format(config, *means))
+        if len(self.configs) > _LISTED:
+            lines.append(f"    and {len(self.configs) - _LISTED} more configurations")
+        return "\n    ".join(["TrainingResult(", *lines]) + "\n)"
+
+    @property
+    def _outcomes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return self.returns, self.steps, self.deliveries
+
+    def _check_forms(self) -> None:
+        """Raises AntsError if an array has not the type and shape that it must have."""
+        runs = (len(self.configs), len(self.seeds))
+        plans = any(config.planning_steps for config in self.configs)
+        model = (*runs, _PAIRS if plans or np.shape(self.state.slots)[2:] == (_PAIRS,) else 1)
+        episodes = np.shape(self.returns)[2] if np.ndim(self.returns) == 3 else 0
+        outcome = ("int32", (*runs, episodes))
+        forms = {
+            **dict.fromkeys(("returns", "steps", "deliveries"), outcome),
+            "q": ("float32", (*runs, N_STATES, 8)),
+            "random_states": ("uint64", runs),
+            "exploration": ("float64", (*runs, 3)),
+            "settings": ("int32", (*runs, 3)),
+            **dict.fromkeys(("entries", "slots"), ("int32", model)),
+        }
+        arrays = {**vars(self), **vars(self.state)}
+        for name, (kind, shape) in forms.items():
+            array = arrays[name]
+            if not isinstance(array, np.ndarray) or (array.dtype, array.shape) != (kind, shape):
+                raise AntsError(
+                    f"{name} of a result is {shown(array)}; for {runs[0]} configurations and "
+                    f"{runs[1]} seeds it must be an array of shape {shape} and type {kind}."
+                )
+
+    def check(self) -> None:
+        """Make sure that training can go on from the arrays, which kernels believe.
+
+        Raises:
+            AntsError: It cannot.
+        """
+        self._check_forms()
+        state = self.state
+        given = [
+            [(c.epsilon_decay, c.min_epsilon, c.planning_steps, c.delivery == "continuing")]
+            for c in self.configs
+        ]
+        kept = np.concatenate([state.exploration[..., 1:], state.settings[..., :2]], axis=2)
+        epsilon, visited = state.exploration[..., 0], state.settings[..., 2]
+        seen = np.count_nonzero(state.slots, axis=2)
+        if not (
+            (kept == given).all()
+            and ((epsilon >= 0) & (epsilon <= 1)).all()
+            and (visited == seen).all()
+            and ((state.slots >= 0) & (state.slots <= seen[..., None])).all()
+        ):
+            raise AntsError(
+                "the state of a result does not go with its configurations, or its models do not "
+                "add up; leave the arrays of a result as they are."
+            )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Rollouts(Record):
+    """What `evaluate` returns: int32 arrays of shape q_values.shape[:-2] + (rollouts,)."""
+
+    returns: np.ndarray
+    steps: np.ndarray
+    deliveries: np.ndarray

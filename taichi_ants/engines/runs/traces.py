@@ -1,0 +1,210 @@
+"""Step-by-step traces of the engine of independent runs, for pictures, teaching and tests.
+
+The kernel is the one that trains and evaluates, compiled once more so that it records.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from taichi_ants import checks, learners, runtime
+from taichi_ants.engines.records import Record
+from taichi_ants.engines.runs.engine import RunEngine
+from taichi_ants.engines.runs.results import RunState
+from taichi_ants.engines.runs.training import (
+    fixed_policy_state,
+    fresh_state,
+    rates_of,
+    rollout_streams,
+)
+from taichi_ants.errors import AntsError, checked_flag
+from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.learners.registry import Learner
+from taichi_ants.task.constants import DELIVERED, N_ACTIONS
+from taichi_ants.worlds.world import World
+
+MAX_ROLLOUT_STEPS = 1_000_000
+MAX_TRAINING_STEPS = 100_000  # each keeps a Q-table of 4 KiB
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Trace(Record):
+    """What happened in each of n steps; position, heading and state are those before the action.
+
+    Attributes:
+        episodes: int32 (n,), number of the episode, from 0; of `trace_policies`, of the policy.
+        steps: int32 (n,), number of the step in its episode, from 0.
+        cells: int32 (n, 3), cube coordinates in normal form.
+        headings: int32 (n,), 0 to 5.
+        states: int32 (n,), state indices, see `taichi_ants.task.states`.
+        actions: int32 (n,), 0 to 4.
+        rewards: int32 (n,).
+        next_states: int32 (n,), what the ant sees after the step.
+        terminated: bool (n,), whether the learner took the next state as terminal.
+        events: int32 (n,), what came of the action: ENTERED_EMPTY, ENTERED_LURE, FAILED, PICKED_UP
+            or DELIVERED, see `taichi_ants.task.constants`.
+        q_values: float32 (n, 5), the action values of the state when the action was chosen.
+        td_errors: float32 (n,), of the update after the step; None without learning.
+        tables: float32 (n, 128, 5), the Q-table after the step; None without learning.
+    """
+
+    episodes: np.ndarray
+    steps: np.ndarray
+    cells: np.ndarray
+    headings: np.ndarray
+    states: np.ndarray
+    actions: np.ndarray
+    rewards: np.ndarray
+    next_states: np.ndarray
+    terminated: np.ndarray
+    events: np.ndarray
+    q_values: np.ndarray
+    td_errors: np.ndarray | None = None
+    tables: np.ndarray | None = None
+
+    def __len__(self) -> int:
+        return len(self.steps)
+
+    @property
+    def delivered(self) -> np.ndarray:
+        """Whether the food was given to the queen, bool (n,)."""
+        return self.events == DELIVERED
+
+
+def rollout(
+    world: World,
+    q_values: np.ndarray,
+    seed: int = 0,
+    number: int = 0,
+    max_steps: int = 600,
+    evaporation: bool = True,
+    epsilon: float = 0.0,
+) -> Trace:
+    """One episode with a fixed policy: rollout `number` of the seed, as `evaluate` does it.
+
+    Args:
+        world: The world.
+        q_values: float (128, 5), action values; the best action is taken, ties at random.
+        seed: The seed.
+        number: Which of the seed's rollouts, from 0.
+        max_steps: Steps after which the episode is truncated.
+        evaporation: Whether trails fall by 1 with each step.
+        epsilon: Probability of a random action.
+
+    Raises:
+        AntsError: An argument is not allowed; the message names it.
+    """
+    tables = checks.checked_q_values(q_values)
+    if tables.ndim != 2:
+        raise AntsError(f"q_values has shape {tables.shape}; a rollout follows one (128, 5) table.")
+    seeds = checks.checked_seeds_for(seed, ())
+    numbers = np.array([checks.checked_count("number", number, least=0)])
+    state = fixed_policy_state(tables[None], checks.checked_share("epsilon", epsilon))
+    streams = rollout_streams(seeds, numbers)
+    rates = np.zeros((1, 2), dtype=np.float32)
+    return _trace(world, None, seeds, rates, state, 1, max_steps, evaporation, streams)
+
+
+def trace_policies(
+    world: World,
+    q_values: np.ndarray,
+    seeds: Sequence[int],
+    max_steps: int = 600,
+    evaporation: bool = True,
+) -> Iterator[Trace]:
+    """Rollout 0 of each of many policies, some policies at a time.
+
+    Args:
+        world: The world.
+        q_values: float (n, 128, 5), action values of each policy.
+        seeds: Their seeds (n,); a seed may come several times.
+        max_steps, evaporation: As in `rollout`.
+
+    Yields:
+        The steps of the first policies, of the next ones, and so on, in order.
+
+    Raises:
+        AntsError: An argument is not allowed; the message names it.
+    """
+    tables = checks.checked_q_values(q_values)
+    checks.checked_world(world)
+    # A step takes ten times as much memory as a cell of the world.
+    per_policy = max(checks.checked_max_steps(max_steps), world.grid.size // 10)
+    for first in range(0, len(tables), size := max(1, MAX_ROLLOUT_STEPS // per_policy)):
+        some = tables[first : first + size]
+        words = np.array(seeds[first : first + size], dtype=object)
+        state = fixed_policy_state(some, epsilon=0.0)
+        streams = rollout_streams(words, np.zeros(1, dtype=int))
+        rates = np.zeros((len(some), 2), dtype=np.float32)
+        trace = _trace(world, None, words, rates, state, 1, max_steps, evaporation, streams)
+        yield replace(trace, episodes=trace.episodes + first)
+
+
+def trace_training(
+    world: World,
+    config: TrainingConfig,
+    seed: int = 0,
+    episodes: int = 1,
+    max_steps: int = 600,
+    evaporation: bool = False,
+) -> Trace:
+    """The first episodes of one training run, step by step, with the Q-table after each step.
+
+    Args and errors as in `train`; episodes * max_steps may not exceed 100 000.
+    """
+    checks.checked_task(world)
+    several = checks.checked_configs(config)
+    if len(several) > 1:
+        raise AntsError(f"config holds {len(several)} configurations; a trace is of one.")
+    (config,) = several
+    seeds = checks.checked_seeds_for(seed, ())
+    state = fresh_state((config,), seeds.tolist()).take(0)
+    episodes = checks.checked_count("episodes", episodes)
+    learner = learners.get(config.learner)
+    rates = rates_of((config,), 1)
+    return _trace(world, learner, seeds, rates, state, episodes, max_steps, evaporation)
+
+
+def _trace(
+    world: World,
+    learner: Learner | None,
+    seeds: np.ndarray,
+    rates: np.ndarray,
+    state: RunState,
+    episodes: int,
+    max_steps: int,
+    evaporation: bool,
+    streams: np.ndarray | None = None,
+) -> Trace:
+    capacity = episodes * checks.checked_max_steps(max_steps)
+    most = MAX_ROLLOUT_STEPS if learner is None else MAX_TRAINING_STEPS
+    if capacity > most:
+        raise AntsError(
+            f"episodes * max_steps is {capacity}; at most {most} steps can be traced, so lower one."
+        )
+    evaporation = checked_flag("evaporation", evaporation)
+    engine = RunEngine(checks.checked_world(world), max_steps, evaporation, runtime.start())
+    before = state.q.copy()
+    runs, integers, errors, tables = engine.trace(learner, seeds, rates, state, episodes, streams)
+    (episode, step, cell, heading, states, action, reward, seen, ended, event) = integers.T
+    chosen_from, number = before, runs
+    if learner is not None:
+        chosen_from, number = np.concatenate([before, tables[:-1]]), np.arange(len(states))
+    return Trace(
+        episodes=runs.astype(np.int32) * episodes + episode,
+        steps=step,
+        cells=world.grid.cells(cell),
+        headings=heading,
+        states=states,
+        actions=action,
+        rewards=reward,
+        next_states=seen,
+        terminated=ended.astype(bool),
+        events=event,
+        q_values=chosen_from[number, states, :N_ACTIONS],
+        td_errors=None if learner is None else errors,
+        tables=None if learner is None else tables[:, :, :N_ACTIONS],
+    )

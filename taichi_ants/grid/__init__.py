@@ -1,0 +1,1 @@
+"""The hexagonal grid and the random streams on the host; NumPy only."""

@@ -1,0 +1,22 @@
+"""The directions of the grid and the random streams of a seed, shared by every part."""
+
+from __future__ import annotations
+
+# The six headings, clockwise, as steps in cube coordinates; heading 0 points up.
+HEADING_STEPS: tuple[tuple[int, int, int], ...] = (
+    (1, 0, 0),
+    (1, 1, 0),
+    (0, 1, 0),
+    (0, 1, 1),
+    (0, 0, 1),
+    (1, 0, 1),
+)
+N_HEADINGS = 6
+
+# What the random streams of a seed are for. Streams of different purposes never meet.
+STREAM_ANT = 0  # number: the ant
+STREAM_ROLLOUT = 1  # number: the greedy rollout
+STREAM_START_CELL = 2  # number: the cell, in lexicographic order of (x, y, z)
+STREAM_START_HEADING = 3  # number: the ant
+STREAM_BORN = 4  # number: episode * 2**32 + the ant
+STREAM_QUEEN = 5  # number: 0

@@ -1,0 +1,246 @@
+"""Geometry of the hexagonal grid, in NumPy alone.
+
+A cell is the class of cube coordinates (x, y, z) equal up to adding (c, c, c). Its normal form has
+minimum 0; its axial form is q = x - z, r = y - z. Arrays of cells have shape (..., 3). The six
+headings run clockwise, heading 0 points up.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from taichi_ants.errors import AntsError
+from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
+
+# A grid's arrays are allocated whole; four bytes for each of this many cells are one gibibyte.
+MAX_ARRAY_CELLS = 1 << 28
+
+_STEPS = np.array(HEADING_STEPS, dtype=np.int64)
+_SQRT_3 = math.sqrt(3.0)
+
+
+def _integers(values: object, last_axis: int, what: str) -> np.ndarray:
+    """`values` as an int64 array whose last axis has length `last_axis`."""
+    array = np.asarray(values)
+    if array.dtype.kind not in "iu" or array.ndim == 0 or array.shape[-1] != last_axis:
+        raise AntsError(
+            f"{what} have shape {array.shape} and type {array.dtype}; "
+            f"they must be whole numbers of shape (..., {last_axis})."
+        )
+    return array.astype(np.int64)
+
+
+def normal_form(cells: object) -> np.ndarray:
+    """The normal form of cube coordinates (..., 3): the shift whose minimum is 0. int64."""
+    cube = _integers(cells, 3, "cells")
+    return cube - cube.min(axis=-1, keepdims=True)
+
+
+def axial(cells: object) -> np.ndarray:
+    """Axial coordinates (..., 2) = (q, r) of cube coordinates (..., 3) in any form. int64."""
+    cube = _integers(cells, 3, "cells")
+    return cube[..., :2] - cube[..., 2:]
+
+
+def cube(axials: object) -> np.ndarray:
+    """The normal form (..., 3) of axial coordinates (..., 2) = (q, r). int64."""
+    qr = _integers(axials, 2, "axial coordinates")
+    low = np.minimum(qr.min(axis=-1, keepdims=True), 0)
+    return np.concatenate([qr - low, -low], axis=-1)
+
+
+def turn(headings: int | np.ndarray, sixths: int | np.ndarray) -> int | np.ndarray:
+    """Headings after turning clockwise by `sixths` of a full turn (negative: anticlockwise)."""
+    return (headings + sixths) % N_HEADINGS
+
+
+def step(cells: object, headings: int | np.ndarray) -> np.ndarray:
+    """The normal form of the cells one step from `cells` (..., 3) at `headings` (...). int64."""
+    return normal_form(_integers(cells, 3, "cells") + _STEPS[headings])
+
+
+def neighbours(cells: object) -> np.ndarray:
+    """The six neighbours (..., 6, 3) of cells (..., 3), in the order of the headings. int64."""
+    return normal_form(_integers(cells, 3, "cells")[..., None, :] + _STEPS)
+
+
+def distance(cells: object, others: object) -> np.ndarray:
+    """The number of steps from `cells` to `others` (both (..., 3), broadcast), no obstacles."""
+    difference = _integers(cells, 3, "cells") - _integers(others, 3, "cells")
+    return difference.max(axis=-1) - difference.min(axis=-1)
+
+
+def count_cells(ranges: tuple[int, int, int]) -> int:
+    """The number of cells of a world of ranges (X, Y, Z)."""
+    x, y, z = ranges
+    return x * y + y * z + z * x - x - y - z + 1
+
+
+def centre_of(cells: object, size: float) -> np.ndarray:
+    """Pixel coordinates of the centres of flat-topped hexagons.
+
+    Args:
+        cells: Cube coordinates (..., 3).
+        size: Pixels from a hexagon's centre to its corners.
+
+    Returns:
+        float64 (..., 2) = (pixel x to the right, pixel y downwards). The origin (0, 0, 0) lies at
+        (0, 0), heading 0 points up (towards lower y), heading 1 up and to the right.
+    """
+    qr = axial(cells)
+    q, r = qr[..., 0], qr[..., 1]
+    return np.stack([1.5 * size * r, _SQRT_3 * size * (0.5 * r - q)], axis=-1)
+
+
+def cell_at(pixels: object, size: float) -> np.ndarray:
+    """The cells (normal form, (..., 3), int64) whose hexagons hold pixel coordinates (..., 2).
+
+    The inverse of `centre_of`; on a border of two hexagons, one of the two.
+    """
+    points = np.asarray(pixels, dtype=np.float64)
+    r = points[..., 0] / (1.5 * size)
+    q = 0.5 * r - points[..., 1] / (_SQRT_3 * size)
+    # Cube rounding: q, -r and r - q sum to zero; after rounding, the coordinate that moved most is
+    # the one that gives way to restore the sum.
+    exact = np.stack([q, -r, r - q], axis=-1)
+    near = np.rint(exact)
+    moved = np.abs(near - exact)
+    fixes_q = (moved[..., 0] > moved[..., 1]) & (moved[..., 0] > moved[..., 2])
+    fixes_r = ~fixes_q & (moved[..., 1] > moved[..., 2])
+    whole_q = np.where(fixes_q, -near[..., 1] - near[..., 2], near[..., 0])
+    whole_r = np.where(fixes_r, near[..., 0] + near[..., 2], -near[..., 1])
+    return cube(np.stack([whole_q, whole_r], axis=-1).astype(np.int64))
+
+
+@dataclass(frozen=True)
+class AxialGrid:
+    """How the cells of a world lie in a flat array.
+
+    The array holds the axial bounding box with a border of one void cell, row by row (r), so that
+    a step to a neighbour is an addition and needs no bounds check:
+    index = (r + Z) * width + (q + Z).
+
+    Attributes:
+        ranges: (X, Y, Z), each at least 1.
+
+    Raises:
+        AntsError: The array would have more than `MAX_ARRAY_CELLS` cells.
+    """
+
+    ranges: tuple[int, int, int]
+
+    def __post_init__(self) -> None:
+        if self.size > MAX_ARRAY_CELLS:
+            raise AntsError(
+                f"ranges are {self.ranges}; a world of them needs arrays of {self.size} cells, "
+                f"at most {MAX_ARRAY_CELLS} are allowed, so choose smaller ranges."
+            )
+
+    @property
+    def width(self) -> int:
+        """Cells of a row: the values of q, and a void cell at each end."""
+        return self.ranges[0] + self.ranges[2] + 1
+
+    @property
+    def height(self) -> int:
+        """Number of rows: the values of r, and a void row at each end."""
+        return self.ranges[1] + self.ranges[2] + 1
+
+    @property
+    def size(self) -> int:
+        """Length of the flat array, void cells included."""
+        return self.width * self.height
+
+    @property
+    def count(self) -> int:
+        """Number of existing cells."""
+        return count_cells(self.ranges)
+
+    @cached_property
+    def offsets(self) -> np.ndarray:
+        """int32 (6,), read-only: what a step at each heading adds to a flat index."""
+        steps = axial(_STEPS)
+        return _frozen((steps[:, 0] + steps[:, 1] * self.width).astype(np.int32))
+
+    @cached_property
+    def exists(self) -> np.ndarray:
+        """bool (size,), read-only: whether a flat index belongs to a cell of the world."""
+        x, y, z = self.ranges
+        q, r = self.axes()
+        # In normal form x = max(0, q, q - r), y = max(0, r, r - q), z = max(0, -q, -r).
+        inside = np.empty((self.height, self.width), dtype=bool)
+        difference = q - r
+        np.less(difference, x, out=inside)
+        inside &= difference > -y
+        inside &= (q > -z) & (q < x)
+        inside &= (r > -z) & (r < y)
+        return _frozen(inside.reshape(-1))
+
+    def axes(self) -> tuple[np.ndarray, np.ndarray]:
+        """The array's axes in two dimensions: q as int32 (1, width), r as int32 (height, 1)."""
+        z = self.ranges[2]
+        q = np.arange(-z, self.width - z, dtype=np.int32)
+        r = np.arange(-z, self.height - z, dtype=np.int32)
+        return q[None, :], r[:, None]
+
+    def contains(self, cells: object) -> np.ndarray:
+        """bool (...): whether cells (..., 3) in any form exist in the world."""
+        return np.all(normal_form(cells) < np.array(self.ranges), axis=-1)
+
+    def index(self, cells: object) -> np.ndarray:
+        """Flat indices, int32 (...), of cells (..., 3) in any form.
+
+        Raises:
+            AntsError: A cell lies beyond the array (cells of the void border do not).
+        """
+        qr = axial(cells) + self.ranges[2]
+        beyond = ((qr < 0) | (qr >= (self.width, self.height))).any(axis=-1)
+        if beyond.any():
+            cell = tuple(np.asarray(cells)[beyond][0].tolist())
+            raise AntsError(f"the cell {cell} is outside a world of ranges {self.ranges}.")
+        return (qr[..., 1] * self.width + qr[..., 0]).astype(np.int32)
+
+    def cells(self, index: object) -> np.ndarray:
+        """Normal forms, int32 (..., 3), of flat indices (...).
+
+        Raises:
+            AntsError: An index is not in [0, size).
+        """
+        flat = np.asarray(index)
+        if flat.dtype.kind not in "iu" or ((flat < 0) | (flat >= self.size)).any():
+            raise AntsError(f"flat indices must be whole numbers from 0 to {self.size - 1}.")
+        # int32 throughout: a world has up to MAX_ARRAY_CELLS cells, and millions are usual.
+        r, q = np.divmod(flat.astype(np.int32), np.int32(self.width))
+        r -= self.ranges[2]
+        q -= self.ranges[2]
+        low = np.minimum(np.minimum(q, r), np.int32(0))
+        return np.stack([q - low, r - low, -low], axis=-1)
+
+    def number(self, cells: object) -> np.ndarray:
+        """The cell numbers, int64 (...), of existing cells (..., 3) in any form.
+
+        A cell's number is its position among all existing cells in lexicographic order of the
+        normal form (x, y, z).
+
+        Raises:
+            AntsError: A cell does not exist.
+        """
+        normal = normal_form(cells)
+        outside = (normal >= np.array(self.ranges)).any(axis=-1)
+        if outside.any():
+            cell = tuple(normal[outside][0].tolist())
+            raise AntsError(f"the cell {cell} is outside a world of ranges {self.ranges}.")
+        _, y_range, z_range = self.ranges
+        x, y, z = normal[..., 0], normal[..., 1], normal[..., 2]
+        # x = 0 leaves y and z free. Each x > 0 has first y = 0 with any z, then z = 0 with y > 0.
+        first = y_range * z_range + (x - 1) * (y_range + z_range - 1)
+        return np.where(x == 0, y * z_range + z, first + np.where(y == 0, z, z_range + y - 1))
+
+
+def _frozen(array: np.ndarray) -> np.ndarray:
+    array.setflags(write=False)
+    return array

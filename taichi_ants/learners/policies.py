@@ -1,0 +1,149 @@
+"""Policies: tables of action values, two that need no learning, and their files.
+
+A policy is a float32 array of shape (128, 5): the value of each action in each state. An ant takes
+a best action, ties at random with equal probability. So a table can state a random choice, but no
+other probabilities.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from taichi_ants.errors import AntsError, shown
+from taichi_ants.files import PathLike, read_npz, to_json, write_npz
+from taichi_ants.task.constants import (
+    FORWARD,
+    GIVE,
+    LEFT,
+    N_ACTIONS,
+    N_STATES,
+    PICK_UP,
+    RIGHT,
+    SEES_EMPTY,
+    SEES_GOAL,
+    SEES_LURE,
+)
+from taichi_ants.task.states import State, state_from_index
+
+Policy = npt.NDArray[np.float32]
+
+
+def random_policy() -> Policy:
+    """The policy that takes each of the five actions with equal probability, in every state."""
+    return np.zeros((N_STATES, N_ACTIONS), np.float32)
+
+
+def trail_follower() -> Policy:
+    """A hand-written policy that forages well: 1 for the actions that it takes, 0 for the others.
+
+    Without food it picks up what it sees, follows a trail (straight on where it can), and
+    otherwise walks straight over open ground and turns at random beside anything that blocks.
+    With food it gives it to the queen, moves nearer to her, or wanders at random until a nearer
+    cell comes into view. In a dead end it turns left, which opens a way out after two turns.
+    """
+    q_values = random_policy()
+    for index in range(N_STATES):
+        q_values[index, _choices(state_from_index(index))] = 1.0
+    return q_values
+
+
+def _choices(state: State) -> list[int]:
+    """The actions among which the trail follower chooses at random."""
+    moves = (LEFT, FORWARD, RIGHT)
+    if SEES_GOAL in state.view:
+        return [GIVE if state.carries else PICK_UP]
+    lured = [move for move in moves if state.view[move] == SEES_LURE]
+    if lured:
+        straight = FORWARD in lured and not state.carries
+        return [FORWARD] if straight else lured
+    empty = [move for move in moves if state.view[move] == SEES_EMPTY]
+    if not empty:
+        return [LEFT]
+    # Straight on only in the open: along a wall it would run round the world forever. With food,
+    # straight on would lead away from the queen, since no cell in view is nearer to her.
+    in_the_open = len(empty) == len(moves)
+    return [FORWARD] if in_the_open and not state.carries else empty
+
+
+def save_policy(path: PathLike, q_values: npt.ArrayLike, metadata: Mapping[str, Any]) -> None:
+    """Write a policy file: an .npz with the action values and what made them.
+
+    Args:
+        path: The file; the whole name, no ending is added.
+        q_values: Action values of shape (128, 5), finite as float32.
+        metadata: What made the policy (configuration, seed, world ...), anything that
+            `files.write_json` can write.
+
+    Raises:
+        AntsError: The values are no policy, the metadata cannot be written as JSON, or the file
+            cannot be written.
+    """
+    table = _checked(q_values, "q_values")
+    if not isinstance(metadata, Mapping):
+        raise AntsError(f"metadata is {shown(metadata)}; it must be a mapping of names to values.")
+    try:
+        text = to_json(metadata)
+    except (TypeError, ValueError, RecursionError) as error:
+        reason = str(error) or type(error).__name__
+        raise AntsError(
+            f"metadata is {shown(metadata)}, which JSON cannot hold ({reason}); use numbers, text, "
+            "lists and mappings."
+        ) from error
+    write_npz(path, {"q_values": table, "metadata": np.array(text)})
+
+
+def load_policy(path: PathLike) -> tuple[Policy, dict[str, Any]]:
+    """Read a policy file that `save_policy` wrote.
+
+    Returns:
+        The action values, float32 of shape (128, 5), and the metadata.
+
+    Raises:
+        AntsError: The file is missing, damaged, no policy file, or its values are no policy.
+    """
+    arrays = read_npz(path)
+    missing = [name for name in ("q_values", "metadata") if name not in arrays]
+    if missing:
+        raise AntsError(
+            f"{str(path)!r} holds no {' and no '.join(missing)}; name a policy file that "
+            "save_policy wrote."
+        )
+    try:
+        metadata = json.loads(str(arrays["metadata"][()]))
+    except (ValueError, RecursionError):
+        metadata = None
+    if not isinstance(metadata, dict):
+        raise AntsError(
+            f"the metadata in {str(path)!r} is not a JSON object; name a policy file that "
+            "save_policy wrote."
+        )
+    return _checked(arrays["q_values"], f"q_values in {str(path)!r}"), metadata
+
+
+def _checked(q_values: npt.ArrayLike, what: str) -> Policy:
+    """A float32 copy of action values, or an AntsError that says what is wrong with them."""
+    try:
+        table = np.asarray(q_values)
+    except ValueError as error:  # rows of different lengths
+        raise AntsError(f"{what} is no array ({error}); it must hold real numbers.") from error
+    if table.dtype.kind not in "fiu":
+        raise AntsError(f"{what} has the type {table.dtype}; it must hold real numbers.")
+    if table.shape != (N_STATES, N_ACTIONS):
+        raise AntsError(
+            f"{what} has the shape {table.shape}; it must be ({N_STATES}, {N_ACTIONS})."
+        )
+    # A float64 beyond the range of float32 becomes infinite, which the next check reports.
+    with np.errstate(over="ignore"):
+        table = table.astype(np.float32)
+    if not np.isfinite(table).all():
+        state, action = np.argwhere(~np.isfinite(table))[0]
+        raise AntsError(
+            f"{what} is {table[state, action]} for state {state} and action {action}; "
+            "it must be finite."
+        )
+    return table

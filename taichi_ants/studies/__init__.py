@@ -1,0 +1,1 @@
+"""Sweeps as data, the runner of resumable blocks, and the folders of results."""

@@ -1,0 +1,93 @@
+"""Where results come from: what determines them, and what made them."""
+
+from __future__ import annotations
+
+import datetime
+import hashlib
+import os
+import platform
+import shlex
+import subprocess
+from collections.abc import Sequence
+from dataclasses import asdict
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from taichi_ants import __version__
+from taichi_ants.studies.sweeps import Sweep
+from taichi_ants.worlds.world import World
+
+_PACKAGES = ("taichi", "numpy", "scipy", "matplotlib")
+
+
+def sweep_settings(sweep: Sweep) -> dict[str, Any]:
+    """All that determines the numbers of a sweep; equal settings give equal results."""
+    return {
+        "version": __version__,
+        "world": world_facts(sweep.world),
+        "configurations": [asdict(config) for config in sweep.configs],
+        "seeds": list(sweep.seeds),
+        "episodes": sweep.episodes,
+        "max_steps": sweep.max_steps,
+        "rollouts": sweep.rollouts,
+        "train_evaporation": sweep.train_evaporation,
+        "greedy_evaporation": sweep.greedy_evaporation,
+    }
+
+
+def world_facts(world: World) -> dict[str, Any]:
+    """A world in a few numbers, and a hash of all of it."""
+    digest = hashlib.sha256()
+    for array in (world.foods, world.obstacles, world.trails, world.ants):
+        digest.update(repr(array.shape).encode())
+        digest.update(array.tobytes())
+    return {
+        "ranges": list(world.ranges),
+        "queen": list(world.queen),
+        "foods": len(world.foods),
+        "obstacles": len(world.obstacles),
+        "trail_cells": len(world.trails),
+        "ants": len(world.ants),
+        "sha256": digest.hexdigest(),
+    }
+
+
+def provenance(arguments: Sequence[str]) -> dict[str, Any]:
+    """What made results: command, versions, machine, time and commit."""
+    return {
+        "command": shlex.join(arguments),
+        "finished": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
+        "commit": commit(),
+        "python": platform.python_version(),
+        "packages": {"taichi_ants": __version__, **{name: _version(name) for name in _PACKAGES}},
+        "platform": platform.platform(),
+        "cpus": os.cpu_count(),
+    }
+
+
+def commit() -> str | None:
+    """The commit of the source, "+changes" behind it if files differ; None outside a checkout."""
+    root = Path(__file__).resolve().parent.parent
+    if not (root / ".git").exists():
+        return None
+    head = _git(root, "rev-parse", "HEAD")
+    changed = _git(root, "status", "--porcelain", "--untracked-files=no")
+    return head and head + ("+changes" if changed else "")
+
+
+def _git(root: Path, *arguments: str) -> str | None:
+    try:
+        done = subprocess.run(
+            ["git", *arguments], cwd=root, capture_output=True, text=True, timeout=10, check=True
+        )
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return done.stdout.strip()
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None

@@ -1,0 +1,55 @@
+"""What the outcome of an action pays."""
+
+from __future__ import annotations
+
+from dataclasses import astuple, dataclass, fields
+
+import numpy as np
+
+from taichi_ants.errors import AntsError
+from taichi_ants.grid.randomness import whole
+
+MOST = 1000
+
+
+@dataclass(frozen=True)
+class Rewards:
+    """The reward of each event, whole numbers from -1000 to 1000; the paper's table 1 by default.
+
+    The fields stand in the order of the events, see `constants`.
+
+    Attributes:
+        empty: A move onto a cell that was seen as E.
+        failed: A blocked move, or a pick-up or give that cannot be done.
+        lure: A move onto a cell that was seen as T or S.
+        pick_up: A food picked up.
+        give: A food given to the queen.
+    """
+
+    empty: int = 0
+    failed: int = -1
+    lure: int = 1
+    pick_up: int = 3
+    give: int = 10
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = whole(f"the reward {field.name}", getattr(self, field.name))
+            if not -MOST <= value <= MOST:
+                raise AntsError(
+                    f"the reward {field.name} is {value}; it must lie between {-MOST} and {MOST}."
+                )
+            object.__setattr__(self, field.name, value)
+
+    def by_event(self) -> np.ndarray:
+        """The rewards by event, int32 (5,)."""
+        return np.array(astuple(self), dtype=np.int32)
+
+    @property
+    def largest(self) -> int:
+        """The largest absolute value, on which the range of a return depends."""
+        return max(map(abs, astuple(self)))
+
+
+# Those in force, everywhere.
+REWARDS = Rewards()

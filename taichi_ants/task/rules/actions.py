@@ -1,0 +1,56 @@
+"""What the five actions do and what they are worth."""
+
+import taichi as ti
+
+from taichi_ants.grid.constants import N_HEADINGS
+from taichi_ants.task.constants import FAILED, LEFT, RIGHT
+
+# A compass is an i32 array of 38: the index steps to the left, forward and right cell of heading h
+# at h, h + 1 and h + 2, then the heading after each of the five actions, by action and heading
+# (picking up turns round only if it succeeds, so that it stands there as no turn).
+_TURNS_AT = 8
+
+
+@ti.func
+def step_towards(compass: ti.template(), heading, position):
+    """The index step to the cell in view at position 0 (left), 1 (forward) or 2 (right)."""
+    return compass[heading + position]
+
+
+@ti.func
+def turn(compass: ti.template(), heading, move):
+    """The heading after a move (LEFT, FORWARD or RIGHT).
+
+    A branch with a look-up, not arithmetic: then the processor goes on with the predicted action,
+    which a learned policy repeats, instead of waiting for the comparison of the action values.
+    """
+    turned = heading
+    if move == LEFT:
+        turned = turned_by(compass, heading, LEFT)
+    elif move == RIGHT:
+        turned = turned_by(compass, heading, RIGHT)
+    return turned
+
+
+@ti.func
+def turned_by(compass: ti.template(), heading, action):
+    """The same by look-up alone, for any action: for crowds, whose actions nobody can predict."""
+    return compass[_TURNS_AT + N_HEADINGS * action + heading]
+
+
+@ti.func
+def turn_round(heading):
+    """The opposite heading."""
+    return ti.select(heading < 3, heading + 3, heading - 3)
+
+
+@ti.func
+def is_open(code):
+    """Whether a cell that looks like this can be entered: E, T and S can."""
+    return code & 1 == 0
+
+
+@ti.func
+def move_event(code):
+    """What comes of a move to a cell that looks like this: ENTERED_EMPTY, ENTERED_LURE, FAILED."""
+    return ti.select(is_open(code), code, FAILED)

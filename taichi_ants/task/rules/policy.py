@@ -1,0 +1,63 @@
+"""How an ant chooses among its five actions."""
+
+import taichi as ti
+from taichi.math import popcnt
+
+from taichi_ants.task.constants import N_ACTIONS
+from taichi_ants.task.rules.random_bits import below, high_word, low_word
+
+
+@ti.func
+def larger(a, b):
+    """The larger of two floats, in one instruction (`ti.max` takes several to respect NaN)."""
+    return ti.select(a > b, a, b)
+
+
+@ti.func
+def smaller(a, b):
+    """The smaller of two floats."""
+    return ti.select(a < b, a, b)
+
+
+@ti.func
+def best_value(values):
+    """The largest of five action values (f32)."""
+    return larger(larger(larger(values[0], values[1]), larger(values[2], values[3])), values[4])
+
+
+@ti.func
+def lowest_bit_number(mask):
+    """The number of the lowest set bit of a non-zero i32."""
+    return popcnt((mask & -mask) - 1)
+
+
+@ti.func
+def bit_number(mask, k):
+    """The number of the k-th set bit (from 0, ascending) of an i32."""
+    rest = mask
+    for _ in range(k):
+        rest &= rest - 1
+    return lowest_bit_number(rest)
+
+
+@ti.func
+def choose(values, bits, explore_below):
+    """Epsilon-greedy choice, ties uniformly at random, from one draw of 64 bits.
+
+    The upper word decides whether to explore (if it lies below `explore_below`, epsilon * 2**32 as
+    u64), the lower word which action, so that every decision costs one draw.
+    """
+    action = 0
+    if high_word(bits) < explore_below:
+        action = below(low_word(bits), N_ACTIONS)
+    else:
+        best = best_value(values)
+        mask = (1 << N_ACTIONS) - 1
+        for a in ti.static(range(N_ACTIONS)):
+            # Not `values[a] == best`: with values that are no numbers none would be left.
+            mask ^= ti.cast(values[a] < best, ti.i32) << a
+        if mask & (mask - 1) == 0:  # one best action: nearly always, and well predicted
+            action = lowest_bit_number(mask)
+        else:
+            action = bit_number(mask, below(low_word(bits), popcnt(mask)))
+    return action

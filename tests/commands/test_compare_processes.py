@@ -1,0 +1,303 @@
+"""The comparison as a process: stopped, killed, piped, without a home, with a plugin."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from command_lines import (
+    EXPERIMENTS,
+    PROMPTLY,
+    assert_one_sentence,
+    command,
+    contents,
+    environment,
+    run,
+    start,
+)
+
+from taichi_ants import TrainingConfig, reference, worlds
+from taichi_ants.reference import learners as twins
+
+LONG = [
+    *("--seeds", 4, "--episodes", 500, "--learners", "q_learning", "dyna_q"),
+    *("--planning-steps", 9, "--learning-rates", 0.001, 0.01, "--discounts", 0.9, 0.99),
+    *("--epsilons", 0.5, "--no-figures", "--no-render"),
+]
+PICTURED = [
+    *("--seeds", 2, "--episodes", 20, "--learners", "q_learning", "sarsa", "--discounts", 0.9),
+    *("--learning-rates", 0.1, "--epsilons", 0.3, "--epsilon-decays", 0.9),
+]
+MANY = [*LONG, "--seeds", 50]
+BLOCKS = 2 * 2 * 2  # settings of delivery, learners, pieces of at most 333 runs
+TINY = [
+    *("--seeds", 1, "--episodes", 2, "--max-steps", 30, "--learners", "q_learning"),
+    *("--learning-rates", 0.1, "--discounts", 0.9, "--epsilons", 0.3, "--epsilon-decays", 0.9),
+    *("--delivery", "absorbing", "--no-figures", "--no-render"),
+]
+
+
+def blocks_in(folder):
+    """Finished blocks with the time at which they were written."""
+    found = (folder / "unfinished" / "blocks").glob("*.npz")
+    return {path.name: path.stat().st_mtime_ns for path in found}
+
+
+def stop_after_a_block(process, folder, stop_signal, least):
+    """Send a signal once there are `least` blocks; what the process wrote, and how long it took."""
+    while process.poll() is None and len(blocks_in(folder)) < least:
+        time.sleep(0.002)
+    sent = time.perf_counter()
+    process.send_signal(stop_signal)
+    out, err = process.communicate(timeout=60)
+    return out, err, time.perf_counter() - sent
+
+
+@pytest.fixture(scope="module")
+def uninterrupted(tmp_path_factory, kernels):
+    place = tmp_path_factory.mktemp("uninterrupted")
+    assert run("compare", [*MANY, "--out", "out"], kernels, place).returncode == 0
+    return contents(place / "out")
+
+
+def test_stopped_and_killed_it_goes_on_to_the_same_results(uninterrupted, kernels, tmp_path):
+    folder = tmp_path / "out"
+    arguments = [*MANY, "--out", "out"]
+
+    process = start("compare", arguments, kernels, tmp_path)
+    out, err, seconds = stop_after_a_block(process, folder, signal.SIGINT, 1)
+    assert process.returncode == 130
+    assert (out, err) == (
+        "",
+        "Stopped; finished runs are kept, and the same command goes on from there.\n",
+    )
+    assert seconds < PROMPTLY
+    kept = blocks_in(folder)
+    assert 1 <= len(kept) < BLOCKS
+    assert [path.name for path in folder.iterdir()] == ["unfinished"]
+
+    other = [*arguments, "--seeds", 5]
+    refused = run("compare", other, kernels, tmp_path)
+    assert refused.returncode == 2
+    assert_one_sentence(refused.stderr)
+    assert "unfinished" in refused.stderr
+
+    process = start("compare", arguments, kernels, tmp_path)
+    stop_after_a_block(process, folder, signal.SIGKILL, len(kept) + 1)
+    assert process.returncode == -signal.SIGKILL
+    assert len(kept) < len(blocks_in(folder)) < BLOCKS
+    assert kept.items() <= blocks_in(folder).items()  # none of them was done again
+
+    done = run("compare", arguments, kernels, tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    after = contents(folder)
+    assert set(after) == set(uninterrupted)
+    for name in set(after) - {"manifest.json", "report.txt"}:  # these two tell times
+        assert after[name] == uninterrupted[name], name
+
+
+@pytest.mark.parametrize(("stop", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_an_interruption_before_the_first_block_leaves_nothing(stop, status, kernels, tmp_path):
+    process = start("compare", [*LONG, "--out", "new/folder"], kernels, tmp_path)
+    while process.poll() is None and not (tmp_path / "new").exists():
+        time.sleep(0.002)
+    process.send_signal(stop)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (status, "")
+    assert err.startswith("Stopped")
+    assert err.count("\n") == 1
+    if not blocks_in(tmp_path / "new" / "folder"):  # under load the first may be done by now
+        assert list(tmp_path.iterdir()) == []
+
+
+def test_a_damaged_block_is_done_again_with_a_word_on_it(kernels, tmp_path):
+    process = start("compare", [*MANY, "--out", "out"], kernels, tmp_path)
+    stop_after_a_block(process, tmp_path / "out", signal.SIGTERM, 1)
+    assert process.returncode == 143
+    name = min(blocks_in(tmp_path / "out"))
+    path = tmp_path / "out" / "unfinished" / "blocks" / name
+    path.write_bytes(path.read_bytes()[:-100])
+    process = start("compare", [*MANY, "--out", "out"], kernels, tmp_path)
+    _, err, _ = stop_after_a_block(process, tmp_path / "out", signal.SIGINT, 2)
+    damaged, stopped = err.splitlines()
+    assert damaged == f"'out/unfinished/blocks/{name}' is damaged, so this part is done again."
+    assert stopped.startswith("Stopped")
+
+
+@pytest.mark.parametrize("seconds", [0.05, 0.6])
+def test_an_interruption_of_the_pictures_keeps_the_runs(seconds, kernels, tmp_path):
+    """Ctrl-C on a terminal goes to the process that draws, too, and that says nothing."""
+    arguments = [*PICTURED, "--out", "out"]
+    process = start("compare", arguments, kernels, tmp_path, start_new_session=True)
+    unfinished = tmp_path / "out" / "unfinished"
+    while process.poll() is None and not list(unfinished.glob("ready/policies/*")):
+        time.sleep(0.002)
+    time.sleep(seconds)
+    os.killpg(process.pid, signal.SIGINT)
+    sent = time.perf_counter()
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (130, "")
+    assert err.startswith("Stopped")
+    assert err.count("\n") == 1
+    assert time.perf_counter() - sent < PROMPTLY
+    assert len(blocks_in(tmp_path / "out")) == 2 * 2
+
+
+def test_a_second_process_waits_its_turn(kernels, tmp_path):
+    process = start("compare", [*LONG, "--out", "out"], kernels, tmp_path)
+    try:
+        while process.poll() is None and not (tmp_path / "out" / "unfinished" / "ready").exists():
+            time.sleep(0.002)
+        process.send_signal(signal.SIGSTOP)
+        second = run("compare", [*LONG, "--out", "out"], kernels, tmp_path)
+        assert second.returncode == 2
+        assert_one_sentence(second.stderr)
+        assert "another process" in second.stderr
+    finally:
+        process.send_signal(signal.SIGCONT)
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=60)
+    assert process.returncode == 130
+
+
+def test_help_is_quick_and_needs_no_taichi(tmp_path):
+    script = (
+        "import runpy, sys\n"
+        f"sys.argv = ['compare.py', '--help']\n"
+        "try:\n"
+        f"    runpy.run_path({str(EXPERIMENTS / 'compare.py')!r}, run_name='__main__')\n"
+        "except SystemExit as end:\n"
+        "    assert end.code == 0\n"
+        "heavy = {'taichi', 'numpy', 'scipy', 'matplotlib', 'rich'} & set(sys.modules)\n"
+        "print('heavy:', sorted(heavy))\n"
+    )
+    began = time.perf_counter()
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        env=environment(tmp_path),
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert time.perf_counter() - began < 1
+    assert done.stdout.endswith("heavy: []\n")
+    for flag in (
+        *("--seeds", "--seed", "--episodes", "--max-steps", "--delivery", "--learners"),
+        *("--learning-rates", "--discounts", "--epsilons", "--epsilon-decays"),
+        *("--planning-steps", "--world", "--threads", "--arch", "--out", "--quick", "--force"),
+        *("--no-figures", "--no-render"),
+    ):
+        assert f"  {flag}" in done.stdout
+
+
+def test_only_the_beginning_is_read(kernels, tmp_path):
+    """`| head -1`, and an output that is full."""
+    arguments = [*TINY, "--out", "out"]
+    assert run("compare", arguments, kernels, tmp_path).returncode == 0
+    before = contents(tmp_path / "out")
+    line = " ".join(command("compare", arguments))
+    for end, status, complaint in (
+        ("| head -1", 0, ""),
+        ("> /dev/full", 2, "error: cannot read or write the output: No space left on device.\n"),
+        (">&-", 0, ""),
+    ):
+        done = subprocess.run(
+            ["bash", "-c", f"{line} {end}; exit ${{PIPESTATUS[0]}}"],
+            cwd=tmp_path,
+            env=environment(kernels, PYTHONIOENCODING="ascii"),
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
+        assert (done.returncode, done.stderr) == (status, complaint)
+        if "head" in end:
+            assert done.stdout.startswith("World: the paper's.")
+            assert done.stdout.count("\n") == 1
+    assert contents(tmp_path / "out") == before
+
+
+@pytest.mark.parametrize("home", [None, "/proc/nope", "/proc"])
+def test_without_a_home(home, kernels, tmp_path):
+    """Kernels are then kept among the temporary files."""
+    places = {"HOME": home, "XDG_CACHE_HOME": None, "TMPDIR": str(kernels)}
+    done = run("compare", [*TINY, "--out", "out"], kernels, tmp_path, **places)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "out" / "summary.csv").exists()
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+    if hasattr(os, "getuid"):
+        assert (kernels / f"taichi_ants-{os.getuid()}").stat().st_mode & 0o077 == 0
+
+
+HYSTERETIC = """
+import taichi as ti
+
+from taichi_ants.learners import Learner, register
+from taichi_ants.task.rules.policy import best_value
+
+
+@ti.func
+def td_error(value, reward, discount, next_values, next_action, epsilon):
+    error = reward + discount * best_value(next_values) - value
+    if error < 0:
+        error *= 0.25
+    return error
+
+
+register(Learner("hysteretic", td_error, summary="slow to believe bad news"))
+"""
+
+
+def hysteretic_twin(value, reward, discount, next_values, next_action, epsilon):
+    error = (reward + discount * max(next_values)) - value
+    return error * np.float32(0.25) if error < 0 else error
+
+
+def test_a_learner_from_a_file_of_ones_own(kernels, tmp_path, monkeypatch):
+    (tmp_path / "own.py").write_text(HYSTERETIC)
+    arguments = [
+        *(*TINY, "--learners", "hysteretic", "q_learning", "--plugin", "own.py"),
+        *("--episodes", 12, "--max-steps", 120, "--out", "out"),
+    ]
+    done = run("compare", arguments, kernels, tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "hysteretic" in done.stdout
+
+    monkeypatch.setattr(twins, "_learners", dict(twins._learners))
+    twins.register("hysteretic", hysteretic_twin)
+    with np.load(tmp_path / "out" / "episodes.npz") as archive:
+        for row, name in enumerate(("hysteretic", "q_learning")):
+            config = TrainingConfig(name, 0.1, 0.9, 0.3, 0.9)
+            plain = reference.train(worlds.paper(), config, 0, 12, 120)
+            assert archive["returns"][row, 0].tolist() == plain.returns
+            assert archive["steps"][row, 0].tolist() == plain.steps
+        assert not np.array_equal(archive["returns"][0], archive["returns"][1])
+
+    # A file that was changed since may mean other results.
+    (tmp_path / "own.py").write_text(HYSTERETIC.replace("0.25", "0.5"))
+    refused = run("compare", arguments, kernels, tmp_path)
+    assert refused.returncode == 2
+    assert_one_sentence(refused.stderr)
+    assert "plugin" in refused.stderr
+
+
+@pytest.mark.skipif(shutil.which("script") is None, reason="needs `script` for a terminal")
+def test_progress_on_a_terminal(kernels, tmp_path):
+    line = " ".join(command("compare", [*TINY, "--out", "out"]))
+    done = subprocess.run(
+        ["script", "-qec", line, "/dev/null"],
+        cwd=tmp_path,
+        env=environment(kernels, TERM="xterm"),
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 0
+    assert re.search(r"training.*0 %", done.stdout)

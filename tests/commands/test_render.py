@@ -1,0 +1,362 @@
+"""The command line of `experiments/render.py`, from outside."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from taichi_ants.commands import render
+from taichi_ants.learners.policies import save_policy, trail_follower
+from taichi_ants.rendering import colours, learning_frames, text
+from taichi_ants.worlds import paper
+
+ROOT = Path(__file__).parents[2]
+SCRIPT = ROOT / "experiments" / "render.py"
+
+sys.path.insert(0, str(SCRIPT.parent))
+import gallery  # noqa: E402
+
+sys.path.remove(str(SCRIPT.parent))
+
+
+def environment(**changes: str) -> dict[str, str]:
+    """No display, and the package from this folder."""
+    kept = {name: value for name, value in os.environ.items() if name != "DISPLAY"}
+    return {**kept, "PYTHONPATH": str(ROOT), **changes}
+
+
+def run(*arguments: object, **changes: str) -> subprocess.CompletedProcess:
+    return subprocess.run(
+        [sys.executable, str(SCRIPT), *map(str, arguments)],
+        env=environment(**changes),
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def policy(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("policies") / "follower.npz"
+    save_policy(path, trail_follower(), {})
+    return path
+
+
+def files_in(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.rglob("*"))
+
+
+def test_an_episode_without_display_and_home(tmp_path, policy) -> None:
+    path = tmp_path / "new" / "a.gif"
+    done = run("--policy", policy, "--size", "400x330", "--out", path, HOME="/proc/nope")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert done.stdout == f"{path}: 34 steps, return 45, delivered\n"
+    with Image.open(path) as image:
+        assert image.n_frames == 35
+        assert image.size == (400, 330)
+    assert files_in(tmp_path) == ["a.gif", "new"]
+
+
+def test_training_on_the_spot(tmp_path) -> None:
+    done = run("--episodes", 30, "--out", tmp_path / "frames", "--size", "64x64", "--max-steps", 4)
+    assert done.returncode == 0, done.stderr
+    assert files_in(tmp_path / "frames")[0] == "frame_000000.png"
+    assert 5 <= len(files_in(tmp_path / "frames")) <= 17
+
+
+def test_one_step_and_a_sheet(tmp_path, policy) -> None:
+    path = tmp_path / "a.png"
+    assert run("--policy", policy, "--step", 3, "--out", path).stdout.endswith("step 3 of 34\n")
+    assert Image.open(path).size == (1280, 720)
+    late = run("--policy", policy, "--step", 35, "--out", tmp_path / "b.png")
+    assert late.returncode == 2
+    assert "no step 35" in late.stderr
+    done = run("--policy", policy, "--show", "sheet", "--out", tmp_path / "sheet.png")
+    assert done.returncode == 0, done.stderr
+    assert Image.open(tmp_path / "sheet.png").width == 1280
+    assert files_in(tmp_path) == ["a.png", "sheet.png"]
+    done = run("--policy", policy, "--show", "sheet", "--all-states", "--out", tmp_path / "all.png")
+    assert done.returncode == 0, done.stderr
+    assert Image.open(tmp_path / "all.png").width == 1920
+
+
+def test_learning_and_a_colony(tmp_path) -> None:
+    done = run(
+        *("--show", "learning", "--stages", "0,2", "--max-steps", 9, "--size", "300x200"),
+        *("--out", tmp_path / "a.webp"),
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.endswith("a.webp: before learning, after 2 episodes\n")
+    with Image.open(tmp_path / "a.webp") as image:
+        assert image.n_frames >= 5
+    done = run(
+        *("--show", "colony", "--world", "open", "--ants", 7, "--episodes", 2, "--max-steps", 9),
+        *("--every", 3, "--size", "300x200", "--out", tmp_path / "b.gif"),
+    )
+    assert done.returncode == 0, done.stderr
+    assert "7 ants, 9 ticks" in done.stdout
+    with Image.open(tmp_path / "b.gif") as image:
+        assert image.n_frames == 4
+
+
+WRONG = {
+    "ending": (["--out", "{}/a.avi"], ".gif, .webp, .mp4"),
+    "ending of a sheet": (["--show", "sheet", "--out", "{}/a.gif"], ".png"),
+    "ending of learning": (["--show", "learning", "--out", "{}/a.png"], ".gif"),
+    "place": (["--out", "/proc/nope/a.gif"], "cannot write"),
+    "size": (["--size", "63x63", "--out", "{}/a.gif"], "64 to 4096"),
+    "large size": (["--size", "5000x100", "--out", "{}/a.gif"], "64 to 4096"),
+    "size of a sheet": (["--show", "sheet", "--size", "400x300"], "--size"),
+    "file as a folder": (["--out", "{}/a.gif/"], "as a folder"),
+    "picture as a folder": (["--show", "sheet", "--out", "{}/a.png/"], "as a folder"),
+    "form of a size": (["--size", "1280*720"], "1280x720"),
+    "speed": (["--fps", "0", "--out", "{}/a.gif"], "fps"),
+    "no number": (["--fps", "fast"], "not a number"),
+    "world": (["--world", "mars", "--out", "{}/a.gif"], "mars"),
+    "policy": (["--policy", "nope.npz", "--out", "{}/a.gif"], "nope.npz"),
+    "policy and learning": (
+        ["--show", "learning", "--policy", "a.npz"],
+        "--policy changes nothing in learning; leave it out (it is for a colony, a",
+    ),
+    "episodes of learning": (["--show", "learning", "--episodes", "500"], "--episodes changes"),
+    "step of a GIF": (
+        ["--step", "3"],
+        "--step changes nothing in an episode; leave it out (it is for a still colony, a",
+    ),
+    "states of an episode": (["--all-states"], "--all-states changes nothing in an episode"),
+    "world seed of the paper": (
+        ["--world-seed", "3"],
+        "--world-seed is for a world drawn at random",
+    ),
+    "step of a sheet": (["--show", "sheet", "--step", "3"], "--step changes nothing in a sheet"),
+    "ants of an episode": (["--ants", "80"], "--ants changes nothing in an episode"),
+    "every of a still": (["--show", "colony", "--every", "4", "--out", "a.png"], "--every"),
+    "view of a colony": (["--show", "colony", "--no-view"], "--no-view changes nothing"),
+    "legend of learning": (["--show", "learning", "--no-legend"], "--no-legend changes nothing"),
+    "lines of learning": (["--show", "learning", "--no-hud"], "--no-hud changes nothing"),
+    "speed of a still": (["--fps", "9", "--out", "a.png"], "--fps changes nothing in a still"),
+    "stages of an episode": (["--stages", "1"], "--stages changes nothing in an episode"),
+    "training and policy": (["--policy", "a.npz", "--learner", "sarsa"], "--learner is for"),
+    "greedy and epsilon": (["--greedy", "--epsilon", "0.5"], "--greedy"),
+    "epsilon": (["--policy", "{policy}", "--epsilon", "2", "--out", "{}/a.gif"], "epsilon"),
+    "learner": (["--learner", "magic", "--out", "{}/a.gif"], "magic"),
+    "stages": (["--show", "learning", "--stages", "5,1", "--out", "{}/a.gif"], "ascend"),
+    "order of stages": (
+        ["--show", "learning", "--stages", "5", "5", "2", "--out", "{}/a.gif"],
+        "stages are (5, 5, 2); they must ascend",
+    ),
+    "steps": (["--max-steps", "0"], "from 1 to"),
+    "unknown option": (["--colour", "red"], "--colour"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_mistakes_are_one_sentence(tmp_path, policy, name) -> None:
+    arguments, named = WRONG[name]
+    done = run(*(part.format(tmp_path, policy=policy) for part in arguments))
+    assert done.returncode == 2, done.stderr
+    assert named in done.stderr
+    assert done.stderr.startswith("error: ")
+    assert done.stderr.count("\n") == 1
+    assert done.stdout == ""
+    assert files_in(tmp_path) == []
+
+
+def test_without_pyav(tmp_path, policy) -> None:
+    hidden = "import sys, runpy; sys.modules['av'] = None; sys.argv = sys.argv[1:]; "
+    hidden += "runpy.run_path(sys.argv[0], run_name='__main__')"
+    done = subprocess.run(
+        [sys.executable, "-c", hidden, str(SCRIPT), "--out", str(tmp_path / "a.mp4")],
+        env=environment(),
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert ".[video]" in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert files_in(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "sent", "status"),
+    [
+        ("a.gif", signal.SIGINT, 130),
+        ("frames", signal.SIGINT, 130),
+        ("a.webp", signal.SIGTERM, 143),
+    ],
+)
+def test_stopped_midway_it_leaves_nothing_behind(tmp_path, policy, name, sent, status) -> None:
+    # An ant that moves at random has far more steps to take than there is time for.
+    arguments = ["--policy", str(policy), "--epsilon", "1", "--max-steps", "100000"]
+    arguments += ["--world", "open", "--size", "1600x1200", "--out", str(tmp_path / "new" / name)]
+    with subprocess.Popen(
+        [sys.executable, str(SCRIPT), *arguments],
+        env=environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        for _ in range(600):
+            if any(path.name.endswith(".tmp") for path in tmp_path.rglob(".*")):
+                break
+            time.sleep(0.1)
+        else:
+            process.kill()
+            pytest.fail("it has not begun to write")
+        time.sleep(0.7)
+        process.send_signal(sent)
+        _, errors = process.communicate(timeout=30)
+    assert process.returncode == status
+    assert errors == ("Stopped; nothing was left behind.\n" if sent == signal.SIGINT else "")
+    assert files_in(tmp_path) == []
+
+
+def test_trails_of_a_colony_stay_without_evaporation(tmp_path, policy) -> None:
+    pictures = []
+    for more in ([], ["--no-evaporation"]):
+        path = tmp_path / f"{len(more)}.png"
+        colony = ["--show", "colony", "--policy", policy, "--ants", 60, "--max-steps", 150]
+        done = run(*colony, "--no-hud", "--no-legend", "--world", "paper", *more, "--out", path)
+        assert done.returncode == 0, done.stderr
+        pictures.append(np.asarray(Image.open(path)).astype(int))
+    # A trail is as it was at the start, 25, or as an ant laid it, 250, unless it evaporates.
+    between = set(colours.TRAIL_RAMP[40:230].tolist())
+    evaporated = [between & set(colours.pack(picture).ravel().tolist()) for picture in pictures]
+    assert len(evaporated[0]) > 10
+    assert not evaporated[1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "world"),
+    [([], "paper"), (["--show", "colony"], "open"), (["--show", "colony", "--world", "x"], "x")],
+)
+def test_default_worlds(arguments, world) -> None:
+    assert render.parse_arguments(arguments).world == world
+
+
+@pytest.mark.parametrize(
+    ("arguments", "size"),
+    [
+        ([], (1280, 720)),
+        (["--show", "learning"], (1280, 520)),
+        (["--show", "colony"], (960, 540)),
+        (["--show", "colony", "--out", "a.png"], (1280, 720)),
+        (["--show", "colony", "--size", "320x200"], (320, 200)),
+    ],
+)
+def test_default_sizes(arguments, size) -> None:
+    assert render.parse_arguments(arguments).size == size
+
+
+def test_help_is_quick_and_needs_little() -> None:
+    took = []
+    for _ in range(3):
+        began = time.perf_counter()
+        done = run("--help")
+        took.append(time.perf_counter() - began)
+        assert "--policy" in done.stdout
+    assert min(took) < 1.0
+    heavy = "import sys; sys.path.insert(0, sys.argv[1]); import render, gallery; "
+    heavy += "print({'taichi', 'matplotlib', 'PIL', 'av', 'numpy'} & set(sys.modules))"
+    loaded = subprocess.run(
+        [sys.executable, "-c", heavy, str(SCRIPT.parent)],
+        env=environment(),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert loaded.stdout == "set()\n"
+
+
+def test_an_ant_that_circles_earns_more_than_a_delivery_and_the_picture_says_why(
+    monkeypatch,
+) -> None:
+    # What README says of the picture.
+    arguments = render.parse_arguments(gallery.GALLERY["learning.gif"])
+    stages = render.noted_stages(arguments, paper())
+    assert [stage.note for stage in stages] == [
+        *("", "circles with food", "delivered", "delivered"),
+    ]
+    returns = [int(stage.episode.trace.rewards.sum()) for stage in stages]
+    assert returns[1] == 57 > returns[3] == 45
+    lines = []
+    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
+    list(learning_frames(stages, arguments.size))
+    assert "return 57: circles with food" in lines
+    assert "= T 16 + S 38 + F 3" in lines
+    assert "= T 16 + S 16 + F 3 + Q 10" in lines
+    assert "S nearer to the queen, with food +1" in lines  # the legend
+
+
+def test_the_gallery_is_there_and_small() -> None:
+    sizes = []
+    for name, arguments in gallery.GALLERY.items():
+        settings = render.parse_arguments([*arguments, "--out", name])
+        path = ROOT / "renders" / name
+        sizes.append(path.stat().st_size)
+        with Image.open(path) as image:
+            if settings.show != "sheet":
+                assert image.size == settings.size
+            frames = getattr(image, "n_frames", 1)
+            assert (frames > 1) == name.endswith(".gif")
+            assert np.asarray(image.convert("RGB")).std() > 5
+    assert len(sizes) == 5
+    assert sum(sizes) < 3_000_000
+    figures = [ROOT / "docs" / "figures" / name for name in (*gallery.COMPARISON, *gallery.COLONY)]
+    assert sum(path.stat().st_size for path in figures) < 600_000
+
+
+def test_the_tracked_pictures_are_those_of_the_gallery() -> None:
+    listed = subprocess.run(
+        ["git", "ls-files", "renders", "docs", "*.png", "*.gif", "*.webp", "*.mp4"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if listed.returncode:
+        pytest.skip("not a git repository")
+    pictures = {
+        path
+        for path in listed.stdout.split()
+        if Path(path).suffix in (".png", ".gif", ".webp", ".mp4") and not path.startswith("tests/")
+    }
+    figures = {f"docs/figures/{name}" for name in (*gallery.COMPARISON, *gallery.COLONY)}
+    assert pictures == figures | {f"renders/{name}" for name in gallery.GALLERY}
+
+
+@pytest.mark.parametrize("shown", ["episode", "colony", "learning", "sheet"])
+def test_by_default_no_tracked_picture_is_replaced(shown) -> None:
+    place = render.parse_arguments(["--show", shown]).out
+    ignored = subprocess.run(
+        ["git", "check-ignore", "--no-index", "-q", place],
+        cwd=ROOT,
+        capture_output=True,
+        check=False,
+    )
+    if ignored.returncode == 128:
+        pytest.skip("not a git repository")
+    assert ignored.returncode == 0
+
+
+def test_figures_of_the_docs_are_those_of_the_studies(tmp_path) -> None:
+    """As the gallery keeps them: the same picture in at most 256 colours."""
+    drawn = tmp_path / "drawn"
+    drawn.mkdir()
+    picture = np.random.default_rng(1).integers(0, 4, (90, 160, 3), dtype=np.uint8) * 60
+    Image.fromarray(picture).save(drawn / "scaling.png")
+    gallery.keep(drawn, gallery.COLONY, tmp_path / "docs")
+    with Image.open(tmp_path / "docs" / "colony_scaling.png") as kept:
+        assert (np.asarray(kept.convert("RGB")) == picture).all()

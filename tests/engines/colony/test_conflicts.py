@@ -1,0 +1,142 @@
+"""The conflict rule of the colony, in drawn micro-worlds: both outcomes, worked by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from taichi_ants import Colony, ColonyConfig, TrainingConfig, World
+from taichi_ants.engines.colony import arrays as names
+from taichi_ants.grid.randomness import GAMMA, mix
+from taichi_ants.learners.policies import random_policy
+from taichi_ants.task.constants import EMPTY, FOOD, FORWARD, GIVE, LEFT, PICK_UP, RIGHT
+
+TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 0.0, 1.0)
+
+
+def act(world: World, actions: list[int], **config: object) -> Colony:
+    """One tick in which the listed ants do these actions."""
+    colony = Colony(
+        world, ColonyConfig(ants=len(actions), **config), TRAINING, 0, "fixed", random_policy()
+    )
+    colony.begin_episode()
+    colony.arrays["ants"][names.ACTION] = actions
+    colony.tick()
+    return colony
+
+
+def ants(colony: Colony) -> list[tuple[tuple[int, ...], int, int, int]]:
+    """Cell, heading, carries and reward of each ant."""
+    table = colony.arrays["ants"]
+    cells = colony.snapshot().grid.cells(table[names.CELL]).tolist()
+    rewards = colony.arrays["rewards"][table[names.EVENT]]
+    rows = (table[names.HEADING], table[names.CARRIES], rewards)
+    return [(tuple(cell), *map(int, row)) for cell, *row in zip(cells, *rows, strict=True)]
+
+
+def key(world: World, cell: tuple[int, int, int], tick: int = 0) -> int:
+    """The conflict key, written once more from its definition."""
+    inner = int(mix((int(world.grid.index(cell)) + GAMMA) % 2**64))
+    return int(mix(((inner ^ tick) + GAMMA) % 2**64))
+
+
+@pytest.mark.parametrize("row", range(6))
+def test_of_two_ants_that_want_one_cell_one_wins(row):
+    """Both face (3, row, 0), from (2, row, 0) and from (4, row, 0); the loser is blocked."""
+    cells = [(2, row, 0), (4, row, 0)]
+    world = World((8, 8, 1), (0, 7, 0), ants=[(cells[0], 0), (cells[1], 3)])
+    first, second = ants(act(world, [FORWARD, FORWARD]))
+    if key(world, cells[0]) < key(world, cells[1]):
+        assert first == (tuple(normal((3, row, 0))), 0, 0, 0)
+        assert second == (tuple(normal(cells[1])), 3, 0, -1)
+    else:
+        assert first == (tuple(normal(cells[0])), 0, 0, -1)
+        assert second == (tuple(normal((3, row, 0))), 3, 0, 0)
+
+
+def test_either_of_two_ants_can_win():
+    """Over the rows of the test above each side wins somewhere: the key decides, not the number."""
+    world = World((8, 8, 1), (0, 7, 0))
+    first_wins = [key(world, (2, row, 0)) < key(world, (4, row, 0)) for row in range(6)]
+    assert set(first_wins) == {True, False}
+
+
+def test_the_number_of_an_ant_does_not_matter():
+    """The same two ants listed the other way round: the same one wins."""
+    forward = World((8, 8, 1), (0, 7, 0), ants=[((2, 1, 0), 0), ((4, 1, 0), 3)])
+    backward = World((8, 8, 1), (0, 7, 0), ants=[((4, 1, 0), 3), ((2, 1, 0), 0)])
+    assert ants(act(forward, [1, 1])) == ants(act(backward, [1, 1]))[::-1]
+
+
+def test_two_ants_cannot_swap():
+    facing = World((8, 8, 1), (0, 7, 0), ants=[((2, 2, 0), 0), ((3, 2, 0), 3)])
+    outcome = ants(act(facing, [FORWARD, FORWARD]))
+    assert [ant[0] for ant in outcome] == [(2, 2, 0), (3, 2, 0)]
+    assert [ant[3] for ant in outcome] == [-1, -1]
+
+
+def test_a_following_chain_moves_only_at_its_head():
+    """A cell that is left in this tick was not empty at its start."""
+    chain = [((i, 0, 0), 0) for i in (1, 2, 3)]
+    world = World((8, 8, 1), (0, 7, 0), ants=chain)
+    outcome = ants(act(world, [FORWARD] * 3))
+    assert [ant[0] for ant in outcome] == [(1, 0, 0), (2, 0, 0), (4, 0, 0)]
+    assert [ant[3] for ant in outcome] == [-1, -1, 0]
+
+
+def test_one_food_goes_to_one_of_two_ants():
+    """The winner turns round with the food; the loser gets -1 and stays as it is."""
+    cells = [(2, 2, 0), (4, 2, 0)]
+    world = World((8, 8, 1), (0, 7, 0), foods=[(3, 2, 0)], ants=[(cells[0], 0), (cells[1], 3)])
+    colony = act(world, [PICK_UP, PICK_UP])
+    first, second = ants(colony)
+    winner, loser = (
+        (first, second) if key(world, cells[0]) < key(world, cells[1]) else (second, first)
+    )
+    assert (winner[1], winner[2], winner[3]) == (3 if winner is first else 0, 1, 3)
+    assert (loser[1], loser[2], loser[3]) == (0 if loser is first else 3, 0, -1)
+    assert colony.snapshot().ground[world.grid.index((3, 2, 0))] == EMPTY
+
+
+def test_six_ants_around_the_queen_all_give_in_one_tick():
+    queen = np.array([3, 3, 0])
+    steps = [(1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1), (1, 0, 1)]
+    around = [(tuple((queen + step).tolist()), (h + 3) % 6) for h, step in enumerate(steps)]
+    world = World((8, 8, 1), tuple(queen.tolist()), ants=around)
+    colony = Colony(world, ColonyConfig(ants=6), TRAINING, 0, "fixed", random_policy())
+    colony.begin_episode()
+    table = colony.arrays["ants"]
+    table[names.CARRIES] = 1
+    table[names.STATE] = 64 | 3 << 2  # the queen ahead
+    table[names.ACTION] = GIVE
+    colony.tick()
+    assert [ant[2:] for ant in ants(colony)] == [(0, 10)] * 6
+    assert [ant[1] for ant in ants(colony)] == [(h + 3) % 6 for h in range(6)]
+    assert colony.outcome().deliveries[0, 0] == 6
+
+
+def test_a_blocked_move_turns_the_ant():
+    world = World((8, 8, 1), (3, 0, 0), ants=[((2, 0, 0), 1)])
+    (ant,) = ants(act(world, [LEFT]))  # the queen is up of it
+    assert ant == ((2, 0, 0), 0, 0, -1)
+
+
+def test_ants_look_like_obstacles_to_each_other():
+    world = World((8, 8, 1), (0, 7, 0), ants=[((2, 2, 0), 0), ((3, 2, 0), 0)])
+    colony = Colony(world, ColonyConfig(ants=2), TRAINING, 0, "fixed", random_policy())
+    colony.begin_episode()
+    assert colony.arrays["ants"][names.STATE, 0] >> 2 & 3 == 1
+    colony.arrays["ants"][names.ACTION] = [PICK_UP, RIGHT]  # the second moves away
+    colony.tick()
+    assert colony.arrays["ants"][names.STATE, 0] >> 2 & 3 == 0
+
+
+def test_food_that_is_taken_grows_back_at_once():
+    world = World((8, 8, 1), (0, 7, 0), foods=[(3, 2, 0)], ants=[((2, 2, 0), 0)])
+    colony = act(world, [PICK_UP], regrowth=0)
+    assert colony.snapshot().ground[world.grid.index((3, 2, 0))] == FOOD
+    assert colony.outcome().regrown[0, 0] == 1
+
+
+def normal(cell: tuple[int, int, int]) -> list[int]:
+    return [c - min(cell) for c in cell]

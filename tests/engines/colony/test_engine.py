@@ -1,0 +1,167 @@
+"""Trails of the colony against closed forms, conservation of food, and clear errors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from taichi_ants import AntsError, Colony, ColonyConfig, Pheromone, TrainingConfig, World, worlds
+from taichi_ants.engines.colony import arrays as names
+from taichi_ants.learners.policies import random_policy
+from taichi_ants.rendering import colony_picture
+from taichi_ants.task.constants import FOOD
+
+TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 1.0, 1.0)
+
+
+def levels_after(pheromone: Pheromone, ticks: int, level: int = 400) -> np.ndarray:
+    """The levels of a lone trail cell's world after so many ticks; the ant is walled in."""
+    around = [(1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1), (1, 0, 1)]
+    world = World(
+        (12, 12, 12),
+        (11, 11, 0),
+        obstacles=[tuple(np.add((0, 0, 11), step).tolist()) for step in around[:3]] + [(10, 10, 0)],
+        trails=[((0, 0, 0), level)],
+        ants=[((0, 0, 11), 0)],
+    )
+    training = TrainingConfig("q_learning", 0.1, 0.9, 0.0, 1.0)
+    life = ColonyConfig(ants=1, pheromone=pheromone)
+    colony = Colony(world, life, training, 0, "fixed", random_policy())
+    colony.begin_episode()
+    colony.tick(ticks)
+    return colony.snapshot().trail
+
+
+@pytest.mark.parametrize("ticks", [1, 7, 399, 400, 450])
+def test_linear_evaporation(ticks):
+    assert levels_after(Pheromone("linear"), ticks).sum() == max(0, 400 - ticks)
+
+
+def test_no_evaporation():
+    assert levels_after(Pheromone("none"), 500).sum() == 400
+
+
+@pytest.mark.parametrize("half_life", [3.0, 50.0])
+def test_exponential_evaporation_halves_in_its_half_life(half_life):
+    """400 * 2^(-t / half-life), to the precision of repeated f32 products; gone below 1."""
+    for ticks in (1, 3, 10, 30):
+        expected = 400 * 0.5 ** (ticks / half_life)
+        level = levels_after(Pheromone("exponential", half_life=half_life), ticks).sum()
+        assert level == pytest.approx(expected if expected >= 1 else 0.0, rel=1e-5)
+
+
+@pytest.mark.parametrize("rate", [0.1, 1.0])
+def test_diffusion_keeps_the_mass(rate):
+    """In the middle of a field one tick gives each of the six neighbours a sixth of the rate."""
+    pheromone = Pheromone("none", diffusion=rate)
+    once = np.sort(levels_after(pheromone, 1))[::-1]
+    share = 400 * rate / 6
+    expected = np.sort([400 - 6 * share] + [share] * 6)[::-1]
+    assert once[:7] == pytest.approx(expected, rel=1e-5, abs=1e-3)
+    assert once[7:].any() == np.False_
+    # In many ticks it reaches the walls, which give back their share.
+    assert levels_after(pheromone, 300).sum(dtype=np.float64) == pytest.approx(400, rel=1e-4)
+
+
+@given(
+    seed=st.integers(0, 10_000),
+    ants=st.integers(1, 25),
+    births=st.booleans(),
+    lifespan=st.sampled_from([None, 5, 40]),
+    regrowth=st.sampled_from([None, 0, 3]),
+    wander=st.sampled_from([1, 4]),
+)
+def test_food_is_conserved(seed, ants, births, lifespan, regrowth, wander):
+    """In the ground + carried + delivered = at the start + regrown; no two ants share a cell."""
+    world = worlds.open_world(seed=seed % 7, ranges=(6, 6, 6))
+    config = ColonyConfig(
+        ants=ants, births=births, lifespan=lifespan, regrowth=regrowth, wander=wander
+    )
+    colony = Colony(world, config, TRAINING, seed)
+    colony.begin_episode()
+    for _ in range(6):
+        colony.tick(10)
+        now, outcome = colony.snapshot(), colony.outcome()
+        there = (now.ground == FOOD).sum() + now.ant_carries.sum() + outcome.deliveries[0, 0]
+        assert there == len(world.foods) + outcome.regrown[0, 0]
+        assert len(set(now.ant_cells.tolist())) == len(now.ant_cells) == outcome.living[0, 0]
+        assert outcome.living[0, 0] == ants + outcome.births[0, 0] - outcome.deaths[0, 0]
+
+
+def test_births_fill_the_slots_and_no_more():
+    """A colony that is fed well grows to its capacity; further foods wait in the store."""
+    world = World(
+        (6, 6, 6),
+        (0, 0, 0),
+        foods=[(2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 2, 2), (0, 0, 2), (2, 0, 2)],
+        ants=[((1, 0, 0), 0)],
+    )
+    config = ColonyConfig(ants=1, capacity=4, births=True, regrowth=0)
+    training = TrainingConfig("q_learning", 0.3, 0.9, 0.5, 1.0)
+    colony = Colony(world, config, training, 0)
+    outcome = colony.run(1, 3000)
+    assert outcome.living[0, 0] == 4
+    assert outcome.births[0, 0] == 3
+    stored = colony.arrays["worlds"][names.STORE, 0]
+    assert stored == outcome.deliveries[0, 0] - 3 > 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"config": ColonyConfig(ants=5000)}, "5000"),
+        ({"config": 3}, "config is 3"),
+        ({"sharing": "some"}, "'some'"),
+        ({"sharing": "fixed"}, "sharing is 'fixed', but q_values is None; nobody learns"),
+        ({"world": World((3, 3, 3), (0, 0, 0))}, "the world has no food"),
+        ({"seeds": []}, "seeds"),
+        ({"seeds": [1, 1]}, "1"),
+        ({"world": [worlds.paper()] * 2, "seeds": [1]}, "2 worlds"),
+        ({"world": [worlds.paper(), worlds.open_world(0, (5, 5, 5))], "seeds": [1, 2]}, "ranges"),
+        ({"schedule": "quick"}, "'quick'"),
+        ({"q_values": np.zeros((3, 3))}, "(3, 3)"),
+        ({"q_values": np.zeros((2, 128, 5))}, "(2, 128, 5)"),
+        ({"training": [TRAINING, TRAINING]}, "it must be one TrainingConfig"),
+        ({"training": None}, "training is None"),
+        ({"world": "paper"}, "world is 'paper'; it must be a World"),
+        ({"world": 7}, "world is 7; it must be a World"),
+        ({"world": ["paper"]}, "world is 'paper'; it must be a World"),
+        ({"training": TrainingConfig("nobody", 0.1, 0.9, 0.3, 0.9)}, "'nobody'"),
+    ],
+)
+def test_wrong_arguments_are_named(arguments, said):
+    usual = {"world": worlds.paper(), "config": ColonyConfig(), "training": TRAINING}
+    with pytest.raises(AntsError, match=r"[.]$") as caught:
+        Colony(**{**usual, **arguments})
+    assert said in str(caught.value)
+
+
+def test_both_schedules_agree_where_places_stay_vacant():
+    """The ants are sorted by their cells now and then, but not in among the vacant places."""
+    config, deliveries = ColonyConfig(ants=5, capacity=9, regrowth=0), []
+    for schedule in ("by_world", "by_chunk"):
+        colony = Colony(worlds.paper(), config, TRAINING, 3, schedule=schedule)
+        colony.begin_episode()
+        colony.tick(100)
+        deliveries.append(vars(colony.outcome()))
+    for name, counted in deliveries[0].items():
+        np.testing.assert_array_equal(counted, deliveries[1][name], name)
+
+
+def test_a_tick_needs_an_episode():
+    with pytest.raises(AntsError, match="begin_episode"):
+        Colony(worlds.paper(), ColonyConfig(), TRAINING).tick()
+    for look in (Colony.snapshot, colony_picture):
+        with pytest.raises(AntsError, match="begin_episode"):
+            look(Colony(worlds.paper(), ColonyConfig(), TRAINING))
+
+
+@pytest.mark.parametrize("content", [b"", b"nothing", None])
+def test_damaged_files_are_named(tmp_path, content):
+    path = tmp_path / "colony.npz"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(AntsError, match=r"colony\.npz"):
+        Colony.load(path)

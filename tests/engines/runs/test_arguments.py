@@ -1,0 +1,351 @@
+"""What training and evaluation refuse, each with the value named, and what they accept."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from taichi_ants import (
+    AntsError,
+    Colony,
+    ColonyConfig,
+    TrainingConfig,
+    continue_training,
+    evaluate,
+    rollout,
+    trace_training,
+    train,
+    worlds,
+)
+from taichi_ants.checks import checked_count, checked_seeds, checked_seeds_for
+from taichi_ants.engines.runs.launches import plan_launches
+from taichi_ants.errors import shown
+from taichi_ants.rendering import Episode, episode_picture
+from taichi_ants.rendering.learning import learning_stages
+from taichi_ants.rendering.replay import Replay
+from taichi_ants.worlds import World, paper
+
+CONFIG = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 0.99)
+PLANS = TrainingConfig("dyna_q", 0.1, 0.9, 0.3, 0.99, planning_steps=2)
+TABLE = np.zeros((128, 5))
+NO_ROOM = World((2, 1, 1), queen=(0, 0, 0), foods=[(1, 0, 0)])
+
+
+def says(text, function, *arguments, **options):
+    with pytest.raises(AntsError) as caught:
+        function(*arguments, **options)
+    assert text in str(caught.value)
+    assert str(caught.value).endswith(".")
+    assert "\n" not in str(caught.value)
+
+
+def unplanned(planning_steps, learner="q_learning"):
+    return TrainingConfig(learner, 0.1, 0.9, 0.3, 0.99, planning_steps=planning_steps)
+
+
+@pytest.mark.parametrize(
+    ("configs", "text"),
+    [
+        ([], "configs is empty"),
+        (None, "configs is None"),
+        (3, "configs is 3"),
+        ("q_learning", "configs holds 'q'"),
+        ([CONFIG, None], "configs holds None"),
+        (TrainingConfig("td_zero", 0.1, 0.9, 0.3, 0.99), "there is no learner 'td_zero'"),
+        (unplanned(0, "dyna_q"), "planning_steps is 0, but learner 'dyna_q' plans"),
+        ([CONFIG, unplanned(7)], "planning_steps is 7, but learner 'q_learning' does not plan"),
+    ],
+)
+def test_configurations(configs, text):
+    says(text, train, paper(), configs, 0, 1, 1)
+
+
+BAD_SEEDS = [
+    ([], "seeds is empty"),
+    (np.zeros(0, int), "seeds is empty"),
+    (0.5, "a seed is 0.5"),
+    ([0, 1.0], "a seed is 1.0"),
+    (np.array([0.0]), "a seed is 0.0"),
+    (True, "a seed is True"),
+    (None, "a seed is None"),
+    ("12", "a seed is '12'"),
+    ([[0, 1]], "a seed is [0, 1]"),
+    (2**64, f"seeds holds {2**64}; a seed must fit into 64 bits"),
+    ([-(2**63) - 1], f"seeds holds {-(2**63) - 1}"),
+    ([4, 5, 4], "seeds holds 4 more than once"),
+    ([-1, 2**64 - 1], f"seeds holds {2**64 - 1} and -1, which are one in 64 bits"),
+]
+
+
+@pytest.mark.parametrize(("seeds", "text"), BAD_SEEDS)
+def test_seeds(seeds, text):
+    says(text, train, paper(), CONFIG, seeds, 1, 1)
+    says(text, evaluate, paper(), np.zeros((3, 128, 5)), 1, seeds)
+
+
+@pytest.mark.parametrize(
+    ("seeds", "expected"),
+    [
+        (5, (5,)),
+        (range(3), (0, 1, 2)),
+        ((seed for seed in (2, 1)), (2, 1)),
+        (np.array([3, 2], np.uint8), (3, 2)),
+        (np.array(7), (7,)),
+        ([-(2**63), 2**64 - 1], (-(2**63), 2**64 - 1)),
+    ],
+)
+def test_seeds_that_are_fine(seeds, expected):
+    checked = checked_seeds(seeds)
+    assert checked == expected
+    assert all(type(seed) is int for seed in checked)
+
+
+def test_seeds_of_tables():
+    assert checked_seeds_for(4, ()).tolist() == [4]
+    assert checked_seeds_for(4, (2, 3)).tolist() == [4] * 6
+    assert checked_seeds_for([1, 2, 3], (2, 3)).tolist() == [1, 2, 3, 1, 2, 3]
+    for shape in ((), (2,), (3, 2)):
+        says(
+            f"there are 3 seeds for tables of leading shape {shape}",
+            checked_seeds_for,
+            [1, 2, 3],
+            shape,
+        )
+
+
+NO_COUNTS = [(0, "0"), (-1, "-1"), (1.0, "1.0"), ("1", "'1'"), (None, "None"), (True, "True")]
+
+
+@pytest.mark.parametrize(("value", "shown"), [*NO_COUNTS, (2**31, str(2**31))])
+def test_counts(value, shown):
+    text = f"episodes is {shown}; it must"
+    says(text, train, paper(), CONFIG, 0, value, 1)
+    says(text, continue_training, train(paper(), CONFIG, 0, 1, 1), value)
+    says(text, trace_training, paper(), CONFIG, 0, value, 1)
+    says(f"rollouts is {shown}; it must", evaluate, paper(), TABLE, value)
+
+
+@pytest.mark.parametrize(("value", "shown"), [*NO_COUNTS, (10_000_001, "10000001")])
+def test_step_limits(value, shown):
+    text = f"max_steps is {shown}; it must"
+    says(text, train, paper(), CONFIG, 0, 1, value)
+    says(text, evaluate, paper(), TABLE, 1, 0, value)
+    says(text, rollout, paper(), TABLE, 0, 0, value)
+    says(text, trace_training, paper(), CONFIG, 0, 1, value)
+
+
+@pytest.mark.parametrize(("value", "shown"), [*NO_COUNTS[1:], (2**31, str(2**31))])
+def test_numbers_of_rollouts(value, shown):
+    says(f"number is {shown}; it must", rollout, paper(), TABLE, 0, value)
+
+
+def test_counts_of_any_kind_of_integer():
+    assert checked_count("n", np.int64(3)) == 3
+    assert type(checked_count("n", np.uint8(3))) is int
+    assert checked_count("n", 0, least=0) == 0
+
+
+@pytest.mark.parametrize("value", ["none", "off", 0, 1, None, 0.5, [True]])
+def test_flags(value):
+    """Text such as "none" would turn evaporation on."""
+    text = f"evaporation is {value!r}; it must be True or False"
+    says(text, train, paper(), CONFIG, 0, 1, 1, value)
+    says(text, evaluate, paper(), TABLE, evaporation=value)
+    says(text, rollout, paper(), TABLE, evaporation=value)
+    says(text, trace_training, paper(), CONFIG, evaporation=value)
+    trace = rollout(paper(), TABLE, max_steps=1)
+    says(text, Replay, paper(), trace, evaporation=value)
+    says(text, learning_stages, paper(), CONFIG, stages=(0,), evaporation=value)
+    for name in ("hud", "legend", "view"):
+        says(f"{name} is {value!r}", episode_picture, Episode(paper(), trace), 0, **{name: value})
+    for name in ("births", "ends_at_delivery"):
+        says(f"{name} is {value!r}", ColonyConfig, **{name: value})
+
+
+def test_flags_of_numpy_are_fine():
+    on, off = (train(paper(), CONFIG, 0, 1, 1, flag) for flag in (np.True_, np.False_))
+    assert (on.evaporation, off.evaporation) == (True, False)
+    assert type(on.evaporation) is bool
+
+
+@pytest.mark.parametrize("value", [-0.1, 1.1, float("nan"), "0.5", None, True, [0.5], 10**400])
+def test_epsilon(value):
+    for function in (evaluate, rollout):
+        says(f"epsilon is {shown(value)}", function, paper(), TABLE, epsilon=value)
+
+
+@pytest.mark.parametrize(
+    ("table", "text"),
+    [
+        (np.zeros((128, 4)), "q_values has shape (128, 4)"),
+        (np.zeros((5, 128)), "q_values has shape (5, 128)"),
+        (np.zeros(640), "q_values has shape (640,)"),
+        (np.zeros((0, 128, 5)), "q_values has shape (0, 128, 5)"),
+        (3.0, "q_values has shape ()"),
+        (np.full((128, 5), np.nan), "q_values holds numbers that are not finite"),
+        (np.full((128, 5), np.inf), "q_values holds numbers that are not finite"),
+        (np.full((128, 5), 1e39), "q_values holds numbers that are not finite"),
+        (None, "q_values"),
+        ("policy", "q_values is not an array of numbers"),
+        (np.zeros((128, 5), complex), "q_values is not an array of numbers"),
+        ([[1, 2], [3]], "q_values is not an array of numbers"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:overflow encountered in cast")
+def test_tables(table, text):
+    says(text, evaluate, paper(), table)
+    says(text, rollout, paper(), table)
+
+
+def test_one_table_for_a_rollout():
+    says("q_values has shape (1, 128, 5)", rollout, paper(), TABLE[None])
+
+
+@pytest.mark.parametrize("world", [None, "paper", ((2, 2, 2), (0, 0, 0))])
+def test_worlds(world):
+    text = f"world is {world!r}; it must be a World"
+    says(text, train, world, CONFIG, 0, 1, 1)
+    says(text, evaluate, world, TABLE)
+    says(text, rollout, world, TABLE)
+    says(text, trace_training, world, CONFIG)
+
+
+def test_worlds_without_room():
+    says("this world has room for 0", train, NO_ROOM, CONFIG, 0)
+    says("this world has room for 0", evaluate, NO_ROOM, TABLE)
+    says("this world has room for 0", rollout, NO_ROOM, TABLE)
+    says("this world has room for 0", trace_training, NO_ROOM, CONFIG)
+
+
+@pytest.mark.parametrize(
+    ("threads", "text"),
+    [
+        *((0, "threads is 0"), (1025, "threads is 1025"), (1.5, "threads is 1.5")),
+        *((True, "threads is True"), ("2", "threads is '2'")),
+    ],
+)
+def test_threads(threads, text):
+    says(text, train, paper(), CONFIG, 0, 1, 1, threads=threads)
+    says(text, evaluate, paper(), TABLE, threads=threads)
+
+
+@pytest.mark.parametrize("arch", ["gpu", "CPU", "", 3])
+def test_architectures(arch):
+    says(
+        f"arch is {arch!r}; it must be one of cpu, cuda", train, paper(), CONFIG, 0, 1, 1, arch=arch
+    )
+
+
+def test_traces_have_a_limit():
+    says("episodes * max_steps is 100200", trace_training, paper(), CONFIG, 0, 167, 600)
+    says("episodes * max_steps is 1000001", rollout, paper(), TABLE, max_steps=1_000_001)
+
+
+def test_arguments_are_left_as_they_are():
+    tables = np.random.default_rng(0).normal(size=(2, 128, 5)).astype(np.float32)
+    tables.setflags(write=False)
+    before = tables.copy()
+    evaluate(paper(), tables[:, :, ::-1], 2, [0, 1], 50)  # strided and read-only
+    assert np.array_equal(tables, before)
+
+    result = train(paper(), [CONFIG, PLANS], [0, 1], 3, 50)
+    kept = {name: array.copy() for name, array in vars(result.state).items()}
+    says("result is None; give what train has returned", continue_training, None, 2)
+    longer = continue_training(result, 2)
+    for name, array in kept.items():
+        assert np.array_equal(getattr(result.state, name), array)
+    assert result.episodes == 3
+    assert longer.episodes == 5
+
+
+def test_results_have_the_documented_forms():
+    result = train(paper(), [CONFIG, PLANS], (3, 1, 2), 4, 20)
+    for array in (result.returns, result.steps, result.deliveries):
+        assert (array.shape, array.dtype) == ((2, 3, 4), np.int32)
+    assert (result.q_values.shape, result.q_values.dtype) == ((2, 3, 128, 5), np.float32)
+    assert (result.configs, result.seeds) == ((CONFIG, PLANS), (3, 1, 2))
+    result.q_values[:] = 1  # a copy
+    assert not (result.q_values == 1).all()
+    costs = [(cost.learner, cost.planning_steps, cost.steps) for cost in result.costs]
+    steps = result.steps.sum(axis=(1, 2)).tolist()
+    assert costs == [("q_learning", 0, steps[0]), ("dyna_q", 2, steps[1])]
+
+    for shape in ((), (3,), (2, 3)):
+        outcome = evaluate(paper(), np.zeros((*shape, 128, 5)), 6, max_steps=20)
+        for array in (outcome.returns, outcome.steps, outcome.deliveries):
+            assert (array.shape, array.dtype) == ((*shape, 6), np.int32)
+
+
+def test_progress_rises_to_one():
+    shares = []
+    train(paper(), [CONFIG, PLANS, CONFIG], range(4), 3, 20, progress=shares.append)
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1)
+    assert len(shares) >= 2
+    shares.clear()
+    evaluate(paper(), TABLE, 3, progress=shares.append)
+    assert shares[-1] == pytest.approx(1)
+
+
+@pytest.mark.parametrize("progress", [3, "yes", True])
+def test_progress_can_be_called(progress):
+    text = f"progress is {progress!r}; it must be a function"
+    says(text, train, paper(), CONFIG, 0, 1, 1, progress=progress)
+    says(text, evaluate, paper(), TABLE, 1, progress=progress)
+    says(text, Colony(paper(), ColonyConfig(), CONFIG).run, 1, 1, progress)
+
+
+def test_a_world_to_learn_in_has_food():
+    bare = World((4, 4, 4), (0, 0, 0))
+    text = "the world has no food, so there is nothing to learn"
+    says(text, train, bare, CONFIG, 0, 1, 1)
+    says(text, trace_training, bare, CONFIG)
+    assert evaluate(bare, TABLE, 2, max_steps=3).deliveries.sum() == 0
+    assert len(rollout(bare, TABLE, max_steps=3)) == 3
+
+
+@pytest.mark.parametrize(
+    "value",
+    [[0] * 10**6, "x" * 10**7, np.zeros(10**6), 10**5000],
+    ids=["list", "text", "array", "number"],
+)
+def test_messages_stay_short_whatever_they_name(value):
+    for function, arguments in (
+        *((train, (value, CONFIG, 0, 1, 1)), (train, (paper(), [value], 0, 1, 1))),
+        *((train, (paper(), CONFIG, [value], 1, 1)), (train, (paper(), CONFIG, 0, value, 1))),
+        *((evaluate, (paper(), TABLE, value)), (World, ((3, 3, 3), value))),
+        *((worlds.build, (value,)), (worlds.register, (value, None)), (ColonyConfig, (value,))),
+        *((continue_training, (value, 1)), (Colony, (paper(), value, CONFIG))),
+    ):
+        with pytest.raises(AntsError) as caught:
+            function(*arguments)
+        assert len(str(caught.value)) < 300
+
+
+@pytest.mark.parametrize("workers", [1, 2, 64, 4096])
+@pytest.mark.parametrize("episodes", [1, 500, 10**6, 2**31 - 1])
+@pytest.mark.parametrize("max_steps", [1, 600, 10**7])
+@pytest.mark.parametrize("cells", [11, 500, 10**8])
+def test_launches_are_short_and_can_be_indexed(workers, episodes, max_steps, cells):
+    for planning_steps in (0, 1000):
+        plan = plan_launches(workers, episodes, max_steps, planning_steps, cells)
+        assert plan.runs >= 1
+        assert 1 <= plan.episodes <= episodes
+        assert plan.runs == 1 or plan.runs * cells * 4 <= 2**28
+        assert plan.runs * 1024 < 2**31  # Q-tables
+        assert plan.runs * plan.episodes < 2**31
+        # A second of a thread, if every episode has its greatest length, or one episode.
+        steps = -(-plan.runs // workers) * plan.episodes * max_steps
+        assert plan.episodes == 1 or steps * (25 + 6 * planning_steps) <= 1.1e9
+
+
+@pytest.mark.parametrize(("n_runs", "n_episodes"), [(1, 1), (7, 500), (8, 3), (20, 10)])
+def test_launches_cover_all_work_once_and_episodes_in_order(n_runs, n_episodes):
+    plan = plan_launches(2, 4, 3_000_000, 0, 500)
+    done = np.zeros((n_runs, n_episodes), int)
+    for launch in plan.launches(n_runs, n_episodes):
+        rows = slice(launch.first, launch.first + launch.count)
+        assert launch.end <= n_episodes
+        assert (done[rows, : launch.begin] == 1).all()
+        done[rows, launch.begin : launch.end] += 1
+    assert (done == 1).all()

@@ -1,0 +1,166 @@
+"""The kernels meet the 100 reachable states and no other.
+
+Micro-worlds are built from the letters of each state; which cells are nearer to the queen is worked
+out here, without the package's geometry.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from random_worlds import random_world
+
+from taichi_ants import TrainingConfig, rollout, trace_training, train
+from taichi_ants.task.constants import N_STATES, PICK_UP
+from taichi_ants.task.states import REACHABLE_STATES, state_name
+from taichi_ants.worlds import World
+
+Cell = tuple[int, int, int]
+
+STEPS = ((1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1), (1, 0, 1))
+RANGES = (6, 6, 6)
+CENTRE = (1, 2, 0)
+CELLS = [cell for cell in itertools.product(range(6), repeat=3) if min(cell) == 0]
+PICKS_UP = np.zeros((N_STATES, 5))
+PICKS_UP[:, PICK_UP] = 1
+
+CARRYING = [index for index in REACHABLE_STATES if index >= 64]
+
+
+def normal(cell: Cell) -> Cell:
+    return tuple(part - min(cell) for part in cell)
+
+
+def beside(cell: Cell, heading: int) -> Cell:
+    return normal(tuple(a + b for a, b in zip(cell, STEPS[heading % 6], strict=True)))
+
+
+def distance(one: Cell, other: Cell) -> int:
+    return max(normal(tuple(a - b for a, b in zip(one, other, strict=True))))
+
+
+def letters_of(state: int) -> str:
+    """The three letters of a state's name: left, forward, right."""
+    return "".join(state_name(state).split()[1:])
+
+
+def view_from_centre(heading: int) -> list[Cell]:
+    return [beside(CENTRE, heading + turn) for turn in (-1, 0, 1)]
+
+
+def queens(state: int, heading: int) -> list[Cell]:
+    """Where the queen can be, for an ant in the centre with this heading to see this state."""
+    letters = letters_of(state)
+    looks = dict(zip(view_from_centre(heading), letters, strict=True))
+    taken = {CENTRE, beside(CENTRE, heading + 3)}
+    return [
+        queen
+        for queen in CELLS
+        if queen not in taken
+        and (queen in looks) == ("Q" in letters)
+        and (state < 64 or all(fits_queen(looks[cell], cell, queen) for cell in looks))
+    ]
+
+
+def micro_world(state: int, heading: int, queen: Cell) -> World:
+    """A world in which an ant in the centre with this heading sees this state.
+
+    An ant without food starts there. One with food starts with its back to the view and food before
+    it; it picks that up and turns round.
+    """
+    carries = state >= 64
+    looks = dict(zip(view_from_centre(heading), letters_of(state), strict=True))
+    picked_up = [beside(CENTRE, heading + 3)] if carries else []
+    return World(
+        RANGES,
+        queen,
+        foods=[cell for cell in looks if looks[cell] == "F"] + picked_up,
+        obstacles=[cell for cell in looks if looks[cell] == "O"],
+        trails=[(cell, 9) for cell in looks if looks[cell] == "T"],
+        ants=[(CENTRE, (heading + 3) % 6 if carries else heading)],
+    )
+
+
+def fits_queen(letter: str, cell: Cell, queen: Cell) -> bool:
+    """Whether an ant with food in the centre sees this letter on a cell, for this queen."""
+    if letter == "O":
+        return cell != queen
+    if letter == "Q":
+        return cell == queen
+    return cell != queen and (distance(cell, queen) < distance(CENTRE, queen)) == (letter == "S")
+
+
+def seen(world: World, carries: bool) -> int:
+    """The state that the kernel observes first, or after its pick-up."""
+    trace = rollout(world, PICKS_UP, max_steps=1)
+    if not carries:
+        return trace.states[0]
+    assert trace.rewards[0] == 3
+    return trace.next_states[0]
+
+
+def test_there_are_a_hundred():
+    assert len(set(REACHABLE_STATES)) == 100
+    assert len(CARRYING) == 36
+
+
+@pytest.mark.parametrize("heading", range(6))
+def test_micro_worlds_reach_every_state(heading):
+    for state in REACHABLE_STATES:
+        places = queens(state, heading)
+        assert places, f"no world shows {state_name(state)}"
+        for queen in {places[0], places[len(places) // 2], places[-1]}:
+            world = micro_world(state, heading, queen)
+            assert seen(world, state >= 64) == state, (state_name(state), queen)
+
+
+@pytest.mark.parametrize("heading", range(6))
+def test_no_micro_world_shows_another_carrying_state(heading):
+    """The same construction finds no place for the queen in the 28 others."""
+    others = set(range(64, N_STATES)) - set(CARRYING)
+    assert len(others) == 28
+    for state in others:
+        assert not queens(state, heading), state_name(state)
+
+
+def test_obstacles_of_all_kinds():
+    """The edge of the world and the queen look O without food; the edge and food do with food."""
+    row = World((4, 1, 1), queen=(0, 0, 0), foods=[(3, 0, 0)], ants=[((1, 0, 0), 3)])
+    assert state_name(seen(row, False)) == "foraging O O O"  # edge, queen, edge
+    between = World((4, 1, 1), queen=(0, 0, 0), foods=[(3, 0, 0)], ants=[((2, 0, 0), 0)])
+    assert state_name(seen(between, False)) == "foraging O F O"
+    assert state_name(seen(between, True)) == "carrying O S O"
+    foods = [beside(CENTRE, heading) for heading in (3, 5, 0, 1)]
+    pantry = World(RANGES, queen=(5, 5, 0), foods=foods, ants=[(CENTRE, 3)])
+    assert state_name(seen(pantry, True)) == "carrying O O O"
+
+
+def test_random_worlds_show_no_other_state():
+    """Random walks and learning ants, in all kinds of worlds."""
+    met: set[int] = set()
+    for number in range(120):
+        config = TrainingConfig("sarsa", 0.5, 0.9, 1.0 if number % 2 else 0.3, 1.0)
+        world = random_world(number + 3000, 6)
+        trace = trace_training(world, config, number, 3, 40, evaporation=number % 3 == 0)
+        met |= {*trace.states.tolist(), *trace.next_states.tolist()}
+    assert met <= set(REACHABLE_STATES)
+    assert len(met) > 90
+
+
+def test_training_touches_no_other_row():
+    """Long runs of all learners: the action values of other states stay as they were."""
+    configs = [
+        TrainingConfig("q_learning", 0.3, 0.9, 1.0, 1.0),
+        TrainingConfig("expected_sarsa", 0.3, 0.9, 0.5, 0.99),
+        TrainingConfig("dyna_q", 0.3, 0.9, 1.0, 1.0, planning_steps=2),
+    ]
+    others = sorted(set(range(N_STATES)) - set(REACHABLE_STATES))
+    touched = np.zeros(N_STATES, bool)
+    for number in range(40):
+        world = random_world(number + 5000, 8)
+        result = train(world, configs, range(6), 15, 80, evaporation=number % 2 == 0)
+        touched |= result.q_values.any(axis=(0, 1, 3))
+    assert not touched[others].any()
+    assert touched.sum() > 95

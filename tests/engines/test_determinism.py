@@ -1,0 +1,172 @@
+"""A run depends on its world, configuration and seed alone: to the bit, on every repeat."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from random_worlds import random_world
+
+from taichi_ants import TrainingConfig, continue_training, evaluate, train
+from taichi_ants.engines.runs import engine as run_engine
+from taichi_ants.engines.runs.launches import LaunchPlan
+from taichi_ants.worlds import World, paper
+
+# Uneven on purpose: some deliver within 34 steps, some walk in circles for all of an episode, and
+# a step of Dyna-Q costs several of the others.
+CONFIGS = (
+    TrainingConfig("q_learning", 0.01, 0.99, 0.3, 0.9, delivery="continuing"),
+    TrainingConfig("dyna_q", 0.01, 0.99, 0.5, 0.99, planning_steps=5, delivery="continuing"),
+    TrainingConfig("sarsa", 0.01, 0.9, 0.3, 0.95),
+    TrainingConfig("dyna_q", 0.1, 0.9, 0.3, 0.9, planning_steps=1),
+    TrainingConfig("expected_sarsa", 0.37, 0.9, 0.3, 0.9),
+    TrainingConfig("dyna_q", 0.001, 0.99, 0.3, 0.9, planning_steps=5, delivery="continuing"),
+    TrainingConfig("q_learning", 0.001, 0.9, 0.0, 1.0),
+)
+SEEDS = (3, 0, 2**64 - 1, -7, 12, 5, 4, 99)
+EPISODES, MAX_STEPS = 40, 300
+ARRAYS = ("returns", "steps", "deliveries", "q_values")
+GREEDY = ARRAYS[:3]
+
+
+@pytest.fixture(scope="module")
+def expected():
+    result = train(paper(), CONFIGS, SEEDS, EPISODES, MAX_STEPS, threads=1)
+    lengths = result.steps.mean(axis=(1, 2))
+    assert lengths.max() > 2 * lengths.min()  # uneven indeed
+    assert 0 < result.deliveries.mean() < 1
+    return result
+
+
+def assert_same(one, other, names=ARRAYS):
+    for name in names:
+        assert np.array_equal(getattr(one, name), getattr(other, name)), name
+
+
+def assert_same_state(one, other):
+    """All that training goes on from; the rest of the model's arrays is never read."""
+    for name in ("q", "random_states", "exploration", "settings"):
+        assert np.array_equal(getattr(one, name), getattr(other, name)), name
+    for c in range(one.q.shape[0]):
+        for s in range(one.q.shape[1]):
+            visited = one.settings[c, s, 2]
+            assert np.array_equal(one.entries[c, s, :visited], other.entries[c, s, :visited])
+            assert np.array_equal(one.slots[c, s], other.slots[c, s])
+
+
+def test_repeats_and_threads(expected):
+    for threads in (2,) * 10 + (1,):
+        again = train(paper(), CONFIGS, SEEDS, EPISODES, MAX_STEPS, threads=threads)
+        assert_same(again, expected)
+        assert_same_state(again.state, expected.state)
+
+
+def test_whatever_else_is_in_the_sweep(expected):
+    """Single runs, parts of the sweep, and all of it in other orders."""
+    shuffle = random.Random(1)
+    for _ in range(6):
+        chosen = shuffle.sample(range(len(CONFIGS)), shuffle.randint(1, len(CONFIGS)))
+        seeds = shuffle.sample(range(len(SEEDS)), shuffle.randint(1, len(SEEDS)))
+        part = train(
+            *(paper(), [CONFIGS[c] for c in chosen], [SEEDS[s] for s in seeds]),
+            *(EPISODES, MAX_STEPS),
+        )
+        for name in ARRAYS:
+            whole = getattr(expected, name)[np.ix_(chosen, seeds)]
+            assert np.array_equal(getattr(part, name), whole), name
+    for c, config in enumerate(CONFIGS):
+        alone = train(paper(), config, SEEDS[c], EPISODES, MAX_STEPS)
+        for name in ARRAYS:
+            assert np.array_equal(getattr(alone, name)[0, 0], getattr(expected, name)[c, c])
+
+
+def test_a_configuration_that_is_listed_twice_runs_twice(expected):
+    twice = train(paper(), [CONFIGS[1], CONFIGS[0], CONFIGS[1]], SEEDS[:2], EPISODES, MAX_STEPS)
+    for name in ARRAYS:
+        array = getattr(twice, name)
+        assert np.array_equal(array[0], array[2])
+        assert np.array_equal(array[0], getattr(expected, name)[1, :2])
+
+
+@pytest.mark.parametrize("size", [LaunchPlan(1, EPISODES), LaunchPlan(3, 7), LaunchPlan(1000, 1)])
+def test_whatever_the_size_of_launches(size, expected, monkeypatch):
+    used = []
+    monkeypatch.setattr(run_engine, "plan_launches", lambda *sizes: used.append(sizes) or size)
+    again = train(paper(), CONFIGS, SEEDS, EPISODES, MAX_STEPS, threads=2)
+    assert used
+    assert_same(again, expected)
+    assert_same_state(again.state, expected.state)
+    greedy = evaluate(paper(), again.q_values, 5, SEEDS, 100, epsilon=0.2)
+    monkeypatch.undo()
+    assert_same(greedy, evaluate(paper(), again.q_values, 5, SEEDS, 100, epsilon=0.2), GREEDY)
+
+
+def test_training_that_is_continued_is_longer_training():
+    """250 and 250 episodes are 500; so are other parts, with other threads in between."""
+    world = replace(paper(), ants=())  # the ant is placed by the seed
+    for parts in ((250, 250), (1, 498, 1)):
+        total = sum(parts)
+        whole = train(world, CONFIGS, SEEDS[:3], total, 120)
+        result = train(world, CONFIGS, SEEDS[:3], parts[0], 120)
+        for number, part in enumerate(parts[1:]):
+            result = continue_training(result, part, threads=1 + number)
+        assert result.episodes == total
+        assert_same(result, whole)
+        assert_same_state(result.state, whole.state)
+
+
+def test_continued_training_with_evaporation():
+    world = random_world(6, 7)
+    whole = train(world, CONFIGS, SEEDS[:2], 30, 60, evaporation=True)
+    result = continue_training(train(world, CONFIGS, SEEDS[:2], 11, 60, evaporation=True), 19)
+    assert_same(result, whole)
+    without = train(world, CONFIGS, SEEDS[:2], 30, 60)
+    assert not np.array_equal(without.returns, whole.returns)
+
+
+def test_evaluation(expected):
+    """On repeats, on any number of threads, table by table and rollout by rollout."""
+    tables = expected.q_values
+    options = {"max_steps": 150, "epsilon": 0.1}
+    whole = evaluate(paper(), tables, 20, SEEDS, threads=1, **options)
+    for threads in (2,) * 10:
+        assert_same(evaluate(paper(), tables, 20, SEEDS, threads=threads, **options), whole, GREEDY)
+    fewer = evaluate(paper(), tables, 7, SEEDS, **options)
+    for name in GREEDY:
+        assert np.array_equal(getattr(fewer, name), getattr(whole, name)[..., :7])
+    order = [4, 1, 6, 0]
+    seeds = [SEEDS[s] for s in order]
+    some = evaluate(paper(), tables[2:5, order], 20, seeds, **options)
+    for name in GREEDY:
+        assert np.array_equal(getattr(some, name), getattr(whole, name)[2:5, order])
+    alone = evaluate(paper(), tables[3, 2], 20, SEEDS[2], **options)
+    for name in GREEDY:
+        assert np.array_equal(getattr(alone, name), getattr(whole, name)[3, 2])
+
+
+def test_evaluation_leaves_training_as_it_is(expected):
+    """Rollouts have streams of their own."""
+    first = train(paper(), CONFIGS, SEEDS, EPISODES // 2, MAX_STEPS)
+    evaluate(paper(), first.q_values, 5, SEEDS)
+    assert_same(continue_training(first, EPISODES - EPISODES // 2), expected)
+
+
+def test_seeds_and_rollouts_differ(expected):
+    """The same numbers everywhere would pass all of the above."""
+    for c in (0, 1, 2):
+        runs = {expected.returns[c, s].tobytes() for s in range(len(SEEDS))}
+        assert len(runs) == len(SEEDS)
+    outcome = evaluate(paper(), np.zeros((2, 128, 5)), 30, (0, 1), 60)
+    assert len({tuple(row) for row in outcome.returns.tolist()}) == 2
+    assert all(len(set(row)) > 5 for row in outcome.returns.tolist())
+
+
+def test_worlds_without_trails_or_listed_ants_differ_by_seed():
+    world = World((7, 7, 7), queen=(3, 3, 0), foods=[(6, 0, 0)])
+    starts = {tuple(np.concatenate(world.start(seed)).tolist()) for seed in range(30)}
+    assert len(starts) > 10
+    outcome = evaluate(world, np.zeros((30, 128, 5)), 3, range(30), 40)
+    alone = [evaluate(world, np.zeros((128, 5)), 3, seed, 40).returns for seed in range(30)]
+    assert np.array_equal(outcome.returns, alone)

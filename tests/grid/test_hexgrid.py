@@ -1,0 +1,162 @@
+"""The geometry of the grid against values worked by hand."""
+
+import math
+
+import numpy as np
+import pytest
+
+from taichi_ants.errors import AntsError
+from taichi_ants.grid import hexgrid
+from taichi_ants.grid.constants import HEADING_STEPS
+from taichi_ants.grid.hexgrid import AxialGrid
+
+
+def test_normal_forms() -> None:
+    cells = [(5, 3, 8), (-8, 0, 0), (0, 0, 0), (7, 7, 7), (2, 0, -1)]
+    assert hexgrid.normal_form(cells).tolist() == [
+        [2, 0, 5],
+        [0, 8, 8],
+        [0, 0, 0],
+        [0, 0, 0],
+        [3, 1, 0],
+    ]
+
+
+def test_axial_and_back() -> None:
+    assert hexgrid.axial((5, 3, 8)).tolist() == [-3, -5]
+    assert hexgrid.cube((-3, -5)).tolist() == [2, 0, 5]
+    assert hexgrid.cube((4, -1)).tolist() == [5, 0, 1]
+    assert hexgrid.cube((0, 0)).tolist() == [0, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "steps"),
+    [
+        ((0, 0, 0), (0, 0, 0), 0),
+        ((0, 0, 0), (1, 1, 0), 1),
+        ((0, 0, 0), (3, 3, 0), 3),
+        ((0, 9, 9), (9, 0, 0), 18),
+        ((2, 0, 5), (5, 0, 2), 6),
+        ((4, 0, 0), (0, 3, 0), 7),
+    ],
+)
+def test_distances(one: tuple, other: tuple, steps: int) -> None:
+    assert hexgrid.distance(one, other) == steps
+    assert hexgrid.distance(other, one) == steps
+
+
+def test_neighbours_of_the_origin_are_the_headings() -> None:
+    assert hexgrid.neighbours((4, 4, 4)).tolist() == [list(step) for step in HEADING_STEPS]
+    assert hexgrid.step([(0, 0, 2)], np.array([0])).tolist() == [[1, 0, 2]]
+    assert hexgrid.step((0, 0, 2), 3).tolist() == [0, 1, 3]
+
+
+def test_turning() -> None:
+    assert hexgrid.turn(0, -1) == 5
+    assert hexgrid.turn(5, 1) == 0
+    assert hexgrid.turn(np.array([0, 2, 4]), 3).tolist() == [3, 5, 1]
+
+
+@pytest.mark.parametrize(
+    ("ranges", "count"),
+    [((10, 10, 10), 271), ((1, 1, 1), 1), ((2, 2, 2), 7), ((7, 7, 1), 49), ((4, 1, 1), 4)],
+)
+def test_counts(ranges: tuple, count: int) -> None:
+    assert hexgrid.count_cells(ranges) == count
+    grid = AxialGrid(ranges)
+    assert grid.count == count
+    assert grid.exists.sum() == count
+
+
+def test_existing_cells_are_those_of_the_definition() -> None:
+    ranges = (3, 2, 4)
+    expected = {
+        (x, y, z)
+        for x in range(3)
+        for y in range(2)
+        for z in range(4)
+        if min(x, y, z) == 0  # normal forms within the ranges
+    }
+    grid = AxialGrid(ranges)
+    found = grid.cells(np.flatnonzero(grid.exists))
+    assert set(map(tuple, found.tolist())) == expected
+    assert len(found) == len(expected)
+    assert grid.contains(sorted(expected)).all()
+    assert not grid.contains([(3, 0, 0), (0, 2, 0), (0, 0, 4), (-4, 0, 0)]).any()
+
+
+def test_flat_index_by_hand() -> None:
+    grid = AxialGrid((3, 2, 4))
+    assert (grid.width, grid.height, grid.size) == (8, 7, 56)
+    # The origin is at q = r = 0: row Z = 4, column Z = 4.
+    assert grid.index((0, 0, 0)) == 4 * 8 + 4
+    assert grid.index((2, 0, 0)) == 4 * 8 + 6
+    assert grid.index((1, 1, 4)) == 1 * 8 + 1
+    # Up is one to the right in the array, down-right one row on.
+    assert grid.offsets.tolist() == [1, 9, 8, -1, -9, -8]
+    assert grid.cells(4 * 8 + 6).tolist() == [2, 0, 0]
+    assert grid.index([(0, 0, 0)]).dtype == grid.cells([36]).dtype == grid.offsets.dtype == np.int32
+
+
+def test_numbers_are_lexicographic() -> None:
+    grid = AxialGrid((3, 2, 4))
+    cells = sorted(map(tuple, grid.cells(np.flatnonzero(grid.exists)).tolist()))
+    assert grid.number(cells).tolist() == list(range(grid.count))
+
+
+def test_grid_arrays_are_read_only() -> None:
+    grid = AxialGrid((3, 3, 3))
+    for array in (grid.exists, grid.offsets):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1
+
+
+@pytest.mark.parametrize("size", [1.0, 7.5])
+def test_pixels_of_headings(size: float) -> None:
+    height = math.sqrt(3.0) * size
+    centres = hexgrid.centre_of(HEADING_STEPS, size)
+    # y grows downwards: heading 0 is straight up, heading 1 up and to the right.
+    expected = [
+        (0, -height),
+        (1.5 * size, -height / 2),
+        (1.5 * size, height / 2),
+        (0, height),
+        (-1.5 * size, height / 2),
+        (-1.5 * size, -height / 2),
+    ]
+    np.testing.assert_allclose(centres, expected, atol=1e-12)
+    np.testing.assert_allclose(hexgrid.centre_of((0, 0, 0), size), (0, 0))
+
+
+def test_pixels_just_inside_corners_and_edges() -> None:
+    up = math.sqrt(3.0) / 2
+    inside = [(0.99, 0), (-0.99, 0), (0.49, 0.99 * up), (0, -0.99 * up), (0.6, -0.5)]
+    assert hexgrid.cell_at(inside, 1.0).tolist() == [[0, 0, 0]] * 5
+    outside = [(0, -1.01 * up), (0.8, -0.5), (0.8, 0.5), (0, 1.01 * up), (-0.8, 0.5), (-0.8, -0.5)]
+    assert hexgrid.cell_at(outside, 1.0).tolist() == [list(step) for step in HEADING_STEPS]
+
+
+@pytest.mark.parametrize(
+    "cells", [(1.0, 2, 3), ("1", "2", "3"), (1, 2), 5, [], [[1, 2, 3, 4]], np.zeros((2, 3))]
+)
+def test_cells_must_be_three_whole_numbers(cells: object) -> None:
+    for function in (hexgrid.normal_form, hexgrid.axial, hexgrid.neighbours):
+        with pytest.raises(AntsError, match="whole numbers"):
+            function(cells)
+
+
+def test_cells_beyond_the_array_are_refused() -> None:
+    grid = AxialGrid((3, 3, 1))
+    grid.index((0, 0, 1))  # a void border cell has an index
+    with pytest.raises(AntsError, match=r"\(9, 0, 0\).*\(3, 3, 1\)"):
+        grid.index([(0, 0, 0), (9, 0, 0)])
+    with pytest.raises(AntsError, match=r"\(0, 0, 1\)"):
+        grid.number([(0, 0, 1)])
+    for index in (-1, grid.size, 1.0):
+        with pytest.raises(AntsError, match="flat indices"):
+            grid.cells([index])
+
+
+def test_huge_ranges_are_refused() -> None:
+    with pytest.raises(AntsError, match="smaller ranges"):
+        AxialGrid((1 << 15, 1 << 15, 1))

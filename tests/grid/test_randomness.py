@@ -1,0 +1,91 @@
+"""The host's random streams: known values, and one draw or many giving the same."""
+
+import numpy as np
+import pytest
+
+from taichi_ants.errors import AntsError
+from taichi_ants.grid.randomness import GAMMA, Stream, choose, mix, stream_state, whole
+
+# The first outputs of splitmix64 for the state 1234567, as published with the generator's ports.
+PUBLISHED = [
+    6457827717110365317,
+    3203168211198807973,
+    9817491932198370423,
+    4593380528125082431,
+    16408922859458223821,
+]
+
+
+def test_a_stream_draws_the_published_numbers() -> None:
+    stream = Stream(0, 0)
+    stream.state = 1234567
+    assert [stream.bits() for _ in range(5)] == PUBLISHED
+
+
+def test_many_draws_at_once_are_the_single_draws() -> None:
+    one, many = Stream(3, 1, 4), Stream(3, 1, 4)
+    singles = [one.bits() for _ in range(7)]
+    assert np.concatenate([many.bits(3), many.bits(0), many.bits(4)]).tolist() == singles
+    assert one.state == many.state
+    assert one.below(10) == many.below(10, 1)[0]
+
+
+def test_the_state_is_the_chain_of_mixes() -> None:
+    chained = mix((mix((mix(5 + GAMMA) ^ 2) + GAMMA) ^ 9) + GAMMA)
+    assert stream_state(5, 2, 9) == chained
+
+
+@pytest.mark.parametrize("seed", [0, 1, -1, 2**63, 2**64 - 1, -(2**63)])
+def test_arrays_give_what_numbers_give(seed: int) -> None:
+    numbers = np.arange(5)
+    states = stream_state(seed, 3, numbers)
+    assert states.dtype == np.uint64
+    assert states.tolist() == [stream_state(seed, 3, n) for n in range(5)]
+    assert stream_state([seed, 8], 3, 1).tolist() == [
+        stream_state(seed, 3, 1),
+        stream_state(8, 3, 1),
+    ]
+
+
+def test_seeds_count_modulo_two_to_the_64() -> None:
+    assert stream_state(-1, 0, 0) == stream_state(2**64 - 1, 0, 0)
+    assert stream_state(2**64 + 5, 0, 0) == stream_state(5, 0, 0)
+    assert stream_state(np.int64(5), 0, np.uint8(1)) == stream_state(5, 0, 1)
+
+
+def test_seed_purpose_and_number_are_not_interchangeable() -> None:
+    states = {stream_state(a, b, c) for a in range(4) for b in range(4) for c in range(4)}
+    assert len(states) == 64
+
+
+def test_a_choice_is_the_scaled_word() -> None:
+    assert [choose(word, 3) for word in (0, 0x5555_5555, 0x5555_5556, 0xFFFF_FFFF)] == [0, 0, 1, 2]
+    words = np.array([0, 0x5555_5555, 0x5555_5556, 0xFFFF_FFFF], dtype=np.uint64)
+    assert choose(words, 3).tolist() == [0, 0, 1, 2]
+
+
+def test_below_stays_below_and_is_even() -> None:
+    drawn = Stream(1, 2).below(6, 60_000)
+    counts = np.bincount(drawn, minlength=6)
+    # Six standard deviations of a binomial count with mean 10000.
+    assert len(counts) == 6
+    assert np.abs(counts - 10_000).max() < 6 * np.sqrt(60_000 * 5 / 36)
+    assert Stream(1, 2).below(1) == 0
+
+
+@pytest.mark.parametrize("n", [0, -1, 2**32 + 1, 2.0])
+def test_below_refuses_what_is_no_choice(n: object) -> None:
+    with pytest.raises(AntsError, match=str(n)):
+        Stream(0, 0).below(n)
+
+
+@pytest.mark.parametrize("value", [1.0, "1", None, True, np.float64(2), np.bool_(True), [1]])
+def test_only_whole_numbers_are_whole(value: object) -> None:
+    with pytest.raises(AntsError, match="seed is"):
+        whole("seed", value)
+
+
+@pytest.mark.parametrize("seed", [1.5, "3", None, np.array([1.5]), [1, 2.0]])
+def test_a_seed_must_be_whole(seed: object) -> None:
+    with pytest.raises(AntsError, match="seed is"):
+        stream_state(seed, 0, 0)

@@ -1,0 +1,113 @@
+"""The settings of a learner: their bounds, and what they are stored as."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import FrozenInstanceError, asdict
+from decimal import Decimal
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from taichi_ants import AntsError, TrainingConfig
+from taichi_ants.errors import shown
+from taichi_ants.learners.config import share_of_one
+
+GOOD = {
+    **{"learner": "dyna_q", "learning_rate": 0.1, "discount": 0.9, "epsilon": 0.3},
+    **{"epsilon_decay": 0.99, "min_epsilon": 0.05, "planning_steps": 3, "delivery": "continuing"},
+}
+
+
+def test_defaults():
+    config = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 0.99)
+    assert (config.min_epsilon, config.planning_steps, config.delivery) == (0.01, 0, "absorbing")
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *((name, value) for name in ("learning_rate", "epsilon_decay") for value in (1, 1e-300)),
+        *((name, value) for name in ("discount", "epsilon", "min_epsilon") for value in (0, 1)),
+        *(("planning_steps", 0), ("planning_steps", 1000)),
+        *(("delivery", "absorbing"), ("delivery", "continuing")),
+        ("learner", "not registered yet"),
+    ],
+)
+def test_bounds_are_allowed(name, value):
+    assert getattr(TrainingConfig(**{**GOOD, name: value}), name) == value
+
+
+NO_SHARES = [-1e-9, 1.0000001, float("nan"), float("inf"), 10**400, True, "0.5", None, [0.5], 1j]
+
+
+@pytest.mark.parametrize("value", [*NO_SHARES, np.True_, np.array([0.5]), Decimal("0.5")])
+@pytest.mark.parametrize(
+    "name", ["learning_rate", "discount", "epsilon", "epsilon_decay", "min_epsilon"]
+)
+def test_numbers_out_of_bounds(name, value):
+    with pytest.raises(AntsError, match=rf"^{name} is .*; it must be a number .*1\.$") as caught:
+        TrainingConfig(**{**GOOD, name: value})
+    assert shown(value) in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["learning_rate", "epsilon_decay"])
+def test_numbers_that_may_not_be_zero(name):
+    with pytest.raises(AntsError, match=rf"{name} is 0; .* above 0 and at most 1"):
+        TrainingConfig(**{**GOOD, name: 0})
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "says"),
+    [
+        ("planning_steps", -1, "planning_steps is -1; it must lie between 0 and 1000."),
+        ("planning_steps", 1001, "planning_steps is 1001; it must lie between 0 and 1000."),
+        ("planning_steps", 2.0, "planning_steps is 2.0; it must be a whole number."),
+        ("planning_steps", True, "planning_steps is True; it must be a whole number."),
+        ("planning_steps", "3", "planning_steps is '3'; it must be a whole number."),
+        ("planning_steps", None, "planning_steps is None; it must be a whole number."),
+        ("delivery", "never", "delivery is 'never'; it must be one of absorbing, continuing."),
+        ("delivery", None, "delivery is None; it must be one of absorbing, continuing."),
+        ("learner", None, "learner is None; it must be the name of a learner."),
+        ("learner", 3, "learner is 3; it must be the name of a learner."),
+    ],
+)
+def test_other_mistakes(name, value, says):
+    with pytest.raises(AntsError) as caught:
+        TrainingConfig(**{**GOOD, name: value})
+    assert str(caught.value) == says
+
+
+def test_numbers_of_any_kind_are_stored_as_plain_ones():
+    plain = TrainingConfig(**{**GOOD, "discount": 0.5, "epsilon": 1})
+    other = TrainingConfig(
+        **{
+            **GOOD,
+            "discount": Fraction(1, 2),
+            "epsilon": np.float32(1),
+            "planning_steps": np.int8(3),
+        }
+    )
+    assert plain == other
+    assert hash(plain) == hash(other)
+    assert asdict(plain) == asdict(other)
+    assert [type(value) for value in asdict(other).values()] == [
+        *(str, float, float, float, float, float, int, str)
+    ]
+    assert pickle.loads(pickle.dumps(other)) == plain
+
+
+def test_configurations_cannot_be_changed():
+    with pytest.raises(FrozenInstanceError):
+        TrainingConfig(**GOOD).epsilon = 2
+
+
+@pytest.mark.parametrize("value", NO_SHARES)
+def test_no_share_of_one(value):
+    assert not share_of_one(value)
+
+
+@pytest.mark.parametrize("value", [0, 1, 0.5, np.float32(0.25), np.int64(1), Fraction(1, 3)])
+def test_share_of_one(value):
+    assert share_of_one(value)

@@ -1,0 +1,247 @@
+"""The hand-written policies, and policy files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from taichi_ants import reference
+from taichi_ants.errors import AntsError
+from taichi_ants.learners.policies import load_policy, random_policy, save_policy, trail_follower
+from taichi_ants.task.constants import FORWARD, GIVE, LEFT, N_STATES, PICK_UP, RIGHT
+from taichi_ants.task.states import parse_state
+from taichi_ants.worlds.open_world import open_world
+from taichi_ants.worlds.paper import paper
+
+
+def best_actions(q_values: np.ndarray, name: str) -> set[int]:
+    row = q_values[parse_state(name)]
+    return set(np.flatnonzero(row == row.max()).tolist())
+
+
+def test_the_random_policy_makes_no_difference_between_actions() -> None:
+    policy = random_policy()
+    assert policy.shape == (128, 5)
+    assert policy.dtype == np.float32
+    assert (policy == policy[0, 0]).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "actions"),
+    [
+        ("foraging E T F", {PICK_UP}),
+        ("foraging F F O", {PICK_UP}),
+        ("foraging T T T", {FORWARD}),
+        ("foraging T E T", {LEFT, RIGHT}),
+        ("foraging E O T", {RIGHT}),
+        ("foraging E E E", {FORWARD}),
+        ("foraging O E E", {FORWARD, RIGHT}),
+        ("foraging E O E", {LEFT, RIGHT}),
+        ("foraging O E O", {FORWARD}),
+        ("foraging O O O", {LEFT}),
+        ("carrying O Q E", {GIVE}),
+        ("carrying S S O", {LEFT, FORWARD}),
+        ("carrying E E S", {RIGHT}),
+        ("carrying E E E", {LEFT, FORWARD, RIGHT}),
+        ("carrying O E O", {FORWARD}),
+        ("carrying O O O", {LEFT}),
+    ],
+)
+def test_what_the_trail_follower_does(name: str, actions: set[int]) -> None:
+    assert best_actions(trail_follower(), name) == actions
+
+
+def test_the_trail_follower_only_does_what_succeeds_except_in_a_dead_end() -> None:
+    policy = trail_follower()
+    for index in range(N_STATES):
+        carries, codes = index >= 64, (index >> 4 & 3, index >> 2 & 3, index & 3)
+        for action in np.flatnonzero(policy[index]):
+            if codes == (1, 1, 1):
+                assert action == LEFT
+            elif action in (PICK_UP, GIVE):
+                assert 3 in codes
+                assert action == (GIVE if carries else PICK_UP)
+            else:
+                assert codes[action] in (0, 2)
+
+
+@pytest.mark.parametrize("evaporation", [False, True])
+def test_the_trail_follower_takes_the_shortest_way_in_the_world_of_the_paper(
+    evaporation: bool,
+) -> None:
+    rollout = reference.rollout(paper(), trail_follower(), evaporation=evaporation)
+    assert (rollout.episode_return, rollout.steps, rollout.deliveries) == (45, 34, 1)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_trail_follower_finds_its_way_in_open_worlds(seed: int) -> None:
+    world = open_world(seed, (14, 12, 16))
+    rollouts = [
+        reference.rollout(world, trail_follower(), seed=seed, number=number, max_steps=2000)
+        for number in range(4)
+    ]
+    assert all(rollout.deliveries == 1 for rollout in rollouts)
+
+
+# Files.
+
+
+def test_a_policy_comes_back_from_its_file(tmp_path: Path) -> None:
+    q_values = np.random.default_rng(1).normal(size=(128, 5)).astype(np.float32)
+    metadata = {"learner": "sarsa", "seed": np.int64(3), "world": "world of é", "none": None}
+    path = tmp_path / "policy"
+    save_policy(path, q_values, metadata)
+    loaded, loaded_metadata = load_policy(path)
+    np.testing.assert_array_equal(loaded, q_values)
+    assert loaded.dtype == np.float32
+    assert loaded_metadata == {"learner": "sarsa", "seed": 3, "world": "world of é", "none": None}
+    assert [entry.name for entry in tmp_path.iterdir()] == ["policy"]
+
+
+def test_other_number_types_are_converted(tmp_path: Path) -> None:
+    path = tmp_path / "policy.npz"
+    save_policy(path, np.ones((128, 5), np.int64).tolist(), {})
+    assert load_policy(path)[0].dtype == np.float32
+    big_endian = np.ones((128, 5), ">f8")
+    np.savez(path, q_values=big_endian, metadata=np.array("{}"))
+    np.testing.assert_array_equal(load_policy(path)[0], np.ones((128, 5), np.float32))
+
+
+@pytest.mark.parametrize(
+    ("q_values", "message"),
+    [
+        (np.zeros((127, 5)), r"\(127, 5\)"),
+        (np.zeros(640), r"\(640,\)"),
+        (np.full((128, 5), np.nan), "nan for state 0 and action 0"),
+        (np.full((128, 5), np.inf), "inf"),
+        (np.full((128, 5), 1e300), "inf"),
+        (np.full((128, 5), "a"), "real numbers"),
+        (np.zeros((128, 5), complex), "real numbers"),
+        (np.zeros((128, 5), bool), "real numbers"),
+    ],
+)
+def test_values_that_are_no_policy_are_refused_both_ways(
+    tmp_path: Path, q_values: np.ndarray, message: str
+) -> None:
+    path = tmp_path / "policy.npz"
+    with pytest.raises(AntsError, match=message):
+        save_policy(path, q_values, {})
+    assert list(tmp_path.iterdir()) == []
+    np.savez(path, q_values=q_values, metadata=np.array("{}"))
+    with pytest.raises(AntsError, match=message) as raised:
+        load_policy(path)
+    assert str(path) in str(raised.value)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_one_value_that_is_not_finite_is_named(tmp_path: Path, bad: float) -> None:
+    q_values = random_policy()
+    q_values[17, 4] = bad
+    with pytest.raises(AntsError, match="state 17 and action 4"):
+        save_policy(tmp_path / "policy.npz", q_values, {})
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "3", '"x"'])
+def test_metadata_that_is_no_object_is_refused(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "policy.npz"
+    np.savez(path, q_values=random_policy(), metadata=np.array(text))
+    with pytest.raises(AntsError, match="not a JSON object"):
+        load_policy(path)
+
+
+def test_metadata_of_another_form_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "policy.npz"
+    np.savez(path, q_values=random_policy(), metadata=np.zeros(3))
+    with pytest.raises(AntsError, match="not a JSON object"):
+        load_policy(path)
+
+
+@pytest.mark.parametrize(
+    ("arrays", "missing"),
+    [
+        ({"metadata": np.array("{}")}, "no q_values"),
+        ({"q_values": random_policy()}, "no metadata"),
+        ({"weights": random_policy()}, "no q_values and no metadata"),
+    ],
+)
+def test_a_foreign_archive_is_refused(tmp_path: Path, arrays: dict, missing: str) -> None:
+    path = tmp_path / "policy.npz"
+    np.savez(path, **arrays)
+    with pytest.raises(AntsError, match=missing):
+        load_policy(path)
+
+
+@pytest.mark.parametrize("deep", ["[" * 100_000, '{"a":' * 100_000])
+def test_metadata_nested_beyond_reason_is_damaged(tmp_path: Path, deep: str) -> None:
+    path = tmp_path / "policy.npz"
+    np.savez(path, q_values=random_policy(), metadata=np.array(deep))
+    with pytest.raises(AntsError, match="not a JSON object"):
+        load_policy(path)
+
+
+@pytest.mark.parametrize(
+    ("path", "q_values", "metadata", "message"),
+    [
+        (1, random_policy(), {}, "the path is 1; it must be the name of a file"),
+        (None, random_policy(), {}, "the path is None"),
+        (b"p.npz", random_policy(), {}, "the path is b'p.npz'"),
+        ("p.npz", [[1, 2], [3]], {}, "q_values is no array"),
+        ("p.npz", None, {}, "q_values has the type object"),
+        ("p.npz", random_policy(), None, "metadata is None; it must be a mapping"),
+        ("p.npz", random_policy(), {"a": object}, "which JSON cannot hold"),
+    ],
+)
+def test_what_cannot_be_a_policy_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, path, q_values, metadata, message
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(AntsError, match=message):
+        save_policy(path, q_values, metadata)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_number_is_no_file_and_nothing_is_closed(capfd: pytest.CaptureFixture) -> None:
+    for number in (0, 1, 2):
+        with pytest.raises(AntsError, match=f"the path is {number}"):
+            load_policy(number)
+    print("still open", flush=True)
+    assert capfd.readouterr().out == "still open\n"
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(AntsError, match=r"none\.npz.*no such file"):
+        load_policy(tmp_path / "none.npz")
+
+
+def outcome_of_loading(path: Path) -> tuple[np.ndarray, dict] | AntsError:
+    try:
+        return load_policy(path)
+    except AntsError as error:
+        return error
+
+
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_a_damaged_file_gives_one_clear_error_or_the_same_policy(
+    tmp_path: Path, data: st.DataObject
+) -> None:
+    path = tmp_path / "policy.npz"
+    metadata = {"learner": "q_learning"}
+    save_policy(path, trail_follower(), metadata)
+    content = bytearray(path.read_bytes())
+    if data.draw(st.booleans(), label="cut"):
+        del content[data.draw(st.integers(0, len(content) - 1), label="length") :]
+    else:
+        place = data.draw(st.integers(0, len(content) - 1), label="place")
+        content[place] ^= data.draw(st.integers(1, 255), label="bits")
+    path.write_bytes(content)
+    outcome = outcome_of_loading(path)
+    if isinstance(outcome, AntsError):
+        assert str(path) in str(outcome)
+    else:
+        np.testing.assert_array_equal(outcome[0], trail_follower())
+        assert outcome[1] == metadata

@@ -1,0 +1,194 @@
+"""Every action of the reference's ant, where it succeeds and where it fails.
+
+The drawing is that of the vision's tests: ranges (5, 5, 5), the ant A at the origin with heading 1,
+in its view L (heading 0), M (heading 1), R (heading 2).
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from taichi_ants.reference import Ant, Event, RandomStream, WorldState, act, observe
+from taichi_ants.task.constants import EMPTY, FOOD, FORWARD, GIVE, LEFT, PICK_UP, RIGHT
+from taichi_ants.worlds.world import World
+
+A, L, M, R = (0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)
+BEHIND = (0, 0, 1)  # heading 4
+FAR = (0, 0, 4)
+GAMMA = 0x9E3779B97F4A7C15
+
+
+class Scene:
+    """A world with one ant, which acts once."""
+
+    def __init__(self, carries=False, cell=A, heading=1, queen=FAR, rng_state=0, **contents):
+        self.world = WorldState(World((5, 5, 5), queen, **contents), evaporation=True)
+        self.ant = Ant(cell, heading, carries)
+        self.stream = RandomStream(rng_state)
+
+    def act(self, action):
+        return act(self.world, self.ant, observe(self.world, self.ant), action, self.stream)
+
+
+@pytest.mark.parametrize(
+    ("action", "heading", "cell"), [(LEFT, 0, L), (FORWARD, 1, M), (RIGHT, 2, R)]
+)
+def test_a_move_onto_an_empty_cell_turns_and_goes(action, heading, cell):
+    scene = Scene()
+    assert scene.act(action) == (0, Event.MOVED)
+    assert scene.ant == Ant(cell, heading, False)
+    assert scene.world.level(cell) == 0  # without food, no deposit
+
+
+def test_headings_wrap_around():
+    scene = Scene(heading=0)
+    scene.act(LEFT)
+    assert scene.ant == Ant((1, 0, 1), 5)
+    scene = Scene(heading=5)
+    scene.act(RIGHT)
+    assert scene.ant == Ant((1, 0, 0), 0)
+
+
+def test_a_move_onto_a_trail_that_is_seen_pays_one():
+    trails = [(L, 10), (M, 4)]  # M has less than half of L, so it looks E
+    assert Scene(trails=trails).act(LEFT) == (1, Event.MOVED)
+    assert Scene(trails=trails).act(FORWARD) == (0, Event.MOVED)
+
+
+@pytest.mark.parametrize("action", [LEFT, FORWARD, RIGHT])
+@pytest.mark.parametrize("carries", [False, True])
+def test_a_blocked_move_only_turns(action, carries):
+    # L is food, M an obstacle, R the queen.
+    scene = Scene(carries, queen=R, foods=[L], obstacles=[M])
+    assert scene.act(action) == (-1, Event.BLOCKED)
+    assert scene.ant == Ant(A, action, carries)  # headings 0, 1, 2
+    assert [scene.world.level(cell) for cell in (A, L, M, R)] == [0, 0, 0, 0]
+
+
+def test_a_move_out_of_the_world_only_turns():
+    scene = Scene(cell=(4, 0, 0), heading=0)
+    assert scene.act(LEFT) == (-1, Event.BLOCKED)
+    assert scene.ant == Ant((4, 0, 0), 5)
+
+
+def test_with_food_a_move_nearer_pays_one_and_deposits_on_the_new_cell():
+    scene = Scene(carries=True, queen=(4, 0, 0))  # sees S E E
+    assert scene.act(LEFT) == (1, Event.MOVED)
+    assert scene.ant == Ant(L, 0, True)
+    assert scene.world.level(L) == 250
+    assert scene.world.level(A) == 0
+
+
+def test_with_food_a_move_not_nearer_pays_nothing_and_deposits_too():
+    scene = Scene(carries=True, queen=(4, 0, 0))
+    assert scene.act(FORWARD) == (0, Event.MOVED)
+    assert scene.world.level(M) == 250
+
+
+def test_a_deposit_sets_the_trail_and_does_not_add():
+    scene = Scene(carries=True, trails=[(L, 1000), (M, 3)])
+    scene.act(LEFT)
+    assert scene.world.level(L) == 250
+    scene = Scene(carries=True, trails=[(L, 1000), (M, 3)])
+    scene.act(FORWARD)
+    assert scene.world.level(M) == 250
+
+
+def test_pick_up_takes_the_food_turns_round_and_deposits_on_both_cells():
+    scene = Scene(foods=[R])
+    assert scene.act(PICK_UP) == (3, Event.PICKED_UP)
+    assert scene.ant == Ant(A, 4, True)  # heading 1 + 3, wherever the food was
+    assert scene.world.content(R) == EMPTY
+    assert [scene.world.level(cell) for cell in (A, R, L, M)] == [250, 250, 0, 0]
+    assert scene.stream.state == 0  # one food: no draw
+
+
+@pytest.mark.parametrize(
+    ("foods", "rng_state", "taken"),
+    [
+        # The first draw from state 0 is 0xE220A839..., 0.88 of the range: of two the second, of
+        # three the third. From state GAMMA it is 0x6E789E6A..., 0.43: the first, the second.
+        ([L, M], 0, M),
+        ([L, R], 0, R),
+        ([M, R], 0, R),
+        ([R, M, L], 0, R),  # in the order of the view, not of the world's list
+        ([L, M], GAMMA, L),
+        ([M, R], GAMMA, M),
+        ([R, M, L], GAMMA, M),
+    ],
+)
+def test_of_several_foods_the_draw_decides(foods, rng_state, taken):
+    scene = Scene(foods=foods, rng_state=rng_state)
+    assert scene.act(PICK_UP) == (3, Event.PICKED_UP)
+    left_over = {cell for cell in foods if scene.world.content(cell) == FOOD}
+    assert left_over == set(foods) - {taken}
+    assert {cell for cell in (L, M, R) if scene.world.level(cell) == 250} == {taken}
+    assert scene.stream.state == (rng_state + GAMMA) % 2**64  # one draw
+
+
+@pytest.mark.parametrize(
+    "contents",
+    [
+        {},  # nothing to take
+        {"foods": [BEHIND]},  # not in view
+        {"queen": M},  # without food she looks O
+        {"carries": True, "foods": [M]},  # already carries
+        {"carries": True, "queen": M},  # Q shares its code with F
+    ],
+)
+def test_pick_up_fails(contents):
+    scene = Scene(**contents)
+    carries = scene.ant.carries
+    assert scene.act(PICK_UP) == (-1, Event.FAILED)
+    assert scene.ant == Ant(A, 1, carries)
+    assert scene.stream.state == 0
+    assert all(scene.world.content(cell) == FOOD for cell in contents.get("foods", []))
+    assert scene.world.level(A) == 0
+
+
+@pytest.mark.parametrize(("queen", "state"), [(L, 16), (M, 4), (R, 1)])
+def test_give_pays_ten_and_keeps_the_heading(queen, state):
+    scene = Scene(carries=True, queen=queen)
+    assert scene.act(GIVE) == (10, Event.DELIVERED)
+    assert scene.ant == Ant(A, 1, False)
+    assert observe(scene.world, scene.ant) == state  # the queen looks O again
+    assert scene.world.level(A) == 0
+
+
+@pytest.mark.parametrize(
+    "contents",
+    [
+        {"carries": True},  # no queen in view
+        {"carries": True, "queen": BEHIND},
+        {"queen": M},  # nothing to give
+        {"foods": [M]},  # F shares its code with Q
+    ],
+)
+def test_give_fails(contents):
+    scene = Scene(**contents)
+    carries = scene.ant.carries
+    assert scene.act(GIVE) == (-1, Event.FAILED)
+    assert scene.ant == Ant(A, 1, carries)
+
+
+@pytest.mark.parametrize(("evaporation", "levels"), [(True, [25, 24, 1, 0, 0]), (False, [25] * 5)])
+def test_evaporation_takes_one_per_tick_and_stops_at_zero(evaporation, levels):
+    world = WorldState(World((5, 5, 5), FAR, trails=[(L, 25)]), evaporation)
+    seen = []
+    for clock in range(27):
+        assert world.clock == clock
+        if clock in (0, 1, 24, 25, 26):
+            seen.append(world.level(L))
+        world.tick()
+    assert seen == levels
+
+
+@pytest.mark.parametrize(("evaporation", "level"), [(True, 249), (False, 250)])
+def test_a_deposit_evaporates_in_its_own_tick(evaporation, level):
+    world = WorldState(World((5, 5, 5), FAR, trails=[(L, 25)]), evaporation)
+    for _ in range(3):
+        world.tick()
+    world.deposit(L)
+    assert world.level(L) == 250
+    world.tick()
+    assert world.level(L) == level

@@ -1,0 +1,122 @@
+"""What holds after every tick of any colony: food is conserved, no two ants share a cell."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+from colonies import foods_of
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from random_colonies import random_colony
+
+from taichi_ants.reference import ReferenceColony, neighbour
+from taichi_ants.task.constants import EMPTY, PICK_UP
+
+SEEDS = st.integers(0, 2**32 - 1)
+TICKS = 40
+
+
+def colonies_of(seed, ticks=TICKS, episodes=2):
+    """Yield the colony of a seed after each tick, and the cells and headings before it."""
+    drawn = random_colony(seed)
+    colony = ReferenceColony(
+        drawn.world, drawn.config, drawn.training, drawn.seed, drawn.sharing, drawn.q_values
+    )
+    for _ in range(episodes):
+        colony.begin_episode()
+        while not colony.over and colony.record.ticks < ticks:
+            before = {slot: (ant.cell, ant.heading) for slot, ant in colony.ants.items()}
+            colony.tick()
+            yield drawn, colony, before
+        colony.end_episode()
+
+
+@given(SEEDS)
+@settings(max_examples=60, deadline=None, derandomize=True)
+def test_food_is_conserved(seed):
+    for drawn, colony, _ in colonies_of(seed):
+        carried = sum(ant.carries for ant in colony.ants.values())
+        record = colony.record
+        there = len(foods_of(colony)) + carried + record.deliveries
+        assert there == len(drawn.world.foods) + record.regrown
+        if drawn.config.births:
+            assert record.births + colony.queen.store == record.deliveries
+        else:
+            assert record.births == 0
+
+
+@given(SEEDS)
+@settings(max_examples=60, deadline=None, derandomize=True)
+def test_ants_stand_alone_on_empty_cells(seed):
+    for drawn, colony, _ in colonies_of(seed):
+        cells = [ant.cell for ant in colony.ants.values()]
+        assert len(set(cells)) == len(cells)
+        assert set(cells) == colony.world.occupied
+        assert all(colony.world.ground[cell] == EMPTY for cell in cells)
+        record = colony.record
+        assert len(cells) == drawn.config.ants + record.births - record.deaths
+        assert len(cells) <= drawn.config.slots
+        assert max(colony.ants, default=0) < drawn.config.slots
+        numbers = [ant.number for ant in colony.ants.values()]
+        assert len(set(numbers)) == len(numbers)
+
+
+@given(SEEDS)
+@settings(max_examples=60, deadline=None, derandomize=True)
+def test_of_those_that_want_a_free_cell_exactly_one_gets_it(seed):
+    for _, colony, before in colonies_of(seed, episodes=1):
+        wanting, getting = Counter(), Counter()
+        for step in colony.transitions:
+            code = [step.state >> 4 & 3, step.state >> 2 & 3, step.state & 3, 1, 1][step.action]
+            if step.action >= PICK_UP or code not in (0, 2):
+                continue
+            cell, heading = before[step.slot]
+            target = neighbour(cell, heading + step.action - 1)
+            assert target not in {cell for cell, _ in before.values()}
+            wanting[target] += 1
+            getting[target] += step.reward >= 0
+        assert getting == Counter(dict.fromkeys(wanting, 1))
+
+
+@given(SEEDS)
+@settings(max_examples=20, deadline=None, derandomize=True)
+def test_homes_that_are_full_hold_food(seed):
+    for _, colony, _ in colonies_of(seed):
+        full = [home.cell for home in colony.homes.homes if home.waiting_since is None]
+        assert len(set(full)) == len(full)
+        assert set(full) <= foods_of(colony)
+
+
+@given(SEEDS)
+@settings(max_examples=20, deadline=None, derandomize=True)
+def test_a_run_depends_on_its_seed_alone(seed):
+    drawn = random_colony(seed)
+    arguments = (drawn.world, drawn.config, drawn.training)
+    runs = []
+    for _ in range(2):
+        colony = ReferenceColony(*arguments, drawn.seed, drawn.sharing, drawn.q_values)
+        colony.run(2, 30)
+        runs.append((colony.records, colony.snapshot()))
+    (records, first), (same_records, second) = runs
+    assert records == same_records
+    assert first.ants == second.ants
+    assert first.queen_rng_state == second.queen_rng_state
+    np.testing.assert_array_equal(first.q_values, second.q_values)
+
+
+def test_the_colonies_drawn_here_do_everything():
+    """So that the properties above are not true for want of deeds."""
+    total, losses = Counter(), 0
+    for seed in range(120):
+        for _, colony, _ in colonies_of(seed, episodes=1):
+            last = colony.record
+        total.update(
+            {
+                name: getattr(last, name)
+                for name in ("deliveries", "moves", "blocked", "births", "deaths", "regrown")
+            }
+        )
+        losses += last.blocked > 0
+    assert losses > 40
+    assert min(total[name] for name in ("deliveries", "births", "deaths", "regrown")) > 50

@@ -1,0 +1,66 @@
+"""The reference is independent: it imports nothing of the package but what it may."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+from taichi_ants import reference
+
+FOLDER = Path(reference.__file__).parent
+ALLOWED = {
+    "taichi_ants.task.colony",
+    "taichi_ants.grid.constants",
+    "taichi_ants.task.constants",
+    "taichi_ants.errors",
+    "taichi_ants.learners.config",
+    "taichi_ants.task.rewards",
+    "taichi_ants.worlds.world",
+}
+OUTSIDE = {"__future__", "collections", "dataclasses", "enum", "numpy", "typing"}
+
+
+def imported_by(path: Path) -> set[str]:
+    modules = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            modules |= {name.name for name in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path} imports relatively"
+            modules.add(node.module)
+    return modules
+
+
+def test_the_reference_imports_only_what_it_may():
+    files = sorted(FOLDER.glob("*.py"))
+    assert len(files) >= 10
+    for path in files:
+        for module in imported_by(path):
+            own = module.startswith("taichi_ants.reference.")
+            plain = module.split(".")[0] in OUTSIDE
+            assert own or plain or module in ALLOWED, f"{path.name} imports {module}"
+
+
+def test_of_the_world_only_fields_are_read():
+    # A world's helpers (its grid, ground, closer cells, starts) belong to what is tested.
+    fields = {"ranges", "queen", "foods", "obstacles", "trails", "ants"}
+    alone = ("world_state.py", "start.py", "episode.py", "runs.py")
+    together = ("colony.py", "colony_world.py", "colony_trail.py")
+    for name in alone + together:
+        tree = ast.parse((FOLDER / name).read_text(encoding="utf-8"))
+        for function in ast.walk(tree):
+            if not isinstance(function, ast.FunctionDef):
+                continue
+            worlds = {
+                argument.arg
+                for argument in function.args.args
+                if argument.annotation is not None and ast.unparse(argument.annotation) == "World"
+            }
+            read = {
+                node.attr
+                for node in ast.walk(function)
+                if isinstance(node, ast.Attribute)
+                and isinstance(node.value, ast.Name)
+                and node.value.id in worlds
+            }
+            assert read <= fields, f"{name}: {function.name} reads {read - fields}"

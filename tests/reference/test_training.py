@@ -1,0 +1,263 @@
+"""Training by the reference, in an episode of two steps worked out by hand.
+
+    M   food, (1, 1, 0), ahead: heading 1
+    A   the ant, at the origin
+    Q   queen, (0, 0, 1), behind: heading 4
+
+Step 0: the ant sees E F E, state 12. Picking up pays 3 and turns it round, to heading 4. It then
+sees E Q E with food, state 64 + 12 = 76: the cells beside the queen are at distance 1, as the ant.
+Step 1: giving pays 10. The ant then sees E O E without food, state 4; the trail lies on A and M,
+out of view.
+
+The tables below make these two actions the only best ones: with epsilon 0 the episode is certain.
+Learning rate and discount are 1/2, so that all values are exact.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from taichi_ants.errors import AntsError
+from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.reference import Event, Run, learner_names, train
+from taichi_ants.task.constants import GIVE, PICK_UP
+from taichi_ants.worlds.world import World
+
+GAMMA = 0x9E3779B97F4A7C15
+TWO_STEPS = World((3, 3, 3), (0, 0, 1), foods=[(1, 1, 0)], ants=[((0, 0, 0), 1)])
+
+
+def config(learner="q_learning", **settings):
+    defaults = {
+        "learning_rate": 0.5,
+        "discount": 0.5,
+        "epsilon": 0.0,
+        "epsilon_decay": 1.0,
+        "min_epsilon": 0.0,
+        "planning_steps": 3 if learner == "dyna_q" else 0,
+    }
+    return TrainingConfig(learner, **{**defaults, **settings})
+
+
+def prepared(rng_state=0):
+    """A run to start from: Q(12, pick up) = 1, Q(76, give) = 2, Q(4, forward) = 4."""
+    q_values = np.zeros((128, 5), np.float32)
+    q_values[12, PICK_UP], q_values[76, GIVE], q_values[4, 1] = 1, 2, 4
+    return Run(q_values, epsilon=0.0, rng_state=rng_state)
+
+
+def train_once(learning, max_steps=600, rng_state=0):
+    return train(TWO_STEPS, learning, 0, 1, max_steps, trace=True, start_from=prepared(rng_state))
+
+
+def draws(run):
+    """How many draws the run made from state 0: each adds GAMMA."""
+    return next(n for n in range(100) if n * GAMMA % 2**64 == run.rng_state)
+
+
+def test_the_record_of_the_episode():
+    run = train_once(config())
+    assert (run.returns, run.steps, run.deliveries) == ([13], [2], [1])
+    first, second = run.trace
+    assert (first.cell, first.heading, first.state) == ((0, 0, 0), 1, 12)
+    assert (first.action, first.reward, first.event) == (PICK_UP, 3, Event.PICKED_UP)
+    assert (first.next_cell, first.next_heading, first.next_state) == ((0, 0, 0), 4, 76)
+    assert (first.delivered, first.terminated, first.truncated) == (False, False, False)
+    assert (second.cell, second.heading, second.state) == ((0, 0, 0), 4, 76)
+    assert (second.action, second.reward, second.event) == (GIVE, 10, Event.DELIVERED)
+    assert (second.next_cell, second.next_heading, second.next_state) == ((0, 0, 0), 4, 4)
+    assert (second.delivered, second.terminated, second.truncated) == (True, True, False)
+    assert [(step.episode, step.step) for step in run.trace] == [(0, 0), (0, 1)]
+    assert second.rng_state == run.rng_state
+
+
+# All four learners see the same errors here: a' is the best action, and epsilon is 0.
+#   Step 0: 3 + 0.5 * 2 - 1 = 3.
+#   Step 1, absorbing: 10 - 2 = 8; continuing: 10 + 0.5 * 4 - 2 = 10.
+@pytest.mark.parametrize(("delivery", "last"), [("absorbing", 8.0), ("continuing", 10.0)])
+@pytest.mark.parametrize("learner", learner_names())
+def test_td_errors_by_delivery_setting(learner, delivery, last):
+    run = train_once(config(learner, delivery=delivery))
+    assert [step.td_error for step in run.trace] == [3.0, last]
+    assert [step.terminated for step in run.trace] == [False, delivery == "absorbing"]
+    assert run.deliveries == [1]
+
+
+@pytest.mark.parametrize(("delivery", "given"), [("absorbing", 6.0), ("continuing", 7.0)])
+@pytest.mark.parametrize("learner", ["q_learning", "sarsa", "expected_sarsa"])
+def test_the_table_moves_by_the_learning_rate(learner, delivery, given):
+    run = train_once(config(learner, delivery=delivery))
+    expected = prepared().q_values
+    expected[12, PICK_UP] = 1 + 0.5 * 3
+    expected[76, GIVE] = given  # 2 + 0.5 * 8 and 2 + 0.5 * 10
+    np.testing.assert_array_equal(run.q_values, expected)
+    assert run.q_values.dtype == np.float32
+    assert run.model == {}
+
+
+@pytest.mark.parametrize("delivery", ["absorbing", "continuing"])
+@pytest.mark.parametrize("learner", learner_names())
+def test_truncation_bootstraps(learner, delivery):
+    run = train_once(config(learner, delivery=delivery), max_steps=1)
+    [step] = run.trace
+    assert (step.truncated, step.delivered, step.terminated) == (True, False, False)
+    assert step.td_error == 3.0  # as without the limit
+    assert (run.returns, run.steps, run.deliveries) == ([3], [1], [0])
+
+
+def test_a_delivery_in_the_last_step_is_no_truncation():
+    last = train_once(config(), max_steps=2).trace[-1]
+    assert (last.delivered, last.terminated, last.truncated) == (True, True, False)
+
+
+@pytest.mark.parametrize(
+    ("learner", "delivery", "max_steps", "expected"),
+    [
+        ("q_learning", "absorbing", 600, 2),  # one for each choice
+        ("expected_sarsa", "continuing", 600, 2),
+        ("sarsa", "absorbing", 600, 2),  # the second is a' of the first step, none at the end
+        ("sarsa", "continuing", 600, 3),  # a' at the delivery, for the target
+        ("sarsa", "absorbing", 1, 2),  # a' at truncation, for the target
+        ("dyna_q", "absorbing", 600, 8),  # 2 choices and 2 * 3 planning steps
+    ],
+)
+def test_how_many_draws_are_made(learner, delivery, max_steps, expected):
+    run = train_once(config(learner, delivery=delivery), max_steps)
+    assert draws(run) == expected
+
+
+def test_planning_repeats_the_last_seen_transition():
+    # Only (12, pick up) is visited; its target is 3 + 0.5 * 2 = 4. The value goes from 1 halfway to
+    # 4 in the step, and three times more: 2.5, 3.25, 3.625, 3.8125.
+    run = train_once(config("dyna_q"), max_steps=1)
+    assert run.q_values[12, PICK_UP] == 3.8125
+    assert run.model == {(12, PICK_UP): (3, 76, False)}
+
+
+@pytest.mark.parametrize(
+    ("rng_state", "pick_up", "give"),
+    [
+        # Step 0: 1 -> 2.5, planned towards 4: 3.25. Step 1: Q(76, give) 2 -> 6 (target 10).
+        # The draw of the second planning step is the fourth: 0xF88BB8A8 (0.97) from state 0, the
+        # second of two pairs, 6 -> 8; 0x1B39896A (0.11) from state GAMMA, the first pair, whose
+        # target is now 3 + 0.5 * 6 = 6: 3.25 -> 4.625.
+        (0, 3.25, 8.0),
+        (GAMMA, 4.625, 6.0),
+    ],
+)
+def test_planning_draws_one_of_the_visited_pairs(rng_state, pick_up, give):
+    run = train_once(config("dyna_q", planning_steps=1), rng_state=rng_state)
+    assert run.q_values[12, PICK_UP] == pick_up
+    assert run.q_values[76, GIVE] == give
+    assert list(run.model.items()) == [
+        ((12, PICK_UP), (3, 76, False)),
+        ((76, GIVE), (10, 4, True)),
+    ]
+
+
+def test_the_model_holds_the_last_outcome_in_the_order_of_first_visit():
+    learning = config("dyna_q", epsilon=1.0, delivery="continuing")
+    run = train(TWO_STEPS, learning, 3, 8, 40, trace=True)
+    outcomes, changed = {}, 0
+    for step in run.trace:
+        pair, outcome = (step.state, step.action), (step.reward, step.next_state, False)
+        changed += outcomes.get(pair, outcome) != outcome
+        outcomes[pair] = outcome
+    assert list(run.model.items()) == list(outcomes.items())
+    assert changed > 0  # the test would not see the difference otherwise
+
+
+@pytest.mark.parametrize("delivery", ["absorbing", "continuing"])
+def test_sarsa_executes_the_action_it_learned_from(delivery):
+    learning = config("sarsa", epsilon=0.7, delivery=delivery)
+    run = train(TWO_STEPS, learning, 1, 6, 30, trace=True, trace_tables=True)
+    followed = 0
+    for before, step, after in zip(run.trace, run.trace[1:], run.trace[2:], strict=False):
+        if step.episode == after.episode:
+            table = before.q_values
+            target = step.reward + 0.5 * float(table[step.next_state, after.action])
+            expected = target - float(table[step.state, step.action])
+            assert float(step.td_error) == pytest.approx(expected, abs=1e-5)
+            followed += after.action != table[step.next_state].argmax()
+    assert followed > 0  # some of these actions were not the greedy ones
+
+
+def test_the_table_of_each_step_leads_to_the_next():
+    run = train(TWO_STEPS, config(epsilon=0.5), 1, 3, 30, trace=True, trace_tables=True)
+    table = np.zeros((128, 5), np.float32)
+    for step in run.trace:
+        table[step.state, step.action] += np.float32(0.5) * step.td_error
+        np.testing.assert_array_equal(step.q_values, table)
+    np.testing.assert_array_equal(run.q_values, table)
+
+
+def test_epsilon_decays_to_its_floor():
+    learning = config(epsilon=0.5, epsilon_decay=0.5, min_epsilon=0.2)
+    epsilons = [train(TWO_STEPS, learning, 0, n, 5).epsilon for n in range(4)]
+    assert epsilons == [0.5, 0.25, 0.2, 0.2]
+
+
+def test_an_epsilon_below_the_floor_is_raised_after_the_first_episode():
+    learning = config(epsilon=0.0, min_epsilon=0.01)
+    assert [train(TWO_STEPS, learning, 0, n, 5).epsilon for n in range(2)] == [0.0, 0.01]
+
+
+@pytest.mark.parametrize("learner", learner_names())
+def test_going_on_gives_what_training_in_one_go_gives(learner):
+    learning = config(learner, epsilon=0.6, epsilon_decay=0.9, delivery="continuing")
+    whole = train(TWO_STEPS, learning, 9, 12, 40, trace=True)
+    half = train(TWO_STEPS, learning, 9, 5, 40, trace=True)
+    table_before, model_before = half.q_values.copy(), dict(half.model)
+    resumed = train(TWO_STEPS, learning, 9, 7, 40, trace=True, start_from=half)
+    for run_field in ("returns", "steps", "deliveries", "epsilon", "rng_state", "trace"):
+        assert getattr(resumed, run_field) == getattr(whole, run_field)
+    assert list(resumed.model.items()) == list(whole.model.items())
+    np.testing.assert_array_equal(resumed.q_values, whole.q_values)
+    # What was gone on from is as it was.
+    np.testing.assert_array_equal(half.q_values, table_before)
+    assert half.model == model_before
+    assert len(half.returns) == 5
+
+
+def test_a_run_depends_on_its_seed():
+    learning = config(epsilon=0.6)
+    runs = [train(TWO_STEPS, learning, seed, 5, 40) for seed in (0, 0, 1)]
+    assert runs[0].steps == runs[1].steps
+    assert runs[0].rng_state == runs[1].rng_state != runs[2].rng_state
+
+
+def test_every_episode_starts_from_the_same_world():
+    run = train(TWO_STEPS, config(epsilon=1.0), 2, 20, 100, trace=True)
+    assert sum(run.deliveries) > 1
+    starts = [step for step in run.trace if step.step == 0]
+    assert {(step.cell, step.heading, step.state) for step in starts} == {((0, 0, 0), 1, 12)}
+
+
+@pytest.mark.parametrize(("learner", "planning_steps"), [("q_learning", 3), ("dyna_q", 0)])
+def test_planning_steps_must_fit_the_learner(learner, planning_steps):
+    with pytest.raises(AntsError, match="planning_steps is"):
+        train(TWO_STEPS, config(learner, planning_steps=planning_steps), 0, 1, 1)
+
+
+def test_the_trace_is_kept_on_request_only():
+    assert train(TWO_STEPS, config(), 0, 2, 10).trace == []
+    traced = train(TWO_STEPS, config(), 0, 2, 10, trace=True)
+    assert len(traced.trace) == sum(traced.steps)
+    assert all(step.q_values is None for step in traced.trace)
+
+
+def test_each_step_begins_where_the_last_one_ended():
+    run = train(TWO_STEPS, config(epsilon=0.8), 4, 4, 30, trace=True)
+    for step, after in itertools.pairwise(run.trace):
+        if step.delivered or step.truncated:
+            assert (after.episode, after.step) == (step.episode + 1, 0)
+        else:
+            assert (after.episode, after.step) == (step.episode, step.step + 1)
+            ended = (step.next_cell, step.next_heading, step.next_state)
+            assert (after.cell, after.heading, after.state) == ended
+    for episode, (gained, length) in enumerate(zip(run.returns, run.steps, strict=True)):
+        steps = [step for step in run.trace if step.episode == episode]
+        assert (sum(step.reward for step in steps), len(steps)) == (gained, length)

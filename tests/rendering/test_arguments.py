@@ -1,0 +1,156 @@
+"""What is public in rendering names an argument of a wrong kind where it comes in."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from taichi_ants import AntsError, Colony, ColonyConfig, TrainingConfig, rendering
+from taichi_ants.learners.policies import trail_follower
+from taichi_ants.rendering import Episode, Scene, Snapshot, Status, Viewport
+from taichi_ants.worlds import paper
+
+WORLD = paper()
+TABLE = trail_follower()
+FRAME = np.zeros((64, 64, 3), np.uint8)
+CONFIG = TrainingConfig("sarsa", 0.01, 0.9, 0.5, 0.995)
+
+
+def episode() -> Episode:
+    return Episode.play(WORLD, TABLE)
+
+
+def colony() -> Colony:
+    made = Colony(WORLD, ColonyConfig(ants=3), CONFIG, 0, "fixed", TABLE)
+    made.begin_episode()
+    return made
+
+
+def of(make: Callable, *others: object, **named: object) -> Callable[[object], object]:
+    """Calls with a wrong first argument; generators are begun."""
+
+    def call(wrong: object) -> object:
+        found = make(wrong, *others, **named)
+        return next(found) if inspect.isgenerator(found) else found
+
+    return call
+
+
+# Public name -> calls with one wrong argument, which the message names.
+CALLS: dict[str, list[tuple[str, Callable[[object], object]]]] = {
+    "Episode": [("world", of(Episode.play, TABLE))],
+    "Scene": [
+        ("grid", of(Scene)),
+        ("size", lambda wrong: Scene(WORLD.grid, wrong)),
+        ("title", lambda wrong: Scene(WORLD.grid, title=wrong)),
+        ("full_level", lambda wrong: Scene(WORLD.grid, full_level=wrong)),
+        ("moment", lambda wrong: Scene(WORLD.grid).draw(wrong)),
+        ("status", lambda wrong: Scene(WORLD.grid).draw(Snapshot.at_start(WORLD), wrong)),
+    ],
+    "Snapshot": [("world", of(Snapshot.at_start)), ("moment", of(Snapshot.of))],
+    "Stage": [("a stage", lambda wrong: next(rendering.learning_frames([wrong])))],
+    "Status": [("status", lambda wrong: Scene(WORLD.grid).draw(Snapshot.at_start(WORLD), wrong))],
+    "Viewport": [("grid", lambda wrong: Viewport.fit(wrong, 0, 0, 9, 9))],
+    "best_actions": [("values", of(rendering.best_actions))],
+    "check_animation": [
+        ("path", of(rendering.check_animation, 8)),
+        ("fps", lambda wrong: rendering.check_animation("a.gif", wrong)),
+    ],
+    "check_picture": [("path", of(rendering.check_picture))],
+    "check_size": [("size", of(rendering.check_size))],
+    "clarity": [("values", of(rendering.clarity, 1.0))],
+    "colony_frames": [
+        ("colony", of(rendering.colony_frames, 3)),
+        ("ticks", lambda wrong: next(rendering.colony_frames(colony(), wrong))),
+        ("every", lambda wrong: next(rendering.colony_frames(colony(), 3, every=wrong))),
+        ("world", lambda wrong: next(rendering.colony_frames(colony(), 3, world=wrong))),
+    ],
+    "colony_picture": [("colony", of(rendering.colony_picture))],
+    "episode_frames": [("episode", of(rendering.episode_frames))],
+    "episode_picture": [
+        ("episode", of(rendering.episode_picture, 0)),
+        ("step", lambda wrong: rendering.episode_picture(episode(), wrong)),
+    ],
+    "learning_frames": [
+        ("stages", of(rendering.learning_frames)),
+        ("title", lambda wrong: next(rendering.learning_frames([stage()], title=wrong))),
+    ],
+    "learning_stages": [("stages", lambda wrong: learning_stages(wrong))],
+    "policy_sheet": [
+        ("q_values", of(rendering.policy_sheet)),
+        ("title", lambda wrong: rendering.policy_sheet(TABLE, wrong)),
+        ("width", lambda wrong: rendering.policy_sheet(TABLE, width=wrong)),
+        ("complete", lambda wrong: rendering.policy_sheet(TABLE, complete=wrong)),
+    ],
+    "render_colony": [
+        ("path", of(rendering.render_colony, colony, 3)),
+        ("colony", lambda wrong: rendering.render_colony("a.gif", wrong, 3)),
+    ],
+    "render_episode": [
+        ("path", of(rendering.render_episode, WORLD, TABLE)),
+        ("world", lambda wrong: rendering.render_episode("a.gif", wrong, TABLE)),
+        ("title", lambda wrong: rendering.render_episode("a.gif", WORLD, TABLE, title=wrong)),
+    ],
+    "render_learning": [
+        ("path", lambda wrong: rendering.render_learning(wrong, [stage()])),
+        ("stages", lambda wrong: rendering.render_learning("a.gif", wrong)),
+    ],
+    "save_animation": [
+        ("path", of(rendering.save_animation, [FRAME], 8)),
+        ("frames", lambda wrong: rendering.save_animation("a.gif", wrong, 8)),
+        ("a frame", lambda wrong: rendering.save_animation("a.gif", [wrong], 8)),
+    ],
+    "save_picture": [
+        ("path", of(rendering.save_picture, FRAME)),
+        ("a frame", lambda wrong: rendering.save_picture("a.png", wrong)),
+    ],
+    "usual_spread": [("q_values", of(rendering.usual_spread))],
+}
+
+
+def stage() -> rendering.Stage:
+    return rendering.Stage(0, episode())
+
+
+def learning_stages(wrong: object) -> object:
+    return rendering.learning_stages(WORLD, CONFIG, stages=wrong)
+
+
+def test_all_that_is_public_is_tried() -> None:
+    assert set(CALLS) == set(rendering.__all__)
+
+
+@pytest.mark.parametrize(
+    ("called", "named", "call"),
+    [(name, named, call) for name, calls in CALLS.items() for named, call in calls],
+)
+@pytest.mark.parametrize("wrong", [7.5, object(), np.zeros(3)], ids=["7.5", "object", "array"])
+def test_a_wrong_kind_is_named_in_one_sentence(
+    called, named, call, wrong, tmp_path, monkeypatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    if named in ("fps", "full_level") and isinstance(wrong, float):
+        wrong = "7.5"
+    with pytest.raises(AntsError) as caught:
+        call(wrong)
+    message = str(caught.value)
+    assert named.removeprefix("a ").rstrip("s") in message
+    assert "\n" not in message
+    assert len(message) < 250
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_snapshot_of_another_grid_is_refused() -> None:
+    from taichi_ants.worlds import open_world
+
+    with pytest.raises(AntsError, match="ranges"):
+        Scene(WORLD.grid).draw(Snapshot.at_start(open_world(1)), Status(0))
+
+
+def test_pictures_are_at_least_a_tick_apart():
+    for wrong in (0, -3):
+        with pytest.raises(AntsError, match=f"every is {wrong}"):
+            rendering.render_colony("a.gif", colony(), 3, every=wrong)

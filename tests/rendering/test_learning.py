@@ -1,0 +1,307 @@
+"""Learning made visible, the policy sheet, and colonies."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from taichi_ants import AntsError, Colony, ColonyConfig, TrainingConfig, train
+from taichi_ants.learners.policies import random_policy, trail_follower
+from taichi_ants.rendering import (
+    Episode,
+    Snapshot,
+    Stage,
+    best_actions,
+    clarity,
+    colony_frames,
+    colony_picture,
+    learning_frames,
+    learning_stages,
+    policy_sheet,
+    render_colony,
+    render_learning,
+    text,
+    usual_spread,
+)
+from taichi_ants.rendering.colours import CHOSEN
+from taichi_ants.rendering.sheet import hardly_learned
+from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT
+from taichi_ants.task.states import REACHABLE_STATES, parse_state
+from taichi_ants.worlds import open_world, paper
+
+CONFIG = TrainingConfig("sarsa", 0.01, 0.9, 0.5, 0.995)
+
+
+def coloured(picture: np.ndarray, colour: int) -> np.ndarray:
+    return (picture == (colour >> 16, colour >> 8 & 255, colour & 255)).all(axis=2)
+
+
+def test_stages_are_those_of_one_training() -> None:
+    stages = learning_stages(paper(), CONFIG, seed=2, stages=(0, 3, 20), max_steps=60)
+    assert [stage.episodes for stage in stages] == [0, 3, 20]
+    assert [stage.title for stage in stages] == [
+        "before learning",
+        "after 3 episodes",
+        "after 20 episodes",
+    ]
+    for stage in stages:
+        table = np.zeros((128, 5), dtype=np.float32)
+        if stage.episodes:
+            table = train(paper(), CONFIG, 2, stage.episodes).q_values[0, 0]
+        trace = stage.episode.trace
+        assert (trace.q_values == table[trace.states]).all()
+        assert len(trace) <= 60
+
+
+def test_a_stage_that_is_given_twice_is_shown_once() -> None:
+    stages = learning_stages(paper(), CONFIG, stages=(0, 2, 2), max_steps=5)
+    assert [stage.episodes for stage in stages] == [0, 2]
+
+
+@pytest.mark.parametrize("n", [2, 12, 40, 80])
+def test_the_return_stays_where_there_is_little_room(n, monkeypatch) -> None:
+    """Many worlds side by side are narrow."""
+    written = []
+    original = text.write
+
+    def noting(frame, line, *place, **settings) -> None:
+        written.append(line)
+        original(frame, line, *place, **settings)
+
+    stages = learning_stages(paper(), CONFIG, seed=2, stages=range(n), max_steps=9)
+    monkeypatch.setattr(text, "write", noting)
+    *_, last = learning_frames(stages, (600, 400))
+    assert last.shape == (400, 600, 3)
+    captions = [line for line in written if "return" in line or line.lstrip("-").isdecimal()]
+    assert len(captions) == sum(len(stage.episode) for stage in stages)
+    for line in captions:
+        assert "..." not in line
+        number = line.split("return ")[-1].removesuffix(": delivered")
+        assert number.lstrip("-").isdecimal()
+
+
+def test_the_account_says_where_the_return_comes_from() -> None:
+    """The shortest delivery earns 16 on the trail, 16 on the way back, 3 for the food and 10."""
+    follower = Stage(500, Episode.play(paper(), trail_follower()))
+    account = follower.account()
+    assert account[-1].tolist() == [16, 16, 3, 10, 0]
+    assert account[0].tolist() == [0] * 5
+    for seed, stages in ((2, (0, 10)), (7, (10, 30))):
+        for stage in learning_stages(paper(), CONFIG, seed=seed, stages=stages, max_steps=80):
+            returns = np.concatenate([[0], stage.episode.trace.rewards.cumsum()])
+            assert (stage.account().sum(axis=1) == returns).all()
+            assert (stage.account()[:, :4] >= 0).all()
+            assert (stage.account()[:, 4] <= 0).all()
+
+
+@pytest.mark.parametrize("stages", [(), (3, 2), (5, 5, 2), (-1, 5)])
+def test_stages_that_are_refused(stages) -> None:
+    with pytest.raises(AntsError, match="stages"):
+        learning_stages(paper(), CONFIG, stages=stages)
+
+
+def test_a_stage_that_has_ended_stays() -> None:
+    stages = learning_stages(paper(), CONFIG, seed=2, stages=(0, 50), max_steps=60)
+    short, long = sorted(stages, key=lambda stage: len(stage.episode))
+    assert len(short.episode) < len(long.episode) == 61
+    frames = list(learning_frames(stages, (640, 400), "a title"))
+    assert len(frames) == 61
+    halves = [(frame[:, :320], frame[:, 320:]) for frame in frames]
+    ended = stages.index(short)
+    last = len(short.episode) - 1
+    assert all((half[ended] == halves[last][ended]).all() for half in halves[last:])
+    assert not (halves[last - 1][ended] == halves[last][ended]).all()
+    assert not (halves[-1][1 - ended] == halves[last][1 - ended]).all()
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (400, 900), (64, 64), (4096, 200)])
+def test_all_stages_fit(size, tmp_path) -> None:
+    stages = learning_stages(paper(), CONFIG, stages=(0, 1, 2, 3), max_steps=3)
+    render_learning(tmp_path / "a.gif", stages, size=size, fps=10)
+    with Image.open(tmp_path / "a.gif") as image:
+        assert image.size == size
+        picture = np.asarray(image.convert("RGB")).astype(int)
+    # The columns and the rows of worlds, told by their queens; there is one in the legend too.
+    letters = round(min(size[0] / 60, size[1] / 26))
+    picture = picture[: size[1] - round(2.6 * letters) * (letters >= text.SMALLEST)]
+    purple = (picture[..., 0] - picture[..., 1] > 90) & (picture[..., 2] - picture[..., 1] > 90)
+    groups = [(np.diff(np.flatnonzero(purple.any(axis=axis))) > 8).sum() + 1 for axis in (0, 1)]
+    assert groups == {(1280, 720): [4, 1], (400, 900): [2, 2], (64, 64): [2, 2]}.get(size, [4, 1])
+
+
+def test_how_clear_a_choice_is() -> None:
+    """Worked by hand: the gap to the second best over the spread that is usual in the table."""
+    assert clarity(np.array([0.0, 4.0, 3.0, -1.0, 0.0]), 4.0) == pytest.approx(0.25)
+    assert clarity(np.array([1.0, 0.0, 0.0, 0.0, 0.0]), 1.0) == 1.0
+    assert clarity(np.array([9.0, 0.0, 0.0, 0.0, 0.0]), 3.0) == 1.0
+    assert clarity(np.array([2.0, 2.0, 0.0, 0.0, 0.0]), 2.0) == 0.0
+    assert math.isnan(clarity(np.full(5, 3.0), 1.0))
+    assert math.isnan(clarity(np.zeros(5), 0.0))
+    assert best_actions(np.array([0.0, 4.0, 3.0, -1.0, 4.0])) == [FORWARD, GIVE]
+    assert best_actions(np.zeros(5)) == [LEFT, FORWARD, RIGHT, PICK_UP, GIVE]
+
+
+def test_the_usual_spread() -> None:
+    """Worked by hand: the mean over states that can occur and whose values differ."""
+    table = random_policy()
+    assert usual_spread(table) == 0.0
+    table[parse_state("foraging E E E")] = (0.0, 4.0, 3.0, -1.0, 0.0)
+    table[parse_state("foraging E F E")] = (2.0, 2.0, 2.0, 3.0, 2.0)
+    table[parse_state("foraging F F F")] = 7.0
+    assert usual_spread(table) == pytest.approx((5 + 1) / 2)
+    unreachable = next(index for index in range(128) if index not in REACHABLE_STATES)
+    table[unreachable] = (100.0, 0.0, 0.0, 0.0, 0.0)
+    assert usual_spread(table) == pytest.approx(3.0)
+
+
+HARDLY_VISITED = [
+    (0.0, 0.0, 1.97e-5, 0.0, 0.0),
+    (2.6e-6, 0.0, 0.0, 0.0, 0.0),
+    (-0.002, 0.0, -0.001, -0.001, -0.001),  # the best is the one that was never tried
+]
+
+
+@pytest.mark.parametrize("values", HARDLY_VISITED)
+def test_a_hairline_is_no_clear_choice(values) -> None:
+    assert clarity(np.array(values), 0.4) < 0.01
+    assert hardly_learned(np.array(values), 0.4)
+    assert not hardly_learned(np.array(values), 100 * 2.5e-6)
+    table = random_policy()
+    table[parse_state("foraging E F E")] = (0.0, 0.0, 0.0, 0.8, 0.0)
+    blank = policy_sheet(table, complete=True)
+    place = parse_state("foraging O O O")
+    table[place] = values
+    hardly = policy_sheet(table, complete=True)
+    table[place] = (0.0, 0.8, 0.0, 0.0, 0.0)
+    learned = policy_sheet(table, complete=True)
+    # Neither as if never visited, nor with a bar and an arrow of full strength.
+    assert (hardly != blank).any()
+    assert not coloured(hardly, CHOSEN).any()
+    assert coloured(learned, CHOSEN).sum(axis=1).max() > 60
+
+
+def test_a_sheet_without_any_visited_state() -> None:
+    sheet = policy_sheet(random_policy())
+    assert sheet.shape[1] == 1280
+    assert policy_sheet(random_policy(), complete=True).shape[1] == 1920
+    assert sheet.dtype == np.uint8
+    assert not coloured(sheet, CHOSEN).any()
+
+
+def places(table: np.ndarray, blank: np.ndarray) -> list[int]:
+    """Left, right, top and bottom of what differs from another complete sheet, without counts."""
+    differs = (policy_sheet(table, complete=True) != blank).any(axis=2)
+    rows, columns = np.nonzero(differs[:, :1650])  # the counts stand at the right
+    return [columns.min(), columns.max(), rows.min(), rows.max()]
+
+
+def test_one_visited_state_has_a_bar_at_its_place() -> None:
+    blank = policy_sheet(random_policy(), complete=True)
+    found = {}
+    for name in ("foraging E E E", "foraging F E E", "foraging E E F", "foraging E F E"):
+        table = random_policy()
+        table[parse_state(name)] = (0.0, 4.0, 3.0, -1.0, 0.0)
+        left, right, top, bottom = places(table, blank)
+        assert right - left < 118
+        assert bottom - top < 118
+        bar = coloured(policy_sheet(table, complete=True), CHOSEN).sum(axis=1).max()
+        assert 10 <= bar < 30  # a fifth of about 84 pixels
+        found[name] = np.array([left + right, top + bottom]) / 2
+    # By the cell ahead, a row each, then by the one to the left, then by the one to the right.
+    first = found["foraging E E E"]
+    assert found["foraging E E F"] - first == pytest.approx([3 * 116, 0], abs=12)
+    assert found["foraging F E E"] - first == pytest.approx([12 * 116, 0], abs=12)
+    assert found["foraging E F E"][0] == pytest.approx(first[0], abs=12)
+    assert found["foraging E F E"][1] > first[1] + 300
+
+
+def test_all_reachable_states_are_on_the_complete_sheet() -> None:
+    """Each of the 100 states that is visited changes the sheet, each of the others does not."""
+    blank = policy_sheet(random_policy(), complete=True)
+    table = random_policy()
+    table[[index for index in range(128) if index not in REACHABLE_STATES]] = (1, 0, 0, 0, 0)
+    assert (policy_sheet(table, complete=True) == blank).all()
+    seen = set()
+    for index in REACHABLE_STATES[::9]:
+        table = random_policy()
+        table[index, GIVE] = 1
+        changed = (policy_sheet(table, complete=True) != blank).any(axis=2)
+        rows, columns = np.nonzero(changed[:, :1650] if changed[:, :1650].any() else changed)
+        seen.add((int(rows.min()) // 20, int(columns.min()) // 20))
+    assert len(seen) == len(REACHABLE_STATES[::9])
+
+
+def test_a_sheet_shows_what_was_learned_in_large_letters() -> None:
+    """Cropped to the states with a choice, so that it can be read at the width of a page."""
+    table = random_policy()
+    learned = REACHABLE_STATES[:30]
+    for index in learned:
+        table[index, RIGHT] = 1.0
+    sheet, complete = policy_sheet(table), policy_sheet(table, complete=True)
+
+    def bar(picture: np.ndarray) -> float:
+        """The length of a full bar as a share of the picture's width."""
+        runs = np.diff(np.flatnonzero(~coloured(picture, CHOSEN).reshape(-1))) - 1
+        return runs.max() / picture.shape[1]
+
+    assert bar(sheet) > 1.6 * bar(complete)
+    one = random_policy()
+    one[parse_state("foraging E F E"), PICK_UP] = 1.0
+    assert policy_sheet(one).shape[0] < sheet.shape[0]
+
+
+def test_text_on_a_sheet_says_what_it_shows(monkeypatch) -> None:
+    lines = []
+    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
+    table = random_policy()
+    table[parse_state("foraging E F E"), PICK_UP] = 1.0
+    policy_sheet(table, "a title")
+    assert lines[0] == "a title"
+    assert "1 of 64 states learned" in lines
+    assert "nothing was learned here" in lines  # with food
+    assert lines.count("pick up") == 1
+    assert max(map(len, lines)) < 125
+
+
+def test_sheets_that_are_refused() -> None:
+    for wrong in (np.zeros((5, 128)), np.zeros((128, 5), bool), np.full((128, 5), "a")):
+        with pytest.raises(AntsError, match="q_values"):
+            policy_sheet(wrong)
+    with pytest.raises(AntsError, match="finite numbers of shape"):
+        policy_sheet(np.full((128, 5), np.nan))
+    for width in (100, 5000, 1920.5, True):
+        with pytest.raises(AntsError, match="width"):
+            policy_sheet(random_policy(), width=width)
+
+
+def colony(ants: int = 30) -> Colony:
+    made = Colony(open_world(3), ColonyConfig(ants=ants), CONFIG, 0, "fixed", trail_follower())
+    made.begin_episode()
+    return made
+
+
+def test_a_colony_on_the_move(tmp_path) -> None:
+    frames = list(colony_frames(colony(), 7, (200, 150), every=3))
+    assert len(frames) == 4
+    assert not any((a == b).all() for a, b in itertools.pairwise(frames))
+    other = colony()
+    other.tick(7)
+    assert (colony_picture(other, (200, 150)) == frames[-1]).all()
+    render_colony(tmp_path / "a.gif", colony(), 6, (200, 150), every=2, fps=10)
+    with Image.open(tmp_path / "a.gif") as image:
+        assert image.n_frames == 4
+    for wrong in ({"every": 0}, {"ticks": 0}):
+        with pytest.raises(AntsError, match="at least 1"):
+            list(colony_frames(colony(), **{"ticks": 5, **wrong}))
+
+
+def test_the_snapshot_of_a_colony_is_drawn_where_its_ants_are() -> None:
+    moment = colony(12).snapshot()
+    snapshot = Snapshot.of(moment)
+    assert Snapshot.of(snapshot) is snapshot
+    assert (snapshot.ant_cells == moment.ant_cells).all()
+    assert len(snapshot.ant_cells) == 12

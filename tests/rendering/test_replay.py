@@ -1,0 +1,114 @@
+"""The replay of a rollout equals the reference's world at every step."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from random_worlds import random_world
+
+from taichi_ants import AntsError, World, reference, rollout
+from taichi_ants.grid.constants import STREAM_ROLLOUT
+from taichi_ants.grid.hexgrid import normal_form
+from taichi_ants.learners.policies import random_policy, trail_follower
+from taichi_ants.rendering import Episode, episode_frames, episode_picture
+from taichi_ants.rendering.replay import Replay
+from taichi_ants.worlds import paper
+
+
+def pantry() -> World:
+    """Foods side by side, so that an ant has to choose which one to take."""
+    return World(
+        ranges=(6, 6, 6),
+        queen=(0, 0, 0),
+        foods=[(1, 4, 0)] + [(x, y, 0) for x in range(2, 6) for y in range(2, 6)],
+        trails=[((0, 1, 0), 3)],
+        ants=[((1, 3, 0), 1)],
+    )
+
+
+def check(world: World, seed: int, number: int, evaporation: bool, epsilon: float) -> int:
+    """Compare step by step; the number of choices among several foods."""
+    table = trail_follower()
+    trace = rollout(world, table, seed, number, 120, evaporation, epsilon)
+    snapshots = list(Replay(world, trace, seed, number, evaporation).snapshots())
+    assert len(snapshots) == len(trace) + 1
+
+    state = reference.WorldState(world, evaporation)
+    ant = reference.Ant(*reference.start(world, seed)[0])
+    stream = reference.RandomStream(reference.stream_state(seed, STREAM_ROLLOUT, number))
+    existing = reference.existing_cells(state.ranges)
+    index = world.grid.index(np.array(list(existing)))
+    choices = 0
+    for step, snapshot in enumerate(snapshots):
+        seen = reference.observe(state, ant)
+        assert snapshot.ground[index].tolist() == [state.content(cell) for cell in existing]
+        assert snapshot.trail[index].tolist() == [state.level(cell) for cell in existing]
+        assert snapshot.ant_cells[0] == world.grid.index(normal_form(ant.cell))
+        assert snapshot.ant_headings[0] == ant.heading
+        assert snapshot.ant_carries[0] == ant.carries
+        letters = "EOSQ" if ant.carries else "EOTF"
+        assert snapshot.letters == "".join(letters[seen >> shift & 3] for shift in (4, 2, 0))
+        if step == len(trace):
+            break
+        action = reference.choose_action([list(row) for row in table][seen], epsilon, stream)
+        assert action == trace.actions[step]
+        before = stream.state
+        reference.act(state, ant, seen, action, stream)
+        choices += stream.state != before
+        state.tick()
+    return choices
+
+
+@pytest.mark.parametrize("evaporation", [True, False])
+def test_the_paper_world(evaporation) -> None:
+    check(paper(), 0, 0, evaporation, 0.0)
+    check(paper(), 1, 2, evaporation, 0.6)
+
+
+def test_several_foods_in_view() -> None:
+    choices = [check(pantry(), seed, seed % 3, True, 0.3) for seed in range(8)]
+    assert sum(choices) >= 4
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_worlds(seed) -> None:
+    check(random_world(seed), seed, seed % 4, bool(seed % 2), 0.4)
+
+
+def test_what_the_head_up_lines_say() -> None:
+    episode = Episode.play(paper(), trail_follower())
+    statuses = [status for _, status in episode.moments()]
+    assert len(statuses) == len(episode) == 35
+    assert statuses[0].episode_return == 0
+    assert [status.step for status in statuses] == list(range(35))
+    assert statuses[-1].episode_return == 45
+    assert statuses[-1].outcome == "delivered"
+    assert episode.delivered
+    assert {status.outcome for status in statuses[:-1]} == {""}
+    gained = np.diff([status.episode_return for status in statuses])
+    assert (gained == episode.trace.rewards).all()
+    lost = Episode.play(paper(), random_policy(), max_steps=5)
+    assert not lost.delivered
+    assert [status.outcome for _, status in lost.moments()][-1] == "step limit"
+    begun = replace(lost, whole=False)
+    assert [status.outcome for _, status in begun.moments()][-1] == ""
+
+
+def test_a_picture_of_one_step_is_that_frame() -> None:
+    episode = Episode.play(pantry(), trail_follower(), max_steps=12)
+    last = len(episode) - 1
+    frames = list(episode_frames(episode, (400, 330)))
+    for step in (0, 1, last):
+        assert (episode_picture(episode, step, (400, 330)) == frames[step]).all()
+    assert not (frames[0] == frames[1]).all()
+    with pytest.raises(AntsError, match="step"):
+        episode_picture(episode, last + 1, (400, 330))
+
+
+def test_snapshots_do_not_share_their_arrays() -> None:
+    episode = Episode.play(paper(), trail_follower())
+    snapshots = [snapshot for snapshot, _ in episode.moments()]
+    assert (snapshots[0].ground == paper().ground()).all()
+    assert not (snapshots[-1].ground == paper().ground()).all()

@@ -1,0 +1,356 @@
+"""What the command lines share: arguments, exits, plugins, progress."""
+
+from __future__ import annotations
+
+import io
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+import time
+
+import pytest
+
+from taichi_ants.errors import AntsError
+from taichi_ants.studies import command_line
+from taichi_ants.studies.command_line import (
+    ListAction,
+    Parser,
+    load_plugin,
+    number,
+    process_beside,
+    progress_bar,
+    run_command,
+    whole_number,
+)
+
+
+@pytest.fixture
+def parser():
+    parser = Parser("Does something.")
+    parser.add_argument("--size", type=whole_number(1, 9), default=3, help="how large")
+    parser.add_argument("--seed", type=whole_number(), default=0, help="the first")
+    parser.add_argument("--count", type=whole_number(2), help="how many")
+    lists = {"action": ListAction, "metavar": "X"}
+    parser.add_argument("--rates", **lists, item=number, default=(0.1, 2.0), help="how fast")
+    parser.add_argument("--names", **lists, default=("a",), help="whose")
+    parser.add_argument("--loud", action="store_true", help="whether")
+    return parser
+
+
+def refused(parser, arguments, capsys):
+    with pytest.raises(SystemExit) as end:
+        parser.parse_args(arguments)
+    assert end.value.code == 2
+    return capsys.readouterr().err
+
+
+def test_values_and_defaults(parser):
+    arguments = ["--size", "9", "--seed", "-4", "--count", "2", "--rates", "1", "2,3", "--loud"]
+    parsed = vars(parser.parse_args(arguments))
+    assert parsed == {
+        **{"size": 9, "seed": -4, "count": 2, "rates": (1.0, 2.0, 3.0), "names": ("a",)},
+        "loud": True,
+    }
+    parsed = vars(parser.parse_args([]))
+    assert parsed == {
+        **{"size": 3, "seed": 0, "count": None, "rates": (0.1, 2.0), "names": ("a",)},
+        "loud": False,
+    }
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (["a,b"], ("a", "b")),
+        (["a", "b"], ("a", "b")),
+        (["b,", ",a"], ("b", "a")),
+        (["b", "a", "b"], ("b", "a")),
+        (["a b"], ("a b",)),
+    ],
+)
+def test_lists(text, expected, parser):
+    assert parser.parse_args(["--names", *text]).names == expected
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["--size", "0"], "--size: 0 is not allowed, it must be from 1 to 9"),
+        (["--size", "10"], "--size: 10 is not allowed, it must be from 1 to 9"),
+        (["--size", "2.5"], "--size: '2.5' is not a whole number"),
+        (["--count", "1"], "--count: 1 is not allowed, it must be at least 2"),
+        (["--rates", "1", "x"], "--rates: 'x' is not a number"),
+        (["--rates", ","], "--rates: the list is empty, give at least one value"),
+        (["--names"], "--names: expected at least one argument"),
+        (["--siz", "3"], "unrecognized arguments: --siz 3"),
+        (["a\nb"], "unrecognized arguments: a b"),
+    ],
+)
+def test_mistakes_are_one_sentence(arguments, sentence, parser, capsys):
+    assert refused(parser, arguments, capsys) == f"error: {sentence}; see --help.\n"
+
+
+def test_help_shows_the_defaults_that_say_something(parser, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")
+    lines = [" ".join(line.split()) for line in parser.format_help().splitlines()]
+    assert "--size SIZE how large (default: 3)" in lines
+    assert "--seed SEED the first (default: 0)" in lines
+    assert "--count COUNT how many" in lines
+    assert "--rates X [X ...] how fast (default: 0.1 2.0)" in lines
+    assert "--loud whether" in lines
+
+
+def fail_with(error):
+    def command():
+        print("before")
+        raise error
+
+    return command
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "says"),
+    [
+        (AntsError("the world is flat."), 2, "error: the world is flat.\n"),
+        (AntsError("one\ntwo."), 2, "error: one two.\n"),
+        (
+            MemoryError(),
+            2,
+            "error: this needs more memory than there is; ask for less at once.\n",
+        ),
+        (KeyboardInterrupt(), 130, "Halted.\n"),
+        (BrokenPipeError(32, "Broken pipe"), 0, ""),
+        (
+            FileNotFoundError(2, "No such file or directory", "x.txt"),
+            2,
+            "error: cannot read or write 'x.txt': No such file or directory.\n",
+        ),
+        (
+            OSError(28, "No space left"),
+            2,
+            "error: cannot read or write the output: No space left.\n",
+        ),
+    ],
+)
+def test_how_commands_end(error, status, says, capsys):
+    with pytest.raises(SystemExit) as end:
+        run_command(fail_with(error), "Halted.")
+    assert end.value.code == status
+    assert capsys.readouterr() == ("before\n", says)
+
+
+def test_a_command_that_succeeds(capsys):
+    with pytest.raises(SystemExit) as end:
+        run_command(lambda: print("done"))
+    assert end.value.code == 0
+    assert capsys.readouterr() == ("done\n", "")
+
+
+def test_mistakes_of_ours_are_not_hidden():
+    with pytest.raises(ZeroDivisionError):
+        run_command(lambda: 1 / 0)
+
+
+def test_without_standard_streams(monkeypatch):
+    """The caller has closed them: `>&- 2>&-`."""
+    monkeypatch.setattr(sys, "stdout", None)
+    monkeypatch.setattr(sys, "stderr", None)
+    for command, status in ((lambda: print("x"), 0), (fail_with(AntsError("no.")), 2)):
+        with pytest.raises(SystemExit) as end:
+            run_command(command)
+        assert end.value.code == status
+    with progress_bar("title") as progress:
+        progress(0.5)
+
+
+def test_characters_that_the_terminal_lacks(monkeypatch):
+    output = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    monkeypatch.setattr(sys, "stdout", output)
+    with pytest.raises(SystemExit) as end:
+        run_command(lambda: print("a─b"))
+    assert end.value.code == 0
+    assert output.buffer.getvalue() == b"a?b\n"
+
+
+def test_an_interruption_that_a_library_swallows_is_found_later(capsys):
+    steps = []
+
+    def command():
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except BaseException:
+            steps.append("swallowed")
+        with progress_bar("title") as progress:
+            progress(0.1)
+            steps.append("not reached")
+
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(SystemExit) as end:
+        run_command(command)
+    assert end.value.code == 130
+    assert capsys.readouterr().err == "Stopped.\n"
+    assert steps == ["swallowed"]
+    assert signal.getsignal(signal.SIGINT) is before
+
+    with pytest.raises(SystemExit) as end:  # the next command starts afresh
+        run_command(lambda: progress_bar("title").__enter__()(0.1))
+    assert end.value.code == 0
+
+
+def test_commands_run_in_other_threads_too():
+    """Where Python lets nobody watch signals."""
+    statuses = []
+
+    def work():
+        try:
+            run_command(lambda: None)
+        except SystemExit as end:
+            statuses.append(end.code)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert statuses == [0]
+
+
+def leave_a_note(path):
+    path.write_text("done")
+
+
+def complain(text):
+    raise AntsError(text)
+
+
+def die():
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def sleep_for_long(path):
+    path.write_text("asleep")
+    time.sleep(60)
+
+
+def test_work_in_a_process_beside(tmp_path, capfd):
+    with process_beside(leave_a_note, tmp_path / "note"):
+        pass
+    assert (tmp_path / "note").read_text() == "done"
+
+    with pytest.raises(SystemExit) as end, process_beside(complain, "it is dark."):
+        pass
+    assert end.value.code == 2
+    assert capfd.readouterr().err == "error: it is dark.\n"
+
+    with pytest.raises(AntsError, match="stopped a process"), process_beside(die):
+        pass
+
+
+def write_for_long(path):
+    for _ in range(6000):
+        with open(path, "a") as file:
+            file.write(".")
+        time.sleep(0.01)
+
+
+def hold_a_process_beside(path):
+    with process_beside(write_for_long, path):
+        pass
+
+
+def test_a_process_beside_does_not_outlive_a_killed_parent(tmp_path):
+    note = tmp_path / "note"
+    parent = multiprocessing.get_context("spawn").Process(
+        target=hold_a_process_beside, args=(note,)
+    )
+    parent.start()
+    while not note.exists():
+        time.sleep(0.002)
+    parent.kill()
+    parent.join()
+    lengths = []
+    while len(lengths) < 2 or lengths[-1] > lengths[-2]:
+        assert len(lengths) < 20
+        lengths.append(note.stat().st_size)
+        time.sleep(0.5)
+
+
+def test_a_process_beside_does_not_outlive_an_interruption(tmp_path):
+    def command():
+        with process_beside(sleep_for_long, tmp_path / "note"):
+            while not (tmp_path / "note").exists():
+                time.sleep(0.002)
+            raise KeyboardInterrupt
+
+    began = time.perf_counter()
+    with pytest.raises(KeyboardInterrupt):
+        command()
+    assert time.perf_counter() - began < 30
+    assert multiprocessing.active_children() == []
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def test_progress_is_drawn_on_terminals_only(monkeypatch, capsys):
+    with progress_bar("training") as progress:
+        progress(0.5)
+    assert capsys.readouterr() == ("", "")
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "80")
+    with progress_bar("training") as progress:
+        progress(0.25)
+    assert "training" in terminal.getvalue()
+    assert "25 %" in terminal.getvalue()
+
+
+def test_plugins_are_executed(tmp_path, monkeypatch):
+    monkeypatch.setattr(command_line, "seen_by_plugin", [], raising=False)
+    file = tmp_path / "own file.py"
+    file.write_text(
+        "from taichi_ants.studies import command_line\n"
+        "def f(): pass\n"
+        "command_line.seen_by_plugin.append((__name__, __file__))\n"
+    )
+    load_plugin(str(file))
+    assert command_line.seen_by_plugin == [("plugin_own file", str(file))]
+    assert "def f()" in sys.modules["plugin_own file"].__loader__.get_source("plugin_own file")
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("1 / 0", "ZeroDivisionError: division by zero"),
+        ("(", "SyntaxError"),
+        ("raise SystemExit(0)", "SystemExit"),
+        ("import nosuchmodule", "nosuchmodule"),
+        ("raise ValueError('a\\nb')", "ValueError: a b"),
+    ],
+)
+def test_plugins_that_fail(text, says, tmp_path):
+    file = tmp_path / "own.py"
+    file.write_text(text)
+    with pytest.raises(AntsError, match=r"own\.py") as caught:
+        load_plugin(str(file))
+    assert says in str(caught.value)
+
+
+def test_what_a_plugin_says_itself_is_passed_on(tmp_path):
+    file = tmp_path / "own.py"
+    file.write_text("from taichi_ants import AntsError\nraise AntsError('no such thing.')")
+    with pytest.raises(AntsError, match=r"^no such thing\.$"):
+        load_plugin(str(file))
+
+
+@pytest.mark.parametrize("name", ["missing.py", "folder.py", "text.txt", "a\0b.py", ""])
+def test_what_is_no_plugin(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder.py").mkdir()
+    (tmp_path / "text.txt").write_text("x = 1")
+    with pytest.raises(AntsError, match="cannot read the plugin"):
+        load_plugin(name)

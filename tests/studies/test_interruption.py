@@ -1,0 +1,172 @@
+"""Signals that end a command, whatever it is doing."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import threading
+import weakref
+
+import pytest
+from command_lines import EXPERIMENTS, ROOT, environment
+
+from taichi_ants.studies.interruption import held, stop_if_noted, stoppable
+
+
+def stopped_by(number, work):
+    """The exit status of work that a signal stops."""
+    before = signal.getsignal(number), sys.unraisablehook
+    with pytest.raises(SystemExit) as end, stoppable("Halted."):
+        work()
+    assert (signal.getsignal(number), sys.unraisablehook) == before
+    with stoppable():  # the next one starts afresh
+        stop_if_noted()
+    return end.value.code
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_ends_the_work_with_a_line(number, status, capsys):
+    assert stopped_by(number, lambda: signal.raise_signal(number)) == status
+    assert capsys.readouterr() == ("", "Halted.\n")
+
+
+def test_an_error_that_a_library_makes_of_it_is_still_it(capsys):
+    """As an import of a C extension does: "ImportError: initialization failed"."""
+
+    def work():
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            raise ImportError("initialization failed") from None
+
+    assert stopped_by(signal.SIGINT, work) == 130
+    assert capsys.readouterr().err == "Halted.\n"
+
+
+class Thing:
+    pass
+
+
+def test_in_a_callback_it_is_noted_without_a_traceback(capsys):
+    def work():
+        thing = Thing()
+        reference = weakref.ref(thing, lambda _: signal.raise_signal(signal.SIGINT))
+        del thing
+        assert reference() is None
+        stop_if_noted()
+
+    assert stopped_by(signal.SIGINT, work) == 130
+    assert capsys.readouterr().err == "Halted.\n"
+
+
+def test_other_errors_in_callbacks_are_told(capsys):
+    with stoppable():
+        thing = Thing()
+        reference = weakref.ref(thing, lambda _: 1 / 0)
+        del thing
+        assert reference() is None
+    assert "ZeroDivisionError" in capsys.readouterr().err
+
+
+def test_what_is_held_is_done_first():
+    steps = []
+
+    def work():
+        with held():
+            with held():
+                signal.raise_signal(signal.SIGTERM)
+                steps.append("inner")
+            steps.append("outer")
+        steps.append("not reached")
+
+    assert stopped_by(signal.SIGTERM, work) == 143
+    assert steps == ["inner", "outer"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_what_is_ignored_on_purpose_stays_ignored(number):
+    """As of `nohup`, or of a shell for its background processes."""
+    before = signal.signal(number, signal.SIG_IGN)
+    try:
+        with stoppable():
+            signal.raise_signal(number)
+            stop_if_noted()
+    finally:
+        signal.signal(number, before)
+
+
+def test_what_is_inside_another_leaves_the_end_to_it(capsys):
+    def work():
+        with stoppable("Inner."):
+            pass
+        signal.raise_signal(signal.SIGINT)
+
+    assert stopped_by(signal.SIGINT, work) == 130
+    assert capsys.readouterr().err == "Halted.\n"
+
+
+def test_in_other_threads_it_does_nothing():
+    done = []
+
+    def work():
+        with stoppable():
+            done.append(True)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert done == [True]
+
+
+SCRIPT = """
+import runpy, signal, sys
+
+class Interrupting:
+    def find_spec(self, name, path=None, target=None):
+        if name == {module!r}:
+            signal.raise_signal(signal.SIGINT)
+
+sys.meta_path.insert(0, Interrupting())
+sys.argv = {arguments!r}
+{start}
+"""
+STARTS = {
+    "script": f"runpy.run_path({str(EXPERIMENTS / 'compare.py')!r}, run_name='__main__')",
+    "module": "runpy.run_module('taichi_ants', run_name='__main__', alter_sys=True)",
+}
+
+
+@pytest.mark.parametrize("start", STARTS)
+@pytest.mark.parametrize("module", ["argparse", "numpy", "taichi._lib.core.taichi_python"])
+def test_while_a_command_is_imported(module, start, tmp_path):
+    arguments = ["compare.py"] if start == "script" else ["taichi-ants", "compare"]
+    script = SCRIPT.format(module=module, arguments=arguments, start=STARTS[start])
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        cwd=tmp_path,
+        env=environment(tmp_path),
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert (done.returncode, done.stdout) == (130, "")
+    assert done.stderr.startswith("Stopped")
+    assert done.stderr.count("\n") == 1
+    assert not (tmp_path / "results").exists()
+
+
+def test_little_is_imported_before_a_command_can_be_stopped(tmp_path):
+    script = (
+        "import sys, taichi_ants.commands\n"
+        "print({'argparse', 'multiprocessing', 'tempfile'} & set(sys.modules))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-S", "-c", script],
+        cwd=ROOT,
+        env=environment(tmp_path),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout == "set()\n"

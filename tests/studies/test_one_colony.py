@@ -1,0 +1,156 @@
+"""One colony that lives for a while: its files, what stops it, what it says."""
+
+from __future__ import annotations
+
+import os
+import signal
+
+import numpy as np
+import pytest
+
+from taichi_ants import AntsError, Colony, ColonyConfig, TrainingConfig, worlds
+from taichi_ants.engines.colony import arrays as names
+from taichi_ants.learners.policies import trail_follower
+from taichi_ants.rendering import writers
+from taichi_ants.studies.one_colony import (
+    Outputs,
+    Pace,
+    let_time_pass,
+    live,
+    stop_requests,
+    summary,
+)
+
+TRAINING = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0, 0.1, delivery="continuing")
+
+
+def begun(**options: object) -> Colony:
+    colony = Colony(worlds.paper(), ColonyConfig(**{"ants": 3, **options}), TRAINING, 4)
+    colony.begin_episode()
+    return colony
+
+
+@pytest.mark.parametrize(
+    ("render", "writer", "ticks"), [("a.gif", ".gif", 6), ("frames", "", 6), ("a.png", "", 20)]
+)
+@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), RuntimeError("odd")])
+def test_a_colony_is_saved_although_its_picture_cannot_be(
+    tmp_path, monkeypatch, render, writer, ticks, error
+) -> None:
+    def failing(file, frames, *settings, **options) -> None:
+        if writer:
+            for _, _ in zip(range(4), frames, strict=False):  # at the start and after 2, 4, 6 ticks
+                pass
+        raise error
+
+    if writer:
+        monkeypatch.setitem(writers._ANIMATIONS, writer, failing)
+    else:
+        pictures = []
+
+        def fourth(file, frame, **options) -> None:
+            pictures.append(frame)
+            if len(pictures) == 4 or render == "a.png":
+                raise error
+
+        monkeypatch.setattr(writers, "_write_png", fourth)
+    colony = begun()
+    outputs = Outputs(str(tmp_path / "keep.npz"), str(tmp_path / render), every=2)
+    expected = AntsError if isinstance(error, OSError) else RuntimeError
+    with pytest.raises(expected) as caught:
+        live(colony, 20, outputs, lambda share: None)
+    if expected is AntsError:
+        text = str(caught.value)
+        assert "o space left on device" in text
+        assert text.endswith(f"; the colony is saved in {outputs.save!r}, at tick {ticks}.")
+    assert os.listdir(tmp_path) == ["keep.npz"]
+    other = begun()
+    other.tick(ticks)
+    saved = Colony.load(outputs.save)
+    assert saved.ticks == ticks
+    np.testing.assert_array_equal(saved.arrays["ants"], other.arrays["ants"])
+    np.testing.assert_array_equal(saved.q_values, other.q_values)
+
+
+def test_the_colony_and_its_picture_need_two_places(tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for render in ("x.gif", str(tmp_path / "x.gif"), "sub/../x.gif"):
+        with pytest.raises(AntsError, match=r"'x.gif' and .* are one place"):
+            Outputs("x.gif", render).check()
+    Outputs("x.npz", "x.gif").check()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_asks_for_an_end_and_a_second_one_ends(number) -> None:
+    before = signal.getsignal(number)
+    with stop_requests() as stop:
+        assert stop() == 0
+        os.kill(os.getpid(), number)
+        assert stop() == number
+        with pytest.raises((KeyboardInterrupt, SystemExit)) as caught:
+            os.kill(os.getpid(), number)
+        if number == signal.SIGTERM:
+            assert caught.value.code == 143
+    assert signal.getsignal(number) is before
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_that_is_ignored_stays_ignored(number) -> None:
+    before = signal.signal(number, signal.SIG_IGN)
+    try:
+        with stop_requests() as stop:
+            assert signal.getsignal(number) is signal.SIG_IGN
+            os.kill(os.getpid(), number)
+            assert stop() == 0
+    finally:
+        signal.signal(number, before)
+
+
+def test_a_stopped_colony_says_by_which_signal(tmp_path) -> None:
+    def progress(share: float) -> None:
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    colony = begun()
+    outputs = Outputs(str(tmp_path / "keep.npz"), str(tmp_path / "a.gif"), every=2)
+    pace, number = live(colony, 10, outputs, progress)
+    assert (pace.ticks, number) == (2, signal.SIGTERM)
+    assert Colony.load(outputs.save).ticks == 2
+    assert (tmp_path / "a.gif").exists()
+
+
+def test_the_summary_counts_in_words() -> None:
+    def summed(**counts: int) -> str:
+        colony = begun(ants=1)
+        colony.tick(1)
+        rows = {"deliveries": names.DELIVERIES, "births": names.BORN, "deaths": names.DIED}
+        for name, count in counts.items():
+            colony.arrays["worlds"][rows[name]] = count
+        return summary(colony, Pace(ticks=1))
+
+    one, two = summed(deliveries=1, births=1), summed(deliveries=2, births=2, deaths=1)
+    assert one.startswith("1 ant, 1 tick: ")
+    assert "\n1 delivery by tick 1, " in one
+    assert one.endswith(" % of the moves blocked, 1 birth.")
+    assert "\n2 deliveries by tick 1, " in two
+    assert two.endswith(" % of the moves blocked, 2 births, 1 death.")
+
+
+def test_the_summary_says_when_all_places_are_taken() -> None:
+    def lived(**options: object) -> str:
+        config = ColonyConfig(**{"ants": 8, "regrowth": 0, **options})
+        training = TrainingConfig("sarsa", 0.1, 0.9, 0.0, 1.0, 0.0)
+        colony = Colony(worlds.paper(), config, training, 4, "fixed", trail_follower())
+        colony.begin_episode()
+        pace = Pace()
+        for _ in let_time_pass(colony, 400, pace, lambda: 0):
+            pass
+        return summary(colony, pace), colony
+
+    text, colony = lived(births=True, capacity=9)
+    waiting = colony.outcome().deliveries.sum() - 1
+    assert colony.waiting_foods == waiting > 1
+    assert text.endswith(
+        f"\n9 of 9 places are taken, {waiting} foods wait at the queen; --capacity gives more."
+    )
+    assert "places" not in lived(births=True, capacity=5000)[0]
+    assert "places" not in lived()[0]

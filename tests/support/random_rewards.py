@@ -1,0 +1,31 @@
+"""Tables of rewards drawn at random, put in force for a test."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from taichi_ants.task import rewards
+from taichi_ants.task.rewards import MOST, Rewards
+
+# Tables in which something that is recognised by its reward would be mistaken.
+TELLING = (
+    Rewards(pick_up=10),
+    Rewards(failed=10, empty=10, lure=10),
+    Rewards(give=0),
+    Rewards(lure=7, empty=-3),
+    Rewards(*[MOST] * 5),
+    Rewards(*[-MOST] * 5),
+)
+
+
+def random_rewards(seed: int) -> Rewards:
+    """The paper's rewards, one of those above, or any whole numbers from -1000 to 1000."""
+    rng = np.random.default_rng([seed, 5])
+    drawn = Rewards(*rng.integers(-MOST, MOST + 1, 5).tolist())
+    return (Rewards(), TELLING[seed % len(TELLING)], drawn)[rng.integers(3)]
+
+
+def put_in_force(monkeypatch: pytest.MonkeyPatch, table: Rewards) -> None:
+    """Let kernels and reference alike pay by a table."""
+    monkeypatch.setattr(rewards, "REWARDS", table)

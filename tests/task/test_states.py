@@ -1,0 +1,109 @@
+"""State indices, names and the reachable states, worked by hand."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from taichi_ants.errors import AntsError
+from taichi_ants.task.constants import N_STATES
+from taichi_ants.task.states import (
+    REACHABLE_STATES,
+    State,
+    parse_state,
+    state_from_index,
+    state_index,
+    state_name,
+)
+
+
+@pytest.mark.parametrize(
+    ("state", "index", "name"),
+    [
+        (State(False, 0, 0, 0), 0, "foraging E E E"),
+        (State(False, 0, 2, 1), 9, "foraging E T O"),
+        (State(False, 3, 1, 2), 54, "foraging F O T"),
+        (State(False, 3, 3, 3), 63, "foraging F F F"),
+        (State(True, 0, 0, 0), 64, "carrying E E E"),
+        (State(True, 2, 3, 1), 109, "carrying S Q O"),
+        (State(True, 1, 1, 1), 85, "carrying O O O"),
+        (State(True, 3, 3, 3), 127, "carrying Q Q Q"),
+    ],
+)
+def test_index_and_name_of_a_state(state: State, index: int, name: str) -> None:
+    assert state_index(state.carries, *state.view) == index
+    assert state_from_index(index) == state
+    assert state_name(index) == name
+    assert parse_state(name) == index
+
+
+@given(st.integers(0, N_STATES - 1))
+def test_every_index_comes_back_from_its_state_and_its_name(index: int) -> None:
+    state = state_from_index(index)
+    assert state_index(state.carries, state.left, state.forward, state.right) == index
+    assert parse_state(state_name(index)) == index
+
+
+def test_names_are_unique() -> None:
+    assert len({state_name(index) for index in range(N_STATES)}) == N_STATES
+
+
+def test_parsing_ignores_case_and_spacing() -> None:
+    assert parse_state("  Foraging  e t O ") == 9
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "",
+        "foraging",
+        "foraging E T",
+        "foraging E T O O",
+        "foraging ETO",
+        "foraging E S O",
+        "carrying E T O",
+        "carrying E X O",
+        "resting E E E",
+        "foraging EO O O",
+    ],
+)
+def test_what_is_no_name_is_refused(name: str) -> None:
+    with pytest.raises(AntsError, match="is not a state") as raised:
+        parse_state(name)
+    assert repr(name) in str(raised.value)
+
+
+@pytest.mark.parametrize("index", [-1, 128, 1.5])
+def test_an_index_out_of_range_is_refused(index: float) -> None:
+    with pytest.raises(AntsError, match="from 0 to 127"):
+        state_from_index(index)
+
+
+@pytest.mark.parametrize("codes", [(4, 0, 0), (0, -1, 0), (0, 0, 7)])
+def test_a_code_out_of_range_is_refused(codes: tuple[int, int, int]) -> None:
+    with pytest.raises(AntsError, match="must be 0, 1, 2 or 3"):
+        state_index(False, *codes)
+
+
+def test_the_reachable_states_are_those_that_the_paper_counts() -> None:
+    views = {state_name(index) for index in REACHABLE_STATES}
+    foraging = {name for name in views if name.startswith("foraging")}
+    carrying = views - foraging
+    with_queen = {name for name in carrying if "Q" in name}
+    assert (len(foraging), len(carrying - with_queen), len(with_queen)) == (64, 24, 12)
+    # Section 1.5.2: without the queen only these three of 27 are missing.
+    letters = [f"carrying {a} {b} {c}" for a in "EOS" for b in "EOS" for c in "EOS"]
+    missing = {"carrying S E S", "carrying S O S", "carrying S S S"}
+    assert set(letters) - carrying == missing
+    # With the queen in one place, the other two are E or O.
+    pairs = [(a, b) for a in "EO" for b in "EO"]
+    expected = {f"carrying Q {a} {b}" for a, b in pairs}
+    expected |= {f"carrying {a} Q {b}" for a, b in pairs}
+    expected |= {f"carrying {a} {b} Q" for a, b in pairs}
+    assert with_queen == expected
+
+
+def test_the_reachable_states_are_ascending() -> None:
+    assert list(REACHABLE_STATES) == sorted(set(REACHABLE_STATES))
+    assert isinstance(REACHABLE_STATES, tuple)

@@ -1,0 +1,175 @@
+"""The shape of the house: who imports whom, who starts Taichi, and how long files are."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import subprocess
+import sys
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+from command_lines import ROOT, environment
+
+import taichi_ants
+
+# From the ground up: a part imports parts of lower layers only. What is not listed is on top.
+LAYERS = (
+    {"errors", "environment"},
+    {"files", "grid"},
+    {"task"},
+    {"runtime", "worlds", "learners"},
+    {"checks"},
+    {"engines", "reference"},
+    {"analysis", "rendering", "envs"},
+    {"studies"},
+)
+TOP = len(LAYERS)
+# Kernels live in these; runtime starts Taichi.
+PARTS_WITH_TAICHI = {"task", "learners", "engines", "rendering", "envs", "runtime"}
+
+FILES = sorted([*(ROOT / "taichi_ants").rglob("*.py"), *(ROOT / "experiments").rglob("*.py")])
+PACKAGE = [path for path in FILES if "taichi_ants" in path.relative_to(ROOT).parts]
+EXPERIMENTS = [path for path in FILES if path not in PACKAGE or "commands" in path.parts]
+
+
+def name(path: Path) -> str:
+    return str(path.relative_to(ROOT))
+
+
+@cache
+def tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def imported(path: Path, types_too: bool = False) -> Iterator[str]:
+    """The full names of what a file imports; without what only type checkers see."""
+    for node in _running(tree(path), types_too):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{name(path)} imports relatively"
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def _running(node: ast.AST, types_too: bool) -> Iterator[ast.AST]:
+    yield node
+    for child in ast.iter_child_nodes(node):
+        only_types = isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING"
+        if types_too or not only_types:
+            yield from _running(child, types_too)
+
+
+def part_of(module: str) -> str:
+    """The part of the package to which a module, or a name in it, belongs."""
+    pieces = module.split(".")
+    return pieces[1] if len(pieces) > 1 else ""
+
+
+def layer(part: str) -> int:
+    return next((number for number, parts in enumerate(LAYERS) if part in parts), TOP)
+
+
+def test_there_is_something_to_check():
+    assert len(PACKAGE) > 60
+    assert len(EXPERIMENTS) >= 2
+    parts = {part_of(".".join(path.relative_to(ROOT).with_suffix("").parts)) for path in PACKAGE}
+    assert {"engines", "analysis", "worlds", "task", "learners", "grid"} <= parts
+
+
+@pytest.mark.parametrize("path", PACKAGE, ids=name)
+def test_imports_point_one_way(path):
+    own = part_of(".".join(path.relative_to(ROOT).with_suffix("").parts))
+    if own == "__init__":  # the package itself names all of its parts
+        return
+    for module in imported(path):
+        if not module.startswith("taichi_ants."):
+            continue
+        other = part_of(module)
+        if other in (own, "__version__"):
+            continue
+        assert layer(other) < layer(own) or layer(own) == TOP, f"{name(path)} imports {module}"
+
+
+@pytest.mark.parametrize("path", PACKAGE, ids=name)
+def test_only_parts_with_kernels_import_taichi(path):
+    own = part_of(".".join(path.relative_to(ROOT).with_suffix("").parts))
+    if own not in PARTS_WITH_TAICHI:
+        for module in imported(path):
+            assert module.split(".")[0] != "taichi", name(path)
+
+
+@pytest.mark.parametrize("path", FILES, ids=name)
+def test_taichi_is_started_in_one_place(path):
+    starts = [
+        ast.unparse(node)
+        for node in ast.walk(tree(path))
+        if isinstance(node, ast.Attribute) and ast.unparse(node) in ("ti.init", "taichi.init")
+    ]
+    starts += [module for module in imported(path) if module == "taichi.init"]
+    assert bool(starts) == (name(path) == "taichi_ants/runtime.py")
+
+
+def test_analysis_runs_without_taichi(tmp_path):
+    """All of its modules, and what they import in turn."""
+    modules = [
+        ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+        for path in PACKAGE
+        if "analysis" in path.parts
+    ]
+    assert len(modules) > 10
+    others = ["taichi_ants.worlds", "taichi_ants.reference", "taichi_ants.task.states"]
+    script = "\n".join(f"import {module}" for module in [*modules, *others])
+    script += "\nimport sys\nassert 'taichi' not in sys.modules"
+    done = subprocess.run(
+        [sys.executable, "-c", script], env=environment(tmp_path), capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("path", EXPERIMENTS, ids=name)
+def test_experiments_use_public_names_only(path):
+    every = imported(path, types_too=True)
+    modules = [module for module in every if module.startswith("taichi_ants")]
+    aliases = {module.split(".")[-1] for module in modules}
+    for module in modules:
+        private = [piece for piece in module.split(".") if piece.startswith("_")]
+        assert not private, f"{name(path)}: {module}"
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            private = node.attr.startswith("_") and not node.attr.startswith("__")
+            assert not (private and node.value.id in aliases), f"{name(path)}: {ast.unparse(node)}"
+
+
+@pytest.mark.parametrize("path", [path for path in FILES if path.stat().st_size], ids=name)
+def test_files_say_what_they_are(path):
+    assert ast.get_docstring(tree(path))
+
+
+@pytest.mark.parametrize("public", taichi_ants.__all__)
+def test_public_names_exist_and_are_explained(public):
+    value = getattr(taichi_ants, public)
+    if public == "__version__":
+        assert isinstance(value, str)
+        return
+    text = inspect.getdoc(value)
+    assert text
+    # Dataclasses without a docstring get their signature as one.
+    assert not text.startswith(f"{public}(")
+
+
+def test_public_names_are_listed_once_and_found():
+    assert len(set(taichi_ants.__all__)) == len(taichi_ants.__all__)
+    assert set(dir(taichi_ants)) == set(taichi_ants.__all__)
+    with pytest.raises(AttributeError, match="'taichi_ants' has no attribute 'nothing'"):
+        taichi_ants.nothing  # noqa: B018
+
+
+def test_type_checkers_and_python_see_the_same_names():
+    """The names that are imported when used stand twice in `__init__`."""
+    path = ROOT / "taichi_ants" / "__init__.py"
+    lazily = set(imported(path, types_too=True)) - set(imported(path))
+    listed = {module.split(".")[-1] for module in lazily}
+    assert listed == set(taichi_ants.__all__) - {"__version__"}

@@ -1,0 +1,319 @@
+"""Writing files whole or not at all."""
+
+from __future__ import annotations
+
+import csv
+import errno
+import json
+import os
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+import pytest
+
+from taichi_ants import files
+from taichi_ants.errors import AntsError
+
+NOBODY = 65534
+
+
+@contextmanager
+def without_privileges() -> Iterator[None]:
+    """Permissions do not bind root, so give them up for a while."""
+    if not hasattr(os, "geteuid") or os.geteuid() != 0:
+        yield
+        return
+    os.seteuid(NOBODY)
+    try:
+        yield
+    finally:
+        os.seteuid(0)
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(entry.name for entry in folder.iterdir())
+
+
+# write_atomically.
+
+
+def test_a_file_is_written_and_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "a.bin"
+    for content in (b"one", b"two, longer"):
+        files.write_atomically(path, lambda file, content=content: file.write(content))
+        assert path.read_bytes() == content
+    assert names(tmp_path) == ["a.bin"]
+
+
+def test_a_failing_writer_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "a.bin"
+    path.write_bytes(b"old")
+
+    def writer(file: BinaryIO) -> None:
+        file.write(b"half of the n")
+        raise KeyError("broken")
+
+    with pytest.raises(KeyError, match="broken"):
+        files.write_atomically(path, writer)
+    assert path.read_bytes() == b"old"
+    assert names(tmp_path) == ["a.bin"]
+
+
+def test_an_interrupted_write_leaves_nothing(tmp_path: Path) -> None:
+    def writer(file: BinaryIO) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        files.write_atomically(tmp_path / "a.bin", writer)
+    assert names(tmp_path) == []
+
+
+def test_a_full_disk_is_reported_with_the_file(tmp_path: Path) -> None:
+    def writer(file: BinaryIO) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with pytest.raises(AntsError, match="no space left") as raised:
+        files.write_atomically(tmp_path / "a.bin", writer)
+    assert str(tmp_path / "a.bin") in str(raised.value)
+    assert names(tmp_path) == []
+
+
+def test_a_replacement_that_fails_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def replace(source: str, target: str) -> None:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    monkeypatch.setattr(os, "replace", replace)
+    with pytest.raises(AntsError, match="read-only file system"):
+        files.write_text(tmp_path / "a.txt", "text")
+    assert names(tmp_path) == []
+
+
+def test_the_old_content_stays_readable_while_writing(tmp_path: Path) -> None:
+    path = tmp_path / "a.bin"
+    path.write_bytes(b"old")
+
+    def writer(file: BinaryIO) -> None:
+        file.write(b"new")
+        file.flush()
+        assert path.read_bytes() == b"old"
+
+    files.write_atomically(path, writer)
+    assert path.read_bytes() == b"new"
+
+
+def test_a_missing_folder_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(AntsError, match="no such file or directory"):
+        files.write_text(tmp_path / "none" / "a.txt", "text")
+    assert names(tmp_path) == []
+
+
+def test_a_file_in_place_of_the_folder_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("content")
+    with pytest.raises(AntsError, match="not a directory"):
+        files.write_text(tmp_path / "file" / "a.txt", "text")
+    assert (tmp_path / "file").read_text() == "content"
+
+
+def test_a_folder_in_place_of_the_file_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").mkdir()
+    with pytest.raises(AntsError, match="not a regular file"):
+        files.write_text(tmp_path / "a.txt", "text")
+    assert names(tmp_path) == ["a.txt"]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_a_pipe_is_refused_and_stays(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(AntsError, match="not a regular file"):
+        files.write_text(tmp_path / "pipe", "text")
+    assert stat.S_ISFIFO((tmp_path / "pipe").stat().st_mode)
+
+
+def test_a_symbolic_link_is_followed(tmp_path: Path) -> None:
+    target = tmp_path / "target.txt"
+    target.write_text("old")
+    link = tmp_path / "link.txt"
+    link.symlink_to(target)
+    files.write_text(link, "new")
+    assert link.is_symlink()
+    assert target.read_text() == "new"
+
+
+@pytest.mark.parametrize("name", ["a\0b", "\0", "x\0/a"])
+def test_a_null_character_is_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(AntsError, match="null character"):
+        files.write_text(tmp_path / name, "text")
+    assert names(tmp_path) == []
+
+
+def test_the_longest_name_can_be_written_and_a_longer_one_is_refused(tmp_path: Path) -> None:
+    longest = "n" * os.pathconf(tmp_path, "PC_NAME_MAX")
+    files.write_text(tmp_path / longest, "text")
+    with pytest.raises(AntsError, match="too long"):
+        files.write_text(tmp_path / (longest + "n"), "text")
+    assert names(tmp_path) == [longest]
+
+
+def test_a_new_file_has_the_permissions_of_any_new_file(tmp_path: Path) -> None:
+    (tmp_path / "plain").write_text("text")
+    files.write_text(tmp_path / "atomic", "text")
+    modes = [(tmp_path / name).stat().st_mode for name in ("plain", "atomic")]
+    assert modes[0] == modes[1]
+
+
+def test_a_folder_without_permission_is_refused(tmp_path: Path) -> None:
+    locked = tmp_path / "locked"
+    locked.mkdir(mode=0o500)
+    with without_privileges(), pytest.raises(AntsError, match="ermission denied"):
+        files.write_text(locked / "a.txt", "text")
+    assert names(locked) == []
+
+
+# Text, JSON and CSV.
+
+
+def test_text_is_utf_8_with_its_own_line_ends(tmp_path: Path) -> None:
+    files.write_text(tmp_path / "a.txt", "é\nb\r\n")
+    assert (tmp_path / "a.txt").read_bytes() == b"\xc3\xa9\nb\r\n"
+
+
+def test_json_converts_what_it_does_not_know(tmp_path: Path) -> None:
+    value = {
+        "integer": np.int32(3),
+        "float": np.float32(0.5),
+        "flag": np.bool_(True),
+        "array": np.array([[1.0, np.nan]]),
+        "tuple": (1, float("inf")),
+        "path": Path("a/b"),
+        "text": "é",
+        "nothing": None,
+    }
+    files.write_json(tmp_path / "a.json", value)
+    text = (tmp_path / "a.json").read_text(encoding="utf-8")
+    assert json.loads(text) == {
+        "integer": 3,
+        "float": 0.5,
+        "flag": True,
+        "array": [[1.0, None]],
+        "tuple": [1, None],
+        "path": "a/b",
+        "text": "é",
+        "nothing": None,
+    }
+    assert "é" in text
+    assert text.endswith("}\n")
+
+
+def test_json_refuses_what_has_no_form(tmp_path: Path) -> None:
+    with pytest.raises(TypeError):
+        files.write_json(tmp_path / "a.json", {"a": object()})
+    assert names(tmp_path) == []
+
+
+def test_csv_reads_back(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    rows = [
+        {"b": 0.1 + 0.2, "a": 'with, comma and "quotes"\nand a line'},
+        {"a": None, "b": np.float64(1e-300)},
+        {"b": np.float32(0.1)},
+        {"a": float("nan"), "b": 2},
+    ]
+    files.write_csv(path, rows, ["a", "b"])
+    assert path.read_bytes().startswith(b"a,b\n")
+    with open(path, newline="", encoding="utf-8") as file:
+        read = list(csv.DictReader(file))
+    assert [row["a"] for row in read] == ['with, comma and "quotes"\nand a line', "", "", ""]
+    assert [float(row["b"]) for row in read] == [0.1 + 0.2, 1e-300, float(np.float32(0.1)), 2]
+
+
+def test_csv_without_rows_is_a_header(tmp_path: Path) -> None:
+    files.write_csv(tmp_path / "a.csv", [], ("a", "b"))
+    assert (tmp_path / "a.csv").read_text() == "a,b\n"
+
+
+def test_csv_refuses_a_key_that_is_no_column(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="extra"):
+        files.write_csv(tmp_path / "a.csv", [{"a": 1, "extra": 2}], ["a"])
+    assert names(tmp_path) == []
+
+
+# check_writable_folder.
+
+
+def test_a_folder_is_created_with_its_parents_and_left_empty(tmp_path: Path) -> None:
+    folder = tmp_path / "a" / "b" / "c"
+    assert files.check_writable_folder(folder) == folder
+    assert names(folder) == []
+
+
+def test_a_folder_that_exists_keeps_its_content(tmp_path: Path) -> None:
+    (tmp_path / "kept").write_text("kept")
+    files.check_writable_folder(tmp_path)
+    assert names(tmp_path) == ["kept"]
+
+
+@pytest.mark.parametrize("below", ["file", "file/a", "file/a/b"])
+def test_a_file_in_the_way_is_refused(tmp_path: Path, below: str) -> None:
+    (tmp_path / "file").write_text("kept")
+    with pytest.raises(AntsError, match="cannot write to the folder") as raised:
+        files.check_writable_folder(tmp_path / below)
+    assert str(tmp_path / below) in str(raised.value)
+    assert names(tmp_path) == ["file"]
+    assert (tmp_path / "file").read_text() == "kept"
+
+
+def test_a_link_to_nowhere_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to(tmp_path / "nowhere")
+    with pytest.raises(AntsError, match="cannot write"):
+        files.check_writable_folder(tmp_path / "link")
+    assert names(tmp_path) == ["link"]
+
+
+@pytest.mark.parametrize("name", ["a\0b", "n" * 5000, "new/" + "n" * 5000])
+def test_an_impossible_name_is_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(AntsError, match="cannot write"):
+        files.check_writable_folder(tmp_path / name)
+    assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize("below", ["", "new/folder"])
+def test_no_permission_is_refused(tmp_path: Path, below: str) -> None:
+    locked = tmp_path / "locked"
+    locked.mkdir(mode=0o500)
+    with without_privileges(), pytest.raises(AntsError, match="ermission denied"):
+        files.check_writable_folder(locked / below)
+    assert names(locked) == []
+
+
+def test_a_failing_check_removes_only_the_folders_that_it_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Folders can be made but no files, as with a quota.
+    def no_files(dir: Path) -> None:
+        raise OSError(errno.EDQUOT, "Disk quota exceeded")
+
+    monkeypatch.setattr("tempfile.TemporaryFile", no_files)
+    (tmp_path / "old").mkdir()
+    with pytest.raises(AntsError, match="disk quota exceeded"):
+        files.check_writable_folder(tmp_path / "old" / "new" / "newer")
+    assert names(tmp_path) == ["old"]
+    assert names(tmp_path / "old") == []
+
+
+def test_a_folder_that_another_process_makes_in_between_is_fine(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make = Path.mkdir
+
+    def made_by_another(folder: Path) -> None:
+        make(folder)
+        raise FileExistsError(errno.EEXIST, "File exists")
+
+    monkeypatch.setattr(Path, "mkdir", made_by_another)
+    assert files.check_writable_folder(tmp_path / "a" / "b") == tmp_path / "a" / "b"

@@ -1,0 +1,190 @@
+"""The open world: what every one guarantees, and how the drawing goes."""
+
+import importlib
+
+import numpy as np
+import pytest
+
+from taichi_ants.errors import AntsError
+from taichi_ants.grid import hexgrid
+from taichi_ants.grid.hexgrid import AxialGrid
+from taichi_ants.grid.randomness import Stream
+from taichi_ants.task.constants import EMPTY
+from taichi_ants.worlds import World, open_world
+
+# The package's name `open_world` is the function, which hides the module of that name.
+module = importlib.import_module("taichi_ants.worlds.open_world")
+
+RANGES = [(30, 20, 25), (40, 40, 1), (12, 5, 9), (64, 1, 33)]
+
+
+def all_cells(world: World) -> np.ndarray:
+    return world.grid.cells(np.flatnonzero(world.grid.exists))
+
+
+def pile_cells(world: World) -> set[tuple]:
+    """The cells of the three piles, by their definition."""
+    cells = all_cells(world)
+    found = set()
+    for axis, n in enumerate(world.ranges):
+        centre = [0, 0, 0]
+        centre[axis] = 3 * n // 4
+        near = hexgrid.distance(cells, centre) <= max(1, n // 16)
+        found |= set(map(tuple, cells[near].tolist()))
+    return found
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("ranges", RANGES)
+def test_what_every_open_world_guarantees(ranges: tuple, seed: int) -> None:
+    world = open_world(seed, ranges)
+    assert world.ranges == ranges
+    assert world.queen == (0, 0, 0)
+    assert len(world.trails) == len(world.ants) == 0
+    assert world.reachable_foods().any()
+
+    cells = all_cells(world)
+    clearing = cells[hexgrid.distance(cells, world.queen) <= 3]
+    beside = [cell for cell in clearing.tolist() if cell != [0, 0, 0]]
+    assert (world.ground()[world.grid.index(beside)] == EMPTY).all()
+
+    foods = set(map(tuple, world.foods.tolist()))
+    piles = pile_cells(world) - set(map(tuple, clearing.tolist()))
+    assert piles <= foods
+    assert len(foods - piles) == round(0.03 * world.grid.count)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.15, 0.6])
+@pytest.mark.parametrize("ranges", RANGES)
+def test_rocks_cover_their_share_and_no_rock_more(ranges: tuple, share: float) -> None:
+    grid = AxialGrid(ranges)
+    covered = module.scatter_rocks(grid, share, Stream(1, 2, 3))
+    assert not covered[~grid.exists].any()
+    radius = max(1, min(ranges) // 20)
+    excess = covered.sum() - share * grid.count
+    assert 0 <= excess < 1 + 3 * radius * (radius + 1)
+
+
+def test_rocks_are_placed_one_by_one_in_the_order_of_the_draws() -> None:
+    grid = AxialGrid((50, 45, 40))  # radii 0 to 2
+    cells = grid.cells(np.flatnonzero(grid.exists))
+    stream, covered = Stream(1, 2, 3), np.zeros(len(cells), dtype=bool)
+    while covered.sum() < 0.15 * len(cells):
+        word = stream.bits()
+        centre = cells[((word >> 32) * len(cells)) >> 32]
+        radius = ((word & 0xFFFF_FFFF) * 3) >> 32
+        covered |= hexgrid.distance(cells, centre) <= radius
+    found = module.scatter_rocks(grid, 0.15, Stream(1, 2, 3))
+    assert (found[grid.index(cells)] == covered).all()
+
+
+def test_batches_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = open_world(4, (60, 50, 70))
+    monkeypatch.setattr(module, "_BATCH_CELLS", 100)
+    assert open_world(4, (60, 50, 70)) == world
+
+
+def test_rocks_make_way_for_the_clearing_and_the_piles_only() -> None:
+    ranges = (40, 30, 35)
+    world = open_world(5, ranges)
+    cells = all_cells(world)
+    scattered = module.scatter_rocks(world.grid, 0.15, Stream(5, module._STREAM_ROCKS, 0))
+    rocks = set(map(tuple, world.grid.cells(np.flatnonzero(scattered)).tolist()))
+    clearing = set(map(tuple, cells[hexgrid.distance(cells, (0, 0, 0)) <= 3].tolist()))
+    assert clearing & rocks
+    assert set(map(tuple, world.obstacles.tolist())) == rocks - clearing - pile_cells(world)
+
+
+def test_the_same_seed_gives_the_same_world() -> None:
+    assert open_world(1) == open_world(1)
+    assert open_world(1) != open_world(2)
+    assert open_world(-1, (20, 20, 20)) == open_world(2**64 - 1, [np.int32(20), 20, 20])
+
+
+def test_more_food_leaves_the_rocks_alone() -> None:
+    little, much = (open_world(7, (40, 40, 40), food_share=share) for share in (0.01, 0.2))
+    assert (little.obstacles == much.obstacles).all()
+    assert len(little.foods) < len(much.foods)
+
+
+def test_drawn_ranges_fill_their_bounds() -> None:
+    drawn = np.array([module._draw_ranges(Stream(seed, 1)) for seed in range(1000)])
+    assert drawn.min() == 10
+    assert drawn.max() == 100
+    # The mean of 1000 numbers drawn evenly from 10 .. 100 has a standard deviation of 0.83.
+    assert np.abs(drawn.mean(axis=0) - 55).max() < 5
+
+
+def test_rocks_and_food_are_spread_evenly() -> None:
+    world = open_world(3, (200, 200, 1))
+    for kind, share in (("obstacles", 0.15), ("foods", 0.03)):
+        cells = getattr(world, kind)
+        for low in (60, 100):  # two quarters with neither clearing nor pile in them
+            inside = ((cells[:, :2] >= low) & (cells[:, :2] < low + 40)).all(axis=1).sum()
+            assert abs(inside / 1600 - share) < 0.35 * share
+
+
+def test_pinned_worlds() -> None:
+    """Worlds of known seeds stay as they are, whatever the version of NumPy."""
+    world = open_world(0)
+    assert world.ranges == (64, 56, 29)
+    assert (len(world.foods), len(world.obstacles)) == (312, 1018)
+    assert world.obstacles.sum(axis=0).tolist() == [25950, 24092, 6654]
+    assert world.foods.sum(axis=0).tolist() == [7981, 5663, 1742]
+
+
+def test_a_world_without_reachable_food_is_drawn_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    draw, attempts = module._draw, []
+
+    def shut_in(*arguments: object) -> World:
+        attempts.append(arguments[-1])
+        if len(attempts) <= 2:
+            return World((9, 1, 1), (0, 0, 0), foods=[(8, 0, 0)], obstacles=[(4, 0, 0)])
+        return draw(*arguments)
+
+    monkeypatch.setattr(module, "_draw", shut_in)
+    world = open_world(0, (20, 20, 20))
+    assert attempts == [0, 1, 2]
+    assert world == draw((20, 20, 20), 0.15, 0.03, 0, 2)
+    assert world != draw((20, 20, 20), 0.15, 0.03, 0, 0)
+
+
+@pytest.mark.parametrize("ranges", [(1, 1, 1), (3, 3, 1), (4, 4, 4)])
+def test_a_hundred_worlds_without_food_are_an_error(ranges: tuple) -> None:
+    with pytest.raises(AntsError, match=r"in 100 open worlds of ranges .* choose larger ranges"):
+        open_world(0, ranges)
+
+
+def test_no_rocks_and_no_single_food() -> None:
+    world = open_world(0, (20, 20, 20), rock_share=0, food_share=0)
+    assert len(world.obstacles) == 0
+    assert set(map(tuple, world.foods.tolist())) == pile_cells(world)
+
+
+def test_more_food_than_room_fills_the_room() -> None:
+    world = open_world(0, (6, 6, 1), rock_share=0, food_share=0.9)
+    assert (world.ground() == EMPTY).sum() == 16 - 1  # the clearing less the queen's cell
+
+
+@pytest.mark.parametrize("name", ["rock_share", "food_share"])
+@pytest.mark.parametrize("share", [-0.1, 0.91, np.nan, np.inf, "0.1", None, True, [0.1]])
+def test_shares_have_bounds(name: str, share: object) -> None:
+    with pytest.raises(AntsError, match=rf"{name} is .* between 0 and 0\.9"):
+        open_world(0, (20, 20, 20), **{name: share})
+
+
+def test_shares_leave_room() -> None:
+    with pytest.raises(AntsError, match=r"rock_share 0\.5 and food_share 0\.5 .* smaller shares"):
+        open_world(0, (20, 20, 20), rock_share=0.5, food_share=0.5)
+
+
+@pytest.mark.parametrize("ranges", [(20, 20), (0, 20, 20), (20.0, 20, 20), 20, "20"])
+def test_ranges_are_checked(ranges: object) -> None:
+    with pytest.raises(AntsError, match="ranges are"):
+        open_world(0, ranges)
+
+
+@pytest.mark.parametrize("seed", [0.5, "1", None])
+def test_seeds_are_whole(seed: object) -> None:
+    with pytest.raises(AntsError, match="seed is"):
+        open_world(seed, (20, 20, 20))
