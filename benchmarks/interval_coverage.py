@@ -14,7 +14,7 @@ import argparse
 
 import numpy as np
 
-from taichi_ants import TrainingConfig, train, worlds
+from taichi_ants import Task, TrainingConfig, train, worlds
 from taichi_ants.analysis.markdown import table
 from taichi_ants.analysis.statistics import (
     bootstrap_interval,
@@ -28,14 +28,16 @@ DRAWS = 2000
 RESAMPLES = 10_000
 VERDICT_LEVEL = 0.999
 
-SLOW = TrainingConfig("q_learning", 0.001, 0.99, 0.3, 0.99, delivery="continuing")
-FAST = TrainingConfig("q_learning", 0.01, 0.99, 0.3, 0.99, delivery="continuing")
-SARSA = TrainingConfig("sarsa", 0.001, 0.99, 0.3, 0.99, delivery="continuing")
+SLOW = TrainingConfig("q_learning", 0.001, 0.99, 0.3, 0.99)
+FAST = TrainingConfig("q_learning", 0.01, 0.99, 0.3, 0.99)
+SARSA = TrainingConfig("sarsa", 0.001, 0.99, 0.3, 0.99)
 
 
 def pools(seeds: int = POOL) -> dict[str, np.ndarray]:
     """Quantities of the analysis, float64 (seeds,) each, over the last 50 of 500 episodes."""
-    result = train(worlds.paper(), (SLOW, FAST, SARSA), range(seeds))
+    result = train(
+        worlds.paper(), (SLOW, FAST, SARSA), range(seeds), task=Task(delivery="continuing")
+    )
     late = slice(-50, None)
     slow, fast, sarsa = result.returns[..., late].mean(axis=2)
     return {

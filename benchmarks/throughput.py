@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from taichi_ants import TrainingConfig, World, train, worlds
+from taichi_ants import Task, TrainingConfig, World, train, worlds
 from taichi_ants.analysis.paper import GRID
 from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.grid.randomness import stream_state
@@ -64,6 +64,7 @@ def train_in_c(
     yardstick: ctypes.CDLL,
     world: World,
     config: TrainingConfig,
+    continuing: bool,
     seed: int,
     episodes: int,
     max_steps: int,
@@ -81,27 +82,27 @@ def train_in_c(
     yardstick.train(
         *(in_c, stream_state(seed, STREAM_ANT, 0), config.learning_rate, config.discount),
         *(config.epsilon, config.epsilon_decay, config.min_epsilon),
-        *(config.delivery == "continuing", episodes, max_steps),
+        *(continuing, episodes, max_steps),
         *(array.ctypes.data for array in (q_values, returns, steps)),
     )
     return returns, steps, q_values, time.process_time() - began
 
 
-def grid(learner: str, planning_steps: int, delivery: str) -> list[TrainingConfig]:
+def grid(learner: str, planning_steps: int) -> list[TrainingConfig]:
     """The paper's 16 configurations of a learner."""
-    return [
-        TrainingConfig(learner, *point, planning_steps=planning_steps, delivery=delivery)
-        for point in GRID
-    ]
+    more = {"planning_steps": planning_steps} if planning_steps else {}
+    return [TrainingConfig(learner, *point, hyperparameters=more) for point in GRID]
 
 
 def measure_c(command: str, delivery: str, seeds: int, episodes: int, max_steps: int) -> float:
     """CPU nanoseconds of a step of Q-learning in C."""
-    total, seconds = 0, 0.0
+    total, seconds, continuing = 0, 0.0, delivery == "continuing"
     with tempfile.TemporaryDirectory() as folder:
         yardstick = load_yardstick(command, folder)
-        for config, seed in itertools.product(grid("q_learning", 0, delivery), range(seeds)):
-            run = train_in_c(yardstick, worlds.paper(), config, seed, episodes, max_steps)
+        for config, seed in itertools.product(grid("q_learning", 0), range(seeds)):
+            run = train_in_c(
+                yardstick, worlds.paper(), config, continuing, seed, episodes, max_steps
+            )
             total += int(run[1].sum(dtype=np.int64))
             seconds += run[3]
     return seconds * 1e9 / total
@@ -115,10 +116,12 @@ def measure(seeds: int, episodes: int, max_steps: int, delivery: str, threads: i
     line = "{:16}{:6}{:13,}{:9.2f}{:9.2f}{:11.1f}{:9.1f}"
     sums, fastest = [0, 0, 0.0, 0.0], 0.0
     for learner, planning_steps in LEARNERS:
-        configs = grid(learner, planning_steps, delivery)
+        configs = grid(learner, planning_steps)
+        task = Task(delivery=delivery)
         train(worlds.paper(), configs, 0, 1, 1, threads=threads)
         began = time.perf_counter()
-        (cost,) = train(worlds.paper(), configs, range(seeds), episodes, max_steps).costs
+        result = train(worlds.paper(), configs, range(seeds), episodes, max_steps, task)
+        (cost,) = result.costs
         figures = [len(configs) * seeds, cost.steps, time.perf_counter() - began, cost.seconds]
         sums = [one + other for one, other in zip(sums, figures, strict=True)]
         fastest = fastest or cost.nanoseconds_per_step

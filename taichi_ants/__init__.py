@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from taichi_ants.environment import prepare_for_taichi
 
 if TYPE_CHECKING:
-    from taichi_ants import analysis, learners, reference, rendering, worlds
+    from taichi_ants import analysis, learners, reference, rendering, task, worlds
     from taichi_ants.engines.colony.colony import Colony, ColonyEpisodes
     from taichi_ants.engines.runs.results import LearnerCost, Rollouts, TrainingResult
     from taichi_ants.engines.runs.traces import Trace, rollout, trace_training
@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from taichi_ants.errors import AntsError
     from taichi_ants.learners.config import TrainingConfig
     from taichi_ants.learners.policies import load_policy, save_policy
-    from taichi_ants.task import states
-    from taichi_ants.task.colony import ColonyConfig, Pheromone
+    from taichi_ants.task import Life, Observation, Pheromone, Rewards, Task, states
     from taichi_ants.worlds import World
 
 __version__ = "0.1.0"
@@ -27,9 +26,8 @@ __version__ = "0.1.0"
 _HOMES = {
     "AntsError": "taichi_ants.errors",
     "Colony": "taichi_ants.engines.colony.colony",
-    "ColonyConfig": "taichi_ants.task.colony",
     "ColonyEpisodes": "taichi_ants.engines.colony.colony",
-    "Pheromone": "taichi_ants.task.colony",
+    **dict.fromkeys(("Life", "Observation", "Pheromone", "Rewards", "Task"), "taichi_ants.task"),
     "LearnerCost": "taichi_ants.engines.runs.results",
     "Rollouts": "taichi_ants.engines.runs.results",
     "Trace": "taichi_ants.engines.runs.traces",
@@ -44,20 +42,22 @@ _HOMES = {
     "trace_training": "taichi_ants.engines.runs.traces",
     "train": "taichi_ants.engines.runs.training",
 }
-_MODULES = {
-    **{name: f"taichi_ants.{name}" for name in ("analysis", "learners", "reference", "rendering")},
-    "states": "taichi_ants.task.states",
-    "worlds": "taichi_ants.worlds",
+_MODULES = {"states": "taichi_ants.task.states"} | {
+    name: f"taichi_ants.{name}"
+    for name in ("analysis", "learners", "reference", "rendering", "task", "worlds")
 }
 
 __all__ = [
     "AntsError",
     "Colony",
-    "ColonyConfig",
     "ColonyEpisodes",
     "LearnerCost",
+    "Life",
+    "Observation",
     "Pheromone",
+    "Rewards",
     "Rollouts",
+    "Task",
     "Trace",
     "TrainingConfig",
     "TrainingResult",
@@ -73,6 +73,7 @@ __all__ = [
     "rollout",
     "save_policy",
     "states",
+    "task",
     "trace_training",
     "train",
     "worlds",

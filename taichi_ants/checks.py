@@ -7,11 +7,10 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from taichi_ants import learners
-from taichi_ants.errors import AntsError, shown
-from taichi_ants.grid.randomness import whole
+from taichi_ants.errors import AntsError, shown, whole
 from taichi_ants.learners.config import TrainingConfig, share_of_one
-from taichi_ants.task import rewards
-from taichi_ants.task.constants import MAX_STEPS, N_ACTIONS, N_STATES
+from taichi_ants.task import Pheromone, Task
+from taichi_ants.task.constants import MAX_STEPS, N_ACTIONS
 from taichi_ants.worlds.world import World
 
 
@@ -22,7 +21,26 @@ def checked_world(world: World) -> World:
     return world
 
 
-def checked_task(world: World) -> World:
+def checked_task(task: Task) -> Task:
+    """The task, if it is one."""
+    if not isinstance(task, Task):
+        raise AntsError(f"task is {shown(task)}; it must be a Task, for example task.paper().")
+    return task
+
+
+def checked_runs_task(task: Task | None) -> Task:
+    """The task, the paper's if it is None, if independent runs can have it."""
+    task = checked_task(task or Task())
+    if task.life.changes:
+        raise AntsError(
+            f"life of the task is {task.life}; runs of one ant have none, so use a Colony."
+        )
+    if task.pheromone != Pheromone():
+        raise AntsError(f"pheromone of the task is {task.pheromone}; use a Colony for it.")
+    return task
+
+
+def checked_food(world: World) -> World:
     """The world, if it is one to learn in: it has food, or nothing could ever be delivered."""
     if not len(checked_world(world).foods):
         raise AntsError("the world has no food, so there is nothing to learn; give it some.")
@@ -39,7 +57,7 @@ def checked_progress(progress: Callable[[float], None] | None) -> Callable[[floa
 
 
 def checked_configs(configs: TrainingConfig | Sequence[TrainingConfig]) -> tuple:
-    """One configuration or several as a tuple; their learners exist and plan as they say."""
+    """One configuration or several as a tuple, with all hyperparameters of their learners."""
     if isinstance(configs, TrainingConfig):
         configs = (configs,)
     elif not isinstance(configs, Iterable):
@@ -52,17 +70,7 @@ def checked_configs(configs: TrainingConfig | Sequence[TrainingConfig]) -> tuple
             raise AntsError(
                 f"configs holds {shown(config)}; it must hold TrainingConfig objects only."
             )
-        plans = learners.get(config.learner).plans
-        if plans and config.planning_steps == 0:
-            raise AntsError(
-                f"planning_steps is 0, but learner {shown(config.learner)} plans; give 1 or more."
-            )
-        if not plans and config.planning_steps != 0:
-            raise AntsError(
-                f"planning_steps is {config.planning_steps}, but learner {shown(config.learner)} "
-                "does not plan; leave it at 0."
-            )
-    return several
+    return tuple(learners.settle(config) for config in several)
 
 
 def checked_seeds(seeds: int | Sequence[int]) -> tuple[int, ...]:
@@ -107,9 +115,9 @@ def checked_count(name: str, value: int, most: int = 2**31 - 1, least: int = 1) 
     return value
 
 
-def checked_max_steps(value: int) -> int:
+def checked_max_steps(value: int, task: Task) -> int:
     """The step limit of an episode, whose return must fit into 32 bits."""
-    most = (2**31 - 1) // max(1, rewards.REWARDS.largest)
+    most = (2**31 - 1) // max(1, task.rewards.largest)
     return checked_count("max_steps", value, min(MAX_STEPS, most))
 
 
@@ -135,19 +143,21 @@ def check_finite(
         )
 
 
-def checked_q_values(q_values: np.ndarray) -> np.ndarray:
-    """Action values as float32 (..., 128, 5), finite."""
+def checked_q_values(q_values: np.ndarray, task: Task) -> np.ndarray:
+    """Action values as float32 (..., n_states, 5), finite."""
     try:
         if np.iscomplexobj(q_values):
             raise TypeError
         tables = np.asarray(q_values, dtype=np.float32)
     except (OverflowError, TypeError, ValueError):
         raise AntsError(
-            "q_values is not an array of numbers; give a float (..., 128, 5) array."
+            "q_values is not an array of numbers; give a float "
+            f"(..., {task.n_states}, {N_ACTIONS}) array."
         ) from None
-    if tables.shape[-2:] != (N_STATES, N_ACTIONS) or tables.size == 0:
+    if tables.shape[-2:] != (task.n_states, N_ACTIONS) or tables.size == 0:
         raise AntsError(
-            f"q_values has shape {tables.shape}; it must end in ({N_STATES}, {N_ACTIONS})."
+            f"q_values has shape {tables.shape}; for the observation {task.observation!r} it must "
+            f"end in ({task.n_states}, {N_ACTIONS})."
         )
     if not np.isfinite(tables).all():
         raise AntsError("q_values holds numbers that are not finite; action values must be finite.")

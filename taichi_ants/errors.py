@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 import reprlib
 from collections.abc import Sequence
 
@@ -53,3 +54,30 @@ def checked_flag(name: str, value: object) -> bool:
     if not isinstance(value, (bool, np.bool_)):
         raise AntsError(f"{name} is {shown(value)}; it must be True or False.")
     return bool(value)
+
+
+def whole(name: str, value: object, otherwise: str = "") -> int:
+    """`value` as a Python integer.
+
+    Raises:
+        AntsError: `value` is not a whole number (booleans and floats are none); names it `name`,
+            and adds what is allowed otherwise.
+    """
+    import numpy as np
+
+    try:
+        if isinstance(value, (bool, np.bool_)):
+            raise TypeError
+        return operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        raise AntsError(
+            f"{name} is {shown(value)}; it must be a whole number{otherwise}."
+        ) from None
+
+
+def check_whole(name: str, value: object, least: int, most: int, otherwise: str = "") -> None:
+    """Raises AntsError, naming the value `name`, if it is no whole number from least to most."""
+    if not least <= whole(name, value, otherwise) <= most:
+        raise AntsError(
+            f"{name} is {shown(value)}; it must lie between {least} and {most}{otherwise}."
+        )

@@ -15,8 +15,7 @@ from pathlib import Path
 from types import ModuleType
 
 from taichi_ants.environment import fallback_folder, is_writable_folder
-from taichi_ants.errors import AntsError, check_one_of, shown
-from taichi_ants.grid.randomness import whole
+from taichi_ants.errors import AntsError, check_one_of, shown, whole
 
 ARCHITECTURES = ("cpu", "cuda")
 MAX_THREADS = 1024

@@ -11,6 +11,7 @@ from taichi_ants.analysis.dynamic_programming import Outcome, exact_bounds
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.policies import random_policy, trail_follower
+from taichi_ants.task import Task
 from taichi_ants.worlds.world import World
 
 BASELINE_COLUMNS: tuple[str, ...] = (
@@ -50,7 +51,7 @@ class Rollouts(Protocol):
     def deliveries(self) -> np.ndarray: ...
 
 
-# Called as evaluate(world, q_values, rollouts=, epsilon=, max_steps=, evaporation=, seeds=), with
+# Called as evaluate(world, q_values, rollouts=, epsilon=, max_steps=, task=, seeds=), with
 # one table for each seed: q_values (seeds, 128, 5).
 Evaluate = Callable[..., Rollouts]
 
@@ -144,7 +145,7 @@ def policy_rows(
                 rollouts=rollouts,
                 epsilon=0.0,
                 max_steps=max_steps,
-                evaporation=evaporation,
+                task=Task(evaporation_in_evaluation=evaporation),
                 seeds=list(seeds),
             )
             returns = np.asarray(outcome.returns, float).mean(axis=1)

@@ -15,6 +15,7 @@ import numpy as np
 from taichi_ants.analysis.measures import MEASURES, WINDOW
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.task import Task
 
 # The order in which the delivery settings are reported; others follow in order of appearance.
 DELIVERY_ORDER: tuple[str, ...] = ("continuing", "absorbing")
@@ -78,8 +79,8 @@ class Row:
     delivery: str
 
     @classmethod
-    def of(cls, config: TrainingConfig) -> Row:
-        """The row of a training configuration."""
+    def of(cls, task: Task, config: TrainingConfig) -> Row:
+        """The row of a task and a training configuration."""
         return cls(
             config.learner,
             config.planning_steps,
@@ -87,7 +88,7 @@ class Row:
             config.discount,
             config.epsilon,
             config.epsilon_decay,
-            config.delivery,
+            task.delivery,
         )
 
     @property

@@ -198,8 +198,9 @@ def training_config(settings: argparse.Namespace, least: float) -> TrainingConfi
         settings.epsilon,
         epsilon_decay=1.0,
         min_epsilon=least,
-        planning_steps=(settings.planning_steps or PLANNING_STEPS) if plans else 0,
-        delivery="continuing",
+        hyperparameters=(
+            {"planning_steps": settings.planning_steps or PLANNING_STEPS} if plans else {}
+        ),
     )
 
 
@@ -334,30 +335,29 @@ def one_colony(settings: argparse.Namespace) -> None:
 
 def new_colony(settings: argparse.Namespace) -> Colony:
     """A colony at the start of its episode."""
-    from taichi_ants import Colony, ColonyConfig, Pheromone, load_policy
+    from taichi_ants import Colony, Life, Pheromone, Task, load_policy
 
     names = ("evaporation", "half_life", "diffusion", "deposit", "level", "cap")
     given = {name: getattr(settings, name) for name in names if getattr(settings, name) is not None}
     if "half_life" in given:
         given.setdefault("evaporation", "exponential")
-    life = ColonyConfig(
-        settings.ants,
-        settings.capacity,
-        Pheromone(**given),
-        settings.births,
-        settings.lifespan,
-        settings.regrowth,
-        settings.wander,
-        start=settings.start or "nest",
+    task = Task(
+        pheromone=Pheromone(**given),
+        delivery="continuing",
+        evaporation_in_training=True,
+        life=Life(settings.births, settings.lifespan, settings.regrowth, settings.wander),
     )
     colony = Colony(
         build_world(settings),
-        life,
+        task,
         training_config(settings, settings.epsilon),
         range(settings.seed, settings.seed + (settings.colonies or 1)),
-        settings.sharing or "shared",
-        load_policy(settings.policy)[0] if settings.policy else None,
-        settings.threads,
+        ants=settings.ants,
+        capacity=settings.capacity,
+        start=settings.start or "nest",
+        sharing=settings.sharing or "shared",
+        q_values=load_policy(settings.policy)[0] if settings.policy else None,
+        threads=settings.threads,
         arch=settings.arch,
     )
     colony.begin_episode()

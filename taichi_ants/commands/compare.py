@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from taichi_ants.learners.config import TrainingConfig
     from taichi_ants.studies.result_folder import ResultFolder
     from taichi_ants.studies.sweeps import Sweep, SweepResult
+    from taichi_ants.task import Task
 
 DELIVERIES = ("continuing", "absorbing")
 ROLLOUTS = 50
@@ -108,29 +109,37 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     return settings
 
 
-def configurations(settings: argparse.Namespace) -> tuple[TrainingConfig, ...]:
-    """The grid: learners and planning steps, times rates, discounts and exploration."""
-    from taichi_ants import TrainingConfig, learners
+def points(settings: argparse.Namespace) -> list[tuple[Task, TrainingConfig]]:
+    """The grid: tasks, learners and planning steps, times rates, discounts and exploration."""
+    from taichi_ants import Task, TrainingConfig, learners
 
     deliveries = DELIVERIES if settings.delivery == "both" else (settings.delivery,)
+    tasks = [
+        Task(
+            delivery=delivery,
+            evaporation_in_training=settings.train_evaporation == "on",
+            evaporation_in_evaluation=settings.greedy_evaporation == "on",
+        )
+        for delivery in deliveries
+    ]
     variants = [
-        (name, planning_steps)
+        (name, hyperparameters)
         for name in settings.learners
-        for planning_steps in (settings.planning_steps if learners.get(name).plans else (0,))
+        for hyperparameters in (
+            [{"planning_steps": n} for n in settings.planning_steps]
+            if learners.get(name).plans
+            else [{}]
+        )
     ]
     grid = itertools.product(
         settings.learning_rates, settings.discounts, settings.epsilons, settings.epsilon_decays
     )
-    return tuple(
-        TrainingConfig(
-            *(name, rate, discount, epsilon, decay),
-            planning_steps=planning_steps,
-            delivery=delivery,
+    return [
+        (task, TrainingConfig(name, *numbers, hyperparameters=hyperparameters))
+        for task, (name, hyperparameters), numbers in itertools.product(
+            tasks, variants, tuple(grid)
         )
-        for delivery, (name, planning_steps), (rate, discount, epsilon, decay) in itertools.product(
-            deliveries, variants, tuple(grid)
-        )
-    )
+    ]
 
 
 def build_sweep(settings: argparse.Namespace) -> Sweep:
@@ -142,9 +151,9 @@ def build_sweep(settings: argparse.Namespace) -> Sweep:
     if settings.plugin:
         load_plugin(settings.plugin)
     _refuse_what_changes_nothing(settings)
-    configs = configurations(settings)
+    grid = points(settings)
     # The tables find configurations by six digits of their numbers.
-    rows = [Row.of(config) for config in configs]
+    rows = [Row.of(task, config) for task, config in grid]
     if len({(row.delivery, row.variant, row.hyperparameters.key()) for row in rows}) < len(rows):
         raise AntsError("two values of a list agree in six digits; leave one of them out.")
     world = worlds.build(settings.world, settings.world_seed)
@@ -156,13 +165,12 @@ def build_sweep(settings: argparse.Namespace) -> Sweep:
     seeds = tuple(range(settings.seed, settings.seed + settings.seeds))
     return Sweep(
         world,
-        configs,
+        tuple(task for task, _ in grid),
+        tuple(config for _, config in grid),
         seeds,
         settings.episodes,
         settings.max_steps,
         ROLLOUTS,
-        settings.train_evaporation == "on",
-        settings.greedy_evaporation == "on",
     )
 
 
@@ -196,7 +204,7 @@ def to_comparison(
     from taichi_ants.analysis.comparison import PAPER_WORLD, Comparison, Row
 
     return Comparison(
-        rows=tuple(Row.of(config) for config in sweep.configs),
+        rows=tuple(Row.of(*point) for point in zip(sweep.tasks, sweep.configs, strict=True)),
         seeds=sweep.seeds,
         returns=result.returns,
         steps=result.steps,
@@ -207,10 +215,17 @@ def to_comparison(
         max_steps=sweep.max_steps,
         behaviours=behaviours,
         policy_returns=policy_returns,
-        train_evaporation=sweep.train_evaporation,
-        greedy_evaporation=sweep.greedy_evaporation,
+        train_evaporation=sweep.tasks[0].evaporation_in_training,
+        greedy_evaporation=sweep.tasks[0].evaporation_in_evaluation,
         world=PAPER_WORLD if sweep.world == worlds.paper() else world,
     )
+
+
+def as_in_training(task: Task) -> Task:
+    """The task with the evaporation of training in rollouts too."""
+    from dataclasses import replace
+
+    return replace(task, evaporation_in_evaluation=task.evaporation_in_training)
 
 
 def what_policies_do(sweep: Sweep, q_values: Any) -> tuple[Any, Any]:
@@ -226,7 +241,7 @@ def what_policies_do(sweep: Sweep, q_values: Any) -> tuple[Any, Any]:
     pieces = [
         classify(trace, max_steps)
         for trace in trace_policies(
-            sweep.world, tables, sweep.seeds * runs[0], max_steps, sweep.train_evaporation
+            sweep.world, tables, sweep.seeds * runs[0], max_steps, as_in_training(sweep.tasks[0])
         )
     ]
     behaviours, returns = zip(*pieces, strict=True)
@@ -271,22 +286,21 @@ def write_episodes(folder: Path, comparison: Comparison) -> None:
 
 def write_policies(folder: Path, sweep: Sweep, comparison: Comparison, tables: Any) -> None:
     """Write the final Q-tables of some runs, with what an ant that follows them does."""
-    from dataclasses import asdict
-
     from taichi_ants import save_policy
     from taichi_ants.analysis.behaviour import BEHAVIOURS, NAMES
     from taichi_ants.analysis.best_of import examples
 
     for row, run in examples(comparison):
-        config, behaviour = sweep.configs[row], comparison.behaviours[row, run]
+        task, config = sweep.tasks[row], sweep.configs[row]
+        behaviour = comparison.behaviours[row, run]
         depth = f"_p{config.planning_steps}" if config.planning_steps else ""
-        name = f"{config.delivery}_{config.learner}{depth}_{NAMES[behaviour]}"
+        name = f"{task.delivery}_{config.learner}{depth}_{NAMES[behaviour]}"
         metadata = {
-            "config": asdict(config),
+            "task": task.as_dict(),
+            "config": config.as_dict(),
             "seed": sweep.seeds[run],
             "episodes": sweep.episodes,
             "max_steps": sweep.max_steps,
-            "evaporation": sweep.train_evaporation,
             "return_last50": comparison.measure("return_last50")[row, run],
             "behaviour": BEHAVIOURS[behaviour],
         }
@@ -341,8 +355,8 @@ def do_comparison(
         ROLLOUTS,
         settings.discounts,
         sweep.max_steps,
-        sweep.train_evaporation,
-        sweep.greedy_evaporation,
+        sweep.tasks[0].evaporation_in_training,
+        sweep.tasks[0].evaporation_in_evaluation,
     )
     laps["baselines"] = time.perf_counter()
     costs = [cost.as_row() for cost in result.costs]
@@ -390,17 +404,19 @@ def render_policies(sweep: Sweep, policies: Path, folder: Path) -> None:
         for done, path in enumerate(paths):
             q_values, metadata = load_policy(path)
             config = metadata["config"]
-            learner = Variant(config["learner"], config["planning_steps"]).label
+            learner = Variant(
+                config["learner"], config["hyperparameters"].get("planning_steps", 0)
+            ).label
             episode = Episode.play(
                 sweep.world,
                 q_values,
                 seed=metadata["seed"],
                 max_steps=min(sweep.max_steps, RENDERED_STEPS),
-                evaporation=sweep.train_evaporation,
+                task=as_in_training(sweep.tasks[0]),
             )
             whole = episode.delivered or len(episode.trace) == sweep.max_steps
             episode = replace(episode, name=metadata["behaviour"], whole=whole)
-            title = f"{learner}, {config['delivery']}"
+            title = f"{learner}, {metadata['task']['delivery']}"
             frames = with_pause(
                 episode_frames(episode, (720, 480), title=title), len(episode), DEFAULT_FPS
             )

@@ -23,6 +23,7 @@ from taichi_ants.studies.command_line import (
     run_command,
     whole_number,
 )
+from taichi_ants.task import Task
 
 if TYPE_CHECKING:
     import numpy as np
@@ -277,7 +278,7 @@ def training_config(settings: argparse.Namespace) -> TrainingConfig:
         discount=settings.discount,
         epsilon=settings.train_epsilon,
         epsilon_decay=settings.epsilon_decay,
-        planning_steps=planning_steps,
+        hyperparameters={"planning_steps": planning_steps} if planning_steps else {},
     )
 
 
@@ -343,7 +344,7 @@ def noted_stages(settings: argparse.Namespace, world: World) -> list[Stage]:
             seed=settings.seed,
             stages=settings.stages,
             max_steps=settings.max_steps,
-            evaporation=not settings.no_evaporation,
+            task=Task(evaporation_in_evaluation=not settings.no_evaporation),
             epsilon=settings.epsilon,
             progress=progress,
         )
@@ -389,22 +390,24 @@ def show_colony(settings: argparse.Namespace, world: World) -> None:
 
 def settled_colony(settings: argparse.Namespace, world: World) -> tuple[Colony, str]:
     """A colony that follows a policy from a file or one that it has learned, and a title."""
-    from taichi_ants import Colony, ColonyConfig, Pheromone, load_policy
+    from taichi_ants import Colony, Pheromone, load_policy
 
     pheromone = Pheromone(evaporation="none" if settings.no_evaporation else "linear")
-    life = ColonyConfig(ants=settings.ants, pheromone=pheromone)
+    task = Task(pheromone=pheromone, evaporation_in_training=True)
     training = training_config(settings)
     if settings.policy:
         table, _ = load_policy(settings.policy)
         title = f"policy {Path(settings.policy).stem}"
     else:
-        learning = Colony(world, life, training, settings.seed)
+        learning = Colony(world, task, training, settings.seed, settings.ants)
         with progress_bar("Training") as progress:
             learning.run(settings.episodes, settings.max_steps, progress)
         table = learning.q_values[0]
         title = f"{settings.learner}, {settings.episodes} episodes together"
     steady = replace(training, epsilon=settings.epsilon, epsilon_decay=1.0, min_epsilon=0.0)
-    colony = Colony(world, life, steady, settings.seed, sharing="fixed", q_values=table)
+    colony = Colony(
+        world, task, steady, settings.seed, settings.ants, sharing="fixed", q_values=table
+    )
     return colony, settings.title or title
 
 
@@ -421,7 +424,7 @@ def _rollout(settings: argparse.Namespace) -> dict[str, Any]:
         "seed": settings.seed,
         "number": settings.number,
         "max_steps": settings.max_steps,
-        "evaporation": not settings.no_evaporation,
+        "task": Task(evaporation_in_evaluation=not settings.no_evaporation),
         "epsilon": settings.epsilon,
     }
 

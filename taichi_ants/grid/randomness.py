@@ -7,31 +7,16 @@ version of NumPy. All arithmetic is modulo 2^64.
 
 from __future__ import annotations
 
-import operator
 from typing import Any
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, shown
+from taichi_ants.errors import AntsError, shown, whole
 
 GAMMA = 0x9E3779B97F4A7C15
 _FACTOR_1 = 0xBF58476D1CE4E5B9
 _FACTOR_2 = 0x94D049BB133111EB
 _MASK = 0xFFFF_FFFF_FFFF_FFFF
-
-
-def whole(name: str, value: object) -> int:
-    """`value` as a Python integer.
-
-    Raises:
-        AntsError: `value` is not a whole number (booleans and floats are none); names it `name`.
-    """
-    if isinstance(value, (bool, np.bool_)):
-        raise AntsError(f"{name} is {shown(value)}; it must be a whole number.")
-    try:
-        return operator.index(value)  # type: ignore[arg-type]
-    except TypeError:
-        raise AntsError(f"{name} is {shown(value)}; it must be a whole number.") from None
 
 
 def mix(words: int | np.ndarray) -> Any:

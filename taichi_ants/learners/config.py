@@ -1,20 +1,18 @@
-"""What a training run needs to know besides its world and its seed."""
+"""How an ant learns: the learner and its settings."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
 from numbers import Real
-from typing import Any, Literal, get_args
+from typing import Any
 
-from taichi_ants.errors import AntsError, check_one_of, shown
-from taichi_ants.grid.randomness import whole
+import numpy as np
 
-Delivery = Literal["absorbing", "continuing"]
-DELIVERIES: tuple[str, ...] = get_args(Delivery)
-MAX_PLANNING_STEPS = 1000
+from taichi_ants.errors import AntsError, shown
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class TrainingConfig:
     """The settings of one learner.
 
@@ -25,16 +23,14 @@ class TrainingConfig:
         epsilon: Probability of a random action in the first episode, in [0, 1].
         epsilon_decay: Factor on epsilon after each episode, in (0, 1].
         min_epsilon: Epsilon does not decay below this, in [0, 1].
-        planning_steps: Updates from the model after each step, at least 1 for learners that plan,
-            0 for all others.
-        delivery: "absorbing": the delivery is a terminal state, its target is the reward alone.
-            "continuing": the update at delivery bootstraps from what the ant then sees. The
-            episode ends in both.
+        hyperparameters: What this learner has besides, (name, number) pairs by name; given as a
+            mapping, or as keywords: `TrainingConfig("dyna_q", ..., planning_steps=5)`. Those that
+            are left out have their usual values, see `taichi_ants.learners.get(name)`.
 
     Raises:
-        AntsError: A value is outside its range. Whether the learner exists, and whether it plans,
-            is checked when training starts, so that configurations can be written down before a
-            learner is registered.
+        AntsError: A value is outside its range. Whether the learner exists, and has these
+            hyperparameters, is checked when training starts, so that configurations can be
+            written down before a learner is registered.
     """
 
     learner: str
@@ -42,35 +38,80 @@ class TrainingConfig:
     discount: float
     epsilon: float
     epsilon_decay: float
-    min_epsilon: float = 0.01
-    planning_steps: int = 0
-    delivery: Delivery = "absorbing"
+    min_epsilon: float
+    hyperparameters: tuple[tuple[str, float], ...]
 
-    def __post_init__(self) -> None:
-        if not isinstance(self.learner, str):
-            raise AntsError(f"learner is {shown(self.learner)}; it must be the name of a learner.")
-        self._check_number("learning_rate", "above 0 and at most 1", open_below=True)
-        self._check_number("discount", "between 0 and 1")
-        self._check_number("epsilon", "between 0 and 1")
-        self._check_number("epsilon_decay", "above 0 and at most 1", open_below=True)
-        self._check_number("min_epsilon", "between 0 and 1")
-        steps = whole("planning_steps", self.planning_steps)
-        if not 0 <= steps <= MAX_PLANNING_STEPS:
+    def __init__(
+        self,
+        learner: str,
+        learning_rate: float,
+        discount: float,
+        epsilon: float,
+        epsilon_decay: float,
+        min_epsilon: float = 0.01,
+        hyperparameters: Mapping[str, float] | Iterable[tuple[str, float]] = (),
+        **more: float,
+    ) -> None:
+        if not isinstance(learner, str):
+            raise AntsError(f"learner is {shown(learner)}; it must be the name of a learner.")
+        above = "above 0 and at most 1"
+        between = "between 0 and 1"
+        object.__setattr__(self, "learner", learner)
+        self._set("learning_rate", learning_rate, above)
+        self._set("discount", discount, between)
+        self._set("epsilon", epsilon, between)
+        self._set("epsilon_decay", epsilon_decay, above)
+        self._set("min_epsilon", min_epsilon, between)
+        try:
+            pairs = {**dict(hyperparameters), **more}
+        except (TypeError, ValueError):
             raise AntsError(
-                f"planning_steps is {shown(steps)}; it must lie between 0 and {MAX_PLANNING_STEPS}."
-            )
-        object.__setattr__(self, "planning_steps", steps)
-        check_one_of("delivery", self.delivery, DELIVERIES)
+                f"hyperparameters is {shown(hyperparameters)}; it must be a mapping of names to "
+                "numbers."
+            ) from None
+        for name, value in pairs.items():
+            if not isinstance(value, Real) or isinstance(value, bool):
+                raise AntsError(f"{name} is {shown(value)}; it must be a number.")
+        plain = {name: getattr(value, "item", lambda v=value: v)() for name, value in pairs.items()}
+        object.__setattr__(self, "hyperparameters", tuple(sorted(plain.items())))
 
-    def _check_number(self, name: str, allowed: str, open_below: bool = False) -> None:
-        """Check a field and store it as a Python float, so that equal settings are equal."""
-        value = getattr(self, name)
-        if not share_of_one(value) or (open_below and value == 0):
+    def _set(self, name: str, value: float, allowed: str) -> None:
+        """Store a number from 0 to 1 as a Python float, so that equal settings are equal."""
+        if not share_of_one(value) or (allowed.startswith("above") and value == 0):
             raise AntsError(f"{name} is {shown(value)}; it must be a number {allowed}.")
         object.__setattr__(self, name, float(value))
+
+    @property
+    def planning_steps(self) -> int:
+        """Updates from a model after each step: the hyperparameter of that name, or 0."""
+        return int(dict(self.hyperparameters).get("planning_steps", 0))
+
+    def as_dict(self) -> dict[str, Any]:
+        """The settings as names and numbers, for files; `TrainingConfig(**facts)` reads them."""
+        return {**asdict(self), "hyperparameters": dict(self.hyperparameters)}
 
 
 def share_of_one(value: Any) -> bool:
     """Whether a value is a number from 0 to 1; booleans, text and arrays are none."""
     number = isinstance(value, Real) and not isinstance(value, bool)
     return number and bool(0 <= value <= 1)
+
+
+def update_weights(alpha: float, most: int) -> np.ndarray:
+    """How far the mean of n TD errors moves a shared value: 1 - (1 - alpha)^n.
+
+    So far n updates in turn, each with learning rate alpha, go towards one target. Kernels and
+    reference take these numbers from here, since powers differ in the last bit between libraries.
+
+    Args:
+        alpha: The learning rate, in (0, 1]; taken as float32.
+        most: The largest n.
+
+    Returns:
+        float32 (most + 1,), by n; at 0 it is 0, at 1 alpha itself.
+    """
+    rate = np.float32(alpha)
+    weights = (1.0 - (1.0 - np.float64(rate)) ** np.arange(most + 1)).astype(np.float32)
+    # In float64 1 - (1 - alpha) may differ from alpha by a rounding.
+    weights[1:2] = rate
+    return weights

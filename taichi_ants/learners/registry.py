@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import dis
 import inspect
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, fields, replace
 from importlib import import_module
 from types import FunctionType
 from typing import Any
 
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, shown
+from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.learners.hyperparameters import Hyperparameters
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,8 @@ class Learner:
         plans: The learner keeps a model of the last seen outcome of each visited pair and updates
             from it `planning_steps` times after each step. These updates have no next action, so
             td_error may not look at it.
+        hyperparameters: What it has besides the settings of all learners: a dataclass whose fields
+            `whole_number` and `number` of `taichi_ants.learners` make, all with usual values.
         summary: One line for listings.
     """
 
@@ -41,6 +45,7 @@ class Learner:
     td_error: Any
     draws_next_action: bool = False
     plans: bool = False
+    hyperparameters: type[Hyperparameters] = Hyperparameters
     summary: str = ""
 
 
@@ -107,6 +112,24 @@ def get(name: str) -> Learner:
     if name not in _LEARNERS:
         raise AntsError(f"there is no learner {name!r}; choose one of {', '.join(names())}.")
     return _LEARNERS[name]
+
+
+def settle(config: TrainingConfig) -> TrainingConfig:
+    """The configuration with all hyperparameters of its learner.
+
+    Raises:
+        AntsError: There is no such learner, it has no such hyperparameter, or a value is outside
+            its range.
+    """
+    kind = get(config.learner).hyperparameters
+    given, known = dict(config.hyperparameters), [field.name for field in fields(kind)]
+    for name in given:
+        if name not in known:
+            allowed = f"it has {', '.join(known)}" if known else "it has none"
+            raise AntsError(
+                f"{shown(name)} is no hyperparameter of learner {config.learner!r}; {allowed}."
+            )
+    return replace(config, hyperparameters=asdict(kind(**given)))
 
 
 def names() -> tuple[str, ...]:

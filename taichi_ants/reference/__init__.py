@@ -4,7 +4,7 @@ It is an oracle, not a simulator to use: every rule is written down a second tim
 reads, with a geometry of its own (tuples of cube coordinates in normal form), its own random
 streams, its own vision and its own learners. Tests compare each step of the engines with it, for
 equality to the bit. To keep the two independent, this package imports nothing of `taichi_ants` but
-`constants`, `errors`, the configurations (with the weights of `colony_config.update_weights`) and
+`constants`, `errors`, the configurations (with the weights of `learners.config.update_weights`) and
 the type `World`, and of a world it reads only the fields (ranges, queen, foods, obstacles, trails,
 ants).
 

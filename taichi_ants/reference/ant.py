@@ -8,7 +8,6 @@ from typing import Protocol
 
 import numpy as np
 
-import taichi_ants.task.rewards as rewards
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.geometry import Cell, distance, neighbour
 from taichi_ants.reference.random_stream import RandomStream, pick
@@ -134,7 +133,7 @@ def act(
     if action == PICK_UP:
         return _pick_up(world, ant, codes, stream)
     if action == GIVE:
-        return _give(ant, codes)
+        return _give(world, ant, codes)
     return _move(world, ant, codes, action)
 
 
@@ -143,11 +142,11 @@ def _move(world: WorldState, ant: Ant, codes: tuple[int, ...], action: int) -> t
     # The turn is made even if the way is blocked: so an ant gets out of a dead end.
     ant.heading = (ant.heading + action - 1) % N_HEADINGS
     if world.content(target) != EMPTY:
-        return rewards.REWARDS.failed, Event.BLOCKED
+        return world.rewards.failed, Event.BLOCKED
     ant.cell = target
     if ant.carries:
         world.deposit(target)
-    table = rewards.REWARDS
+    table = world.rewards
     return (table.lure if codes[action] == SEES_LURE else table.empty), Event.MOVED
 
 
@@ -158,7 +157,7 @@ def _pick_up(
         cell for cell, code in zip(cells_in_view(ant), codes, strict=True) if code == SEES_GOAL
     ]
     if ant.carries or not foods:
-        return rewards.REWARDS.failed, Event.FAILED
+        return world.rewards.failed, Event.FAILED
     chosen = foods[0]
     if len(foods) > 1:
         high, _ = stream.draw()
@@ -168,11 +167,11 @@ def _pick_up(
     world.deposit(ant.cell)
     ant.carries = True
     ant.heading = (ant.heading + 3) % N_HEADINGS
-    return rewards.REWARDS.pick_up, Event.PICKED_UP
+    return world.rewards.pick_up, Event.PICKED_UP
 
 
-def _give(ant: Ant, codes: tuple[int, ...]) -> tuple[int, Event]:
+def _give(world: WorldState, ant: Ant, codes: tuple[int, ...]) -> tuple[int, Event]:
     if not ant.carries or SEES_GOAL not in codes:
-        return rewards.REWARDS.failed, Event.FAILED
+        return world.rewards.failed, Event.FAILED
     ant.carries = False
-    return rewards.REWARDS.give, Event.DELIVERED
+    return world.rewards.give, Event.DELIVERED

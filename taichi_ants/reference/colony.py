@@ -25,12 +25,12 @@ from taichi_ants.reference.colony_world import ColonyWorld
 from taichi_ants.reference.learning import decayed_epsilon
 from taichi_ants.reference.policy import choose_action
 from taichi_ants.reference.random_stream import RandomStream, stream_state
-from taichi_ants.reference.start import start
+from taichi_ants.reference.start import start as start_of
+from taichi_ants.task import Task
 from taichi_ants.task.constants import PICK_UP
 
 if TYPE_CHECKING:
     from taichi_ants.learners.config import TrainingConfig
-    from taichi_ants.task.colony import ColonyConfig
     from taichi_ants.worlds.world import World
 
 
@@ -55,9 +55,13 @@ class ReferenceColony:
     def __init__(
         self,
         world: World,
-        config: ColonyConfig,
+        task: Task | None,
         training: TrainingConfig,
         seed: int,
+        ants: int = 1,
+        capacity: int | None = None,
+        start: str = "nest",
+        ends_at_delivery: bool = False,
         sharing: str = "shared",
         q_values: np.ndarray | None = None,
     ) -> None:
@@ -65,10 +69,11 @@ class ReferenceColony:
 
         Args:
             world: Every episode starts from it.
-            config: The life of the colony.
+            task: The rules of the game; the paper's if None.
             training: The learner and its settings.
             seed: Any integer.
-            sharing: "shared", "own" or "fixed", see `colony_config.Sharing`.
+            ants, capacity, start, ends_at_delivery: As in `Colony`.
+            sharing: "shared", "own" or "fixed".
             q_values: The table to begin with, (128, 5); with "own" also (slots, 128, 5). Zeros if
                 not given. A born ant that has a table of its own begins with zeros all the same.
 
@@ -78,14 +83,22 @@ class ReferenceColony:
         """
         if sharing not in SHARING:
             raise AntsError(f"sharing is {sharing!r}; it must be one of {', '.join(SHARING)}.")
-        self._start_world, self._config, self._training = world, config, training
+        self._task = task or Task()
+        self._start_world, self._life, self._training = world, self._task.life, training
+        self._n_ants, self._ends_at_delivery = ants, ends_at_delivery
+        self._slots = capacity or (2 * ants + 64 if self._life.births else ants)
+        learns = sharing != "fixed"
+        falls = (
+            self._task.evaporation_in_training if learns else self._task.evaporation_in_evaluation
+        )
+        self._pheromone = self._task.pheromone if falls else self._task.pheromone.lasting
         self._seed, self._sharing = seed, sharing
-        self._starts = start(world, seed, config.ants, config.start)
+        self._starts = start_of(world, seed, ants, start)
         self._initial_streams = [
-            RandomStream(stream_state(seed, STREAM_ANT, number)) for number in range(config.ants)
+            RandomStream(stream_state(seed, STREAM_ANT, number)) for number in range(ants)
         ]
         self.queen = Queen(RandomStream(stream_state(seed, STREAM_QUEEN, 0)))
-        self.minds = SHARING[sharing](training, config.slots, q_values)
+        self.minds = SHARING[sharing](training, self._slots, q_values)
         self.epsilon = float(training.epsilon)
         self.episode = -1
         self.records: list[EpisodeRecord] = []
@@ -94,7 +107,7 @@ class ReferenceColony:
     def _set_up(self) -> None:
         """Put everything that does not outlive an episode where it starts."""
         world = self._start_world
-        self.world = ColonyWorld(world, self._config.pheromone)
+        self.world = ColonyWorld(world, self._pheromone, self._task.rewards)
         self.homes = Homes([(x, y, z) for x, y, z in world.foods.tolist()])
         self.queen.store = 0
         self.record = EpisodeRecord()
@@ -158,7 +171,7 @@ class ReferenceColony:
         self._learn(acting, states, events, {ant.slot for ant in dying})
         self.record.living_per_tick.append(len(self.ants))
         self.record.ticks += 1
-        self.over = self._config.ends_at_delivery and self.record.deliveries > 0
+        self.over = self._ends_at_delivery and self.record.deliveries > 0
 
     def _choose(self, ant: ColonyAnt) -> int:
         action, ant.chosen = ant.chosen, None
@@ -181,13 +194,13 @@ class ReferenceColony:
             record.first_delivery = record.ticks + 1
 
     def _births(self, gives: int) -> None:
-        if not self._config.births:
+        if not self._life.births:
             return
         self.queen.store += gives
-        free_slots = [slot for slot in range(self._config.slots) if slot not in self.ants]
+        free_slots = [slot for slot in range(self._slots) if slot not in self.ants]
         # The slots first: where they end, no further place is asked for, and so none is drawn.
         for slot, (cell, heading) in zip(free_slots, self.queen.places(self.world), strict=False):
-            number = self._config.ants + self.record.births
+            number = self._n_ants + self.record.births
             state = stream_state(self._seed, STREAM_BORN, (self.episode << 32) + number)
             stream = RandomStream(state)
             self._add(ColonyAnt(cell, heading, slot=slot, number=number, stream=stream))
@@ -195,26 +208,26 @@ class ReferenceColony:
             self.record.births += 1
 
     def _deaths(self, ants: list[ColonyAnt]) -> list[ColonyAnt]:
-        if self._config.lifespan is None:
+        if self._life.lifespan is None:
             return []
-        dying = grow_old(self.world, ants, self._config.lifespan)
+        dying = grow_old(self.world, ants, self._life.lifespan)
         for ant in dying:
             del self.ants[ant.slot]
         self.record.deaths += len(dying)
         return dying
 
     def _food(self, tick: int) -> None:
-        config = self._config
-        if config.regrowth is not None:
-            self.record.regrown += self.homes.regrow(self.world, config.regrowth, tick)
-        if config.wander is not None and (tick + 1) % config.wander == 0:
+        life = self._life
+        if life.regrowth is not None:
+            self.record.regrown += self.homes.regrow(self.world, life.regrowth, tick)
+        if life.wander is not None and (tick + 1) % life.wander == 0:
             self.homes.wander(self.world, self.queen.stream)
 
     def _learn(
         self, acting: list[ColonyAnt], states: list[int], events: list[Event], dying: set[int]
     ) -> None:
         """Draw a' where the learner wants it, by the tables as they stand; then learn."""
-        absorbing = self._training.delivery == "absorbing"
+        absorbing = self._task.delivery == "absorbing"
         self.transitions = []
         for ant, state, event in zip(acting, states, events, strict=True):
             terminated = event is Event.DELIVERED and absorbing

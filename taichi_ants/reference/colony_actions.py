@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import taichi_ants.task.rewards as rewards
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.ant import Event
 from taichi_ants.reference.colony_conflicts import Claim, winners
@@ -103,12 +102,12 @@ def carry_out(
 def _commit(world: ColonyWorld, intent: Intent, wins: bool) -> Event:
     ant = intent.ant
     ant.action = intent.action
-    ant.reward = rewards.REWARDS.failed
+    ant.reward = world.rewards.failed
     if intent.action == GIVE:
         if not intent.gives:
             return Event.FAILED
         ant.carries = False
-        ant.reward = rewards.REWARDS.give
+        ant.reward = world.rewards.give
         return Event.DELIVERED
     if intent.action == PICK_UP:
         if not wins or intent.target is None:
@@ -116,7 +115,7 @@ def _commit(world: ColonyWorld, intent: Intent, wins: bool) -> Event:
         world.take_food(intent.target)
         ant.carries = True
         ant.heading = (ant.heading + 3) % N_HEADINGS
-        ant.reward = rewards.REWARDS.pick_up
+        ant.reward = world.rewards.pick_up
         return Event.PICKED_UP
     # The turn is made even if the way is blocked: so an ant gets out of a dead end.
     ant.heading = intent.heading
@@ -125,5 +124,5 @@ def _commit(world: ColonyWorld, intent: Intent, wins: bool) -> Event:
     world.occupied.remove(ant.cell)
     world.occupied.add(intent.target)
     ant.cell = intent.target
-    ant.reward = rewards.REWARDS.lure if intent.lured else rewards.REWARDS.empty
+    ant.reward = world.rewards.lure if intent.lured else world.rewards.empty
     return Event.MOVED

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from taichi_ants.learners.config import update_weights
 from taichi_ants.reference.colony_records import Transition
 from taichi_ants.reference.knowledge import Knowledge
 from taichi_ants.reference.learning import learn_alone
 from taichi_ants.reference.random_stream import RandomStream
 from taichi_ants.reference.records import Pair
-from taichi_ants.task.colony import update_weights
 from taichi_ants.task.constants import N_ACTIONS, N_STATES
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.geometry import Cell, existing_cells, neighbour
 
 if TYPE_CHECKING:
-    from taichi_ants.task.colony import Pheromone
+    from taichi_ants.task.pheromone import Pheromone
     from taichi_ants.worlds.world import World
 
 

@@ -11,7 +11,8 @@ from taichi_ants.reference.geometry import Cell, existing_cells
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
 if TYPE_CHECKING:
-    from taichi_ants.task.colony import Pheromone
+    from taichi_ants.task.pheromone import Pheromone
+    from taichi_ants.task.rewards import Rewards
     from taichi_ants.worlds.world import World
 
 
@@ -23,11 +24,13 @@ class ColonyWorld:
         ground: What each existing cell holds, ants aside: EMPTY, OBSTACLE, FOOD or QUEEN.
         occupied: The cells on which ants stand; they are EMPTY in `ground`.
         trail: The trail of every cell.
+        rewards: What each event pays.
     """
 
-    def __init__(self, world: World, pheromone: Pheromone) -> None:
+    def __init__(self, world: World, pheromone: Pheromone, rewards: Rewards) -> None:
         self._ranges = world.ranges
         self.queen: Cell = world.queen
+        self.rewards = rewards
         self.ground: dict[Cell, int] = dict.fromkeys(existing_cells(self._ranges), EMPTY)
         self.ground[self.queen] = QUEEN
         for x, y, z in world.foods.tolist():

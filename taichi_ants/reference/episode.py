@@ -11,6 +11,7 @@ from taichi_ants.reference.records import Step
 from taichi_ants.reference.world_state import WorldState
 
 if TYPE_CHECKING:
+    from taichi_ants.task.rewards import Rewards
     from taichi_ants.worlds.world import World
 
 
@@ -28,6 +29,7 @@ class Episode:
         begin: tuple[Cell, int],
         stream: RandomStream,
         evaporation: bool,
+        rewards: Rewards,
         max_steps: int,
         number: int = 0,
     ) -> None:
@@ -38,11 +40,12 @@ class Episode:
             begin: Cell and heading of the ant.
             stream: Where a pick-up draws from.
             evaporation: Whether every trail falls by 1 per tick.
+            rewards: What each event pays.
             max_steps: The step limit, at least 1.
             number: Of the episode in its run.
         """
         self._ant = Ant(*begin)
-        self._world = WorldState(world, evaporation)
+        self._world = WorldState(world, evaporation, rewards)
         self._stream = stream
         self._max_steps = max_steps
         self._number = number

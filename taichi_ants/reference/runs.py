@@ -13,6 +13,7 @@ from taichi_ants.reference.policy import choose_action
 from taichi_ants.reference.random_stream import RandomStream, stream_state
 from taichi_ants.reference.records import LearningStep, Rollout, Run, Step
 from taichi_ants.reference.start import start
+from taichi_ants.task import Task
 
 if TYPE_CHECKING:
     from taichi_ants.learners.config import TrainingConfig
@@ -25,7 +26,7 @@ def train(
     seed: int,
     episodes: int,
     max_steps: int,
-    evaporation: bool = False,
+    task: Task | None = None,
     trace: bool = False,
     start_from: Run | None = None,
     trace_tables: bool = False,
@@ -39,7 +40,7 @@ def train(
         seed: Any integer.
         episodes: How many episodes to train (further ones, with `start_from`).
         max_steps: An episode is truncated after so many steps, at least 1.
-        evaporation: Whether every trail falls by 1 per tick.
+        task: The rules of the game; the paper's if not given.
         trace: Whether to record each step.
         start_from: A run of the same world, configuration and seed to go on from. It is left as it
             is; the result holds its episodes, and its trace, before the new ones.
@@ -50,11 +51,13 @@ def train(
             cell for the ant.
     """
     learning = Learning(config, seed, start_from)
-    absorbing = config.delivery == "absorbing"
+    task = task or Task()
+    falls, rewards = task.evaporation_in_training, task.rewards
+    absorbing = task.delivery == "absorbing"
     [begin] = start(world, seed)
     returns, lengths, deliveries, recorded = _history(start_from)
     for number in range(len(returns), len(returns) + episodes):
-        episode = Episode(world, begin, learning.stream, evaporation, max_steps, number)
+        episode = Episode(world, begin, learning.stream, falls, rewards, max_steps, number)
         steps = _train_episode(episode, learning, absorbing, trace_tables)
         learning.end_episode()
         returns.append(sum(step.reward for step in steps))
@@ -116,7 +119,7 @@ def rollout(
     seed: int = 0,
     number: int = 0,
     max_steps: int = 600,
-    evaporation: bool = True,
+    task: Task | None = None,
     epsilon: float = 0.0,
     trace: bool = True,
 ) -> Rollout:
@@ -128,7 +131,7 @@ def rollout(
         seed: Any integer.
         number: Which rollout of the seed it is; each has a random stream of its own.
         max_steps: The episode is truncated after so many steps, at least 1.
-        evaporation: Whether every trail falls by 1 per tick.
+        task: The rules of the game; the paper's if not given.
         epsilon: Probability of a random action.
         trace: Whether to record each step.
 
@@ -138,7 +141,9 @@ def rollout(
     rows = [list(row) for row in np.asarray(q_values, np.float32)]
     stream = RandomStream(stream_state(seed, STREAM_ROLLOUT, number))
     [begin] = start(world, seed)
-    episode = Episode(world, begin, stream, evaporation, max_steps)
+    task = task or Task()
+    falls = task.evaporation_in_evaluation
+    episode = Episode(world, begin, stream, falls, task.rewards, max_steps)
     steps: list[Step] = []
     while not episode.over:
         action = choose_action(rows[episode.state], epsilon, stream)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from taichi_ants.reference.geometry import Cell, exists
 from taichi_ants.task.constants import DEPOSIT_LEVEL, EMPTY, FOOD, OBSTACLE, QUEEN
+from taichi_ants.task.rewards import Rewards
 
 if TYPE_CHECKING:
     from taichi_ants.worlds.world import World
@@ -18,13 +19,15 @@ class WorldState:
         ranges: (X, Y, Z) of the world.
         queen: The queen's cell.
         evaporation: Whether every trail falls by 1 per tick.
+        rewards: What each event pays.
         clock: Ticks since the episode's start.
     """
 
-    def __init__(self, world: World, evaporation: bool) -> None:
+    def __init__(self, world: World, evaporation: bool, rewards: Rewards | None = None) -> None:
         self.ranges = world.ranges
         self.queen: Cell = world.queen
         self.evaporation = evaporation
+        self.rewards = rewards or Rewards()
         self.clock = 0
         # Cells that are not named here are empty, if they exist.
         self._holds: dict[Cell, int] = {self.queen: QUEEN}

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, whole
 from taichi_ants.grid.hexgrid import AxialGrid
-from taichi_ants.grid.randomness import whole
 from taichi_ants.rendering.arguments import expect
 from taichi_ants.rendering.episodes import DEFAULT_FPS, Progress, with_pause
 from taichi_ants.rendering.panel import Status

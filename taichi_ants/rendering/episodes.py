@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from taichi_ants.engines.runs.traces import Trace, rollout
-from taichi_ants.errors import AntsError, checked_flag
-from taichi_ants.grid.randomness import whole
+from taichi_ants.errors import AntsError, checked_flag, whole
 from taichi_ants.rendering.arguments import expect
 from taichi_ants.rendering.panel import Status
 from taichi_ants.rendering.replay import Replay
 from taichi_ants.rendering.scene import DEFAULT_SIZE, Scene, check_size, range_with_zero
 from taichi_ants.rendering.snapshot import Snapshot
 from taichi_ants.rendering.writers import PathLike, check_animation, save_animation
+from taichi_ants.task import Task
 from taichi_ants.worlds.world import World
 
 Progress = Callable[[float], None]  # called with the share of the work that is done, 0 to 1
@@ -34,7 +34,7 @@ class Episode:
         world: Where it happened.
         trace: Its n steps.
         seed, number: Of the rollout.
-        evaporation: Whether trails fell by 1 with each step.
+        task: The rules of the game; None is the paper's.
         name: What the head-up lines call it.
         whole: Whether it ended with its last step; the beginning of an episode has no outcome.
     """
@@ -43,7 +43,7 @@ class Episode:
     trace: Trace
     seed: int = 0
     number: int = 0
-    evaporation: bool = True
+    task: Task | None = None
     name: str = ""
     whole: bool = True
 
@@ -56,14 +56,14 @@ class Episode:
         seed: int = 0,
         number: int = 0,
         max_steps: int = 600,
-        evaporation: bool = True,
+        task: Task | None = None,
         epsilon: float = 0.0,
     ) -> Episode:
         """Roll a policy out; arguments and errors are those of `rollout`."""
         expect("world", world, World)
-        trace = rollout(world, q_values, seed, number, max_steps, evaporation, epsilon)
+        trace = rollout(world, q_values, seed, number, max_steps, task, epsilon)
         name = "greedy" if epsilon == 0 else f"epsilon {epsilon:g}"
-        return cls(world, trace, seed, number, evaporation, name)
+        return cls(world, trace, seed, number, task, name)
 
     @property
     def delivered(self) -> bool:
@@ -79,7 +79,7 @@ class Episode:
         trace = self.trace
         returns = np.concatenate([[0], np.cumsum(trace.rewards)]).tolist()
         outcome = "delivered" if self.delivered else "step limit"
-        replay = Replay(self.world, trace, self.seed, self.number, self.evaporation)
+        replay = Replay(self.world, trace, self.seed, self.number, self.task)
         for step, snapshot in enumerate(replay.snapshots()):
             if step < len(trace):
                 yield (
@@ -177,7 +177,7 @@ def render_episode(
     seed: int = 0,
     number: int = 0,
     max_steps: int = 600,
-    evaporation: bool = True,
+    task: Task | None = None,
     epsilon: float = 0.0,
     size: tuple[int, int] = DEFAULT_SIZE,
     fps: float = DEFAULT_FPS,
@@ -191,7 +191,7 @@ def render_episode(
 
     Args:
         path: The ending decides: .gif, .webp or .mp4; a folder of numbered PNG pictures without.
-        world, q_values, seed, number, max_steps, evaporation, epsilon: As in `rollout`; a smaller
+        world, q_values, seed, number, max_steps, task, epsilon: As in `rollout`; a smaller
             `max_steps` keeps the episode of an ant that has not learned short.
         size: Width and height in pixels, 64 to 4096 each.
         fps: Steps per second. The last picture stays a little longer.
@@ -214,7 +214,7 @@ def render_episode(
         seed=seed,
         number=number,
         max_steps=max_steps,
-        evaporation=evaporation,
+        task=task,
         epsilon=epsilon,
     )
     frames = episode_frames(episode, size, hud=hud, legend=legend, view=view, title=title)

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_ants.engines.runs.training import continue_training, train
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, whole
 from taichi_ants.grid.hexgrid import AxialGrid
-from taichi_ants.grid.randomness import whole
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.rendering import colours, text
 from taichi_ants.rendering.arguments import expect
@@ -21,6 +20,7 @@ from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.rendering.scene import check_size
 from taichi_ants.rendering.viewport import Viewport
 from taichi_ants.rendering.writers import PathLike, check_animation, save_animation
+from taichi_ants.task import Task
 from taichi_ants.task.constants import (
     DELIVERED,
     DEPOSIT_LEVEL,
@@ -96,7 +96,7 @@ def learning_stages(
     stages: Sequence[int] = STAGES,
     train_steps: int = 600,
     max_steps: int = 150,
-    evaporation: bool = True,
+    task: Task | None = None,
     epsilon: float = 0.0,
     progress: Progress | None = None,
 ) -> list[Stage]:
@@ -109,7 +109,7 @@ def learning_stages(
         stages: Numbers of episodes, ascending, of equal ones one counts; 0 is before learning.
         train_steps: Step limit of a training episode.
         max_steps: Step limit of a rollout.
-        evaporation: Whether trails fall in the rollouts; they never do in training.
+        task: The rules of the game; None is the paper's.
         epsilon: Probability of a random action in the rollouts.
         progress: Called with the share of the work that is done.
 
@@ -137,7 +137,7 @@ def learning_stages(
             table,
             seed=seed,
             max_steps=max_steps,
-            evaporation=evaporation,
+            task=task,
             epsilon=epsilon,
         )
         played.append(Stage(n, episode))

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from taichi_ants.engines.runs.traces import Trace
-from taichi_ants.errors import checked_flag
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_ROLLOUT
 from taichi_ants.grid.randomness import Stream
 from taichi_ants.rendering.snapshot import Snapshot
+from taichi_ants.task import Task
 from taichi_ants.task.constants import (
     DEPOSIT_LEVEL,
     EMPTY,
@@ -32,18 +32,18 @@ class Replay:
         trace: What `rollout` returned.
         seed, number: Of the rollout. They decide which of several foods in view was taken, the
             only thing that a trace does not tell.
-        evaporation: Whether trails fell by 1 with each step.
+        task: The rules of the game; None is the paper's.
     """
 
     def __init__(
-        self, world: World, trace: Trace, seed: int = 0, number: int = 0, evaporation: bool = True
+        self, world: World, trace: Trace, seed: int = 0, number: int = 0, task: Task | None = None
     ) -> None:
         self._grid = world.grid
         self._trace = trace
         self._cells = world.grid.index(trace.cells)
         self._ground = world.ground()
         self._trail = world.trail_levels()
-        self._evaporation = checked_flag("evaporation", evaporation)
+        self._evaporation = (task or Task()).evaporation_in_evaluation
         self._stream = Stream(seed, STREAM_ROLLOUT, number)
 
     def snapshots(self) -> Iterator[Snapshot]:

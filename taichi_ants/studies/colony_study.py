@@ -8,7 +8,7 @@ where it was.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -34,15 +34,24 @@ from taichi_ants.errors import AntsError
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.provenance import world_facts
 from taichi_ants.studies.sweeps import read_block
-from taichi_ants.task.colony import ColonyConfig, Pheromone
+from taichi_ants.task import Life, Pheromone, Task
 from taichi_ants.worlds.world import World
 
-PHEROMONES: dict[str, Pheromone] = {
+_PHEROMONES = {
     ON: Pheromone(),
     OFF: Pheromone(deposit="none"),
     LASTING: Pheromone(evaporation="none"),
 }
-REGROWTH = 0  # food grows back at once
+# Trails fall in training too, food grows back at once, and an ant goes on after a delivery.
+TASKS = {
+    name: Task(
+        pheromone=pheromone,
+        delivery="continuing",
+        evaporation_in_training=True,
+        life=Life(regrowth=0),
+    )
+    for name, pheromone in _PHEROMONES.items()
+}
 # Seeds of the evaluation are those of the training plus this, so that no random number serves both.
 EVALUATION_SEEDS = 1 << 32
 _EXPLORING = 0.7  # of the training episodes, until epsilon has fallen to what evaluation uses
@@ -164,9 +173,8 @@ def settings_of(plan: StudyPlan) -> dict[str, Any]:
     """All that determines the numbers of a study; equal settings give equal results."""
     return {
         "version": __version__,
-        "training": asdict(plan.training),
-        "pheromones": {name: asdict(one) for name, one in PHEROMONES.items()},
-        "regrowth": REGROWTH,
+        "training": plan.training.as_dict(),
+        "tasks": {name: task.as_dict() for name, task in TASKS.items()},
         "arenas": [
             {
                 **{field.name: getattr(arena, field.name) for field in fields(arena)},
@@ -218,7 +226,7 @@ def median_policies(
             run = int(np.argsort(values, kind="stable")[(arena.seeds - 1) // 2])
             metadata = {
                 **vars(condition),
-                "training": asdict(plan.training),
+                "training": plan.training.as_dict(),
                 "seed": plan.arenas[place].seeds[run],
                 "episodes": arena.episodes,
                 "ticks": arena.ticks,
@@ -251,9 +259,7 @@ class _Runner:
     ) -> None:
         self._plan, self._arena, self._condition = plan, arena, condition
         self._where: dict[str, Any] = {"threads": threads, "arch": arch}
-        self._life = ColonyConfig(
-            ants=condition.ants, pheromone=PHEROMONES[condition.pheromone], regrowth=REGROWTH
-        )
+        self._task = TASKS[condition.pheromone]
 
     def run(
         self, tables: Mapping[Condition, np.ndarray], progress: Progress
@@ -285,9 +291,10 @@ class _Runner:
         decay = min(1.0, (least / max(training.epsilon, least)) ** (1 / exploring))
         colony = Colony(
             arena.worlds,
-            self._life,
+            self._task,
             replace(training, epsilon_decay=decay),
             arena.seeds,
+            ants=self._condition.ants,
             sharing="own" if self._condition.way == OWN else "shared",
             q_values=start,
             **self._where,
@@ -302,9 +309,10 @@ class _Runner:
         least = self._plan.training.min_epsilon
         colony = Colony(
             arena.worlds,
-            self._life,
+            self._task,
             replace(self._plan.training, epsilon=least, epsilon_decay=1.0),
             [seed + EVALUATION_SEEDS for seed in arena.seeds],
+            ants=self._condition.ants,
             sharing="fixed",
             q_values=q_values,
             **self._where,

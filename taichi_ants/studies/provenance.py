@@ -9,7 +9,6 @@ import platform
 import shlex
 import subprocess
 from collections.abc import Sequence
-from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -26,13 +25,14 @@ def sweep_settings(sweep: Sweep) -> dict[str, Any]:
     return {
         "version": __version__,
         "world": world_facts(sweep.world),
-        "configurations": [asdict(config) for config in sweep.configs],
+        "points": [
+            {"task": task.as_dict(), "training": config.as_dict()}
+            for task, config in zip(sweep.tasks, sweep.configs, strict=True)
+        ],
         "seeds": list(sweep.seeds),
         "episodes": sweep.episodes,
         "max_steps": sweep.max_steps,
         "rollouts": sweep.rollouts,
-        "train_evaporation": sweep.train_evaporation,
-        "greedy_evaporation": sweep.greedy_evaporation,
     }
 
 
@@ -68,7 +68,7 @@ def provenance(arguments: Sequence[str]) -> dict[str, Any]:
 
 def commit() -> str | None:
     """The commit of the source, "+changes" behind it if files differ; None outside a checkout."""
-    root = Path(__file__).resolve().parent.parent
+    root = Path(__file__).resolve().parents[2]
     if not (root / ".git").exists():
         return None
     head = _git(root, "rev-parse", "HEAD")

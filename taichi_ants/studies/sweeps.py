@@ -20,9 +20,10 @@ import numpy as np
 from taichi_ants import checks, files
 from taichi_ants.engines.records import Record
 from taichi_ants.engines.runs.results import LearnerCost
-from taichi_ants.errors import AntsError, checked_flag
+from taichi_ants.errors import AntsError
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.task.constants import N_ACTIONS, N_STATES
+from taichi_ants.task import Task
+from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.worlds.world import World
 
 _STEPS_OF_A_BLOCK = 100_000_000  # at most, if every episode used all its steps
@@ -38,13 +39,12 @@ class Sweep:
 
     Attributes:
         world: The world of all runs.
+        tasks: C tasks, that of each configuration.
         configs: C configurations.
         seeds: S seeds.
         episodes: Training episodes of each run.
         max_steps: Step limit of episodes and rollouts.
         rollouts: Greedy rollouts of each final policy.
-        train_evaporation: Whether trails fall by 1 with each step of training; not in the paper.
-        greedy_evaporation: Whether they do in the greedy rollouts; they do in the paper.
 
     Raises:
         AntsError: A value is not allowed, the world has no room for the ant, or the results would
@@ -52,25 +52,28 @@ class Sweep:
     """
 
     world: World
+    tasks: tuple[Task, ...]
     configs: tuple[TrainingConfig, ...]
     seeds: tuple[int, ...]
     episodes: int = 500
     max_steps: int = 600
     rollouts: int = 50
-    train_evaporation: bool = False
-    greedy_evaporation: bool = True
 
     def __post_init__(self) -> None:
         checks.checked_world(self.world).start(checks.checked_seeds(self.seeds)[0])
-        checks.checked_configs(self.configs)
+        configs = checks.checked_configs(self.configs)
+        object.__setattr__(self, "configs", configs)
+        for task in self.tasks:
+            checks.checked_runs_task(task)
+        if len(self.tasks) != len(configs):
+            raise AntsError(f"there are {len(self.tasks)} tasks for {len(configs)} configurations.")
         checks.checked_count("episodes", self.episodes)
-        checks.checked_max_steps(self.max_steps)
+        for task in dict.fromkeys(self.tasks):
+            checks.checked_max_steps(self.max_steps, task)
         checks.checked_count("rollouts", self.rollouts)
-        for name in ("train_evaporation", "greedy_evaporation"):
-            object.__setattr__(self, name, checked_flag(name, getattr(self, name)))
         runs = len(self.configs) * len(self.seeds)
         figures = len(_ARRAYS) * (self.episodes + self.rollouts)
-        needed = runs * (4 * figures + 4 * N_STATES * N_ACTIONS) * _COPIES
+        needed = runs * (4 * figures + 4 * self.n_states * N_ACTIONS) * _COPIES
         if needed > available_memory():
             raise AntsError(
                 f"{runs} runs of {self.episodes} episodes need about {needed / 1e9:.0f} GB of "
@@ -85,12 +88,18 @@ class Sweep:
         """
         longest = self.episodes * self.max_steps
         size = min(max(1, _STEPS_OF_A_BLOCK // longest), _RUNS_OF_A_BLOCK)
-        for _, alike in itertools.groupby(range(len(self.configs)), lambda c: self.cost_of(c)):
+        kind = lambda c: (self.tasks[c], self.cost_of(c))  # noqa: E731
+        for _, alike in itertools.groupby(range(len(self.configs)), kind):
             first, *others = alike
             configs = slice(first, first + 1 + len(others))
             for some in _pieces(configs, max(1, size // len(self.seeds))):
                 for seeds in _pieces(slice(0, len(self.seeds)), size):
                     yield some, seeds
+
+    @property
+    def n_states(self) -> int:
+        """The rows of each table."""
+        return self.tasks[0].n_states
 
     def cost_of(self, c: int) -> tuple[str, int]:
         """What the cost of a configuration depends on: its learner and its planning steps."""
@@ -182,7 +191,7 @@ def _do_block(
         chosen,
         sweep.episodes,
         sweep.max_steps,
-        sweep.train_evaporation,
+        sweep.tasks[configs.start],
         threads=threads,
         arch=arch,
     )
@@ -193,7 +202,7 @@ def _do_block(
         sweep.rollouts,
         chosen,
         sweep.max_steps,
-        sweep.greedy_evaporation,
+        sweep.tasks[configs.start],
         threads=threads,
         arch=arch,
     )
@@ -218,7 +227,7 @@ def _empty_result(sweep: Sweep) -> dict[str, np.ndarray]:
     runs = (len(sweep.configs), len(sweep.seeds))
     arrays = {name: np.zeros((*runs, sweep.episodes), dtype=np.int32) for name in _ARRAYS}
     arrays |= {name: np.zeros((*runs, sweep.rollouts), dtype=np.int32) for name in _GREEDY}
-    return arrays | {"q_values": np.zeros((*runs, N_STATES, N_ACTIONS), dtype=np.float32)}
+    return arrays | {"q_values": np.zeros((*runs, sweep.n_states, N_ACTIONS), dtype=np.float32)}
 
 
 def _add_cost(

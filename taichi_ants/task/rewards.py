@@ -6,8 +6,7 @@ from dataclasses import astuple, dataclass, fields
 
 import numpy as np
 
-from taichi_ants.errors import AntsError
-from taichi_ants.grid.randomness import whole
+from taichi_ants.errors import AntsError, whole
 
 MOST = 1000
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, shown
+from taichi_ants.errors import AntsError, shown, whole
 from taichi_ants.grid.hexgrid import AxialGrid, axial, cube
-from taichi_ants.grid.randomness import Stream, choose, whole
+from taichi_ants.grid.randomness import Stream, choose
 from taichi_ants.worlds.validation import parse_ranges
 from taichi_ants.worlds.world import World
 

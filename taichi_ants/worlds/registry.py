@@ -6,8 +6,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from taichi_ants.errors import AntsError, shown
-from taichi_ants.grid.randomness import whole
+from taichi_ants.errors import AntsError, shown, whole
 from taichi_ants.worlds.text_map import load_map
 from taichi_ants.worlds.world import World
 

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, check_one_of, shown
+from taichi_ants.errors import AntsError, check_one_of, shown, whole
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_START_CELL, STREAM_START_HEADING
-from taichi_ants.grid.randomness import choose, stream_state, whole
-from taichi_ants.task.colony import STARTS
+from taichi_ants.grid.randomness import choose, stream_state
 from taichi_ants.task.constants import EMPTY
 
 if TYPE_CHECKING:
     from taichi_ants.worlds.world import World
+
+Start = Literal["nest", "spread"]
+STARTS: tuple[str, ...] = get_args(Start)
 
 
 def place(world: World, seed: int, n: int, where: str) -> tuple[np.ndarray, np.ndarray]:

@@ -6,10 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, shown
+from taichi_ants.errors import AntsError, shown, whole
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import MAX_ARRAY_CELLS, AxialGrid
-from taichi_ants.grid.randomness import whole
 from taichi_ants.task.constants import MAX_TRAIL_LEVEL
 
 # Coordinates beyond this are in no world, and their differences would leave 64 bits.

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from taichi_ants.errors import AntsError
-from taichi_ants.grid.randomness import GAMMA, Stream, choose, mix, stream_state, whole
+from taichi_ants.errors import AntsError, whole
+from taichi_ants.grid.randomness import GAMMA, Stream, choose, mix, stream_state
 
 # The first outputs of splitmix64 for the state 1234567, as published with the generator's ports.
 PUBLISHED = [

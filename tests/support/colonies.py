@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 
 from taichi_ants import TrainingConfig
 from taichi_ants.reference import Cell, ReferenceColony, observe
-from taichi_ants.task.colony import ColonyConfig
+from taichi_ants.task import Life, Task
 from taichi_ants.task.constants import FOOD
 from taichi_ants.worlds import World, from_text
 
@@ -21,7 +23,7 @@ def training(learner: str = "q_learning", **settings: object) -> TrainingConfig:
         "epsilon": 0.0,
         "epsilon_decay": 1.0,
         "min_epsilon": 0.0,
-        "planning_steps": 3 if learner == "dyna_q" else 0,
+        **({"planning_steps": 3} if learner == "dyna_q" else {}),
     }
     return TrainingConfig(learner, **{**defaults, **settings})
 
@@ -36,8 +38,19 @@ def begun(
 ) -> ReferenceColony:
     """A colony in its first episode; as many ants as the world lists, unless options say more."""
     world = from_text(world) if isinstance(world, str) else world
-    config = ColonyConfig(**{"ants": len(world.ants), **options})
-    colony = ReferenceColony(world, config, learning or training(), seed, sharing, q_values)
+    names = {field.name for field in fields(Life)}
+    life = Life(**{name: options.pop(name) for name in names & options.keys()})
+    rules = {name: options.pop(name) for name in ("pheromone", "delivery") if name in options}
+    task = Task(evaporation_in_training=True, life=life, **rules)
+    colony = ReferenceColony(
+        world,
+        task,
+        learning or training(),
+        seed,
+        **{"ants": len(world.ants), **options},
+        sharing=sharing,
+        q_values=q_values,
+    )
     colony.begin_episode()
     return colony
 

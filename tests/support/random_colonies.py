@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from random_worlds import random_world
 
 from taichi_ants import TrainingConfig
-from taichi_ants.task.colony import SHARINGS, STARTS, ColonyConfig, Pheromone
+from taichi_ants.engines.colony.population import SHARINGS
+from taichi_ants.task import Life, Pheromone, Rewards, Task
 from taichi_ants.task.constants import EMPTY, GIVE, N_ACTIONS, N_STATES, PICK_UP
 from taichi_ants.worlds import World
+from taichi_ants.worlds.starts import STARTS
 
 LEARNERS = [("q_learning", 0), ("sarsa", 0), ("expected_sarsa", 0), ("dyna_q", 2)]
 
@@ -20,7 +23,8 @@ class RandomColony:
     """What makes a colony."""
 
     world: World
-    config: ColonyConfig
+    task: Task
+    population: dict[str, Any]
     training: TrainingConfig
     seed: int
     sharing: str
@@ -28,17 +32,24 @@ class RandomColony:
 
 
 def random_colony(
-    seed: int, most_ants: int = 24, sharing: str | None = None, largest_range: int = 5
+    seed: int,
+    most_ants: int = 24,
+    sharing: str | None = None,
+    largest_range: int = 5,
+    rewards: Rewards | None = None,
 ) -> RandomColony:
     """The same seed gives the same colony; `sharing` may be given instead of drawn."""
     rng = np.random.default_rng([seed, 2])
     world = random_world(seed, largest_range)
     room = int(np.count_nonzero(world.ground() == EMPTY))
     sharing = str(rng.choice(SHARINGS)) if sharing is None else sharing
+    population, task = _rules(rng, min(room, most_ants))
+    training, delivery = _training(rng)
     return RandomColony(
         world=world,
-        config=_config(rng, min(room, most_ants)),
-        training=_training(rng),
+        task=replace(task, delivery=delivery, rewards=rewards or Rewards()),
+        population=population,
+        training=training,
         seed=int(rng.integers(-5, 2**40)),
         sharing=sharing,
         q_values=forager() if sharing == "fixed" or rng.random() < 0.6 else None,
@@ -57,21 +68,23 @@ def forager() -> np.ndarray:
     return q_values
 
 
-def _config(rng: np.random.Generator, most_ants: int) -> ColonyConfig:
+def _rules(rng: np.random.Generator, most_ants: int) -> tuple[dict[str, Any], Task]:
     # One ant, any number, or as many as there is room for.
     ants = int(rng.choice([1, rng.integers(1, most_ants + 1), most_ants]))
     births = bool(rng.random() < 0.5)
-    return ColonyConfig(
-        ants=ants,
-        capacity=ants + int(rng.integers(0, 6)) if rng.random() < 0.5 else None,
-        pheromone=_pheromone(rng),
-        births=births,
-        lifespan=int(rng.integers(1, 30)) if rng.random() < 0.5 else None,
-        regrowth=int(rng.choice([0, 0, 1, 2, 7])) if rng.random() < 0.7 else None,
-        wander=int(rng.choice([1, 2, 5])) if rng.random() < 0.5 else None,
-        ends_at_delivery=ants == 1 and not births and bool(rng.random() < 0.5),
-        start=str(rng.choice(STARTS)),
+    capacity = ants + int(rng.integers(0, 6)) if rng.random() < 0.5 else None
+    pheromone = _pheromone(rng)
+    lifespan = int(rng.integers(1, 30)) if rng.random() < 0.5 else None
+    regrowth = int(rng.choice([0, 0, 1, 2, 7])) if rng.random() < 0.7 else None
+    wander = int(rng.choice([1, 2, 5])) if rng.random() < 0.5 else None
+    ends = ants == 1 and not births and bool(rng.random() < 0.5)
+    start = str(rng.choice(STARTS))
+    task = Task(
+        pheromone=pheromone,
+        evaporation_in_training=True,
+        life=Life(births, lifespan, regrowth, wander),
     )
+    return {"ants": ants, "capacity": capacity, "ends_at_delivery": ends, "start": start}, task
 
 
 def _pheromone(rng: np.random.Generator) -> Pheromone:
@@ -89,16 +102,16 @@ def _pheromone(rng: np.random.Generator) -> Pheromone:
     )
 
 
-def _training(rng: np.random.Generator) -> TrainingConfig:
+def _training(rng: np.random.Generator) -> tuple[TrainingConfig, str]:
     """Values far from each other and from round ones."""
     learner, planning_steps = LEARNERS[rng.integers(len(LEARNERS))]
-    return TrainingConfig(
+    config = TrainingConfig(
         learner=learner,
         learning_rate=float(rng.choice([0.001, 0.01, 0.37, 1.0])),
         discount=float(rng.choice([0.0, 0.9, 0.99])),
         epsilon=float(rng.choice([0.0, 0.05, 0.3, 1.0])),
         epsilon_decay=float(rng.choice([0.3, 0.99, 1.0])),
         min_epsilon=float(rng.choice([0.0, 0.01, 0.2])),
-        planning_steps=planning_steps,
-        delivery=str(rng.choice(["absorbing", "continuing"])),
+        hyperparameters={"planning_steps": planning_steps} if planning_steps else {},
     )
+    return config, str(rng.choice(["absorbing", "continuing"]))

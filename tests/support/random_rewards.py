@@ -1,11 +1,9 @@
-"""Tables of rewards drawn at random, put in force for a test."""
+"""Tables of rewards drawn at random."""
 
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
-from taichi_ants.task import rewards
 from taichi_ants.task.rewards import MOST, Rewards
 
 # Tables in which something that is recognised by its reward would be mistaken.
@@ -24,8 +22,3 @@ def random_rewards(seed: int) -> Rewards:
     rng = np.random.default_rng([seed, 5])
     drawn = Rewards(*rng.integers(-MOST, MOST + 1, 5).tolist())
     return (Rewards(), TELLING[seed % len(TELLING)], drawn)[rng.integers(3)]
-
-
-def put_in_force(monkeypatch: pytest.MonkeyPatch, table: Rewards) -> None:
-    """Let kernels and reference alike pay by a table."""
-    monkeypatch.setattr(rewards, "REWARDS", table)

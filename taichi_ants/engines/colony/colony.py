@@ -11,12 +11,13 @@ import numpy as np
 from taichi_ants import checks, learners, runtime
 from taichi_ants.engines.colony import files as colony_files
 from taichi_ants.engines.colony import memory as colony_memory
+from taichi_ants.engines.colony.population import SHARINGS, Population, Start
 from taichi_ants.engines.records import Record
 from taichi_ants.errors import AntsError, check_one_of, shown
 from taichi_ants.files import PathLike
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.task.colony import SHARINGS, ColonyConfig
+from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, MAX_STEPS, N_ACTIONS, N_STATES
 from taichi_ants.worlds.world import World
 
@@ -87,9 +88,18 @@ class Colony:
 
     Args:
         world: One world for all seeds, or one for each, of the same ranges.
-        config: How many ants, their pheromone, and what comes and goes.
+        task: The rules of the game; None is the paper's. Colonies that learn have its evaporation
+            in training, others that in evaluation.
         training: The learner and its settings.
         seeds: One seed for each of the W worlds.
+        ants: How many start each episode, 1 to 2**24: the listed ants of the World first, then
+            others on free cells, see `start`.
+        capacity: How many ants can live at once, at least `ants`. None: `ants` if none are born,
+            else 2 * `ants` + 64.
+        start: Where ants start that the World does not list: "nest", on the free cells nearest to
+            the queen; "spread", on free cells anywhere. The seed decides which, and the headings.
+        ends_at_delivery: Whether an episode ends at its first delivery, as when an ant trains
+            alone. Only for one ant, without births.
         sharing: "shared": one table for all ants of a world. "own": one for each slot. "fixed":
             nobody learns.
         q_values: Action values to start from, float (128, 5) or (W, 128, 5); None: zeros, but if
@@ -106,9 +116,13 @@ class Colony:
     def __init__(
         self,
         world: World | Sequence[World],
-        config: ColonyConfig,
+        task: Task | None,
         training: TrainingConfig,
         seeds: int | Sequence[int] = 0,
+        ants: int = 1,
+        capacity: int | None = None,
+        start: Start = "nest",
+        ends_at_delivery: bool = False,
         sharing: str = "shared",
         q_values: np.ndarray | None = None,
         threads: int | None = None,
@@ -116,8 +130,8 @@ class Colony:
         arch: str | None = None,
         schedule: str | None = None,
     ) -> None:
-        if not isinstance(config, ColonyConfig):
-            raise AntsError(f"config is {shown(config)}; it must be a ColonyConfig.")
+        self.task = checks.checked_task(Task() if task is None else task)
+        self.population = Population.of(self.task, ants, capacity, start, ends_at_delivery)
         if not isinstance(training, TrainingConfig):
             raise AntsError(f"training is {shown(training)}; it must be one TrainingConfig.")
         (self.training,) = checks.checked_configs(training)
@@ -127,8 +141,10 @@ class Colony:
                 "sharing is 'fixed', but q_values is None; nobody learns, so give the action "
                 "values that the ants follow."
             )
-        table = None if q_values is None else checks.checked_q_values(q_values)
-        self.config = config
+        table = None if q_values is None else checks.checked_q_values(q_values, self.task)
+        learns = sharing != "fixed"
+        falls = self.task.evaporation_in_training if learns else self.task.evaporation_in_evaluation
+        self.pheromone = self.task.pheromone if falls else self.task.pheromone.lasting
         self.seeds = checks.checked_seeds(seeds)
         self.sharing = sharing
         self._learner = learners.get(training.learner)
@@ -138,30 +154,26 @@ class Colony:
         several = tuple(given)
         if len(several) != len(self.seeds):
             raise AntsError(f"there are {len(several)} worlds for {len(self.seeds)} seeds.")
-        check_world = checks.checked_world if sharing == "fixed" else checks.checked_task
+        check_world = checks.checked_world if sharing == "fixed" else checks.checked_food
         self.layout = colony_memory.Layout(
-            [check_world(one) for one in several], config, self.seeds
+            [check_world(one) for one in several], self.task.life, self.population, self.seeds
         )
-        options = (config.births, config.lifespan, config.regrowth, config.wander)
-        self._lively = any(option is not None and option is not False for option in options)
-        large = config.slots >= _LARGE_COLONY
+        self._lively = self.task.life.changes
+        slots = self.population.slots
+        large = slots >= _LARGE_COLONY
         self.schedule = ("by_chunk" if large else "by_world") if schedule is None else schedule
         check_one_of("schedule", self.schedule, ("by_world", "by_chunk"))
         chunks = 1
         if self.schedule == "by_chunk":
-            chunks = min(_MOST_CHUNKS, -(-config.slots // _ANTS_PER_CHUNK))
+            chunks = min(_MOST_CHUNKS, -(-slots // _ANTS_PER_CHUNK))
         self.chunks = chunks
         words = np.array([seed % 2**64 for seed in self.seeds], dtype=np.uint64)
         plans = self._learner.plans and sharing != "fixed"
-        self.arrays = colony_memory.allocate(
-            self.layout, config, self.training, words, sharing, plans, chunks
-        )
+        self.arrays = colony_memory.allocate(self, words, plans, chunks)
         self.one_a_slot = sharing == "own" or (
             sharing == "fixed" and table is not None and table.ndim == 4
         )
-        tables = colony_memory.allocate_tables(
-            len(self.seeds), config.slots, self.one_a_slot, table
-        )
+        tables = colony_memory.allocate_tables(len(self.seeds), slots, self.one_a_slot, table)
         self.arrays["q"] = tables
         self.epsilon = float(self.training.epsilon)
         self.episode = -1
@@ -173,7 +185,7 @@ class Colony:
 
         self.episode += 1
         self.ticks = 0
-        colony_memory.fill_episode(self.arrays, self.layout, self.config, self.epsilon)
+        colony_memory.fill_episode(self)
         self._launch(BEGIN, 0, 1)
 
     def tick(self, n: int = 1) -> None:
@@ -193,7 +205,7 @@ class Colony:
             if self._learner.plans and self.sharing == "shared":
                 for _ in range(self.training.planning_steps):
                     self._launch(PLAN, self.ticks, 1)
-            if self._lively or self.config.ends_at_delivery:
+            if self._lively or self.population.ends_at_delivery:
                 self._launch(END, self.ticks, 1)
             self.ticks += 1
 
@@ -206,9 +218,9 @@ class Colony:
         from taichi_ants.engines.colony import arrays as names
 
         ants = self.arrays["ants"]
-        first = (ants[names.LIFE] != names.VACANT) & (ants[names.NUMBER] < self.config.ants)
+        first = (ants[names.LIFE] != names.VACANT) & (ants[names.NUMBER] < self.population.ants)
         (columns,) = np.nonzero(first & (ants[names.NUMBER] >= 0))
-        slots = self.config.slots
+        slots = self.population.slots
         places = columns // slots * slots + ants[names.NUMBER, columns]
         self.arrays["first_streams"][places] = self.arrays["streams"][columns]
         self._check_finite()
@@ -269,7 +281,7 @@ class Colony:
     @property
     def q_values(self) -> np.ndarray:
         """The action values, float32 (W, 128, 5), or (W, slots, 128, 5) with own tables; a copy."""
-        n = self.config.slots if self.one_a_slot else 1
+        n = self.population.slots if self.one_a_slot else 1
         tables = self.arrays["q"].reshape(len(self.seeds), n, N_STATES, -1)[..., :N_ACTIONS]
         return (tables if self.one_a_slot else tables[:, 0]).copy()
 
@@ -296,15 +308,15 @@ class Colony:
         self._check_begun()
         world = checks.checked_count("world", world, len(self.seeds) - 1, least=0)
         cells = slice(world * self.layout.size, (world + 1) * self.layout.size)
-        slots = slice(world * self.config.slots, (world + 1) * self.config.slots)
+        slots = slice(world * self.population.slots, (world + 1) * self.population.slots)
         ants = self.arrays["ants"][:, slots]
         ants = ants[:, ants[names.LIFE] == names.LIVING]
         ground = self.arrays["ground"][cells].copy()
         ground[ants[names.CELL]] = EMPTY
-        if self.config.pheromone.dense:
+        if self.pheromone.dense:
             trail = self.arrays["level"][cells].copy()
         else:
-            clock = self.ticks if self.config.pheromone.evaporation == "linear" else 0
+            clock = self.ticks if self.pheromone.evaporation == "linear" else 0
             trail = np.maximum(self.arrays["trail"][cells] - clock, 0)
         return ColonySnapshot(
             self.layout.grid,
@@ -345,7 +357,8 @@ class Colony:
     def __repr__(self) -> str:
         others = len(dict.fromkeys(self.worlds)) - 1
         more = f" and {others} more" if others else ""
-        lines = [f"world: {self.worlds[0]}{more}", f"config: {self.config}"]
+        lines = [f"world: {self.worlds[0]}{more}", f"task: {self.task}"]
+        lines += [f"population: {self.population}"]
         lines += [f"training: {self.training}", f"seeds: {shown(self.seeds)}"]
         lines += [f"sharing: {self.sharing!r}, epsilon: {self.epsilon:.4g}"]
         if self.episode >= 0:
@@ -369,9 +382,9 @@ class Colony:
             return 1
         rounds = -(-len(self.seeds) // self._settings.threads)
         cost = _TICK_NS * (1 + self.training.planning_steps)
-        if self.config.pheromone.dense:
-            cost += 2 * self.layout.size / self.config.slots
-        return max(1, int(_LAUNCH_SECONDS * 1e9 / (rounds * self.config.slots * cost)))
+        if self.pheromone.dense:
+            cost += 2 * self.layout.size / self.population.slots
+        return max(1, int(_LAUNCH_SECONDS * 1e9 / (rounds * self.population.slots * cost)))
 
     def _sort_ants(self) -> None:
         """Store the ants of a world in the order of their cells, so that neighbours share caches.
@@ -382,12 +395,13 @@ class Colony:
         """
         from taichi_ants.engines.colony import arrays as names
 
-        config = self.config
-        if config.births or config.lifespan or self.one_a_slot or config.slots > config.ants:
+        life, population = self.task.life, self.population
+        spare = population.slots > population.ants
+        if life.births or life.lifespan or self.one_a_slot or spare:
             return
         ants = self.arrays["ants"]
         cells = ants[names.CELL].reshape(len(self.seeds), -1)
-        first = np.arange(len(self.seeds))[:, None] * config.slots
+        first = np.arange(len(self.seeds))[:, None] * population.slots
         order = (np.argsort(cells, axis=1) + first).ravel()
         for row in ants:
             row[:] = row[order]
@@ -398,7 +412,7 @@ class Colony:
         from taichi_ants.engines.colony.kernels import colony_kernel
 
         self._settings = runtime.start()  # the caller may have reset Taichi, or forked
-        dense = self.config.pheromone.dense
+        dense = self.pheromone.dense
         kernel = colony_kernel(
             self._learner, self.sharing, self.one_a_slot, dense, self._lively, what
         )
@@ -407,12 +421,12 @@ class Colony:
             kernel(tick, n, *numbers, *Arrays(**self.arrays))
 
     def _numbers(self) -> dict[str, int | float]:
-        config, pheromone = self.config, self.config.pheromone
+        life, population, pheromone = self.task.life, self.population, self.pheromone
         off = -1
         return {
             "worlds": len(self.seeds),
-            "ants": config.ants,
-            "slots": config.slots,
+            "ants": population.ants,
+            "slots": population.slots,
             "chunks": self.chunks,
             "size": self.layout.size,
             "homes": self.layout.homes,
@@ -423,11 +437,11 @@ class Colony:
             "cap": pheromone.cap or 0,
             "decay": -1.0 if pheromone.evaporation == "linear" else float(pheromone.decay),
             "share": float(pheromone.share) if pheromone.diffusion else 0.0,
-            "births": int(config.births),
-            "lifespan": config.lifespan or off,
-            "regrowth": off if config.regrowth is None else config.regrowth,
-            "wander": config.wander or off,
-            "ends_at_delivery": int(config.ends_at_delivery),
+            "births": int(life.births),
+            "lifespan": life.lifespan or off,
+            "regrowth": off if life.regrowth is None else life.regrowth,
+            "wander": life.wander or off,
+            "ends_at_delivery": int(population.ends_at_delivery),
             "planning_steps": self.training.planning_steps,
-            "continuing": int(self.training.delivery == "continuing"),
+            "continuing": int(self.task.delivery == "continuing"),
         }

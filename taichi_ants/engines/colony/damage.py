@@ -59,7 +59,7 @@ def _check_ants(colony: Colony) -> None:
 def _check_worlds(colony: Colony) -> None:
     from taichi_ants.engines.colony import arrays as names
 
-    worlds, slots = colony.arrays["worlds"], colony.config.slots
+    worlds, slots = colony.arrays["worlds"], colony.population.slots
     living = (colony.arrays["ants"][names.LIFE] == names.LIVING).reshape(-1, slots)
     _check_range("whether a world goes on", worlds[names.RUNNING], 1)
     for row in (names.TOP, names.FIRST_VACANT):
@@ -142,7 +142,7 @@ def _check_views(colony: Colony) -> None:
 
     ants, size = colony.arrays["ants"], colony.layout.grid.size
     (columns,) = np.nonzero(ants[names.LIFE] == names.LIVING)
-    world, ants = columns // colony.config.slots, ants[:, columns]
+    world, ants = columns // colony.population.slots, ants[:, columns]
     ground, here = colony.arrays["ground"], world * size + ants[names.CELL]
     stands = (ground[here] == names.ANT_GROUND) & (colony.layout.walls.reshape(-1)[here] == 0)
     _demand(bool(stands.all()), "an ant is not where it stands")

@@ -12,13 +12,13 @@ from taichi_ants.engines.colony.damage import check_contents
 from taichi_ants.engines.records import same
 from taichi_ants.engines.stored import FileKind, world_arrays, world_facts, world_from
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.task.colony import ColonyConfig, Pheromone
-from taichi_ants.task.constants import N_ACTIONS, N_STATES
+from taichi_ants.task import Task
+from taichi_ants.task.constants import N_ACTIONS
 
 if TYPE_CHECKING:
     from taichi_ants.engines.colony.colony import Colony
 
-_KIND = FileKind("taichi-ants colony 2", "colony", "Colony.save")
+_KIND = FileKind("taichi-ants colony 3", "colony", "Colony.save")
 # What the worlds and configurations determine is not stored.
 _DERIVED = frozenset({"walls", "closer", "compass", "rewards", "weights", "spare", "seeds"})
 
@@ -48,8 +48,9 @@ def _contents(colony: Colony) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     for world, number in numbers.items():
         arrays |= world_arrays(world, f"world{number}")
     facts = {
-        "config": asdict(colony.config),
-        "training": asdict(colony.training),
+        "task": colony.task.as_dict(),
+        "population": asdict(colony.population),
+        "training": colony.training.as_dict(),
         "sharing": colony.sharing,
         "one_a_slot": colony.one_a_slot,
         "seeds": list(colony.seeds),
@@ -105,18 +106,19 @@ def _rebuild(
     worlds = [
         world_from(stored, f"world{number}", one) for number, one in enumerate(facts["worlds"])
     ]
-    pheromone = Pheromone(**facts["config"].pop("pheromone"))
-    config = ColonyConfig(pheromone=pheromone, **facts["config"])
+    task, population = Task.from_dict(facts["task"]), dict(facts["population"])
+    population["capacity"] = population.pop("slots")
     # A colony that does not learn needs tables of the right shape, until its own are put in.
-    leading = (len(facts["seeds"]), config.slots) if facts["one_a_slot"] else ()
+    leading = (len(facts["seeds"]), population["capacity"]) if facts["one_a_slot"] else ()
     fixed = facts["sharing"] == "fixed"
     return cls(
         [worlds[number] for number in facts["world_of"]],
-        config,
+        task,
         TrainingConfig(**facts["training"]),
         facts["seeds"],
-        facts["sharing"],
-        q_values=np.zeros((*leading, N_STATES, N_ACTIONS), np.float32) if fixed else None,
+        **population,
+        sharing=facts["sharing"],
+        q_values=np.zeros((*leading, task.n_states, N_ACTIONS), np.float32) if fixed else None,
         threads=threads,
         arch=arch,
         schedule=facts["schedule"],

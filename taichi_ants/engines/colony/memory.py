@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from taichi_ants.engines.colony.population import Population
 from taichi_ants.engines.packing import compass_of
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import STREAM_ANT, STREAM_QUEEN
 from taichi_ants.grid.randomness import stream_state
-from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.task import rewards
-from taichi_ants.task.colony import ColonyConfig, update_weights
+from taichi_ants.learners.config import update_weights
+from taichi_ants.task import Life
 from taichi_ants.task.constants import N_ACTIONS, N_STATES
 from taichi_ants.worlds.world import World
+
+if TYPE_CHECKING:
+    from taichi_ants.engines.colony.colony import Colony
 
 _ROW = 8
 _MODEL = N_STATES * N_ACTIONS
@@ -23,7 +27,9 @@ _MODEL = N_STATES * N_ACTIONS
 class Layout:
     """What stays the same in all episodes: worlds, starts and places of food."""
 
-    def __init__(self, worlds: Sequence[World], config: ColonyConfig, seeds: Sequence[int]) -> None:
+    def __init__(
+        self, worlds: Sequence[World], life: Life, population: Population, seeds: Sequence[int]
+    ) -> None:
         grids = {world.ranges for world in worlds}
         if len(grids) > 1:
             raise AntsError(f"the worlds have the ranges {sorted(grids)}; all must have the same.")
@@ -37,12 +43,12 @@ class Layout:
         self.compass = compass_of(self.grid)
         self.queens = np.array([int(self.grid.index(world.queen)) for world in worlds], np.int32)
         starts = [
-            world.start(seed, config.ants, config.start)
+            world.start(seed, population.ants, population.start)
             for world, seed in zip(worlds, seeds, strict=True)
         ]
         self.start_cells = np.stack([cells for cells, _ in starts])
         self.start_headings = np.stack([headings for _, headings in starts])
-        moving = config.regrowth is not None or config.wander is not None
+        moving = life.regrowth is not None or life.wander is not None
         self.homes = max((len(world.foods) for world in worlds), default=0) if moving else 0
         self.home_cells = self._of_each(lambda world: self.grid.index(world.foods))
         self.home_piles = self._of_each(lambda world: self._piles(self.grid.index(world.foods)))
@@ -75,28 +81,22 @@ class Layout:
         return np.argsort(np.argsort(first))[numbers].astype(np.int32)
 
 
-def allocate(
-    layout: Layout,
-    config: ColonyConfig,
-    training: TrainingConfig,
-    seeds: np.ndarray,
-    sharing: str,
-    plans: bool,
-    chunks: int,
-) -> dict[str, np.ndarray]:
+def allocate(colony: Colony, seeds: np.ndarray, plans: bool, chunks: int) -> dict[str, np.ndarray]:
     """All arrays of `colony_arrays.Arrays` but `q`, before the first episode."""
     from taichi_ants.engines.colony import arrays as names
 
-    n_worlds, slots, size = len(seeds), config.slots, layout.size
+    layout, population, training = colony.layout, colony.population, colony.training
+    sharing = colony.sharing
+    n_worlds, slots, size = len(seeds), population.slots, layout.size
     cells = n_worlds * size
-    dense, homes = config.pheromone.dense, layout.homes
+    dense, homes = colony.pheromone.dense, layout.homes
     tables = n_worlds * (slots if sharing == "own" else 1)
     shared = sharing == "shared"
     model = tables * _MODEL if plans else 1
     sums = n_worlds * chunks * _MODEL if shared else 1
     first_streams = np.zeros((n_worlds, slots), np.uint64)
-    numbers = np.arange(config.ants, dtype=np.uint64)
-    first_streams[:, : config.ants] = stream_state(seeds[:, None], STREAM_ANT, numbers[None, :])
+    numbers = np.arange(population.ants, dtype=np.uint64)
+    first_streams[:, : population.ants] = stream_state(seeds[:, None], STREAM_ANT, numbers[None, :])
     return {
         "ground": np.zeros(cells, np.uint8),
         "trail": np.zeros(1 if dense else cells, np.int32),
@@ -112,7 +112,7 @@ def allocate(
         "worlds": np.zeros((names.WORLD_ROWS, n_worlds), np.int32),
         "queen_streams": np.atleast_1d(stream_state(seeds, STREAM_QUEEN, 0)).astype(np.uint64),
         "seeds": seeds.copy(),
-        "rewards": rewards.REWARDS.by_event(),
+        "rewards": colony.task.rewards.by_event(),
         "returns": np.zeros(n_worlds, np.int64),
         "tallies": np.zeros((names.TALLY_ROWS, n_worlds * chunks), np.int32),
         "homes": np.zeros((names.HOME_ROWS, max(1, n_worlds * homes)), np.int32),
@@ -148,17 +148,17 @@ def allocate_tables(
     return q.reshape(-1)
 
 
-def fill_episode(
-    arrays: dict[str, np.ndarray], layout: Layout, config: ColonyConfig, epsilon: float
-) -> None:
+def fill_episode(colony: Colony) -> None:
     """Set everything that an episode starts with; tables, models and streams stay."""
     from taichi_ants.engines.colony import arrays as names
 
-    n_worlds, slots, n = len(layout.worlds), config.slots, config.ants
+    arrays, layout, epsilon = colony.arrays, colony.layout, colony.epsilon
+    slots, n = colony.population.slots, colony.population.ants
+    n_worlds = len(layout.worlds)
     ground = arrays["ground"].reshape(n_worlds, -1)
     ground[:] = layout.ground
     np.put_along_axis(ground, layout.start_cells.astype(np.int64), names.ANT_GROUND, axis=1)
-    target = "level" if config.pheromone.dense else "trail"
+    target = "level" if colony.pheromone.dense else "trail"
     arrays[target].reshape(n_worlds, -1)[:] = layout.levels
     visited = arrays["ants"][names.VISITED].copy()
     arrays["ants"][:] = 0

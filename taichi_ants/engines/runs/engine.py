@@ -12,7 +12,7 @@ from taichi_ants.engines.packing import compass_of, pack_cells
 from taichi_ants.engines.runs.launches import Launch, plan_launches
 from taichi_ants.engines.runs.results import RunState
 from taichi_ants.learners.registry import Learner
-from taichi_ants.task import rewards
+from taichi_ants.task import Task
 from taichi_ants.worlds.world import World
 
 Progress = Callable[[float], None]  # called with the share of the work that is done, 0 to 1
@@ -29,7 +29,7 @@ class RunEngine:
     """
 
     def __init__(
-        self, world: World, max_steps: int, evaporation: bool, settings: runtime.Runtime
+        self, world: World, task: Task, max_steps: int, evaporation: bool, settings: runtime.Runtime
     ) -> None:
         self.seconds = 0.0
         self._world = world
@@ -41,7 +41,7 @@ class RunEngine:
             pack_cells(world),
             world.closer().copy(),
             compass_of(world.grid),
-            rewards.REWARDS.by_event(),
+            task.rewards.by_event(),
         )
 
     def run(

@@ -10,11 +10,12 @@ import numpy as np
 from taichi_ants import files
 from taichi_ants.engines.stored import FileKind, world_arrays, world_facts, world_from
 from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.task import Task
 
 if TYPE_CHECKING:
     from taichi_ants.engines.runs.results import TrainingResult
 
-_KIND = FileKind("taichi-ants training 1", "training result", "TrainingResult.save")
+_KIND = FileKind("taichi-ants training 2", "training result", "TrainingResult.save")
 _OUTCOMES = ("returns", "steps", "deliveries")
 
 
@@ -22,10 +23,10 @@ def save_training(result: TrainingResult, path: files.PathLike) -> None:
     """Write a result, compressed; raises as `files.write_atomically` does."""
     facts = {
         "world": world_facts(result.world),
-        "configs": [asdict(config) for config in result.configs],
+        "task": result.task.as_dict(),
+        "configs": [config.as_dict() for config in result.configs],
         "seeds": result.seeds,
         "max_steps": result.max_steps,
-        "evaporation": result.evaporation,
         "costs": [asdict(cost) for cost in result.costs],
     }
     arrays = {name: getattr(result, name) for name in _OUTCOMES}
@@ -44,8 +45,7 @@ def load_training(cls: type[TrainingResult], path: files.PathLike) -> TrainingRe
 
     stored, facts = _KIND.read(path)
     with _KIND.rebuilding(path):
-        if not isinstance(facts["evaporation"], bool):
-            raise ValueError("evaporation is neither true nor false")
+        task = Task.from_dict(facts["task"])
         costs = tuple(LearnerCost(**cost) for cost in facts["costs"])
         for cost in costs:
             checked_count("steps", cost.steps, most=2**63 - 1, least=0)
@@ -54,8 +54,8 @@ def load_training(cls: type[TrainingResult], path: files.PathLike) -> TrainingRe
             world=world_from(stored, "world", facts["world"]),
             configs=tuple(TrainingConfig(**config) for config in facts["configs"]),
             seeds=checked_seeds(facts["seeds"]),
-            max_steps=checked_max_steps(facts["max_steps"]),
-            evaporation=facts["evaporation"],
+            max_steps=checked_max_steps(facts["max_steps"], task),
+            task=task,
             **outcomes,
             costs=costs,
             state=RunState(

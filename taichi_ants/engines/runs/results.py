@@ -11,11 +11,12 @@ from taichi_ants.engines.records import Record
 from taichi_ants.engines.runs import files as training_files
 from taichi_ants.errors import AntsError, shown
 from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS, N_STATES
 from taichi_ants.worlds.world import World
 
 # What the arrays of a result come from.
-_MAKERS = ("world", "configs", "seeds", "max_steps", "evaporation")
+_MAKERS = ("world", "task", "configs", "seeds", "max_steps")
 _PAIRS = N_STATES * N_ACTIONS
 _SUMMED_UP, _LISTED = 50, 6  # episodes and configurations that a result shows
 
@@ -89,7 +90,7 @@ class TrainingResult(Record):
         configs: The configurations, in the order of the arrays' first axis.
         seeds: The seeds, in the order of the second axis.
         max_steps: The step limit of an episode.
-        evaporation: Whether trails evaporated.
+        task: The rules of the game.
         returns: int32 (C, S, E), undiscounted sum of the rewards of each episode.
         steps: int32 (C, S, E), length of each episode.
         deliveries: int32 (C, S, E), 1 where the food was given to the queen.
@@ -105,7 +106,7 @@ class TrainingResult(Record):
     configs: tuple[TrainingConfig, ...]
     seeds: tuple[int, ...]
     max_steps: int
-    evaporation: bool
+    task: Task
     returns: np.ndarray
     steps: np.ndarray
     deliveries: np.ndarray
@@ -159,7 +160,7 @@ class TrainingResult(Record):
             f"world: {self.world}",
             f"seeds: {len(self.seeds)}, from {min(self.seeds)} to {max(self.seeds)}",
             f"episodes: {self.episodes}, of at most {self.max_steps} steps each",
-            f"evaporation: {self.evaporation}",
+            f"task: {self.task}",
             f"means over seeds and the last {min(_SUMMED_UP, self.episodes)} episodes:",
         ]
         for c, config in enumerate(self.configs[:_LISTED]):
@@ -206,9 +207,9 @@ class TrainingResult(Record):
         """
         self._check_forms()
         state = self.state
+        continues = self.task.delivery == "continuing"
         given = [
-            [(c.epsilon_decay, c.min_epsilon, c.planning_steps, c.delivery == "continuing")]
-            for c in self.configs
+            [(c.epsilon_decay, c.min_epsilon, c.planning_steps, continues)] for c in self.configs
         ]
         kept = np.concatenate([state.exploration[..., 1:], state.settings[..., :2]], axis=2)
         epsilon, visited = state.exploration[..., 0], state.settings[..., 2]

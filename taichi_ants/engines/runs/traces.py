@@ -20,9 +20,10 @@ from taichi_ants.engines.runs.training import (
     rates_of,
     rollout_streams,
 )
-from taichi_ants.errors import AntsError, checked_flag
+from taichi_ants.errors import AntsError
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.registry import Learner
+from taichi_ants.task import Task
 from taichi_ants.task.constants import DELIVERED, N_ACTIONS
 from taichi_ants.worlds.world import World
 
@@ -80,7 +81,7 @@ def rollout(
     seed: int = 0,
     number: int = 0,
     max_steps: int = 600,
-    evaporation: bool = True,
+    task: Task | None = None,
     epsilon: float = 0.0,
 ) -> Trace:
     """One episode with a fixed policy: rollout `number` of the seed, as `evaluate` does it.
@@ -91,21 +92,22 @@ def rollout(
         seed: The seed.
         number: Which of the seed's rollouts, from 0.
         max_steps: Steps after which the episode is truncated.
-        evaporation: Whether trails fall by 1 with each step.
+        task: The rules of the game; None is the paper's.
         epsilon: Probability of a random action.
 
     Raises:
         AntsError: An argument is not allowed; the message names it.
     """
-    tables = checks.checked_q_values(q_values)
+    task = checks.checked_runs_task(task)
+    tables = checks.checked_q_values(q_values, task)
     if tables.ndim != 2:
-        raise AntsError(f"q_values has shape {tables.shape}; a rollout follows one (128, 5) table.")
+        raise AntsError(f"q_values has shape {tables.shape}; a rollout follows one table.")
     seeds = checks.checked_seeds_for(seed, ())
     numbers = np.array([checks.checked_count("number", number, least=0)])
     state = fixed_policy_state(tables[None], checks.checked_share("epsilon", epsilon))
     streams = rollout_streams(seeds, numbers)
     rates = np.zeros((1, 2), dtype=np.float32)
-    return _trace(world, None, seeds, rates, state, 1, max_steps, evaporation, streams)
+    return _trace(world, task, None, seeds, rates, state, 1, max_steps, streams)
 
 
 def trace_policies(
@@ -113,7 +115,7 @@ def trace_policies(
     q_values: np.ndarray,
     seeds: Sequence[int],
     max_steps: int = 600,
-    evaporation: bool = True,
+    task: Task | None = None,
 ) -> Iterator[Trace]:
     """Rollout 0 of each of many policies, some policies at a time.
 
@@ -121,7 +123,7 @@ def trace_policies(
         world: The world.
         q_values: float (n, 128, 5), action values of each policy.
         seeds: Their seeds (n,); a seed may come several times.
-        max_steps, evaporation: As in `rollout`.
+        max_steps, task: As in `rollout`.
 
     Yields:
         The steps of the first policies, of the next ones, and so on, in order.
@@ -129,17 +131,18 @@ def trace_policies(
     Raises:
         AntsError: An argument is not allowed; the message names it.
     """
-    tables = checks.checked_q_values(q_values)
+    task = checks.checked_runs_task(task)
+    tables = checks.checked_q_values(q_values, task)
     checks.checked_world(world)
     # A step takes ten times as much memory as a cell of the world.
-    per_policy = max(checks.checked_max_steps(max_steps), world.grid.size // 10)
+    per_policy = max(checks.checked_max_steps(max_steps, task), world.grid.size // 10)
     for first in range(0, len(tables), size := max(1, MAX_ROLLOUT_STEPS // per_policy)):
         some = tables[first : first + size]
         words = np.array(seeds[first : first + size], dtype=object)
         state = fixed_policy_state(some, epsilon=0.0)
         streams = rollout_streams(words, np.zeros(1, dtype=int))
         rates = np.zeros((len(some), 2), dtype=np.float32)
-        trace = _trace(world, None, words, rates, state, 1, max_steps, evaporation, streams)
+        trace = _trace(world, task, None, words, rates, state, 1, max_steps, streams)
         yield replace(trace, episodes=trace.episodes + first)
 
 
@@ -149,44 +152,46 @@ def trace_training(
     seed: int = 0,
     episodes: int = 1,
     max_steps: int = 600,
-    evaporation: bool = False,
+    task: Task | None = None,
 ) -> Trace:
     """The first episodes of one training run, step by step, with the Q-table after each step.
 
     Args and errors as in `train`; episodes * max_steps may not exceed 100 000.
     """
-    checks.checked_task(world)
+    checks.checked_food(world)
+    task = checks.checked_runs_task(task)
     several = checks.checked_configs(config)
     if len(several) > 1:
         raise AntsError(f"config holds {len(several)} configurations; a trace is of one.")
     (config,) = several
     seeds = checks.checked_seeds_for(seed, ())
-    state = fresh_state((config,), seeds.tolist()).take(0)
+    state = fresh_state((config,), seeds.tolist(), task).take(0)
     episodes = checks.checked_count("episodes", episodes)
     learner = learners.get(config.learner)
     rates = rates_of((config,), 1)
-    return _trace(world, learner, seeds, rates, state, episodes, max_steps, evaporation)
+    return _trace(world, task, learner, seeds, rates, state, episodes, max_steps)
 
 
 def _trace(
     world: World,
+    task: Task,
     learner: Learner | None,
     seeds: np.ndarray,
     rates: np.ndarray,
     state: RunState,
     episodes: int,
     max_steps: int,
-    evaporation: bool,
     streams: np.ndarray | None = None,
 ) -> Trace:
-    capacity = episodes * checks.checked_max_steps(max_steps)
+    capacity = episodes * checks.checked_max_steps(max_steps, task)
     most = MAX_ROLLOUT_STEPS if learner is None else MAX_TRAINING_STEPS
     if capacity > most:
         raise AntsError(
             f"episodes * max_steps is {capacity}; at most {most} steps can be traced, so lower one."
         )
-    evaporation = checked_flag("evaporation", evaporation)
-    engine = RunEngine(checks.checked_world(world), max_steps, evaporation, runtime.start())
+    learns = learner is not None
+    evaporates = task.evaporation_in_training if learns else task.evaporation_in_evaluation
+    engine = RunEngine(checks.checked_world(world), task, max_steps, evaporates, runtime.start())
     before = state.q.copy()
     runs, integers, errors, tables = engine.trace(learner, seeds, rates, state, episodes, streams)
     (episode, step, cell, heading, states, action, reward, seen, ended, event) = integers.T

@@ -12,21 +12,23 @@ from taichi_ants.checks import (
     check_finite,
     checked_configs,
     checked_count,
+    checked_food,
     checked_max_steps,
     checked_progress,
     checked_q_values,
+    checked_runs_task,
     checked_seeds,
     checked_seeds_for,
     checked_share,
-    checked_task,
     checked_world,
 )
 from taichi_ants.engines.runs.engine import Progress, RunEngine
 from taichi_ants.engines.runs.results import LearnerCost, Rollouts, RunState, TrainingResult
-from taichi_ants.errors import AntsError, checked_flag, shown
+from taichi_ants.errors import AntsError, shown
 from taichi_ants.grid.constants import STREAM_ANT, STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS, N_STATES
 from taichi_ants.worlds.world import World
 
@@ -40,7 +42,7 @@ def train(
     seeds: int | Sequence[int],
     episodes: int = 500,
     max_steps: int = 600,
-    evaporation: bool = False,
+    task: Task | None = None,
     threads: int | None = None,
     *,
     arch: str | None = None,
@@ -57,7 +59,7 @@ def train(
         seeds: One seed or several different ones.
         episodes: Episodes of each run, at least 1.
         max_steps: Steps after which an episode is truncated, 1 to 10 million.
-        evaporation: Whether trails fall by 1 with each step.
+        task: The rules of the game; None is the paper's.
         threads: CPU threads; None keeps what runs, or takes all.
         arch: "cpu" or "cuda"; None keeps what runs, or takes the CPU.
         progress: Called now and then with the share of the work that is done.
@@ -67,19 +69,20 @@ def train(
     """
     configs = checked_configs(configs)
     seeds = checked_seeds(seeds)
-    checked_task(world)
+    checked_food(world)
+    task = checked_runs_task(task)
     none_yet = np.zeros((len(configs), len(seeds), 0), dtype=np.int32)
     start = TrainingResult(
         world=world,
         configs=configs,
         seeds=seeds,
-        max_steps=checked_max_steps(max_steps),
-        evaporation=checked_flag("evaporation", evaporation),
+        max_steps=checked_max_steps(max_steps, task),
+        task=task,
         returns=none_yet,
         steps=none_yet,
         deliveries=none_yet,
         costs=(),
-        state=fresh_state(configs, seeds),
+        state=fresh_state(configs, seeds, task),
     )
     return continue_training(start, episodes, threads, arch=arch, progress=progress)
 
@@ -122,7 +125,10 @@ def continue_training(
     work = _Work(result.configs, progress)
     for group in _groups(result.configs):
         config = result.configs[group[0]]
-        engine = RunEngine(result.world, result.max_steps, result.evaporation, settings)
+        task = result.task
+        engine = RunEngine(
+            result.world, task, result.max_steps, task.evaporation_in_training, settings
+        )
         runs = _flat(state.take(group))
         outcomes[:, group] = engine.run(
             learners.get(config.learner),
@@ -157,7 +163,7 @@ def evaluate(
     rollouts: int = 50,
     seeds: int | Sequence[int] = 0,
     max_steps: int = 600,
-    evaporation: bool = True,
+    task: Task | None = None,
     epsilon: float = 0.0,
     threads: int | None = None,
     *,
@@ -172,22 +178,24 @@ def evaluate(
         rollouts: Episodes with each table, at least 1. Rollout k of a seed has a stream of its own.
         seeds: One seed for all tables, or as many as the tables' last leading axis is long.
         max_steps: Steps after which a rollout is truncated.
-        evaporation: Whether trails fall by 1 with each step.
+        task: The rules of the game; None is the paper's.
         epsilon: Probability of a random action.
         threads, arch, progress: As in `train`.
 
     Raises:
         AntsError: An argument is not allowed; the message names it.
     """
-    tables = checked_q_values(q_values)
+    task = checked_runs_task(task)
+    tables = checked_q_values(q_values, task)
     shape = tables.shape[:-2]
     run_seeds = checked_seeds_for(seeds, shape)
     rollouts = checked_count("rollouts", rollouts)
     epsilon = checked_share("epsilon", epsilon)
-    max_steps = checked_max_steps(max_steps)
-    evaporation = checked_flag("evaporation", evaporation)
+    max_steps = checked_max_steps(max_steps, task)
     progress = checked_progress(progress)
-    engine = RunEngine(checked_world(world), max_steps, evaporation, runtime.start(threads, arch))
+    settings = runtime.start(threads, arch)
+    evaporates = task.evaporation_in_evaluation
+    engine = RunEngine(checked_world(world), task, max_steps, evaporates, settings)
     outcomes = engine.run(
         None,
         run_seeds,
@@ -214,7 +222,7 @@ def fixed_policy_state(tables: np.ndarray, epsilon: float) -> RunState:
     return state
 
 
-def fresh_state(configs: Sequence[TrainingConfig], seeds: Sequence[int]) -> RunState:
+def fresh_state(configs: Sequence[TrainingConfig], seeds: Sequence[int], task: Task) -> RunState:
     """The state of runs that have not begun, leading axes (configurations, seeds)."""
     plans = any(learners.get(config.learner).plans for config in configs)
     state = _bare_state((len(configs), len(seeds)), plans)
@@ -222,7 +230,7 @@ def fresh_state(configs: Sequence[TrainingConfig], seeds: Sequence[int]) -> RunS
     state.random_states[:] = stream_state(words, STREAM_ANT, 0)
     for c, config in enumerate(configs):
         state.exploration[c] = (config.epsilon, config.epsilon_decay, config.min_epsilon)
-        state.settings[c] = (config.planning_steps, config.delivery == "continuing", 0)
+        state.settings[c] = (config.planning_steps, task.delivery == "continuing", 0)
     return state
 
 

@@ -1,0 +1,24 @@
+"""The paper's codes, in two more cells: the ones behind left and behind right."""
+
+from taichi_ants.task.observations.names import name_of_codes
+from taichi_ants.task.observations.registry import Observation
+
+CELLS = (-2, -1, 0, 1, 2)
+
+
+def row(look):
+    """The load, then the codes from behind left to behind right, as digits of base 4."""
+    index = look.carries
+    for k in range(5):
+        index = 4 * index + look.codes[k]
+    return index
+
+
+FIVE_CELLS = Observation(
+    "five_cells",
+    2 * 4**5,
+    row,
+    CELLS,
+    name_of_codes(len(CELLS), "EOTF", "EOSQ"),
+    "all cells around but the one behind",
+)

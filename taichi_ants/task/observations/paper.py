@@ -1,0 +1,14 @@
+"""What the paper's ants see: the three cells ahead, four codes each."""
+
+from taichi_ants.task.observations.registry import Observation
+from taichi_ants.task.states import state_name
+
+
+def row(look):
+    """The paper's state itself."""
+    return look.percept
+
+
+PAPER = Observation(
+    "paper", 128, row, name_of=state_name, summary="the three cells ahead, four codes each"
+)

@@ -1,0 +1,19 @@
+"""The paper's codes, in all six cells around."""
+
+from taichi_ants.task.observations.names import name_of_codes
+from taichi_ants.task.observations.registry import Observation
+
+CELLS = (-2, -1, 0, 1, 2, 3)
+
+
+def row(look):
+    """The load, then the codes from behind left to behind right and behind, as digits of base 4."""
+    index = look.carries
+    for k in range(6):
+        index = 4 * index + look.codes[k]
+    return index
+
+
+SIX_CELLS = Observation(
+    "six_cells", 2 * 4**6, row, CELLS, name_of_codes(len(CELLS), "EOTF", "EOSQ"), "all cells around"
+)

@@ -1,0 +1,40 @@
+"""The three cells ahead; a trail is weak, middling or strong, relative to the strongest ahead."""
+
+from taichi_ants.task.observations.names import name_of_codes
+from taichi_ants.task.observations.registry import Observation
+
+
+def row(look):
+    """The load, then a code of each cell as a digit of base 6.
+
+    0 empty, 1 obstacle, 2 to 4 a trail of less than a third, of less than two thirds, or of more of
+    the strongest ahead; 5 food or queen. For an ant with food 4 is nearer to the queen.
+    """
+    index = look.carries
+    for k in range(3):
+        code = look.codes[k]
+        if code == 3:
+            code = 5
+        elif code != 1:
+            level = look.levels[k]
+            if look.carries == 1:
+                code = 2 * code
+            elif level < 1:
+                code = 0
+            elif level < look.strongest - 2 * level:
+                code = 2
+            elif level < 2 * (look.strongest - level):
+                code = 3
+            else:
+                code = 4
+        index = 6 * index + code
+    return index
+
+
+TRAIL_LEVELS = Observation(
+    "trail_levels",
+    2 * 6**3,
+    row,
+    name_of=name_of_codes(3, "EO123F", "EO--SQ"),
+    summary="the three cells ahead, a trail in three strengths",
+)

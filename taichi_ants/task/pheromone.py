@@ -1,0 +1,104 @@
+"""How trails are laid, fall and spread."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+import numpy as np
+
+from taichi_ants.errors import AntsError, check_one_of, check_whole, shown
+from taichi_ants.task.constants import DEPOSIT_LEVEL
+
+Evaporation = Literal["linear", "exponential", "none"]
+Deposit = Literal["set", "add", "none"]
+EVAPORATIONS: tuple[str, ...] = get_args(Evaporation)
+DEPOSITS: tuple[str, ...] = get_args(Deposit)
+MAX_DEPOSIT = 1_000_000
+
+
+@dataclass(frozen=True)
+class Pheromone:
+    """How trails are laid, fall and spread.
+
+    Attributes:
+        evaporation: "linear": a trail falls by 1 per tick, not below 0. "exponential": it halves
+            every `half_life` ticks, and what falls below 1 becomes 0. "none": it stays.
+        half_life: In ticks, above 0; of exponential evaporation only, there 50 if None.
+        diffusion: Share of a cell's trail that it gives to its six neighbours per tick, a sixth
+            of it to each, in [0, 1]. The share aimed at an obstacle or out of the world stays.
+        deposit: "set": a carrying ant sets the trail of a cell to `level`. "add": it adds `level`,
+            up to `cap`. "none": it lays nothing.
+        level: What a deposit sets or adds, in ticks of linear evaporation, 1 .. 1 000 000.
+        cap: No deposit that adds leaves a trail above this, 1 .. 1 000 000; of "add" only, there
+            1000 if None.
+
+    Raises:
+        AntsError: A value is outside its range, or would change nothing.
+    """
+
+    evaporation: Evaporation = "linear"
+    half_life: float | None = None
+    diffusion: float = 0.0
+    deposit: Deposit = "set"
+    level: int = DEPOSIT_LEVEL
+    cap: int | None = None
+
+    def __post_init__(self) -> None:
+        check_one_of("evaporation", self.evaporation, EVAPORATIONS)
+        if self.half_life is not None and not 0 < _number(self.half_life) < math.inf:
+            raise AntsError(
+                f"half_life is {shown(self.half_life)}; it must be a number of ticks above 0."
+            )
+        if not 0 <= _number(self.diffusion) <= 1:
+            raise AntsError(
+                f"diffusion is {shown(self.diffusion)}; it must be a number from 0 to 1."
+            )
+        check_one_of("deposit", self.deposit, DEPOSITS)
+        check_whole("level", self.level, 1, MAX_DEPOSIT)
+        if self.cap is not None:
+            check_whole("cap", self.cap, 1, MAX_DEPOSIT)
+        self._settle("half_life", 50.0, "evaporation", "exponential")
+        self._settle("cap", 1000, "deposit", "add")
+
+    def _settle(self, name: str, usual: float, other: str, needed: str) -> None:
+        """Refuse an option where another one makes it mean nothing; fill it in where it is not."""
+        chosen = getattr(self, other)
+        if getattr(self, name) is None:
+            object.__setattr__(self, name, usual if chosen == needed else None)
+        elif chosen != needed:
+            raise AntsError(
+                f"{name} is {shown(getattr(self, name))}, but {other} is {chosen!r}; give "
+                f"{other}={needed!r} with it, or leave it out."
+            )
+
+    @property
+    def dense(self) -> bool:
+        """Whether levels are float32 and change in every cell each tick; else they are integers."""
+        return self.evaporation == "exponential" or self.diffusion > 0
+
+    @property
+    def lasting(self) -> Pheromone:
+        """The same without evaporation."""
+        return replace(self, evaporation="none", half_life=None)
+
+    @property
+    def decay(self) -> np.float32:
+        """The factor on every level per tick of exponential evaporation, else 1."""
+        return np.float32(0.5 ** (1.0 / float(self.half_life)) if self.half_life else 1.0)
+
+    @property
+    def share(self) -> np.float32:
+        """The part of its level that a cell gives to one neighbour per tick of diffusion."""
+        return np.float32(float(self.diffusion) / 6.0)
+
+
+def _number(value: object) -> float:
+    """A number as float; nan for what is none."""
+    if isinstance(value, (bool, str)):
+        return math.nan
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        return math.nan
