@@ -9,18 +9,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_ants.engines.runs.training import continue_training, train
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, expect
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.grid.randomness import whole
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.rendering import colours, text
-from taichi_ants.rendering.arguments import expect
-from taichi_ants.rendering.episodes import DEFAULT_FPS, Episode, Progress, with_pause, without_view
+from taichi_ants.rendering.moments import Episode
+from taichi_ants.rendering.observed import PAPER
 from taichi_ants.rendering.panel import Status, draw_swatch
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.rendering.scene import check_size
 from taichi_ants.rendering.viewport import Viewport
-from taichi_ants.rendering.writers import PathLike, check_animation, save_animation
+from taichi_ants.rendering.writers import Progress
 from taichi_ants.task.constants import (
     DELIVERED,
     DEPOSIT_LEVEL,
@@ -28,7 +28,6 @@ from taichi_ants.task.constants import (
     FAILED,
     FOOD,
     N_ACTIONS,
-    N_STATES,
     OBSTACLE,
     PICKED_UP,
     QUEEN,
@@ -78,8 +77,8 @@ class Stage:
         food picked up, food given to her, and what failed.
         """
         trace = self.episode.trace
-        carries = trace.states >= N_STATES // 2
         events = trace.events
+        carries = np.cumsum(events == PICKED_UP) > np.cumsum(events == DELIVERED)
         sources = np.select(
             [events == FAILED, events == DELIVERED, events == PICKED_UP, carries], [4, 3, 2, 1], 0
         )
@@ -124,7 +123,7 @@ def learning_stages(
     played, result = [], None
     different = tuple(dict.fromkeys(stages))
     for n in different:
-        table = np.zeros((N_STATES, N_ACTIONS), dtype=np.float32)
+        table = np.zeros((PAPER.n_states, N_ACTIONS), dtype=np.float32)
         if n:
             result = (
                 train(world, config, seed, n, train_steps)
@@ -188,23 +187,6 @@ def learning_frames(
         yield canvas.copy()
 
 
-def render_learning(
-    path: PathLike,
-    stages: Sequence[Stage],
-    *,
-    size: tuple[int, int] = DEFAULT_SIZE,
-    fps: float = DEFAULT_FPS,
-    title: str = "",
-    progress: Progress | None = None,
-) -> None:
-    """Write the stages as an animation; arguments and errors as in `render_episode`."""
-    check_animation(path, fps)
-    stages = _checked(stages)
-    frames = learning_frames(stages, size, title)
-    longest = max(len(stage.episode) for stage in stages)
-    save_animation(path, with_pause(frames, longest, fps, progress), fps)
-
-
 def _checked(stages: Sequence[Stage]) -> list[Stage]:
     """The stages, at least one."""
     if isinstance(stages, Stage) or not isinstance(stages, Iterable):
@@ -258,7 +240,7 @@ class _Panel:
         if moment is None:
             return
         snapshot, status = moment
-        self._rasteriser.draw(self._canvas, without_view(snapshot))
+        self._rasteriser.draw(self._canvas, snapshot)
         if not self._text_size:
             return
         left = round(self._middle - self._width / 2)

@@ -82,15 +82,18 @@ class Rasteriser:
         """Whether a letter in a cell could be read."""
         return self.viewport.hexagon >= _SMALLEST_LETTERS
 
-    def draw(self, frame: np.ndarray, snapshot: Snapshot) -> None:
+    def draw(
+        self, frame: np.ndarray, snapshot: Snapshot, in_view: np.ndarray | None = None
+    ) -> None:
         """Draw a world with its ants.
 
         Args:
             frame: uint8 (height, width, 3), contiguous; all pixels of the viewport are set.
-            snapshot: The world, of this grid. Letters are not drawn, only the cells in view.
+            snapshot: The world, of this grid.
+            in_view: Flat indices of the cells that ant number 0 sees, to be marked.
         """
         self.draw_ground(frame, snapshot.ground, snapshot.trail)
-        layers = [self._things(snapshot), *self._view(snapshot), self._ants(snapshot)]
+        layers = [self._things(snapshot), *self._view(snapshot, in_view), self._ants(snapshot)]
         if not self.has_hexagons:
             # Dots overlap. A dot of hers over the ants would hide those beside her, one under them
             # may be hidden by a crowd: they lie over it, and a ring around it over them.
@@ -172,15 +175,16 @@ class Rasteriser:
         rings[:, 2] = _QUEEN_RING
         return rings, np.full(len(rings), colours.CELL_QUEEN, dtype=np.uint32)
 
-    def _view(self, snapshot: Snapshot) -> list[tuple[np.ndarray, np.ndarray]]:
+    def _view(
+        self, snapshot: Snapshot, in_view: np.ndarray | None
+    ) -> list[tuple[np.ndarray, np.ndarray]]:
         """The outlines of the cells in view, or around the ant where cells are small."""
-        if snapshot.letters is None:
+        if in_view is None:
             return []
         if self.viewport.hexagon >= _SMALLEST_OUTLINE:
-            rings = self.shapes(snapshot.cells_in_view(), self.kernels.IN_VIEW, fill=0.98)
+            rings = self.shapes(in_view, self.kernels.IN_VIEW, fill=0.98)
         else:
-            ant = snapshot.ant_cells[[snapshot.watched]]
-            rings = self.shapes(ant, self.kernels.IN_VIEW, fill=_MARK)
+            rings = self.shapes(snapshot.ant_cells[:1], self.kernels.IN_VIEW, fill=_MARK)
             rings[:, 2] = np.maximum(rings[:, 2], _SMALLEST_MARK)
         return [(rings, np.full(len(rings), colours.INK, dtype=np.uint32))]
 

@@ -12,11 +12,10 @@ import math
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, checked_flag, shown
+from taichi_ants.errors import AntsError, checked_flag, expect, shown
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.grid.randomness import whole
 from taichi_ants.rendering import colours, text
-from taichi_ants.rendering.arguments import expect
 from taichi_ants.rendering.panel import fill
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.rendering.scene import write_letter

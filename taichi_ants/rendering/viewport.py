@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, shown
+from taichi_ants.errors import AntsError, expect, shown
 from taichi_ants.grid import hexgrid
 from taichi_ants.grid.hexgrid import AxialGrid
-from taichi_ants.rendering.arguments import expect
 
 _SQRT_3 = math.sqrt(3.0)
 

@@ -15,11 +15,14 @@ from typing import BinaryIO
 import numpy as np
 
 from taichi_ants import files
-from taichi_ants.errors import AntsError, shown
+from taichi_ants.errors import AntsError, expect, shown
 from taichi_ants.rendering import animated_files
-from taichi_ants.rendering.arguments import expect
 
 PathLike = str | os.PathLike[str]
+Progress = Callable[[float], None]  # called with the share of the work that is done, 0 to 1
+
+DEFAULT_FPS = 8.0
+PAUSE = 1.5  # seconds, for which episodes are shown as they ended
 
 _ANIMATIONS: dict[str, Callable[[BinaryIO, Iterable[np.ndarray], float], None]] = {
     ".gif": animated_files.write_gif,
@@ -77,23 +80,47 @@ def check_animation(path: PathLike, fps: float) -> Path:
     return target
 
 
-def save_animation(path: PathLike, frames: Iterable[np.ndarray], fps: float) -> None:
+def save_animation(
+    path: PathLike,
+    frames: Iterable[np.ndarray],
+    fps: float = DEFAULT_FPS,
+    *,
+    pause: float = 0.0,
+    n: int = 0,
+    progress: Progress | None = None,
+) -> None:
     """Write frames as they come; raises as `check_animation` does, which it calls first.
 
     Args:
         path: The file or folder, see `check_animation`. A file that exists is replaced.
         frames: At least one, uint8 (height, width, 3), all of one size.
         fps: Frames per second.
+        pause: Seconds for which the last one is shown, so that it can be looked at before all
+            begins anew.
+        n: How many frames there are, for `progress`.
+        progress: Called after each frame with the share of the work that is done.
     """
     target = check_animation(path, fps)
     kind = target.suffix.lower()
-    checked = _checked(frames, kind)
+    checked = _shown(_checked(frames, kind), round(pause * fps) - 1, n, progress)
     with _folder_of(target):
         if kind:
             write = _ANIMATIONS[kind]
             files.write_atomically(target, lambda file: write(file, checked, fps))
         else:
             _save_pictures(target, checked)
+
+
+def _shown(
+    frames: Iterator[np.ndarray], more: int, n: int, progress: Progress | None
+) -> Iterator[np.ndarray]:
+    """The frames, the last of them so many times more."""
+    for done, frame in enumerate(frames, start=1):
+        yield frame
+        if progress is not None:
+            progress(done / n)
+    for _ in range(more):
+        yield frame
 
 
 def save_picture(path: PathLike, frame: np.ndarray) -> None:

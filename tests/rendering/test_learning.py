@@ -13,17 +13,15 @@ from taichi_ants import AntsError, Colony, ColonyConfig, TrainingConfig, train
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.rendering import (
     Episode,
-    Snapshot,
     Stage,
     best_actions,
     clarity,
-    colony_frames,
-    colony_picture,
+    colony_moments,
+    frames,
     learning_frames,
     learning_stages,
     policy_sheet,
-    render_colony,
-    render_learning,
+    save_animation,
     text,
     usual_spread,
 )
@@ -121,7 +119,7 @@ def test_a_stage_that_has_ended_stays() -> None:
 @pytest.mark.parametrize("size", [(1280, 720), (400, 900), (64, 64), (4096, 200)])
 def test_all_stages_fit(size, tmp_path) -> None:
     stages = learning_stages(paper(), CONFIG, stages=(0, 1, 2, 3), max_steps=3)
-    render_learning(tmp_path / "a.gif", stages, size=size, fps=10)
+    save_animation(tmp_path / "a.gif", learning_frames(stages, size), 10)
     with Image.open(tmp_path / "a.gif") as image:
         assert image.size == size
         picture = np.asarray(image.convert("RGB")).astype(int)
@@ -284,24 +282,13 @@ def colony(ants: int = 30) -> Colony:
     return made
 
 
-def test_a_colony_on_the_move(tmp_path) -> None:
-    frames = list(colony_frames(colony(), 7, (200, 150), every=3))
-    assert len(frames) == 4
-    assert not any((a == b).all() for a, b in itertools.pairwise(frames))
+def test_a_colony_on_the_move() -> None:
+    pictures = list(frames(colony_moments(colony(), 7, every=3), (200, 150)))
+    assert len(pictures) == 4
+    assert not any((a == b).all() for a, b in itertools.pairwise(pictures))
     other = colony()
     other.tick(7)
-    assert (colony_picture(other, (200, 150)) == frames[-1]).all()
-    render_colony(tmp_path / "a.gif", colony(), 6, (200, 150), every=2, fps=10)
-    with Image.open(tmp_path / "a.gif") as image:
-        assert image.n_frames == 4
-    for wrong in ({"every": 0}, {"ticks": 0}):
-        with pytest.raises(AntsError, match="at least 1"):
-            list(colony_frames(colony(), **{"ticks": 5, **wrong}))
-
-
-def test_the_snapshot_of_a_colony_is_drawn_where_its_ants_are() -> None:
-    moment = colony(12).snapshot()
-    snapshot = Snapshot.of(moment)
-    assert Snapshot.of(snapshot) is snapshot
-    assert (snapshot.ant_cells == moment.ant_cells).all()
-    assert len(snapshot.ant_cells) == 12
+    assert (next(frames(colony_moments(other), (200, 150))) == pictures[-1]).all()
+    for wrong in ({"every": 0}, {"ticks": -1}, {"world": 1}):
+        with pytest.raises(AntsError, match=next(iter(wrong))):
+            list(colony_moments(colony(), **{"ticks": 5, **wrong}))
