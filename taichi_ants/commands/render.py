@@ -1,6 +1,6 @@
 """Pictures of ants: an episode, a colony, learning made visible, or a policy sheet.
 
-Follows a policy from a file, or trains one on the spot (a colony learns together). The ending of
+All but learning follow a policy from a file, or one that is trained on the spot. The ending of
 --out chooses the kind of file: .gif, .webp, .mp4, .png for a single picture, and without an ending
 a folder of PNG pictures.
 """
@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import signal
 import sys
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,189 +28,128 @@ from taichi_ants.studies.command_line import (
 if TYPE_CHECKING:
     import numpy as np
 
-    from taichi_ants import Colony, World
+    from taichi_ants import ColonyConfig, World
     from taichi_ants.learners.config import TrainingConfig
     from taichi_ants.rendering import Stage
 
-DEFAULT_OUT = {
-    "episode": "results/renders/episode.gif",
-    "colony": "results/renders/colony.gif",
-    "learning": "results/renders/learning.gif",
-    "sheet": "results/renders/policy_sheet.png",
+KINDS = {  # what each subcommand shows, and how it is called
+    "episode": ("One ant that follows a policy", "--policy my.npz --epsilon 0.1 --out ant.mp4"),
+    "colony": ("Many ants that follow one policy", "--ants 200 --out ants.gif"),
+    "learning": ("One ant before and after it learns, side by side", "--stages 0 20 500"),
+    "sheet": ("What a policy does in each state", "--policy my.npz --out sheet.png"),
 }
-DEFAULT_MAX_STEPS = {"episode": 600, "colony": 600, "learning": 150}
-DEFAULT_SIZE = {"colony": (960, 540), "learning": (1280, 520)}  # all others: 1280 x 720
-DEFAULT_EVERY = 4
-DEFAULT_EPISODES = {"colony": 60}  # all others: 500
 DEFAULT_PLANNING_STEPS = 5
-DEFAULT_WORLD = {"colony": "open"}  # all others: the paper's, with one food for them all
+_SIZE, _COLONY_SIZE, _LEARNING_SIZE = (1280, 720), (960, 540), (1280, 520)
 
 _IN_WORDS = {"delivers": "delivered", "other": ""}  # all others speak for themselves
 
-# What is shown, and whether as a single picture or moving.
-_EPISODES, _COLONIES = {"a still episode", "an episode"}, {"a still colony", "a colony"}
-_ROLLOUTS = _EPISODES | _COLONIES | {"learning"}
-# Options that change nothing in all that is shown, by where they do.
-_WHERE_IT_COUNTS: dict[str, set[str]] = {
-    "policy": _EPISODES | _COLONIES | {"a sheet"},
-    "episodes": _EPISODES | _COLONIES | {"a sheet"},
-    "stages": {"learning"},
-    "all_states": {"a sheet"},
-    "greedy": _ROLLOUTS,
-    "epsilon": _ROLLOUTS,
-    "number": _EPISODES,
-    "max_steps": _ROLLOUTS,
-    "ants": _COLONIES,
-    "no_evaporation": _ROLLOUTS,
-    "size": _ROLLOUTS,
-    "fps": {"an episode", "a colony", "learning"},
-    "step": {"a still episode", "a still colony"},
-    "every": {"a colony"},
-    "no_hud": _EPISODES | _COLONIES,
-    "no_legend": _EPISODES | _COLONIES,
-    "no_view": _EPISODES,
-}
+
+def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
+    """The settings of the command line."""
+    summary, more = __doc__.split("\n", 1)
+    parser = Parser(summary, epilog=f"{more} `%(prog)s episode --help` tells what it has to offer.")
+    kinds = parser.add_subparsers(metavar="|".join(KINDS), required=True)
+    for name, (shows, example) in KINDS.items():
+        one = kinds.add_parser(
+            name, help=shows, description=f"{shows}.", epilog=f"Example: %(prog)s {example}"
+        )
+        _add_options(one, name)
+    given = sys.argv[1:] if arguments is None else arguments
+    parser.parse_args(given)
+    settings, named = kinds.choices[given[0]].parse_given(given[1:])
+    settings.kind, settings.world_seed_given = given[0], "world_seed" in named
+    settings.still = Path(settings.out).suffix.lower() == ".png" and settings.kind != "learning"
+    if settings.kind in ("episode", "colony") and settings.size is None:
+        settings.size = _COLONY_SIZE if settings.kind == "colony" and not settings.still else _SIZE
+    for name, flag in named.items():
+        if name in _OF_TRAINING and getattr(settings, "policy", None):
+            parser.error(f"{flag} is for training, but --policy is given; leave out one of the two")
+        if name == "step" and not settings.still:
+            parser.error(f"{flag} is for a single picture; leave it out, or let --out end in .png")
+        if name in ("fps", "every") and settings.still:
+            parser.error(f"{flag} is for an animation, but --out ends in .png; leave out one")
+    return settings
+
+
 _OF_TRAINING = (
     *("learner", "episodes", "learning_rate", "discount", "train_epsilon", "epsilon_decay"),
     "planning_steps",
 )
 
 
-def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
-    """The settings of the command line."""
-    parser = Parser(__doc__.split("\n", 1)[0], epilog=__doc__.split("\n", 1)[1])
+def _add_options(parser: argparse.ArgumentParser, kind: str) -> None:
+    """All options of one kind of picture."""
+    colony, learning, sheet = kind == "colony", kind == "learning", kind == "sheet"
     add = parser.add_argument
-    add("--show", choices=tuple(DEFAULT_OUT), default="episode", help="what to show")
-    add("--world", help="paper, open, or the path of a map file (default: paper, of a colony open)")
-    add(
-        "--world-seed",
-        type=whole_number(),
-        default=0,
-        metavar="N",
-        help="seed of a world drawn at random",
-    )
-    add(
-        "--seed",
-        type=whole_number(),
-        default=0,
-        metavar="N",
-        help="seed of training and of the episode",
-    )
+    out = "policy_sheet.png" if sheet else f"{kind}.gif"
+    add("--out", default=f"results/renders/{out}", metavar="PATH", help="file or folder")
+    add("--title", help="a line above all")
+    world = "open" if colony else "paper"
+    add("--world", default=world, help="paper, open, or the path of a map file")
+    seed = {"type": whole_number(), "default": 0, "metavar": "N"}
+    add("--world-seed", **seed, help="seed of a world drawn at random")
+    add("--seed", **seed, help="seed of training and of what is shown")
     add("--plugin", metavar="FILE", help="a Python file that registers learners or worlds")
-    _add_policy(parser)
-    _add_episode(parser)
-    _add_picture(parser)
-    settings, given = parser.parse_given(arguments)
-    settings.world_seed_given = "world_seed" in given
-    settings.out = settings.out or DEFAULT_OUT[settings.show]
-    _refuse_what_changes_nothing(parser, settings, given)
-    settings.world = settings.world or DEFAULT_WORLD.get(settings.show, "paper")
-    settings.episodes = settings.episodes or DEFAULT_EPISODES.get(settings.show, 500)
-    settings.max_steps = settings.max_steps or DEFAULT_MAX_STEPS.get(settings.show)
-    settings.size = settings.size or _default_size(settings)
-    return settings
+    if colony:
+        add("--ants", type=whole_number(1), default=80, metavar="N", help="how many")
+    if learning:
+        stages = {"action": ListAction, "item": whole_number(0), "unique": False}
+        words = "episodes of training after which to look at the ant"
+        add("--stages", **stages, default=(0, 10, 100, 500), metavar="N", help=words)
+    else:
+        add("--policy", metavar="FILE", help="a policy file (.npz), to train none")
+    _add_training(parser, kind)
+    if sheet:
+        add("--all-states", action="store_true", help="also those that were not visited")
+    else:
+        _add_acting(parser, kind)
+        _add_picture(parser, kind)
 
 
-def _refuse_what_changes_nothing(
-    parser: Parser, settings: argparse.Namespace, given: dict[str, str]
-) -> None:
-    shown = _what_is_shown(settings)
-    for name, flag in given.items():
-        counts = _WHERE_IT_COUNTS.get(name, {shown})
-        if shown not in counts:
-            places = ", ".join(sorted(counts))
-            parser.error(f"{flag} changes nothing in {shown}; leave it out (it is for {places})")
-        if name in _OF_TRAINING and settings.policy:
-            parser.error(f"{flag} is for training, but --policy is given; leave out one of the two")
-
-
-def _what_is_shown(settings: argparse.Namespace) -> str:
-    """One of the names in `_WHERE_IT_COUNTS`."""
-    if settings.show in ("learning", "sheet"):
-        return {"learning": "learning", "sheet": "a sheet"}[settings.show]
-    if Path(settings.out).suffix.lower() == ".png":
-        return f"a still {settings.show}"
-    return {"episode": "an episode", "colony": "a colony"}[settings.show]
-
-
-def _default_size(settings: argparse.Namespace) -> tuple[int, int]:
-    """Width and height; a long animation of many ants is smaller, so that its file is."""
-    if settings.show == "colony" and Path(settings.out).suffix.lower() == ".png":
-        return 1280, 720
-    return DEFAULT_SIZE.get(settings.show, (1280, 720))
-
-
-def _add_policy(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("policy, from a file or trained on the spot")
-    add = group.add_argument
-    add("--policy", metavar="FILE", help="a policy file (.npz)")
-    add("--learner", default="sarsa", help="name of the learner to train")
-    add("--episodes", type=whole_number(1), metavar="N", help="of training, 500, of a colony 60")
+def _add_training(parser: argparse.ArgumentParser, kind: str) -> None:
+    add = parser.add_argument_group("training").add_argument
+    add("--learner", default="sarsa", help="name of the learner")
+    if kind != "learning":
+        usual = 60 if kind == "colony" else 500
+        add("--episodes", type=whole_number(1), default=usual, metavar="N", help="how many")
     add("--learning-rate", type=number, default=0.001, metavar="X", help="in (0, 1]")
     add("--discount", type=number, default=0.9, metavar="X", help="in [0, 1]")
     add("--train-epsilon", type=number, default=0.3, metavar="X", help="in the first episode")
     add("--epsilon-decay", type=number, default=0.99, metavar="X", help="after each episode")
     add("--planning-steps", type=whole_number(1), metavar="N", help="of learners that plan")
-    add(
-        "--stages",
-        action=ListAction,
-        item=whole_number(0),
-        unique=False,
-        default=(0, 10, 100, 500),
-        metavar="N",
-        help="numbers of episodes after which --show learning looks at the ant",
-    )
 
 
-def _add_episode(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("episode")
-    choice = group.add_mutually_exclusive_group()
-    choice.add_argument("--greedy", action="store_true", help="always a best action (the default)")
-    choice.add_argument(
-        "--epsilon", type=number, default=0.0, metavar="X", help="probability of a random action"
-    )
-    add = group.add_argument
-    add(
-        "--number",
-        type=whole_number(0),
-        default=0,
-        metavar="N",
-        help="which of the seed's rollouts",
-    )
-    add(
-        "--max-steps",
-        type=whole_number(1, 100_000),
-        metavar="N",
-        help="step limit, by default 600, for --show learning 150",
-    )
-    add("--ants", type=whole_number(1), default=80, metavar="N", help="of a colony")
+def _add_acting(parser: argparse.ArgumentParser, kind: str) -> None:
+    add = parser.add_argument_group("what is shown").add_argument
+    steps = {"type": whole_number(1, 100_000), "metavar": "N"}
+    if kind == "colony":
+        add("--ticks", **steps, default=600, help="length of an episode")
+    else:
+        usual = 150 if kind == "learning" else 600
+        add("--max-steps", **steps, default=usual, help="step limit")
+    if kind == "episode":
+        words = "which of the seed's rollouts"
+        add("--number", type=whole_number(0), default=0, metavar="N", help=words)
+    words = "probability of a random action"
+    add("--epsilon", type=number, default=0.0, metavar="X", help=words)
     add("--no-evaporation", action="store_true", help="trails stay as they are")
 
 
-def _add_picture(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("picture")
-    add = group.add_argument
-    add(
-        "--size",
-        type=_size,
-        metavar="WxH",
-        help="in pixels, by default 1280x720, of learning 1280x520, of a moving colony 960x540",
-    )
-    add("--fps", type=number, default=8.0, metavar="X", help="steps per second")
-    add("--title", help="a line above all")
-    add("--step", type=whole_number(0), metavar="N", help="of a .png: which step, else the last")
-    add(
-        "--every",
-        type=whole_number(1),
-        default=DEFAULT_EVERY,
-        metavar="N",
-        help=f"ticks of a colony a picture, by default {DEFAULT_EVERY}",
-    )
+def _add_picture(parser: argparse.ArgumentParser, kind: str) -> None:
+    add = parser.add_argument_group("picture").add_argument
+    size = _LEARNING_SIZE if kind == "learning" else None
+    usual = {"episode": " (1280x720)", "colony": " (960x540, a .png 1280x720)"}.get(kind, "")
+    add("--size", type=_size, default=size, metavar="WxH", help=f"in pixels{usual}")
+    add("--fps", type=number, default=8.0, metavar="X", help="pictures a second")
+    if kind == "learning":
+        return
+    if kind == "colony":
+        add("--every", type=whole_number(1), default=4, metavar="N", help="ticks a picture")
+    else:
+        add("--no-view", action="store_true", help="do not mark the cells in view")
+    add("--step", type=whole_number(0), metavar="N", help="of a .png: which one, else the last")
     add("--no-hud", action="store_true", help="no head-up lines")
     add("--no-legend", action="store_true", help="no legend")
-    add("--all-states", action="store_true", help="a sheet of states that were not visited, too")
-    add("--no-view", action="store_true", help="do not mark the cells in view")
-    add("--out", metavar="PATH", help="file or folder, by default in results/renders/")
 
 
 def _size(text: str) -> tuple[int, int]:
@@ -224,9 +164,9 @@ def show(settings: argparse.Namespace) -> None:
     from taichi_ants import worlds
     from taichi_ants.rendering import check_animation, check_picture, check_size
 
-    one_picture = Path(settings.out).suffix.lower() == ".png"
-    check_size(settings.size)
-    if settings.show == "sheet" or (settings.show in ("episode", "colony") and one_picture):
+    if settings.kind != "sheet":
+        check_size(settings.size)
+    if settings.still or settings.kind == "sheet":
         check_picture(settings.out)
     else:
         check_animation(settings.out, settings.fps)
@@ -235,33 +175,94 @@ def show(settings: argparse.Namespace) -> None:
     if settings.world_seed_given:
         worlds.check_seed_counts(settings.world)
     world = worlds.build(settings.world, settings.world_seed)
-    if settings.show == "learning":
-        show_learning(settings, world)
-        return
-    if settings.show == "colony":
-        show_colony(settings, world)
-        return
+    kinds = (show_episode, show_colony, show_learning, show_sheet)
+    dict(zip(KINDS, kinds, strict=True))[settings.kind](settings, world)
+
+
+def show_episode(settings: argparse.Namespace, world: World) -> None:
+    """Write an episode as an animation, or one step of it as a picture."""
+    from taichi_ants.rendering import Episode, frames, save_picture
+
     q_values, title = find_policy(settings, world)
-    if settings.show == "sheet":
-        show_sheet(settings, q_values, title)
-    elif one_picture:
-        show_step(settings, world, q_values, title)
+    episode = Episode.play(
+        world, q_values, number=settings.number, max_steps=settings.max_steps, **_acting(settings)
+    )
+    look = {**_look(settings, title), "view": not settings.no_view}
+    if settings.still:
+        last = len(episode) - 1
+        step = last if settings.step is None else settings.step
+        save_picture(settings.out, next(frames([episode.moment(step)], **look)))
+        print(f"{settings.out}: step {step} of {last}")
+        return
+    _save(settings, frames(episode.moments(), **look), len(episode))
+    outcome = "delivered" if episode.delivered else "not delivered"
+    rewards = int(episode.trace.rewards.sum())
+    print(f"{settings.out}: {len(episode.trace)} steps, return {rewards}, {outcome}")
+
+
+def show_colony(settings: argparse.Namespace, world: World) -> None:
+    """Let a colony learn together, then write an episode in which it follows what it has learned.
+
+    As a single picture, the episode is shown at its last tick, or at `--step`.
+    """
+    from taichi_ants import Colony
+    from taichi_ants.analysis.markdown import count
+    from taichi_ants.rendering import colony_moments, frames, save_picture
+
+    q_values, title = find_policy(settings, world)
+    config = replace(training_config(settings), epsilon=settings.epsilon, min_epsilon=0.0)
+    colony = Colony(world, colony_config(settings), config, settings.seed, "fixed", q_values)
+    colony.begin_episode()
+    look = _look(settings, title)
+    if settings.still:
+        ticks = settings.ticks if settings.step is None else settings.step
+        if ticks:
+            colony.tick(ticks)
+        save_picture(settings.out, next(frames(colony_moments(colony), **look)))
     else:
-        show_episode(settings, world, q_values, title)
+        moments = colony_moments(colony, settings.ticks, settings.every)
+        _save(settings, frames(moments, **look), 1 + -(-settings.ticks // settings.every))
+    delivered = count(int(colony.outcome().deliveries.sum()), "delivery")
+    ants, ticks = count(settings.ants, "ant"), count(colony.ticks, "tick")
+    print(f"{settings.out}: {ants}, {ticks}, {delivered}")
+
+
+def show_learning(settings: argparse.Namespace, world: World) -> None:
+    """Write the same ant after more and more episodes, side by side."""
+    from taichi_ants.rendering import learning_frames
+
+    stages = noted_stages(settings, world)
+    title = settings.title or f"{settings.learner}: the same ant before and after learning"
+    longest = max(len(stage.episode) for stage in stages)
+    _save(settings, learning_frames(stages, settings.size, title), longest)
+    print(f"{settings.out}: {', '.join(stage.title for stage in stages)}")
+
+
+def show_sheet(settings: argparse.Namespace, world: World) -> None:
+    """Write what a policy does in each state."""
+    from taichi_ants.rendering import policy_sheet, save_picture
+
+    q_values, title = find_policy(settings, world)
+    save_picture(settings.out, policy_sheet(q_values, title, complete=settings.all_states))
+    print(f"{settings.out}: the best action in each state")
 
 
 def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray, str]:
     """The action values (128, 5) to follow, and a title that says where they come from."""
-    from taichi_ants import load_policy, train
+    from taichi_ants import Colony, load_policy, train
 
     if settings.policy:
         q_values, _ = load_policy(settings.policy)
         return q_values, settings.title or f"policy {Path(settings.policy).stem}"
+    config, seed, episodes = training_config(settings), settings.seed, settings.episodes
     with progress_bar("Training") as progress:
-        result = train(
-            world, training_config(settings), settings.seed, settings.episodes, progress=progress
-        )
-    title = f"{settings.learner} after {settings.episodes} episodes"
+        if settings.kind == "colony":
+            colony = Colony(world, colony_config(settings), config, seed)
+            colony.run(episodes, settings.ticks, progress)
+            title = f"{settings.learner}, {episodes} episodes together"
+            return colony.q_values[0], settings.title or title
+        result = train(world, config, seed, episodes, progress=progress)
+    title = f"{settings.learner} after {episodes} episodes"
     return result.q_values[0, 0], settings.title or title
 
 
@@ -281,56 +282,6 @@ def training_config(settings: argparse.Namespace) -> TrainingConfig:
     )
 
 
-def show_episode(
-    settings: argparse.Namespace, world: World, q_values: np.ndarray, title: str
-) -> None:
-    """Write an episode as an animation."""
-    from taichi_ants.rendering import render_episode
-
-    with progress_bar("Rendering") as progress:
-        episode = render_episode(
-            settings.out,
-            world,
-            q_values,
-            **_rollout(settings),
-            **_look(settings, title),
-            fps=settings.fps,
-            progress=progress,
-        )
-    outcome = "delivered" if episode.delivered else "not delivered"
-    rewards = int(episode.trace.rewards.sum())
-    print(f"{settings.out}: {len(episode.trace)} steps, return {rewards}, {outcome}")
-
-
-def show_step(settings: argparse.Namespace, world: World, q_values: np.ndarray, title: str) -> None:
-    """Write one step of an episode as a picture."""
-    from taichi_ants.rendering import Episode, episode_picture, save_picture
-
-    episode = Episode.play(world, q_values, **_rollout(settings))
-    last = len(episode) - 1
-    step = last if settings.step is None else settings.step
-    save_picture(settings.out, episode_picture(episode, step, **_look(settings, title)))
-    print(f"{settings.out}: step {step} of {last}")
-
-
-def show_learning(settings: argparse.Namespace, world: World) -> None:
-    """Write the same ant after more and more episodes, side by side."""
-    from taichi_ants.rendering import render_learning
-
-    stages = noted_stages(settings, world)
-    title = settings.title or f"{settings.learner}: the same ant before and after learning"
-    with progress_bar("Rendering") as progress:
-        render_learning(
-            settings.out,
-            stages,
-            size=settings.size,
-            fps=settings.fps,
-            title=title,
-            progress=progress,
-        )
-    print(f"{settings.out}: {', '.join(stage.title for stage in stages)}")
-
-
 def noted_stages(settings: argparse.Namespace, world: World) -> list[Stage]:
     """The stages of an ant that learns, each with what it does then in words."""
     from taichi_ants.analysis.behaviour import BEHAVIOURS, classify
@@ -340,12 +291,10 @@ def noted_stages(settings: argparse.Namespace, world: World) -> list[Stage]:
         stages = learning_stages(
             world,
             training_config(settings),
-            seed=settings.seed,
             stages=settings.stages,
             max_steps=settings.max_steps,
-            evaporation=not settings.no_evaporation,
-            epsilon=settings.epsilon,
             progress=progress,
+            **_acting(settings),
         )
     noted = []
     for stage in stages:
@@ -355,85 +304,30 @@ def noted_stages(settings: argparse.Namespace, world: World) -> list[Stage]:
     return noted
 
 
-def show_colony(settings: argparse.Namespace, world: World) -> None:
-    """Let a colony learn together, then write an episode in which it follows what it has learned.
-
-    As a single picture, the episode is shown at its last tick, or at `--step`.
-    """
-    from taichi_ants.analysis.markdown import count
-    from taichi_ants.rendering import colony_picture, render_colony, save_picture
-
-    colony, title = settled_colony(settings, world)
-    look = {key: _look(settings, title)[key] for key in ("size", "hud", "legend", "title")}
-    colony.begin_episode()
-    if Path(settings.out).suffix.lower() == ".png":
-        ticks = settings.max_steps if settings.step is None else settings.step
-        if ticks:
-            colony.tick(ticks)
-        save_picture(settings.out, colony_picture(colony, **look))
-    else:
-        with progress_bar("Rendering") as progress:
-            render_colony(
-                settings.out,
-                colony,
-                settings.max_steps,
-                every=settings.every,
-                fps=settings.fps,
-                progress=progress,
-                **look,
-            )
-    delivered = count(int(colony.outcome().deliveries.sum()), "delivery")
-    ants, ticks = count(settings.ants, "ant"), count(colony.ticks, "tick")
-    print(f"{settings.out}: {ants}, {ticks}, {delivered}")
-
-
-def settled_colony(settings: argparse.Namespace, world: World) -> tuple[Colony, str]:
-    """A colony that follows a policy from a file or one that it has learned, and a title."""
-    from taichi_ants import Colony, ColonyConfig, Pheromone, load_policy
+def colony_config(settings: argparse.Namespace) -> ColonyConfig:
+    from taichi_ants import ColonyConfig, Pheromone
 
     pheromone = Pheromone(evaporation="none" if settings.no_evaporation else "linear")
-    life = ColonyConfig(ants=settings.ants, pheromone=pheromone)
-    training = training_config(settings)
-    if settings.policy:
-        table, _ = load_policy(settings.policy)
-        title = f"policy {Path(settings.policy).stem}"
-    else:
-        learning = Colony(world, life, training, settings.seed)
-        with progress_bar("Training") as progress:
-            learning.run(settings.episodes, settings.max_steps, progress)
-        table = learning.q_values[0]
-        title = f"{settings.learner}, {settings.episodes} episodes together"
-    steady = replace(training, epsilon=settings.epsilon, epsilon_decay=1.0, min_epsilon=0.0)
-    colony = Colony(world, life, steady, settings.seed, sharing="fixed", q_values=table)
-    return colony, settings.title or title
+    return ColonyConfig(ants=settings.ants, pheromone=pheromone)
 
 
-def show_sheet(settings: argparse.Namespace, q_values: np.ndarray, title: str) -> None:
-    """Write what a policy does in each state."""
-    from taichi_ants.rendering import policy_sheet, save_picture
-
-    save_picture(settings.out, policy_sheet(q_values, title, complete=settings.all_states))
-    print(f"{settings.out}: the best action in each state")
-
-
-def _rollout(settings: argparse.Namespace) -> dict[str, Any]:
-    return {
-        "seed": settings.seed,
-        "number": settings.number,
-        "max_steps": settings.max_steps,
-        "evaporation": not settings.no_evaporation,
-        "epsilon": settings.epsilon,
-    }
+def _acting(settings: argparse.Namespace) -> dict[str, Any]:
+    evaporation = not settings.no_evaporation
+    return {"seed": settings.seed, "evaporation": evaporation, "epsilon": settings.epsilon}
 
 
 def _look(settings: argparse.Namespace, title: str) -> dict[str, Any]:
-    return {
-        "size": settings.size,
-        "hud": not settings.no_hud,
-        "legend": not settings.no_legend,
-        "view": not settings.no_view,
-        "title": title,
-    }
+    hud, legend = not settings.no_hud, not settings.no_legend
+    return {"size": settings.size, "hud": hud, "legend": legend, "title": title}
+
+
+def _save(settings: argparse.Namespace, pictures: Iterable[np.ndarray], n: int) -> None:
+    """Write n pictures as an animation."""
+    from taichi_ants.rendering import PAUSE, save_animation
+
+    with progress_bar("Rendering") as progress:
+        told = {"n": n, "progress": progress}
+        save_animation(settings.out, pictures, settings.fps, pause=PAUSE, **told)
 
 
 def main(arguments: list[str] | None = None) -> None:
