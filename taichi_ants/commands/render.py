@@ -86,14 +86,14 @@ def _add_options(parser: argparse.ArgumentParser, kind: str) -> None:
     add("--title", help="a line above all")
     world = "open" if colony else "paper"
     add("--world", default=world, help="paper, open, or the path of a map file")
-    seed = {"type": whole_number(), "default": 0, "metavar": "N"}
+    seed: dict[str, Any] = {"type": whole_number(), "default": 0, "metavar": "N"}
     add("--world-seed", **seed, help="seed of a world drawn at random")
     add("--seed", **seed, help="seed of training and of what is shown")
     add("--plugin", metavar="FILE", help="a Python file that registers learners or worlds")
     if colony:
         add("--ants", type=whole_number(1), default=80, metavar="N", help="how many")
     if learning:
-        stages = {"action": ListAction, "item": whole_number(0), "unique": False}
+        stages: dict[str, Any] = {"action": ListAction, "item": whole_number(0), "unique": False}
         words = "episodes of training after which to look at the ant"
         add("--stages", **stages, default=(0, 10, 100, 500), metavar="N", help=words)
     else:
@@ -121,7 +121,7 @@ def _add_training(parser: argparse.ArgumentParser, kind: str) -> None:
 
 def _add_acting(parser: argparse.ArgumentParser, kind: str) -> None:
     add = parser.add_argument_group("what is shown").add_argument
-    steps = {"type": whole_number(1, 100_000), "metavar": "N"}
+    steps: dict[str, Any] = {"type": whole_number(1, 100_000), "metavar": "N"}
     if kind == "colony":
         add("--ticks", **steps, default=600, help="length of an episode")
     else:
@@ -326,8 +326,8 @@ def _save(settings: argparse.Namespace, pictures: Iterable[np.ndarray], n: int) 
     from taichi_ants.rendering import PAUSE, save_animation
 
     with progress_bar("Rendering") as progress:
-        told = {"n": n, "progress": progress}
-        save_animation(settings.out, pictures, settings.fps, pause=PAUSE, **told)
+        options: dict[str, Any] = {"pause": PAUSE, "n": n, "progress": progress}
+        save_animation(settings.out, pictures, settings.fps, **options)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -30,9 +30,13 @@ PAPER = Observation("paper", N_STATES, (-1, 0, 1), state_name)
 
 
 def task_and_letters(observation: Observation, state: int) -> tuple[str, list[str]]:
-    """The task in a state's name, and a letter for each cell in view; none if it has others."""
+    """The task in a state's name, and a letter or two for each cell in view; none if it has others.
+
+    Of two letters the first tells the kind of cell, as in "T3".
+    """
     task, *letters = observation.name_of(state).split()
-    return task, letters if len(letters) == len(observation.cells) else []
+    one_each = len(letters) == len(observation.cells) and max(map(len, letters)) <= 2
+    return task, letters if one_each else []
 
 
 def possible_states(observation: Observation) -> Sequence[int]:

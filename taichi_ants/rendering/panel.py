@@ -68,9 +68,7 @@ def range_with_zero(q_values: np.ndarray) -> tuple[float, float]:
     return (low, high) if high > low else (0.0, 1.0)
 
 
-def draw_status(
-    frame: np.ndarray, status: Status, place: tuple[int, int, int], size: int
-) -> None:
+def draw_status(frame: np.ndarray, status: Status, place: tuple[int, int, int], size: int) -> None:
     """Draw the head-up lines.
 
     Args:

@@ -69,7 +69,17 @@ def test_an_episode_without_display_and_home(tmp_path, policy) -> None:
 
 
 def test_training_on_the_spot(tmp_path) -> None:
-    done = run("episode", "--episodes", 30, "--out", tmp_path / "frames", "--size", "64x64", "--max-steps", 4)
+    done = run(
+        "episode",
+        "--episodes",
+        30,
+        "--out",
+        tmp_path / "frames",
+        "--size",
+        "64x64",
+        "--max-steps",
+        4,
+    )
     assert done.returncode == 0, done.stderr
     assert files_in(tmp_path / "frames")[0] == "frame_000000.png"
     assert 5 <= len(files_in(tmp_path / "frames")) <= 17
@@ -77,7 +87,9 @@ def test_training_on_the_spot(tmp_path) -> None:
 
 def test_one_step_and_a_sheet(tmp_path, policy) -> None:
     path = tmp_path / "a.png"
-    assert run("episode", "--policy", policy, "--step", 3, "--out", path).stdout.endswith("step 3 of 34\n")
+    assert run("episode", "--policy", policy, "--step", 3, "--out", path).stdout.endswith(
+        "step 3 of 34\n"
+    )
     assert Image.open(path).size == (1280, 720)
     late = run("episode", "--policy", policy, "--step", 35, "--out", tmp_path / "b.png")
     assert late.returncode == 2

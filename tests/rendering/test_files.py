@@ -13,13 +13,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from taichi_ants import AntsError
+from taichi_ants import AntsError, rendering
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.rendering import (
     Episode,
     animated_files,
     check_animation,
-    frames as drawn,
     save_animation,
     save_picture,
 )
@@ -31,7 +30,7 @@ SIZE = (330, 324)
 @pytest.fixture(scope="module")
 def frames() -> list[np.ndarray]:
     episode = Episode.play(paper(), trail_follower(), max_steps=24)
-    return list(drawn(episode.moments(), SIZE, title="a title"))
+    return list(rendering.frames(episode.moments(), SIZE, title="a title"))
 
 
 def decoded(path: Path) -> tuple[list[np.ndarray], list[float]]:

@@ -25,7 +25,8 @@ from taichi_ants.rendering import (
     text,
     usual_spread,
 )
-from taichi_ants.rendering.colours import CHOSEN
+from taichi_ants.rendering.colours import CELL_FOOD, CHOSEN
+from taichi_ants.rendering.observed import Observation
 from taichi_ants.rendering.sheet import hardly_learned
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT
 from taichi_ants.task.states import REACHABLE_STATES, parse_state
@@ -263,6 +264,54 @@ def test_text_on_a_sheet_says_what_it_shows(monkeypatch) -> None:
     assert "nothing was learned here" in lines  # with food
     assert lines.count("pick up") == 1
     assert max(map(len, lines)) < 125
+
+
+def five_letters(row: int) -> str:
+    """The name of a state with five cells in view, the first of them most significant."""
+    carries, view = divmod(row, 4**5)
+    letters = ("EOTF", "EOSQ")[carries]
+    seen = (letters[view >> shift & 3] for shift in range(8, -1, -2))
+    return " ".join((("foraging", "carrying")[carries], *seen))
+
+
+FIVE = Observation("five_cells", 2 * 4**5, (-2, -1, 0, 1, 2), five_letters)
+
+
+def test_the_sheet_of_an_observation_of_more_cells(monkeypatch) -> None:
+    """One state is visited: foraging T E F O E, with food ahead and a trail behind to the left."""
+    table = np.zeros((FIVE.n_states, 5), dtype=np.float32)
+    row = next(row for row in range(FIVE.n_states) if five_letters(row) == "foraging T E F O E")
+    table[row, PICK_UP] = 1.0
+    sheet = policy_sheet(table, observation=FIVE)
+    assert coloured(sheet, CELL_FOOD).sum() > 60
+    lines: list[str] = []
+    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
+    policy_sheet(table, observation=FIVE)
+    assert "1 of 1024 states learned" in lines
+    assert [line for line in lines if len(line) == 1] == list("TEFOE")
+    with pytest.raises(AntsError, match=r"\(2048, 5\)"):
+        policy_sheet(random_policy(), observation=FIVE)
+
+
+def test_of_very_many_states_a_sheet_shows_the_first_and_says_so(monkeypatch) -> None:
+    lines: list[str] = []
+    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
+    table = np.zeros((FIVE.n_states, 5), dtype=np.float32)
+    table[:300, RIGHT] = 1.0
+    policy_sheet(table, observation=FIVE)
+    assert "300 of 1024 states learned; 256 are shown" in lines
+    assert lines.count("right") == 256
+    sheet = policy_sheet(table, complete=True, observation=FIVE)
+    assert sheet.shape[0] < 6000
+
+
+def test_states_with_names_of_another_form_are_written_out(monkeypatch) -> None:
+    own = Observation("own", 4, (-1, 0, 1), lambda row: f"carrying crumb number {row}")
+    lines: list[str] = []
+    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
+    policy_sheet(np.eye(4, 5), observation=own)
+    assert {f"crumb number {row}" for row in range(4)} <= set(lines)
+    assert "4 of 4 states learned" in lines
 
 
 def test_sheets_that_are_refused() -> None:

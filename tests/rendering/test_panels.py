@@ -8,6 +8,7 @@ import pytest
 from taichi_ants import AntsError
 from taichi_ants.rendering import Scene, Status, at_start, panel, text
 from taichi_ants.rendering.colours import CHOSEN
+from taichi_ants.rendering.observed import Observation
 from taichi_ants.rendering.panel import range_with_zero
 from taichi_ants.task.states import parse_state
 from taichi_ants.worlds import World, paper
@@ -146,6 +147,18 @@ def test_letters_lie_in_the_cells_in_view() -> None:
     for x, y in centres:
         around = changed[int(y) - 6 : int(y) + 6, int(x) - 6 : int(x) + 6]
         assert around.sum() > 12
+
+
+def test_an_observation_of_five_cells_marks_five() -> None:
+    """The ant stands at (0, 8, 8) and looks up."""
+    five = Observation("five", 1, (-2, -1, 0, 1, 2), lambda row: "foraging E T O E T")
+    scene = Scene(WORLD.grid, (500, 500), hud=False, legend=False)
+    plain = scene.draw(at_start(WORLD))
+    seen = scene.draw(at_start(WORLD), Status(0, state=0, observation=five))
+    for cell, marked in (((0, 8, 9), True), ((0, 9, 8), True), ((0, 9, 9), False)):
+        x, y = scene.viewport.centres(cell).astype(int)
+        part = (slice(y - 6, y + 6), slice(x - 6, x + 6))
+        assert (seen[part] != plain[part]).any() == marked
 
 
 @pytest.mark.parametrize("side", [500, 700])

@@ -238,9 +238,7 @@ def golden_scene() -> np.ndarray:
         trails=[((1, 0, 0), 250), ((2, 0, 0), 120), ((0, 3, 1), 25), ((0, 4, 1), 1)],
         ants=[((1, 0, 0), 1), ((0, 3, 1), 4), ((3, 4, 0), 2)],
     )
-    snapshot = dataclasses.replace(
-        at_start(world, n=3), ant_carries=np.array([True, False, False])
-    )
+    snapshot = dataclasses.replace(at_start(world, n=3), ant_carries=np.array([True, False, False]))
     return Scene(world.grid, (320, 200), hud=False, legend=False).draw(snapshot)
 
 
