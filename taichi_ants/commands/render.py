@@ -39,9 +39,74 @@ KINDS = {  # what each subcommand shows, and how it is called
     "sheet": ("What a policy does in each state", "--policy my.npz --out sheet.png"),
 }
 DEFAULT_PLANNING_STEPS = 5
-_SIZE, _COLONY_SIZE, _LEARNING_SIZE = (1280, 720), (960, 540), (1280, 520)
 
 _IN_WORDS = {"delivers": "delivered", "other": ""}  # all others speak for themselves
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, cross, height = text.lower().partition("x")
+    if not (cross and width.isdecimal() and height.isdecimal()):
+        raise argparse.ArgumentTypeError(f"{text!r} is no size, write it as 1280x720")
+    return int(width), int(height)
+
+
+_SEED: dict[str, Any] = {"type": whole_number(), "default": 0, "metavar": "N"}
+_LENGTH: dict[str, Any] = {"type": whole_number(1, 100_000), "default": 600, "metavar": "N"}
+_COUNT: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
+_NUMBER: dict[str, Any] = {"type": number, "metavar": "X"}
+_FLAG: dict[str, Any] = {"action": "store_true"}
+_STAGES = {"action": ListAction, "item": whole_number(0), "unique": False, "metavar": "N"}
+
+# Each option: the kinds of pictures that it is for, by their first letters, what it does, and how
+# it is read.
+_OPTIONS: dict[str, tuple[str, str, dict[str, Any]]] = {
+    "--out": ("ecls", "file or folder", {"metavar": "PATH"}),
+    "--title": ("ecls", "a line above all", {"metavar": "TEXT"}),
+    "--world": ("ecls", "paper, open, or the path of a map file", {"default": "paper"}),
+    "--world-seed": ("ecls", "seed of a world drawn at random", _SEED),
+    "--seed": ("ecls", "seed of training and of what is shown", _SEED),
+    "--plugin": ("ecls", "a Python file that registers learners or worlds", {"metavar": "FILE"}),
+    "--ants": ("c", "how many", {**_COUNT, "default": 80}),
+    "--max-steps": ("el", "step limit of the episode shown", _LENGTH),
+    "--ticks": ("c", "length of an episode", _LENGTH),
+    "--number": ("e", "which of the seed's rollouts", {**_SEED, "type": whole_number(0)}),
+    "--epsilon": ("ecl", "probability of a random action", {**_NUMBER, "default": 0.0}),
+    "--no-evaporation": ("ecl", "trails stay as they are", _FLAG),
+    "--policy": ("ecs", "a policy file (.npz); without one, it is trained", {"metavar": "FILE"}),
+    "--learner": ("ecls", "name of the learner to train", {"default": "sarsa", "metavar": "NAME"}),
+    "--episodes": ("ecs", "of training", {**_COUNT, "default": 500}),
+    "--stages": ("l", "looks at the ant after so many episodes of training", _STAGES),
+    "--learning-rate": ("ecls", "in (0, 1]", {**_NUMBER, "default": 0.001}),
+    "--discount": ("ecls", "in [0, 1]", {**_NUMBER, "default": 0.9}),
+    "--train-epsilon": ("ecls", "epsilon in the first episode", {**_NUMBER, "default": 0.3}),
+    "--epsilon-decay": ("ecls", "a factor after each episode", {**_NUMBER, "default": 0.99}),
+    "--planning-steps": ("ecls", "of learners that plan", _COUNT),
+    "--size": ("ecl", "in pixels", {"type": _size, "metavar": "WxH"}),
+    "--fps": ("ecl", "pictures a second", {**_NUMBER, "default": 8.0}),
+    "--every": ("c", "ticks from one picture to the next", {**_COUNT, "default": 4}),
+    "--step": ("ec", "of a .png: which one, else the last", {**_SEED, "default": None}),
+    "--no-hud": ("ec", "no head-up lines", _FLAG),
+    "--no-legend": ("ec", "no legend", _FLAG),
+    "--no-view": ("e", "do not mark the cells in view", _FLAG),
+    "--all-states": ("s", "also those that were not visited", _FLAG),
+}
+_OF_TRAINING = (
+    *("learner", "episodes", "learning_rate", "discount", "train_epsilon", "epsilon_decay"),
+    "planning_steps",
+)
+# Where a kind has defaults of its own. A still picture has 1280x720 pixels.
+_DEFAULTS: dict[str, dict[str, Any]] = {
+    "episode": {"out": "results/renders/episode.gif", "size": "1280x720"},
+    "colony": {
+        **{"out": "results/renders/colony.gif", "size": "960x540"},
+        **{"world": "open", "episodes": 60},
+    },
+    "learning": {
+        **{"out": "results/renders/learning.gif", "size": "1280x520"},
+        **{"max_steps": 150, "stages": (0, 10, 100, 500)},
+    },
+    "sheet": {"out": "results/renders/policy_sheet.png"},
+}
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -49,18 +114,21 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     summary, more = __doc__.split("\n", 1)
     parser = Parser(summary, epilog=f"{more} `%(prog)s episode --help` tells what it has to offer.")
     kinds = parser.add_subparsers(metavar="|".join(KINDS), required=True)
-    for name, (shows, example) in KINDS.items():
-        one = kinds.add_parser(
-            name, help=shows, description=f"{shows}.", epilog=f"Example: %(prog)s {example}"
-        )
-        _add_options(one, name)
+    for kind, (shows, example) in KINDS.items():
+        example = f"Example: %(prog)s {example}"
+        one = kinds.add_parser(kind, help=shows, description=f"{shows}.", epilog=example)
+        for flag, (where, words, reading) in _OPTIONS.items():
+            if kind[0] in where:
+                one.add_argument(flag, help=words, **reading)
+        one.set_defaults(**_DEFAULTS[kind])
     given = sys.argv[1:] if arguments is None else arguments
     parser.parse_args(given)
-    settings, named = kinds.choices[given[0]].parse_given(given[1:])
-    settings.kind, settings.world_seed_given = given[0], "world_seed" in named
-    settings.still = Path(settings.out).suffix.lower() == ".png" and settings.kind != "learning"
-    if settings.kind in ("episode", "colony") and settings.size is None:
-        settings.size = _COLONY_SIZE if settings.kind == "colony" and not settings.still else _SIZE
+    kind = given[0]
+    settings, named = kinds.choices[kind].parse_given(given[1:])
+    settings.kind, settings.world_seed_given = kind, "world_seed" in named
+    settings.still = Path(settings.out).suffix.lower() == ".png" and kind != "learning"
+    if kind != "sheet" and "size" not in named:
+        settings.size = _size("1280x720" if settings.still else settings.size)
     for name, flag in named.items():
         if name in _OF_TRAINING and getattr(settings, "policy", None):
             parser.error(f"{flag} is for training, but --policy is given; leave out one of the two")
@@ -69,94 +137,6 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
         if name in ("fps", "every") and settings.still:
             parser.error(f"{flag} is for an animation, but --out ends in .png; leave out one")
     return settings
-
-
-_OF_TRAINING = (
-    *("learner", "episodes", "learning_rate", "discount", "train_epsilon", "epsilon_decay"),
-    "planning_steps",
-)
-
-
-def _add_options(parser: argparse.ArgumentParser, kind: str) -> None:
-    """All options of one kind of picture."""
-    colony, learning, sheet = kind == "colony", kind == "learning", kind == "sheet"
-    add = parser.add_argument
-    out = "policy_sheet.png" if sheet else f"{kind}.gif"
-    add("--out", default=f"results/renders/{out}", metavar="PATH", help="file or folder")
-    add("--title", help="a line above all")
-    world = "open" if colony else "paper"
-    add("--world", default=world, help="paper, open, or the path of a map file")
-    seed: dict[str, Any] = {"type": whole_number(), "default": 0, "metavar": "N"}
-    add("--world-seed", **seed, help="seed of a world drawn at random")
-    add("--seed", **seed, help="seed of training and of what is shown")
-    add("--plugin", metavar="FILE", help="a Python file that registers learners or worlds")
-    if colony:
-        add("--ants", type=whole_number(1), default=80, metavar="N", help="how many")
-    if learning:
-        stages: dict[str, Any] = {"action": ListAction, "item": whole_number(0), "unique": False}
-        words = "episodes of training after which to look at the ant"
-        add("--stages", **stages, default=(0, 10, 100, 500), metavar="N", help=words)
-    else:
-        add("--policy", metavar="FILE", help="a policy file (.npz), to train none")
-    _add_training(parser, kind)
-    if sheet:
-        add("--all-states", action="store_true", help="also those that were not visited")
-    else:
-        _add_acting(parser, kind)
-        _add_picture(parser, kind)
-
-
-def _add_training(parser: argparse.ArgumentParser, kind: str) -> None:
-    add = parser.add_argument_group("training").add_argument
-    add("--learner", default="sarsa", help="name of the learner")
-    if kind != "learning":
-        usual = 60 if kind == "colony" else 500
-        add("--episodes", type=whole_number(1), default=usual, metavar="N", help="how many")
-    add("--learning-rate", type=number, default=0.001, metavar="X", help="in (0, 1]")
-    add("--discount", type=number, default=0.9, metavar="X", help="in [0, 1]")
-    add("--train-epsilon", type=number, default=0.3, metavar="X", help="in the first episode")
-    add("--epsilon-decay", type=number, default=0.99, metavar="X", help="after each episode")
-    add("--planning-steps", type=whole_number(1), metavar="N", help="of learners that plan")
-
-
-def _add_acting(parser: argparse.ArgumentParser, kind: str) -> None:
-    add = parser.add_argument_group("what is shown").add_argument
-    steps: dict[str, Any] = {"type": whole_number(1, 100_000), "metavar": "N"}
-    if kind == "colony":
-        add("--ticks", **steps, default=600, help="length of an episode")
-    else:
-        usual = 150 if kind == "learning" else 600
-        add("--max-steps", **steps, default=usual, help="step limit")
-    if kind == "episode":
-        words = "which of the seed's rollouts"
-        add("--number", type=whole_number(0), default=0, metavar="N", help=words)
-    words = "probability of a random action"
-    add("--epsilon", type=number, default=0.0, metavar="X", help=words)
-    add("--no-evaporation", action="store_true", help="trails stay as they are")
-
-
-def _add_picture(parser: argparse.ArgumentParser, kind: str) -> None:
-    add = parser.add_argument_group("picture").add_argument
-    size = _LEARNING_SIZE if kind == "learning" else None
-    usual = {"episode": " (1280x720)", "colony": " (960x540, a .png 1280x720)"}.get(kind, "")
-    add("--size", type=_size, default=size, metavar="WxH", help=f"in pixels{usual}")
-    add("--fps", type=number, default=8.0, metavar="X", help="pictures a second")
-    if kind == "learning":
-        return
-    if kind == "colony":
-        add("--every", type=whole_number(1), default=4, metavar="N", help="ticks a picture")
-    else:
-        add("--no-view", action="store_true", help="do not mark the cells in view")
-    add("--step", type=whole_number(0), metavar="N", help="of a .png: which one, else the last")
-    add("--no-hud", action="store_true", help="no head-up lines")
-    add("--no-legend", action="store_true", help="no legend")
-
-
-def _size(text: str) -> tuple[int, int]:
-    width, cross, height = text.lower().partition("x")
-    if not (cross and width.isdecimal() and height.isdecimal()):
-        raise argparse.ArgumentTypeError(f"{text!r} is no size, write it as 1280x720")
-    return int(width), int(height)
 
 
 def show(settings: argparse.Namespace) -> None:

@@ -102,25 +102,13 @@ def save_animation(
     """
     target = check_animation(path, fps)
     kind = target.suffix.lower()
-    checked = _shown(_checked(frames, kind), round(pause * fps) - 1, n, progress)
+    checked = _checked(frames, kind, round(pause * fps) - 1, n, progress)
     with _folder_of(target):
         if kind:
             write = _ANIMATIONS[kind]
             files.write_atomically(target, lambda file: write(file, checked, fps))
         else:
             _save_pictures(target, checked)
-
-
-def _shown(
-    frames: Iterator[np.ndarray], more: int, n: int, progress: Progress | None
-) -> Iterator[np.ndarray]:
-    """The frames, the last of them so many times more."""
-    for done, frame in enumerate(frames, start=1):
-        yield frame
-        if progress is not None:
-            progress(done / n)
-    for _ in range(more):
-        yield frame
 
 
 def save_picture(path: PathLike, frame: np.ndarray) -> None:
@@ -181,33 +169,33 @@ def _save_pictures(folder: Path, frames: Iterable[np.ndarray]) -> None:
         shutil.rmtree(temporary, ignore_errors=True)
 
 
-def _checked(frames: Iterable[np.ndarray], kind: str) -> Iterator[np.ndarray]:
-    """The frames, at least one, of a size that the kind of file holds; checks the first at once."""
+def _checked(
+    frames: Iterable[np.ndarray], kind: str, more: int, n: int, progress: Progress | None
+) -> Iterator[np.ndarray]:
+    """The frames, if they are what the kind of file can hold, the last one so many times more."""
     if not isinstance(frames, Iterable):
         raise AntsError(f"frames is {shown(frames)}; it must be several pictures.")
-    frames = iter(frames)
-    first = next(frames, None)
-    if first is None:
-        raise AntsError("there are no frames; an animation needs at least one.")
-    _check_frame(first)
-    height, width = first.shape[:2]
-    most = _LARGEST.get(kind, max(width, height))
-    if max(width, height) > most:
-        raise AntsError(
-            f"the frames are {width} x {height} pixels; a {kind} holds at most {most} in width and "
-            "height, draw them smaller."
-        )
-    return _of_one_size(first, frames)
-
-
-def _of_one_size(first: np.ndarray, frames: Iterator[np.ndarray]) -> Iterator[np.ndarray]:
-    yield first
-    for frame in frames:
+    shape = None
+    for done, frame in enumerate(frames, start=1):
         _check_frame(frame)
-        if frame.shape != first.shape:
+        if shape is None:
+            height, width, _ = shape = frame.shape
+            most = _LARGEST.get(kind, max(width, height))
+            if max(width, height) > most:
+                raise AntsError(
+                    f"the frames are {width} x {height} pixels; a {kind} holds at most {most} in "
+                    "width and height, draw them smaller."
+                )
+        if frame.shape != shape:
             raise AntsError(
-                f"a frame is {frame.shape}, the first one {first.shape}; all must be of one size."
+                f"a frame is {frame.shape}, the first one {shape}; all must be of one size."
             )
+        yield frame
+        if progress is not None:
+            progress(done / max(n, done))
+    if shape is None:
+        raise AntsError("there are no frames; an animation needs at least one.")
+    for _ in range(more):
         yield frame
 
 
