@@ -219,8 +219,8 @@ class _Panel:
         self._footer = top + height - below
         grid = stage.episode.world.grid
         margin = max(2, round(min(width, height) / 60))
-        room = (left, top + above, width, height - above - below)
-        viewport = Viewport.fit(grid, *room, margin=margin)
+        viewport = Viewport.fit(grid, width, height - above - below, margin=margin)
+        self._world = canvas[top + above :, left:][: viewport.height, :width]
         self.hexagon = viewport.hexagon
         self._rasteriser = Rasteriser(grid, viewport)
         self._moments = stage.episode.moments()
@@ -240,7 +240,7 @@ class _Panel:
         if moment is None:
             return
         snapshot, status = moment
-        self._rasteriser.draw(self._canvas, snapshot)
+        self._world[:] = self._rasteriser.draw(snapshot)
         if not self._text_size:
             return
         left = round(self._middle - self._width / 2)
@@ -304,7 +304,7 @@ def _tiles(
 
     def fitted(columns: int) -> Viewport:
         rows = math.ceil(n / columns)
-        return Viewport.fit(grid, 0, 0, width // columns, max(1, height // rows - lines))
+        return Viewport.fit(grid, width // columns, max(1, height // rows - lines))
 
     columns = max(range(1, n + 1), key=lambda count: (fitted(count).hexagon, count))
     rows = math.ceil(n / columns)

@@ -202,10 +202,9 @@ def draw_swatch(
         ant_headings=np.full(n, 1, dtype=np.int32),
         ant_carries=np.full(n, bool(carries)),
     )
-    width = round(1.18 * side)
-    viewport = Viewport.fit(grid, left, top, width, side, margin=1)
-    rasteriser = Rasteriser(grid, viewport, ants_like=hexagon)
-    rasteriser.draw(frame, snapshot)
+    viewport = Viewport.fit(grid, round(1.18 * side), side, margin=1)
+    picture = Rasteriser(grid, viewport, ants_like=hexagon).draw(snapshot)
+    frame[top : top + viewport.height, left : left + viewport.width] = picture
 
 
 def fill(

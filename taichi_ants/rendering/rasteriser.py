@@ -1,4 +1,4 @@
-"""Draws the cells and the ants of a world into a frame."""
+"""Draws the cells and the ants of a world."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ _SQRT_3 = math.sqrt(3.0)
 
 
 class Rasteriser:
-    """Draws worlds of one grid into one place of a frame.
+    """Draws worlds of one grid as pictures of one size.
 
-    What depends on the place alone, which cells a pixel shows and by how much, is found once.
+    What depends on these alone, which cells a pixel shows and by how much, is found once.
 
     Args:
         grid: The grid of all worlds to draw.
-        viewport: Where to draw, within the frame.
+        viewport: The size, and where the cells lie.
         full_level: The trail level that has the last colour of the ramp, as stronger ones have.
         shown: bool (grid.size,), cells to draw, all others are page; None draws all that exist.
         ants_like: Draw ants as in hexagons of this size, in pixels, for a legend; None takes that
@@ -58,10 +58,9 @@ class Rasteriser:
     ) -> None:
         self.grid = grid
         self.viewport = viewport
-        self._full_level = full_level
+        self._full_level = np.float32(full_level)
         self._ants_like = viewport.hexagon if ants_like is None else ants_like
-        self._shown = (grid.exists if shown is None else shown).view(np.uint8)
-        self._colours = np.zeros(grid.size, dtype=np.uint32)
+        self._shown = grid.exists if shown is None else shown
         self._map = self._map_pixels() if self.has_hexagons else None
 
     @property
@@ -82,59 +81,38 @@ class Rasteriser:
         """Whether a letter in a cell could be read."""
         return self.viewport.hexagon >= _SMALLEST_LETTERS
 
-    def draw(
-        self, frame: np.ndarray, snapshot: Snapshot, in_view: np.ndarray | None = None
-    ) -> None:
-        """Draw a world with its ants.
+    def draw(self, snapshot: Snapshot, in_view: np.ndarray | None = None) -> np.ndarray:
+        """The picture of a world with its ants, uint8 (height, width, 3).
 
         Args:
-            frame: uint8 (height, width, 3), contiguous; all pixels of the viewport are set.
             snapshot: The world, of this grid.
             in_view: Flat indices of the cells that ant number 0 sees, to be marked.
         """
-        self.draw_ground(frame, snapshot.ground, snapshot.trail)
+        frame = self.draw_cells(self._colour_cells(snapshot))
         layers = [self._things(snapshot), *self._view(snapshot, in_view), self._ants(snapshot)]
         if not self.has_hexagons:
             # Dots overlap. A dot of hers over the ants would hide those beside her, one under them
             # may be hidden by a crowd: they lie over it, and a ring around it over them.
             layers.append(self._queen_rings(snapshot))
         self.draw_shapes(frame, *(np.concatenate(parts) for parts in zip(*layers, strict=True)))
-
-    def draw_ground(self, frame: np.ndarray, ground: np.ndarray, trail: np.ndarray) -> None:
-        """Draw the cells: what they hold, uint8 (grid.size,), and the trail, any (grid.size,)."""
-        self.kernels.colour_cells(
-            self._colours,
-            np.ascontiguousarray(ground),
-            self._shown,
-            np.ascontiguousarray(trail, dtype=np.float32),
-            self._colours_of_ground(),
-            colours.TRAIL_RAMP,
-            self._full_level,
-            EMPTY,
-        )
-        self.draw_colours(frame, self._colours)
+        return frame
 
     def colour_of(self, cells: np.ndarray) -> np.ndarray:
         """The colours, uint32 (...), in which `draw` has just drawn cells (flat indices (...))."""
         return self._colours[cells]
 
-    def draw_colours(self, frame: np.ndarray, of_cells: np.ndarray) -> None:
-        """Draw the cells in the given colours, uint32 (grid.size,)."""
-        view = self.viewport
-        place = (view.left, view.top, view.width, view.height)
+    def draw_cells(self, of_cells: np.ndarray) -> np.ndarray:
+        """The picture of the cells in the given colours, uint32 (grid.size,)."""
+        frame = np.empty((self.viewport.height, self.viewport.width, 3), dtype=np.uint8)
         if self._map is not None:
-            flat = [frame.reshape(-1), *self._map]
-            self.kernels.draw_cells(*flat, of_cells, frame.shape[1], *place)
+            self.kernels.draw_cells(frame.reshape(-1), *self._map, of_cells, self.viewport.width)
         else:
-            outline = self._relative_outline()
-            self.kernels.draw_small_cells(frame, of_cells, *place, *outline, *self._layout())
+            self.kernels.draw_small_cells(frame, of_cells, *self._layout())
+        return frame
 
     def draw_shapes(self, frame: np.ndarray, table: np.ndarray, of_shapes: np.ndarray) -> None:
         """Draw shapes, rows of `table` as in `raster_kernels`, in colours uint32 (n,)."""
-        view = self.viewport
-        self.kernels.draw_shapes(
-            frame, table, of_shapes, view.left, view.top, view.width, view.height
-        )
+        self.kernels.draw_shapes(frame, table, of_shapes)
 
     def shapes(
         self,
@@ -220,33 +198,30 @@ class Rasteriser:
         growth = math.log(covered / _FREE_SHARE) / math.log(most / _FREE_SHARE)
         return min(1.0, (_FREE_SHARE + (1.0 - _FREE_SHARE) * growth) / covered)
 
-    def _colours_of_ground(self) -> np.ndarray:
-        """uint32 (16,), by the code of the ground."""
+    def _colour_cells(self, snapshot: Snapshot) -> np.ndarray:
+        """The colours of all cells, uint32 (grid.size,): by what they hold, else by the trail."""
         small = self.viewport.hexagon < _SMALLEST_DRAWING
-        table = np.full(16, colours.CELL_EMPTY, dtype=np.uint32)
-        table[OBSTACLE] = colours.CELL_OBSTACLE
-        table[FOOD] = colours.CELL_FOOD if small else colours.FLOOR_FOOD
-        table[QUEEN] = colours.CELL_QUEEN if small else colours.FLOOR_QUEEN
-        return table
+        of_ground = np.full(16, colours.CELL_EMPTY, dtype=np.uint32)
+        of_ground[OBSTACLE] = colours.CELL_OBSTACLE
+        of_ground[FOOD] = colours.CELL_FOOD if small else colours.FLOOR_FOOD
+        of_ground[QUEEN] = colours.CELL_QUEEN if small else colours.FLOOR_QUEEN
+        of_cells = of_ground[snapshot.ground & 15]
+        marked = np.flatnonzero((snapshot.ground == EMPTY) & (snapshot.trail >= 1))
+        share = np.minimum(snapshot.trail[marked].astype(np.float32) / self._full_level, 1)
+        of_cells[marked] = colours.TRAIL_RAMP[(share * 255 + 0.5).astype(np.int32)]
+        of_cells[~self._shown] = colours.PAGE
+        self._colours = of_cells
+        return of_cells
 
     def _map_pixels(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         shape = (self.viewport.height, self.viewport.width)
         nearest, second, shares = (np.empty(shape, dtype=np.int32) for _ in range(3))
-        hexagon = self.viewport.hexagon
         # The lines fade away where cells are small, and don't grow with large ones for ever.
-        line = float(np.clip(0.09 * hexagon - 0.25, 0.0, 3.0))
-        self.kernels.map_pixels(
-            *(nearest, second, shares),
-            *self._relative_outline(),
-            line,
-            *self._layout(),
-        )
+        line = float(np.clip(0.09 * self.viewport.hexagon - 0.25, 0.0, 3.0))
+        self.kernels.map_pixels(nearest, second, shares, line, *self._layout())
         return nearest.reshape(-1), second.reshape(-1), shares.reshape(-1)
 
-    def _relative_outline(self) -> tuple[float, float, float]:
-        """The origin relative to the viewport, and the size of a hexagon."""
-        x, y = self.viewport.origin
-        return x - self.viewport.left, y - self.viewport.top, self.viewport.hexagon
-
-    def _layout(self) -> tuple[int, int, int]:
-        return self.grid.width, self.grid.height, self.grid.ranges[2]
+    def _layout(self) -> tuple[float, float, float, int, int, int]:
+        """Origin and size of the hexagons, columns and rows of the grid, and its last range."""
+        grid, viewport = self.grid, self.viewport
+        return (*viewport.origin, viewport.hexagon, grid.width, grid.height, grid.ranges[2])

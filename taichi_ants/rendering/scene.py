@@ -11,7 +11,7 @@ from taichi_ants.errors import AntsError, checked_flag, expect, shown
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import colours, panel, text
-from taichi_ants.rendering.observed import Observation, task_and_letters
+from taichi_ants.rendering.observed import task_and_letters
 from taichi_ants.rendering.panel import Status
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.rendering.snapshot import Snapshot, check_snapshot
@@ -108,52 +108,51 @@ class Scene:
                 f"the snapshot is of ranges {snapshot.grid.ranges}, the scene of "
                 f"{self._rasteriser.grid.ranges}; draw it with a Scene of its own grid."
             )
+        world = self._draw_world(snapshot, status)
         frame = self._background.copy()
-        if self._view and status and status.state is not None and len(snapshot.ant_cells):
-            self._draw_with_view(frame, snapshot, status.observation, status.state)
-        else:
-            self._rasteriser.draw(frame, snapshot)
+        frame[: world.shape[0], : world.shape[1]] = world
         if self._hud and status is not None:
             panel.draw_status(frame, status, self._places["status"], self._text_size)
         return frame
 
-    def _draw_with_view(
-        self, frame: np.ndarray, snapshot: Snapshot, observation: Observation, state: int
-    ) -> None:
-        """Draw a world, and in the cells that ant number 0 sees the letters of its state."""
-        turned = (snapshot.ant_headings[0] + np.array(observation.cells)) % N_HEADINGS
+    def _draw_world(self, snapshot: Snapshot, status: Status | None) -> np.ndarray:
+        """The world; if asked for, with letters in the cells that ant number 0 sees."""
+        state = None if status is None else status.state
+        if not self._view or state is None or status is None or not len(snapshot.ant_cells):
+            return self._rasteriser.draw(snapshot)
+        turned = (snapshot.ant_headings[0] + np.array(status.observation.cells)) % N_HEADINGS
         cells = snapshot.ant_cells[0] + snapshot.grid.offsets[turned]
-        self._rasteriser.draw(frame, snapshot, in_view=cells)
-        _, letters = task_and_letters(observation, state)
-        if not letters or not self._rasteriser.has_room_for_letters:
-            return
-        centres = self.viewport.centres(snapshot.grid.cells(cells)).tolist()
-        floors = self._rasteriser.colour_of(cells).tolist()
-        taken = np.isin(snapshot.ground[cells], (FOOD, QUEEN)).tolist()  # by their drawings
-        for number, letter in enumerate(letters):
-            if not taken[number]:
-                hexagon = self.viewport.hexagon
-                write_letter(frame, letter, centres[number], hexagon, floor=floors[number])
+        world = self._rasteriser.draw(snapshot, in_view=cells)
+        _, letters = task_and_letters(status.observation, state)
+        if letters and self._rasteriser.has_room_for_letters:
+            centres = self.viewport.centres(snapshot.grid.cells(cells)).tolist()
+            floors = self._rasteriser.colour_of(cells).tolist()
+            taken = np.isin(snapshot.ground[cells], (FOOD, QUEEN)).tolist()  # by their drawings
+            for number, letter in enumerate(letters):
+                if not taken[number]:
+                    hexagon = self.viewport.hexagon
+                    write_letter(world, letter, centres[number], hexagon, floor=floors[number])
+        return world
 
-    def _world_room(self, margin: int) -> tuple[int, int, int, int]:
-        """Left, top, width and height of the part of the picture for the world."""
+    def _world_room(self, margin: int) -> tuple[int, int]:
+        """Width and height of the upper left part of the picture, which is for the world."""
         width, height = self.size
         if not (self._hud or self._legend):
-            return 0, 0, width, height
+            return width, height
         if width >= height:
-            return 0, 0, width - _PANEL_WIDTH * self._text_size - margin, height
+            return width - _PANEL_WIDTH * self._text_size - margin, height
         lines = max(panel.STATUS_HEIGHT * self._hud, panel.LEGEND_HEIGHT * self._legend)
-        return 0, 0, width, height - round((lines + _TITLE_HEIGHT) * self._text_size) - margin
+        return width, height - round((lines + _TITLE_HEIGHT) * self._text_size) - margin
 
     def _panel_places(
-        self, room: tuple[int, int, int, int], margin: int, title: str
+        self, room: tuple[int, int], margin: int, title: str
     ) -> dict[str, tuple[int, int, int]]:
         """Left, top and width of the head-up lines and of the legend; writes the title."""
         if not (self._hud or self._legend):
             return {}
         size, (width, height) = self._text_size, self.size
         beside = width >= height
-        left, top = (room[2], margin) if beside else (margin, room[3])
+        left, top = (room[0], margin) if beside else (margin, room[1])
         right = width - margin
         if title:
             room_for_title = right - left

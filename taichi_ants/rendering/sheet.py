@@ -270,36 +270,35 @@ class _Picture:
         room = float(rows.max() - rows.min()) + _SQRT_3 * hexagon
         self.height = round(room + 0.136 * hexagon)
         y = (self.height - room) / 2 + 0.5 * _SQRT_3 * hexagon - float(rows.min())
-        viewport = Viewport(0, 0, width, self.height, hexagon, (width / 2, y))
+        viewport = Viewport(width, self.height, hexagon, (width / 2, y))
         self._hexagon = hexagon
         self._centres = viewport.centres(cells)
         self._rasteriser = Rasteriser(grid, viewport, shown=shown)
-        self._frame = np.empty((self.height, width, 3), dtype=np.uint8)
         self._floors = np.full(grid.size, colours.PAGE, dtype=np.uint32)
 
     def draw(self, state: int, actions: list[int]) -> np.ndarray:
-        """The picture, uint8 (height, width, 3); valid until the next one is drawn."""
+        """The picture, uint8 (height, width, 3)."""
         task, letters = task_and_letters(self._observation, state)
         carries, unnamed = task == TASK_NAMES[1], not letters
         letters = letters or [" "] * len(self._observation.cells)
         floors = [_FLOORS.get(letter[0], colours.CELL_EMPTY) for letter in letters]
         self._floors[self._cells] = [colours.CELL_EMPTY, *floors]
-        self._rasteriser.draw_colours(self._frame, self._floors)
-        self._draw_things(letters)
-        self._draw_ant(carries)
+        frame = self._rasteriser.draw_cells(self._floors)
+        self._draw_things(frame, letters)
+        self._draw_ant(frame, carries)
         for letter, floor, (x, y) in zip(letters, floors, self._centres[1:].tolist(), strict=True):
             goal = letter in _GOALS
             place = x, y - _rise(goal) * self._hexagon
-            write_letter(self._frame, letter, place, self._hexagon, floor=floor, beside=goal)
+            write_letter(frame, letter, place, self._hexagon, floor=floor, beside=goal)
         if unnamed:
-            size, width = round(0.6 * self._hexagon), self._frame.shape[1]
+            size, width = round(0.6 * self._hexagon), frame.shape[1]
             name = self._observation.name_of(state).partition(" ")[2]
             name = text.shortened(name, size, width)
-            text.write(self._frame, name, width / 2, size, size, align="middle")
-        self._draw_arrows(letters, actions)
-        return self._frame
+            text.write(frame, name, width / 2, size, size, align="middle")
+        self._draw_arrows(frame, letters, actions)
+        return frame
 
-    def _draw_things(self, letters: list[str]) -> None:
+    def _draw_things(self, frame: np.ndarray, letters: list[str]) -> None:
         kernels = self._rasteriser.kernels
         goals = {"F": (kernels.FOOD, colours.CELL_FOOD), "Q": (kernels.QUEEN, colours.CELL_QUEEN)}
         for cell, letter in zip(self._cells[1:], letters, strict=True):
@@ -309,16 +308,16 @@ class _Picture:
                 marks[:, 0] -= 0.58 * marks[:, 2]  # room for a letter beside them
                 marks[:, 2] *= 0.6
                 marks[:, 1] -= _rise(True) * self._hexagon
-                self._draw_shapes(marks, [colour])
+                self._draw_shapes(frame, marks, [colour])
 
-    def _draw_ant(self, carries: bool) -> None:
+    def _draw_ant(self, frame: np.ndarray, carries: bool) -> None:
         kernels = self._rasteriser.kernels
         shape = kernels.ANT_WITH_FOOD if carries else kernels.ANT
         ant = self._rasteriser.shapes(self._cells[:1], shape, fill=0.62)
         ant[:, 1] += 0.2 * self._hexagon
-        self._draw_shapes(ant, [colours.ANT])
+        self._draw_shapes(frame, ant, [colours.ANT])
 
-    def _draw_arrows(self, letters: list[str], actions: list[int]) -> None:
+    def _draw_arrows(self, frame: np.ndarray, letters: list[str], actions: list[int]) -> None:
         """An arrow to where a move goes, from the food that is picked up, or to the queen."""
         rows, of_rows = [], []
         for action in actions:
@@ -331,10 +330,10 @@ class _Picture:
                     rows.append((x, y, 0.37 * self._hexagon, turned, arrow, 1.0))
                     of_rows.append(_ARROW_COLOURS.get(action, colours.CHOSEN))
         if rows:
-            self._draw_shapes(np.array(rows, np.float32), of_rows)
+            self._draw_shapes(frame, np.array(rows, np.float32), of_rows)
 
-    def _draw_shapes(self, table: np.ndarray, of_shapes: list[int]) -> None:
-        self._rasteriser.draw_shapes(self._frame, table, np.array(of_shapes, dtype=np.uint32))
+    def _draw_shapes(self, frame: np.ndarray, table: np.ndarray, of_shapes: list[int]) -> None:
+        self._rasteriser.draw_shapes(frame, table, np.array(of_shapes, dtype=np.uint32))
 
 
 def _rise(goal: bool) -> float:

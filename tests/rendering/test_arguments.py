@@ -57,7 +57,7 @@ CALLS: dict[str, list[tuple[str, Callable[[object], object]]]] = {
     "Stage": [("a stage", lambda wrong: next(rendering.learning_frames([wrong])))],
     "Status": [("status", lambda wrong: Scene(WORLD.grid).draw(at_start(WORLD), wrong))],
     "at_start": [("world", of(at_start))],
-    "Viewport": [("grid", lambda wrong: Viewport.fit(wrong, 0, 0, 9, 9))],
+    "Viewport": [("grid", lambda wrong: Viewport.fit(wrong, 9, 9))],
     "best_actions": [("values", of(rendering.best_actions))],
     "check_animation": [
         ("path", of(rendering.check_animation, 8)),

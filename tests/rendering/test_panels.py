@@ -49,13 +49,13 @@ def test_bars_of_negative_values_lie_on_the_other_side_of_the_axis() -> None:
     assert left.max() < right.min() <= left.max() + 3
     assert len(right) == pytest.approx(7 * (len(left) + 1), abs=8)  # 1: the axis
     view = Scene(WORLD.grid, (640, 400)).viewport
-    assert left.min() > view.left + view.width + text.width("forward", 11)
+    assert left.min() > view.width + text.width("forward", 11)
 
 
 def test_only_what_is_switched_on_is_there() -> None:
     plain = picture(hud=False, legend=False)
     right = Scene(WORLD.grid, (640, 400)).viewport
-    edge = right.left + right.width
+    edge = right.width
     everything = picture(status=status(1), title="x")
     assert (everything[:, edge:] != 255).any()
     without_status = picture()
