@@ -14,9 +14,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from taichi_ants import commands
 from taichi_ants.commands import render
 from taichi_ants.learners.policies import save_policy, trail_follower
 from taichi_ants.rendering import colours, learning_frames, text
+from taichi_ants.studies.command_line import Parser
 from taichi_ants.worlds import paper
 
 ROOT = Path(__file__).parents[2]
@@ -272,6 +274,16 @@ def test_default_worlds(arguments, world) -> None:
 )
 def test_default_sizes(arguments, size) -> None:
     assert render.parse_arguments(arguments).size == size
+
+
+def test_the_command_names_itself_as_it_is_called(capsys, monkeypatch) -> None:
+    monkeypatch.setattr(sys, "argv", ["taichi-ants", "render", "colony", "--help"])
+    monkeypatch.setattr(Parser, "program", None)
+    with pytest.raises(SystemExit):
+        commands.main()
+    shown = capsys.readouterr().out
+    assert shown.startswith("usage: taichi-ants render colony [-h]")
+    assert "Example: taichi-ants render colony --ants 200 --out ants.gif" in shown
 
 
 def test_help_is_quick_and_needs_little() -> None:

@@ -103,6 +103,12 @@ def test_stages_that_are_refused(stages) -> None:
         learning_stages(paper(), CONFIG, stages=stages)
 
 
+def test_stages_of_several_worlds_are_refused() -> None:
+    stages = [Stage(1, Episode.play(world, trail_follower())) for world in (paper(), open_world(3))]
+    with pytest.raises(AntsError, match="several worlds"):
+        next(learning_frames(stages))
+
+
 def test_a_stage_that_has_ended_stays() -> None:
     stages = learning_stages(paper(), CONFIG, seed=2, stages=(0, 50), max_steps=60)
     short, long = sorted(stages, key=lambda stage: len(stage.episode))
