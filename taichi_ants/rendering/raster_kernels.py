@@ -14,7 +14,7 @@ from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
 from taichi_ants.rendering import shapes
 from taichi_ants.rendering.colours import CELL_FOOD, PAGE
 
-# Shapes, in the last column of a table of shapes.
+# Shapes, as in a table of shapes.
 FOOD, QUEEN, IN_VIEW, ANT, ANT_WITH_FOOD, DART, DART_WITH_FOOD, DOT, ARROW, RING = range(10)
 
 BAND = 16  # rows that one thread draws
@@ -250,19 +250,18 @@ def draw_mark(rgb, p, radius, shape, colour):
 def draw_shapes(
     frame: ti.types.ndarray(dtype=ti.u8, ndim=3),
     table: ti.types.ndarray(dtype=ti.f32, ndim=2),
-    colours: ti.types.ndarray(dtype=ti.u32, ndim=1),
 ):
     """Shapes over a frame, in the order of the table, which later ones cover.
 
-    Rows of `table`: x, y (pixels), radius (pixels), heading, shape, opacity. A band of rows belongs
-    to one thread, so that the order is the same however many there are.
+    Rows of `table`: x, y (pixels), radius (pixels), heading, shape, opacity, colour. A band of rows
+    belongs to one thread, so that the order is the same however many there are.
     """
     ti.loop_config(block_dim=1)
     for band in range((frame.shape[0] + BAND - 1) // BAND):
         first, last = band * BAND, ti.min((band + 1) * BAND, frame.shape[0]) - 1
         for n in range(table.shape[0]):
             x, y, radius = table[n, 0], table[n, 1], table[n, 2]
-            shape, colour = ti.cast(table[n, 4], ti.i32), colours[n]
+            shape, colour = ti.cast(table[n, 4], ti.i32), ti.cast(table[n, 6], ti.i32)
             reach = radius + ti.select(shape == DOT, 0.5, _HALO + 0.5)  # with its smooth edge
             if y + reach >= first and y - reach <= last + 1:
                 angle = table[n, 3] * (math.pi / 3)

@@ -89,12 +89,14 @@ class Rasteriser:
             in_view: Flat indices of the cells that ant number 0 sees, to be marked.
         """
         frame = self.draw_cells(self._colour_cells(snapshot))
-        layers = [self._things(snapshot), *self._view(snapshot, in_view), self._ants(snapshot)]
+        layers = [*self._things(snapshot), *self._view(snapshot, in_view), self._ants(snapshot)]
         if not self.has_hexagons:
             # Dots overlap. A dot of hers over the ants would hide those beside her, one under them
             # may be hidden by a crowd: they lie over it, and a ring around it over them.
-            layers.append(self._queen_rings(snapshot))
-        self.draw_shapes(frame, *(np.concatenate(parts) for parts in zip(*layers, strict=True)))
+            queens = np.flatnonzero(snapshot.ground == QUEEN)
+            ring = {"fill": 0.0, "least": _QUEEN_RING}
+            layers.append(self.shapes(queens, self.kernels.RING, colours.CELL_QUEEN, **ring))
+        self.kernels.draw_shapes(frame, np.concatenate(layers))
         return frame
 
     def colour_of(self, cells: np.ndarray) -> np.ndarray:
@@ -110,78 +112,65 @@ class Rasteriser:
             self.kernels.draw_small_cells(frame, of_cells, *self._layout())
         return frame
 
-    def draw_shapes(self, frame: np.ndarray, table: np.ndarray, of_shapes: np.ndarray) -> None:
-        """Draw shapes, rows of `table` as in `raster_kernels`, in colours uint32 (n,)."""
-        self.kernels.draw_shapes(frame, table, of_shapes)
-
     def shapes(
         self,
         cells: np.ndarray,
         shape: int | np.ndarray,
+        colour: int,
         headings: npt.ArrayLike = 0,
         fill: float = _FILL,
+        least: float = 0.0,
     ) -> np.ndarray:
-        """A table of shapes on cells (flat indices (n,)), float32 (n, 6)."""
-        table = np.empty((len(cells), 6), dtype=np.float32)
+        """A table of shapes on cells (flat indices (n,)), float32 (n, 7), see `raster_kernels`.
+
+        Their radius is `fill` sizes of a hexagon, and at least so many pixels.
+        """
+        table = np.empty((len(cells), 7), dtype=np.float32)
         table[:, :2] = self.viewport.centres(self.grid.cells(cells))
-        table[:, 2] = fill * self.viewport.hexagon
+        table[:, 2] = max(fill * self.viewport.hexagon, least)
         table[:, 3] = headings
         table[:, 4] = shape
         table[:, 5] = 1.0
+        table[:, 6] = colour  # below 2^24, so that float32 holds it
         return table
 
-    def _things(self, snapshot: Snapshot) -> tuple[np.ndarray, np.ndarray]:
+    def _things(self, snapshot: Snapshot) -> list[np.ndarray]:
         """Food and queen."""
         kernels = self.kernels
         queens = np.flatnonzero(snapshot.ground == QUEEN)
         if self.viewport.hexagon < _SMALLEST_DRAWING:
-            marks = self.shapes(queens, kernels.DOT)
-            marks[:, 2] = np.maximum(marks[:, 2], _QUEEN_RADIUS)
-            return marks, np.full(len(queens), colours.CELL_QUEEN, dtype=np.uint32)
+            return [self.shapes(queens, kernels.DOT, colours.CELL_QUEEN, least=_QUEEN_RADIUS)]
         foods = np.flatnonzero(snapshot.ground == FOOD)
-        marks = np.concatenate(
-            [
-                self.shapes(foods, kernels.FOOD, fill=0.72),
-                self.shapes(queens, kernels.QUEEN, fill=0.72),
-            ]
-        )
-        of_shapes = np.repeat([colours.CELL_FOOD, colours.CELL_QUEEN], [len(foods), len(queens)])
-        return marks, of_shapes.astype(np.uint32)
+        return [
+            self.shapes(foods, kernels.FOOD, colours.CELL_FOOD, fill=0.72),
+            self.shapes(queens, kernels.QUEEN, colours.CELL_QUEEN, fill=0.72),
+        ]
 
-    def _queen_rings(self, snapshot: Snapshot) -> tuple[np.ndarray, np.ndarray]:
-        rings = self.shapes(np.flatnonzero(snapshot.ground == QUEEN), self.kernels.RING)
-        rings[:, 2] = _QUEEN_RING
-        return rings, np.full(len(rings), colours.CELL_QUEEN, dtype=np.uint32)
-
-    def _view(
-        self, snapshot: Snapshot, in_view: np.ndarray | None
-    ) -> list[tuple[np.ndarray, np.ndarray]]:
+    def _view(self, snapshot: Snapshot, in_view: np.ndarray | None) -> list[np.ndarray]:
         """The outlines of the cells in view, or around the ant where cells are small."""
         if in_view is None:
             return []
-        if self.viewport.hexagon >= _SMALLEST_OUTLINE:
-            rings = self.shapes(in_view, self.kernels.IN_VIEW, fill=0.98)
-        else:
-            rings = self.shapes(snapshot.ant_cells[:1], self.kernels.IN_VIEW, fill=_MARK)
-            rings[:, 2] = np.maximum(rings[:, 2], _SMALLEST_MARK)
-        return [(rings, np.full(len(rings), colours.INK, dtype=np.uint32))]
+        cells, size = in_view, {"fill": 0.98}
+        if self.viewport.hexagon < _SMALLEST_OUTLINE:
+            cells, size = snapshot.ant_cells[:1], {"fill": _MARK, "least": _SMALLEST_MARK}
+        return [self.shapes(cells, self.kernels.IN_VIEW, colours.INK, **size)]
 
-    def _ants(self, snapshot: Snapshot) -> tuple[np.ndarray, np.ndarray]:
+    def _ants(self, snapshot: Snapshot) -> np.ndarray:
         kernels, hexagon = self.kernels, self._ants_like
         carries = snapshot.ant_carries
-        of_shapes = np.full(len(carries), colours.ANT, dtype=np.uint32)
-        if hexagon < _SMALLEST_HEXAGON:
+        dots = hexagon < _SMALLEST_HEXAGON
+        if dots:
             shape = np.full(len(carries), kernels.DOT)
-            of_shapes[carries] = _DOT_WITH_FOOD
         elif hexagon < _SMALLEST_ANT:
             shape = np.where(carries, kernels.DART_WITH_FOOD, kernels.DART)
         else:
             shape = np.where(carries, kernels.ANT_WITH_FOOD, kernels.ANT)
-        ants = self.shapes(snapshot.ant_cells, shape, snapshot.ant_headings)
-        if hexagon < _SMALLEST_HEXAGON:
+        ants = self.shapes(snapshot.ant_cells, shape, colours.ANT, snapshot.ant_headings)
+        if dots:
             ants[:, 2] = max(_FILL * hexagon, _DOT_RADIUS)
             ants[:, 5] = self._dot_opacity(len(ants))
-        return ants, of_shapes
+            ants[carries, 6] = _DOT_WITH_FOOD
+        return ants
 
     def _dot_opacity(self, n: int) -> float:
         """How strong n dots are drawn: fully, unless they would hide the world and each other.

@@ -303,37 +303,31 @@ class _Picture:
         goals = {"F": (kernels.FOOD, colours.CELL_FOOD), "Q": (kernels.QUEEN, colours.CELL_QUEEN)}
         for cell, letter in zip(self._cells[1:], letters, strict=True):
             if letter in goals:
-                shape, colour = goals[letter]
-                marks = self._rasteriser.shapes(cell[None], shape, fill=0.72)
-                marks[:, 0] -= 0.58 * marks[:, 2]  # room for a letter beside them
-                marks[:, 2] *= 0.6
-                marks[:, 1] -= _rise(True) * self._hexagon
-                self._draw_shapes(frame, marks, [colour])
+                mark = self._rasteriser.shapes(cell[None], *goals[letter], fill=0.72)
+                mark[:, 0] -= 0.58 * mark[:, 2]  # room for a letter beside it
+                mark[:, 2] *= 0.6
+                mark[:, 1] -= _rise(True) * self._hexagon
+                kernels.draw_shapes(frame, mark)
 
     def _draw_ant(self, frame: np.ndarray, carries: bool) -> None:
         kernels = self._rasteriser.kernels
         shape = kernels.ANT_WITH_FOOD if carries else kernels.ANT
-        ant = self._rasteriser.shapes(self._cells[:1], shape, fill=0.62)
+        ant = self._rasteriser.shapes(self._cells[:1], shape, colours.ANT, fill=0.62)
         ant[:, 1] += 0.2 * self._hexagon
-        self._draw_shapes(frame, ant, [colours.ANT])
+        kernels.draw_shapes(frame, ant)
 
     def _draw_arrows(self, frame: np.ndarray, letters: list[str], actions: list[int]) -> None:
         """An arrow to where a move goes, from the food that is picked up, or to the queen."""
-        rows, of_rows = [], []
+        kernels, own = self._rasteriser.kernels, self._cells[:1]
         for action in actions:
+            colour = _ARROW_COLOURS.get(action, colours.CHOSEN)
             for place, turn in enumerate(self._observation.cells):
                 towards = turn == action - 1 if action <= RIGHT else letters[place] in _GOALS
                 if towards and -1 <= turn <= 1:  # it reaches what lies ahead only
-                    x, y = (0.5 * self._centres[0] + 0.5 * self._centres[place + 1]).tolist()
                     turned = self._headings[place] + (3 if action == PICK_UP else 0)
-                    arrow = self._rasteriser.kernels.ARROW
-                    rows.append((x, y, 0.37 * self._hexagon, turned, arrow, 1.0))
-                    of_rows.append(_ARROW_COLOURS.get(action, colours.CHOSEN))
-        if rows:
-            self._draw_shapes(frame, np.array(rows, np.float32), of_rows)
-
-    def _draw_shapes(self, frame: np.ndarray, table: np.ndarray, of_shapes: list[int]) -> None:
-        self._rasteriser.draw_shapes(frame, table, np.array(of_shapes, dtype=np.uint32))
+                    arrow = self._rasteriser.shapes(own, kernels.ARROW, colour, turned, fill=0.37)
+                    arrow[:, :2] = 0.5 * (self._centres[0] + self._centres[place + 1])
+                    kernels.draw_shapes(frame, arrow)
 
 
 def _rise(goal: bool) -> float:
