@@ -81,3 +81,17 @@ def check_whole(name: str, value: object, least: int, most: int, otherwise: str 
         raise AntsError(
             f"{name} is {shown(value)}; it must lie between {least} and {most}{otherwise}."
         )
+
+
+def expect(name: str, value: object, *kinds: type) -> None:
+    """Raises AntsError, naming the value `name`, if it is of none of the kinds."""
+    if not isinstance(value, kinds):
+        words = " or ".join(_PLAIN.get(kind.__name__) or _with_article(kind) for kind in kinds)
+        raise AntsError(f"{name} is {shown(value)}; it must be {words}.")
+
+
+_PLAIN = {"str": "text", "NoneType": "None", "ndarray": "an array", "PathLike": "a path"}
+
+
+def _with_article(kind: type) -> str:
+    return f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}"

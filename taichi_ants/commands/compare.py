@@ -395,8 +395,7 @@ def render_policies(sweep: Sweep, policies: Path, folder: Path) -> None:
 
     from taichi_ants import files, load_policy
     from taichi_ants.analysis.comparison import Variant
-    from taichi_ants.rendering import Episode, episode_frames, save_animation
-    from taichi_ants.rendering.episodes import DEFAULT_FPS, with_pause
+    from taichi_ants.rendering import PAUSE, Episode, frames, save_animation
 
     place = files.check_writable_folder(folder / RENDERS)
     with progress_bar("rendering") as report_progress:
@@ -417,10 +416,8 @@ def render_policies(sweep: Sweep, policies: Path, folder: Path) -> None:
             whole = episode.delivered or len(episode.trace) == sweep.max_steps
             episode = replace(episode, name=metadata["behaviour"], whole=whole)
             title = f"{learner}, {metadata['task']['delivery']}"
-            frames = with_pause(
-                episode_frames(episode, (720, 480), title=title), len(episode), DEFAULT_FPS
-            )
-            save_animation(place / f"{path.stem}.gif", frames, DEFAULT_FPS)
+            pictures = frames(episode.moments(), (720, 480), title=title)
+            save_animation(place / f"{path.stem}.gif", pictures, pause=PAUSE)
             report_progress((done + 1) / len(paths))
 
 

@@ -41,8 +41,8 @@ class Parser(argparse.ArgumentParser):
     program: str | None = None  # what --help calls it; None: the name of the script
 
     def __init__(self, description: str, **settings: Any) -> None:
+        settings.setdefault("prog", self.program)
         super().__init__(
-            self.program,
             description=description,
             formatter_class=_HelpFormatter,
             allow_abbrev=False,

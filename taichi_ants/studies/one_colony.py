@@ -9,10 +9,9 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
-
-import numpy as np
 
 from taichi_ants import files
 from taichi_ants.analysis.markdown import count
@@ -227,21 +226,17 @@ def _with_progress(
 
 
 def _save_animation(path: str, colony: Colony, passing: Iterator[int]) -> None:
-    from taichi_ants.rendering import colony_picture, save_animation
+    from taichi_ants.rendering import colony_moments, frames, save_animation
 
-    def frames() -> Iterator[np.ndarray]:
-        yield colony_picture(colony)
-        for _ in passing:
-            yield colony_picture(colony)
-
-    save_animation(path, frames(), FRAMES_PER_SECOND)
+    moments = (moment for _ in chain([0], passing) for moment in colony_moments(colony))
+    save_animation(path, frames(moments), FRAMES_PER_SECOND)
 
 
 def _save_picture(path: str, outputs: Outputs, colony: Colony) -> None:
-    from taichi_ants.rendering import colony_picture, save_picture
+    from taichi_ants.rendering import colony_moments, frames, save_picture
 
     try:
-        save_picture(path, colony_picture(colony))
+        save_picture(path, next(frames(colony_moments(colony))))
     except Exception as error:
         _report(error, outputs, colony)
 

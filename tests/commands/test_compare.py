@@ -25,8 +25,7 @@ from taichi_ants import (
 from taichi_ants.analysis.behaviour import DELIVERS
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.commands import compare as commands
-from taichi_ants.rendering import Episode, episode_frames, save_animation, text
-from taichi_ants.rendering.episodes import DEFAULT_FPS, with_pause
+from taichi_ants.rendering import PAUSE, Episode, frames, save_animation, text
 
 GARDEN = EXPERIMENTS / "maps" / "garden.txt"
 SEEDS, EPISODES, MAX_STEPS, ROLLOUTS = (7, 8, 9), 60, 45, 50
@@ -297,8 +296,8 @@ def test_pictures_show_the_episode_that_told_the_behaviour(finished, tmp_path):
         path = tmp_path / f"{evaporation}.gif"
         more = {"seed": metadata["seed"], "max_steps": MAX_STEPS, "evaporation": evaporation}
         episode = replace(Episode.play(worlds.paper(), q_values, **more), name="circles with food")
-        frames = episode_frames(episode, (720, 480), title="SARSA, continuing")
-        save_animation(path, with_pause(frames, len(episode), DEFAULT_FPS), DEFAULT_FPS)
+        pictures = frames(episode.moments(), (720, 480), title="SARSA, continuing")
+        save_animation(path, pictures, pause=PAUSE)
         assert (path.read_bytes() == shown) == (not evaporation)
 
 

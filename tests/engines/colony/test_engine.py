@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from taichi_ants import AntsError, Colony, ColonyConfig, Pheromone, TrainingConfig, World, worlds
 from taichi_ants.engines.colony import arrays as names
 from taichi_ants.learners.policies import random_policy
-from taichi_ants.rendering import colony_picture
+from taichi_ants.rendering import colony_moments
 from taichi_ants.task.constants import FOOD
 
 TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 1.0, 1.0)
@@ -153,7 +153,7 @@ def test_both_schedules_agree_where_places_stay_vacant():
 def test_a_tick_needs_an_episode():
     with pytest.raises(AntsError, match="begin_episode"):
         Colony(worlds.paper(), ColonyConfig(), TRAINING).tick()
-    for look in (Colony.snapshot, colony_picture):
+    for look in (Colony.snapshot, lambda colony: next(colony_moments(colony))):
         with pytest.raises(AntsError, match="begin_episode"):
             look(Colony(worlds.paper(), ColonyConfig(), TRAINING))
 

@@ -20,9 +20,8 @@ from taichi_ants import (
 from taichi_ants.checks import checked_count, checked_seeds, checked_seeds_for
 from taichi_ants.engines.runs.launches import plan_launches
 from taichi_ants.errors import shown
-from taichi_ants.rendering import Episode, episode_picture
+from taichi_ants.rendering import Scene
 from taichi_ants.rendering.learning import learning_stages
-from taichi_ants.rendering.replay import Replay
 from taichi_ants.worlds import World, paper
 
 CONFIG = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 0.99)
@@ -153,11 +152,9 @@ def test_flags(value):
     says(text, evaluate, paper(), TABLE, evaporation=value)
     says(text, rollout, paper(), TABLE, evaporation=value)
     says(text, trace_training, paper(), CONFIG, evaporation=value)
-    trace = rollout(paper(), TABLE, max_steps=1)
-    says(text, Replay, paper(), trace, evaporation=value)
     says(text, learning_stages, paper(), CONFIG, stages=(0,), evaporation=value)
     for name in ("hud", "legend", "view"):
-        says(f"{name} is {value!r}", episode_picture, Episode(paper(), trace), 0, **{name: value})
+        says(f"{name} is {value!r}", Scene, paper().grid, **{name: value})
     for name in ("births", "ends_at_delivery"):
         says(f"{name} is {value!r}", ColonyConfig, **{name: value})
 

@@ -1,4 +1,4 @@
-"""The replay of a rollout equals the reference's world at every step."""
+"""What is drawn of an episode equals its trace and the reference's world at every step."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from taichi_ants import AntsError, World, reference, rollout
 from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.hexgrid import normal_form
 from taichi_ants.learners.policies import random_policy, trail_follower
-from taichi_ants.rendering import Episode, episode_frames, episode_picture
-from taichi_ants.rendering.replay import Replay
+from taichi_ants.rendering import Episode, Scene, frames
 from taichi_ants.worlds import paper
 
 
@@ -32,8 +31,15 @@ def check(world: World, seed: int, number: int, evaporation: bool, epsilon: floa
     """Compare step by step; the number of choices among several foods."""
     table = trail_follower()
     trace = rollout(world, table, seed, number, 120, evaporation, epsilon)
-    snapshots = list(Replay(world, trace, seed, number, evaporation).snapshots())
-    assert len(snapshots) == len(trace) + 1
+    episode = Episode.play(
+        world,
+        table,
+        **{"seed": seed, "number": number, "max_steps": 120},
+        **{"evaporation": evaporation, "epsilon": epsilon},
+    )
+    assert episode.trace == trace
+    moments = list(episode.moments())
+    assert len(moments) == len(trace) + 1
 
     state = reference.WorldState(world, evaporation)
     ant = reference.Ant(*reference.start(world, seed)[0])
@@ -41,17 +47,18 @@ def check(world: World, seed: int, number: int, evaporation: bool, epsilon: floa
     existing = reference.existing_cells(state.ranges)
     index = world.grid.index(np.array(list(existing)))
     choices = 0
-    for step, snapshot in enumerate(snapshots):
+    for step, (snapshot, status) in enumerate(moments):
         seen = reference.observe(state, ant)
         assert snapshot.ground[index].tolist() == [state.content(cell) for cell in existing]
         assert snapshot.trail[index].tolist() == [state.level(cell) for cell in existing]
         assert snapshot.ant_cells[0] == world.grid.index(normal_form(ant.cell))
         assert snapshot.ant_headings[0] == ant.heading
         assert snapshot.ant_carries[0] == ant.carries
-        letters = "EOSQ" if ant.carries else "EOTF"
-        assert snapshot.letters == "".join(letters[seen >> shift & 3] for shift in (4, 2, 0))
+        assert status.state == seen
         if step == len(trace):
             break
+        assert snapshot.ant_cells[0] == world.grid.index(trace.cells[step])
+        assert snapshot.ant_headings[0] == trace.headings[step]
         action = reference.choose_action([list(row) for row in table][seen], epsilon, stream)
         assert action == trace.actions[step]
         before = stream.state
@@ -96,19 +103,19 @@ def test_what_the_head_up_lines_say() -> None:
     assert [status.outcome for _, status in begun.moments()][-1] == ""
 
 
-def test_a_picture_of_one_step_is_that_frame() -> None:
+def test_the_moment_of_one_step_is_that_of_all() -> None:
     episode = Episode.play(pantry(), trail_follower(), max_steps=12)
     last = len(episode) - 1
-    frames = list(episode_frames(episode, (400, 330)))
+    pictures = list(frames(episode.moments(), (400, 330)))
+    scene = Scene(episode.world.grid, (400, 330))
     for step in (0, 1, last):
-        assert (episode_picture(episode, step, (400, 330)) == frames[step]).all()
-    assert not (frames[0] == frames[1]).all()
+        assert (scene.draw(*episode.moment(step)) == pictures[step]).all()
+    assert not (pictures[0] == pictures[1]).all()
     with pytest.raises(AntsError, match="step"):
-        episode_picture(episode, last + 1, (400, 330))
+        episode.moment(last + 1)
 
 
-def test_snapshots_do_not_share_their_arrays() -> None:
-    episode = Episode.play(paper(), trail_follower())
-    snapshots = [snapshot for snapshot, _ in episode.moments()]
+def test_moments_do_not_share_their_arrays() -> None:
+    snapshots = [snapshot for snapshot, _ in Episode.play(paper(), trail_follower()).moments()]
     assert (snapshots[0].ground == paper().ground()).all()
     assert not (snapshots[-1].ground == paper().ground()).all()
