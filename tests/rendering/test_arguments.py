@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from taichi_ants import AntsError, Colony, ColonyConfig, TrainingConfig, rendering
+from taichi_ants import AntsError, Colony, TrainingConfig, rendering
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.rendering import Episode, Scene, Status, Viewport, at_start
 from taichi_ants.worlds import paper
@@ -24,7 +24,7 @@ def episode() -> Episode:
 
 
 def colony() -> Colony:
-    made = Colony(WORLD, ColonyConfig(ants=3), CONFIG, 0, "fixed", TABLE)
+    made = Colony(WORLD, None, CONFIG, 0, 3, sharing="fixed", q_values=TABLE)
     made.begin_episode()
     return made
 

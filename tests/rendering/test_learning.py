@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from taichi_ants import AntsError, Colony, ColonyConfig, TrainingConfig, train
+from taichi_ants import AntsError, Colony, TrainingConfig, train
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.rendering import (
     Episode,
@@ -26,8 +26,8 @@ from taichi_ants.rendering import (
     usual_spread,
 )
 from taichi_ants.rendering.colours import CELL_FOOD, CHOSEN
-from taichi_ants.rendering.observed import Observation
 from taichi_ants.rendering.sheet import hardly_learned
+from taichi_ants.task import Observation, observations
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT
 from taichi_ants.task.states import REACHABLE_STATES, parse_state
 from taichi_ants.worlds import open_world, paper
@@ -272,21 +272,13 @@ def test_text_on_a_sheet_says_what_it_shows(monkeypatch) -> None:
     assert max(map(len, lines)) < 125
 
 
-def five_letters(row: int) -> str:
-    """The name of a state with five cells in view, the first of them most significant."""
-    carries, view = divmod(row, 4**5)
-    letters = ("EOTF", "EOSQ")[carries]
-    seen = (letters[view >> shift & 3] for shift in range(8, -1, -2))
-    return " ".join((("foraging", "carrying")[carries], *seen))
-
-
-FIVE = Observation("five_cells", 2 * 4**5, (-2, -1, 0, 1, 2), five_letters)
+FIVE = observations.get("five_cells")
 
 
 def test_the_sheet_of_an_observation_of_more_cells(monkeypatch) -> None:
     """One state is visited: foraging T E F O E, with food ahead and a trail behind to the left."""
     table = np.zeros((FIVE.n_states, 5), dtype=np.float32)
-    row = next(row for row in range(FIVE.n_states) if five_letters(row) == "foraging T E F O E")
+    row = next(row for row in range(FIVE.n_states) if FIVE.name_of(row) == "foraging T E F O E")
     table[row, PICK_UP] = 1.0
     sheet = policy_sheet(table, observation=FIVE)
     assert coloured(sheet, CELL_FOOD).sum() > 60
@@ -312,7 +304,7 @@ def test_of_very_many_states_a_sheet_shows_the_first_and_says_so(monkeypatch) ->
 
 
 def test_states_with_names_of_another_form_are_written_out(monkeypatch) -> None:
-    own = Observation("own", 4, (-1, 0, 1), lambda row: f"carrying crumb number {row}")
+    own = Observation("own", 4, lambda look: 0, name_of=lambda row: f"carrying crumb number {row}")
     lines: list[str] = []
     monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
     policy_sheet(np.eye(4, 5), observation=own)
@@ -332,7 +324,7 @@ def test_sheets_that_are_refused() -> None:
 
 
 def colony(ants: int = 30) -> Colony:
-    made = Colony(open_world(3), ColonyConfig(ants=ants), CONFIG, 0, "fixed", trail_follower())
+    made = Colony(open_world(3), None, CONFIG, 0, ants, sharing="fixed", q_values=trail_follower())
     made.begin_episode()
     return made
 

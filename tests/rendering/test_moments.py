@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from random_worlds import random_world
 
-from taichi_ants import AntsError, World, reference, rollout
-from taichi_ants.grid.constants import STREAM_ROLLOUT
+from taichi_ants import AntsError, Task, World, reference, rollout
 from taichi_ants.grid.hexgrid import normal_form
+from taichi_ants.grid.randomness import GAMMA
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.rendering import Episode, Scene, frames
 from taichi_ants.worlds import paper
@@ -27,44 +27,43 @@ def pantry() -> World:
     )
 
 
+def draws_between(one: int, other: int) -> int:
+    """How many draws lead from one state of a random stream to another."""
+    return (other - one) * pow(GAMMA, -1, 2**64) % 2**64
+
+
 def check(world: World, seed: int, number: int, evaporation: bool, epsilon: float) -> int:
     """Compare step by step; the number of choices among several foods."""
-    table = trail_follower()
-    trace = rollout(world, table, seed, number, 120, evaporation, epsilon)
+    table, task = trail_follower(), Task(evaporation_in_evaluation=evaporation)
+    trace = rollout(world, table, seed, number, 120, task, epsilon)
     episode = Episode.play(
-        world,
-        table,
-        **{"seed": seed, "number": number, "max_steps": 120},
-        **{"evaporation": evaporation, "epsilon": epsilon},
+        world, table, seed=seed, number=number, max_steps=120, task=task, epsilon=epsilon
     )
     assert episode.trace == trace
     moments = list(episode.moments())
     assert len(moments) == len(trace) + 1
 
-    state = reference.WorldState(world, evaporation)
-    ant = reference.Ant(*reference.start(world, seed)[0])
-    stream = reference.RandomStream(reference.stream_state(seed, STREAM_ROLLOUT, number))
-    existing = reference.existing_cells(state.ranges)
+    colony = reference.follower(world, table, seed, number, task, epsilon)
+    colony.begin_episode()
+    existing = reference.existing_cells(world.ranges)
     index = world.grid.index(np.array(list(existing)))
     choices = 0
     for step, (snapshot, status) in enumerate(moments):
-        seen = reference.observe(state, ant)
-        assert snapshot.ground[index].tolist() == [state.content(cell) for cell in existing]
-        assert snapshot.trail[index].tolist() == [state.level(cell) for cell in existing]
+        ant, levels = colony.ants[0], colony.world.levels()
+        assert snapshot.ground[index].tolist() == [colony.world.ground[cell] for cell in existing]
+        assert snapshot.trail[index].tolist() == [levels[cell] for cell in existing]
         assert snapshot.ant_cells[0] == world.grid.index(normal_form(ant.cell))
         assert snapshot.ant_headings[0] == ant.heading
         assert snapshot.ant_carries[0] == ant.carries
-        assert status.state == seen
+        assert status.state == ant.state
         if step == len(trace):
             break
         assert snapshot.ant_cells[0] == world.grid.index(trace.cells[step])
         assert snapshot.ant_headings[0] == trace.headings[step]
-        action = reference.choose_action([list(row) for row in table][seen], epsilon, stream)
-        assert action == trace.actions[step]
-        before = stream.state
-        reference.act(state, ant, seen, action, stream)
-        choices += stream.state != before
-        state.tick()
+        before = ant.stream.state
+        colony.tick()
+        assert colony.transitions[0].action == trace.actions[step]
+        choices += draws_between(before, ant.stream.state) > 1
     return choices
 
 

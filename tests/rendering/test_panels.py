@@ -8,7 +8,7 @@ import pytest
 from taichi_ants import AntsError
 from taichi_ants.rendering import Scene, Status, at_start, panel, text
 from taichi_ants.rendering.colours import CHOSEN
-from taichi_ants.rendering.observed import Observation
+from taichi_ants.task import Observation
 from taichi_ants.rendering.panel import range_with_zero
 from taichi_ants.task.states import parse_state
 from taichi_ants.worlds import World, paper
@@ -151,7 +151,13 @@ def test_letters_lie_in_the_cells_in_view() -> None:
 
 def test_an_observation_of_five_cells_marks_five() -> None:
     """The ant stands at (0, 8, 8) and looks up."""
-    five = Observation("five", 1, (-2, -1, 0, 1, 2), lambda row: "foraging E T O E T")
+    five = Observation(
+        "five",
+        1,
+        lambda look: 0,
+        cells=(-2, -1, 0, 1, 2),
+        name_of=lambda row: "foraging E T O E T",
+    )
     scene = Scene(WORLD.grid, (500, 500), hud=False, legend=False)
     plain = scene.draw(at_start(WORLD))
     seen = scene.draw(at_start(WORLD), Status(0, state=0, observation=five))
