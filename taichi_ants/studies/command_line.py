@@ -41,8 +41,8 @@ class Parser(argparse.ArgumentParser):
     program: str | None = None  # what --help calls it; None: the name of the script
 
     def __init__(self, description: str, **settings: Any) -> None:
+        settings.setdefault("prog", self.program)
         super().__init__(
-            self.program,
             description=description,
             formatter_class=_HelpFormatter,
             allow_abbrev=False,
@@ -70,6 +70,23 @@ class Parser(argparse.ArgumentParser):
         self.exit(EXIT_BAD_INPUT, f"error: {text}; see --help.\n")
 
 
+def add_common(parser: argparse.ArgumentParser) -> None:
+    """The options of all commands that compute something."""
+    add = parser.add_argument
+    add("--plugin", metavar="FILE", help="a Python file that registers learners or worlds")
+    add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
+    add("--arch", choices=("cpu", "cuda"), default="cpu", help="where kernels run")
+
+
+def add_results(parser: argparse.ArgumentParser, place: str) -> None:
+    """The options of commands with a folder of results."""
+    add = parser.add_argument
+    add("--out", type=Path, metavar="FOLDER", help=f"for the results (default: {place})")
+    add("--force", action="store_true", help="replace what FOLDER holds")
+    add("--no-figures", action="store_true", help="draw no figures")
+
+
+BESIDE_DEFAULTS = "results/{0}, and behind it what differs from the defaults, as in results/{0}-{1}"
 _NOT_IN_NAMES = ("out", "threads", "force", "no_figures", "no_render")  # they change no results
 _NAMED_BY_VALUE = ("world", "plugin")  # without the flag
 
@@ -94,13 +111,13 @@ def default_folder(
         default = usual.get(action.dest, action.default)
         if value in (argparse.SUPPRESS, default) or action.dest in _NOT_IN_NAMES:
             continue
+        flag = [action.option_strings[0].removeprefix("--")]
         if action.dest in _NAMED_BY_VALUE:
             parts.append(Path(value).stem)
         elif value is True:
-            parts.append(action.option_strings[0].removeprefix("--"))
+            parts += flag
         else:
-            values = value if isinstance(value, tuple) else (value,)
-            parts += [action.option_strings[0].removeprefix("--"), *map(str, values)]
+            parts += flag + [str(one) for one in (value if isinstance(value, tuple) else (value,))]
     return Path("results", re.sub(r"[^\w.+-]+", "_", "-".join(parts)))
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from random_worlds import random_world
+from taichi_ants.task.colony import ColonyConfig, Pheromone
 
 from taichi_ants import TrainingConfig
 from taichi_ants.reference import ReferenceColony, train
-from taichi_ants.task.colony import ColonyConfig, Pheromone
 from taichi_ants.worlds import World, paper
 
 LEARNERS = [("q_learning", 0), ("sarsa", 0), ("expected_sarsa", 0), ("dyna_q", 3)]

@@ -10,12 +10,12 @@ import itertools
 import numpy as np
 import pytest
 from colonies import GAMMA, act, begun, load, n_draws, training
+from taichi_ants.task.colony import ColonyConfig, update_weights
 
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.reference import RandomStream, ReferenceColony, Transition, stream_state
 from taichi_ants.reference.colony_learning import OwnTables, SharedTable, mean_error
-from taichi_ants.task.colony import ColonyConfig, update_weights
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP
 from taichi_ants.worlds import World
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from taichi_ants.studies.sweeps import Sweep, run_sweep
 
 from taichi_ants import AntsError, TrainingConfig, evaluate, files, train
 from taichi_ants.studies import sweeps
 from taichi_ants.studies.provenance import commit, provenance, sweep_settings, world_facts
-from taichi_ants.studies.sweeps import Sweep, run_sweep
 from taichi_ants.worlds import World, paper
 
 CONFIGS = (
