@@ -72,11 +72,11 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     options = {"study": _add_study, "live": _add_live}
     for kind, words in KINDS.items():
         options[kind](kinds.add_parser(kind, help=words, description=f"{words}."))
-    words = sys.argv[1:] if arguments is None else arguments
-    parser.parse_args(words)
-    chosen: Any = kinds.choices[words[0]]
-    settings, given = chosen.parse_given(words[1:])
-    settings.kind = words[0]
+    given_words = sys.argv[1:] if arguments is None else arguments
+    parser.parse_args(given_words)
+    chosen: Any = kinds.choices[given_words[0]]
+    settings, given = chosen.parse_given(given_words[1:])
+    settings.kind = given_words[0]
     if settings.kind == "study":
         usual: dict[str, Any] = QUICK if settings.quick else DEFAULTS
         for name, value in usual.items():
@@ -279,14 +279,15 @@ def live(settings: argparse.Namespace) -> None:
     outputs = Outputs(settings.save, settings.render, settings.every)
     outputs.check()
     colony = resumed_colony(settings) if settings.resume else new_colony(settings)
-    with held() as stopped, progress_bar("colony") as progress:
-        pace = live(colony, settings.ticks, outputs, progress, stopped)
-    print(summary(colony, pace))
-    for path in filter(None, (settings.save, settings.render)):
-        print(f"{path} is written.")
-    if stopped():
-        kept = f"; --resume {settings.save} goes on from there" if settings.save else ""
-        raise KeyboardInterrupt(f"Stopped at tick {colony.ticks}{kept}.")
+    with held() as stopped:
+        with progress_bar("colony") as progress:
+            pace = live(colony, settings.ticks, outputs, progress, stopped)
+        print(summary(colony, pace))
+        for path in filter(None, (settings.save, settings.render)):
+            print(f"{path} is written.")
+        if stopped():
+            kept = f"; --resume {settings.save} goes on from there" if settings.save else ""
+            raise KeyboardInterrupt(f"Stopped at tick {colony.ticks}{kept}.")
 
 
 def new_colony(settings: argparse.Namespace) -> Colony:

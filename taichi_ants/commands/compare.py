@@ -109,14 +109,11 @@ def points(settings: argparse.Namespace, world: World) -> tuple[RunPoint, ...]:
         )
         for delivery in (DELIVERIES if settings.delivery == "both" else (settings.delivery,))
     ]
+    depths: list[dict[str, Any]] = [{"planning_steps": n} for n in settings.planning_steps]
     variants = [
-        (name, hyperparameters)
+        (name, more)
         for name in settings.learners
-        for hyperparameters in (
-            [{"planning_steps": n} for n in settings.planning_steps]
-            if learners.get(name).plans
-            else [{}]
-        )
+        for more in (depths if learners.get(name).plans else [{}])
     ]
     numbers = itertools.product(
         settings.learning_rates, settings.discounts, settings.epsilons, settings.epsilon_decays
@@ -124,7 +121,7 @@ def points(settings: argparse.Namespace, world: World) -> tuple[RunPoint, ...]:
     grid = itertools.product(tasks, variants, tuple(numbers))
     lengths = settings.episodes, settings.max_steps, ROLLOUTS
     return tuple(
-        RunPoint(world, task, TrainingConfig(name, *four, 0.01, more), *lengths)
+        RunPoint(world, task, TrainingConfig(name, *four, **more), *lengths)
         for task, (name, more), four in grid
     )
 
