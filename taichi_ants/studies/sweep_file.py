@@ -117,18 +117,19 @@ def _one_of(name: str, value: object, allowed: Iterable[str]) -> str:
     return value
 
 
-def _values(grid: Settings) -> dict[str, list]:
+def _values(grid: Settings, before: str = "") -> dict[str, list]:
     """What varies, as lists: a single value is one of one, a range is drawn out."""
     found: dict[str, list] = {}
-    for name, value in grid.items():
+    for last, value in grid.items():
+        name = before + last
         if isinstance(value, dict) and not {"from", "to"} & set(value):
-            found |= {f"{name}.{inner}": more for inner, more in _values(value).items()}
+            found |= _values(value, f"{name}.")
         elif isinstance(value, dict):
             found[name] = _range(name, value)
+        elif value == []:
+            raise AntsError(f"{name} is an empty list; give at least one value.")
         else:
             found[name] = value if isinstance(value, list) else [value]
-            if not found[name]:
-                raise AntsError(f"{name} is an empty list; give at least one value.")
     return found
 
 
