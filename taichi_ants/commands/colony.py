@@ -59,7 +59,6 @@ DEFAULTS = {
     "rollouts": 4,
 }
 EVALUATION_EPSILON = 0.01
-PLANNING_STEPS = 5
 EPISODES, FIGURES = "episodes.npz", "figures"
 _OF_RESUMED = ("resume", "ticks", "save", "render", "every", "plugin", "threads", "arch")
 
@@ -163,20 +162,11 @@ def _add_live(parser: argparse.ArgumentParser) -> None:
 
 def training_config(settings: argparse.Namespace, least: float) -> TrainingConfig:
     """The learner; its epsilon does not decay, but for what a study makes of it."""
-    from taichi_ants import TrainingConfig, learners
+    from taichi_ants import TrainingConfig
 
-    plans = learners.get(settings.learner).plans
-    return TrainingConfig(
-        settings.learner,
-        settings.learning_rate,
-        settings.discount,
-        settings.epsilon,
-        epsilon_decay=1.0,
-        min_epsilon=least,
-        hyperparameters=(
-            {"planning_steps": settings.planning_steps or PLANNING_STEPS} if plans else {}
-        ),
-    )
+    numbers = settings.learning_rate, settings.discount, settings.epsilon
+    planning = {"planning_steps": settings.planning_steps} if settings.planning_steps else {}
+    return TrainingConfig(settings.learner, *numbers, 1.0, least, planning)
 
 
 def build_plan(settings: argparse.Namespace) -> StudyPlan:

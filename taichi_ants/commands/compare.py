@@ -9,8 +9,6 @@ from __future__ import annotations
 import argparse
 import csv
 import itertools
-import time
-from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,7 +23,6 @@ from taichi_ants.studies.command_line import (
     load_plugin,
     notice,
     number,
-    process_beside,
     progress_bar,
     run_command,
     whole_number,
@@ -243,10 +240,11 @@ def write_policies(
     folder: Path, study: Study[RunPoint], comparison: Comparison, tables: np.ndarray
 ) -> None:
     """Write the final Q-tables of some runs, with what an ant that follows them does."""
-    from taichi_ants import save_policy
+    from taichi_ants import files, save_policy
     from taichi_ants.analysis.behaviour import BEHAVIOURS, NAMES
     from taichi_ants.analysis.best_of import examples
 
+    files.check_writable_folder(folder)
     for row, run in examples(comparison):
         point = study.points[row]
         task, config = point.task, point.training
@@ -294,11 +292,9 @@ def do_comparison(
     from taichi_ants.analysis.baselines import BASELINE_COLUMNS, baseline_rows
     from taichi_ants.engines.runs.training import evaluate
 
-    laps = {"start": time.perf_counter()}
     where = {"threads": settings.threads, "arch": settings.arch}
     with progress_bar("training") as progress:
         outcomes = study.run(blocks, **where, progress=progress, notice=notice)
-    laps["training and evaluation"] = time.perf_counter()
     in_order = [outcomes[point] for point in study.points]
     arrays = {name: np.stack([one[name] for one in in_order], dtype=np.int32) for name in _ARRAYS}
     q_values = np.stack([one["q_values"] for one in in_order])
@@ -306,7 +302,6 @@ def do_comparison(
     small = {name: files.smallest(array) for name, array in arrays.items()}
     files.write_npz(ready / EPISODES, small)
     comparison = to_comparison(study, arrays, world)
-    laps["behaviours"] = time.perf_counter()
     first = study.points[0]
     baselines = baseline_rows(
         *(first.world, partial(evaluate, **where), study.seeds, ROLLOUTS, settings.discounts),
@@ -315,21 +310,12 @@ def do_comparison(
         first.task.evaporation_in_evaluation,
     )
     files.write_csv(ready / BASELINES, baselines, BASELINE_COLUMNS)
-    laps["baselines"] = time.perf_counter()
     costs = [cost.as_row() for cost in costs_of(study, outcomes)]
-    with ExitStack() as beside:  # figures take one core and need no more than these two files
-        if FIGURES in pictures:
-            beside.enter_context(process_beside(pictures[FIGURES], ready, ready))
-        write_tables(ready, comparison, baselines, costs)
-        policies = files.check_writable_folder(ready / POLICIES)
-        write_policies(policies, study, comparison, q_values)
-        laps["tables"] = time.perf_counter()
-        if RENDERS in pictures:
-            pictures[RENDERS](ready, ready)
-    laps["figures and renders"] = time.perf_counter()
-    marks = list(laps.items())
-    seconds = {name: end - marks[i][1] for i, (name, end) in enumerate(marks[1:])}
-    return {"cost_per_step": costs, "seconds_of": seconds}
+    write_tables(ready, comparison, baselines, costs)
+    write_policies(ready / POLICIES, study, comparison, q_values)
+    for draw in pictures.values():
+        draw(ready, ready)
+    return {"cost_per_step": costs}
 
 
 def draw_figures(study: Study[RunPoint], world: str, results: Path, folder: Path) -> None:

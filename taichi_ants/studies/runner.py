@@ -21,7 +21,7 @@ import numpy as np
 
 from taichi_ants import __version__, checks, files
 from taichi_ants.engines.colony.population import Population
-from taichi_ants.errors import AntsError, check_one_of
+from taichi_ants.errors import AntsError, check_one_of, count
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.provenance import world_facts
 from taichi_ants.task import Task
@@ -195,10 +195,11 @@ class Study(Generic[PointKind]):
             self._check_room(world, ants)
         needed = sum(point.size for point in self.points) * len(self.seeds) * _COPIES
         if needed > available_memory():
+            longest = max(point.episodes for point in self.points)
             raise AntsError(
-                f"{len(self.points)} points with {len(self.seeds)} seeds need about "
-                f"{needed / 1e9:.0f} GB of memory, this machine has "
-                f"{available_memory() / 1e9:.0f} GB; take fewer seeds, points or episodes at once."
+                f"{count(len(self.points), 'point')} of up to {longest} episodes with "
+                f"{count(len(self.seeds), 'seed')} need about {needed / 1e9:.0f} GB of memory, "
+                f"this machine has {available_memory() / 1e9:.0f} GB; take less of something at once."
             )
 
     def _check_room(self, world: World | tuple[World, ...], ants: int) -> None:

@@ -146,7 +146,7 @@ def test_a_finished_study_is_shown_and_nothing_is_lost(finished, tmp_path, kerne
         ("--seeds 20 --epsilon 0.3 --threads 1 --no-figures", "colony"),
         ("--quick --seeds 8", "colony-quick"),
         ("--sizes 1 8 --quick", "colony-sizes-1-8-quick"),
-        ("--learner dyna_q --arenas paper", "colony-learner-dyna_q-arenas-paper"),
+        ("--learner dyna_q --arenas paper", "colony-arenas-paper-learner-dyna_q"),
     ],
 )
 def test_default_folders_tell_what_is_run(arguments, folder):
@@ -210,7 +210,7 @@ def test_stopped_and_killed_it_goes_on_to_the_same_results(finished, kernels, tm
     [
         ([], "study|live"),
         (["play"], "invalid choice: 'play'"),
-        (["--ants", 2], "unrecognized arguments"),
+        (["--ants", 2], "invalid choice: '2'"),
         (["live", "--quick"], "unrecognized arguments: --quick"),
         (["study", "--save", "x"], "unrecognized arguments: --save x"),
         (["live", "--resume", "x", "--regrowth", 0], "--regrowth cannot change a colony that is"),

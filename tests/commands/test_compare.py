@@ -347,7 +347,7 @@ def test_manifest(finished):
     assert manifest["settings"]["worlds"][0]["ranges"] == [10, 10, 10]
     assert {"taichi", "numpy", "taichi_ants"} <= set(manifest["packages"])
     assert set(manifest["files"]) == set(FILES) - {"manifest.json"}
-    assert 0 < sum(manifest["seconds_of"].values()) < manifest["seconds"]
+    assert manifest["seconds"] > 0
     costs = {(cost["learner"], cost["planning_steps"]): cost for cost in manifest["cost_per_step"]}
     assert set(costs) == {("q_learning", 0), ("sarsa", 0), ("dyna_q", 2)}
     with np.load(finished / "episodes.npz") as archive:
