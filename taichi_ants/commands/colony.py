@@ -214,14 +214,11 @@ def study(settings: argparse.Namespace) -> None:
 
     plan = build_plan(settings)
     pictures = {} if settings.no_figures else {FIGURES: partial(draw_figures, plan)}
-    work = partial(do_study, settings, plan, pictures)
-    work_or_show(settings, plan.study().settings(), work, pictures)
+    work_or_show(settings, plan.study().settings(), partial(do_study, settings, plan), pictures)
 
 
-def do_study(
-    settings: argparse.Namespace, plan: StudyPlan, pictures: Any, blocks: Path, ready: Path
-) -> dict[str, Any]:
-    """All the work, and all files but the manifest."""
+def do_study(settings: argparse.Namespace, plan: StudyPlan, blocks: Path, ready: Path) -> None:
+    """All but the pictures."""
     from taichi_ants import files, save_policy
     from taichi_ants.studies.colony_study import to_arrays
 
@@ -233,9 +230,6 @@ def do_study(
     policies = files.check_writable_folder(ready / "policies")
     for name, q_values, metadata in plan.median_policies(found, outcomes):
         save_policy(policies / f"{name}.npz", q_values, metadata)
-    for draw in pictures.values():
-        draw(ready, ready)
-    return {}
 
 
 def write_tables(found: ColonyStudy, folder: Path) -> None:

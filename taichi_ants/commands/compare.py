@@ -44,6 +44,7 @@ MOST_SEEDS = 10_000
 EPISODES, BASELINES = "episodes.npz", "baselines.csv"
 FIGURES, POLICIES, RENDERS = "figures", "policies", "renders"
 RENDERED_STEPS = 80  # at most; a delivery takes 34, to and fro on the trail 38
+_DEPTH = "planning_steps"  # the one hyperparameter that the paper varies
 _ARRAYS = ("returns", "steps", "deliveries", "greedy_returns", "greedy_steps", "greedy_deliveries")
 
 
@@ -106,11 +107,11 @@ def points(settings: argparse.Namespace, world: World) -> tuple[RunPoint, ...]:
         )
         for delivery in (DELIVERIES if settings.delivery == "both" else (settings.delivery,))
     ]
-    depths: list[dict[str, Any]] = [{"planning_steps": n} for n in settings.planning_steps]
+    depths: list[dict[str, Any]] = [{_DEPTH: n} for n in settings.planning_steps]
     variants = [
         (name, more)
         for name in settings.learners
-        for more in (depths if learners.get(name).plans else [{}])
+        for more in (depths if hasattr(learners.get(name).hyperparameters, _DEPTH) else [{}])
     ]
     numbers = itertools.product(
         settings.learning_rates, settings.discounts, settings.epsilons, settings.epsilon_decays
@@ -273,19 +274,14 @@ def compare(settings: argparse.Namespace) -> None:
         pictures[RENDERS] = partial(render_policies, study)
     if not settings.no_figures:
         pictures[FIGURES] = partial(draw_figures, study, world)
-    work = partial(do_comparison, settings, study, world, pictures)
+    work = partial(do_comparison, settings, study, world)
     work_or_show(settings, study.settings(), work, pictures)
 
 
 def do_comparison(
-    settings: argparse.Namespace,
-    study: Study[RunPoint],
-    world: str,
-    pictures: dict[str, Any],
-    blocks: Path,
-    ready: Path,
+    settings: argparse.Namespace, study: Study[RunPoint], world: str, blocks: Path, ready: Path
 ) -> dict[str, Any]:
-    """All the work; what the manifest says of it."""
+    """All but the pictures; what the manifest says of it."""
     import numpy as np
 
     from taichi_ants import files
@@ -313,8 +309,6 @@ def do_comparison(
     costs = [cost.as_row() for cost in costs_of(study, outcomes)]
     write_tables(ready, comparison, baselines, costs)
     write_policies(ready / POLICIES, study, comparison, q_values)
-    for draw in pictures.values():
-        draw(ready, ready)
     return {"cost_per_step": costs}
 
 

@@ -57,13 +57,11 @@ def sweep(settings: argparse.Namespace) -> None:
         "varies": asked.settings,
         "rows": list(map(asked.study.in_order.index, asked.study.points)),
     }
-    work_or_show(settings, facts, partial(do_sweep, settings, asked, pictures), pictures)
+    work_or_show(settings, facts, partial(do_sweep, settings, asked), pictures)
 
 
-def do_sweep(
-    settings: argparse.Namespace, asked: Sweep, pictures: Any, blocks: Path, ready: Path
-) -> dict[str, Any]:
-    """All the work, and all files but the manifest."""
+def do_sweep(settings: argparse.Namespace, asked: Sweep, blocks: Path, ready: Path) -> None:
+    """All but the figure."""
     from taichi_ants import files
     from taichi_ants.analysis import sweeps
     from taichi_ants.studies.result_folder import REPORT
@@ -77,9 +75,6 @@ def do_sweep(
     rows = sweeps.summary_rows(asked.settings, values, typical)
     files.write_csv(ready / SUMMARY, rows, sweeps.columns_of(rows))
     files.write_text(ready / REPORT, sweeps.report(asked.settings, values))
-    for draw in pictures.values():
-        draw(ready, ready)
-    return {}
 
 
 def draw_figure(asked: Sweep, results: Path, folder: Path) -> None:

@@ -40,7 +40,7 @@ PICTURES = ("figures", "renders")  # can be drawn again from the other results
 def work_or_show(
     settings: Namespace,
     determines: Mapping[str, Any],
-    work: Callable[[Path, Path], Mapping[str, Any]],
+    work: Callable[[Path, Path], Mapping[str, Any] | None],
     pictures: Mapping[str, Callable[[Path, Path], None]],
 ) -> None:
     """Do the work of a command, or show what its folder holds already; print the report.
@@ -48,10 +48,10 @@ def work_or_show(
     Args:
         settings: The command's `out`, `force`, `plugin` and `arch`.
         determines: What determines the results besides these.
-        work: Called with a folder for blocks and one for all results, among them the report.
+        work: Called with a folder for blocks and one for the results, among them the report.
             Returns what the manifest says besides where the results come from.
-        pictures: What can be drawn later from finished results: the folder's name, and a function
-            of the folder of the results and of the one in which to make it.
+        pictures: What is drawn from the results, at once or later: the folder's name, and a
+            function of the folder of the results and of the one in which to make it.
 
     Raises:
         AntsError: The folder holds something else, cannot be written, or was altered.
@@ -69,7 +69,9 @@ def work_or_show(
         return
     began = time.perf_counter()
     with folder.work(settings.force) as (blocks, ready):
-        manifest = work(blocks, ready)
+        manifest = work(blocks, ready) or {}
+        for draw in pictures.values():
+            draw(ready, ready)
         report = files.read_text(ready / REPORT)
         seconds = time.perf_counter() - began
         folder.publish({**provenance(sys.argv), "seconds": seconds, **manifest})

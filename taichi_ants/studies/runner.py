@@ -73,7 +73,7 @@ class RunPoint:
     def __post_init__(self) -> None:
         (config,) = checks.checked_configs(self.training)
         object.__setattr__(self, "training", config)
-        checks.checked_runs_task(self.task)
+        checks.checked_runs_task(checks.checked_task(self.task))
         checks.checked_count("episodes", self.episodes)
         checks.checked_max_steps(self.max_steps, self.task)
         checks.checked_count("rollouts", self.rollouts)
@@ -143,6 +143,7 @@ class ColonyPoint:
     def __post_init__(self) -> None:
         (config,) = checks.checked_configs(self.training)
         object.__setattr__(self, "training", config)
+        checks.checked_task(self.task)
         Population.of(self.task, self.ants, self.capacity, self.start, False)  # type: ignore[arg-type]
         check_one_of("sharing", self.sharing, ("shared", "own"))
         checks.checked_count("episodes", self.episodes, least=0 if self.after else 1)
@@ -198,8 +199,8 @@ class Study(Generic[PointKind]):
             longest = max(point.episodes for point in self.points)
             raise AntsError(
                 f"{count(len(self.points), 'point')} of up to {longest} episodes with "
-                f"{count(len(self.seeds), 'seed')} need about {needed / 1e9:.0f} GB of memory, "
-                f"this machine has {available_memory() / 1e9:.0f} GB; take less of something at once."
+                f"{count(len(self.seeds), 'seed')} need about {needed / 1e9:.0f} GB, this machine "
+                f"has {available_memory() / 1e9:.0f} GB of memory; take less of something at once."
             )
 
     def _check_room(self, world: World | tuple[World, ...], ants: int) -> None:
