@@ -75,21 +75,19 @@ def make_gallery(settings: argparse.Namespace) -> None:
 
 def make_figures(folder: Path) -> None:
     """Draw the figures of the docs from the two studies, which are run where they are missing."""
-    from taichi_ants import files
-    from taichi_ants.analysis.colony.figures import save_all
     from taichi_ants.commands import colony, compare
-    from taichi_ants.studies.colony_study import from_arrays
 
     comparison = compare.parse_arguments(["--out", str(ROOT / "results" / "compare")])
     compare.compare(comparison)
-    study = colony.parse_arguments(["--out", str(ROOT / "results" / "colony")])
+    study = colony.parse_arguments(["study", "--out", str(ROOT / "results" / "colony")])
     colony.study(study)
+    world = compare.world_name(comparison)
     with tempfile.TemporaryDirectory() as place:
-        compare.draw_figures(compare.build_sweep(comparison), comparison.out, Path(place))
-        keep(Path(place) / compare.FIGURES, COMPARISON, folder)
-        found = files.read_npz(study.out / colony.EPISODES)
-        save_all(from_arrays(colony.build_plan(study), found), Path(place) / colony.FIGURES)
-        keep(Path(place) / colony.FIGURES, COLONY, folder)
+        drawn = Path(place)
+        compare.draw_figures(compare.build_study(comparison), world, comparison.out, drawn)
+        keep(drawn / compare.FIGURES, COMPARISON, folder)
+        colony.draw_figures(colony.build_plan(study), study.out, drawn)
+        keep(drawn / colony.FIGURES, COLONY, folder)
 
 
 def keep(drawn: Path, names: dict[str, str], folder: Path) -> None:

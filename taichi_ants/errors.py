@@ -1,4 +1,4 @@
-"""The one exception that speaks to users, and how its messages name values."""
+"""The one exception that speaks to users, and how messages name values and numbers of things."""
 
 from __future__ import annotations
 
@@ -35,6 +35,13 @@ def shown(value: object, most: int = 80) -> str:
     except ValueError:  # Python writes no integers of more than 4300 digits
         text = "a huge number"
     return text if len(text) <= most else text[: most - 3] + "..."
+
+
+def count(number_of: int, noun: str) -> str:
+    """How many of something: "1 seed", "2 seeds", "3 deliveries"."""
+    if number_of == 1:
+        return f"1 {noun}"
+    return f"{number_of} {noun[:-1]}ies" if noun.endswith("y") else f"{number_of} {noun}s"
 
 
 def check_one_of(name: str, value: object, allowed: Sequence[str]) -> None:

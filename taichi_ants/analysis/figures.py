@@ -15,7 +15,6 @@ import numpy as np
 from taichi_ants.analysis.behaviour import BEHAVIOURS, DELIVERS, counts
 from taichi_ants.analysis.best_of import best_of, best_position, percentile_of
 from taichi_ants.analysis.comparison import Comparison, Variant
-from taichi_ants.analysis.markdown import count
 from taichi_ants.analysis.paper import FIGURE_1, TABLE_2
 from taichi_ants.analysis.sensitivity import sensitivity
 from taichi_ants.analysis.statistics import interquartile_mean
@@ -32,6 +31,7 @@ from taichi_ants.analysis.style import (
     save,
     styled,
 )
+from taichi_ants.errors import count
 from taichi_ants.files import check_writable_folder
 
 if TYPE_CHECKING:

@@ -29,13 +29,6 @@ def table(headers: Sequence[str], lines: Sequence[Sequence[str]], text_columns: 
     return "\n".join(f"| {' | '.join(cells)} |" for cells in (headers, rule, *lines)) + "\n"
 
 
-def count(number_of: int, noun: str) -> str:
-    """How many of something: "1 seed", "2 seeds", "3 deliveries"."""
-    if number_of == 1:
-        return f"1 {noun}"
-    return f"{number_of} {noun[:-1]}ies" if noun.endswith("y") else f"{number_of} {noun}s"
-
-
 def baseline_name(row: Mapping) -> str:
     """A row of baselines.csv by name, for example "optimal policy, discount 0.9"."""
     discount = row["discount"]

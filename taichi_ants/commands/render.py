@@ -185,7 +185,7 @@ def show_colony(settings: argparse.Namespace, world: World) -> None:
     As a single picture, the episode is shown at its last tick, or at `--step`.
     """
     from taichi_ants import Colony
-    from taichi_ants.analysis.markdown import count
+    from taichi_ants.errors import count
     from taichi_ants.rendering import colony_moments, frames, save_picture
 
     q_values, title = find_policy(settings, world)

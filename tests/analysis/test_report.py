@@ -15,10 +15,11 @@ from taichi_ants.analysis.behaviour import CIRCLES, OTHER, WALKS
 from taichi_ants.analysis.best_of import paper_position
 from taichi_ants.analysis.claims import CLAIMS, Verdict, assess
 from taichi_ants.analysis.comparison import PAPER_WORLD, Comparison, Variant
-from taichi_ants.analysis.markdown import count, interval, number, table
+from taichi_ants.analysis.markdown import interval, number, table
 from taichi_ants.analysis.paper import DYNA_P5, FIGURE_1, SARSA
 from taichi_ants.analysis.report import WIDTH, print_report, render
 from taichi_ants.analysis.table2 import table2
+from taichi_ants.errors import count
 
 BASELINES = [
     {

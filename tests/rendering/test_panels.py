@@ -8,8 +8,8 @@ import pytest
 from taichi_ants import AntsError
 from taichi_ants.rendering import Scene, Status, at_start, panel, text
 from taichi_ants.rendering.colours import CHOSEN
-from taichi_ants.task import Observation
 from taichi_ants.rendering.panel import range_with_zero
+from taichi_ants.task import Observation
 from taichi_ants.task.states import parse_state
 from taichi_ants.worlds import World, paper
 

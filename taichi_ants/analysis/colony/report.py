@@ -9,6 +9,7 @@ from typing import Any
 from taichi_ants.analysis import markdown
 from taichi_ants.analysis.colony.findings import Finding
 from taichi_ants.analysis.colony.study import PHEROMONES, WAYS, Arena, ColonyStudy
+from taichi_ants.errors import count
 
 WIDTH = 100
 
@@ -50,7 +51,7 @@ def _table(arena: Arena, rows: list[dict[str, Any]]) -> Any:
 
     table = Table(
         title=(
-            f"{arena.words[0].upper()}{arena.words[1:]}, {markdown.count(arena.seeds, 'seed')}: "
+            f"{arena.words[0].upper()}{arena.words[1:]}, {count(arena.seeds, 'seed')}: "
             "deliveries per 1000 ticks"
         ),
         box=SIMPLE_HEAD,
