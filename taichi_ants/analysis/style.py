@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taichi_ants.analysis.comparison import Variant
-from taichi_ants.analysis.markdown import baseline_name
-from taichi_ants.analysis.paper import DYNA_P3, DYNA_P5, Q_LEARNING, SARSA
+from taichi_ants.analysis.paper.comparison import Variant
+from taichi_ants.analysis.paper.published import DYNA_P3, DYNA_P5, Q_LEARNING, SARSA
+from taichi_ants.analysis.tables import baseline_name
 from taichi_ants.files import write_atomically
 
 if TYPE_CHECKING:

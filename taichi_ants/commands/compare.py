@@ -29,7 +29,7 @@ from taichi_ants.studies.command_line import (
 )
 
 if TYPE_CHECKING:
-    from taichi_ants.analysis.comparison import Comparison
+    from taichi_ants.analysis.paper.comparison import Comparison
     from taichi_ants.learners.config import TrainingConfig
     from taichi_ants.studies.result_folder import ResultFolder
     from taichi_ants.studies.sweeps import Sweep, SweepResult
@@ -136,7 +136,7 @@ def configurations(settings: argparse.Namespace) -> tuple[TrainingConfig, ...]:
 def build_sweep(settings: argparse.Namespace) -> Sweep:
     """The work, checked as a whole before any of it is done."""
     from taichi_ants import AntsError, worlds
-    from taichi_ants.analysis.comparison import Row
+    from taichi_ants.analysis.paper.comparison import Row
     from taichi_ants.studies.sweeps import Sweep
 
     if settings.plugin:
@@ -193,7 +193,7 @@ def to_comparison(
 ) -> Comparison:
     """What the analysis reads; the world's name counts where it is not the paper's."""
     from taichi_ants import worlds
-    from taichi_ants.analysis.comparison import PAPER_WORLD, Comparison, Row
+    from taichi_ants.analysis.paper.comparison import PAPER_WORLD, Comparison, Row
 
     return Comparison(
         rows=tuple(Row.of(config) for config in sweep.configs),
@@ -238,8 +238,8 @@ def write_tables(
 ) -> tuple[Any, ...]:
     """Write all tables and the report; what `report.print_report` needs to show it."""
     from taichi_ants import files
-    from taichi_ants.analysis import report, summary, table2
     from taichi_ants.analysis.claims import assess, claims_markdown, claims_rows
+    from taichi_ants.analysis.paper import report, summary, table2
 
     lines = summary.summarise(comparison)
     files.write_csv(folder / "summary.csv", lines, summary.SUMMARY_COLUMNS)
@@ -275,7 +275,7 @@ def write_policies(folder: Path, sweep: Sweep, comparison: Comparison, tables: A
 
     from taichi_ants import save_policy
     from taichi_ants.analysis.behaviour import BEHAVIOURS, NAMES
-    from taichi_ants.analysis.best_of import examples
+    from taichi_ants.analysis.paper.best_of import examples
 
     for row, run in examples(comparison):
         config, behaviour = sweep.configs[row], comparison.behaviours[row, run]
@@ -295,7 +295,7 @@ def write_policies(folder: Path, sweep: Sweep, comparison: Comparison, tables: A
 
 def compare(settings: argparse.Namespace) -> None:
     """Run the comparison, or show the finished one."""
-    from taichi_ants.analysis.report import print_report
+    from taichi_ants.analysis.paper.report import print_report
     from taichi_ants.files import file_hash
     from taichi_ants.studies.provenance import provenance, sweep_settings
     from taichi_ants.studies.result_folder import ResultFolder
@@ -323,7 +323,7 @@ def do_comparison(
     from functools import partial
 
     from taichi_ants import files
-    from taichi_ants.analysis.baselines import BASELINE_COLUMNS, baseline_rows
+    from taichi_ants.analysis.bounds.baselines import BASELINE_COLUMNS, baseline_rows
     from taichi_ants.engines.runs.training import evaluate
     from taichi_ants.studies.sweeps import run_sweep
 
@@ -365,7 +365,7 @@ def do_comparison(
 
 def draw_figures(sweep: Sweep, results: Path, folder: Path) -> None:
     """Draw the figures of the comparison in one folder into the folder `figures` of another."""
-    from taichi_ants.analysis.figures import save_all
+    from taichi_ants.analysis.paper.figures import save_all
 
     save_all(*read_back(results, sweep), folder / FIGURES)
 
@@ -380,7 +380,7 @@ def render_policies(sweep: Sweep, policies: Path, folder: Path) -> None:
     from dataclasses import replace
 
     from taichi_ants import files, load_policy
-    from taichi_ants.analysis.comparison import Variant
+    from taichi_ants.analysis.paper.comparison import Variant
     from taichi_ants.rendering import Episode, episode_frames, save_animation
     from taichi_ants.rendering.episodes import DEFAULT_FPS, with_pause
 
@@ -432,8 +432,8 @@ def show_report(settings: argparse.Namespace, sweep: Sweep) -> None:
     from dataclasses import replace
 
     from taichi_ants import files
-    from taichi_ants.analysis import report, table2
     from taichi_ants.analysis.claims import assess
+    from taichi_ants.analysis.paper import report, table2
     from taichi_ants.studies.result_folder import MANIFEST
 
     comparison, baselines = read_back(settings.out, sweep)
@@ -447,7 +447,7 @@ def show_report(settings: argparse.Namespace, sweep: Sweep) -> None:
 def read_back(folder: Path, sweep: Sweep) -> tuple[Comparison, list[dict[str, Any]]]:
     """The comparison and the baselines that a folder holds."""
     from taichi_ants import AntsError, files
-    from taichi_ants.analysis.baselines import BASELINE_COLUMNS
+    from taichi_ants.analysis.bounds.baselines import BASELINE_COLUMNS
     from taichi_ants.studies.sweeps import SweepResult
 
     try:

@@ -360,7 +360,7 @@ def show_colony(settings: argparse.Namespace, world: World) -> None:
 
     As a single picture, the episode is shown at its last tick, or at `--step`.
     """
-    from taichi_ants.analysis.markdown import count
+    from taichi_ants.analysis.tables import count
     from taichi_ants.rendering import colony_picture, render_colony, save_picture
 
     colony, title = settled_colony(settings, world)

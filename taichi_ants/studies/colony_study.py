@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import __version__, files
-from taichi_ants.analysis.colony.limits import Limits, limits_of
+from taichi_ants.analysis.bounds.limits import Limits, limits_of
 from taichi_ants.analysis.colony.study import (
     COPIED,
     COPIED_LONG,

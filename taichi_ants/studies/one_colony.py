@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NoReturn
 import numpy as np
 
 from taichi_ants import files
-from taichi_ants.analysis.markdown import count
+from taichi_ants.analysis.tables import count
 from taichi_ants.errors import AntsError
 
 if TYPE_CHECKING:

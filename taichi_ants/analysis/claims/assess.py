@@ -16,8 +16,8 @@ import numpy as np
 from taichi_ants.analysis.claims.catalogue import CLAIMS
 from taichi_ants.analysis.claims.model import Claim, Finding, Verdict
 from taichi_ants.analysis.claims.slice import NotTestedError, Slice
-from taichi_ants.analysis.comparison import Comparison
-from taichi_ants.analysis.measures import WINDOW
+from taichi_ants.analysis.paper.comparison import Comparison
+from taichi_ants.analysis.paper.measures import WINDOW
 from taichi_ants.analysis.statistics import cautious_interval, interquartile_mean, without_noise
 
 SIMULTANEOUS_LEVEL = 0.95

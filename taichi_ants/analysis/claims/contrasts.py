@@ -8,8 +8,8 @@ import numpy as np
 
 from taichi_ants.analysis.claims.model import Contrast
 from taichi_ants.analysis.claims.slice import Slice
-from taichi_ants.analysis.comparison import Variant
-from taichi_ants.analysis.paper import DYNA_P3, DYNA_P5, Q_LEARNING, SARSA
+from taichi_ants.analysis.paper.comparison import Variant
+from taichi_ants.analysis.paper.published import DYNA_P3, DYNA_P5, Q_LEARNING, SARSA
 
 # What is too small to matter. An episode along the shortest path returns 45 reward in 34 steps:
 # one reward is one step on a trail, and two steps is the spread that the paper itself calls alike

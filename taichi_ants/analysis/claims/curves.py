@@ -22,7 +22,7 @@ from taichi_ants.analysis.claims.contrasts import (
 )
 from taichi_ants.analysis.claims.model import Above, Claim, Within
 from taichi_ants.analysis.claims.slice import Slice
-from taichi_ants.analysis.paper import (
+from taichi_ants.analysis.paper.published import (
     DYNA_P3,
     DYNA_P5,
     FIGURE_1,

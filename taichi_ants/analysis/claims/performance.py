@@ -28,7 +28,7 @@ from taichi_ants.analysis.claims.contrasts import (
 )
 from taichi_ants.analysis.claims.model import Above, Claim, Contrast, Within
 from taichi_ants.analysis.claims.slice import Slice
-from taichi_ants.analysis.paper import DYNA_P3, DYNA_P5, GRID, Q_LEARNING, SARSA, VARIANTS
+from taichi_ants.analysis.paper.published import DYNA_P3, DYNA_P5, GRID, Q_LEARNING, SARSA, VARIANTS
 
 _DYNAS = (DYNA_P3, DYNA_P5)
 _Q_AGAINST_ALL = tuple((Q_LEARNING, other) for other in (SARSA, *_DYNAS))

@@ -25,8 +25,8 @@ from taichi_ants.analysis.claims.contrasts import (
 )
 from taichi_ants.analysis.claims.model import Above, Claim, Contrast, Within
 from taichi_ants.analysis.claims.slice import Slice
-from taichi_ants.analysis.comparison import Variant
-from taichi_ants.analysis.paper import (
+from taichi_ants.analysis.paper.comparison import Variant
+from taichi_ants.analysis.paper.published import (
     DYNA_P3,
     DYNA_P5,
     FACTORS,

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from taichi_ants.analysis.best_of import held_out
-from taichi_ants.analysis.comparison import Comparison, Hyperparameters, Variant
-from taichi_ants.analysis.measures import MEASURES
-from taichi_ants.analysis.paper import FACTORS, FIGURE_1, GRID, TABLE_2
+from taichi_ants.analysis.paper.best_of import held_out
+from taichi_ants.analysis.paper.comparison import Comparison, Hyperparameters, Variant
+from taichi_ants.analysis.paper.measures import MEASURES
+from taichi_ants.analysis.paper.published import FACTORS, FIGURE_1, GRID, TABLE_2
 
 
 class NotTestedError(Exception):

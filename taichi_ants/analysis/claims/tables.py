@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 from taichi_ants.analysis.claims.assess import SIMULTANEOUS_LEVEL
 from taichi_ants.analysis.claims.model import Finding, Verdict
-from taichi_ants.analysis.comparison import PAPER_WORLD
-from taichi_ants.analysis.markdown import interval, number, table
+from taichi_ants.analysis.paper.comparison import PAPER_WORLD
+from taichi_ants.analysis.tables import interval, number, table
 
 
 def claims_rows(findings: Sequence[Finding]) -> list[dict]:

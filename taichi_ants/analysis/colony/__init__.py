@@ -3,9 +3,9 @@
 Imports no Taichi.
 """
 
+from taichi_ants.analysis.bounds.limits import Limits, limits_of
 from taichi_ants.analysis.colony.contrasts import judge_all
 from taichi_ants.analysis.colony.findings import Finding, find
-from taichi_ants.analysis.colony.limits import Limits, limits_of
 from taichi_ants.analysis.colony.study import Arena, ColonyStudy, Condition, Record
 
 __all__ = [

@@ -6,7 +6,7 @@ import io
 import textwrap
 from typing import Any
 
-from taichi_ants.analysis import markdown
+from taichi_ants.analysis import tables as markdown
 from taichi_ants.analysis.colony.findings import Finding
 from taichi_ants.analysis.colony.study import PHEROMONES, WAYS, Arena, ColonyStudy
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_ants.analysis.colony.limits import Limits
+from taichi_ants.analysis.bounds.limits import Limits
 
 # Ways of sharing, with the words of tables and figures.
 COPIED, COPIED_LONG, JOINT, THEN_JOINT, OWN = "copied", "copied_long", "joint", "then_joint", "own"

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants.analysis import markdown
+from taichi_ants.analysis import tables as markdown
 from taichi_ants.analysis.colony.contrasts import CONTRASTS, Judged
 from taichi_ants.analysis.colony.findings import Finding
 from taichi_ants.analysis.colony.study import MEASURES, ON, PHEROMONES, WAYS, Arena, ColonyStudy

@@ -10,7 +10,7 @@ import pytest
 from synthetic_comparison import build, change, subset, unchanged
 
 from taichi_ants.analysis.behaviour import CIRCLES, DELIVERS, MIXED, OTHER, WALKS
-from taichi_ants.analysis.best_of import (
+from taichi_ants.analysis.paper.best_of import (
     Chosen,
     best_of,
     choice,
@@ -19,10 +19,17 @@ from taichi_ants.analysis.best_of import (
     paper_position,
     percentile_of,
 )
-from taichi_ants.analysis.comparison import Comparison, Variant
-from taichi_ants.analysis.paper import DYNA_P3, FIGURE_1, Q_LEARNING, SARSA, TABLE_2, VARIANTS
+from taichi_ants.analysis.paper.comparison import Comparison, Variant
+from taichi_ants.analysis.paper.published import (
+    DYNA_P3,
+    FIGURE_1,
+    Q_LEARNING,
+    SARSA,
+    TABLE_2,
+    VARIANTS,
+)
+from taichi_ants.analysis.paper.table2 import apart, table2, table2_markdown
 from taichi_ants.analysis.statistics import interquartile_mean
-from taichi_ants.analysis.table2 import apart, table2, table2_markdown
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,8 @@ from dataclasses import fields
 import numpy as np
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, NAMES, counts
-from taichi_ants.analysis.comparison import Comparison, Row
-from taichi_ants.analysis.measures import MEASURES
+from taichi_ants.analysis.paper.comparison import Comparison, Row
+from taichi_ants.analysis.paper.measures import MEASURES
 from taichi_ants.analysis.statistics import centres
 
 _MEASURES = (

@@ -19,7 +19,7 @@ from taichi_ants.analysis.claims import (
     Within,
     assess,
 )
-from taichi_ants.analysis.paper import FIGURE_1, Q_LEARNING, SARSA
+from taichi_ants.analysis.paper.published import FIGURE_1, Q_LEARNING, SARSA
 
 SUPPORTED, CONTRADICTED = Verdict.SUPPORTED, Verdict.CONTRADICTED
 EQUIVALENT, UNDECIDED = Verdict.EQUIVALENT, Verdict.UNDECIDED

@@ -16,8 +16,8 @@ from enum import Enum
 import numpy as np
 
 from taichi_ants.analysis.behaviour import counts
-from taichi_ants.analysis.comparison import Comparison, Hyperparameters, Variant
-from taichi_ants.analysis.paper import TABLE_2
+from taichi_ants.analysis.paper.comparison import Comparison, Hyperparameters, Variant
+from taichi_ants.analysis.paper.published import TABLE_2
 from taichi_ants.analysis.statistics import RANDOM_SEED
 
 DRAWS = 20_000

@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, DELIVERS, counts
-from taichi_ants.analysis.best_of import best_of, best_position, percentile_of
-from taichi_ants.analysis.comparison import Comparison, Variant
-from taichi_ants.analysis.markdown import count
-from taichi_ants.analysis.paper import FIGURE_1, TABLE_2
-from taichi_ants.analysis.sensitivity import sensitivity
+from taichi_ants.analysis.paper.best_of import best_of, best_position, percentile_of
+from taichi_ants.analysis.paper.comparison import Comparison, Variant
+from taichi_ants.analysis.paper.published import FIGURE_1, TABLE_2
+from taichi_ants.analysis.paper.sensitivity import sensitivity
 from taichi_ants.analysis.statistics import interquartile_mean
 from taichi_ants.analysis.style import (
     BEHAVIOUR_LOOKS,
@@ -32,6 +31,7 @@ from taichi_ants.analysis.style import (
     save,
     styled,
 )
+from taichi_ants.analysis.tables import count
 from taichi_ants.files import check_writable_folder
 
 if TYPE_CHECKING:

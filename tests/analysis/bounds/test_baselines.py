@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from taichi_ants import reference
-from taichi_ants.analysis import dynamic_programming
-from taichi_ants.analysis.baselines import (
+from taichi_ants.analysis.bounds import episodes as dynamic_programming
+from taichi_ants.analysis.bounds.baselines import (
     BASELINE_COLUMNS,
     GREEDY_SETTING,
     TRAINING_SETTING,

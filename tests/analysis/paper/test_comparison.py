@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from synthetic_comparison import build, subset, unchanged
 
-from taichi_ants.analysis.comparison import Comparison, Hyperparameters, Row, Variant
-from taichi_ants.analysis.measures import MEASURES
-from taichi_ants.analysis.paper import DYNA_P3, FIGURE_1, GRID, SARSA, TABLE_2, VARIANTS
+from taichi_ants.analysis.paper.comparison import Comparison, Hyperparameters, Row, Variant
+from taichi_ants.analysis.paper.measures import MEASURES
+from taichi_ants.analysis.paper.published import DYNA_P3, FIGURE_1, GRID, SARSA, TABLE_2, VARIANTS
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.config import TrainingConfig
 

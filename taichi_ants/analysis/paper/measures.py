@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from taichi_ants.analysis.comparison import Comparison
+    from taichi_ants.analysis.paper.comparison import Comparison
 
 WINDOW = 50
 LAST = slice(-WINDOW, None)

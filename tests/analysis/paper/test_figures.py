@@ -16,18 +16,25 @@ from matplotlib.markers import CARETLEFT, CARETRIGHT, MarkerStyle
 from PIL import Image
 from synthetic_comparison import build, change, level_truth, subset, unchanged
 
-from taichi_ants.analysis.baselines import GREEDY_SETTING, TRAINING_SETTING
 from taichi_ants.analysis.behaviour import BEHAVIOURS, CIRCLES, OTHER
-from taichi_ants.analysis.best_of import best_of, percentile_of
-from taichi_ants.analysis.comparison import Comparison, Hyperparameters, Variant
-from taichi_ants.analysis.figures import (
+from taichi_ants.analysis.bounds.baselines import GREEDY_SETTING, TRAINING_SETTING
+from taichi_ants.analysis.paper.best_of import best_of, percentile_of
+from taichi_ants.analysis.paper.comparison import Comparison, Hyperparameters, Variant
+from taichi_ants.analysis.paper.figures import (
     best_runs,
     learning_curves,
     return_against_deliveries,
     save_all,
 )
-from taichi_ants.analysis.paper import DYNA_P5, FACTORS, FIGURE_1, SARSA, TABLE_2, VARIANTS
-from taichi_ants.analysis.sensitivity import sensitivity
+from taichi_ants.analysis.paper.published import (
+    DYNA_P5,
+    FACTORS,
+    FIGURE_1,
+    SARSA,
+    TABLE_2,
+    VARIANTS,
+)
+from taichi_ants.analysis.paper.sensitivity import sensitivity
 from taichi_ants.analysis.statistics import interquartile_mean
 from taichi_ants.analysis.style import BEHAVIOUR_LOOKS, in_training, looks
 

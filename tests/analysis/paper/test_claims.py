@@ -17,8 +17,8 @@ from taichi_ants.analysis.claims import (
     claims_markdown,
     claims_rows,
 )
-from taichi_ants.analysis.comparison import Hyperparameters, Variant
-from taichi_ants.analysis.paper import DYNA_P3, DYNA_P5, FIGURE_1, Q_LEARNING, SARSA
+from taichi_ants.analysis.paper.comparison import Hyperparameters, Variant
+from taichi_ants.analysis.paper.published import DYNA_P3, DYNA_P5, FIGURE_1, Q_LEARNING, SARSA
 
 BY_ID = {claim.id: claim for claim in CLAIMS}
 

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from taichi_ants.analysis.discounted import solve_phase
-from taichi_ants.analysis.transitions import Phase, Transitions, build_transitions
+from taichi_ants.analysis.bounds.discounted import solve_phase
+from taichi_ants.analysis.bounds.transitions import Phase, Transitions, build_transitions
 from taichi_ants.errors import AntsError, shown
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task.constants import FORWARD, LEFT, MAX_STEPS, RIGHT

@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import product
 from typing import NamedTuple
 
-from taichi_ants.analysis.comparison import Hyperparameters, Variant
+from taichi_ants.analysis.paper.comparison import Hyperparameters, Variant
 
 Q_LEARNING = Variant("q_learning")
 SARSA = Variant("sarsa")

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from taichi_ants.analysis.dynamic_programming import Outcome, exact_bounds
+from taichi_ants.analysis.bounds.episodes import Outcome, exact_bounds
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.policies import random_policy, trail_follower

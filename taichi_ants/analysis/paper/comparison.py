@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from taichi_ants.analysis.measures import MEASURES, WINDOW
+from taichi_ants.analysis.paper.measures import MEASURES, WINDOW
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.config import TrainingConfig
 
@@ -238,7 +238,7 @@ class Comparison:
         """One number per run, float64 (rows, seeds); nan where there is too little data.
 
         Args:
-            name: A key of `taichi_ants.analysis.measures.MEASURES`.
+            name: A key of `taichi_ants.analysis.paper.measures.MEASURES`.
         """
         if name not in self._measured:
             measure = MEASURES[name]

@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 from random_worlds import random_world
 
 from taichi_ants import worlds
-from taichi_ants.analysis.colony.limits import (
+from taichi_ants.analysis.bounds.episodes import exact_bounds
+from taichi_ants.analysis.bounds.limits import (
     food_limit,
     least_mean_cycle,
     limits_of,
     queen_limit,
 )
-from taichi_ants.analysis.dynamic_programming import exact_bounds
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT
 from taichi_ants.worlds import World
 

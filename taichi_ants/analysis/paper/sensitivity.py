@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taichi_ants.analysis.comparison import Comparison, Hyperparameters, Variant
-from taichi_ants.analysis.markdown import count
+from taichi_ants.analysis.paper.comparison import Comparison, Hyperparameters, Variant
 from taichi_ants.analysis.statistics import bootstrap_interval, interquartile_mean
 from taichi_ants.analysis.style import GREY, INK, frame, looks, new_figure, styled
+from taichi_ants.analysis.tables import count
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

@@ -14,17 +14,17 @@ from typing import IO, TYPE_CHECKING, Literal
 import numpy as np
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS, MIXED, counts, mixture
-from taichi_ants.analysis.best_of import Choice, Chosen, choice
 from taichi_ants.analysis.claims.assess import OTHER_WORLD, SIMULTANEOUS_LEVEL
 from taichi_ants.analysis.claims.model import WITHIN_MARGIN, Finding, Verdict
 from taichi_ants.analysis.claims.tables import by_claim, tally
-from taichi_ants.analysis.comparison import Comparison, Variant
-from taichi_ants.analysis.markdown import MISSING, baseline_name, count, interval, number
-from taichi_ants.analysis.measures import MEASURES
-from taichi_ants.analysis.paper import GREEDY_RETURN, GREEDY_STEPS, VARIANTS
+from taichi_ants.analysis.paper.best_of import Choice, Chosen, choice
+from taichi_ants.analysis.paper.comparison import Comparison, Variant
+from taichi_ants.analysis.paper.measures import MEASURES
+from taichi_ants.analysis.paper.published import GREEDY_RETURN, GREEDY_STEPS, VARIANTS
+from taichi_ants.analysis.paper.summary import mean_returns
+from taichi_ants.analysis.paper.table2 import APART, apart, means, nearer_steps
 from taichi_ants.analysis.statistics import centres
-from taichi_ants.analysis.summary import mean_returns
-from taichi_ants.analysis.table2 import APART, apart, means, nearer_steps
+from taichi_ants.analysis.tables import MISSING, baseline_name, count, interval, number
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -14,12 +14,18 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from taichi_ants.analysis.behaviour import MIXED, mixture
-from taichi_ants.analysis.best_of import DRAWS, best_of, held_out, paper_position, percentile_of
-from taichi_ants.analysis.comparison import Comparison, Variant
-from taichi_ants.analysis.markdown import MISSING, interval, number, table
-from taichi_ants.analysis.measures import MEASURES
-from taichi_ants.analysis.paper import TABLE_2, VARIANTS
+from taichi_ants.analysis.paper.best_of import (
+    DRAWS,
+    best_of,
+    held_out,
+    paper_position,
+    percentile_of,
+)
+from taichi_ants.analysis.paper.comparison import Comparison, Variant
+from taichi_ants.analysis.paper.measures import MEASURES
+from taichi_ants.analysis.paper.published import TABLE_2, VARIANTS
 from taichi_ants.analysis.statistics import centres
+from taichi_ants.analysis.tables import MISSING, interval, number, table
 
 # Column stem -> measure of a run. The paper has one figure of steps, we have two readings of it.
 FIGURES = {

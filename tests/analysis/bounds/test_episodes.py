@@ -15,9 +15,9 @@ from plain_search import (
 )
 
 from taichi_ants import reference
-from taichi_ants.analysis import dynamic_programming
-from taichi_ants.analysis.dynamic_programming import Outcome, exact_bounds
-from taichi_ants.analysis.transitions import build_transitions
+from taichi_ants.analysis.bounds import episodes as dynamic_programming
+from taichi_ants.analysis.bounds.episodes import Outcome, exact_bounds
+from taichi_ants.analysis.bounds.transitions import build_transitions
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.policies import random_policy, trail_follower

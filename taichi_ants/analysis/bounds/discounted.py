@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from taichi_ants.analysis.transitions import Phase
+from taichi_ants.analysis.bounds.transitions import Phase
 
 # Action values this close count as equal, since the same sums in another order differ by rounding:
 # relative to the value of the state, and, for sums that cancel to almost nothing, relative to the

@@ -9,14 +9,14 @@ import pytest
 from synthetic_comparison import build, subset, unchanged
 
 from taichi_ants.analysis.behaviour import CIRCLES, WALKS
-from taichi_ants.analysis.paper import FIGURE_1, SARSA
-from taichi_ants.analysis.statistics import bootstrap_interval
-from taichi_ants.analysis.summary import (
+from taichi_ants.analysis.paper.published import FIGURE_1, SARSA
+from taichi_ants.analysis.paper.summary import (
     BEHAVIOUR_COLUMNS,
     SUMMARY_COLUMNS,
     summarise,
     summarise_behaviours,
 )
+from taichi_ants.analysis.statistics import bootstrap_interval
 
 
 def test_a_line_by_hand() -> None:

@@ -10,15 +10,15 @@ from dataclasses import replace
 import pytest
 from synthetic_comparison import build, change, subset, unchanged
 
-from taichi_ants.analysis.baselines import TRAINING_SETTING
 from taichi_ants.analysis.behaviour import CIRCLES, OTHER, WALKS
-from taichi_ants.analysis.best_of import paper_position
+from taichi_ants.analysis.bounds.baselines import TRAINING_SETTING
 from taichi_ants.analysis.claims import CLAIMS, Verdict, assess
-from taichi_ants.analysis.comparison import PAPER_WORLD, Comparison, Variant
-from taichi_ants.analysis.markdown import count, interval, number, table
-from taichi_ants.analysis.paper import DYNA_P5, FIGURE_1, SARSA
-from taichi_ants.analysis.report import WIDTH, print_report, render
-from taichi_ants.analysis.table2 import table2
+from taichi_ants.analysis.paper.best_of import paper_position
+from taichi_ants.analysis.paper.comparison import PAPER_WORLD, Comparison, Variant
+from taichi_ants.analysis.paper.published import DYNA_P5, FIGURE_1, SARSA
+from taichi_ants.analysis.paper.report import WIDTH, print_report, render
+from taichi_ants.analysis.paper.table2 import table2
+from taichi_ants.analysis.tables import count, interval, number, table
 
 BASELINES = [
     {
@@ -298,7 +298,7 @@ def test_claims_name_their_scope_and_doubtful_sizes(text: str, comparison: Compa
 def test_the_tables_fit_the_terminal(
     comparison: Comparison, columns: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("taichi_ants.analysis.report.WIDTH", columns)
+    monkeypatch.setattr("taichi_ants.analysis.paper.report.WIDTH", columns)
     lines = table2(comparison, 100)
     text = render(comparison, lines, assess(comparison), BASELINES, COSTS)
     assert max(len(line) for line in text.splitlines()) <= columns
