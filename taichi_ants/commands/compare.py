@@ -238,7 +238,7 @@ def write_tables(
 ) -> tuple[Any, ...]:
     """Write all tables and the report; what `report.print_report` needs to show it."""
     from taichi_ants import files
-    from taichi_ants.analysis.claims import assess, claims_markdown, claims_rows
+    from taichi_ants.analysis.paper.audit import assess, claims_markdown, claims_rows
     from taichi_ants.analysis.paper import report, summary, table2
 
     lines = summary.summarise(comparison)
@@ -432,7 +432,7 @@ def show_report(settings: argparse.Namespace, sweep: Sweep) -> None:
     from dataclasses import replace
 
     from taichi_ants import files
-    from taichi_ants.analysis.claims import assess
+    from taichi_ants.analysis.paper.audit import assess
     from taichi_ants.analysis.paper import report, table2
     from taichi_ants.studies.result_folder import MANIFEST
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from taichi_ants.analysis.behaviour import counts
 from taichi_ants.analysis.paper.comparison import Comparison, Hyperparameters, Variant
-from taichi_ants.analysis.paper.published import TABLE_2
+from taichi_ants.analysis.paper.published import TABLE_2, VARIANTS
 from taichi_ants.analysis.statistics import RANDOM_SEED
 
 DRAWS = 20_000
@@ -71,37 +71,6 @@ def percentile_of(figure: float, values: np.ndarray) -> float:
     return float(50 * ((values < figure).mean() + (values <= figure).mean()))
 
 
-@dataclass(frozen=True)
-class HeldOut:
-    """The best configuration by one half of the seeds, measured on the other half.
-
-    Attributes:
-        hyperparameters: The configuration chosen.
-        position: Its row in the comparison.
-        seeds: Positions of the seeds on which it is reported.
-    """
-
-    hyperparameters: Hyperparameters
-    position: int
-    seeds: slice
-
-
-def held_out(comparison: Comparison, positions: Sequence[int]) -> HeldOut | None:
-    """Chooses by mean return on the seeds at even positions; those at odd ones are for the report.
-
-    Args:
-        positions: Rows of the comparison that compete.
-
-    Returns:
-        None where none competes, or there is no second seed.
-    """
-    if not positions or len(comparison.seeds) < 2:
-        return None
-    choice = comparison.measure("return_last50")[positions, ::2].mean(axis=1).argmax()
-    best = positions[int(choice)]
-    return HeldOut(comparison.rows[best].hyperparameters, best, slice(1, None, 2))
-
-
 class Chosen(Enum):
     """Why a configuration stands for its learner."""
 
@@ -127,6 +96,23 @@ class Choice:
     seeds: slice
 
 
+def held_out(comparison: Comparison, positions: Sequence[int]) -> Choice | None:
+    """Chooses by mean return on the seeds at even positions; those at odd ones are for the report.
+
+    Args:
+        comparison: The comparison.
+        positions: Rows of it that compete.
+
+    Returns:
+        None where none competes, or there is no second seed.
+    """
+    if not positions or len(comparison.seeds) < 2:
+        return None
+    best = best_position(comparison, positions, slice(0, None, 2))
+    point = comparison.rows[best].hyperparameters
+    return Choice(Chosen.HELD_OUT, point, best, slice(1, None, 2))
+
+
 def choice(comparison: Comparison, delivery: str, variant: Variant) -> Choice | None:
     """The paper's configuration of a learner, or its best one outside of the paper's table.
 
@@ -136,13 +122,21 @@ def choice(comparison: Comparison, delivery: str, variant: Variant) -> Choice | 
     if same is not None:
         return Choice(Chosen.PAPER, TABLE_2[variant].hyperparameters, same, slice(None))
     positions = comparison.positions(delivery, variant)
-    best = held_out(comparison, positions)
-    if best is not None:
-        return Choice(Chosen.HELD_OUT, best.hyperparameters, best.position, best.seeds)
-    if not positions:
-        return None
-    position = best_position(comparison, positions)
-    return Choice(Chosen.BEST, comparison.rows[position].hyperparameters, position, slice(None))
+    if not positions or len(comparison.seeds) > 1:
+        return held_out(comparison, positions)
+    best = best_position(comparison, positions)
+    return Choice(Chosen.BEST, comparison.rows[best].hyperparameters, best, slice(None))
+
+
+def choices(comparison: Comparison) -> dict[tuple[str, Variant], Choice]:
+    """What stands for each learner in each delivery setting, the paper's learners first."""
+    variants = dict.fromkeys((*VARIANTS, *comparison.variants))
+    found = {
+        (setting, variant): choice(comparison, setting, variant)
+        for setting in comparison.delivery_settings
+        for variant in variants
+    }
+    return {key: chosen for key, chosen in found.items() if chosen is not None}
 
 
 def paper_position(comparison: Comparison, delivery: str, variant: Variant) -> int | None:
@@ -155,9 +149,11 @@ def paper_position(comparison: Comparison, delivery: str, variant: Variant) -> i
     return comparison.position(delivery, variant, TABLE_2[variant].hyperparameters)
 
 
-def best_position(comparison: Comparison, positions: Sequence[int]) -> int:
-    """The row with the highest mean return over all seeds; the first of equals."""
-    returns = comparison.measure("return_last50")[list(positions)].mean(axis=1)
+def best_position(
+    comparison: Comparison, positions: Sequence[int], seeds: slice = slice(None)
+) -> int:
+    """The row with the highest mean return over all seeds, or some; the first of equals."""
+    returns = comparison.measure("return_last50")[list(positions), seeds].mean(axis=1)
     return positions[int(returns.argmax())]
 
 

@@ -106,10 +106,15 @@ MEASURES: dict[str, Measure] = {
     ),
     "steps_all": Measure("mean length of all episodes", "steps", _mean("steps")),
     "deliveries_last50": Measure(
-        "mean deliveries of the last 50 episodes", "deliveries", _mean("deliveries", LAST)
+        "mean deliveries of the last 50 episodes",
+        "deliveries per episode",
+        _mean("deliveries", LAST),
     ),
     "deliveries_second50": Measure(
-        "mean deliveries of episodes 51 to 100", "deliveries", _mean("deliveries", SECOND), _EARLY
+        "mean deliveries of episodes 51 to 100",
+        "deliveries per episode",
+        _mean("deliveries", SECOND),
+        _EARLY,
     ),
     "return_fluctuation_first50": Measure(
         "fluctuation of the return from episode to episode in the first 50 episodes",
@@ -150,7 +155,7 @@ MEASURES: dict[str, Measure] = {
     ),
     "greedy_deliveries": Measure(
         "mean deliveries of the greedy rollouts",
-        "deliveries",
+        "deliveries per episode",
         _mean("greedy_deliveries"),
         rollouts=1,
     ),

@@ -10,13 +10,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from taichi_ants.analysis.behaviour import MIXED, mixture
 from taichi_ants.analysis.paper.best_of import (
     DRAWS,
+    Choice,
+    Chosen,
     best_of,
+    choices,
     held_out,
     paper_position,
     percentile_of,
@@ -25,7 +29,16 @@ from taichi_ants.analysis.paper.comparison import Comparison, Variant
 from taichi_ants.analysis.paper.measures import MEASURES
 from taichi_ants.analysis.paper.published import TABLE_2, VARIANTS
 from taichi_ants.analysis.statistics import centres
-from taichi_ants.analysis.tables import MISSING, interval, number, table
+from taichi_ants.analysis.tables import (
+    MISSING,
+    Block,
+    Table,
+    count,
+    interval,
+    markdown,
+    number,
+    percent,
+)
 
 # Column stem -> measure of a run. The paper has one figure of steps, we have two readings of it.
 FIGURES = {
@@ -34,7 +47,9 @@ FIGURES = {
     "steps_last50": "steps_last50",
     "deliveries": "deliveries_last50",
 }
-DIGITS = {"return": 1, "steps_all": 1, "steps_last50": 1, "deliveries": 2}
+# Below, a note warns that means have too few seeds; what intervals cover is measured in
+# docs/statistics.md.
+FEW_SEEDS = 50
 APART = "!"  # marks a mean that the interval of the IQM excludes
 
 
@@ -110,24 +125,6 @@ def means(comparison: Comparison, stem: str, position: int | None, seeds: slice)
     return columns
 
 
-def apart(line: Mapping, stem: str = "") -> bool:
-    """Whether the mean lies outside of the interval of the IQM, in the columns that begin so."""
-    mean, low, high = (line[f"{stem}{name}"] for name in ("mean", "iqm_ci_low", "iqm_ci_high"))
-    return mean < low or mean > high
-
-
-def nearer_steps(lines: Sequence[Mapping]) -> str:
-    """How the paper's steps can be read, and which reading comes nearer to them here."""
-    words = "the paper leaves open whether it means all episodes or the last 50"
-    off = {
-        name: np.array([line["paper_steps"] - line[f"same_steps_{key}_iqm"] for line in lines])
-        for name, key in (("all", "all"), ("the last 50", "last50"))
-    }
-    if np.isnan(list(off.values())).any():
-        return words
-    return f"{words}; ours come nearer over {min(off, key=lambda name: np.abs(off[name]).sum())}"
-
-
 def _best_run(comparison: Comparison, delivery: str, variant: Variant, draws: int) -> dict:
     best = best_of(comparison, delivery, variant, draws)
     columns: dict[str, float] = {"best_run_of": best.configurations if best else 0}
@@ -151,145 +148,138 @@ def _best_run(comparison: Comparison, delivery: str, variant: Variant, draws: in
     return columns
 
 
-def table2_markdown(lines: list[dict], comparison: Comparison) -> str:
-    """The list of `table2` of a comparison as Markdown: tables, each explained in a sentence.
+def apart(line: Mapping, stem: str = "") -> bool:
+    """Whether the mean lies outside of the interval of the IQM, in the columns that begin so."""
+    mean, low, high = (line[f"{stem}{name}"] for name in ("mean", "iqm_ci_low", "iqm_ci_high"))
+    return mean < low or mean > high
 
-    Outside of the paper's world there is no table of its configurations.
+
+def spread(line: Mapping, stem: str, *names: str) -> str:
+    """A centre and below it its interval, of which one seed has none."""
+    middle, low, high = (line[f"{stem}_{name}"] for name in names)
+    large = max(abs(middle), abs(high)) >= 100
+    digits = 2 if stem.endswith("deliveries") else 0 if large else 1
+    text = number(middle, digits)
+    return text if math.isnan(low) or low == high else f"{text}\n{interval(low, high, digits)}"
+
+
+def mean_and_iqm(line: Mapping, stem: str) -> list[str]:
+    """Both centres, the mean marked where the IQM's interval excludes it; no IQM of deliveries."""
+    mean = spread(line, stem, "mean", "ci_low", "ci_high")
+    if f"{stem}_iqm" not in line:
+        return [mean, MISSING]
+    first, *rest = mean.split("\n")
+    marked = "\n".join([f"{first} {APART}" if apart(line, f"{stem}_") else first, *rest])
+    return [marked, spread(line, stem, "iqm", "iqm_ci_low", "iqm_ci_high")]
+
+
+def label(comparison: Comparison, variant: Variant, chosen: Choice) -> str:
+    """The learner's name, with a star if it is not shown at the paper's, a + if it is mixed."""
+    star = chosen.why is not Chosen.PAPER
+    mixed = mixture(comparison.behaviours[chosen.position, chosen.seeds])
+    return variant.label + (" *" if star else "") + (" +" if mixed else "")
+
+
+def figure_tables(lines: Sequence[Mapping], comparison: Comparison) -> list[Table]:
+    """A table for each figure of a run, beside the paper's in its world; explained below the last.
+
+    Learners are shown at what `best_of.choices` takes for them.
     """
-    of_paper = comparison.in_paper_world
-    late = comparison.late
-    parts = [f"{line}\n" for line in (f"World: {comparison.world}.", comparison.conditions) if line]
+    of_paper, late = comparison.in_paper_world, f"{comparison.late} episodes"
+    titles = (f"return, {late}", "steps, all episodes", f"steps, {late}", f"deliveries, {late}")
+    by_learner = {(one["delivery"], one["learner"], one["planning_steps"]): one for one in lines}
+    shown = choices(comparison) if lines else {}
+    rows: dict[str, list[list[str]]] = {name: [] for name in FIGURES}
+    for (setting, variant), chosen in shown.items():
+        line = by_learner[(setting, *variant)]
+        ours = means(comparison, "ours", chosen.position, chosen.seeds)
+        for name in FIGURES:
+            best = f"best_run_{name}"
+            paper = number(
+                line[f"paper_{name.partition('_')[0]}"], 2 if name == "deliveries" else 1
+            )
+            below = percent(line[f"{best}_paper_percentile"] / 100)
+            cells = [
+                *mean_and_iqm(ours, f"ours_{name}"),
+                spread(line, best, "median", "low", "high"),
+            ]
+            cells = [paper, *cells, below] if of_paper else cells
+            rows[name].append([label(comparison, variant, chosen), setting, *cells])
+    headers = ["Learner", "Delivery", "Mean", "IQM", "Best run"]
+    headers = [*headers[:2], "Paper", *headers[2:], "Below"] if of_paper else headers
+    name = "Table 2" if of_paper else "Training"
+    tables = [
+        Table(f"{name}: {title}", headers, cells, text_columns=2)
+        for title, cells in zip(titles, rows.values(), strict=True)
+    ]
+    return [*tables[:-1], replace(tables[-1], notes=_notes(lines, comparison, shown))]
+
+
+def _notes(
+    lines: Sequence[Mapping], comparison: Comparison, shown: Mapping[tuple[str, Variant], Choice]
+) -> list[str]:
+    of_paper, seeds = comparison.in_paper_world, len(comparison.seeds)
+    whose = "at the paper's configuration, " if of_paper else ""
+    notes = [
+        f"mean, IQM: over {count(seeds, 'seed')}, {whose}intervals at 95 %",
+        "IQM: interquartile mean, of the middle half of the runs: the typical run",
+        f"{APART} the mean lies outside of the IQM's interval: a few far runs have moved it",
+        "best run: best by return of all configurations, one run each: median [95 %]",
+    ]
     if of_paper:
-        seeds = max((line["seeds"] for line in lines), default=0)
-        ours = (
-            f"means and interquartile means (IQM, the typical run) over {seeds} seeds with 95 % "
-            f"intervals; {APART} marks a mean outside of the IQM's interval, which a few far runs "
-            "have moved"
-            if seeds
-            else "not in this comparison"
-        )
-        parts += [
-            f"The paper's configurations: returns and deliveries, {late} episodes. Its figures are "
-            f"single runs; ours are {ours}.\n",
-            _same_table(lines),
-            *_mixtures(lines, "same"),
-            f"The same for the steps of an episode: {nearer_steps(lines)}.\n",
-            _same_steps_table(lines, late),
+        notes += [
+            "below: percentage of these below the paper's figure",
+            f"steps: {nearer_steps(lines)}",
         ]
-    parts += [
-        "Training each configuration once and reporting the best by return, repeated with "
-        "independent random seeds: median and 95 % range of the reported figures."
-        + (
-            " In brackets, the percentage of repetitions that fall below the paper's figure.\n"
-            if of_paper
-            else "\n"
-        ),
-        _best_table(lines, late),
-    ]
-    if any(line["held_out_seeds"] for line in lines):
-        parts += [
-            "The configuration with the highest mean return on half of the seeds, reported on "
-            "the other half, with 95 % intervals: what choosing the best is worth without its "
-            "luck.\n",
-            _held_out_table(lines, late),
-            *_mixtures(lines, "held_out"),
+    if 1 < seeds < FEW_SEEDS:
+        notes += [
+            f"Few seeds ({seeds}): where one run in a hundred is far off, the interval of the mean",
+            "misses it more often than not. The IQM's holds from 10 seeds on (docs/statistics.md).",
         ]
-    return "\n".join(parts)
-
-
-def _name(line: dict) -> list[str]:
-    return [Variant(line["learner"], line["planning_steps"]).label, line["delivery"]]
-
-
-def _centre(line: dict, stem: str, name: str, centre: str = "mean") -> str:
-    """A mean (or "iqm") with its interval, marked where mean and IQM are apart."""
-    digits = DIGITS[name]
-    ends = "iqm_ci" if centre == "iqm" else "ci"
-    text = number(line[f"{stem}_{name}_{centre}"], digits)
-    span = interval(line[f"{stem}_{name}_{ends}_low"], line[f"{stem}_{name}_{ends}_high"], digits)
-    marked = centre == "mean" and name != "deliveries" and apart(line, f"{stem}_{name}_")
-    return text if text == MISSING else f"{text}{' ' + APART if marked else ''} {span}"
-
-
-def _steps_headers(late: str) -> list[str]:
-    return [f"Steps, {which}, {centre}" for which in ("all", late) for centre in ("mean", "IQM")]
-
-
-def _steps(line: dict, stem: str) -> list[str]:
-    return [
-        _centre(line, stem, name, centre)
-        for name in ("steps_all", "steps_last50")
-        for centre in ("mean", "iqm")
-    ]
-
-
-def _mixtures(lines: list[dict], stem: str) -> list[str]:
-    """A paragraph on the lines whose means are over runs that do different things, if any."""
+    for why in (Chosen.HELD_OUT, Chosen.BEST):
+        starred = [
+            f"  {variant.label}, {setting}: {chosen.hyperparameters.label}"
+            for (setting, variant), chosen in shown.items()
+            if chosen.why is why
+        ]
+        if starred:
+            notes += [f"* {why.value}", "  (learning rate / discount / epsilon / decay):", *starred]
     mixed = [
-        f"{', '.join(_name(line))}: {line[f'{stem}_behaviours']}"
-        for line in lines
-        if line[f"{stem}_behaviours"]
+        f"  {variant.label}, {setting}: {words}"
+        for (setting, variant), chosen in shown.items()
+        if (words := mixture(comparison.behaviours[chosen.position, chosen.seeds]))
     ]
-    # Two blanks break the line in Markdown.
-    return ["  \n".join([f"Here {MIXED}:", *mixed]) + "\n"] if mixed else []
+    return [*notes, f"+ {MIXED}:", *mixed] if mixed else notes
 
 
-def _same_table(lines: list[dict]) -> str:
-    headers = ["Learner", "Delivery", "Configuration", "Return, paper", "mean", "IQM"]
-    headers += ["Deliveries, paper", "mean"]
-    rows = [
-        [
-            *_name(line),
-            line["configuration"],
-            number(line["paper_return"]),
-            _centre(line, "same", "return"),
-            _centre(line, "same", "return", "iqm"),
-            number(line["paper_deliveries"], 2),
-            _centre(line, "same", "deliveries"),
-        ]
-        for line in lines
-        if line["configuration"]
-    ]
-    return table(headers, rows, text_columns=3)
+def nearer_steps(lines: Sequence[Mapping]) -> str:
+    """How the paper's steps can be read, and which reading comes nearer to them here."""
+    words = "the paper leaves open whether it means all episodes or the last 50"
+    off = {
+        name: np.array([line["paper_steps"] - line[f"same_steps_{key}_iqm"] for line in lines])
+        for name, key in (("all", "all"), ("the last 50", "last50"))
+    }
+    if np.isnan(list(off.values())).any():
+        return words
+    return f"{words}; ours come nearer over {min(off, key=lambda name: np.abs(off[name]).sum())}"
 
 
-def _same_steps_table(lines: list[dict], late: str) -> str:
-    rows = [
-        [*_name(line), number(line["paper_steps"]), *_steps(line, "same")]
-        for line in lines
-        if line["configuration"]
-    ]
-    headers = ["Learner", "Delivery", "Steps, paper", *_steps_headers(late)]
-    return table(headers, rows, text_columns=2)
-
-
-def _best_table(lines: list[dict], late: str) -> str:
+def table2_markdown(lines: list[dict], comparison: Comparison) -> str:
+    """The tables of `figure_tables`, and what is best on half of the seeds on the other half."""
+    blocks: list[Block] = [f"World: {comparison.world}.", comparison.conditions]
+    blocks += figure_tables(lines, comparison)
     rows = []
     for line in lines:
-        cells = [*_name(line), str(line["best_run_of"])]
-        for name, digits in DIGITS.items():
-            stem = f"best_run_{name}"
-            span = interval(line[f"{stem}_low"], line[f"{stem}_high"], digits)
-            below = number(line[f"{stem}_paper_percentile"], 0)
-            below = MISSING if below == MISSING else f"({below} %)"
-            parts = (number(line[f"{stem}_median"], digits), span, below)
-            cells.append(" ".join(part for part in parts if part != MISSING) or MISSING)
-        rows.append(cells)
-    headers = ["Learner", "Delivery", "Best of", "Return", "Steps, all", f"Steps, {late}"]
-    return table([*headers, "Deliveries"], rows, text_columns=2)
-
-
-def _held_out_table(lines: list[dict], late: str) -> str:
-    rows = [
-        [
-            *_name(line),
-            line["held_out_configuration"] or MISSING,
-            _centre(line, "held_out", "return"),
-            _centre(line, "held_out", "return", "iqm"),
-            *_steps(line, "held_out"),
-            _centre(line, "held_out", "deliveries"),
-        ]
-        for line in lines
-    ]
-    headers = ["Learner", "Delivery", "Chosen configuration", "Return, mean", "Return, IQM"]
-    return table([*headers, *_steps_headers(late), "Deliveries"], rows, text_columns=3)
+        if line["held_out_seeds"]:
+            variant = Variant(line["learner"], line["planning_steps"])
+            cells = [cell for name in FIGURES for cell in mean_and_iqm(line, f"held_out_{name}")]
+            names = [variant.label, line["delivery"], line["held_out_configuration"]]
+            rows.append([*names, *cells[:-1]])  # deliveries have no IQM
+    if rows:
+        names = ("Return", "Steps, all", f"Steps, {comparison.late}", "Deliveries")
+        headers = [f"{name}, {centre}" for name in names for centre in ("mean", "IQM")]
+        title = "The best by mean return on half of the seeds, reported on the other half"
+        notes = ["Intervals at 95 %: what choosing the best is worth without its luck."]
+        headers = ["Learner", "Delivery", "Configuration", *headers[:-1]]
+        blocks.append(Table(title, headers, rows, notes, text_columns=3))
+    return markdown(blocks)
