@@ -238,8 +238,8 @@ def write_tables(
 ) -> tuple[Any, ...]:
     """Write all tables and the report; what `report.print_report` needs to show it."""
     from taichi_ants import files
-    from taichi_ants.analysis.paper.audit import assess, claims_markdown, claims_rows
     from taichi_ants.analysis.paper import report, summary, table2
+    from taichi_ants.analysis.paper.audit import assess, claims_markdown, claims_rows
 
     lines = summary.summarise(comparison)
     files.write_csv(folder / "summary.csv", lines, summary.SUMMARY_COLUMNS)
@@ -432,8 +432,8 @@ def show_report(settings: argparse.Namespace, sweep: Sweep) -> None:
     from dataclasses import replace
 
     from taichi_ants import files
-    from taichi_ants.analysis.paper.audit import assess
     from taichi_ants.analysis.paper import report, table2
+    from taichi_ants.analysis.paper.audit import assess
     from taichi_ants.studies.result_folder import MANIFEST
 
     comparison, baselines = read_back(settings.out, sweep)

@@ -263,8 +263,7 @@ def _errorbar(
 
 def _draw_limit(axis: Axes, arena: Arena, each: bool) -> None:
     sizes = np.unique(np.geomspace(arena.sizes[0], arena.sizes[-1], 60).round().astype(int))
-    limits = [np.mean([limit.deliveries(int(n)) for limit in arena.limits]) for n in sizes]
-    values = np.array(limits) / (sizes if each else 1)
+    values = np.array([arena.limit(int(n)) for n in sizes]) / (sizes if each else 1)
     axis.plot(sizes, values, "--", color=GREY, linewidth=1.2, label="limit")
 
 

@@ -87,6 +87,11 @@ class Arena:
     long_factor: int
     limits: tuple[Limits, ...]
 
+    def limit(self, ants: int) -> float | None:
+        """The most that so many ants can deliver per 1000 ticks, mean over seeds, if known."""
+        each = [limit.deliveries(ants) for limit in self.limits]
+        return float(np.mean(each)) if each else None
+
 
 @dataclass(frozen=True)
 class Measure:
