@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from taichi_ants.analysis.bounds.discounted import solve_phase
 from taichi_ants.analysis.bounds.transitions import Phase, Transitions, build_transitions
 from taichi_ants.errors import AntsError, shown
 from taichi_ants.grid.constants import N_HEADINGS
@@ -31,6 +30,15 @@ _BACKUP_OVERHEAD = 1000
 _UNIT = 1 << 32
 # Below all scores of episodes that are possible.
 _NEVER = -(1 << 61)
+
+# Action values this close count as equal, since the same sums in another order differ by rounding:
+# relative to the value of the state, and, for sums that cancel to almost nothing, relative to the
+# largest value. So a goal of 10 that is discounted to less than about 1e-13 goes unnoticed, with a
+# discount factor of 0.9 after 300 steps.
+_RELATIVE_TOLERANCE = 1e-12
+_ABSOLUTE_TOLERANCE = 1e-14
+# The discount of what an evaluation may leave out of the sum without end.
+_NEGLIGIBLE = 1e-18
 
 
 @dataclass(frozen=True)
@@ -204,14 +212,61 @@ def _optimal(transitions: Transitions, discount: float, max_steps: int) -> Optim
     policies = []
     for food in range(transitions.n_foods):
         phase = transitions.carrying(food)
-        values, policy = solve_phase(phase, np.zeros(phase.exits.size), discount)
+        values, policy = _solve(phase, np.zeros(phase.exits.size), discount)
         ends, starts = transitions.pick_ups(food)
         sums[ends] += values[starts]
         policies.append(policy)
     choices = (transitions.foods_in_view >= 0).sum(axis=1)
-    values, policy = solve_phase(transitions.foraging, sums / choices, discount)
+    values, policy = _solve(transitions.foraging, sums / choices, discount)
     outcome = _follow(transitions, policy, policies, max_steps)
     return OptimalPolicy(float(discount), float(values[transitions.start]), outcome)
+
+
+def _solve(phase: Phase, end_values: np.ndarray, discount: float) -> tuple[np.ndarray, np.ndarray]:
+    """The optimal values and policy of one phase for a discounted return, by policy iteration.
+
+    Args:
+        phase: Its actions and rewards.
+        end_values: float64 (S,): the values of its ends, what follows the action that leads there.
+        discount: The discount factor, in [0, 1).
+
+    Returns:
+        float64 (6 n,): the largest discounted return from each state, and int8 (6 n,): the action
+        to take there, the lowest number among the optimal ones.
+    """
+    states = np.arange(phase.n_states)
+    policy = phase.rewards.argmax(axis=0)
+    while True:
+        values = _evaluate(phase, policy, end_values, discount)
+        backup = phase.rewards + discount * np.append(values, end_values)[phase.successors]
+        best = backup.max(axis=0)
+        tolerance = _RELATIVE_TOLERANCE * np.abs(best) + _ABSOLUTE_TOLERANCE * np.abs(best).max()
+        improvable = best > backup[policy, states] + tolerance
+        if not improvable.any():
+            return values, (backup >= best - tolerance).argmax(axis=0).astype(np.int8)
+        policy = np.where(improvable, backup.argmax(axis=0), policy)
+
+
+def _evaluate(
+    phase: Phase, policy: np.ndarray, end_values: np.ndarray, discount: float
+) -> np.ndarray:
+    """The discounted return of following a policy from each state, float64 (6 n,).
+
+    Exact, by doubling, as a phase is a deterministic graph: the sum of the first 2k rewards is that
+    of the first k, plus the discounted sum of k from where these lead.
+    """
+    states = np.arange(phase.n_states)
+    ends = phase.n_states + np.arange(phase.exits.size)
+    later = np.concatenate([phase.successors[policy, states], ends])
+    # The value of an end counts with the action that leads there; after that nothing follows.
+    known = np.append(np.zeros(states.size), end_values)
+    values = np.append(phase.rewards[policy, states] + discount * known[later[states]], 0 * ends)
+    factor = discount
+    while factor > _NEGLIGIBLE:
+        values = values + factor * values[later]
+        later = later[later]
+        factor *= factor
+    return values[states]
 
 
 def _follow(

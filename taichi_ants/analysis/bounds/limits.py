@@ -27,8 +27,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_ants.grid.constants import N_HEADINGS
-from taichi_ants.task.constants import EMPTY, FOOD, QUEEN
+from taichi_ants.analysis.bounds.transitions import look_around
+from taichi_ants.task.constants import EMPTY, QUEEN
+from taichi_ants.worlds.geometry import walkable
 from taichi_ants.worlds.world import World
 
 TICKS_A_CELL = 3
@@ -120,14 +121,7 @@ def queen_limit(world: World) -> float:
 
 def _reachable(world: World) -> np.ndarray:
     """bool (grid.size,): empty cells to which a way over empty cells leads from the queen."""
-    ground, offsets = world.ground(), world.grid.offsets
-    reached = np.zeros(ground.size, dtype=bool)
-    frontier = np.array([int(world.grid.index(world.queen))])
-    while len(frontier):
-        ahead = np.unique(frontier[:, None] + offsets)
-        frontier = ahead[(ground[ahead] == EMPTY) & ~reached[ahead]]
-        reached[frontier] = True
-    return reached
+    return walkable(world.grid, world.ground(), world.grid.index(world.queen) + world.grid.offsets)
 
 
 class _Walks:
@@ -144,40 +138,27 @@ class _Walks:
     def __init__(self, world: World, can_stay: bool) -> None:
         from scipy.sparse import coo_array
 
-        ground, offsets = world.ground(), world.grid.offsets.astype(np.int64)
-        cells = np.flatnonzero(ground == EMPTY)
-        self._number = np.full(ground.size, -1)
-        self._number[cells] = np.arange(len(cells))
-        self._cells = n = len(cells)
-        around = cells + offsets[:, None]  # (6, n)
-        is_free, sees = ground[around] == EMPTY, {}
-        for name, code in (("food", FOOD), ("queen", QUEEN)):
-            near = ground[around] == code
-            sees[name] = near | np.roll(near, 1, axis=0) | np.roll(near, -1, axis=0)
-        heading, cell = np.indices((N_HEADINGS, n))
-        edges = []
-        for turn in (-1, 0, 1):
-            towards = (heading + turn) % N_HEADINGS
-            free = is_free[towards, cell]
-            ahead = np.where(free, self._number[around[towards, cell]], cell)
-            edges.append((heading * n + cell, towards * n + ahead))
-            if can_stay:
-                edges.append(((heading * n + cell)[free], (towards * n + cell)[free]))
-        walks = [np.stack([np.ravel(a), np.ravel(b)]) for a, b in edges]
-        half = N_HEADINGS * n
-        picks = np.flatnonzero(sees["food"])
-        turned = (picks // n + 3) % N_HEADINGS * n + picks % n
+        around = look_around(world)
+        self._cells, self._half = around.cells, around.n_states
+        moves = [around.moves(around.empty)]
+        if can_stay:
+            moves.append(around.moves(np.zeros_like(around.empty)))
+        states = np.arange(self._half)
+        walks = [np.stack([states, move]) for move in np.concatenate(moves)]
+        picks = around.sees(around.food)
+        pick_ups = np.stack([picks, around.turned_round(picks) + self._half])
         rows, columns = np.concatenate(
-            [*walks, *[walk + half for walk in walks], np.stack([picks, turned + half])], axis=1
+            [*walks, *[walk + self._half for walk in walks], pick_ups], axis=1
         )
-        ones = np.ones(len(rows), np.int8)
-        self._graph = coo_array((ones, (rows, columns)), shape=(2 * half, 2 * half)).tocsr()
-        self._half = half
-        self._gives = np.flatnonzero(sees["queen"])  # where a carrying ant can give
+        ones, size = np.ones(len(rows), np.int8), 2 * self._half
+        self._graph = coo_array((ones, (rows, columns)), shape=(size, size)).tocsr()
+        # Where a carrying ant can give; no ant comes to a cell that holds food.
+        gives = around.sees(around.queen)
+        self._gives = gives[world.ground()[self._cells[gives % len(self._cells)]] == EMPTY]
 
     def first_delivery(self, cell: int, heading: int) -> float:
         """Ticks to a delivery of an ant that starts on a cell (flat index) without food."""
-        start = heading * self._cells + int(self._number[cell])
+        start = heading * len(self._cells) + int(np.searchsorted(self._cells, cell))
         for horizon in self._horizons():
             ticks = self._to_deliveries([start], horizon).min(initial=np.inf)
             if np.isfinite(ticks):

@@ -19,6 +19,7 @@ import numpy as np
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import rewards as reward_table
 from taichi_ants.task.constants import EMPTY, FOOD, GIVE, N_ACTIONS, PICK_UP, QUEEN
+from taichi_ants.worlds.geometry import walkable
 from taichi_ants.worlds.world import World
 
 
@@ -77,18 +78,17 @@ class Transitions:
     after_pick_up: np.ndarray
     foods_in_view: np.ndarray
     n_foods: int
-    _surroundings: _Surroundings
+    _around: Surroundings
     _food_cells: np.ndarray
 
     def carrying(self, food: int) -> Phase:
         """The phase from the pick-up of a food, which leaves its cell empty, to the delivery."""
-        around = self._surroundings
+        around = self._around
         can_enter = around.empty | (around.neighbours == self._food_cells[food])
         paid = reward_table.REWARDS
         lure = np.where(around.nearer, paid.lure, paid.empty)
-        rewards = _by_move(np.where(can_enter, lure, paid.failed))
-        exits = np.flatnonzero(_by_move(around.queen).any(axis=0))
-        return _phase(around.neighbours, can_enter, rewards, GIVE, exits, paid.give)
+        rewards = by_move(np.where(can_enter, lure, paid.failed))
+        return _phase(around, can_enter, rewards, GIVE, around.sees(around.queen), paid.give)
 
     def pick_ups(self, food: int) -> tuple[np.ndarray, np.ndarray]:
         """The ends of `foraging` that can take a food, and the states in which it is carried."""
@@ -97,16 +97,18 @@ class Transitions:
 
 
 @dataclass(frozen=True)
-class _Surroundings:
-    """What lies at each heading of each cell on which an ant can ever stand; arrays (6, n).
+class Surroundings:
+    """What lies at each heading of each cell on which an ant can ever stand.
 
     Attributes:
-        neighbours: int32: the number of the neighbour, -1 if no ant can ever stand there.
-        empty, food, queen: bool: what it holds at the start.
-        nearer: bool: whether it is nearer to the queen than the cell itself.
-        trail: int32: its trail level at the start.
+        cells: int64 (n,): their flat indices.
+        neighbours: int32 (6, n): the number of the neighbour, -1 if no ant can ever stand there.
+        empty, food, queen: bool (6, n): what it holds at the start.
+        nearer: bool (6, n): whether it is nearer to the queen than the cell itself.
+        trail: int32 (6, n): its trail level at the start.
     """
 
+    cells: np.ndarray
     neighbours: np.ndarray
     empty: np.ndarray
     food: np.ndarray
@@ -114,46 +116,40 @@ class _Surroundings:
     nearer: np.ndarray
     trail: np.ndarray
 
+    @property
+    def n_states(self) -> int:
+        """Number of states (heading, cell)."""
+        return self.neighbours.size
 
-def build_transitions(world: World) -> Transitions:
-    """The tables of a world, for one ant that starts where `world.start(seed=0)` places it."""
+    def moves(self, can_enter: np.ndarray) -> np.ndarray:
+        """int32 (3, 6 n): where the moves lead if these neighbours, bool (6, n), can be entered.
+
+        An ant that is blocked turns without moving.
+        """
+        turned = np.arange(self.n_states, dtype=np.int32).reshape(N_HEADINGS, -1)
+        moved = np.where(can_enter, self.neighbours + turned[:, :1], turned)
+        return by_move(moved).reshape(3, -1)
+
+    def sees(self, what: np.ndarray) -> np.ndarray:
+        """int64 (S,): the states in which some cell in view is of a kind, bool (6, n)."""
+        return np.flatnonzero(by_move(what).any(axis=0))
+
+    def turned_round(self, states: np.ndarray) -> np.ndarray:
+        """The same states with the opposite heading, as after a pick-up."""
+        return (states + 3 * len(self.cells)) % self.n_states
+
+
+def look_around(world: World) -> Surroundings:
+    """The surroundings of all cells that are empty or hold food."""
     ground = world.ground()
     cells = np.flatnonzero((ground == EMPTY) | (ground == FOOD))
-    around = _look_around(world, ground, cells)
-    start_cells, start_headings = world.start(seed=0)
-    start_cell = int(np.searchsorted(cells, start_cells[0]))
-
-    seen = _by_move(around.food & _reachable(around, start_cell)).reshape(3, -1)
-    seen_cells = _by_move(around.neighbours).reshape(3, -1)
-    exits = np.flatnonzero(seen.any(axis=0))
-    food_cells = np.unique(seen_cells[seen])
-    foods_in_view = np.where(seen, np.searchsorted(food_cells, seen_cells), -1)[:, exits].T
-    heading, cell = np.divmod(exits, len(cells))
-    return Transitions(
-        start=int(start_headings[0]) * len(cells) + start_cell,
-        foraging=_phase(
-            around.neighbours,
-            around.empty,
-            _foraging_rewards(around),
-            PICK_UP,
-            exits,
-            reward_table.REWARDS.pick_up,
-        ),
-        after_pick_up=(heading + 3) % N_HEADINGS * len(cells) + cell,
-        foods_in_view=foods_in_view,
-        n_foods=len(food_cells),
-        _surroundings=around,
-        _food_cells=food_cells,
-    )
-
-
-def _look_around(world: World, ground: np.ndarray, cells: np.ndarray) -> _Surroundings:
     number = np.full(ground.size, -1, np.int32)
     number[cells] = np.arange(len(cells), dtype=np.int32)
     # An ant's cell exists, so its neighbours lie at worst on the border of void cells.
     index = cells + world.grid.offsets[:, None].astype(np.int64)
     heading_bits = np.arange(N_HEADINGS)[:, None]
-    return _Surroundings(
+    return Surroundings(
+        cells=cells,
         neighbours=number[index],
         empty=ground[index] == EMPTY,
         food=ground[index] == FOOD,
@@ -163,54 +159,66 @@ def _look_around(world: World, ground: np.ndarray, cells: np.ndarray) -> _Surrou
     )
 
 
+def by_move(ahead: np.ndarray) -> np.ndarray:
+    """From (6, n), by the direction of a neighbour, to (3, 6, n), by move and heading."""
+    return np.stack([np.roll(ahead, turn, axis=0) for turn in (1, 0, -1)])
+
+
+def build_transitions(world: World) -> Transitions:
+    """The tables of a world, for one ant that starts where `world.start(seed=0)` places it."""
+    around = look_around(world)
+    start_cells, start_headings = world.start(seed=0)
+    start_cell = int(np.searchsorted(around.cells, start_cells[0]))
+    reached = walkable(world.grid, world.ground(), start_cells)[around.cells]
+    food_in_reach = around.food & reached
+    exits = around.sees(food_in_reach)
+    seen = by_move(food_in_reach).reshape(3, -1)
+    seen_cells = by_move(around.neighbours).reshape(3, -1)
+    food_cells = np.unique(seen_cells[seen])
+    foods_in_view = np.where(seen, np.searchsorted(food_cells, seen_cells), -1)[:, exits].T
+    paid = reward_table.REWARDS
+    return Transitions(
+        start=int(start_headings[0]) * len(around.cells) + start_cell,
+        foraging=_phase(
+            around, around.empty, _foraging_rewards(around), PICK_UP, exits, paid.pick_up
+        ),
+        after_pick_up=around.turned_round(exits),
+        foods_in_view=foods_in_view,
+        n_foods=len(food_cells),
+        _around=around,
+        _food_cells=food_cells,
+    )
+
+
 def _phase(
-    neighbours: np.ndarray,
+    around: Surroundings,
     can_enter: np.ndarray,
     move_rewards: np.ndarray,
     exit_action: int,
     exits: np.ndarray,
     exit_reward: int,
 ) -> Phase:
-    """Put a phase together from what a move to each neighbour (6, n) does.
+    """A phase in which these neighbours can be entered; moves towards them pay (3, 6, n).
 
-    An ant that is blocked turns without moving; a pick-up or give that fails changes nothing.
+    A pick-up or give that fails changes nothing.
     """
-    n = neighbours.shape[1]
-    states = np.arange(N_HEADINGS * n, dtype=np.int32)
-    turned = states.reshape(N_HEADINGS, n)
-    moved = np.where(can_enter, neighbours + turned[:, :1], turned)
-    successors = np.empty((N_ACTIONS, states.size), np.int32)
-    successors[:3] = _by_move(moved).reshape(3, -1)
-    successors[[PICK_UP, GIVE]] = states
-    successors[exit_action, exits] = states.size + np.arange(exits.size)
+    n_states = around.n_states
+    successors = np.empty((N_ACTIONS, n_states), np.int32)
+    successors[:3] = around.moves(can_enter)
+    successors[[PICK_UP, GIVE]] = np.arange(n_states)
+    successors[exit_action, exits] = n_states + np.arange(exits.size)
     paid = reward_table.REWARDS
-    rewards = np.full((N_ACTIONS, states.size), paid.failed, np.int64)
+    rewards = np.full((N_ACTIONS, n_states), paid.failed, np.int64)
     rewards[:3] = move_rewards.reshape(3, -1)
     rewards[exit_action, exits] = exit_reward
     return Phase(successors, rewards, exits, exit_reward, paid.failed)
 
 
-def _by_move(ahead: np.ndarray) -> np.ndarray:
-    """From (6, n), by the direction of a neighbour, to (3, 6, n), by move and heading."""
-    return np.stack([np.roll(ahead, turn, axis=0) for turn in (1, 0, -1)])
-
-
-def _foraging_rewards(around: _Surroundings) -> np.ndarray:
+def _foraging_rewards(around: Surroundings) -> np.ndarray:
     """Rewards of the moves, (3, 6, n), of an ant without food."""
     # Only empty cells show a trail. 64 bits, because twice the greatest level needs them.
-    levels = _by_move(np.where(around.empty, around.trail, 0).astype(np.int64))
+    levels = by_move(np.where(around.empty, around.trail, 0).astype(np.int64))
     is_trail = (levels >= 1) & (2 * levels >= levels.max(axis=0))
     paid = reward_table.REWARDS
     rewards = np.where(is_trail, paid.lure, paid.empty)
-    return np.where(_by_move(around.empty), rewards, paid.failed)
-
-
-def _reachable(around: _Surroundings, start: int) -> np.ndarray:
-    """bool (n,): the cells that an ant without food can reach over empty cells."""
-    reached = np.zeros(around.empty.shape[1], bool)
-    frontier = np.array([start])
-    while frontier.size:
-        reached[frontier] = True
-        ahead = around.neighbours[:, frontier][around.empty[:, frontier]]
-        frontier = np.unique(ahead[~reached[ahead]])
-    return reached
+    return np.where(by_move(around.empty), rewards, paid.failed)
