@@ -6,20 +6,18 @@ import math
 
 import numpy as np
 import pytest
-from synthetic_comparison import build, unchanged
 
-from taichi_ants.analysis.claims import (
+from taichi_ants.analysis.findings import (
+    UNBOUNDED,
     Above,
-    Claim,
     Contrast,
     Finding,
-    NotTestedError,
-    Slice,
     Verdict,
     Within,
-    assess,
+    judge,
+    tally,
+    weakest,
 )
-from taichi_ants.analysis.paper.published import FIGURE_1, Q_LEARNING, SARSA
 
 SUPPORTED, CONTRADICTED = Verdict.SUPPORTED, Verdict.CONTRADICTED
 EQUIVALENT, UNDECIDED = Verdict.EQUIVALENT, Verdict.UNDECIDED
@@ -91,23 +89,25 @@ def test_criteria_say_what_they_are() -> None:
 def verdict_of(
     effects: dict[str, list[float]], criterion: Above | Within
 ) -> tuple[Verdict, str, float]:
-    """Verdict, contrast shown and its effect, of a claim with these effects of 20 seeds."""
+    """Verdict, contrast shown and its effect, of contrasts with these values of 20 seeds."""
     finding = finding_of(effects, criterion)
-    return finding.verdict, finding.contrast, finding.effect
+    return finding.verdict, finding.contrast.label, finding.effect
 
 
 def finding_of(
-    effects: dict[str, list[float]], criterion: Above | Within, **options: tuple[float, float]
+    effects: dict[str, list[float]],
+    criterion: Above | Within,
+    possible: tuple[float, float] = UNBOUNDED,
 ) -> Finding:
-
-    def contrast(label: str, values: list[float]) -> Contrast:
-        return Contrast(label, lambda part: np.resize(values, 20))
-
-    contrasts = tuple(contrast(label, values) for label, values in effects.items())
-    claim = Claim("made-up", "0", "A claim.", "a number", "reward", criterion, contrasts, **options)
-    comparison = build({"continuing": unchanged}, seeds=20, variants=[SARSA], grid=[FIGURE_1])
-    (finding,) = assess(comparison, [claim])
-    return finding
+    typical = possible == UNBOUNDED
+    return weakest(
+        judge(
+            [
+                Contrast(label, np.resize(values, 20), criterion, typical, possible)
+                for label, values in effects.items()
+            ]
+        )
+    )
 
 
 HIGH, LOW, WIDE = [4.0, 6.0], [-6.0, -4.0], [-50.0, 60.0]
@@ -154,51 +154,55 @@ def test_a_statistic_of_centres_is_that_of_typical_runs() -> None:
     random = np.random.default_rng(0)
     rows = random.normal(0, 0.1, size=(2, 40)) + np.array([[0.0], [3.0]])
     rows[0, 7] = 900.0
-    contrast = Contrast("spread", lambda part: rows, lambda centres: centres[1] - centres[0])
-    assert contrast.values(None, typical=True).mean() == pytest.approx(3.0, abs=0.1)
-    assert contrast.values(None, typical=False).mean() == pytest.approx(3 - 900 / 40, abs=0.1)
+    contrast = Contrast("spread", rows, Above(1.0), True, of_centres=lambda c: c[1] - c[0])
+    (finding,) = judge([contrast])
+    assert finding.effect == pytest.approx(3.0, abs=0.1)
+    assert finding.by_mean.effect == pytest.approx(3 - 900 / 40, abs=0.1)
 
 
-def test_a_slice_reads_the_rows_it_is_asked_for() -> None:
-    comparison = build({"absorbing": unchanged, "continuing": unchanged}, seeds=4)
-    part = Slice(comparison, "absorbing")
-    values = part.figure1("return_last50", SARSA)
-    position = comparison.position("absorbing", SARSA, FIGURE_1)
-    np.testing.assert_array_equal(values, comparison.measure("return_last50")[position])
-    assert part.used == {position}
-    grid = part.grid("steps_all", Q_LEARNING)
-    assert grid.shape == (2, 2, 2, 2, 4)
-    # Learning rate 0.01, discount 0.9, epsilon 0.5, decay 0.99.
-    row = next(
-        number
-        for number, row in enumerate(comparison.rows)
-        if row.variant == Q_LEARNING
-        and row.hyperparameters == (0.01, 0.9, 0.5, 0.99)
-        and row.delivery == "absorbing"
+def test_more_contrasts_at_once_need_wider_intervals() -> None:
+    values = np.random.default_rng(0).normal(1, 1, 20)
+    contrast = Contrast("a", values, Above())
+    (one,), many = judge([contrast]), judge([contrast] * 50)
+    assert one.level == 0.95
+    assert many[0].level == pytest.approx(1 - 0.05 / 50)
+    assert one.low > many[0].low
+    assert one.high < many[0].high
+    assert one.effect == many[0].effect == pytest.approx(values.mean())
+    assert judge([]) == []
+
+
+def test_both_readings_of_a_typical_contrast_count_for_the_level() -> None:
+    values = np.random.default_rng(0).normal(1, 1, 20)
+    (finding,) = judge([Contrast("a", values, Above(), typical=True)])
+    assert finding.level == finding.by_mean.level == pytest.approx(1 - 0.05 / 2)
+
+
+def test_contrasts_of_different_numbers_of_seeds_are_judged_together_in_their_order() -> None:
+    random = np.random.default_rng(0)
+    contrasts = [Contrast(str(n), random.normal(n, 1, n), Above()) for n in (9, 30, 9, 5)]
+    together = judge(contrasts)
+    assert [finding.contrast for finding in together] == contrasts
+    for finding, contrast in zip(together, contrasts, strict=True):
+        assert finding.effect == pytest.approx(contrast.values.mean())
+        assert finding.contrast.seeds == len(contrast.values)
+
+
+def test_one_seed_decides_nothing() -> None:
+    for criterion in (Above(), Within(0.0, 10.0)):
+        (finding,) = judge([Contrast("a", np.array([5.0]), criterion)])
+        assert (finding.verdict, finding.effect) == (UNDECIDED, 5.0)
+        assert np.isnan(finding.low)
+
+
+def test_rounding_errors_are_no_effect() -> None:
+    values = 0.1 + 0.2 - 0.3 + np.array([-1.0, 1.0] * 10)
+    (finding,) = judge([Contrast("a", values, Above())])
+    assert finding.effect == 0.0
+
+
+def test_verdicts_are_counted() -> None:
+    assert tally([UNDECIDED, SUPPORTED, SUPPORTED]) == "2 supported, 1 undecided"
+    assert tally(Verdict) == (
+        "1 supported, 1 contradicted, 1 equivalent, 1 undecided, 1 not tested"
     )
-    np.testing.assert_array_equal(grid[1, 0, 1, 0], comparison.measure("steps_all")[row])
-    pairs = part.pairs("steps_all", Q_LEARNING, "epsilon")
-    assert pairs.shape == (8, 4)
-    np.testing.assert_allclose(
-        pairs.mean(axis=0), grid[:, :, 1].mean(axis=(0, 1, 2)) - grid[:, :, 0].mean(axis=(0, 1, 2))
-    )
-    assert len(part.used) == 17
-
-
-def test_a_slice_says_what_is_missing() -> None:
-    comparison = build({"continuing": unchanged}, variants=[SARSA], grid=[FIGURE_1])
-    with pytest.raises(NotTestedError, match=r"no SARSA at 0\.01"):
-        Slice(comparison, "absorbing").figure1("return_last50", SARSA)
-    with pytest.raises(NotTestedError, match="15 of the paper's 16 configurations of SARSA"):
-        Slice(comparison, "continuing").mean("return_last50", SARSA)
-
-
-def test_the_held_out_half_does_not_choose() -> None:
-    """The configuration that shines on odd seeds only is not chosen for them."""
-    comparison = build({"continuing": unchanged}, seeds=6, variants=[SARSA], noise=0.0, shared=0.0)
-    comparison.returns[...] = 10
-    comparison.returns[3, ::2] = 20  # best on the seeds that choose, poor on the others
-    comparison.returns[3, 1::2] = 0
-    comparison.returns[5, 1::2] = 99
-    values = Slice(comparison, "continuing").held_out("return_last50", SARSA)
-    assert values.tolist() == [0.0, 0.0, 0.0]

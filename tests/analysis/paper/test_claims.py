@@ -8,15 +8,9 @@ import numpy as np
 import pytest
 from synthetic_comparison import Edit, build, change, level_truth, subset, unchanged
 
-from taichi_ants.analysis.claims import (
-    CLAIMS,
-    SIMULTANEOUS_LEVEL,
-    Above,
-    Verdict,
-    assess,
-    claims_markdown,
-    claims_rows,
-)
+from taichi_ants.analysis.findings import SIMULTANEOUS_LEVEL, UNBOUNDED, Above, Verdict
+from taichi_ants.analysis.paper.audit import assess, claims_markdown, claims_rows
+from taichi_ants.analysis.paper.claims import CLAIMS
 from taichi_ants.analysis.paper.comparison import Hyperparameters, Variant
 from taichi_ants.analysis.paper.published import DYNA_P3, DYNA_P5, FIGURE_1, Q_LEARNING, SARSA
 
@@ -155,7 +149,7 @@ def test_where_nothing_differs_no_difference_is_claimed(seeds: int) -> None:
 def test_one_seed_tests_nothing() -> None:
     findings = assess(build({"continuing": unchanged}, seeds=1))
     assert {finding.verdict for finding in findings} == {Verdict.NOT_TESTED}
-    reasons = {finding.note for finding in findings}
+    reasons = {finding.reason for finding in findings}
     assert reasons == {"one seed gives no interval", "needs a second seed"}
     text = claims_markdown(findings)
     assert "No claim could be tested here." in text
@@ -164,16 +158,18 @@ def test_one_seed_tests_nothing() -> None:
 
 def test_two_seeds_have_no_halves_to_compare() -> None:
     findings = assess(build({"continuing": unchanged}, seeds=2))
-    reasons = {f.note for f in findings if f.verdict is Verdict.NOT_TESTED}
+    reasons = {f.reason for f in findings if f.verdict is Verdict.NOT_TESTED}
     assert reasons == {"one seed in each half gives no interval"}
 
 
 def test_missing_configurations_are_named_and_the_rest_is_tested() -> None:
     comparison = build({"continuing": unchanged}, variants=[Q_LEARNING, SARSA], grid=[FIGURE_1])
     by_id = {finding.claim.id: finding for finding in assess(comparison)}
-    assert by_id["q-return-highest"].note == "no Q-learning at 0.001 / 0.99 / 0.3 / 0.99"
-    assert by_id["curves-early-variance"].note == "no Dyna-Q (p3) at 0.01 / 0.9 / 0.3 / 0.995"
-    assert by_id["discount-q"].note == ("15 of the paper's 16 configurations of Q-learning missing")
+    assert by_id["q-return-highest"].reason == "no Q-learning at 0.001 / 0.99 / 0.3 / 0.99"
+    assert by_id["curves-early-variance"].reason == "no Dyna-Q (p3) at 0.01 / 0.9 / 0.3 / 0.995"
+    assert by_id["discount-q"].reason == (
+        "15 of the paper's 16 configurations of Q-learning missing"
+    )
     assert {finding.verdict for finding in by_id.values()} == {Verdict.NOT_TESTED}
     pair = build({"absorbing": unchanged}, variants=[Q_LEARNING, SARSA])
     tested = {f.claim.id for f in assess(pair) if f.verdict is not Verdict.NOT_TESTED}
@@ -195,10 +191,10 @@ def test_short_training_and_no_rollouts_leave_out_only_what_needs_them() -> None
         "overall-improvement-reliable",
         *(name for name in by_id if name.startswith("greedy")),
     }
-    assert by_id["greedy-return"].note == (
+    assert by_id["greedy-return"].reason == (
         "mean return of the greedy rollouts needs greedy rollouts, there are none"
     )
-    assert by_id["curves-sarsa-falls-fastest"].note.endswith(
+    assert by_id["curves-sarsa-falls-fastest"].reason.endswith(
         "needs at least 100 episodes, there are 60"
     )
 
@@ -221,7 +217,7 @@ def test_the_order_of_rows_does_not_matter() -> None:
     shuffled = subset(comparison, order, len(comparison.seeds), comparison.episodes)
     for one, other in zip(assess(comparison), assess(shuffled), strict=True):
         assert one.verdict is other.verdict
-        assert one.effect == pytest.approx(other.effect)
+        assert one.finding.effect == pytest.approx(other.finding.effect)
         assert one.configurations == other.configurations
 
 
@@ -234,7 +230,7 @@ def test_seeds_pair_the_rows() -> None:
     rows = [n for n, row in enumerate(unpaired.rows) if row.variant == SARSA]
     unpaired.returns[rows] = unpaired.returns[rows][:, ::-1]
     (blurred,) = assess(unpaired, [BY_ID["sarsa-return-slightly-lower"]])
-    assert blurred.by_mean.effect == pytest.approx(paired.by_mean.effect)
+    assert blurred.finding.by_mean.effect == pytest.approx(paired.finding.by_mean.effect)
     assert blurred.verdict is Verdict.UNDECIDED
 
 
@@ -242,18 +238,18 @@ def test_a_finding_shows_the_weakest_contrast_and_what_it_rests_on() -> None:
     comparison = build({"continuing": unchanged, "absorbing": P3_HIGH})
     true, false = assess(comparison, [BY_ID["q-return-highest"]])
     # Returns at the configurations of table 2: 52, SARSA 43, p3 45, p5 48.6.
-    assert true.contrast == "Q-learning minus Dyna-Q (p5)"
-    assert true.effect == pytest.approx(3.4, abs=0.2)
-    assert false.contrast == "Q-learning minus Dyna-Q (p3)"
-    assert false.effect == pytest.approx(-13, abs=0.2)
-    assert (true.seeds, true.configurations) == (16, 4)
-    assert true.low < true.effect < true.high
+    assert true.finding.contrast.label == "Q-learning minus Dyna-Q (p5)"
+    assert true.finding.effect == pytest.approx(3.4, abs=0.2)
+    assert false.finding.contrast.label == "Q-learning minus Dyna-Q (p3)"
+    assert false.finding.effect == pytest.approx(-13, abs=0.2)
+    assert (true.finding.contrast.seeds, true.configurations) == (16, 4)
+    assert true.finding.low < true.finding.effect < true.finding.high
     (peak,) = assess(build({"absorbing": unchanged}), [BY_ID["dyna-below-q-peak"]])
-    assert (peak.seeds, peak.configurations) == (8, 48)
+    assert (peak.finding.contrast.seeds, peak.configurations) == (8, 48)
 
 
 def test_contrasts_name_what_they_subtract() -> None:
-    labels = {claim.id: [contrast.label for contrast in claim.contrasts] for claim in CLAIMS}
+    labels = {claim.id: list(claim.quantity.effects) for claim in CLAIMS}
     assert labels["rate-q-small-best"] == ["Q-learning, 0.001 minus 0.01"]
     assert labels["discount-q"] == ["Q-learning, 0.99 minus 0.9"]
     assert labels["epsilon-q-moderate"] == [
@@ -268,20 +264,20 @@ def test_levels_are_corrected_for_all_intervals_of_all_tested_claims() -> None:
     claims = [BY_ID["q-return-highest"], BY_ID["discount-q"], BY_ID["greedy-return"]]
     comparison = build({"continuing": unchanged, "absorbing": unchanged})
     intervals = 2 * (3 + 1 + 4)  # of the typical run and of the mean
-    for finding in assess(comparison, claims):
-        assert finding.level == pytest.approx(1 - (1 - SIMULTANEOUS_LEVEL) / (2 * intervals))
+    for one in assess(comparison, claims):
+        assert one.finding.level == pytest.approx(1 - (1 - SIMULTANEOUS_LEVEL) / (2 * intervals))
     without = build({"continuing": unchanged, "absorbing": unchanged}, rollouts=0)
-    for finding in assess(without, claims[:2]):
-        assert finding.level == pytest.approx(1 - (1 - SIMULTANEOUS_LEVEL) / (2 * 2 * 4))
+    for one in assess(without, claims[:2]):
+        assert one.finding.level == pytest.approx(1 - (1 - SIMULTANEOUS_LEVEL) / (2 * 2 * 4))
     shares = assess(without, [BY_ID["overall-improvement-reliable"]])
-    assert shares[0].level == pytest.approx(1 - (1 - SIMULTANEOUS_LEVEL) / (2 * 4))
+    assert shares[0].finding.level == pytest.approx(1 - (1 - SIMULTANEOUS_LEVEL) / (2 * 4))
 
 
 def test_in_another_world_nothing_is_tested_for_one_reason() -> None:
     garden = replace(build({"continuing": unchanged, "absorbing": unchanged}), world="garden.txt")
     findings = assess(garden)
     assert {finding.verdict for finding in findings} == {Verdict.NOT_TESTED}
-    assert {finding.note for finding in findings} == {"the claims are about the paper's world"}
+    assert {finding.reason for finding in findings} == {"the claims are about the paper's world"}
     assert claims_markdown(findings, "garden.txt").startswith("World: garden.txt.\n")
 
 
@@ -290,20 +286,21 @@ def test_intervals_of_shares_end_where_shares_do() -> None:
     comparison.greedy_returns[:, 0, 0] += 1  # one seed's rollouts differ
     limits = {"share": (0, 1), "correlation": (-1, 1), "deliveries": (-1, 1)}
     cut = 0
-    for finding in assess(comparison):
-        bounds = limits.get(finding.claim.unit.split()[0])
+    for audited in assess(comparison):
+        quantity, finding = audited.claim.quantity, audited.finding
+        bounds = limits.get(quantity.unit.split()[0])
         if bounds is None:
-            assert finding.claim.possible == (-np.inf, np.inf)
+            assert quantity.possible == UNBOUNDED
             continue
         assert bounds[0] <= finding.low <= finding.effect <= finding.high <= bounds[1]
         cut += finding.low in bounds or finding.high in bounds
-        differs = " minus " in finding.contrast or finding.claim.unit == "correlation"
-        assert finding.claim.possible == ((-1, 1) if differs else (0, 1))
+        differs = " minus " in finding.contrast.label or quantity.unit == "correlation"
+        assert quantity.possible == ((-1, 1) if differs else (0, 1))
     assert cut >= 3
 
 
 def test_findings_say_which_configurations_they_rest_on() -> None:
-    scopes = {f.claim.id: f.scope for f in assess(build({"continuing": unchanged}))}
+    scopes = {claim.id: claim.quantity.scope for claim in CLAIMS}
     assert scopes["q-return-highest"] == "table 2 configurations"
     assert scopes["curves-sarsa-stable"] == "figure 1 configuration"
     assert scopes["overall-q-return"] == scopes["discount-q"] == "all 16"
@@ -319,17 +316,32 @@ def test_the_tables_hold_the_findings() -> None:
     assert [row["verdict"] for row in rows] == [finding.verdict.value for finding in findings]
     assert rows[0]["claim"] == "q-return-highest"
     assert rows[0]["criterion"] == "above 0, margin 1"
-    assert rows[0]["effect"] == findings[0].effect
+    assert rows[0]["effect"] == findings[0].finding.effect
     assert (rows[0]["centre"], rows[0]["mean_effect"]) == (
         "interquartile mean",
-        findings[0].by_mean.effect,
+        findings[0].finding.by_mean.effect,
     )
     share = rows[[claim.id for claim in CLAIMS].index("deliveries-about-one") * 2]
     assert (share["centre"], share["mean_verdict"]) == ("mean", "")
     text = claims_markdown(findings)
-    assert all(text.count(f"**{claim.id}**") == 1 for claim in CLAIMS)
+    assert all(text.count(f"| {claim.id} |") == 1 for claim in CLAIMS)
     line = next(line for line in text.splitlines() if line.startswith("| q-return-highest"))
     cells = [cell.strip() for cell in line.strip("|").split("|")]
-    assert cells[4].startswith("**supported")
-    assert cells[5].startswith("**contradicted**")
+    assert cells[4] == "interquartile mean above 0, margin 1 reward"
+    assert cells[5].startswith("**supported")
+    assert cells[6].startswith("**contradicted**")
     assert "not tested (mean return of the greedy rollouts needs greedy rollouts" in text
+
+
+def test_quantities_say_what_is_computed() -> None:
+    by_id = {claim.id: claim.tested_on for claim in CLAIMS}
+    assert by_id["sarsa-much-shorter"] == (
+        "mean length of all episodes, at the learner's configuration in the paper's table 2: "
+        "Q-learning minus SARSA; the configurations differ in more than the learner"
+    )
+    assert by_id["rate-q-small-best"] == (
+        "mean return of the last 50 episodes, learning rate 0.001 minus 0.01, mean over 8 pairs of "
+        "configurations: Q-learning, 0.001 minus 0.01"
+    )
+    for claim in CLAIMS:
+        assert all(label in claim.tested_on for label in claim.quantity.effects), claim.id

@@ -12,13 +12,14 @@ from synthetic_comparison import build, change, subset, unchanged
 
 from taichi_ants.analysis.behaviour import CIRCLES, OTHER, WALKS
 from taichi_ants.analysis.bounds.baselines import TRAINING_SETTING
-from taichi_ants.analysis.claims import CLAIMS, Verdict, assess
+from taichi_ants.analysis.findings import Verdict
+from taichi_ants.analysis.paper.audit import assess
 from taichi_ants.analysis.paper.best_of import paper_position
+from taichi_ants.analysis.paper.claims import CLAIMS
 from taichi_ants.analysis.paper.comparison import PAPER_WORLD, Comparison, Variant
 from taichi_ants.analysis.paper.published import DYNA_P5, FIGURE_1, SARSA
 from taichi_ants.analysis.paper.report import WIDTH, print_report, render
 from taichi_ants.analysis.paper.table2 import table2
-from taichi_ants.analysis.tables import count, interval, number, table
 
 BASELINES = [
     {
@@ -68,13 +69,21 @@ def test_table_2_stands_beside_the_papers(text: str, comparison: Comparison) -> 
         for line in table2(comparison, 500)
         if line["learner"] == "sarsa" and line["delivery"] == "continuing"
     )
-    cells = row(text, "SARSA", after="Table 2, continuing")
-    centres = [f"{line[f'same_return_{centre}']:.1f}" for centre in ("mean", "iqm")]
-    assert cells[:4] == ["SARSA", "47.3", *centres]
-    steps = row(text, "SARSA", after="Table 2, continuing delivery: steps")
-    names = ("steps_all_mean", "steps_all_iqm", "steps_last50_mean", "steps_last50_iqm")
-    assert steps == ["SARSA", "73.0", *(f"{line[f'same_{name}']:.1f}" for name in names)]
-    assert row(text, "Dyna-Q (p5)", after="Table 2, absorbing")[3] == "248"
+    for name, table, paper in (
+        ("return", "return", "47.3"),
+        ("steps_all", "steps, all", "73.0"),
+        ("steps_last50", "steps, last 50", "73.0"),
+    ):
+        centres = [f"{line[f'same_{name}_{centre}']:.1f}" for centre in ("mean", "iqm")]
+        cells = row(text, "SARSA", after=f"Table 2: {table}")
+        assert [cell for cell in cells if cell != "!"][:5] == [
+            *("SARSA", "continuing", paper, *centres),
+        ]
+    deliveries = row(text, "SARSA", after="Table 2: deliveries")
+    assert deliveries[2:5] == ["1.00", "1.00", "-"]
+    absorbing = text[text.index("Table 2: return") :].splitlines()
+    last = next(line for line in absorbing if "Dyna-Q (p5) absorbing" in line)
+    assert last.split()[3:5] == ["49.0", "248"]
     words = " ".join(text.split())
     assert "IQM: interquartile mean, of the middle half of the runs" in words
     assert "the paper leaves open whether it means all episodes or the last 50; ours come" in words
@@ -87,8 +96,8 @@ def test_means_that_far_runs_have_moved_are_marked() -> None:
     comparison.greedy_steps[position, 5] = 600
     text = render(comparison, table2(comparison, 50), [])
     cells = row(text, "SARSA", after="Table 2")
-    assert cells[3] == "!"
-    assert float(cells[4]) < 45 < 90 < float(cells[2])
+    assert cells[4] == "!"
+    assert float(cells[5]) < 45 < 90 < float(cells[3])
     greedy = row(text, "SARSA", after="Greedy")
     assert greedy == ["SARSA", "continuing", "45.0", "45.0", "44.4", "!", "35.0", "1.00"]
     assert text.count(" !\n") + text.count(" ! ") == 2
@@ -136,19 +145,22 @@ def test_it_counts_what_the_ants_do(comparison: Comparison) -> None:
     behaviours[shown - 1, :3] = WALKS
     mixed = replace(comparison, behaviours=behaviours, policy_returns=policy_returns)
     text = render(mixed, table2(mixed, 10), assess(mixed))
-    absorbing = section(text, "What the ants do, absorbing")
+    table = section(text, "What the ants do")
+    absorbing = table[table.index("absorbing") :]
     trained = mixed.measure("return_last50")[shown]
     lines = absorbing[absorbing.index("Dyna-Q (p5)") :].splitlines()
     delivers, walks, circles = (line.split() for line in lines[:3])
     first, rest = f"{trained[:4].mean():.1f}", f"{trained[4:].mean():.1f}"
-    assert delivers == ["Dyna-Q", "(p5)", "+", "delivers", "4", first, "45.0", "45.0", "241"]
+    names = ["Dyna-Q", "(p5)", "+", "absorbing"]
+    assert delivers == [*names, "delivers", "4", first, "45.0", "45.0", "241"]
     assert walks == ["walks", "the", "trail", "0", "-", "-", "-", "3"]
     assert circles[3:] == ["12", rest, "220.0", "45.0", "12"]
-    assert row(absorbing, "SARSA")[1:3] == ["delivers", "16"]
+    assert row(absorbing, "SARSA")[1:4] == ["absorbing", "delivers", "16"]
     assert "circles with food: with food, at least every fourth step leads nearer" in text
     assert "other:" not in text  # nobody does
-    continuing = section(text, "What the ants do, continuing")
-    assert [line.split()[-1] for line in continuing.splitlines()[-4:]] == ["256"] * 4
+    continuing = [line for line in table.splitlines() if " continuing " in line]
+    assert [line.split()[-1] for line in continuing] == ["256"] * 4
+    assert "Dyna-Q (p5), absorbing: delivers 4, circles with food 12" in text
 
 
 def test_means_that_no_run_has_are_marked(comparison: Comparison, text: str) -> None:
@@ -157,12 +169,11 @@ def test_means_that_no_run_has_are_marked(comparison: Comparison, text: str) -> 
     behaviours[paper_position(comparison, "absorbing", DYNA_P5), 0] = OTHER
     mixed = replace(comparison, behaviours=behaviours)
     marked = render(mixed, table2(mixed, 10), [])
-    for start in ("Table 2, absorbing", "Greedy evaluation", "What the ants do, absorbing"):
-        rows = [line for line in section(marked, start).splitlines() if "Dyna-Q" in line]
-        assert [line.startswith("Dyna-Q (p5) +") for line in rows][-1], start
-        assert sum(line.startswith("Dyna-Q (p5) +") for line in rows) == 1, start
-    assert "Dyna-Q (p5) +" not in section(marked, "Table 2, continuing")
-    assert marked.count("\n+ the runs do different things, and no run has their mean") == 2
+    for start in ("Table 2: return", "Greedy evaluation", "What the ants do"):
+        rows = [line for line in section(marked, start).splitlines() if "Dyna-Q (p5)" in line]
+        marks = [(line.startswith("Dyna-Q (p5) +"), "absorbing" in line) for line in rows[:2]]
+        assert marks == [(False, False), (True, True)], start
+    assert marked.count("\n+ the runs do different things, and no run has their mean") == 1
 
 
 class Terminal(io.StringIO):
@@ -210,7 +221,7 @@ def test_a_small_comparison_says_what_is_missing() -> None:
     assert "Greedy evaluation" not in text
     assert "The paper's claims" not in text
     mean = float(one.returns.mean())
-    assert row(text, "SARSA *", after="Table 2")[2:4] == ["47.3", f"{mean:.1f}"]
+    assert row(text, "SARSA *", after="Table 2")[3:5] == ["47.3", f"{mean:.1f}"]
     assert "nan" not in text
 
 
@@ -244,9 +255,9 @@ def test_learners_beside_the_papers_are_shown_at_their_best_on_other_seeds(world
     place = "Table 2" if world == PAPER_WORLD else "Training"
     label = comparison.rows[3].hyperparameters.label
     for name, paper in (("SARSA", ["47.3"]), ("hysteretic", ["-"])):
-        cells = row(text, f"{name} *", after=f"{place}, absorbing")
+        cells = row(text, f"{name} *", after=f"{place}: return")
         expected = [*paper, "30.0"] if world == PAPER_WORLD else ["30.0"]
-        assert cells[2 : 2 + len(expected)] == expected
+        assert cells[3 : 3 + len(expected)] == expected
         assert row(text, f"{name} *", after="Greedy")[3] == "17.0"
         assert f"{name}, absorbing: {label}" in text
     assert "* best by return on half of the seeds, reported on the other half" in text
@@ -255,7 +266,7 @@ def test_learners_beside_the_papers_are_shown_at_their_best_on_other_seeds(world
 def test_one_seed_shows_the_plain_best_as_such() -> None:
     comparison = halves(PAPER_WORLD, [Variant("hysteretic")], 1)
     text = render(comparison, table2(comparison, 100), assess(comparison))
-    assert row(text, "hysteretic *", after="Table 2")[2:6] == ["-", "80.0", "80.0", "80.0"]
+    assert row(text, "hysteretic *", after="Table 2")[3:7] == ["-", "80.0", "80.0", "80.0"]
     assert row(text, "hysteretic *", after="Greedy")[3] == "99.0"
     assert "* best by return on the one seed there is" in text
 
@@ -271,9 +282,9 @@ def test_another_world_is_not_held_against_the_paper(comparison: Comparison) -> 
 
 def test_the_means_verdict_stands_below_where_it_is_another(comparison: Comparison) -> None:
     first, *others = assess(comparison)
-    other = replace(first.by_mean, verdict=Verdict.UNDECIDED)
-    equal = replace(first, verdict=Verdict.EQUIVALENT, by_mean=other)
-    text = render(comparison, [], [equal, *others])
+    other = replace(first.finding.by_mean, verdict=Verdict.UNDECIDED)
+    equal = replace(first.finding, verdict=Verdict.EQUIVALENT, by_mean=other)
+    text = render(comparison, [], [replace(first, finding=equal), *others])
     assert row(text, "3.2", after="In our words")[-2:] == ["equivalent", "contradicted"]
     assert "mean: undecided" in text
     assert "1 equivalent" in text
@@ -288,8 +299,8 @@ def test_claims_name_their_scope_and_doubtful_sizes(text: str, comparison: Compa
     assert "claims.md holds effects, intervals" in words
     assert "~" not in text
     first, *others = assess(comparison)
-    doubtful = [replace(first, note="may be within the margin"), *others]
-    text = render(comparison, [], doubtful)
+    doubtful = replace(first.finding, note="may be within the margin")
+    text = render(comparison, [], [replace(first, finding=doubtful), *others])
     assert row(text, "3.2", after="In our words")[-3:] == ["supported", "~", "contradicted"]
     assert "~ the effect may be too small to matter" in text
 
@@ -316,15 +327,3 @@ def test_a_baseline_without_figures_says_why(comparison: Comparison) -> None:
     endless = BASELINES[0] | empty | {"discount": 1.0, "note": "without bound"}
     text = render(comparison, [], [], [endless])
     assert "optimal policy, discount 1: without bound" in text
-
-
-def test_numbers_as_text() -> None:
-    assert number(-0.04) == "0.0"
-    assert number(-0.06) == "-0.1"
-    assert number(math.nan) == "-"
-    assert number(math.inf, 0) == "inf"
-    assert interval(-1.0, 2.25, 2) == "[-1.00, 2.25]"
-    assert interval(1.0, math.nan) == "-"
-    assert (count(1, "seed"), count(0, "seed")) == ("1 seed", "0 seeds")
-    assert (count(1, "delivery"), count(2, "delivery")) == ("1 delivery", "2 deliveries")
-    assert table(["a", "b"], [["x", "1"]]) == "| a | b |\n| --- | ---: |\n| x | 1 |\n"

@@ -169,8 +169,8 @@ def test_what_is_missing_is_nan() -> None:
     assert math.isnan(absent["best_run_return_median"])
     assert absent["paper_return"] == TABLE_2[Q_LEARNING].return_last50
     text = table2_markdown(lines, cut)
-    assert "ours are not in this comparison" in text
-    assert "| mine (p2) | absorbing | 16 |" in text
+    assert "| mine (p2) * | absorbing | - |" in text
+    assert "| Q-learning |" not in text
     assert "nan" not in text
 
 
@@ -209,30 +209,35 @@ def test_the_markdown_holds_the_numbers(comparison: Comparison) -> None:
     lines = table2(comparison, draws=2000)
     text = table2_markdown(lines, comparison)
     assert text.startswith("World: the paper's.\n\nTraining without evaporation of trails, greedy ")
-    assert "(IQM, the typical run) over 8 seeds" in text
+    assert "mean, IQM: over 8 seeds, at the paper's configuration" in text
     row = next(line for line in text.splitlines() if line.startswith("| SARSA | continuing"))
     cells = [cell.strip() for cell in row.strip("|").split("|")]
     line = lines[1]
-    assert cells[:4] == ["SARSA", "continuing", "0.01 / 0.9 / 0.3 / 0.995", "47.3"]
-    assert cells[4].startswith(f"{line['same_return_mean']:.1f} [")
-    assert cells[5].startswith(f"{line['same_return_iqm']:.1f} [")
+    assert cells[:3] == ["SARSA", "continuing", "47.3"]
+    assert cells[3].startswith(f"{line['same_return_mean']:.1f} [")
+    assert cells[4].startswith(f"{line['same_return_iqm']:.1f} [")
+    assert cells[5].startswith(f"{line['best_run_return_median']:.1f} [")
+    held_out = text[text.index("reported on the other half") :]
+    row = next(line for line in held_out.splitlines() if line.startswith("| SARSA | continuing"))
+    assert f"| {line['held_out_configuration']} | {line['held_out_return_mean']:.1f} [" in row
     widths = {len(row.split("|")) - 2 for row in text.splitlines() if row.startswith("|")}
-    assert widths == {7, 8, 10}
+    assert widths == {7, 10}
 
 
 def test_both_readings_of_steps_are_labelled_and_the_nearer_one_is_named() -> None:
     """All episodes: 100 at first, then fewer; the paper's 73 to 138 lie nearer to their mean."""
     comparison = build({"continuing": change(early_steps=100, late_steps=-30)}, seeds=8)
     text = table2_markdown(table2(comparison, draws=50), comparison)
-    assert "| Steps, all, mean | Steps, all, IQM | Steps, last 50, mean |" in text
-    assert "ours come nearer over all." in text
+    assert "**Table 2: steps, all episodes**" in text
+    assert "**Table 2: steps, last 50 episodes**" in text
+    assert "ours come nearer over all\n" in text.replace("  \n", "\n")
     late = build({"continuing": change(early_steps=500, late_steps=30)}, seeds=8)
     text = table2_markdown(table2(late, draws=50), late)
-    assert "ours come nearer over the last 50." in text
+    assert "ours come nearer over the last 50\n" in text.replace("  \n", "\n")
     short = subset(comparison, range(len(comparison.rows)), 8, 20)
     text = table2_markdown(table2(short, draws=50), short)
-    assert "last 50," not in text
-    assert "Steps, all 20, mean" in text
+    assert "last 50 episodes" not in text
+    assert "**Table 2: steps, all 20 episodes**" in text
 
 
 def test_a_mean_that_far_runs_have_moved_is_marked() -> None:
@@ -245,7 +250,7 @@ def test_a_mean_that_far_runs_have_moved_is_marked() -> None:
     lines = table2(comparison, draws=50)
     assert apart(lines[1], "same_return_")
     text = table2_markdown(lines, comparison)
-    mean = f"{lines[1]['same_return_mean']:.1f} ! ["
+    mean = f"{lines[1]['same_return_mean']:.0f} ! ["
     assert mean in next(row for row in text.splitlines() if row.startswith("| SARSA"))
     assert lines[1]["same_return_iqm"] == pytest.approx(line["same_return_iqm"], abs=0.5)
 
@@ -258,13 +263,15 @@ def some_circle(comparison: Comparison) -> Comparison:
 
 
 def test_means_of_runs_that_do_different_things_are_marked(comparison: Comparison) -> None:
-    lines = table2(some_circle(comparison), draws=10)
+    circling = some_circle(comparison)
+    lines = table2(circling, draws=10)
     mixed = [line for line in lines if line["same_behaviours"]]
     assert [(line["planning_steps"], line["delivery"]) for line in mixed] == [(3, "absorbing")]
     assert mixed[0]["same_behaviours"] == "delivers 5, circles with food 3"
-    text = table2_markdown(lines, comparison)
-    assert f"Here {MIXED}" in text
+    text = table2_markdown(lines, circling)
+    assert f"+ {MIXED}:" in text
     assert "Dyna-Q (p3), absorbing: delivers 5, circles with food 3\n" in text
+    assert text.count("| Dyna-Q (p3) + | absorbing |") == 4
     assert MIXED not in table2_markdown(table2(comparison, draws=10), comparison)
 
 
