@@ -186,11 +186,6 @@ def for_setting(baselines: Iterable[Mapping], setting: str) -> list[Mapping]:
     ]
 
 
-def over_seeds(seeds: int, spread: str) -> str:
-    """What marks and bars are, for a caption: one seed has no spread."""
-    return f"mean of {seeds} seeds with {spread}" if seeds > 1 else "one seed"
-
-
 def save(figure: Figure, path: Path) -> None:
     """Writes a PNG; raises AntsError where that cannot be done."""
     with styled():

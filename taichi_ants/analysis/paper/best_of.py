@@ -21,49 +21,34 @@ from taichi_ants.analysis.paper.published import TABLE_2, VARIANTS
 from taichi_ants.analysis.statistics import RANDOM_SEED
 
 DRAWS = 20_000
-
-
-@dataclass(frozen=True)
-class BestOf:
-    """The winners of many repetitions of "train each once, report the best by return".
-
-    Attributes:
-        configurations: How many compete.
-        returns: Reward, mean of the winner's last 50 episodes, float64 (draws,).
-        steps: The winner's mean length of all episodes, float64 (draws,).
-        steps_last50: The winner's mean length of its last 50 episodes, float64 (draws,).
-        deliveries: The winner's mean deliveries in its last 50 episodes, float64 (draws,).
-    """
-
-    configurations: int
-    returns: np.ndarray
-    steps: np.ndarray
-    steps_last50: np.ndarray
-    deliveries: np.ndarray
+# What is reported of a run -> its measure. The paper has one figure of steps, we have two readings
+# of it.
+FIGURES = {
+    "return": "return_last50",
+    "steps_all": "steps_all",
+    "steps_last50": "steps_last50",
+    "deliveries": "deliveries_last50",
+}
 
 
 def best_of(
     comparison: Comparison, delivery: str, variant: Variant, draws: int = DRAWS
-) -> BestOf | None:
+) -> dict[str, np.ndarray]:
     """Draws an independent random seed for each configuration and reports the best of them.
 
-    Returns None where the comparison has no configuration of the learner.
+    Returns:
+        The winner's figures by their names in `FIGURES`, float64 (draws,) each; none where the
+        comparison has no configuration of the learner.
     """
     positions = comparison.positions(delivery, variant)
     if not positions:
-        return None
+        return {}
     random = np.random.default_rng(RANDOM_SEED)
     seeds = random.integers(0, len(comparison.seeds), size=(draws, len(positions)))
     rows = np.array(positions)
     winner = comparison.measure("return_last50")[rows, seeds].argmax(axis=1)
     won = rows[winner], seeds[np.arange(draws), winner]
-    return BestOf(
-        len(positions),
-        comparison.measure("return_last50")[won],
-        comparison.measure("steps_all")[won],
-        comparison.measure("steps_last50")[won],
-        comparison.measure("deliveries_last50")[won],
-    )
+    return {name: comparison.measure(measure)[won] for name, measure in FIGURES.items()}
 
 
 def percentile_of(figure: float, values: np.ndarray) -> float:

@@ -46,7 +46,7 @@ _CURVES = {
     "steps": "Length\n(steps)",
     "deliveries": "Deliveries\n(per episode)",
 }
-_BEST = {"returns": "Return of the best run", "steps": "Its mean length (steps)"}
+_BEST = {"return": "Return of the best run", "steps_all": "Its mean length (steps)"}
 _OUR_CHOICE = (
     f"All learners have {FIGURE_1.label} (learning rate / discount / epsilon / decay). The paper's "
     "figure 1 shares hyperparameters\ntoo, but does not name them: these are our choice, the only "
@@ -124,7 +124,7 @@ def best_runs(comparison: Comparison) -> Figure:
             for row, (setting, name) in zip(block, rows, strict=True):
                 row[0].set_ylabel(f"{setting.capitalize()}\nshare")
                 bests = {one: best_of(comparison, setting, one) for one in comparison.variants}
-                values = {one: getattr(best, name) for one, best in bests.items() if best}
+                values = {one: best[name] for one, best in bests.items() if best}
                 for axis, variant in zip(row, variants, strict=False):
                     axis.set_xlabel(_BEST[name])
                     axis.tick_params(labelbottom=True)
@@ -381,7 +381,7 @@ def _distributions(
 
 def _paper_mark(axis: Axes, variant: Variant, name: str, drawn: np.ndarray) -> None:
     figures = TABLE_2[variant]
-    place = figures.return_last50 if name == "returns" else figures.steps_all
+    place = figures.return_last50 if name == "return" else figures.steps_all
     below = percentile_of(place, drawn)
     axis.plot(
         place,
@@ -409,7 +409,7 @@ def _span_of(
     ends = [np.percentile(drawn, (2.5, 97.5)) for drawn in values.values()]
     if comparison.in_paper_world:
         papers = [TABLE_2[variant] for variant in values if variant in TABLE_2]
-        ends += [[row.return_last50 if name == "returns" else row.steps_all] for row in papers]
+        ends += [[row.return_last50 if name == "return" else row.steps_all] for row in papers]
     low, high = min(map(min, ends)), max(map(max, ends))
     room = 0.05 * (high - low) or 1.0
     return low - room, high + room

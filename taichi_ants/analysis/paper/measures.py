@@ -92,77 +92,48 @@ def _improved(comparison: Comparison) -> np.ndarray:
 
 
 _EARLY = 2 * WINDOW
+_REWARD, _STEPS, _DELIVERIES, _SHARE = "reward", "steps", "deliveries per episode", "share of runs"
+_CHANGES = "from episode to episode"
 
+# fmt: off
 MEASURES: dict[str, Measure] = {
     "return_last50": Measure(
-        "mean return of the last 50 episodes", "reward", _mean("returns", LAST)
-    ),
+        "mean return of the last 50 episodes", _REWARD, _mean("returns", LAST)),
     "return_first50": Measure(
-        "mean return of the first 50 episodes", "reward", _mean("returns", FIRST), _EARLY
-    ),
-    "steps_last50": Measure("mean length of the last 50 episodes", "steps", _mean("steps", LAST)),
+        "mean return of the first 50 episodes", _REWARD, _mean("returns", FIRST), _EARLY),
+    "steps_last50": Measure(
+        "mean length of the last 50 episodes", _STEPS, _mean("steps", LAST)),
     "steps_first50": Measure(
-        "mean length of the first 50 episodes", "steps", _mean("steps", FIRST), _EARLY
-    ),
-    "steps_all": Measure("mean length of all episodes", "steps", _mean("steps")),
+        "mean length of the first 50 episodes", _STEPS, _mean("steps", FIRST), _EARLY),
+    "steps_all": Measure("mean length of all episodes", _STEPS, _mean("steps")),
     "deliveries_last50": Measure(
-        "mean deliveries of the last 50 episodes",
-        "deliveries per episode",
-        _mean("deliveries", LAST),
-    ),
+        "mean deliveries of the last 50 episodes", _DELIVERIES, _mean("deliveries", LAST)),
     "deliveries_second50": Measure(
-        "mean deliveries of episodes 51 to 100",
-        "deliveries per episode",
-        _mean("deliveries", SECOND),
-        _EARLY,
-    ),
+        "mean deliveries of episodes 51 to 100", _DELIVERIES, _mean("deliveries", SECOND), _EARLY),
     "return_fluctuation_first50": Measure(
-        "fluctuation of the return from episode to episode in the first 50 episodes",
-        "reward",
-        _fluctuation("returns", FIRST),
-        _EARLY,
-    ),
+        f"fluctuation of the return {_CHANGES} in the first 50 episodes",
+        _REWARD, _fluctuation("returns", FIRST), _EARLY),
     "return_fluctuation_last50": Measure(
-        "fluctuation of the return from episode to episode in the last 50 episodes",
-        "reward",
-        _fluctuation("returns", LAST),
-        2,
-    ),
+        f"fluctuation of the return {_CHANGES} in the last 50 episodes",
+        _REWARD, _fluctuation("returns", LAST), 2),
     "return_fluctuation_all": Measure(
-        "fluctuation of the return from episode to episode over all episodes",
-        "reward",
-        _fluctuation("returns"),
-        2,
-    ),
+        f"fluctuation of the return {_CHANGES} over all episodes",
+        _REWARD, _fluctuation("returns"), 2),
     "steps_fluctuation_all": Measure(
-        "fluctuation of the length from episode to episode over all episodes",
-        "steps",
-        _fluctuation("steps"),
-        2,
-    ),
-    "shortest_episode": Measure("length of the shortest training episode", "steps", _shortest),
+        f"fluctuation of the length {_CHANGES} over all episodes",
+        _STEPS, _fluctuation("steps"), 2),
+    "shortest_episode": Measure("length of the shortest training episode", _STEPS, _shortest),
     "improved": Measure(
-        "1 if the last 50 episodes return more than the first 50, else 0",
-        "share of runs",
-        _improved,
-        _EARLY,
-    ),
+        "whether the last 50 episodes return more than the first 50", _SHARE, _improved, _EARLY),
     "greedy_return": Measure(
-        "mean return of the greedy rollouts", "reward", _mean("greedy_returns"), rollouts=1
-    ),
+        "mean return of the greedy rollouts", _REWARD, _mean("greedy_returns"), rollouts=1),
     "greedy_steps": Measure(
-        "mean length of the greedy rollouts", "steps", _mean("greedy_steps"), rollouts=1
-    ),
+        "mean length of the greedy rollouts", _STEPS, _mean("greedy_steps"), rollouts=1),
     "greedy_deliveries": Measure(
-        "mean deliveries of the greedy rollouts",
-        "deliveries per episode",
-        _mean("greedy_deliveries"),
-        rollouts=1,
-    ),
+        "mean deliveries of the greedy rollouts", _DELIVERIES, _mean("greedy_deliveries"),
+        rollouts=1),
     "greedy_repeats": Measure(
-        "1 if all greedy rollouts of a run are equal in return and length, else 0",
-        "share of runs",
-        _repeats,
-        rollouts=2,
-    ),
+        "whether all greedy rollouts of a run are equal in return and length", _SHARE, _repeats,
+        rollouts=2),
 }
+# fmt: on

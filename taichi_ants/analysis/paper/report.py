@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 
@@ -35,23 +35,11 @@ from taichi_ants.analysis.tables import (
 WIDTH = 79
 
 
-def print_report(
-    comparison: Comparison,
-    lines: Sequence[Mapping],
-    audit: Sequence[Audited],
-    baselines: Sequence[Mapping] = (),
-    costs: Sequence[Mapping] = (),
-    file: IO[str] | None = None,
-) -> None:
+def print_report(*data: Any, file: IO[str] | None = None) -> None:
     """Prints the report: in colours and as wide as the terminal, or as `render` has it elsewhere.
 
     Args:
-        comparison: The comparison.
-        lines: Its table 2, from `table2.table2`.
-        audit: Its claims, from `audit.assess`.
-        baselines: Rows of baselines.csv, see `baselines.baseline_rows`.
-        costs: Time per step of learners, each with "learner", "planning_steps" and
-            "nanoseconds_per_step".
+        data: The arguments of `report`.
         file: Where to; standard output by default.
     """
     from rich.console import Console
@@ -59,20 +47,14 @@ def print_report(
     console = Console(file=file, highlight=False, markup=False)
     if console.is_terminal:
         console.width = max(console.width, WIDTH)  # a narrower one breaks lines, but no number
-        print_blocks(report(comparison, lines, audit, baselines, costs), console)
+        print_blocks(report(*data), console)
     else:
-        print(render(comparison, lines, audit, baselines, costs), end="", file=file)
+        print(render(*data), end="", file=file)
 
 
-def render(
-    comparison: Comparison,
-    lines: Sequence[Mapping],
-    audit: Sequence[Audited],
-    baselines: Sequence[Mapping] = (),
-    costs: Sequence[Mapping] = (),
-) -> str:
-    """The report as plain text of at most `WIDTH` columns; arguments as for `print_report`."""
-    return plain_text(report(comparison, lines, audit, baselines, costs), WIDTH)
+def render(*data: Any) -> str:
+    """The report as plain text of at most `WIDTH` columns; arguments as for `report`."""
+    return plain_text(report(*data), WIDTH)
 
 
 def report(
@@ -82,7 +64,16 @@ def report(
     baselines: Sequence[Mapping] = (),
     costs: Sequence[Mapping] = (),
 ) -> list[Block]:
-    """The report as data; arguments as for `print_report`."""
+    """The report as data.
+
+    Args:
+        comparison: The comparison.
+        lines: Its table 2, from `table2.table2`.
+        audit: Its claims, from `audit.assess`.
+        baselines: Rows of baselines.csv, see `baselines.baseline_rows`.
+        costs: Time per step of learners, each with "learner", "planning_steps" and
+            "nanoseconds_per_step".
+    """
     sizes = (
         f"{count(len(comparison.rows), 'configuration')}, {count(len(comparison.seeds), 'seed')}, "
         f"{count(comparison.episodes, 'episode')} of at most {comparison.max_steps} steps, "

@@ -17,6 +17,7 @@ import numpy as np
 from taichi_ants.analysis.behaviour import MIXED, mixture
 from taichi_ants.analysis.paper.best_of import (
     DRAWS,
+    FIGURES,
     Choice,
     Chosen,
     best_of,
@@ -40,13 +41,6 @@ from taichi_ants.analysis.tables import (
     percent,
 )
 
-# Column stem -> measure of a run. The paper has one figure of steps, we have two readings of it.
-FIGURES = {
-    "return": "return_last50",
-    "steps_all": "steps_all",
-    "steps_last50": "steps_last50",
-    "deliveries": "deliveries_last50",
-}
 # Below, a note warns that means have too few seeds; what intervals cover is measured in
 # docs/statistics.md.
 FEW_SEEDS = 50
@@ -127,24 +121,18 @@ def means(comparison: Comparison, stem: str, position: int | None, seeds: slice)
 
 def _best_run(comparison: Comparison, delivery: str, variant: Variant, draws: int) -> dict:
     best = best_of(comparison, delivery, variant, draws)
-    columns: dict[str, float] = {"best_run_of": best.configurations if best else 0}
-    drawn: tuple[np.ndarray | None, ...] = (None,) * len(FIGURES)
-    if best:
-        drawn = (best.returns, best.steps, best.steps_last50, best.deliveries)
     paper = _paper(comparison, variant)
-    for name, values in zip(FIGURES, drawn, strict=True):
-        figure = paper[f"paper_{name.partition('_')[0]}"]
+    columns: dict[str, float] = {"best_run_of": len(comparison.positions(delivery, variant))}
+    for name in FIGURES:
+        figure, values = paper[f"paper_{name.partition('_')[0]}"], best.get(name)
         low = median = high = percentile = math.nan
         if values is not None and len(comparison.seeds) == 1:  # nothing to draw from
             median = float(values[0])
         elif values is not None:
             low, median, high = np.percentile(values, (2.5, 50, 97.5)).tolist()
-            if not math.isnan(figure):
-                percentile = percentile_of(figure, values)
-        columns[f"best_run_{name}_median"] = median
-        columns[f"best_run_{name}_low"] = low
-        columns[f"best_run_{name}_high"] = high
-        columns[f"best_run_{name}_paper_percentile"] = percentile
+            percentile = math.nan if math.isnan(figure) else percentile_of(figure, values)
+        numbers = {"median": median, "low": low, "high": high, "paper_percentile": percentile}
+        columns |= {f"best_run_{name}_{column}": value for column, value in numbers.items()}
     return columns
 
 
@@ -273,8 +261,8 @@ def table2_markdown(lines: list[dict], comparison: Comparison) -> str:
         if line["held_out_seeds"]:
             variant = Variant(line["learner"], line["planning_steps"])
             cells = [cell for name in FIGURES for cell in mean_and_iqm(line, f"held_out_{name}")]
-            names = [variant.label, line["delivery"], line["held_out_configuration"]]
-            rows.append([*names, *cells[:-1]])  # deliveries have no IQM
+            chosen = [variant.label, line["delivery"], line["held_out_configuration"]]
+            rows.append([*chosen, *cells[:-1]])  # deliveries have no IQM
     if rows:
         names = ("Return", "Steps, all", f"Steps, {comparison.late}", "Deliveries")
         headers = [f"{name}, {centre}" for name in names for centre in ("mean", "IQM")]

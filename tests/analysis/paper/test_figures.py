@@ -258,7 +258,9 @@ def test_best_runs_shows_the_distribution_and_the_papers_figures(comparison: Com
     for row, (setting, name) in zip(axes, rows, strict=True):
         assert setting in row[0].get_ylabel().lower()
         for axis, variant in zip(row, VARIANTS, strict=True):
-            values = getattr(best_of(comparison, setting, variant), name)
+            values = best_of(comparison, setting, variant)[
+                {"returns": "return", "steps": "steps_all"}[name]
+            ]
             line = own_line(axis)
             x, y = np.asarray(line.get_xdata())[1:-1], np.asarray(line.get_ydata())[1:-1]
             assert line.get_drawstyle() == "steps-post"  # the few values there are, no hills
