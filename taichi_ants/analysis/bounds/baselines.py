@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -39,20 +39,10 @@ _ENDLESS = (
 BaselineRow = dict[str, Any]
 
 
-class Rollouts(Protocol):
-    """What an evaluation returns: arrays of shape (seeds, rollouts)."""
-
-    @property
-    def returns(self) -> np.ndarray: ...
-    @property
-    def steps(self) -> np.ndarray: ...
-    @property
-    def deliveries(self) -> np.ndarray: ...
-
-
 # Called as evaluate(world, q_values, rollouts=, epsilon=, max_steps=, evaporation=, seeds=), with
-# one table for each seed: q_values (seeds, 128, 5).
-Evaluate = Callable[..., Rollouts]
+# one table for each seed: q_values (seeds, 128, 5). What it returns has returns, steps and
+# deliveries, (seeds, rollouts) each.
+Evaluate = Callable[..., Any]
 
 
 def baseline_rows(

@@ -267,8 +267,10 @@ def _verdicts(
     by_verdict[Verdict.UNDECIDED] += by_verdict[Verdict.EQUIVALENT]
     columns = (Verdict.SUPPORTED, Verdict.CONTRADICTED, Verdict.UNDECIDED)
     sizes = max(findings, key=lambda sizes: _ratio(*_pair(study, arena, series, sizes)))
-    one, other = map(figure, _pair(study, arena, series, sizes))
-    example = f"{sizes[0]}: {one} against {other}" + (" with 1" if sizes[1] != sizes[0] else "")
+    one, other = _pair(study, arena, series, sizes)
+    example = f"{sizes[0]}: {figure(one)} against {figure(other)}"
+    example += "" if sizes[1] == sizes[0] else " with 1"
+    example += f" ({100 * (one / other - 1):+.0f} %)" if min(one, other) > 0 else ""
     cells = (", ".join(map(str, sorted(by_verdict[verdict]))) for verdict in columns)
     return [*(cell or MISSING for cell in cells), example]
 

@@ -164,7 +164,7 @@ def test_the_clearest_example_has_the_greatest_ratio() -> None:
         return 20.0 * ants * (ants if way == JOINT else 1)
 
     (row,) = [row for row in answer(CURE, truth, noise=0.0001) if row[0].endswith("trained alone")]
-    assert row[-1] == "8: 1280 against 160"
+    assert row[-1] == "8: 1280 against 160 (+700 %)"
 
 
 @pytest.mark.parametrize(
@@ -189,7 +189,7 @@ def test_whether_joint_learning_cures_crowding(each: float, noise: float, verdic
     )
     columns = (Verdict.SUPPORTED, Verdict.CONTRADICTED, Verdict.UNDECIDED)
     assert last[1:4] == ["8" if column is verdict else "-" for column in columns]
-    assert last[4].endswith(" with 1")
+    assert " with 1 (" in last[4]
 
 
 @pytest.mark.parametrize("reward", [0.5, 1.0, 2.0])
@@ -209,9 +209,9 @@ def test_what_the_trail_pays_is_judged_beside_what_it_delivers(reward: float) ->
 @pytest.mark.parametrize(
     ("first", "place", "example"),
     [
-        (lambda ants: 400 // ants, 2, "8: 50 against 400 with 1"),
-        (lambda ants: 40 * ants, 1, "8: 320 against 40 with 1"),
-        (lambda ants: 40, 3, "8: 40 against 40 with 1"),
+        (lambda ants: 400 // ants, 2, "8: 50 against 400 with 1 (-88 %)"),
+        (lambda ants: 40 * ants, 1, "8: 320 against 40 with 1 (+700 %)"),
+        (lambda ants: 40, 3, "8: 40 against 40 with 1 (+0 %)"),
     ],
 )
 def test_whether_a_crowd_is_sooner(first: Callable[[int], int], place: int, example: str) -> None:
