@@ -31,7 +31,7 @@ from taichi_ants.studies.interruption import held
 
 if TYPE_CHECKING:
     from taichi_ants import Colony, World
-    from taichi_ants.analysis.colony import ColonyStudy
+    from taichi_ants.analysis.colony.study import ColonyStudy
     from taichi_ants.learners.config import TrainingConfig
     from taichi_ants.studies.colony_study import ArenaPlan, StudyPlan
 
@@ -235,17 +235,17 @@ def do_study(settings: argparse.Namespace, plan: StudyPlan, blocks: Path, ready:
 def write_tables(found: ColonyStudy, folder: Path) -> None:
     """Write tables, findings and the report."""
     from taichi_ants import files
-    from taichi_ants.analysis.colony import find, judge_all, report, tables
+    from taichi_ants.analysis.colony import tables
+    from taichi_ants.analysis.colony.contrasts import judge_all
     from taichi_ants.studies.result_folder import REPORT
 
     rows, judged = tables.condition_rows(found), judge_all(found)
-    findings = find(found, judged)
     files.write_csv(folder / "conditions.csv", rows, tables.CONDITION_COLUMNS)
     differences = tables.difference_rows(judged)
     files.write_csv(folder / "differences.csv", differences, tables.DIFFERENCE_COLUMNS)
     files.write_text(folder / "table.md", tables.table_markdown(found, rows))
-    files.write_text(folder / "findings.md", tables.findings_markdown(findings))
-    files.write_text(folder / REPORT, report.report_text(found, rows, findings))
+    files.write_text(folder / "findings.md", tables.findings_markdown(found, judged))
+    files.write_text(folder / REPORT, tables.report_text(found, rows, judged))
 
 
 def draw_figures(plan: StudyPlan, results: Path, folder: Path) -> None:

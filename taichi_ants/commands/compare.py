@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from taichi_ants import World
-    from taichi_ants.analysis.comparison import Comparison
+    from taichi_ants.analysis.paper.comparison import Comparison
     from taichi_ants.engines.runs.results import LearnerCost
     from taichi_ants.studies.runner import Outcome, RunPoint, Study
     from taichi_ants.task import Task
@@ -127,7 +127,7 @@ def points(settings: argparse.Namespace, world: World) -> tuple[RunPoint, ...]:
 def build_study(settings: argparse.Namespace) -> Study[RunPoint]:
     """The work, checked as a whole before any of it is done."""
     from taichi_ants import AntsError, worlds
-    from taichi_ants.analysis.comparison import Row
+    from taichi_ants.analysis.paper.comparison import Row
     from taichi_ants.studies.runner import Study
 
     if settings.plugin:
@@ -151,7 +151,7 @@ def build_study(settings: argparse.Namespace) -> Study[RunPoint]:
 def world_name(settings: argparse.Namespace) -> str:
     """The world for readers: a registered name with its seed, or the name of a map file."""
     from taichi_ants import worlds
-    from taichi_ants.analysis.comparison import PAPER_WORLD
+    from taichi_ants.analysis.paper.comparison import PAPER_WORLD
 
     if worlds.build(settings.world, settings.world_seed) == worlds.paper():
         return PAPER_WORLD
@@ -162,7 +162,7 @@ def world_name(settings: argparse.Namespace) -> str:
 
 def to_comparison(study: Study[RunPoint], arrays: dict[str, np.ndarray], world: str) -> Comparison:
     """What the analysis reads: the arrays of `EPISODES`, and the world's name."""
-    from taichi_ants.analysis.comparison import Comparison, Row
+    from taichi_ants.analysis.paper.comparison import Comparison, Row
 
     task = study.points[0].task
     return Comparison(
@@ -218,8 +218,8 @@ def write_tables(
 ) -> None:
     """Write all tables and the report."""
     from taichi_ants import files
-    from taichi_ants.analysis import report, summary, table2
-    from taichi_ants.analysis.claims import assess, claims_markdown, claims_rows
+    from taichi_ants.analysis.paper import report, summary, table2
+    from taichi_ants.analysis.paper.audit import assess, claims_markdown, claims_rows
     from taichi_ants.studies.result_folder import REPORT
 
     lines = summary.summarise(comparison)
@@ -243,7 +243,7 @@ def write_policies(
     """Write the final Q-tables of some runs, with what an ant that follows them does."""
     from taichi_ants import files, save_policy
     from taichi_ants.analysis.behaviour import BEHAVIOURS, NAMES
-    from taichi_ants.analysis.best_of import examples
+    from taichi_ants.analysis.paper.best_of import examples
 
     files.check_writable_folder(folder)
     for row, run in examples(comparison):
@@ -285,7 +285,7 @@ def do_comparison(
     import numpy as np
 
     from taichi_ants import files
-    from taichi_ants.analysis.baselines import BASELINE_COLUMNS, baseline_rows
+    from taichi_ants.analysis.bounds.baselines import BASELINE_COLUMNS, baseline_rows
     from taichi_ants.engines.runs.training import evaluate
 
     where = {"threads": settings.threads, "arch": settings.arch}
@@ -315,8 +315,8 @@ def do_comparison(
 def draw_figures(study: Study[RunPoint], world: str, results: Path, folder: Path) -> None:
     """Draw the figures of the comparison in one folder into the folder `figures` of another."""
     from taichi_ants import AntsError, files
-    from taichi_ants.analysis.baselines import BASELINE_COLUMNS
-    from taichi_ants.analysis.figures import save_all
+    from taichi_ants.analysis.bounds.baselines import BASELINE_COLUMNS
+    from taichi_ants.analysis.paper.figures import save_all
 
     try:
         arrays = {name: one.astype(int) for name, one in files.read_npz(results / EPISODES).items()}
@@ -349,7 +349,7 @@ def render_policies(study: Study[RunPoint], results: Path, folder: Path) -> None
     from dataclasses import replace
 
     from taichi_ants import files, load_policy
-    from taichi_ants.analysis.comparison import Variant
+    from taichi_ants.analysis.paper.comparison import Variant
     from taichi_ants.rendering import PAUSE, Episode, frames, save_animation
 
     first, place = study.points[0], files.check_writable_folder(folder / RENDERS)

@@ -98,7 +98,7 @@ def draw_figure(asked: Sweep, results: Path, folder: Path) -> None:
 def measures(kind: str) -> dict[str, Any]:
     """What can be measured, by name."""
     if kind == "runs":
-        from taichi_ants.analysis.measures import MEASURES
+        from taichi_ants.analysis.paper.measures import MEASURES
 
         return dict(MEASURES)
     from taichi_ants.analysis.colony.study import MEASURES as OF_COLONIES
@@ -119,7 +119,7 @@ def run_values(point: Any, seeds: tuple[int, ...], outcome: Outcome, name: str) 
     """A measure of a point's runs, as the comparison has it, float64 (seeds,)."""
     import numpy as np
 
-    from taichi_ants.analysis.comparison import Comparison, Row
+    from taichi_ants.analysis.paper.comparison import Comparison, Row
 
     arrays: Any = {k: array[None].astype(int) for k, array in outcome.items() if array.ndim == 2}
     unknown = np.zeros((1, len(seeds)), int)

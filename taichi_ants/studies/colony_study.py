@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import files
-from taichi_ants.analysis.colony.limits import Limits, limits_of
+from taichi_ants.analysis.bounds.limits import Limits, limits_of
 from taichi_ants.analysis.colony.study import (
     COPIED,
     COPIED_LONG,
