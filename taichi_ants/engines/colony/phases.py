@@ -45,6 +45,7 @@ from taichi_ants.engines.colony.trail import diffused, evaporate
 from taichi_ants.engines.runs.learning import TABLE
 from taichi_ants.engines.trial import tried
 from taichi_ants.learners.registry import Learner
+from taichi_ants.learners.td_errors import guarded
 from taichi_ants.task.constants import DELIVERED
 
 
@@ -78,7 +79,7 @@ def phases(learner: Learner, sharing: str, own: bool, dense: bool, lively: bool)
     on_policy = learns and learner.draws_next_action
     plans = learns and learner.plans
     shared_plans = plans and not alone
-    td_error = tried(learner) if learns else None
+    td_error = guarded(tried(learner).td_error) if learns else None
 
     @ti.func
     def choose_all(c: ti.template(), k: ti.template(), chunk):

@@ -22,6 +22,7 @@ from taichi_ants.engines.runs.learning import (
 from taichi_ants.engines.runs.step import EXTRA_CELLS, Ant, act, observe, restore
 from taichi_ants.engines.trial import tried
 from taichi_ants.learners.registry import Learner
+from taichi_ants.learners.td_errors import guarded
 from taichi_ants.task.constants import DELIVERED
 from taichi_ants.task.rules.policy import choose
 from taichi_ants.task.rules.random_bits import advance, bits_of
@@ -57,7 +58,7 @@ def run_kernel(learner: Learner | None, traced: bool = False) -> Callable[..., N
     learns = learner is not None
     on_policy = learns and learner.draws_next_action
     plans = learns and learner.plans
-    td_error = tried(learner) if learns else None
+    td_error = guarded(tried(learner).td_error) if learns else None
 
     @ti.func
     def decide(q: ti.template(), table, ant, state, explore_below):

@@ -1,0 +1,77 @@
+"""A model of the world: the outcome that was seen last of each visited pair of row and action.
+
+It lies in the integers of a learner's memory: the number of visited pairs; for each pair its slot
+plus 1, or 0; for each slot, in the order of first visits, the pair (its offset in the table) and
+its packed outcome.
+"""
+
+import taichi as ti
+
+from taichi_ants.learners.registry import Memory
+from taichi_ants.task.constants import N_ACTIONS, ROW
+from taichi_ants.task.rewards import MOST
+
+# An outcome packs the next row (20 bits), the reward (11 bits) and whether the step terminated.
+_REWARD_AT, _TERMINATED_AT = 20, 31
+
+
+def model_memory(n_states: int) -> Memory:
+    """The memory that a model takes."""
+    return Memory(integers=1 + 3 * N_ACTIONS * n_states)
+
+
+@ti.func
+def pack_outcome(next_state, reward, terminated):
+    """An outcome as one i32; the reward is a whole number as f32."""
+    paid = ti.cast(reward, ti.i32) + MOST
+    return next_state | paid << _REWARD_AT | terminated << _TERMINATED_AT
+
+
+@ti.func
+def next_state_of(outcome):
+    """The next row of an outcome."""
+    return outcome & (1 << _REWARD_AT) - 1
+
+
+@ti.func
+def reward_of(outcome):
+    """The reward of an outcome, f32."""
+    return ti.cast((outcome >> _REWARD_AT & 2047) - MOST, ti.f32)
+
+
+@ti.func
+def terminated_of(outcome):
+    """1 if the step of an outcome terminated, else 0."""
+    return ti.cast(outcome < 0, ti.i32)
+
+
+@ti.func
+def visited(memory: ti.template(), at):
+    """The number of visited pairs."""
+    return memory.integers[at.integers]
+
+
+@ti.func
+def remember(memory: ti.template(), at, pair, outcome):
+    """Store what was seen last of a pair, new pairs behind all others; the pair's slot."""
+    key = at.integers + 1 + pair // ROW * N_ACTIONS + pair % ROW
+    if memory.integers[key] == 0:
+        memory.integers[at.integers] += 1
+        memory.integers[key] = memory.integers[at.integers]
+    slot = memory.integers[key] - 1
+    place = _place_of(memory, at, slot)
+    memory.integers[place] = pair
+    memory.integers[place + 1] = outcome
+    return slot
+
+
+@ti.func
+def recall(memory: ti.template(), at, slot):
+    """The pair in a slot, and its outcome."""
+    place = _place_of(memory, at, slot)
+    return memory.integers[place], memory.integers[place + 1]
+
+
+@ti.func
+def _place_of(memory: ti.template(), at, slot):
+    return at.integers + 1 + N_ACTIONS * memory.n_states + 2 * slot
