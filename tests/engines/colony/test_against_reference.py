@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from random_rewards import put_in_force, random_rewards
 from random_worlds import random_world
+from taichi_ants.task.colony import STARTS
 
 from taichi_ants import Colony, ColonyConfig, Pheromone, TrainingConfig
 from taichi_ants.engines.colony import arrays as names
 from taichi_ants.learners.policies import random_policy
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.task.colony import STARTS
 from taichi_ants.task.constants import EMPTY
 
 # Each entry is a kernel of its own, so that there are few; all options occur in each.
