@@ -4,8 +4,8 @@ It is an oracle, not a simulator to use: every rule is written down a second tim
 reads, with a geometry of its own (tuples of cube coordinates in normal form), its own random
 streams, its own vision, observations and learners. Tests compare each step of the engines with it,
 for equality to the bit. To keep the two independent, this package imports nothing of `taichi_ants`
-but `constants`, `errors`, the types `Task` and `TrainingConfig` (with `update_weights`) and the type
-`World`, and of a world it reads only the fields (ranges, queen, foods, obstacles, trails, ants).
+but constants, errors, and the types `Task`, `TrainingConfig` (with `update_weights`) and `World`;
+of a world it reads only the fields (ranges, queen, foods, obstacles, trails, ants).
 
 - `ReferenceColony`: ants in one world, tick by tick; `Snapshot`: all of it between two ticks.
 - `train`, `rollout`: whole runs of a colony of one; `follower`: its ant before a rollout.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,7 @@ from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import STREAM_ANT, STREAM_BORN, STREAM_QUEEN
 from taichi_ants.reference.actions import carry_out, intend
 from taichi_ants.reference.homes import Homes
+from taichi_ants.reference.learners import LEARNERS
 from taichi_ants.reference.life import Queen, grow_old
 from taichi_ants.reference.observations import OBSERVATIONS
 from taichi_ants.reference.policy import choose_action
@@ -93,7 +95,8 @@ class ReferenceColony:
         self._starts = start_of(world, seed, ants, start)
         self.streams = [RandomStream(stream_state(seed, STREAM_ANT, n)) for n in range(ants)]
         self.queen = Queen(RandomStream(stream_state(seed, STREAM_QUEEN, 0)))
-        self.minds = SHARING[sharing](training, self._observation.n_states, self._slots, q_values)
+        make = partial(LEARNERS[training.learner], training, self._observation.n_states)
+        self.minds = SHARING[sharing](make, self._slots, q_values)
         self.epsilon = float(training.epsilon)
         self.episode = -1
         self.records: list[EpisodeRecord] = []

@@ -11,66 +11,38 @@ import numpy as np
 from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.reference.colony import ReferenceColony
-from taichi_ants.reference.learners import Learner
 from taichi_ants.reference.random_stream import RandomStream, stream_state
-from taichi_ants.reference.records import Pair, Transition
+from taichi_ants.reference.records import Transition
 
 if TYPE_CHECKING:
     from taichi_ants.task import Task
     from taichi_ants.worlds.world import World
 
 
-@dataclass(eq=False)
 class Run:
     """A training run, with all that is needed to go on.
 
     Attributes:
         colony: The ant and its world after the run.
         trace: Of each step, if asked for.
+        learner: The ant's learner.
+        q_values: Its Q-table; (n_states, 5), float32.
+        model: What it has seen, see `Learner`.
+        epsilon: For the next episode.
+        rng_state: State of the ant's random stream.
+        returns, steps, deliveries: Of each episode.
     """
 
-    colony: ReferenceColony
-    trace: list[Transition]
-
-    @property
-    def learner(self) -> Learner:
-        """The ant's table, and what its learner keeps besides."""
-        return self.colony.minds.tables[0]
-
-    @property
-    def q_values(self) -> np.ndarray:
-        """A copy of the Q-table; (n_states, 5), float32."""
-        return self.learner.table()
-
-    @property
-    def model(self) -> dict[Pair, Transition]:
-        """What the learner has seen, see `Learner`."""
-        return self.learner.model
-
-    @property
-    def epsilon(self) -> float:
-        """For the next episode."""
-        return self.colony.epsilon
-
-    @property
-    def rng_state(self) -> int:
-        """State of the ant's random stream."""
-        return self.colony.streams[0].state
-
-    @property
-    def returns(self) -> list[int]:
-        """Of each episode."""
-        return [record.episode_return for record in self.colony.records]
-
-    @property
-    def steps(self) -> list[int]:
-        """Of each episode."""
-        return [record.ticks for record in self.colony.records]
-
-    @property
-    def deliveries(self) -> list[int]:
-        """Of each episode."""
-        return [record.deliveries for record in self.colony.records]
+    def __init__(self, colony: ReferenceColony, trace: list[Transition]) -> None:
+        self.colony, self.trace = colony, trace
+        self.learner = colony.minds.tables[0]
+        self.q_values = self.learner.table()
+        self.model = self.learner.model
+        self.epsilon = colony.epsilon
+        self.rng_state = colony.streams[0].state
+        self.returns = [record.episode_return for record in colony.records]
+        self.steps = [record.ticks for record in colony.records]
+        self.deliveries = [record.deliveries for record in colony.records]
 
 
 def train(
@@ -104,16 +76,16 @@ def train(
     """
     if start_from is None:
         colony = ReferenceColony(world, task, config, seed, ends_at_delivery=True, sharing="own")
-        run = Run(colony, [])
+        steps = []
     else:
-        run = copy.deepcopy(start_from)
+        colony, steps = copy.deepcopy(start_from.colony), list(start_from.trace)
     for _ in range(episodes):
-        for [step] in run.colony.run_episode(max_steps):
+        for [step] in colony.run_episode(max_steps):
             if trace_tables:
-                step.q_values = run.q_values
+                step.q_values = colony.minds.tables[0].table()
             if trace:
-                run.trace.append(step)
-    return run
+                steps.append(step)
+    return Run(colony, steps)
 
 
 @dataclass(eq=False)

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.config import update_weights
-from taichi_ants.reference.learners import LEARNERS, Learner
+from taichi_ants.reference.learners import Learner
 from taichi_ants.reference.learners.dyna_q import DynaQ
 from taichi_ants.reference.random_stream import RandomStream
 from taichi_ants.reference.records import Pair, Transition
-from taichi_ants.task.constants import N_ACTIONS
 
-if TYPE_CHECKING:
-    from taichi_ants.learners.config import TrainingConfig
+# A table (n_states, 5), or None for zeros -> a learner that begins with a copy of it.
+Make = Callable[[np.ndarray | None], Learner]
 
 _ONE = 1 << 32  # TD errors are summed in units of 2**-32
 
@@ -32,19 +30,9 @@ class FixedTable:
 
     draws_next_action = False
 
-    def __init__(
-        self, config: TrainingConfig, n_states: int, slots: int, q_values: np.ndarray | None
-    ) -> None:
-        """Begin with copies of a table (n_states, 5); zeros if not given.
-
-        Raises:
-            AntsError: The learner is unknown, or has no such hyperparameter.
-        """
-        self._config, self._n_states = config, n_states
-        self.tables = [self._learner(q_values)]
-
-    def _learner(self, q_values: np.ndarray | None = None) -> Learner:
-        return LEARNERS[self._config.learner](self._config, self._n_states, q_values)
+    def __init__(self, make: Make, slots: int, q_values: np.ndarray | None) -> None:
+        """Begin with copies of a table (n_states, 5); zeros if not given."""
+        self.tables = [make(q_values)]
 
     def of(self, slot: int) -> Learner:
         """Return the learner of the ant in a slot."""
@@ -74,23 +62,21 @@ class SharedTable(FixedTable):
     target. One error alone counts as for a single ant, unrounded.
     """
 
-    def __init__(
-        self, config: TrainingConfig, n_states: int, slots: int, q_values: np.ndarray | None
-    ) -> None:
+    def __init__(self, make: Make, slots: int, q_values: np.ndarray | None) -> None:
         """See `FixedTable`.
 
         Raises:
-            AntsError: Also where the learner needs a table for itself.
+            AntsError: The learner needs a table for itself.
         """
-        super().__init__(config, n_states, slots, q_values)
+        super().__init__(make, slots, q_values)
         [self._common] = self.tables
         if not self._common.shares:
             raise AntsError(
-                f"the learner {config.learner!r} keeps a memory of its own, so ants cannot share "
-                'its table; take sharing="own".'
+                f"the learner {self._common.name!r} keeps a memory of its own, so ants cannot "
+                'share its table; take sharing="own".'
             )
         self.draws_next_action = self._common.draws_next_action
-        self._weights = update_weights(config.learning_rate, slots)
+        self._weights = update_weights(float(self._common.learning_rate), slots)
 
     def learn(
         self, steps: Sequence[Transition], streams: Sequence[RandomStream], epsilon: float
@@ -130,15 +116,13 @@ def mean_error(errors: Sequence[np.float32]) -> np.float32:
 class OwnTables(FixedTable):
     """A table for each slot, into which the ant in it learns as if alone."""
 
-    def __init__(
-        self, config: TrainingConfig, n_states: int, slots: int, q_values: np.ndarray | None
-    ) -> None:
+    def __init__(self, make: Make, slots: int, q_values: np.ndarray | None) -> None:
         """See `FixedTable`; `q_values` may also be (slots, n_states, 5)."""
-        if q_values is None:
-            q_values = np.zeros((n_states, N_ACTIONS), np.float32)
-        each = np.broadcast_to(q_values, (slots, n_states, N_ACTIONS))
-        self._config, self._n_states = config, n_states
-        self.tables = [self._learner(table) for table in each]
+        if q_values is None or q_values.ndim == 2:
+            self.tables = [make(q_values) for _ in range(slots)]
+        else:
+            self.tables = [make(table) for table in q_values]
+        self._make = make
         self.draws_next_action = self.tables[0].draws_next_action
 
     def of(self, slot: int) -> Learner:
@@ -147,7 +131,7 @@ class OwnTables(FixedTable):
 
     def born(self, slot: int) -> None:
         """Let the ant that was born into a slot begin with zeros and without memories."""
-        self.tables[slot] = self._learner()
+        self.tables[slot] = self._make(None)
 
     def learn(
         self, steps: Sequence[Transition], streams: Sequence[RandomStream], epsilon: float

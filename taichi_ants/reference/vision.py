@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from taichi_ants.reference.geometry import Cell, distance, neighbour
 from taichi_ants.reference.records import Ant
-from taichi_ants.reference.world_state import WorldState
+from taichi_ants.reference.world_state import Level, WorldState
 from taichi_ants.task.constants import (
     EMPTY,
     FOOD,
@@ -23,7 +23,7 @@ def cells_in_view(ant: Ant, turns: tuple[int, ...] = AHEAD) -> list[Cell]:
     return [neighbour(ant.cell, ant.heading + turn) for turn in turns]
 
 
-def levels_in_view(world: WorldState, ant: Ant, turns: tuple[int, ...] = AHEAD) -> list[float]:
+def levels_in_view(world: WorldState, ant: Ant, turns: tuple[int, ...] = AHEAD) -> list[Level]:
     """Return the trail that can be seen of each cell: that of empty cells; 0 of all others."""
     # A trail on food, or on the queen's cell, is not seen and does not count for the strongest.
     return [
@@ -38,7 +38,7 @@ def codes_in_view(world: WorldState, ant: Ant, turns: tuple[int, ...] = AHEAD) -
     return [_code(world, ant, cell, strongest) for cell in cells_in_view(ant, turns)]
 
 
-def _code(world: WorldState, ant: Ant, cell: Cell, strongest: float) -> int:
+def _code(world: WorldState, ant: Ant, cell: Cell, strongest: Level) -> int:
     content = world.content(cell)
     if content == (QUEEN if ant.carries else FOOD):
         return SEES_GOAL
@@ -48,7 +48,7 @@ def _code(world: WorldState, ant: Ant, cell: Cell, strongest: float) -> int:
         lures = distance(cell, world.queen) < distance(ant.cell, world.queen)
     else:
         level = world.level(cell)
-        lures = level >= 1 and 2 * level >= strongest
+        lures = bool(level >= 1 and 2 * level >= strongest)
     return SEES_LURE if lures else SEES_EMPTY
 
 

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from taichi_ants.worlds.world import World
 
 
+Level = int | np.float32  # of a trail; see `trail`
+
+
 class WorldState:
     """The state of a world that ants change, made anew for each episode.
 
@@ -41,11 +44,11 @@ class WorldState:
             return OBSTACLE
         return self.ground.get(cell, OBSTACLE)
 
-    def level(self, cell: Cell) -> int | np.float32:
+    def level(self, cell: Cell) -> Level:
         """Return the trail level of a cell now."""
         return self.trail.level(cell)
 
-    def levels(self) -> dict[Cell, int | np.float32]:
+    def levels(self) -> dict[Cell, Level]:
         """Return the trail level of every existing cell."""
         return {cell: self.trail.level(cell) for cell in self.ground}
 

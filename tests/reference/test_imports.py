@@ -16,7 +16,16 @@ ALLOWED = {
     "taichi_ants.learners.config",
     "taichi_ants.worlds.world",
 }
-OUTSIDE = {"__future__", "collections", "copy", "dataclasses", "enum", "numpy", "typing"}
+OUTSIDE = {
+    "__future__",
+    "collections",
+    "copy",
+    "dataclasses",
+    "enum",
+    "functools",
+    "numpy",
+    "typing",
+}
 RULES = {"Life", "Pheromone", "Rewards", "Task"}
 
 

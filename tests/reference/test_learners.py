@@ -174,6 +174,14 @@ def test_sarsa_lambda_by_hand():
     assert values_of(learner) == {(0, 0): 2.75, (1, 0): 2.0625, (2, 1): 4, (3, 3): 1}
 
 
+def test_sarsa_lambda_keeps_one_trace_of_a_pair():
+    learner = made("sarsa_lambda", trace_decay=0.5)
+    # 2, so 1; then 3 + 0.5 * 1 - 1 = 2.5, so 1 + 1.25 * 1, and nothing for the older trace.
+    steps = transition(0, 0, 2, 1, next_action=0), transition(0, 0, 3, 0, next_action=0)
+    assert learn(learner, *steps) == [2, 2.5]
+    assert values_of(learner) == {(0, 0): 2.25}
+
+
 def test_sarsa_lambda_scales_before_it_multiplies_by_the_trace():
     # The rate times the error first, 0.1 * 13 in float32, then times the trace 0.81 of it.
     tenth = np.float32(0.1)

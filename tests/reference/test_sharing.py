@@ -6,6 +6,7 @@ Learning rate and discount are 1/2 throughout.
 from __future__ import annotations
 
 import itertools
+from functools import partial
 
 import numpy as np
 import pytest
@@ -21,8 +22,12 @@ from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP
 from taichi_ants.worlds import World
 
 
+def maker(learner, **settings):
+    return partial(LEARNERS[learner], training(learner, **settings), 128)
+
+
 def shared(learner="q_learning", slots=8, q_values=None, **settings):
-    return SharedTable(training(learner, **settings), 128, slots, q_values)
+    return SharedTable(maker(learner, **settings), slots, q_values)
 
 
 def streams(n, state=0):
@@ -280,7 +285,7 @@ def test_a_round_sees_the_table_as_it_stood_at_its_start():
 
 
 def test_own_tables_plan_each_from_its_own_model():
-    minds = OwnTables(training("dyna_q", planning_steps=2), 128, 3, None)
+    minds = OwnTables(maker("dyna_q", planning_steps=2), 3, None)
     ants = streams(2)
     minds.learn(
         [

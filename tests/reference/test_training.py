@@ -87,7 +87,7 @@ def test_td_errors_by_delivery_setting(learner, delivery, last):
 @pytest.mark.parametrize("learner", ["q_learning", "sarsa", "expected_sarsa"])
 def test_the_table_moves_by_the_learning_rate(learner, delivery, given):
     run = train_once(training(learner), delivery)
-    expected = prepared(training()).q_values
+    expected = prepared(training()).colony.minds.tables[0].table()
     expected[12, PICK_UP] = 1 + 0.5 * 3
     expected[76, GIVE] = given  # 2 + 0.5 * 8 and 2 + 0.5 * 10
     np.testing.assert_array_equal(run.q_values, expected)

@@ -7,9 +7,9 @@ import math
 
 import numpy as np
 import pytest
-from taichi_ants.task.colony import MAX_ANTS, ColonyConfig, Pheromone
 
 from taichi_ants.errors import AntsError
+from taichi_ants.task.colony import MAX_ANTS, ColonyConfig, Pheromone
 
 
 def test_the_defaults_are_the_rules_of_the_world():

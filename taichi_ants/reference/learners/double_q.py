@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from taichi_ants.reference.learners.learner import Learner, rows_of
 from taichi_ants.reference.random_stream import RandomStream, pick
 from taichi_ants.reference.records import Transition
-
-if TYPE_CHECKING:
-    from taichi_ants.learners.config import TrainingConfig
 
 
 class DoubleQ(Learner):
@@ -19,11 +14,8 @@ class DoubleQ(Learner):
 
     shares = False
 
-    def __init__(
-        self, config: TrainingConfig, n_states: int, q_values: np.ndarray | None = None
-    ) -> None:
-        """See `Learner`; A and B begin as copies of the table."""
-        super().__init__(config, n_states, q_values)
+    def begin_run(self) -> None:
+        """Let A and B begin as copies of the table."""
         self._tables = (rows_of(self.table()), rows_of(self.table()))
 
     def learn(self, step: Transition, epsilon: float, stream: RandomStream) -> np.float32:

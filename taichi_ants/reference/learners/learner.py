@@ -24,9 +24,10 @@ class Learner:
 
     All numbers are np.float32, with one rounding per operation; the order of the operations is part
     of the rules. The simple learners say no more than `next_value`. Those with a memory of their
-    own override `learn`, and `begin` where it does not outlive an episode.
+    own override `learn`, and `begin_run` or `begin`.
 
     Attributes:
+        name: Its name.
         draws_next_action: Whether a' is drawn before the update, and executed (as SARSA does).
         shares: Whether all ants of a world can learn into one table: the update is `error` alone.
         hyperparameters: What it has besides the settings of all learners, with the usual values.
@@ -50,9 +51,10 @@ class Learner:
         Raises:
             AntsError: The learner has no hyperparameter of a name that is given.
         """
+        self.name = config.learner
         given = dict(config.hyperparameters)
         for name in given.keys() - self.hyperparameters.keys():
-            raise AntsError(f"{name!r} is no hyperparameter of the learner {config.learner!r}.")
+            raise AntsError(f"{name!r} is no hyperparameter of the learner {self.name!r}.")
         self.settings = {**self.hyperparameters, **given}
         self.learning_rate = np.float32(config.learning_rate)
         self.discount = np.float32(config.discount)
@@ -60,14 +62,18 @@ class Learner:
             q_values = np.zeros((n_states, N_ACTIONS), np.float32)
         self.rows = rows_of(q_values)
         self.model: dict[Pair, Transition] = {}
+        self.begin_run()
         self.begin()
 
     def table(self) -> np.ndarray:
         """Return a copy of the table; (n_states, 5), float32."""
         return np.array(self.rows, np.float32)
 
+    def begin_run(self) -> None:
+        """Make the memory that lives through all episodes."""
+
     def begin(self) -> None:
-        """Begin an episode."""
+        """Make the memory of an episode, at its start."""
 
     def learn(self, step: Transition, epsilon: float, stream: RandomStream) -> np.float32:
         """Learn from a transition; return its TD error.

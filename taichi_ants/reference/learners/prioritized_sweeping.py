@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from taichi_ants.reference.learners.dyna_q import DynaQ
 from taichi_ants.reference.random_stream import RandomStream
 from taichi_ants.reference.records import Pair, Transition
-
-if TYPE_CHECKING:
-    from taichi_ants.learners.config import TrainingConfig
 
 
 class PrioritizedSweeping(DynaQ):
@@ -21,11 +18,8 @@ class PrioritizedSweeping(DynaQ):
     shares = False
     hyperparameters: ClassVar[Mapping[str, float]] = {"planning_steps": 5, "threshold": 0.0001}
 
-    def __init__(
-        self, config: TrainingConfig, n_states: int, q_values: np.ndarray | None = None
-    ) -> None:
-        """See `Learner`."""
-        super().__init__(config, n_states, q_values)
+    def begin_run(self) -> None:
+        """Begin without priorities."""
         self._priorities: dict[Pair, np.float32] = {}  # in the order of the model
 
     def learn(self, step: Transition, epsilon: float, stream: RandomStream) -> np.float32:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from taichi_ants.reference.observations.observation import Observation, number
 from taichi_ants.reference.records import Ant
 from taichi_ants.reference.vision import codes_in_view, levels_in_view
-from taichi_ants.reference.world_state import WorldState
+from taichi_ants.reference.world_state import Level, WorldState
 from taichi_ants.task.constants import SEES_GOAL, SEES_LURE, SEES_OBSTACLE
 
 NOTHING, OBSTACLE, WEAK, MIDDLE, STRONG, GOAL = range(6)
@@ -28,7 +28,7 @@ def row(world: WorldState, ant: Ant) -> int:
     return number([ant.carries, *codes], 6)
 
 
-def _share(level: float, strongest: float) -> int:
+def _share(level: Level, strongest: Level) -> int:
     if level < 1:
         return NOTHING
     if level >= 2 * (strongest - level):  # two thirds
