@@ -14,6 +14,8 @@ from dataclasses import asdict, dataclass, fields, replace
 from importlib import import_module
 from typing import Any
 
+import numpy as np
+
 from taichi_ants.errors import AntsError, check_whole, shown
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.hyperparameters import Hyperparameters
@@ -38,9 +40,19 @@ class Memory:
             check_whole(f"{name} of a memory", value, 0, 2**30)
 
 
-def no_memory(settings: Hyperparameters, n_states: int) -> Memory:
+def no_memory(hyperparameters: Hyperparameters, n_states: int) -> Memory:
     """The memory of learners that have none."""
     return Memory()
+
+
+def usual_cost(hyperparameters: Hyperparameters) -> float:
+    """What a step of a learner costs that does one update after each."""
+    return 1.0
+
+
+def any_integers(integers: np.ndarray, hyperparameters: Hyperparameters, n_states: int) -> bool:
+    """What learners make sure of that do not use integers of their memory as indices."""
+    return True
 
 
 @dataclass(frozen=True)
@@ -65,6 +77,11 @@ class Learner:
         hyperparameters: What it has besides the settings of all learners: a dataclass whose fields
             `whole_number` and `number` of `taichi_ants.learners` make, all with usual values.
         memory: A function (hyperparameters, n_states) -> Memory, where a table has n_states rows.
+        sound: A function (integers, hyperparameters, n_states) -> bool: whether the integers of n
+            runs, an i32 array (n, as many or more), can be used as they are. They may come from a
+            file, and kernels believe them; so a learner whose integers are indices checks them.
+        cost: A function (hyperparameters) -> float: the time of a step of one ant, in that of
+            Q-learning. Launches of kernels are cut by it.
         summary: One line for listings.
     """
 
@@ -77,18 +94,13 @@ class Learner:
     needs_episode_end: bool = False
     hyperparameters: type[Hyperparameters] = Hyperparameters
     memory: Callable[[Any, int], Memory] = no_memory
+    sound: Callable[[np.ndarray, Any, int], bool] = any_integers
+    cost: Callable[[Any], float] = usual_cost
     summary: str = ""
 
-    def memory_for(self, config: TrainingConfig, n_states: int) -> Memory:
-        """The memory that it needs with a configuration and tables of n_states rows."""
-        settings = self.hyperparameters(**dict(config.hyperparameters))
-        memory = self.memory(settings, n_states)
-        if not isinstance(memory, Memory):
-            raise AntsError(
-                f"the memory of learner {self.name!r} is {shown(memory)}; it must be a function "
-                "of its hyperparameters and n_states that returns a Memory."
-            )
-        return memory
+    def settings(self, config: TrainingConfig) -> Hyperparameters:
+        """The hyperparameters of a configuration."""
+        return self.hyperparameters(**dict(config.hyperparameters))
 
 
 def td_learner(
