@@ -29,7 +29,7 @@ _LARGE_COLONY = 16_384  # slots from which ants, not worlds, are handed to threa
 _ANTS_PER_CHUNK = 2048
 _MOST_CHUNKS = 256
 _TICKS_BETWEEN_SORTS = 32
-_TICK_NS = 150  # of an ant, on a slow core, planning left out
+_TICK_NS = 150  # of an ant, on a slow core, by Q-learning
 _LAUNCH_SECONDS = 0.4
 
 
@@ -150,10 +150,13 @@ class Colony:
         )
         self._learner = learners.get(training.learner) if learns else None
         self.memory = Memory()
+        self._cost = 1.0  # of a tick of an ant, in that of Q-learning
         if self._learner is not None:
             _check_sharing(self._learner, sharing)
+            settings = self._learner.settings(self.training)
+            self._cost = self._learner.cost(settings)
             if sharing == "own" or self._learner.plans:
-                self.memory = self._learner.memory_for(self.training, self.task.n_states)
+                self.memory = self._learner.memory(settings, self.task.n_states)
         falls = self.task.evaporation_in_training if learns else self.task.evaporation_in_evaluation
         self.pheromone = self.task.pheromone if falls else self.task.pheromone.lasting
         self.seeds = checks.checked_seeds(seeds)
@@ -366,7 +369,7 @@ class Colony:
         if self.schedule == "by_chunk":
             return 1
         rounds = -(-len(self.seeds) // self._settings.threads)
-        cost = _TICK_NS * (1 + self.training.planning_steps)
+        cost = _TICK_NS * max(self._cost, 1 + self.training.planning_steps)
         if self.pheromone.dense:
             cost += 2 * self.layout.size / self.population.slots
         return max(1, int(_LAUNCH_SECONDS * 1e9 / (rounds * self.population.slots * cost)))
@@ -400,6 +403,7 @@ class Colony:
         variant = kernels.Variant(
             self._learner,
             self.one_a_slot,
+            self.memory.tables,
             self.task.sees,
             self.pheromone.dense,
             self.task.life.changes,
@@ -412,7 +416,7 @@ class Colony:
     def _numbers(self) -> dict[str, Any]:
         """What kernels know besides arrays; -1 stands for an option that is off."""
         life, population, pheromone = self.task.life, self.population, self.pheromone
-        owner, off = self.memory, -1
+        off = -1
         return {
             "n_worlds": len(self.seeds),
             "n_ants": population.ants,  # that start an episode
@@ -441,10 +445,8 @@ class Colony:
             "planning_steps": self.training.planning_steps,
             # So that the sum of the errors of all ants is a fixed-point number, see `learning`.
             "largest_error": 2.0**31 / (population.slots + 1),
-            # What a table, and the memory of a learner, take.
-            "table_size": (1 + owner.tables) * self.task.n_states * ROW,
-            "floats_size": owner.floats,
-            "integers_size": owner.integers,
+            "floats_size": self.memory.floats,
+            "integers_size": self.memory.integers,
         }
 
 

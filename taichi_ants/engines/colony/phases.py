@@ -31,58 +31,60 @@ from taichi_ants.engines.colony.steps import commit, grow_old, observe, resolve,
 
 @ti.func
 def ants_of(c: ti.template(), chunk):
-    """The world of a chunk, and the range of its ants."""
+    """The world of a chunk, where its cells begin, and the range of its ants.
+
+    The range is empty once the world's episode has ended.
+    """
     w = chunk // c.n_chunks
     per_chunk = (c.n_slots + c.n_chunks - 1) // c.n_chunks
     first = chunk % c.n_chunks * per_chunk
-    last = ti.min(first + per_chunk, c.worlds[WorldRow.TOP, w])
-    return w, w * c.n_slots + first, w * c.n_slots + last
+    last = ti.min(first + per_chunk, c.worlds[WorldRow.TOP, w]) * c.worlds[WorldRow.RUNNING, w]
+    return w, w * c.size, w * c.n_slots + first, w * c.n_slots + last
 
 
 @ti.func
 def begin_all(c: ti.template(), v: ti.template(), chunk):
     """The ants look around, and their learners begin an episode."""
-    w, first, last = ants_of(c, chunk)
+    w, base, first, last = ants_of(c, chunk)
     for ant in range(first, last):
-        c.ants[AntRow.PERCEPT, ant], c.ants[v.row_at, ant] = observe(c, v, w * c.size, ant, 0)
+        c.ants[AntRow.PERCEPT, ant], c.ants[v.row_at, ant] = observe(c, v, base, ant, 0)
         begin_to_learn(c, v, ant)
 
 
 @ti.func
 def choose_all(c: ti.template(), v: ti.template(), chunk):
-    w, first, last = ants_of(c, chunk)
+    w, base, first, last = ants_of(c, chunk)
     for ant in range(first, last):
-        if c.worlds[WorldRow.RUNNING, w] == 1 and c.ants[AntRow.STAGE, ant] == Stage.LIVING:
+        if c.ants[AntRow.STAGE, ant] == Stage.LIVING:
             action = c.ants[AntRow.ACTION, ant]
             if action < 0:
                 action = draw_action(c, v, w, ant, c.ants[v.row_at, ant])
-            want(c, w * c.size, ant, action)
+            want(c, base, ant, action)
 
 
 @ti.func
 def resolve_all(c: ti.template(), chunk, tick):
-    w, first, last = ants_of(c, chunk)
+    w, base, first, last = ants_of(c, chunk)
     for ant in range(first, last):
-        if c.worlds[WorldRow.RUNNING, w] == 1 and c.ants[AntRow.STAGE, ant] == Stage.LIVING:
-            resolve(c, w * c.size, ant, tick)
+        if c.ants[AntRow.STAGE, ant] == Stage.LIVING:
+            resolve(c, base, ant, tick)
 
 
 @ti.func
 def commit_all(c: ti.template(), v: ti.template(), chunk, tick):
-    w, first, last = ants_of(c, chunk)
+    w, base, first, last = ants_of(c, chunk)
     total = ti.cast(0, ti.i64)
     for ant in range(first, last):
-        if c.worlds[WorldRow.RUNNING, w] == 1 and c.ants[AntRow.STAGE, ant] == Stage.LIVING:
-            total += c.rewards[commit(c, v, w * c.size, ant, chunk, tick)]
+        if c.ants[AntRow.STAGE, ant] == Stage.LIVING:
+            total += c.rewards[commit(c, v, base, ant, chunk, tick)]
     c.returns[w] += total  # atomic, and integer: the order does not matter
 
 
 @ti.func
 def grow_old_all(c: ti.template(), chunk):
-    w, first, last = ants_of(c, chunk)
+    w, base, first, last = ants_of(c, chunk)
     for ant in range(first, last):
-        if c.worlds[WorldRow.RUNNING, w] == 1:
-            grow_old(c, w * c.size, ant, chunk)
+        grow_old(c, base, ant, chunk)
 
 
 @ti.func
@@ -108,12 +110,12 @@ def after_deaths(c: ti.template(), w, tick):
 @ti.func
 def observe_all(c: ti.template(), v: ti.template(), chunk, tick):
     """Observe, choose the next action where the learner asks for it, and learn."""
-    w, first, last = ants_of(c, chunk)
+    w, base, first, last = ants_of(c, chunk)
     clock = (tick + 1) * c.evaporates
     for ant in range(first, last):
         stage = c.ants[AntRow.STAGE, ant]
-        if c.worlds[WorldRow.RUNNING, w] == 1 and stage != Stage.VACANT:
-            percept, row = observe(c, v, w * c.size, ant, clock)
+        if stage != Stage.VACANT:
+            percept, row = observe(c, v, base, ant, clock)
             next_action = -1
             if stage != Stage.NEWBORN:
                 if ti.static(v.draws_next_action):
@@ -124,7 +126,8 @@ def observe_all(c: ti.template(), v: ti.template(), chunk, tick):
                 elif ti.static(v.together):
                     share_error(c, v, w, chunk, ant, row, next_action)
             c.ants[AntRow.PERCEPT, ant] = percept
-            c.ants[v.row_at, ant] = row
+            if ti.static(not v.sees_percept):
+                c.ants[AntRow.STATE, ant] = row
             c.ants[AntRow.ACTION, ant] = next_action
 
 
@@ -138,11 +141,10 @@ def learn_together(c: ti.template(), v: ti.template(), w):
 
 @ti.func
 def draw_all(c: ti.template(), v: ti.template(), chunk):
-    w, first, last = ants_of(c, chunk)
+    w, base, first, last = ants_of(c, chunk)
     for ant in range(first, last):
         stage = c.ants[AntRow.STAGE, ant]
-        acted = stage == Stage.LIVING or stage == Stage.DYING
-        if c.worlds[WorldRow.RUNNING, w] == 1 and acted:
+        if stage == Stage.LIVING or stage == Stage.DYING:
             draw_pair(c, v, w, chunk, ant)
 
 
@@ -156,7 +158,7 @@ def plan_together(c: ti.template(), v: ti.template(), w):
 @ti.func
 def retire_all(c: ti.template(), chunk):
     """At the end of the tick the dead leave their slots, and the newborn are ants."""
-    w, first, last = ants_of(c, chunk)
+    w, base, first, last = ants_of(c, chunk)
     for ant in range(first, last):
         if c.ants[AntRow.STAGE, ant] == Stage.NEWBORN:
             c.ants[AntRow.STAGE, ant] = Stage.LIVING
