@@ -31,21 +31,19 @@ from taichi_ants.engines.colony.steps import commit, grow_old, observe, resolve,
 
 @ti.func
 def ants_of(c: ti.template(), chunk):
-    """The world of a chunk, where its cells begin, and the range of its ants.
-
-    The range is empty once the world's episode has ended.
-    """
+    """The world of a chunk, and the range of its ants, empty once the world's episode has ended."""
     w = chunk // c.n_chunks
     per_chunk = (c.n_slots + c.n_chunks - 1) // c.n_chunks
     first = chunk % c.n_chunks * per_chunk
     last = ti.min(first + per_chunk, c.worlds[WorldRow.TOP, w]) * c.worlds[WorldRow.RUNNING, w]
-    return w, w * c.size, w * c.n_slots + first, w * c.n_slots + last
+    return w, w * c.n_slots + first, w * c.n_slots + last
 
 
 @ti.func
 def begin_all(c: ti.template(), v: ti.template(), chunk):
     """The ants look around, and their learners begin an episode."""
-    w, base, first, last = ants_of(c, chunk)
+    w, first, last = ants_of(c, chunk)
+    base = w * c.size
     for ant in range(first, last):
         c.ants[AntRow.PERCEPT, ant], c.ants[v.row_at, ant] = observe(c, v, base, ant, 0)
         begin_to_learn(c, v, ant)
@@ -53,7 +51,8 @@ def begin_all(c: ti.template(), v: ti.template(), chunk):
 
 @ti.func
 def choose_all(c: ti.template(), v: ti.template(), chunk):
-    w, base, first, last = ants_of(c, chunk)
+    w, first, last = ants_of(c, chunk)
+    base = w * c.size
     for ant in range(first, last):
         if c.ants[AntRow.STAGE, ant] == Stage.LIVING:
             action = c.ants[AntRow.ACTION, ant]
@@ -64,7 +63,8 @@ def choose_all(c: ti.template(), v: ti.template(), chunk):
 
 @ti.func
 def resolve_all(c: ti.template(), chunk, tick):
-    w, base, first, last = ants_of(c, chunk)
+    w, first, last = ants_of(c, chunk)
+    base = w * c.size
     for ant in range(first, last):
         if c.ants[AntRow.STAGE, ant] == Stage.LIVING:
             resolve(c, base, ant, tick)
@@ -72,7 +72,8 @@ def resolve_all(c: ti.template(), chunk, tick):
 
 @ti.func
 def commit_all(c: ti.template(), v: ti.template(), chunk, tick):
-    w, base, first, last = ants_of(c, chunk)
+    w, first, last = ants_of(c, chunk)
+    base = w * c.size
     total = ti.cast(0, ti.i64)
     for ant in range(first, last):
         if c.ants[AntRow.STAGE, ant] == Stage.LIVING:
@@ -82,7 +83,8 @@ def commit_all(c: ti.template(), v: ti.template(), chunk, tick):
 
 @ti.func
 def grow_old_all(c: ti.template(), chunk):
-    w, base, first, last = ants_of(c, chunk)
+    w, first, last = ants_of(c, chunk)
+    base = w * c.size
     for ant in range(first, last):
         grow_old(c, base, ant, chunk)
 
@@ -110,7 +112,8 @@ def after_deaths(c: ti.template(), w, tick):
 @ti.func
 def observe_all(c: ti.template(), v: ti.template(), chunk, tick):
     """Observe, choose the next action where the learner asks for it, and learn."""
-    w, base, first, last = ants_of(c, chunk)
+    w, first, last = ants_of(c, chunk)
+    base = w * c.size
     clock = (tick + 1) * c.evaporates
     for ant in range(first, last):
         stage = c.ants[AntRow.STAGE, ant]
@@ -141,7 +144,7 @@ def learn_together(c: ti.template(), v: ti.template(), w):
 
 @ti.func
 def draw_all(c: ti.template(), v: ti.template(), chunk):
-    w, base, first, last = ants_of(c, chunk)
+    w, first, last = ants_of(c, chunk)
     for ant in range(first, last):
         stage = c.ants[AntRow.STAGE, ant]
         if stage == Stage.LIVING or stage == Stage.DYING:
@@ -158,7 +161,7 @@ def plan_together(c: ti.template(), v: ti.template(), w):
 @ti.func
 def retire_all(c: ti.template(), chunk):
     """At the end of the tick the dead leave their slots, and the newborn are ants."""
-    w, base, first, last = ants_of(c, chunk)
+    w, first, last = ants_of(c, chunk)
     for ant in range(first, last):
         if c.ants[AntRow.STAGE, ant] == Stage.NEWBORN:
             c.ants[AntRow.STAGE, ant] = Stage.LIVING
