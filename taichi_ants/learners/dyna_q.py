@@ -43,10 +43,10 @@ def learn_and_plan(error_of):
             error_of, memory, at, rates, pair, step.reward, step.terminated, step.next_state, -1
         )
         remember(memory, at, pair, pack_outcome(step.next_state, step.reward, step.terminated))
-        rng = random_state
+        rng, n_visited = random_state, visited(memory, at)
         for _ in range(rates.planning_steps):
             rng = advance(rng)
-            drawn, seen = recall(memory, at, below(high_word(bits_of(rng)), visited(memory, at)))
+            drawn, seen = recall(memory, at, below(high_word(bits_of(rng)), n_visited))
             update(
                 error_of,
                 memory,

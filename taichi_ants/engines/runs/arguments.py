@@ -1,7 +1,8 @@
 """The arguments of the kernel of independent runs: each number and each array once.
 
 n runs of one learner with tables of n_states rows. Arrays of runs are flat, one run behind the
-other; `table_size`, `floats_size` and `integers_size` tell how much each run has of them.
+other. Each has so many tables, and so many times 8 floats and integers: then compilers know that
+addresses in a row differ in their last bits alone, which saves Dyna-Q a tenth of its time.
 """
 
 from collections.abc import Callable
@@ -41,9 +42,9 @@ FIELDS = {
     "epsilon": _F64,  # (n,) of the next episode
     "random_states": _U64,  # (n,)
     "streams": _U64,  # (n * n_episodes,): the stream of each episode without learning
-    "table_size": ti.i32,
-    "floats_size": ti.i32,
-    "integers_size": ti.i32,
+    "tables": ti.i32,
+    "floats_by_8": ti.i32,
+    "integers_by_8": ti.i32,
     "q": _F32,
     "floats": _F32,
     "integers": _I32,

@@ -140,9 +140,9 @@ class RunEngine:
             trails=world.trail_levels().astype(np.int32),
             closer=world.closer().copy(),
             compass=compass_of(world.grid),
-            table_size=runs.state.q[0].size,
-            floats_size=runs.state.floats[0].size,
-            integers_size=runs.state.integers[0].size,
+            tables=runs.state.q.shape[1],
+            floats_by_8=runs.state.floats.shape[1] // 8,
+            integers_by_8=runs.state.integers.shape[1] // 8,
         )
         return job, world.grid.size + EXTRA_CELLS
 

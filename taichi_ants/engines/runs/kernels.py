@@ -53,12 +53,13 @@ def run_kernel(
     columns = N_SETTINGS + len(fields(hyperparameters))
     row_of = row_seen(observation)
     n_states = observation.n_states
+    table = n_states * ROW
 
     @ti.func
-    def decide(a: ti.template(), table, ant, row, explore_below):
+    def decide(a: ti.template(), begin, ant, row, explore_below):
         """The ant's next action, and its stream after the draw."""
         rng = advance(ant.random_state)
-        return choose(values_of(a.q, table, row), bits_of(rng), explore_below), rng
+        return choose(values_of(a.q, begin, row), bits_of(rng), explore_below), rng
 
     @ti.func
     def record(a: ti.template(), n, episode, step, before, percept, taken, after, seen):
@@ -76,7 +77,7 @@ def run_kernel(
         ti.loop_config(block_dim=1)
         for i in range(a.n_runs):
             base, first = i * (a.size + EXTRA_CELLS), i * columns
-            at = At(i * a.table_size, i * a.floats_size, i * a.integers_size)
+            at = At(i * a.tables * table, i * a.floats_by_8 * 8, i * a.integers_by_8 * 8)
             learning_rate = ti.cast(a.settings[first + LEARNING_RATE], ti.f32)
             discount = ti.cast(a.settings[first + DISCOUNT], ti.f32)
             restore(a, base, 0, a.size - 1)
@@ -136,8 +137,8 @@ def run_kernel(
                         )
                         if ti.static(traced):
                             a.trace_errors[n_recorded] = error
-                            for k in range(n_states * ROW):
-                                a.trace_tables[n_recorded * n_states * ROW + k] = a.q[at.table + k]
+                            for k in range(table):
+                                a.trace_tables[n_recorded * table + k] = a.q[at.table + k]
                     if ti.static(traced):
                         record(a, n_recorded, episode, step, before, percept, taken, ant, seen)
                         n_recorded += 1

@@ -157,8 +157,8 @@ class TrainingResult(Record):
         forms = {
             **dict.fromkeys(OUTCOMES, ("int32", (*runs, episodes))),
             "q": ("float32", (*runs, *np.shape(self.state.q)[2:3], self.task.n_states, ROW)),
-            "floats": ("float32", (*runs, *np.shape(self.state.floats)[2:3])),
-            "integers": ("int32", (*runs, *np.shape(self.state.integers)[2:3])),
+            "floats": ("float32", (*runs, _by_8(self.state.floats))),
+            "integers": ("int32", (*runs, _by_8(self.state.integers))),
             "random_states": ("uint64", runs),
             "epsilon": ("float64", runs),
         }
@@ -191,6 +191,11 @@ class TrainingResult(Record):
                     f"the memory of a result does not go with learner {config.learner!r}, or does "
                     "not add up; leave the arrays of a result as they are."
                 )
+
+
+def _by_8(array: np.ndarray) -> int:
+    """The length of the last of three axes, down to a multiple of 8; kernels count by it."""
+    return np.shape(array)[2] // 8 * 8 if np.ndim(array) == 3 else 0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
