@@ -6,6 +6,8 @@ what all functions return and what dictionaries are keyed by.
 
 from __future__ import annotations
 
+import numpy as np
+
 from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
 
 Cell = tuple[int, int, int]
@@ -42,3 +44,8 @@ def existing_cells(ranges: tuple[int, int, int]) -> list[Cell]:
     cells |= {(x, 0, z) for x in range(size_x) for z in range(size_z)}
     cells |= {(x, y, 0) for x in range(size_x) for y in range(size_y)}
     return sorted(cells)
+
+
+def listed_cells(rows: np.ndarray) -> list[Cell]:
+    """Return the cells that a world lists; int (n, 3), each row in normal form."""
+    return [(x, y, z) for x, y, z in rows.tolist()]

@@ -5,6 +5,8 @@ A stream depends on (seed, purpose, number) alone, so no run disturbs the draws 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 _MASK_64 = 0xFFFFFFFFFFFFFFFF
 _MASK_32 = 0xFFFFFFFF
 _GAMMA = 0x9E3779B97F4A7C15
@@ -35,6 +37,7 @@ def stream_state(seed: int, purpose: int, number: int) -> int:
     return hash_of(seed, purpose, number)
 
 
+@dataclass(slots=True)
 class RandomStream:
     """A stream of draws, each of two independent 32-bit words.
 
@@ -42,8 +45,7 @@ class RandomStream:
         state: All that the stream is, in 0 .. 2**64 - 1; a stream made from it goes on from here.
     """
 
-    def __init__(self, state: int) -> None:
-        self.state = state
+    state: int
 
     def draw(self) -> tuple[int, int]:
         """Return the high and the low word of the next draw, each in 0 .. 2**32 - 1."""

@@ -1,23 +1,48 @@
-"""Whole runs of one ant: training, and rollouts of a Q-table."""
+"""Whole runs of one ant, a colony of one: training, and rollouts of a Q-table."""
 
 from __future__ import annotations
 
+import copy
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from taichi_ants.grid.constants import STREAM_ROLLOUT
-from taichi_ants.reference.episode import Episode
-from taichi_ants.reference.learning import Learning
-from taichi_ants.reference.policy import choose_action
+from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.reference.colony import ReferenceColony
 from taichi_ants.reference.random_stream import RandomStream, stream_state
-from taichi_ants.reference.records import LearningStep, Rollout, Run, Step
-from taichi_ants.reference.start import start
-from taichi_ants.task import Task
+from taichi_ants.reference.records import Transition
 
 if TYPE_CHECKING:
-    from taichi_ants.learners.config import TrainingConfig
+    from taichi_ants.task import Task
     from taichi_ants.worlds.world import World
+
+
+class Run:
+    """A training run, with all that is needed to go on.
+
+    Attributes:
+        colony: The ant and its world after the run.
+        trace: Of each step, if asked for.
+        learner: The ant's learner.
+        q_values: Its Q-table; (n_states, 5), float32.
+        model: What it has seen, see `Learner`.
+        epsilon: For the next episode.
+        rng_state: State of the ant's random stream.
+        returns, steps, deliveries: Of each episode.
+    """
+
+    def __init__(self, colony: ReferenceColony, trace: list[Transition]) -> None:
+        self.colony, self.trace = colony, trace
+        self.learner = colony.minds.tables[0]
+        self.q_values = self.learner.table()
+        self.model = self.learner.model
+        self.epsilon = colony.epsilon
+        self.rng_state = colony.streams[0].state
+        self.returns = [record.episode_return for record in colony.records]
+        self.steps = [record.ticks for record in colony.records]
+        self.deliveries = [record.deliveries for record in colony.records]
 
 
 def train(
@@ -42,75 +67,44 @@ def train(
         max_steps: An episode is truncated after so many steps, at least 1.
         task: The rules of the game; the paper's if not given.
         trace: Whether to record each step.
-        start_from: A run of the same world, configuration and seed to go on from. It is left as it
-            is; the result holds its episodes, and its trace, before the new ones.
+        start_from: A run of the same arguments to go on from. It is left as it is; the result holds
+            its episodes, and its trace, before the new ones.
         trace_tables: Whether the record of each step holds a copy of the Q-table (2.5 kB each).
 
     Raises:
-        AntsError: The learner is unknown, or `planning_steps` does not fit it; or the world has no
-            cell for the ant.
+        AntsError: See `ReferenceColony`.
     """
-    learning = Learning(config, seed, start_from)
-    task = task or Task()
-    falls, rewards = task.evaporation_in_training, task.rewards
-    absorbing = task.delivery == "absorbing"
-    [begin] = start(world, seed)
-    returns, lengths, deliveries, recorded = _history(start_from)
-    for number in range(len(returns), len(returns) + episodes):
-        episode = Episode(world, begin, learning.stream, falls, rewards, max_steps, number)
-        steps = _train_episode(episode, learning, absorbing, trace_tables)
-        learning.end_episode()
-        returns.append(sum(step.reward for step in steps))
-        lengths.append(len(steps))
-        deliveries.append(sum(step.delivered for step in steps))
-        if trace:
-            recorded += steps
-    return Run(
-        q_values=learning.table(),
-        epsilon=learning.epsilon,
-        rng_state=learning.stream.state,
-        model=learning.model,
-        returns=returns,
-        steps=lengths,
-        deliveries=deliveries,
-        trace=recorded,
-    )
+    if start_from is None:
+        colony = ReferenceColony(world, task, config, seed, ends_at_delivery=True, sharing="own")
+        steps = []
+    else:
+        colony, steps = copy.deepcopy(start_from.colony), list(start_from.trace)
+    for _ in range(episodes):
+        for [step] in colony.run_episode(max_steps):
+            if trace_tables:
+                step.q_values = colony.minds.tables[0].table()
+            if trace:
+                steps.append(step)
+    return Run(colony, steps)
 
 
-def _history(
-    run: Run | None,
-) -> tuple[list[int], list[int], list[int], list[LearningStep]]:
-    if run is None:
-        return [], [], [], []
-    return list(run.returns), list(run.steps), list(run.deliveries), list(run.trace)
+@dataclass(eq=False)
+class Rollout:
+    """One episode without learning.
 
+    Attributes:
+        episode_return: The sum of the rewards.
+        steps: The number of steps.
+        deliveries: 1 if the ant gave its food to the queen, else 0.
+        rng_state: State of the rollout's random stream at the end.
+        trace: Of each step, if asked for.
+    """
 
-def _train_episode(
-    episode: Episode, learning: Learning, absorbing: bool, trace_tables: bool
-) -> list[LearningStep]:
-    steps: list[LearningStep] = []
-    action = None
-    while not episode.over:
-        if action is None:
-            action = learning.choose(episode.state)
-        step = episode.step(action)
-        terminated = step.delivered and absorbing
-        # Where the episode ends without termination, a' is for the target only: the next episode
-        # begins with a choice of its own.
-        action = None
-        if learning.learner.draws_next_action and not terminated:
-            action = learning.choose(episode.state)
-        td_error = learning.learn(step, terminated, action)
-        steps.append(
-            LearningStep(
-                **vars(step),
-                terminated=terminated,
-                td_error=td_error,
-                rng_state=learning.stream.state,
-                q_values=learning.table() if trace_tables else None,
-            )
-        )
-    return steps
+    episode_return: int
+    steps: int
+    deliveries: int
+    rng_state: int
+    trace: list[Transition]
 
 
 def rollout(
@@ -127,7 +121,7 @@ def rollout(
 
     Args:
         world: The episode starts from it, as in `train`.
-        q_values: (128, 5), taken as float32.
+        q_values: (n_states, 5), taken as float32.
         seed: Any integer.
         number: Which rollout of the seed it is; each has a random stream of its own.
         max_steps: The episode is truncated after so many steps, at least 1.
@@ -138,20 +132,29 @@ def rollout(
     Raises:
         AntsError: The world has no cell for the ant.
     """
-    rows = [list(row) for row in np.asarray(q_values, np.float32)]
-    stream = RandomStream(stream_state(seed, STREAM_ROLLOUT, number))
-    [begin] = start(world, seed)
-    task = task or Task()
-    falls = task.evaporation_in_evaluation
-    episode = Episode(world, begin, stream, falls, task.rewards, max_steps)
-    steps: list[Step] = []
-    while not episode.over:
-        action = choose_action(rows[episode.state], epsilon, stream)
-        steps.append(episode.step(action))
+    colony = follower(world, q_values, seed, number, task, epsilon)
+    steps = [step for [step] in colony.run_episode(max_steps)]
     return Rollout(
-        episode_return=sum(step.reward for step in steps),
+        episode_return=colony.record.episode_return,
         steps=len(steps),
-        deliveries=sum(step.delivered for step in steps),
-        rng_state=stream.state,
+        deliveries=colony.record.deliveries,
+        rng_state=colony.streams[0].state,
         trace=steps if trace else [],
     )
+
+
+def follower(
+    world: World,
+    q_values: np.ndarray,
+    seed: int = 0,
+    number: int = 0,
+    task: Task | None = None,
+    epsilon: float = 0.0,
+) -> ReferenceColony:
+    """Return the ant of a rollout, before its episode; arguments as of `rollout`."""
+    training = TrainingConfig("q_learning", 1.0, 1.0, epsilon, 1.0)
+    colony = ReferenceColony(
+        world, task, training, seed, ends_at_delivery=True, sharing="fixed", q_values=q_values
+    )
+    colony.streams[0] = RandomStream(stream_state(seed, STREAM_ROLLOUT, number))
+    return colony

@@ -6,10 +6,8 @@ from typing import TYPE_CHECKING
 
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_START_CELL, STREAM_START_HEADING
-from taichi_ants.reference.geometry import Cell, distance, existing_cells
+from taichi_ants.reference.geometry import Cell, distance, existing_cells, listed_cells
 from taichi_ants.reference.random_stream import pick, stream_state
-from taichi_ants.reference.world_state import WorldState
-from taichi_ants.task.constants import EMPTY
 
 if TYPE_CHECKING:
     from taichi_ants.worlds.world import World
@@ -28,16 +26,16 @@ def start(world: World, seed: int, n: int = 1, where: str = "nest") -> list[tupl
     listed = [((x, y, z), heading) for x, y, z, heading in world.ants.tolist()]
     if n <= len(listed):
         return listed[:n]
-    state = WorldState(world, evaporation=False)
-    taken = {cell for cell, _ in listed}
+    taken = {world.queen, *listed_cells(world.foods), *listed_cells(world.obstacles)}
+    taken |= {cell for cell, _ in listed}
     free = [
         (
-            distance(cell, state.queen) if where == "nest" else 0,
+            distance(cell, world.queen) if where == "nest" else 0,
             stream_state(seed, STREAM_START_CELL, number),
             cell,
         )
-        for number, cell in enumerate(existing_cells(state.ranges))
-        if state.content(cell) == EMPTY and cell not in taken
+        for number, cell in enumerate(existing_cells(world.ranges))
+        if cell not in taken
     ]
     missing = n - len(listed)
     if missing > len(free):

@@ -1,68 +1,75 @@
-"""A world in motion: what each cell holds, the trail, and the clock."""
+"""A world in motion: the ground, who stands where, the trails."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from taichi_ants.reference.geometry import Cell, exists
-from taichi_ants.task.constants import DEPOSIT_LEVEL, EMPTY, FOOD, OBSTACLE, QUEEN
-from taichi_ants.task.rewards import Rewards
+import numpy as np
+
+from taichi_ants.reference.geometry import Cell, existing_cells, listed_cells
+from taichi_ants.reference.trail import make_trail
+from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
 if TYPE_CHECKING:
+    from taichi_ants.task import Pheromone
     from taichi_ants.worlds.world import World
+
+
+Level = int | np.float32  # of a trail; see `trail`
 
 
 class WorldState:
     """The state of a world that ants change, made anew for each episode.
 
     Attributes:
-        ranges: (X, Y, Z) of the world.
         queen: The queen's cell.
-        evaporation: Whether every trail falls by 1 per tick.
-        rewards: What each event pays.
-        clock: Ticks since the episode's start.
+        ground: What each existing cell holds, ants aside: EMPTY, OBSTACLE, FOOD or QUEEN.
+        occupied: The cells on which ants stand; they are EMPTY in `ground`.
+        trail: The trail of every cell.
     """
 
-    def __init__(self, world: World, evaporation: bool, rewards: Rewards | None = None) -> None:
-        self.ranges = world.ranges
+    def __init__(self, world: World, pheromone: Pheromone) -> None:
+        self._ranges = world.ranges
         self.queen: Cell = world.queen
-        self.evaporation = evaporation
-        self.rewards = rewards or Rewards()
-        self.clock = 0
-        # Cells that are not named here are empty, if they exist.
-        self._holds: dict[Cell, int] = {self.queen: QUEEN}
-        for x, y, z in world.foods.tolist():
-            self._holds[x, y, z] = FOOD
-        for x, y, z in world.obstacles.tolist():
-            self._holds[x, y, z] = OBSTACLE
-        # A level and the tick at which it was set: the level falls from there. The levels of the
-        # start count as set at clock 0, so the first observation sees them undiminished.
-        self._trail: dict[Cell, tuple[int, int]] = {
-            (x, y, z): (level, 0) for x, y, z, level in world.trails.tolist()
-        }
+        self.ground: dict[Cell, int] = dict.fromkeys(existing_cells(self._ranges), EMPTY)
+        self.ground[self.queen] = QUEEN
+        self.ground.update(dict.fromkeys(listed_cells(world.foods), FOOD))
+        self.ground.update(dict.fromkeys(listed_cells(world.obstacles), OBSTACLE))
+        self.occupied: set[Cell] = set()
+        self.trail = make_trail(world, pheromone)
 
     def content(self, cell: Cell) -> int:
-        """Return EMPTY, OBSTACLE, FOOD or QUEEN; a cell outside the world is an OBSTACLE."""
-        held = self._holds.get(cell)
-        if held is not None:
-            return held
-        return EMPTY if exists(cell, self.ranges) else OBSTACLE
+        """Return what a cell looks like: the ground, or an OBSTACLE where an ant stands."""
+        if cell in self.occupied:
+            return OBSTACLE
+        return self.ground.get(cell, OBSTACLE)
+
+    def level(self, cell: Cell) -> Level:
+        """Return the trail level of a cell now."""
+        return self.trail.level(cell)
+
+    def levels(self) -> dict[Cell, Level]:
+        """Return the trail level of every existing cell."""
+        return {cell: self.trail.level(cell) for cell in self.ground}
+
+    def index(self, cell: Cell) -> int:
+        """Return the number of a cell in the flat array with a border of one void cell.
+
+        The array holds q = x - z from -Z to X and r = y - z from -Z to Y, row by row (r).
+        """
+        size_x, _, size_z = self._ranges
+        x, y, z = cell
+        width = size_x + size_z + 1
+        return (y - z + size_z) * width + (x - z + size_z)
 
     def take_food(self, cell: Cell) -> None:
         """Empty a cell that holds food."""
-        if self._holds[cell] != FOOD:
+        if self.ground[cell] != FOOD:
             raise AssertionError(f"there is no food at {cell}")
-        del self._holds[cell]
+        self.ground[cell] = EMPTY
 
-    def level(self, cell: Cell) -> int:
-        """Return the trail level of a cell at this clock, 0 where there never was a trail."""
-        level, since = self._trail.get(cell, (0, 0))
-        return max(0, level - (self.clock - since)) if self.evaporation else level
-
-    def deposit(self, cell: Cell) -> None:
-        """Set (not add) the trail of a cell to the deposit level."""
-        self._trail[cell] = (DEPOSIT_LEVEL, self.clock)
-
-    def tick(self) -> None:
-        """Let one tick pass: the trails evaporate."""
-        self.clock += 1
+    def put_food(self, cell: Cell) -> None:
+        """Lay food on an empty cell."""
+        if self.content(cell) != EMPTY:
+            raise AssertionError(f"{cell} is not empty")
+        self.ground[cell] = FOOD

@@ -21,6 +21,7 @@ from taichi_ants.analysis.transitions import build_transitions
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.policies import random_policy, trail_follower
+from taichi_ants.task import Task
 from taichi_ants.worlds.paper import paper
 from taichi_ants.worlds.world import World
 
@@ -128,7 +129,13 @@ def test_no_policy_exceeds_the_bounds() -> None:
     bounds = exact_bounds(world, [0.9], 60)
     assert bounds.shortest is not None
     rollouts = [
-        reference.rollout(world, policy, number=number, max_steps=60, evaporation=False)
+        reference.rollout(
+            world,
+            policy,
+            number=number,
+            max_steps=60,
+            task=Task(evaporation_in_evaluation=False),
+        )
         for policy in (random_policy(), trail_follower())
         for number in range(40)
     ]

@@ -24,7 +24,7 @@ from command_lines import (
 )
 
 from taichi_ants import TrainingConfig, reference, worlds
-from taichi_ants.reference import learners as twins
+from taichi_ants.reference.learners.q_learning import QLearning
 
 LONG = [
     *("--seeds", 4, "--episodes", 500, "--learners", "q_learning", "dyna_q"),
@@ -254,9 +254,10 @@ register(Learner("hysteretic", td_error, summary="slow to believe bad news"))
 """
 
 
-def hysteretic_twin(value, reward, discount, next_values, next_action, epsilon):
-    error = (reward + discount * max(next_values)) - value
-    return error * np.float32(0.25) if error < 0 else error
+class Hysteretic(QLearning):
+    def error(self, step, epsilon):
+        error = super().error(step, epsilon)
+        return error * np.float32(0.25) if error < 0 else error
 
 
 def test_a_learner_from_a_file_of_ones_own(kernels, tmp_path, monkeypatch):
@@ -269,8 +270,7 @@ def test_a_learner_from_a_file_of_ones_own(kernels, tmp_path, monkeypatch):
     assert (done.returncode, done.stderr) == (0, "")
     assert "hysteretic" in done.stdout
 
-    monkeypatch.setattr(twins, "_learners", dict(twins._learners))
-    twins.register("hysteretic", hysteretic_twin)
+    monkeypatch.setitem(reference.LEARNERS, "hysteretic", Hysteretic)
     with np.load(tmp_path / "out" / "episodes.npz") as archive:
         for row, name in enumerate(("hysteretic", "q_learning")):
             config = TrainingConfig(name, 0.1, 0.9, 0.3, 0.9)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 import taichi as ti
@@ -17,7 +19,8 @@ from taichi_ants import (
     train,
 )
 from taichi_ants.learners import Learner, registry
-from taichi_ants.reference import learners as twins
+from taichi_ants.reference.learners.sarsa import Sarsa
+from taichi_ants.task import Task
 from taichi_ants.worlds import paper
 
 DELIVERIES = ("absorbing", "continuing")
@@ -34,9 +37,9 @@ def clipped_td_error(value, reward, discount, next_values, next_action, epsilon)
     return ti.max(ti.min(error, 2.0), -2.0)
 
 
-def clipped_twin(value, reward, discount, next_values, next_action, epsilon):
-    error = (reward + discount * next_values[next_action]) - value
-    return max(min(error, np.float32(2)), np.float32(-2))
+class ClippedSarsa(Sarsa):
+    def error(self, step, epsilon):
+        return max(min(super().error(step, epsilon), np.float32(2)), np.float32(-2))
 
 
 CLIPPED = Learner("clipped_sarsa", clipped_td_error, draws_next_action=True)
@@ -46,21 +49,17 @@ CLIPPED = Learner("clipped_sarsa", clipped_td_error, draws_next_action=True)
 def _clipped_sarsa(monkeypatch):
     """A learner from outside of the package, known during these tests only."""
     monkeypatch.setattr(registry, "_LEARNERS", dict(registry._LEARNERS))
-    monkeypatch.setattr(twins, "_learners", dict(twins._learners))
     learners.register(CLIPPED)
-    twins.register("clipped_sarsa", clipped_twin, draws_next_action=True)
+    monkeypatch.setitem(reference.LEARNERS, "clipped_sarsa", ClippedSarsa)
 
 
 NAMES = (*learners.names(), "clipped_sarsa")
 
 
-def config_for(name, delivery="absorbing", **changes):
-    planning_steps = 3 if learners.get(name).plans else 0
-    settings = {
-        **{"learning_rate": 0.1, "discount": 0.9, "epsilon": 0.3, "epsilon_decay": 0.97},
-        **{"planning_steps": planning_steps, "delivery": delivery, **changes},
-    }
-    return TrainingConfig(name, **settings)
+def config_for(name, **changes):
+    settings = {"learning_rate": 0.1, "discount": 0.9, "epsilon": 0.3, "epsilon_decay": 0.97}
+    hyperparameters = {"planning_steps": 3} if learners.get(name).plans else {}
+    return TrainingConfig(name, **{**settings, **hyperparameters, **changes})
 
 
 def test_the_registry_lists_them():
@@ -71,10 +70,12 @@ def test_the_registry_lists_them():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_it_has_a_twin_in_the_reference(name):
-    assert name in reference.learner_names()
-    learner, twin = learners.get(name), reference.learner_named(name)
+    learner, twin = learners.get(name), reference.LEARNERS[name]
     assert learner.name == name
-    assert (learner.plans, learner.draws_next_action) == (twin.plans, twin.draws_next_action)
+    assert learner.draws_next_action == twin.draws_next_action
+    assert (learner.td_error is not None) == twin.shares
+    usual = {field.name: field.default for field in fields(learner.hyperparameters)}
+    assert usual == twin.hyperparameters
 
 
 @pytest.mark.parametrize("delivery", DELIVERIES)
@@ -84,11 +85,10 @@ def test_it_equals_its_twin_in_every_step(name, delivery):
     steps = deliveries = 0
     for seed in range(12):
         world = random_world(seed + 200)
-        config = config_for(name, delivery, learning_rate=0.37, discount=0.99, epsilon=0.2)
-        ours = trace_training(world, config, seed, 3, 30, seed % 2 == 0)
-        plain = reference.train(
-            world, config, seed, 3, 30, seed % 2 == 0, trace=True, trace_tables=True
-        )
+        config = config_for(name, learning_rate=0.37, discount=0.99, epsilon=0.2)
+        task = Task(delivery=delivery, evaporation_in_training=seed % 2 == 0)
+        ours = trace_training(world, config, seed, 3, 30, task)
+        plain = reference.train(world, config, seed, 3, 30, task, trace=True, trace_tables=True)
         assert len(ours) == len(plain.trace)
         for k, step in enumerate(plain.trace):
             assert (ours.states[k], ours.actions[k]) == (step.state, step.action)
@@ -96,7 +96,7 @@ def test_it_equals_its_twin_in_every_step(name, delivery):
             assert ours.terminated[k] == step.terminated
             assert ours.td_errors[k] == step.td_error
             assert np.array_equal(ours.tables[k], step.q_values)
-        result = train(world, config, seed, 3, 30, seed % 2 == 0)
+        result = train(world, config, seed, 3, 30, task)
         assert result.returns[0, 0].tolist() == plain.returns
         assert np.array_equal(result.q_values[0, 0], plain.q_values)
         steps += len(ours)
@@ -108,8 +108,8 @@ def test_it_equals_its_twin_in_every_step(name, delivery):
 @pytest.mark.parametrize("delivery", DELIVERIES)
 @pytest.mark.parametrize("name", NAMES)
 def test_it_learns_to_deliver_in_the_papers_world(name, delivery):
-    config = config_for(name, delivery)
-    result = train(paper(), config, range(10), 400, 600)
+    config = config_for(name)
+    result = train(paper(), config, range(10), 400, 600, Task(delivery=delivery))
     assert np.isfinite(result.q_values).all()
     late, early = result.steps[0, :, -50:], result.steps[0, :, :3]
     assert late.mean() < early.mean() / 2
@@ -132,7 +132,7 @@ def test_a_taken_name_is_refused(name):
     with pytest.raises(AntsError, match=f"'{name}' exists already"):
         learners.register(Learner(name, clipped_td_error))
     with pytest.raises(AntsError, match=f"'{name}' already"):
-        twins.register(name, clipped_twin)
+        reference.LEARNERS.register(name, ClippedSarsa)
 
 
 def plain_function(value, reward, discount, next_values, next_action, epsilon):

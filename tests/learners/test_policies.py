@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from taichi_ants import reference
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.policies import load_policy, random_policy, save_policy, trail_follower
+from taichi_ants.task import Task
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, N_STATES, PICK_UP, RIGHT
 from taichi_ants.task.states import parse_state
 from taichi_ants.worlds.open_world import open_world
@@ -73,7 +74,8 @@ def test_the_trail_follower_only_does_what_succeeds_except_in_a_dead_end() -> No
 def test_the_trail_follower_takes_the_shortest_way_in_the_world_of_the_paper(
     evaporation: bool,
 ) -> None:
-    rollout = reference.rollout(paper(), trail_follower(), evaporation=evaporation)
+    task = Task(evaporation_in_evaluation=evaporation)
+    rollout = reference.rollout(paper(), trail_follower(), task=task)
     assert (rollout.episode_return, rollout.steps, rollout.deliveries) == (45, 34, 1)
 
 

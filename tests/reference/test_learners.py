@@ -1,44 +1,65 @@
-"""The TD errors and the policy of the reference, against values worked out by hand."""
+"""The learners and the policy of the reference, against values worked out by hand.
+
+Learning rate and discount are 1/2, unless a test says otherwise, so that all values are exact.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from colonies import GAMMA, training
+from transitions import transition
 
 from taichi_ants.errors import AntsError
-from taichi_ants.reference import (
-    RandomStream,
-    choose_action,
-    learner_named,
-    learner_names,
-    learners,
-    register,
-)
+from taichi_ants.reference import LEARNERS, RandomStream, choose_action
 
-GAMMA = 0x9E3779B97F4A7C15
+BY_ERROR = [name for name in LEARNERS if LEARNERS[name].shares]
 
 
-def td_error(name, value, reward, discount, next_values, next_action=-1, epsilon=0.0):
-    result = learner_named(name).td_error(
-        np.float32(value),
-        np.float32(reward),
-        np.float32(discount),
-        [np.float32(number) for number in next_values],
-        next_action,
-        np.float32(epsilon),
-    )
+def made(name, values=(), n_states=5, **settings):
+    """A learner whose table holds these values, {(state, action): value}, and zeros."""
+    q_values = np.zeros((n_states, 5), np.float32)
+    for pair, value in dict(values).items():
+        q_values[pair] = value
+    return LEARNERS[name](training(name, **settings), n_states, q_values)
+
+
+def learn(learner, *steps, rng_state=0):
+    """The TD errors of these steps."""
+    stream = RandomStream(rng_state)
+    errors = [learner.learn(step, 0.0, stream) for step in steps]
+    assert all(type(error) is np.float32 for error in errors)
+    return errors
+
+
+def values_of(learner):
+    """The values that are not zero, by state and action."""
+    table = learner.table()
+    return {(int(s), int(a)): float(table[s, a]) for s, a in np.argwhere(table)}
+
+
+def td_error(name, value, reward, discount, next_values, next_action=0, epsilon=0.0):
+    values = {(0, 2): value, **{(1, action): one for action, one in enumerate(next_values)}}
+    step = transition(0, 2, reward, 1, next_action=next_action)
+    result = made(name, values, discount=discount).error(step, epsilon)
     assert type(result) is np.float32
     return float(result)
 
 
-def test_the_four_learners():
-    assert learner_names() == ("q_learning", "sarsa", "expected_sarsa", "dyna_q")
-    drawing = [name for name in learner_names() if learner_named(name).draws_next_action]
-    planning = [name for name in learner_names() if learner_named(name).plans]
-    assert (drawing, planning) == (["sarsa"], ["dyna_q"])
+def test_what_the_learners_need():
+    drawing = [name for name in LEARNERS if LEARNERS[name].draws_next_action]
+    assert BY_ERROR == ["q_learning", "sarsa", "expected_sarsa", "dyna_q"]
+    assert drawing == ["sarsa", "sarsa_lambda", "n_step_sarsa"]
+    usual = {name: dict(LEARNERS[name].hyperparameters) for name in LEARNERS}
+    assert {name: settings for name, settings in usual.items() if settings} == {
+        "dyna_q": {"planning_steps": 5},
+        "sarsa_lambda": {"trace_decay": 0.9, "trace_length": 32},
+        "n_step_sarsa": {"n_steps": 4},
+        "prioritized_sweeping": {"planning_steps": 5, "threshold": 0.0001},
+    }
 
 
-@pytest.mark.parametrize("name", ["q_learning", "dyna_q"])
+@pytest.mark.parametrize("name", ["q_learning", "dyna_q", "prioritized_sweeping"])
 def test_q_learning_bootstraps_from_the_best(name):
     # 1 + 0.5 * 4 - 0.5
     assert td_error(name, 0.5, 1, 0.5, (2, -1, 4, 0, 0)) == 2.5
@@ -46,10 +67,11 @@ def test_q_learning_bootstraps_from_the_best(name):
     assert td_error(name, 0.5, 0, 0.5, (-2, -1, -4, -8, -1)) == -1.0
 
 
-def test_sarsa_bootstraps_from_the_next_action():
+@pytest.mark.parametrize("name", ["sarsa", "sarsa_lambda", "n_step_sarsa"])
+def test_sarsa_bootstraps_from_the_next_action(name):
     # 1 + 0.5 * 2 - 0.5 and 1 + 0.5 * (-1) - 0.5
-    assert td_error("sarsa", 0.5, 1, 0.5, (2, -1, 4, 0, 0), next_action=0) == 1.5
-    assert td_error("sarsa", 0.5, 1, 0.5, (2, -1, 4, 0, 0), next_action=1) == 0.0
+    assert td_error(name, 0.5, 1, 0.5, (2, -1, 4, 0, 0), next_action=0) == 1.5
+    assert td_error(name, 0.5, 1, 0.5, (2, -1, 4, 0, 0), next_action=1) == 0.0
 
 
 def test_expected_sarsa_mixes_best_and_mean():
@@ -60,17 +82,25 @@ def test_expected_sarsa_mixes_best_and_mean():
     assert td_error("expected_sarsa", 0.5, 1, 0.5, (2, -1, 4, 0, 0), epsilon=1.0) == 1.0
 
 
-@pytest.mark.parametrize("name", learner_names())
-def test_discount_zero_leaves_the_reward(name):
-    # 10 - 0.5, whatever the next values are.
-    assert td_error(name, 0.5, 10, 0.0, (2, -1, 4, 0, 0), epsilon=0.5) == 9.5
+@pytest.mark.parametrize("name", LEARNERS)
+def test_a_terminal_step_leaves_the_reward(name):
+    # 10 - 0.5, whatever the next values are; and with rate 1/2 half of it is learnt.
+    learner = made(name, {(0, 2): 0.5, (1, 0): 4, (1, 1): -8}, **planning(name, 1))
+    [error] = learn(learner, transition(0, 2, 10, 1, terminated=True))
+    assert error == 9.5
+    expected = {"dyna_q": 7.625, "double_q": 2.875}.get(name, 5.25)
+    assert learner.rows[0][2] == expected
 
 
-@pytest.mark.parametrize("name", learner_names())
+def planning(name, steps):
+    return {"planning_steps": steps} if "planning_steps" in LEARNERS[name].hyperparameters else {}
+
+
+@pytest.mark.parametrize("name", BY_ERROR)
 def test_the_target_is_rounded_before_the_value_is_subtracted(name):
     # In float32 1 + 2**24 is 2**24, so the difference is 0; any other order gives 1.
     big = 2.0**24
-    assert td_error(name, big, 1, 1, (big,) * 5, next_action=0) == 0.0
+    assert td_error(name, big, 1, 1, (big,) * 5) == 0.0
 
 
 def test_the_mean_is_summed_from_left_to_right():
@@ -89,18 +119,199 @@ def test_the_mean_is_a_product_with_a_fifth():
     assert result == -15099495 / 2**23
 
 
-def test_a_name_is_registered_once(monkeypatch):
-    monkeypatch.setattr(learners, "_learners", dict(learners._learners))
-    register("mine", learner_named("sarsa").td_error, draws_next_action=True)
-    assert learner_named("mine").draws_next_action
-    assert not learner_named("mine").plans
-    with pytest.raises(AntsError, match="mine"):
-        register("mine", learner_named("sarsa").td_error)
+# The first draw from state 0 is 0xE220A839 (0.883 of the range), so table B is updated; from state
+# GAMMA it is 0x6E789E6A (0.432), so it is A.
+TO_A, TO_B = GAMMA, 0
 
 
-def test_an_unknown_name_is_refused():
+def test_double_q_by_hand():
+    learner = made("double_q", {(0, 1): 1, (1, 0): 2, (1, 1): 4, (1, 2): 3})
+    # B: best of state 1 is action 1, in A worth 4: 3 + 0.5 * 4 - 1 = 4. B(0, 1) = 3; mean 2.
+    assert learn(learner, transition(0, 1, 3, 1), rng_state=TO_B) == [4]
+    assert learner.rows[0][1] == 2
+    # A: best of state 0 is action 1, in B worth 3: -4 + 1.5 - 4 = -6.5. A(1, 1) = 0.75; mean 2.375.
+    assert learn(learner, transition(1, 1, -4, 0), rng_state=TO_A) == [-6.5]
+    assert learner.rows[1][1] == 2.375
+    # A: its best of state 1 is now action 2, in B worth 3: 3 + 1.5 - 1 = 3.5. A(0, 1) = 2.75; mean
+    # (2.75 + 3) / 2. (Chosen in B, it would be action 1, worth 0.75 in A.)
+    assert learn(learner, transition(0, 1, 3, 1), rng_state=TO_A) == [3.5]
+    assert values_of(learner) == {(0, 1): 2.875, (1, 0): 2, (1, 1): 2.375, (1, 2): 3}
+
+
+def test_double_q_takes_the_first_of_the_best_actions():
+    learner = made("double_q", {(1, 1): 4, (1, 2): 4})
+    # A(1, 1) = 4 + 0.5 * (0 - 4) = 2: ended.
+    learn(learner, transition(1, 1, 0, 0, terminated=True), rng_state=TO_A)
+    # B has a tie of actions 1 and 2; in A they are worth 2 and 4.
+    assert learn(learner, transition(0, 0, 0, 1), rng_state=TO_B) == [1]
+
+
+def test_double_q_makes_one_draw_a_step():
+    stream = RandomStream(0)
+    made("double_q").learn(transition(0, 0, 1, 1), 0.0, stream)
+    assert stream.state == GAMMA
+
+
+def test_sarsa_lambda_by_hand():
+    # Traces fade by discount * decay = 1/4; two of them are kept.
+    learner = made("sarsa_lambda", {(1, 0): 4}, trace_decay=0.5, trace_length=2)
+    # 2 + 0.5 * 4 - 0 = 4; Q(0, 0) = 0 + 2 * 1.
+    assert learn(learner, transition(0, 0, 2, 1, next_action=0)) == [4]
+    assert values_of(learner) == {(0, 0): 2, (1, 0): 4}
+    # 0 + 0 - 4; Q(1, 0) = 4 - 2 * 1, Q(0, 0) = 2 - 2 * 1/4.
+    assert learn(learner, transition(1, 0, 0, 2, next_action=1)) == [-4]
+    assert values_of(learner) == {(0, 0): 1.5, (1, 0): 2}
+    # 1 + 0.5 * 2 - 1.5 = 0.5. The old trace of (0, 0) is replaced, not added to: Q(0, 0) = 1.5 +
+    # 0.25 * 1, Q(1, 0) = 2 + 0.25 * 1/4.
+    assert learn(learner, transition(0, 0, 1, 1, next_action=0)) == [0.5]
+    assert values_of(learner) == {(0, 0): 1.75, (1, 0): 2.0625}
+    # Ended: 8 - 0. The trace of (0, 0) fades all the same; that of (1, 0) is pushed out.
+    assert learn(learner, transition(2, 1, 8, 3, terminated=True)) == [8]
+    assert values_of(learner) == {(0, 0): 2.75, (1, 0): 2.0625, (2, 1): 4}
+    learner.begin()
+    # 2 + 0 - 0, of this pair alone.
+    assert learn(learner, transition(3, 3, 2, 4, next_action=0)) == [2]
+    assert values_of(learner) == {(0, 0): 2.75, (1, 0): 2.0625, (2, 1): 4, (3, 3): 1}
+
+
+def test_sarsa_lambda_keeps_one_trace_of_a_pair():
+    learner = made("sarsa_lambda", trace_decay=0.5)
+    # 2, so 1; then 3 + 0.5 * 1 - 1 = 2.5, so 1 + 1.25 * 1, and nothing for the older trace.
+    steps = transition(0, 0, 2, 1, next_action=0), transition(0, 0, 3, 0, next_action=0)
+    assert learn(learner, *steps) == [2, 2.5]
+    assert values_of(learner) == {(0, 0): 2.25}
+
+
+def test_sarsa_lambda_scales_before_it_multiplies_by_the_trace():
+    # The rate times the error first, 0.1 * 13 in float32, then times the trace 0.81 of it.
+    tenth = np.float32(0.1)
+    learner = made("sarsa_lambda", learning_rate=0.1, discount=0.9)
+    learn(learner, transition(0, 0, 0, 1, next_action=0), transition(1, 0, 13, 2, next_action=0))
+    trace = np.float32(1) * (np.float32(0.9) * np.float32(0.9))
+    assert learner.rows[0][0] == (tenth * np.float32(13)) * trace
+    assert learner.rows[0][0] != tenth * (np.float32(13) * trace)
+
+
+def test_n_step_sarsa_by_hand():
+    learner = made("n_step_sarsa", {(1, 0): 4, (2, 1): 8}, n_steps=2)
+    # 2 + 0.5 * 4 - 0: the error of one step; nothing is learnt yet.
+    assert learn(learner, transition(0, 0, 2, 1, next_action=0)) == [4]
+    assert values_of(learner) == {(1, 0): 4, (2, 1): 8}
+    # 4 + 0.5 * 8 - 4. The target of (0, 0) is 2 + 0.5 * (4 + 0.5 * 8) = 6.
+    assert learn(learner, transition(1, 0, 4, 2, next_action=1)) == [4]
+    assert values_of(learner) == {(0, 0): 3, (1, 0): 4, (2, 1): 8}
+    # Ended: 10 - 8. The target of (1, 0) is 4 + 0.5 * 10 = 9, that of (2, 1) is 10.
+    assert learn(learner, transition(2, 1, 10, 3, terminated=True)) == [2]
+    assert values_of(learner) == {(0, 0): 3, (1, 0): 6.5, (2, 1): 9}
+
+
+def test_n_step_sarsa_learns_what_is_left_where_the_episode_is_truncated():
+    learner = made("n_step_sarsa", {(0, 0): 8}, n_steps=3)
+    learn(learner, transition(0, 0, 0, 1, next_action=0))
+    # The target of (0, 0) is 0.5 * 0.5 * 8 = 2, so 5. That of (1, 0) is read after this: 0.5 * 5.
+    learn(learner, transition(1, 0, 0, 0, next_action=0, truncated=True))
+    assert values_of(learner) == {(0, 0): 5, (1, 0): 1.25}
+    # Nothing waits: the next step is the first of three.
+    learn(learner, transition(2, 0, 9, 3, next_action=0))
+    assert values_of(learner) == {(0, 0): 5, (1, 0): 1.25}
+
+
+def test_n_step_sarsa_of_one_step_is_sarsa():
+    steps = [
+        transition(0, 0, 3, 1, next_action=2),
+        transition(1, 2, -1, 0, next_action=0),
+        transition(0, 0, 10, 2, terminated=True),
+    ]
+    several, one = made("n_step_sarsa", n_steps=1), made("sarsa")
+    assert learn(several, *steps) == learn(one, *steps)
+    assert several.rows == one.rows
+
+
+def test_prioritized_sweeping_by_hand():
+    learner = made("prioritized_sweeping", planning_steps=2, threshold=1.0)
+    # No error, so nothing to plan.
+    assert learn(learner, transition(0, 0, 0, 1)) == [0]
+    assert values_of(learner) == {}
+    # Error 8. First (1, 0): 0 + 0.5 * 8. (0, 0) leads to state 1, its error is now 0.5 * 4 = 2, so
+    # it is next: 0 + 0.5 * 2.
+    assert learn(learner, transition(1, 0, 8, 2)) == [8]
+    assert values_of(learner) == {(0, 0): 1, (1, 0): 4}
+    # Ended: 16. First (2, 0) = 8. (1, 0) leads there, error 8 + 0.5 * 8 - 4 = 8: 4 + 0.5 * 8.
+    # (0, 0) has the error 0.5 * 8 - 1 = 3, but there are two updates a step.
+    assert learn(learner, transition(2, 0, 16, 3, terminated=True)) == [16]
+    assert values_of(learner) == {(0, 0): 1, (1, 0): 8, (2, 0): 8}
+    # It is there still in the next step, itself without an error: 1 + 0.5 * 3.
+    assert learn(learner, transition(3, 0, 0, 4)) == [0]
+    assert values_of(learner) == {(0, 0): 2.5, (1, 0): 8, (2, 0): 8}
+
+
+def test_prioritized_sweeping_goes_on_from_errors_above_the_threshold_alone():
+    # (0, 0) gets an error of 0.5 * 4 = 2 by the update of (1, 0).
+    for threshold, value in ((1.75, 1), (2.0, 0)):
+        learner = made("prioritized_sweeping", planning_steps=2, threshold=threshold)
+        learn(learner, transition(0, 0, 0, 1), transition(1, 0, 8, 2))
+        assert learner.rows[0][0] == value
+
+
+def test_prioritized_sweeping_follows_no_pair_back_from_where_it_ended():
+    # (0, 0) leads to state 1 too, but ended there: its value is 0.5 * 4, and stays.
+    learner = made("prioritized_sweeping", planning_steps=3, threshold=0.0)
+    learn(learner, transition(0, 0, 4, 1, terminated=True))
+    before = learner.rows[0][0]
+    assert before == 2  # an error of 2 is left, but nothing has led to it
+    learn(learner, transition(1, 0, 8, 2))
+    assert learner.rows[0][0] == before
+
+
+def test_prioritized_sweeping_takes_the_first_visited_of_equal_priorities():
+    # Both get the error 2 by the update of (2, 0), which is the first of two.
+    learner = made("prioritized_sweeping", planning_steps=2, threshold=0.5)
+    learn(learner, transition(1, 0, 0, 2), transition(0, 0, 0, 2), transition(2, 0, 8, 3))
+    assert values_of(learner) == {(1, 0): 1, (2, 0): 4}
+
+
+def test_prioritized_sweeping_forgets_an_old_priority_where_the_pair_is_seen_again():
+    learner = made("prioritized_sweeping", planning_steps=1, threshold=0.5)
+    learn(learner, transition(0, 0, 0, 1), transition(3, 0, 0, 1))
+    # (1, 0): error 8, so 4; (0, 0) and (3, 0) wait with 0.5 * 4 = 2.
+    learn(learner, transition(1, 0, 8, 2))
+    # (0, 0) again, with the reward -1: error -1 + 2 = 1. So (3, 0) is first: 0 + 0.5 * 2.
+    learn(learner, transition(0, 0, -1, 1))
+    assert values_of(learner) == {(1, 0): 4, (3, 0): 1}
+
+
+def test_prioritized_sweeping_keeps_a_larger_priority_where_a_next_value_changes():
+    learner = made("prioritized_sweeping", planning_steps=1, threshold=0.5)
+    learn(learner, transition(0, 0, 0, 1), transition(3, 0, 0, 1))
+    # (1, 0): error 40, so 20; (0, 0) and (3, 0) wait with 10.
+    learn(learner, transition(1, 0, 40, 2, terminated=True))
+    # (0, 0) with the reward -4: error 6. (3, 0) is updated: 5.
+    learn(learner, transition(0, 0, -4, 1))
+    # (1, 0): error 6 - 20 = -14, so 13. The error of (0, 0) is now -4 + 6.5 = 2.5; it keeps its 6.
+    learn(learner, transition(1, 0, 6, 2, terminated=True))
+    assert values_of(learner) == {(1, 0): 13, (3, 0): 5}
+    # So it comes before (2, 0) with an error of 4.
+    learn(learner, transition(2, 0, 4, 4))
+    assert values_of(learner) == {(0, 0): 1.25, (1, 0): 13, (3, 0): 5}
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+def test_the_table_given_is_left_as_it_is(name):
+    q_values = np.ones((5, 5), np.float32)
+    learner = LEARNERS[name](training(name), 5, q_values)
+    learn(learner, transition(0, 0, 9, 1, next_action=0, truncated=True))
+    assert learner.rows[0][0] != 1
+    assert (q_values == 1).all()
+    assert learner.table().dtype == np.float32
+
+
+def test_names():
     with pytest.raises(AntsError, match=r"'q_lerning'.*q_learning, sarsa"):
-        learner_named("q_lerning")
+        LEARNERS["q_lerning"]
+    with pytest.raises(AntsError, match="'sarsa' already"):
+        LEARNERS.register("sarsa", LEARNERS["sarsa"])
+    with pytest.raises(AntsError, match="'n_steps'"):
+        made("sarsa", n_steps=3)
 
 
 # The first draw from state 0 is 0xE220A839 (0.883 of the range), 0x7B1DCDAF (0.481); from state

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.reference import Ant, WorldState, existing_cells, observe, train
+from taichi_ants.task import Pheromone, Task
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.worlds.world import World
 
@@ -48,7 +49,7 @@ def worlds(draw) -> World:
 
 def states_everywhere(world: World) -> set[int]:
     """What ants see from each free cell in each heading, with and without food."""
-    state = WorldState(world, evaporation=True)
+    state = WorldState(world, Pheromone())
     free = [cell for cell in existing_cells(world.ranges) if state.content(cell) == EMPTY]
     places = itertools.product(free, range(6), (False, True))
     return {observe(state, Ant(*place)) for place in places}
@@ -64,7 +65,8 @@ def test_no_other_state_is_seen_anywhere(world):
 @settings(max_examples=40, deadline=None)
 def test_no_other_state_is_met_in_training(world, seed, evaporation):
     config = TrainingConfig("sarsa", 0.5, 0.9, 0.8, 1.0)
-    run = train(world, config, seed, 3, 40, evaporation, trace=True)
+    task = Task(evaporation_in_training=evaporation)
+    run = train(world, config, seed, 3, 40, task, trace=True)
     met = {step.state for step in run.trace} | {step.next_state for step in run.trace}
     assert met <= REACHABLE
     untouched = [state for state in range(128) if state not in met]
@@ -86,6 +88,6 @@ def test_all_hundred_can_be_seen():
             obstacles=[cell for cell, what in held.items() if what == "o"],
             trails=[(cell, 9) for cell, what in held.items() if what == "t"],
         )
-        state = WorldState(world, evaporation=False)
+        state = WorldState(world, Pheromone())
         seen |= {observe(state, Ant((0, 0, 0), 1, carries)) for carries in (False, True)}
     assert seen == REACHABLE

@@ -9,6 +9,7 @@ from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import STREAM_START_CELL, STREAM_START_HEADING
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.reference import distance, normal_form, rollout, start, stream_state, train
+from taichi_ants.task import Task
 from taichi_ants.task.constants import FORWARD, GIVE, PICK_UP
 from taichi_ants.worlds.world import World
 
@@ -36,7 +37,8 @@ def followers_policy():
 @pytest.mark.parametrize("evaporation", [True, False])
 def test_along_the_papers_trail(evaporation):
     # 16 moves from (0, 8, 8) to (8, 0, 0) at +1, +3, 16 moves back at +1, +10.
-    played = rollout(PAPER, followers_policy(), evaporation=evaporation)
+    task = Task(evaporation_in_evaluation=evaporation)
+    played = rollout(PAPER, followers_policy(), task=task)
     assert (played.episode_return, played.steps, played.deliveries) == (45, 34, 1)
     assert [step.cell for step in played.trace[:17]] == [normal_form(i, 0, 0) for i in range(-8, 9)]
     assert [step.cell for step in played.trace[17:]] == [
@@ -61,7 +63,8 @@ def test_the_first_observation_sees_the_trail_undiminished(evaporation, then):
     world = World((5, 5, 5), (0, 0, 4), trails=[((1, 1, 0), 1)], ants=[((0, 0, 0), 1)])
     q_values = np.zeros((128, 5), np.float32)
     q_values[8, GIVE] = 1
-    [step] = rollout(world, q_values, max_steps=1, evaporation=evaporation).trace
+    task = Task(evaporation_in_evaluation=evaporation)
+    [step] = rollout(world, q_values, max_steps=1, task=task).trace
     assert (step.state, step.next_state) == (8, then)
 
 
@@ -69,9 +72,10 @@ def test_the_first_observation_sees_the_trail_undiminished(evaporation, then):
 def test_training_can_evaporate_too(evaporation):
     world = World((5, 5, 5), (0, 0, 4), trails=[((1, 1, 0), 1)], ants=[((0, 0, 0), 1)])
     config = TrainingConfig("q_learning", 0.1, 0.9, 1.0, 1.0)
+    task = Task(evaporation_in_training=evaporation)
     # A seed whose first action leaves the ant where it is: pick up or give.
     for seed in range(100):
-        [step] = train(world, config, seed, 1, 1, evaporation, trace=True).trace
+        [step] = train(world, config, seed, 1, 1, task, trace=True).trace
         if step.action in (PICK_UP, GIVE):
             assert (step.state, step.next_state) == (8, 0 if evaporation else 8)
             return

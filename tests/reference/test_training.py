@@ -19,38 +19,35 @@ import itertools
 
 import numpy as np
 import pytest
+from colonies import GAMMA, training
 
 from taichi_ants.errors import AntsError
-from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.reference import Event, Run, learner_names, train
+from taichi_ants.reference import LEARNERS, Event, train
+from taichi_ants.task import Task
 from taichi_ants.task.constants import GIVE, PICK_UP
 from taichi_ants.worlds.world import World
 
-GAMMA = 0x9E3779B97F4A7C15
 TWO_STEPS = World((3, 3, 3), (0, 0, 1), foods=[(1, 1, 0)], ants=[((0, 0, 0), 1)])
 
 
-def config(learner="q_learning", **settings):
-    defaults = {
-        "learning_rate": 0.5,
-        "discount": 0.5,
-        "epsilon": 0.0,
-        "epsilon_decay": 1.0,
-        "min_epsilon": 0.0,
-        "planning_steps": 3 if learner == "dyna_q" else 0,
-    }
-    return TrainingConfig(learner, **{**defaults, **settings})
-
-
-def prepared(rng_state=0):
+def prepared(learning, task=None, rng_state=0):
     """A run to start from: Q(12, pick up) = 1, Q(76, give) = 2, Q(4, forward) = 4."""
     q_values = np.zeros((128, 5), np.float32)
     q_values[12, PICK_UP], q_values[76, GIVE], q_values[4, 1] = 1, 2, 4
-    return Run(q_values, epsilon=0.0, rng_state=rng_state)
+    run = train(TWO_STEPS, learning, 0, 0, 600, task)
+    run.colony.minds.tables[0] = LEARNERS[learning.learner](learning, 128, q_values)
+    run.colony.streams[0].state = rng_state
+    return run
 
 
-def train_once(learning, max_steps=600, rng_state=0):
-    return train(TWO_STEPS, learning, 0, 1, max_steps, trace=True, start_from=prepared(rng_state))
+def train_once(learning, delivery="absorbing", max_steps=600, rng_state=0):
+    task = Task(delivery=delivery)
+    begun = prepared(learning, task, rng_state)
+    return train(TWO_STEPS, learning, 0, 1, max_steps, task, trace=True, start_from=begun)
+
+
+def outcomes_of(run):
+    return [(pair, seen.outcome) for pair, seen in run.model.items()]
 
 
 def draws(run):
@@ -59,7 +56,7 @@ def draws(run):
 
 
 def test_the_record_of_the_episode():
-    run = train_once(config())
+    run = train_once(training())
     assert (run.returns, run.steps, run.deliveries) == ([13], [2], [1])
     first, second = run.trace
     assert (first.cell, first.heading, first.state) == ((0, 0, 0), 1, 12)
@@ -74,13 +71,13 @@ def test_the_record_of_the_episode():
     assert second.rng_state == run.rng_state
 
 
-# All four learners see the same errors here: a' is the best action, and epsilon is 0.
+# All learners see the same errors here: a' is the best action, and epsilon is 0.
 #   Step 0: 3 + 0.5 * 2 - 1 = 3.
 #   Step 1, absorbing: 10 - 2 = 8; continuing: 10 + 0.5 * 4 - 2 = 10.
 @pytest.mark.parametrize(("delivery", "last"), [("absorbing", 8.0), ("continuing", 10.0)])
-@pytest.mark.parametrize("learner", learner_names())
+@pytest.mark.parametrize("learner", LEARNERS)
 def test_td_errors_by_delivery_setting(learner, delivery, last):
-    run = train_once(config(learner, delivery=delivery))
+    run = train_once(training(learner), delivery)
     assert [step.td_error for step in run.trace] == [3.0, last]
     assert [step.terminated for step in run.trace] == [False, delivery == "absorbing"]
     assert run.deliveries == [1]
@@ -89,8 +86,8 @@ def test_td_errors_by_delivery_setting(learner, delivery, last):
 @pytest.mark.parametrize(("delivery", "given"), [("absorbing", 6.0), ("continuing", 7.0)])
 @pytest.mark.parametrize("learner", ["q_learning", "sarsa", "expected_sarsa"])
 def test_the_table_moves_by_the_learning_rate(learner, delivery, given):
-    run = train_once(config(learner, delivery=delivery))
-    expected = prepared().q_values
+    run = train_once(training(learner), delivery)
+    expected = prepared(training()).colony.minds.tables[0].table()
     expected[12, PICK_UP] = 1 + 0.5 * 3
     expected[76, GIVE] = given  # 2 + 0.5 * 8 and 2 + 0.5 * 10
     np.testing.assert_array_equal(run.q_values, expected)
@@ -99,9 +96,9 @@ def test_the_table_moves_by_the_learning_rate(learner, delivery, given):
 
 
 @pytest.mark.parametrize("delivery", ["absorbing", "continuing"])
-@pytest.mark.parametrize("learner", learner_names())
+@pytest.mark.parametrize("learner", LEARNERS)
 def test_truncation_bootstraps(learner, delivery):
-    run = train_once(config(learner, delivery=delivery), max_steps=1)
+    run = train_once(training(learner), delivery, max_steps=1)
     [step] = run.trace
     assert (step.truncated, step.delivered, step.terminated) == (True, False, False)
     assert step.td_error == 3.0  # as without the limit
@@ -109,7 +106,7 @@ def test_truncation_bootstraps(learner, delivery):
 
 
 def test_a_delivery_in_the_last_step_is_no_truncation():
-    last = train_once(config(), max_steps=2).trace[-1]
+    last = train_once(training(), max_steps=2).trace[-1]
     assert (last.delivered, last.terminated, last.truncated) == (True, True, False)
 
 
@@ -125,16 +122,16 @@ def test_a_delivery_in_the_last_step_is_no_truncation():
     ],
 )
 def test_how_many_draws_are_made(learner, delivery, max_steps, expected):
-    run = train_once(config(learner, delivery=delivery), max_steps)
+    run = train_once(training(learner), delivery, max_steps)
     assert draws(run) == expected
 
 
 def test_planning_repeats_the_last_seen_transition():
     # Only (12, pick up) is visited; its target is 3 + 0.5 * 2 = 4. The value goes from 1 halfway to
     # 4 in the step, and three times more: 2.5, 3.25, 3.625, 3.8125.
-    run = train_once(config("dyna_q"), max_steps=1)
+    run = train_once(training("dyna_q"), max_steps=1)
     assert run.q_values[12, PICK_UP] == 3.8125
-    assert run.model == {(12, PICK_UP): (3, 76, False)}
+    assert outcomes_of(run) == [((12, PICK_UP), (3, 76, False))]
 
 
 @pytest.mark.parametrize(
@@ -149,31 +146,31 @@ def test_planning_repeats_the_last_seen_transition():
     ],
 )
 def test_planning_draws_one_of_the_visited_pairs(rng_state, pick_up, give):
-    run = train_once(config("dyna_q", planning_steps=1), rng_state=rng_state)
+    run = train_once(training("dyna_q", planning_steps=1), rng_state=rng_state)
     assert run.q_values[12, PICK_UP] == pick_up
     assert run.q_values[76, GIVE] == give
-    assert list(run.model.items()) == [
+    assert outcomes_of(run) == [
         ((12, PICK_UP), (3, 76, False)),
         ((76, GIVE), (10, 4, True)),
     ]
 
 
 def test_the_model_holds_the_last_outcome_in_the_order_of_first_visit():
-    learning = config("dyna_q", epsilon=1.0, delivery="continuing")
-    run = train(TWO_STEPS, learning, 3, 8, 40, trace=True)
+    learning = training("dyna_q", epsilon=1.0)
+    run = train(TWO_STEPS, learning, 3, 8, 40, Task(delivery="continuing"), trace=True)
     outcomes, changed = {}, 0
     for step in run.trace:
         pair, outcome = (step.state, step.action), (step.reward, step.next_state, False)
         changed += outcomes.get(pair, outcome) != outcome
         outcomes[pair] = outcome
-    assert list(run.model.items()) == list(outcomes.items())
+    assert outcomes_of(run) == list(outcomes.items())
     assert changed > 0  # the test would not see the difference otherwise
 
 
 @pytest.mark.parametrize("delivery", ["absorbing", "continuing"])
 def test_sarsa_executes_the_action_it_learned_from(delivery):
-    learning = config("sarsa", epsilon=0.7, delivery=delivery)
-    run = train(TWO_STEPS, learning, 1, 6, 30, trace=True, trace_tables=True)
+    learning, task = training("sarsa", epsilon=0.7), Task(delivery=delivery)
+    run = train(TWO_STEPS, learning, 1, 6, 30, task, trace=True, trace_tables=True)
     followed = 0
     for before, step, after in zip(run.trace, run.trace[1:], run.trace[2:], strict=False):
         if step.episode == after.episode:
@@ -186,7 +183,7 @@ def test_sarsa_executes_the_action_it_learned_from(delivery):
 
 
 def test_the_table_of_each_step_leads_to_the_next():
-    run = train(TWO_STEPS, config(epsilon=0.5), 1, 3, 30, trace=True, trace_tables=True)
+    run = train(TWO_STEPS, training(epsilon=0.5), 1, 3, 30, trace=True, trace_tables=True)
     table = np.zeros((128, 5), np.float32)
     for step in run.trace:
         table[step.state, step.action] += np.float32(0.5) * step.td_error
@@ -195,23 +192,24 @@ def test_the_table_of_each_step_leads_to_the_next():
 
 
 def test_epsilon_decays_to_its_floor():
-    learning = config(epsilon=0.5, epsilon_decay=0.5, min_epsilon=0.2)
+    learning = training(epsilon=0.5, epsilon_decay=0.5, min_epsilon=0.2)
     epsilons = [train(TWO_STEPS, learning, 0, n, 5).epsilon for n in range(4)]
     assert epsilons == [0.5, 0.25, 0.2, 0.2]
 
 
 def test_an_epsilon_below_the_floor_is_raised_after_the_first_episode():
-    learning = config(epsilon=0.0, min_epsilon=0.01)
+    learning = training(epsilon=0.0, min_epsilon=0.01)
     assert [train(TWO_STEPS, learning, 0, n, 5).epsilon for n in range(2)] == [0.0, 0.01]
 
 
-@pytest.mark.parametrize("learner", learner_names())
+@pytest.mark.parametrize("learner", LEARNERS)
 def test_going_on_gives_what_training_in_one_go_gives(learner):
-    learning = config(learner, epsilon=0.6, epsilon_decay=0.9, delivery="continuing")
-    whole = train(TWO_STEPS, learning, 9, 12, 40, trace=True)
-    half = train(TWO_STEPS, learning, 9, 5, 40, trace=True)
+    learning = training(learner, epsilon=0.6, epsilon_decay=0.9)
+    task = Task(delivery="continuing")
+    whole = train(TWO_STEPS, learning, 9, 12, 40, task, trace=True)
+    half = train(TWO_STEPS, learning, 9, 5, 40, task, trace=True)
     table_before, model_before = half.q_values.copy(), dict(half.model)
-    resumed = train(TWO_STEPS, learning, 9, 7, 40, trace=True, start_from=half)
+    resumed = train(TWO_STEPS, learning, 9, 7, 40, task, trace=True, start_from=half)
     for run_field in ("returns", "steps", "deliveries", "epsilon", "rng_state", "trace"):
         assert getattr(resumed, run_field) == getattr(whole, run_field)
     assert list(resumed.model.items()) == list(whole.model.items())
@@ -223,34 +221,33 @@ def test_going_on_gives_what_training_in_one_go_gives(learner):
 
 
 def test_a_run_depends_on_its_seed():
-    learning = config(epsilon=0.6)
+    learning = training(epsilon=0.6)
     runs = [train(TWO_STEPS, learning, seed, 5, 40) for seed in (0, 0, 1)]
     assert runs[0].steps == runs[1].steps
     assert runs[0].rng_state == runs[1].rng_state != runs[2].rng_state
 
 
 def test_every_episode_starts_from_the_same_world():
-    run = train(TWO_STEPS, config(epsilon=1.0), 2, 20, 100, trace=True)
+    run = train(TWO_STEPS, training(epsilon=1.0), 2, 20, 100, trace=True)
     assert sum(run.deliveries) > 1
     starts = [step for step in run.trace if step.step == 0]
     assert {(step.cell, step.heading, step.state) for step in starts} == {((0, 0, 0), 1, 12)}
 
 
-@pytest.mark.parametrize(("learner", "planning_steps"), [("q_learning", 3), ("dyna_q", 0)])
-def test_planning_steps_must_fit_the_learner(learner, planning_steps):
-    with pytest.raises(AntsError, match="planning_steps is"):
-        train(TWO_STEPS, config(learner, planning_steps=planning_steps), 0, 1, 1)
+def test_a_hyperparameter_of_another_learner_is_refused():
+    with pytest.raises(AntsError, match=r"'planning_steps'.*'q_learning'"):
+        train(TWO_STEPS, training("q_learning", planning_steps=3), 0, 1, 1)
 
 
 def test_the_trace_is_kept_on_request_only():
-    assert train(TWO_STEPS, config(), 0, 2, 10).trace == []
-    traced = train(TWO_STEPS, config(), 0, 2, 10, trace=True)
+    assert train(TWO_STEPS, training(), 0, 2, 10).trace == []
+    traced = train(TWO_STEPS, training(), 0, 2, 10, trace=True)
     assert len(traced.trace) == sum(traced.steps)
     assert all(step.q_values is None for step in traced.trace)
 
 
 def test_each_step_begins_where_the_last_one_ended():
-    run = train(TWO_STEPS, config(epsilon=0.8), 4, 4, 30, trace=True)
+    run = train(TWO_STEPS, training(epsilon=0.8), 4, 4, 30, trace=True)
     for step, after in itertools.pairwise(run.trace):
         if step.delivered or step.truncated:
             assert (after.episode, after.step) == (step.episode + 1, 0)

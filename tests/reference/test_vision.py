@@ -16,6 +16,7 @@ from __future__ import annotations
 import pytest
 
 from taichi_ants.reference import Ant, WorldState, cells_in_view, observe
+from taichi_ants.task import Pheromone
 from taichi_ants.worlds.world import World
 
 A, L, M, R = (0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)
@@ -24,14 +25,14 @@ FAR = (0, 0, 4)  # a queen behind the ant, at distance 4; from L 5, from M 5, fr
 
 def sees(carries=False, cell=A, heading=1, queen=FAR, **contents) -> int:
     world = World((5, 5, 5), queen, **contents)
-    return observe(WorldState(world, evaporation=False), Ant(cell, heading, carries))
+    return observe(WorldState(world, Pheromone()), Ant(cell, heading, carries))
 
 
 def test_the_view_is_left_forward_right():
-    assert cells_in_view(Ant(A, 1)) == (L, M, R)
+    assert cells_in_view(Ant(A, 1)) == [L, M, R]
     # Heading 0 looks to headings 5, 0, 1, and heading 5 to 4, 5, 0.
-    assert cells_in_view(Ant(A, 0)) == ((1, 0, 1), (1, 0, 0), (1, 1, 0))
-    assert cells_in_view(Ant(A, 5)) == ((0, 0, 1), (1, 0, 1), (1, 0, 0))
+    assert cells_in_view(Ant(A, 0)) == [(1, 0, 1), (1, 0, 0), (1, 1, 0)]
+    assert cells_in_view(Ant(A, 5)) == [(0, 0, 1), (1, 0, 1), (1, 0, 0)]
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from dataclasses import fields
 import numpy as np
 
 from taichi_ants import TrainingConfig
-from taichi_ants.reference import Cell, ReferenceColony, observe
+from taichi_ants.reference import Cell, ReferenceColony
 from taichi_ants.task import Life, Task
 from taichi_ants.task.constants import FOOD
 from taichi_ants.worlds import World, from_text
@@ -40,7 +40,8 @@ def begun(
     world = from_text(world) if isinstance(world, str) else world
     names = {field.name for field in fields(Life)}
     life = Life(**{name: options.pop(name) for name in names & options.keys()})
-    rules = {name: options.pop(name) for name in ("pheromone", "delivery") if name in options}
+    named = ("pheromone", "delivery", "observation", "rewards")
+    rules = {name: options.pop(name) for name in named if name in options}
     task = Task(evaporation_in_training=True, life=life, **rules)
     colony = ReferenceColony(
         world,
@@ -68,7 +69,7 @@ def load(colony: ReferenceColony, *slots: int) -> None:
     for slot in slots:
         ant = colony.ants[slot]
         ant.carries = True
-        ant.state = observe(colony.world, ant)
+        colony.look(ant)
 
 
 def cells_of(colony: ReferenceColony) -> list[Cell]:

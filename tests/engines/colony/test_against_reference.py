@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from random_rewards import put_in_force, random_rewards
+from random_rewards import random_rewards
 from random_worlds import random_world
 
-from taichi_ants import Colony, ColonyConfig, Pheromone, TrainingConfig
+from taichi_ants import Colony, TrainingConfig
 from taichi_ants.engines.colony import arrays as names
 from taichi_ants.learners.policies import random_policy
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.task.colony import STARTS
+from taichi_ants.task import Life, Pheromone, Task
 from taichi_ants.task.constants import EMPTY
+from taichi_ants.worlds.starts import STARTS
 
 # Each entry is a kernel of its own, so that there are few; all options occur in each.
 KERNELS = [
@@ -42,37 +45,42 @@ def random_colony(seed: int, dense: bool):
     evaporations = ["exponential", "linear", "none"] if dense else ["linear", "none"]
     evaporation, deposit = str(rng.choice(evaporations)), str(rng.choice(["set", "add", "none"]))
     half_life, cap = float(rng.choice([0.7, 3.0, 40.0])), int(rng.choice([200, 600]))
-    config = ColonyConfig(
-        ants=ants,
-        capacity=ants + int(rng.integers(0, 6)) if births else None,
-        pheromone=Pheromone(
-            evaporation=evaporation,
-            half_life=half_life if evaporation == "exponential" else None,
-            diffusion=float(rng.choice([0.05, 0.5, 1.0])) if dense else 0.0,
-            deposit=deposit,
-            level=int(rng.choice([3, 250])),
-            cap=cap if deposit == "add" else None,
-        ),
+    capacity = ants + int(rng.integers(0, 6)) if births else None
+    pheromone = Pheromone(
+        evaporation=evaporation,
+        half_life=half_life if evaporation == "exponential" else None,
+        diffusion=float(rng.choice([0.05, 0.5, 1.0])) if dense else 0.0,
+        deposit=deposit,
+        level=int(rng.choice([3, 250])),
+        cap=cap if deposit == "add" else None,
+    )
+    life = Life(
         births=births,
         lifespan=int(lifespan) or None,
         regrowth=[None, 0, 1, 4][rng.integers(4)],
         wander=int(rng.choice([1, 2, 5, 1000])),
-        start=str(rng.choice(STARTS)),
     )
-    return world, config
+    task = Task(
+        rewards=random_rewards(seed),
+        pheromone=pheromone,
+        evaporation_in_training=True,
+        life=life,
+    )
+    return world, task, {"ants": ants, "capacity": capacity, "start": str(rng.choice(STARTS))}
 
 
-def random_training(seed: int, learner: str, planning_steps: int) -> TrainingConfig:
+def random_training(seed: int, learner: str, planning_steps: int) -> tuple[TrainingConfig, str]:
+    """Settings, and what a delivery is."""
     rng = np.random.default_rng([seed, 98])
-    return TrainingConfig(
+    config = TrainingConfig(
         learner,
         float(rng.choice([0.01, 0.3, 1.0])),
         float(rng.choice([0.0, 0.9, 0.99])),
         float(rng.choice([0.1, 0.5, 1.0])),
         0.9,
-        planning_steps=planning_steps,
-        delivery=str(rng.choice(["absorbing", "continuing"])),
+        hyperparameters={"planning_steps": planning_steps} if planning_steps else {},
     )
+    return config, str(rng.choice(["absorbing", "continuing"]))
 
 
 def assert_equal(colony: Colony, plain: ReferenceColony) -> None:
@@ -89,7 +97,7 @@ def assert_equal(colony: Colony, plain: ReferenceColony) -> None:
         assert tuple(cell) == ant.cell
         assert (mine[names.HEADING], mine[names.CARRIES]) == (ant.heading, ant.carries)
         assert (mine[names.NUMBER], mine[names.AGE]) == (ant.number, ant.age)
-        assert (mine[names.STATE], int(arrays["streams"][slot])) == (ant.state, ant.rng_state)
+        assert (mine[names.STATE], int(arrays["streams"][slot])) == (ant.state, ant.stream.state)
         assert ant.action < 0 or arrays["rewards"][mine[names.EVENT]] == ant.reward
     existing = np.array(list(theirs.ground), dtype=np.int64).reshape(-1, 3)
     places = grid.index(existing)
@@ -120,16 +128,17 @@ def assert_equal_records(colony: Colony, theirs) -> None:
 
 
 @pytest.mark.parametrize(("learner", "planning_steps", "sharing", "dense"), KERNELS)
-def test_every_tick_in_crowded_micro_worlds(learner, planning_steps, sharing, dense, monkeypatch):
+def test_every_tick_in_crowded_micro_worlds(learner, planning_steps, sharing, dense):
     """More than 1000 micro-worlds in all, two episodes each: something goes on between them."""
     happened = np.zeros(5, dtype=int)
     for seed in range(86):
-        world, config = random_colony(seed, dense)
-        training = random_training(seed, learner, planning_steps)
-        put_in_force(monkeypatch, random_rewards(seed))
+        world, task, population = random_colony(seed, dense)
+        training, delivery = random_training(seed, learner, planning_steps)
+        task = replace(task, delivery=delivery)
         table = random_policy() if sharing == "fixed" else None
-        colony = Colony(world, config, training, seed - 3, sharing, table)
-        plain = ReferenceColony(world, config, training, seed - 3, sharing)
+        rules = {**population, "sharing": sharing}
+        colony = Colony(world, task, training, seed - 3, **rules, q_values=table)
+        plain = ReferenceColony(world, task, training, seed - 3, **rules)
         for ticks in (12, 9):
             colony.begin_episode()
             plain.begin_episode()

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from random_rewards import TELLING, put_in_force, random_rewards
+from random_rewards import TELLING, random_rewards
 from random_worlds import random_world
 
 from taichi_ants import TrainingConfig, evaluate, reference, rollout, trace_training, train
-from taichi_ants.task.rewards import Rewards
+from taichi_ants.task import Rewards, Task
 from taichi_ants.worlds import World, paper
 
 LEARNERS = [("q_learning", 0), ("sarsa", 0), ("expected_sarsa", 0), ("dyna_q", 3)]
 DELIVERIES = ["absorbing", "continuing"]
 
 
-def random_config(seed: int, learner: str, planning_steps: int, delivery: str) -> TrainingConfig:
+def planning(steps: int) -> dict[str, int]:
+    return {"planning_steps": steps} if steps else {}
+
+
+def random_config(seed: int, learner: str, planning_steps: int) -> TrainingConfig:
     """A configuration with values far from each other and from round ones."""
     rng = np.random.default_rng([seed, 1])
     return TrainingConfig(
@@ -25,16 +29,15 @@ def random_config(seed: int, learner: str, planning_steps: int, delivery: str) -
         epsilon=float(rng.choice([0.0, 0.05, 0.3, 1.0])),
         epsilon_decay=float(rng.choice([0.3, 0.99, 1.0])),
         min_epsilon=float(rng.choice([0.0, 0.01, 0.2])),
-        planning_steps=planning_steps,
-        delivery=delivery,
+        hyperparameters=planning(planning_steps),
     )
 
 
-def assert_equal_steps(world, config, seed, episodes, max_steps, evaporation):
+def assert_equal_steps(world, config, seed, episodes, max_steps, task):
     """Compare each step of a training run: what happened, the TD error, the whole Q-table."""
-    ours = trace_training(world, config, seed, episodes, max_steps, evaporation)
+    ours = trace_training(world, config, seed, episodes, max_steps, task)
     plain = reference.train(
-        world, config, seed, episodes, max_steps, evaporation, trace=True, trace_tables=True
+        world, config, seed, episodes, max_steps, task, trace=True, trace_tables=True
     )
     assert len(ours) == len(plain.trace) > 0
     for k, step in enumerate(plain.trace):
@@ -53,38 +56,44 @@ def assert_equal_steps(world, config, seed, episodes, max_steps, evaporation):
 @pytest.mark.parametrize(("learner", "planning_steps"), LEARNERS)
 def test_every_step_in_the_papers_world(learner, planning_steps, delivery, evaporation):
     """Long enough to deliver, so that the end of an episode and the next one are compared too."""
-    config = TrainingConfig(learner, 0.01, 0.99, 0.3, 0.9, 0.01, planning_steps, delivery)
-    plain = assert_equal_steps(paper(), config, 3, 12, 120, evaporation)
+    config = TrainingConfig(learner, 0.01, 0.99, 0.3, 0.9, 0.01, planning(planning_steps))
+    task = Task(delivery=delivery, evaporation_in_training=evaporation)
+    plain = assert_equal_steps(paper(), config, 3, 12, 120, task)
     assert sum(plain.deliveries) >= 3
     assert min(plain.steps) < 120
 
 
 @pytest.mark.parametrize("delivery", DELIVERIES)
 @pytest.mark.parametrize(("learner", "planning_steps"), LEARNERS)
-def test_every_step_in_random_worlds(learner, planning_steps, delivery, monkeypatch):
+def test_every_step_in_random_worlds(learner, planning_steps, delivery):
     """Several foods, rocks, trails of all strengths; deliveries and choices among foods occur."""
     delivered = 0
     for seed in range(60):
-        config = random_config(seed, learner, planning_steps, delivery)
+        config = random_config(seed, learner, planning_steps)
         world = random_world(seed)
-        put_in_force(monkeypatch, random_rewards(seed))
-        plain = assert_equal_steps(world, config, seed - 7, 4, 25, seed % 2 == 0)
+        task = Task(
+            rewards=random_rewards(seed),
+            delivery=delivery,
+            evaporation_in_training=seed % 2 == 0,
+        )
+        plain = assert_equal_steps(world, config, seed - 7, 4, 25, task)
         delivered += sum(plain.deliveries)
     assert delivered > 20
 
 
+@pytest.mark.parametrize("delivery", DELIVERIES)
 @pytest.mark.parametrize("table", [Rewards(), *TELLING])
-def test_whole_trainings_of_a_mixed_sweep(table, monkeypatch):
+def test_whole_trainings_of_a_mixed_sweep(table, delivery):
     """The kernel that trains equals the reference too, and runs do not disturb each other."""
-    put_in_force(monkeypatch, table)
-    configs = [
-        random_config(seed, *LEARNERS[seed % 4], DELIVERIES[seed // 4 % 2]) for seed in range(16)
-    ]
+    task = Task(rewards=table, delivery=delivery)
+    configs = [random_config(seed, *LEARNERS[seed % 4]) for seed in range(8)]
     for world in (paper(), random_world(12), random_world(13, 8)):
-        result = train(world, configs, seeds=(5, -1, 2**63 + 5), episodes=9, max_steps=70)
+        result = train(
+            world, configs, seeds=(5, -1, 2**63 + 5), episodes=9, max_steps=70, task=task
+        )
         for c, config in enumerate(configs):
             for s, seed in enumerate(result.seeds):
-                plain = reference.train(world, config, seed, 9, 70)
+                plain = reference.train(world, config, seed, 9, 70, task)
                 assert result.returns[c, s].tolist() == plain.returns
                 assert result.steps[c, s].tolist() == plain.steps
                 assert result.deliveries[c, s].tolist() == plain.deliveries
@@ -98,13 +107,14 @@ def test_whole_trainings_of_a_mixed_sweep(table, monkeypatch):
 def test_rollouts(evaporation):
     """Every step of rollouts, with ties, and the outcomes of `evaluate`."""
     rng = np.random.default_rng(0)
+    task = Task(evaporation_in_evaluation=evaporation)
     for seed in range(40):
         world = random_world(seed + 1000) if seed else paper()
         table = rng.integers(0, 3, (128, 5)).astype(np.float32)
-        outcome = evaluate(world, table, 4, seed, 40, evaporation, epsilon=0.1)
+        outcome = evaluate(world, table, 4, seed, 40, task, epsilon=0.1)
         for number in range(4):
-            plain = reference.rollout(world, table, seed, number, 40, evaporation, 0.1)
-            ours = rollout(world, table, seed, number, 40, evaporation, 0.1)
+            plain = reference.rollout(world, table, seed, number, 40, task, 0.1)
+            ours = rollout(world, table, seed, number, 40, task, 0.1)
             assert outcome.returns[number] == plain.episode_return == ours.rewards.sum()
             assert outcome.steps[number] == plain.steps == len(ours)
             assert outcome.deliveries[number] == plain.deliveries == ours.delivered.sum()
@@ -129,5 +139,5 @@ def test_worlds_of_one_row():
     """The narrowest worlds: every side cell lies outside."""
     world = World((6, 1, 1), queen=(0, 0, 0), foods=[(5, 0, 0)], ants=[((1, 0, 0), 0)])
     config = TrainingConfig("q_learning", 0.1, 0.9, 0.5, 1.0)
-    plain = assert_equal_steps(world, config, 0, 10, 60, True)
+    plain = assert_equal_steps(world, config, 0, 10, 60, Task(evaporation_in_training=True))
     assert sum(plain.deliveries) > 0

@@ -1,4 +1,4 @@
-"""Trails of a colony: laid by hand-worked deposits, fallen and spread as closed forms say."""
+"""Trails: laid by hand-worked deposits, fallen and spread as closed forms say."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from random_worlds import random_world
 
 from taichi_ants.reference import existing_cells, neighbour
-from taichi_ants.reference.colony_trail import DenseTrail, IntegerTrail, make_trail
-from taichi_ants.task.colony import Pheromone
+from taichi_ants.reference.trail import DenseTrail, IntegerTrail, make_trail
+from taichi_ants.task import Pheromone
 from taichi_ants.task.constants import FORWARD, GIVE, PICK_UP
 from taichi_ants.worlds import World
 

@@ -17,12 +17,27 @@ SEEDS = st.integers(0, 2**32 - 1)
 TICKS = 40
 
 
+def made(drawn):
+    return ReferenceColony(
+        drawn.world,
+        drawn.task,
+        drawn.training,
+        drawn.seed,
+        **drawn.population,
+        sharing=drawn.sharing,
+        q_values=drawn.q_values,
+    )
+
+
+def slots_of(drawn):
+    ants = drawn.population["ants"]
+    return drawn.population["capacity"] or (2 * ants + 64 if drawn.task.life.births else ants)
+
+
 def colonies_of(seed, ticks=TICKS, episodes=2):
     """Yield the colony of a seed after each tick, and the cells and headings before it."""
     drawn = random_colony(seed)
-    colony = ReferenceColony(
-        drawn.world, drawn.config, drawn.training, drawn.seed, drawn.sharing, drawn.q_values
-    )
+    colony = made(drawn)
     for _ in range(episodes):
         colony.begin_episode()
         while not colony.over and colony.record.ticks < ticks:
@@ -40,7 +55,7 @@ def test_food_is_conserved(seed):
         record = colony.record
         there = len(foods_of(colony)) + carried + record.deliveries
         assert there == len(drawn.world.foods) + record.regrown
-        if drawn.config.births:
+        if drawn.task.life.births:
             assert record.births + colony.queen.store == record.deliveries
         else:
             assert record.births == 0
@@ -55,9 +70,10 @@ def test_ants_stand_alone_on_empty_cells(seed):
         assert set(cells) == colony.world.occupied
         assert all(colony.world.ground[cell] == EMPTY for cell in cells)
         record = colony.record
-        assert len(cells) == drawn.config.ants + record.births - record.deaths
-        assert len(cells) <= drawn.config.slots
-        assert max(colony.ants, default=0) < drawn.config.slots
+        assert len(cells) == drawn.population["ants"] + record.births - record.deaths
+        slots = slots_of(drawn)
+        assert len(cells) <= slots
+        assert max(colony.ants, default=0) < slots
         numbers = [ant.number for ant in colony.ants.values()]
         assert len(set(numbers)) == len(numbers)
 
@@ -91,11 +107,9 @@ def test_homes_that_are_full_hold_food(seed):
 @given(SEEDS)
 @settings(max_examples=20, deadline=None, derandomize=True)
 def test_a_run_depends_on_its_seed_alone(seed):
-    drawn = random_colony(seed)
-    arguments = (drawn.world, drawn.config, drawn.training)
     runs = []
     for _ in range(2):
-        colony = ReferenceColony(*arguments, drawn.seed, drawn.sharing, drawn.q_values)
+        colony = made(random_colony(seed))
         colony.run(2, 30)
         runs.append((colony.records, colony.snapshot()))
     (records, first), (same_records, second) = runs

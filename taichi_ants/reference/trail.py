@@ -1,4 +1,4 @@
-"""The trails of a colony's world: laid, evaporated, spread.
+"""The trails of a world: laid, evaporated, spread.
 
 Where levels only fall by 1 per tick, or do not fall, they are integers, and a cell stores the tick
 at which its trail has evaporated. Where they halve or spread, they are float32 in every cell.
@@ -14,7 +14,7 @@ from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.geometry import Cell, existing_cells, neighbour
 
 if TYPE_CHECKING:
-    from taichi_ants.task.pheromone import Pheromone
+    from taichi_ants.task import Pheromone
     from taichi_ants.worlds.world import World
 
 

@@ -101,7 +101,7 @@ def test_the_food_waits_while_no_neighbour_is_free():
     assert colony.queen.stream.state == stream_state(0, STREAM_QUEEN, 0)  # no draw in vain
     # The ant at heading 2 turns round and goes: its cell is free in this very tick, for one.
     colony.ants[2].heading = 2
-    colony.ants[2].state = observe(colony.world, colony.ants[2])
+    colony.look(colony.ants[2])
     act(colony, GIVE, GIVE, FORWARD, GIVE, GIVE, GIVE)
     assert (len(colony.ants), colony.queen.store, colony.record.births) == (7, 5, 1)
     assert (colony.ants[6].cell, colony.ants[6].heading) == (neighbour(QUEEN, 2), 2)
@@ -179,7 +179,7 @@ def test_an_ant_dies_at_its_lifespan():
     assert (colony.ants[1].reward, colony.ants[1].state >> 2 & 3) == (-1, 0)
     assert colony.record.deaths == 1
     assert colony.record.living_per_tick == [2, 1]
-    assert [step.died for step in colony.transitions] == [True, False]
+    assert [step.truncated for step in colony.transitions] == [True, False]
     act(colony, FORWARD)
     assert cells_of(colony) == []  # it has got there, and died of age 2
     assert front not in colony.world.occupied
@@ -208,7 +208,7 @@ def test_a_carrying_ant_leaves_its_food_where_it_dies():
     # The one that died saw its last with food: the queen ahead, the world's end to its left.
     [last, _] = colony.transitions
     assert last.next_state == 64 + 16 + 4 * 3 + last.next_state % 4
-    assert last.died
+    assert last.truncated
 
 
 def test_an_ant_that_gives_in_its_last_tick_leaves_nothing():
@@ -229,8 +229,8 @@ def test_a_dying_ant_learns_from_what_it_sees_last_as_if_it_lived_on():
     act(colony, FORWARD)
     assert colony.ants == {}
     [step] = colony.transitions
-    assert (step.pair, step.outcome, step.died) == ((0, FORWARD), (0, 4, False), True)
-    assert colony.td_errors == [2]
+    assert (step.pair, step.outcome, step.truncated) == ((0, FORWARD), (0, 4, False), True)
+    assert step.td_error == 2
     assert colony.snapshot().q_values[0, FORWARD] == 1
 
 

@@ -1,4 +1,4 @@
-"""How the ants of a colony learn, against values worked out by hand.
+"""How the ants of a world learn, against values worked out by hand.
 
 Learning rate and discount are 1/2 throughout.
 """
@@ -6,31 +6,36 @@ Learning rate and discount are 1/2 throughout.
 from __future__ import annotations
 
 import itertools
+from functools import partial
 
 import numpy as np
 import pytest
 from colonies import GAMMA, act, begun, load, n_draws, training
+from transitions import transition
 
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import STREAM_ANT
-from taichi_ants.reference import RandomStream, ReferenceColony, Transition, stream_state
-from taichi_ants.reference.colony_learning import OwnTables, SharedTable, mean_error
-from taichi_ants.task.colony import ColonyConfig, update_weights
+from taichi_ants.learners.config import update_weights
+from taichi_ants.reference import LEARNERS, RandomStream, ReferenceColony, stream_state
+from taichi_ants.reference.sharing import OwnTables, SharedTable, mean_error
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP
 from taichi_ants.worlds import World
 
 
-def transition(state, action, reward, next_state, number=0, slot=None, terminated=False, a=None):
-    slot = number if slot is None else slot
-    return Transition(slot, number, state, action, reward, next_state, terminated, a, died=False)
+def maker(learner, **settings):
+    return partial(LEARNERS[learner], training(learner, **settings), 128)
 
 
 def shared(learner="q_learning", slots=8, q_values=None, **settings):
-    return SharedTable(training(learner, **settings), slots, q_values)
+    return SharedTable(maker(learner, **settings), slots, q_values)
 
 
 def streams(n, state=0):
     return [RandomStream(state) for _ in range(n)]
+
+
+def errors_of(colony):
+    return [step.td_error for step in colony.transitions]
 
 
 def table(**values):
@@ -50,8 +55,9 @@ def changed(minds):
 
 def test_one_error_counts_as_for_a_single_ant():
     minds = shared()
-    errors = minds.learn([transition(0, 1, 3, 5)], streams(1), 0.0)
-    assert errors == [3]
+    step = transition(0, 1, 3, 5)
+    minds.learn([step], streams(1), 0.0)
+    assert step.td_error == 3
     assert changed(minds) == {(0, 1): 1.5}
 
 
@@ -66,17 +72,14 @@ def test_three_errors_of_one_pair_and_one_of_another():
     # Errors by the table as it was before: 3 + 4/2 - 2 = 3, -1 + 0 - 2 = -3, 10 - 2 = 8 (ended);
     # the mean 8/3 times 1 - 1/8; both in float32. The other pair: 1 + 2/2 - 4 = -2.
     minds = shared(q_values=table(s0a1=2, s5a0=4))
-    errors = minds.learn(
-        [
-            transition(0, 1, 3, 5),
-            transition(5, 0, 1, 0, number=1),
-            transition(0, 1, -1, 6, number=2),
-            transition(0, 1, 10, 5, number=3, terminated=True),
-        ],
-        streams(4),
-        0.0,
-    )
-    assert errors == [3, -2, -3, 8]
+    steps = [
+        transition(0, 1, 3, 5),
+        transition(5, 0, 1, 0, number=1),
+        transition(0, 1, -1, 6, number=2),
+        transition(0, 1, 10, 5, number=3, terminated=True),
+    ]
+    minds.learn(steps, streams(4), 0.0)
+    assert [step.td_error for step in steps] == [3, -2, -3, 8]
     mean = np.float32(8 / 3)
     value = np.float32(2) + np.float32(0.875) * mean
     assert changed(minds) == {(0, 1): float(value), (5, 0): 3.0}
@@ -155,7 +158,7 @@ def test_two_ants_that_meet_update_one_pair():
     # The winner's reward is 0, the loser's -1: mean -1/2, times 3/4. All next values are 0.
     colony = begun(MEETING, sharing="shared")
     act(colony, FORWARD, FORWARD)
-    assert sorted(float(error) for error in colony.td_errors) == [-1, 0]
+    assert sorted(errors_of(colony)) == [-1, 0]
     assert colony.snapshot().q_values[0, FORWARD] == -0.375
     assert np.count_nonzero(colony.snapshot().q_values) == 1
 
@@ -176,7 +179,7 @@ def test_a_fixed_table_stays_as_it_is():
     for _ in range(3):
         colony.tick()
     np.testing.assert_array_equal(colony.snapshot().q_values, q_values)
-    assert colony.td_errors == []
+    assert errors_of(colony) == [None, None]
     assert len(colony.transitions) == 2
 
 
@@ -198,7 +201,7 @@ def test_sarsa_chooses_by_the_table_before_the_update(learner, then):
     q_values = table(s0a1=0.25, s0a0=0.1875)
     colony = begun(world, training(learner), "shared", q_values=q_values)
     act(colony, FORWARD, FORWARD)
-    assert colony.td_errors == [-0.125, -0.125]
+    assert errors_of(colony) == [-0.125, -0.125]
     assert colony.snapshot().q_values[0, FORWARD] == 0.15625
     drawn = then if learner == "sarsa" else None
     assert [step.next_action for step in colony.transitions] == [drawn] * 2
@@ -213,14 +216,14 @@ def test_sarsa_after_a_delivery():
     start = stream_state(0, STREAM_ANT, 0)
     for delivery, error, draws in (("absorbing", 10, 0), ("continuing", 12, 1)):
         q_values = table(s4a1=4)  # what the ant sees after it gave: E O E
-        colony = begun(ready, training("sarsa", delivery=delivery), "shared", q_values=q_values)
+        colony = begun(ready, training("sarsa"), "shared", q_values=q_values, delivery=delivery)
         load(colony, 0)
         act(colony, GIVE)
         [step] = colony.transitions
         assert step.next_state == 4
         assert step.terminated == (delivery == "absorbing")
         assert step.next_action == (None if step.terminated else FORWARD)
-        assert colony.td_errors == [error]
+        assert errors_of(colony) == [error]
         assert n_draws(colony.ants[0].stream.state, start) == draws
         colony.tick()
         assert colony.ants[0].action == FORWARD
@@ -228,7 +231,7 @@ def test_sarsa_after_a_delivery():
 
 
 def entries(minds):
-    return [(*pair, *outcome) for pair, outcome in minds.tables[0].model.items()]
+    return [(*pair, *seen.outcome) for pair, seen in minds.tables[0].model.items()]
 
 
 def test_the_model_of_all():
@@ -263,10 +266,9 @@ def test_a_round_of_planning_by_hand():
     for rounds, value in ((1, 7.5), (2, 7.875)):
         minds = shared("dyna_q", planning_steps=rounds)
         ants = streams(2)
-        errors = minds.learn(
-            [transition(0, 1, 8, 5, number=k, terminated=True) for k in range(2)], ants, 0.0
-        )
-        assert errors == [8, 8]  # of the real transitions alone
+        steps = [transition(0, 1, 8, 5, number=k, terminated=True) for k in range(2)]
+        minds.learn(steps, ants, 0.0)
+        assert [step.td_error for step in steps] == [8, 8]  # of the real transitions alone
         assert changed(minds) == {(0, 1): value}
         assert [stream.state for stream in ants] == [rounds * GAMMA % 2**64] * 2
 
@@ -283,7 +285,7 @@ def test_a_round_sees_the_table_as_it_stood_at_its_start():
 
 
 def test_own_tables_plan_each_from_its_own_model():
-    minds = OwnTables(training("dyna_q", planning_steps=2), 3, None)
+    minds = OwnTables(maker("dyna_q", planning_steps=2), 3, None)
     ants = streams(2)
     minds.learn(
         [
@@ -330,7 +332,7 @@ def test_an_ant_born_into_a_slot_begins_with_nothing():
 
 def test_tables_and_models_live_through_the_episodes_and_epsilon_decays():
     learning = training("dyna_q", epsilon=0.8, epsilon_decay=0.5, min_epsilon=0.3)
-    colony = ReferenceColony(MEETING, ColonyConfig(ants=4), learning, 5)
+    colony = ReferenceColony(MEETING, None, learning, 5, ants=4)
     epsilons, sizes = [], []
     for _ in range(3):
         epsilons.append(colony.epsilon)
@@ -340,7 +342,7 @@ def test_tables_and_models_live_through_the_episodes_and_epsilon_decays():
     assert 0 < sizes[0] <= sizes[1] <= sizes[2]
     assert [record.ticks for record in colony.records] == [20] * 3
     # Two halves are a whole.
-    again = ReferenceColony(MEETING, ColonyConfig(ants=4), learning, 5)
+    again = ReferenceColony(MEETING, None, learning, 5, ants=4)
     again.run(3, 20)
     assert again.records == colony.records
     assert again.snapshot().models == colony.snapshot().models
@@ -354,7 +356,7 @@ def test_with_own_tables_an_ant_far_from_others_is_an_ant_alone():
     learning = training("sarsa", epsilon=0.5)
     runs = []
     for place, n in ((world, 2), (alone, 1)):
-        colony = ReferenceColony(place, ColonyConfig(ants=n), learning, 8, "own")
+        colony = ReferenceColony(place, None, learning, 8, ants=n, sharing="own")
         colony.run(2, 60)
         runs.append(colony.snapshot())
     np.testing.assert_array_equal(runs[0].q_values[0], runs[1].q_values[0])
@@ -363,7 +365,7 @@ def test_with_own_tables_an_ant_far_from_others_is_an_ant_alone():
 
 def test_a_table_for_each_slot_may_be_given():
     each = np.arange(2 * 640, dtype=np.float32).reshape(2, 128, 5)
-    colony = ReferenceColony(MEETING, ColonyConfig(ants=2), training(), 0, "own", each)
+    colony = ReferenceColony(MEETING, None, training(), 0, ants=2, sharing="own", q_values=each)
     np.testing.assert_array_equal(colony.snapshot().q_values, each)
 
 
@@ -373,12 +375,27 @@ def test_a_table_for_each_slot_may_be_given():
 )
 def test_unknown_names_are_refused(sharing, learner, message):
     with pytest.raises(AntsError, match=message):
-        ReferenceColony(MEETING, ColonyConfig(ants=2), training(learner), 0, sharing)
+        ReferenceColony(MEETING, None, training(learner), 0, ants=2, sharing=sharing)
+
+
+@pytest.mark.parametrize("learner", [name for name in LEARNERS if not LEARNERS[name].shares])
+def test_learners_with_a_memory_of_their_own_cannot_share_a_table(learner):
+    with pytest.raises(AntsError, match=f"'{learner}'.*own"):
+        begun(MEETING, training(learner), "shared")
+    colony = begun(MEETING, training(learner), "own")
+    for _ in range(3):
+        colony.tick()
+    assert colony.snapshot().q_values.shape == (2, 128, 5)
+
+
+def test_learners_of_a_td_error_share_a_table():
+    sharing = [name for name in LEARNERS if LEARNERS[name].shares]
+    assert sharing == ["q_learning", "sarsa", "expected_sarsa", "dyna_q"]
 
 
 def test_more_ants_than_cells_are_refused():
     with pytest.raises(AntsError, match="n is 61"):
-        ReferenceColony(MEETING, ColonyConfig(ants=61), training(), 0)
+        ReferenceColony(MEETING, None, training(), 0, ants=61)
     assert len(begun(MEETING, ants=60).ants) == 60
 
 

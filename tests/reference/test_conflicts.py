@@ -8,8 +8,8 @@ from __future__ import annotations
 import pytest
 from colonies import act, begun, cells_of, foods_of, load
 
-from taichi_ants.reference import RandomStream, neighbour, normal_form
-from taichi_ants.reference.colony_conflicts import Claim, winners
+from taichi_ants.reference import Ant, RandomStream, neighbour, normal_form
+from taichi_ants.reference.actions import Intent, winners
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT
 from taichi_ants.worlds import World, from_text
 
@@ -96,16 +96,20 @@ def test_of_up_to_six_around_a_cell_one_gets_in(n):
     assert [ant.reward for ant in colony.ants.values()] == [-(k != winner) for k in range(n)]
 
 
+def wish(slot, heading, target):
+    return Intent(Ant((slot, 0, 0), 0, slot=slot), FORWARD, heading, target)
+
+
 def test_equal_hashes_are_decided_by_the_heading():
     # All cells get the same number, so all hashes are equal.
-    claims = [Claim(slot, (slot, 0, 0), heading, (9, 0, 0)) for slot, heading in enumerate((4, 1))]
-    assert winners(claims, 0, lambda cell: 7) == {1}
-    assert winners(claims[::-1], 0, lambda cell: 7) == {1}
+    intents = [wish(slot, heading, (9, 0, 0)) for slot, heading in enumerate((4, 1))]
+    assert winners(intents, 0, lambda cell: 7) == {1}
+    assert winners(intents[::-1], 0, lambda cell: 7) == {1}
 
 
 def test_those_who_want_different_cells_all_win():
-    claims = [Claim(slot, (slot, 0, 0), 0, (slot, 0, 1)) for slot in range(4)]
-    assert winners(claims, 3, lambda cell: cell[0]) == {0, 1, 2, 3}
+    intents = [wish(slot, 0, (slot, 0, 1)) for slot in range(4)]
+    assert winners(intents, 3, lambda cell: cell[0]) == {0, 1, 2, 3}
 
 
 SWAP = """

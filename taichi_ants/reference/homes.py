@@ -1,14 +1,18 @@
-"""Where the food of a colony's world belongs: it grows back there, and its piles wander."""
+"""Where the food of a world belongs: it grows back there, and its piles wander."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
-from taichi_ants.reference.colony_world import ColonyWorld
-from taichi_ants.reference.geometry import Cell, neighbour
+from taichi_ants.reference.geometry import Cell, listed_cells, neighbour
 from taichi_ants.reference.random_stream import RandomStream, pick
+from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task.constants import EMPTY, OBSTACLE, QUEEN
+
+if TYPE_CHECKING:
+    from taichi_ants.worlds.world import World
 
 
 @dataclass(slots=True)
@@ -34,8 +38,8 @@ class Homes:
         homes: In their order.
     """
 
-    def __init__(self, foods: list[Cell]) -> None:
-        self.homes = [Home(cell) for cell in sorted(foods)]
+    def __init__(self, world: World) -> None:
+        self.homes = [Home(cell) for cell in sorted(listed_cells(world.foods))]
         self._piles = _connected(self.homes)
 
     def taken(self, cell: Cell, tick: int) -> None:
@@ -44,7 +48,7 @@ class Homes:
             if home.cell == cell and home.waiting_since is None:
                 home.waiting_since = tick
 
-    def regrow(self, world: ColonyWorld, delay: int, tick: int) -> int:
+    def regrow(self, world: WorldState, delay: int, tick: int) -> int:
         """Let food grow back on the empty cells of homes that have waited `delay` ticks.
 
         Returns:
@@ -60,7 +64,7 @@ class Homes:
             regrown += 1
         return regrown
 
-    def wander(self, world: ColonyWorld, stream: RandomStream) -> None:
+    def wander(self, world: WorldState, stream: RandomStream) -> None:
         """Move each pile by one cell, in a direction drawn for it.
 
         Foods go one after the other, those in front first, and stay where the cell ahead is not

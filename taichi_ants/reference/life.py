@@ -1,14 +1,14 @@
-"""How the ants of a colony come and go."""
+"""How ants come and go."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from taichi_ants.grid.constants import N_HEADINGS
-from taichi_ants.reference.colony_records import ColonyAnt
-from taichi_ants.reference.colony_world import ColonyWorld
 from taichi_ants.reference.geometry import Cell, neighbour
 from taichi_ants.reference.random_stream import RandomStream, pick
+from taichi_ants.reference.records import Ant
+from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task.constants import EMPTY, FOOD
 
 
@@ -25,7 +25,7 @@ class Queen:
         self.stream = stream
         self.store = 0
 
-    def places(self, world: ColonyWorld) -> Iterator[tuple[Cell, int]]:
+    def places(self, world: WorldState) -> Iterator[tuple[Cell, int]]:
         """Yield cell and heading of one ant after the other, while food and place last.
 
         The heading leads away from the queen. Whoever asks for the next ant has put the last one
@@ -48,7 +48,7 @@ class Queen:
             yield neighbour(world.queen, heading), heading
 
 
-def grow_old(world: ColonyWorld, ants: list[ColonyAnt], lifespan: int) -> list[ColonyAnt]:
+def grow_old(world: WorldState, ants: Sequence[Ant], lifespan: int) -> list[Ant]:
     """Let ants grow older by a tick, and those of age die.
 
     A dying ant leaves its cell, and on it the food that it carries; the ant itself is left as it

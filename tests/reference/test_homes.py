@@ -8,7 +8,7 @@ import pytest
 from colonies import act, begun, foods_of, load, n_draws
 
 from taichi_ants.grid.constants import STREAM_QUEEN
-from taichi_ants.reference import RandomStream, neighbour, observe, stream_state
+from taichi_ants.reference import RandomStream, neighbour, stream_state
 from taichi_ants.task.constants import FORWARD, GIVE, PICK_UP
 from taichi_ants.worlds import World
 
@@ -27,7 +27,7 @@ def waiting(colony):
 def turn(colony, heading, slot=0):
     ant = colony.ants[slot]
     ant.heading = heading
-    ant.state = observe(colony.world, ant)
+    colony.look(ant)
 
 
 def test_without_regrowth_food_is_gone():

@@ -1,0 +1,36 @@
+"""Dyna-Q (Sutton 1990): Q-learning, and updates from a model of what was seen last."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from taichi_ants.reference.learners.q_learning import QLearning
+from taichi_ants.reference.random_stream import RandomStream, pick
+from taichi_ants.reference.records import Transition
+
+
+class DynaQ(QLearning):
+    """Q-learning, and `planning_steps` updates from drawn pairs of the model."""
+
+    hyperparameters: ClassVar[Mapping[str, float]] = {"planning_steps": 5}
+
+    def learn(self, step: Transition, epsilon: float, stream: RandomStream) -> np.float32:
+        """See `Learner.learn`."""
+        error = super().learn(step, epsilon, stream)
+        self.remember(step)
+        for _ in range(int(self.settings["planning_steps"])):
+            seen = self.draw_seen(stream)
+            self.update(seen.pair, self.learning_rate, self.error(seen, epsilon))
+        return error
+
+    def remember(self, step: Transition) -> None:
+        """Store a transition; it replaces the one of this pair that was seen before."""
+        self.model[step.pair] = step
+
+    def draw_seen(self, stream: RandomStream) -> Transition:
+        """Draw one of the transitions of the model."""
+        high, _ = stream.draw()
+        return list(self.model.values())[pick(high, len(self.model))]

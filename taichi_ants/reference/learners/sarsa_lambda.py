@@ -1,0 +1,35 @@
+"""SARSA(lambda) with replacing traces (Singh and Sutton 1996), of which a short list is kept."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from taichi_ants.reference.learners.sarsa import Sarsa
+from taichi_ants.reference.random_stream import RandomStream
+from taichi_ants.reference.records import Pair, Transition
+
+
+class SarsaLambda(Sarsa):
+    """SARSA that updates the last pairs of the episode too."""
+
+    shares = False
+    hyperparameters: ClassVar[Mapping[str, float]] = {"trace_decay": 0.9, "trace_length": 32}
+
+    def begin(self) -> None:
+        """Forget the traces."""
+        self._traces: list[tuple[Pair, np.float32]] = []  # newest first
+
+    def learn(self, step: Transition, epsilon: float, stream: RandomStream) -> np.float32:
+        """See `Learner.learn`."""
+        error = self.error(step, epsilon)
+        fade = self.discount * np.float32(self.settings["trace_decay"])
+        older = [(pair, trace * fade) for pair, trace in self._traces if pair != step.pair]
+        length = int(self.settings["trace_length"])
+        self._traces = [(step.pair, np.float32(1)), *older][:length]
+        scaled = self.learning_rate * error
+        for pair, trace in self._traces:
+            self.update(pair, scaled, trace)
+        return error

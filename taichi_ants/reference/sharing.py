@@ -1,0 +1,144 @@
+"""How the ants of a world learn: into one table, each into its own, or not at all."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from taichi_ants.errors import AntsError
+from taichi_ants.learners.config import update_weights
+from taichi_ants.reference.learners import Learner
+from taichi_ants.reference.learners.dyna_q import DynaQ
+from taichi_ants.reference.random_stream import RandomStream
+from taichi_ants.reference.records import Pair, Transition
+
+# A table (n_states, 5), or None for zeros -> a learner that begins with a copy of it.
+Make = Callable[[np.ndarray | None], Learner]
+
+_ONE = 1 << 32  # TD errors are summed in units of 2**-32
+
+
+class FixedTable:
+    """One table for all ants, that stays as it is.
+
+    Attributes:
+        draws_next_action: Whether a' is drawn at the end of a tick.
+        tables: The learners: one, or one for each slot.
+    """
+
+    draws_next_action = False
+
+    def __init__(self, make: Make, slots: int, q_values: np.ndarray | None) -> None:
+        """Begin with copies of a table (n_states, 5); zeros if not given."""
+        self.tables = [make(q_values)]
+
+    def of(self, slot: int) -> Learner:
+        """Return the learner of the ant in a slot."""
+        return self.tables[0]
+
+    def born(self, slot: int) -> None:
+        """Note that an ant was born into a slot."""
+
+    def learn(
+        self, steps: Sequence[Transition], streams: Sequence[RandomStream], epsilon: float
+    ) -> None:
+        """Learn from the transitions of a tick, and note in each its TD error.
+
+        Args:
+            steps: Of all ants that acted, in any order.
+            streams: Of each of these ants, for what learners draw.
+            epsilon: Of the policy.
+        """
+
+
+class SharedTable(FixedTable):
+    """One table into which all ants learn.
+
+    All errors of a tick, and of a round of planning, are errors by the table as it stood before.
+    The n errors of a pair are rounded to multiples of 2**-32, so that their sum is exact, and move
+    its value by 1 - (1 - alpha)**n of their mean: as far as n updates in turn go towards one
+    target. One error alone counts as for a single ant, unrounded.
+    """
+
+    def __init__(self, make: Make, slots: int, q_values: np.ndarray | None) -> None:
+        """See `FixedTable`.
+
+        Raises:
+            AntsError: The learner needs a table for itself.
+        """
+        super().__init__(make, slots, q_values)
+        [self._common] = self.tables
+        if not self._common.shares:
+            raise AntsError(
+                f"the learner {self._common.name!r} keeps a memory of its own, so ants cannot "
+                'share its table; take sharing="own".'
+            )
+        self.draws_next_action = self._common.draws_next_action
+        self._weights = update_weights(float(self._common.learning_rate), slots)
+
+    def learn(
+        self, steps: Sequence[Transition], streams: Sequence[RandomStream], epsilon: float
+    ) -> None:
+        """See `FixedTable.learn`."""
+        for step, error in zip(steps, self._update(steps, epsilon), strict=True):
+            step.td_error = error
+        if isinstance(self._common, DynaQ):
+            # Of several transitions of one pair the last stored counts: the highest ant number's.
+            for step in sorted(steps, key=lambda step: (step.pair, step.number)):
+                self._common.remember(step)
+            for _ in range(int(self._common.settings["planning_steps"])):
+                self._update([self._common.draw_seen(stream) for stream in streams], epsilon)
+
+    def _update(self, steps: Sequence[Transition], epsilon: float) -> list[np.float32]:
+        errors = [self._common.error(step, epsilon) for step in steps]
+        errors_of: dict[Pair, list[np.float32]] = defaultdict(list)
+        for step, error in zip(steps, errors, strict=True):
+            errors_of[step.pair].append(error)
+        for pair, several in errors_of.items():
+            mean = several[0] if len(several) == 1 else mean_error(several)
+            self._common.update(pair, self._weights[len(several)], mean)
+        return errors
+
+
+def mean_error(errors: Sequence[np.float32]) -> np.float32:
+    """Return the mean of TD errors, each rounded to a multiple of 2**-32, rounded once at the end.
+
+    The sum must fit into a signed 64-bit integer.
+    """
+    total = sum(int(np.floor(float(error) * _ONE + 0.5)) for error in errors)
+    if not -(1 << 63) <= total < 1 << 63:
+        raise AssertionError(f"the sum of {len(errors)} TD errors does not fit into 64 bits")
+    return np.float32(float(total) / (float(len(errors)) * _ONE))
+
+
+class OwnTables(FixedTable):
+    """A table for each slot, into which the ant in it learns as if alone."""
+
+    def __init__(self, make: Make, slots: int, q_values: np.ndarray | None) -> None:
+        """See `FixedTable`; `q_values` may also be (slots, n_states, 5)."""
+        if q_values is None or q_values.ndim == 2:
+            self.tables = [make(q_values) for _ in range(slots)]
+        else:
+            self.tables = [make(table) for table in q_values]
+        self._make = make
+        self.draws_next_action = self.tables[0].draws_next_action
+
+    def of(self, slot: int) -> Learner:
+        """See `FixedTable.of`."""
+        return self.tables[slot]
+
+    def born(self, slot: int) -> None:
+        """Let the ant that was born into a slot begin with zeros and without memories."""
+        self.tables[slot] = self._make(None)
+
+    def learn(
+        self, steps: Sequence[Transition], streams: Sequence[RandomStream], epsilon: float
+    ) -> None:
+        """See `FixedTable.learn`."""
+        for step, stream in zip(steps, streams, strict=True):
+            step.td_error = self.tables[step.slot].learn(step, epsilon, stream)
+
+
+SHARING = {"shared": SharedTable, "own": OwnTables, "fixed": FixedTable}

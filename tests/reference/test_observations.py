@@ -1,0 +1,230 @@
+"""The row of its table that an ant looks at, in drawn worlds whose rows are worked out by hand.
+
+In the drawings 0 to 5 are ants with that heading, F is food, Q the queen, # a rock, t a trail. With
+heading 0 an ant looks up; around it lie, from behind left (heading -2) on: down left, up left, up,
+up right, down right, and behind it down.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from colonies import act, begun, load, training
+from random_worlds import random_world
+
+from taichi_ants.errors import AntsError
+from taichi_ants.reference import OBSERVATIONS, ReferenceColony, neighbour
+from taichi_ants.task import Pheromone, Task, observations
+from taichi_ants.task.constants import GIVE, LEFT
+from taichi_ants.worlds import World
+
+# Around the ant from behind left on: a rock, a trail, food, nothing, a trail; behind it the queen.
+AROUND = """
+trail = 8
+    F
+  t   .
+    0
+  #   t
+    Q
+"""
+# The percept: T F E, 2, 3, 0.
+PERCEPT = 16 * 2 + 4 * 3
+
+
+def row_of(drawing, observation, slot=0, carries=False, **options):
+    """The row that an ant looks at."""
+    colony = begun(drawing, observation=observation, **options)
+    if carries:
+        load(colony, slot)
+    return colony.ants[slot].state
+
+
+def digits(base, *codes):
+    return int("".join(map(str, codes)), base)
+
+
+def test_the_papers_row_is_the_percept():
+    assert row_of(AROUND, "paper") == PERCEPT
+    for seed in range(30):
+        colony = ReferenceColony(random_world(seed), None, training(epsilon=1.0), seed)
+        for [step] in colony.run_episode(40):
+            assert colony.ants[0].state == colony.ants[0].percept == step.next_state
+
+
+@pytest.mark.parametrize(
+    ("observation", "row"),
+    [
+        ("five_cells", digits(4, 0, 1, 2, 3, 0, 2)),
+        ("six_cells", digits(4, 0, 1, 2, 3, 0, 2, 1)),  # without food the queen looks O
+        ("trail_levels", digits(6, 0, 4, 5, 0)),
+        ("ants_seen", digits(5, 0, 2, 3, 0)),
+    ],
+)
+def test_without_food(observation, row):
+    assert row_of(AROUND, observation) == row
+
+
+@pytest.mark.parametrize(
+    ("observation", "row"),
+    [
+        # The queen is beside the ant, so no cell is nearer; food looks O, trails are not seen.
+        ("paper", 64 + 4),
+        ("five_cells", digits(4, 1, 1, 0, 1, 0, 0)),
+        ("six_cells", digits(4, 1, 1, 0, 1, 0, 0, 3)),
+        ("trail_levels", digits(6, 1, 0, 1, 0)),
+        ("ants_seen", digits(5, 1, 0, 1, 0)),
+    ],
+)
+def test_with_food(observation, row):
+    assert row_of(AROUND, observation, carries=True) == row
+
+
+# The queen is two cells away: the cells behind left and behind are nearer to her.
+HOMEWARDS = """
+      .
+    .   .
+      0
+    .   #
+      .
+    Q
+"""
+
+
+@pytest.mark.parametrize(
+    ("observation", "row"),
+    [
+        ("five_cells", digits(4, 1, 2, 0, 0, 0, 1)),
+        ("six_cells", digits(4, 1, 2, 0, 0, 0, 1, 2)),
+    ],
+)
+def test_with_food_the_cells_behind_lure_if_they_are_nearer_to_the_queen(observation, row):
+    assert row_of(HOMEWARDS, observation, carries=True) == row
+
+
+def test_with_food_a_nearer_cell_is_a_strong_trail_and_the_queen_a_goal():
+    facing = HOMEWARDS.replace("0", "3")  # ahead down; to the right down left, to the left the rock
+    assert row_of(facing, "trail_levels", carries=True) == digits(6, 1, 1, 4, 4)
+    assert row_of(AROUND.replace("0", "3"), "trail_levels", carries=True) == digits(6, 1, 0, 5, 1)
+
+
+A = (0, 0, 0)
+FAR = (0, 0, 4)
+
+
+def with_trails(observation, levels, pheromone=None):
+    """The row of an ant with heading 1 for these levels at headings -2, -1, ... relative to it."""
+    trails = [(neighbour(A, 1 - 2 + turn), level) for turn, level in enumerate(levels)]
+    world = World((5, 5, 5), FAR, trails=trails, ants=[(A, 1)])
+    return row_of(world, observation, pheromone=pheromone or Pheromone())
+
+
+@pytest.mark.parametrize(
+    ("levels", "codes"),
+    [
+        # Behind left, left, forward, right, behind right. The strongest ahead is 10.
+        ((5, 10, 4, 0, 4), (2, 2, 0, 0, 0)),
+        ((900, 10, 5, 4, 5), (2, 2, 2, 0, 2)),  # what lies behind does not count for the strongest
+        ((1, 0, 0, 0, 0), (2, 0, 0, 0, 0)),  # nothing ahead: a trail of 1 is seen
+    ],
+)
+def test_trails_behind_are_measured_against_the_strongest_ahead(levels, codes):
+    assert with_trails("five_cells", levels) == digits(4, 0, *codes)
+    assert with_trails("six_cells", levels) == digits(4, 0, *codes, 0)
+
+
+@pytest.mark.parametrize("pheromone", [Pheromone(), Pheromone(diffusion=1e-9)])
+@pytest.mark.parametrize(
+    ("levels", "codes"),
+    [
+        ((0, 0, 0), (0, 0, 0)),
+        ((1, 0, 0), (4, 0, 0)),
+        ((9, 3, 2), (4, 3, 2)),  # all, a third, less
+        ((9, 6, 5), (4, 4, 3)),  # all, two thirds, less
+        ((10, 3, 4), (4, 2, 3)),  # a third of 10 lies between 3 and 4
+        ((6, 7, 10), (3, 4, 4)),  # and two thirds between 6 and 7
+        ((1_000_000_000, 333_333_333, 666_666_667), (4, 2, 4)),  # no sum overflows
+    ],
+)
+def test_trails_in_thirds_of_the_strongest(levels, codes, pheromone):
+    if pheromone.dense and max(levels) > 2**24:
+        codes = (4, 3, 4)  # in float32 a third
+    row = with_trails("trail_levels", (900, *levels), pheromone)
+    assert row == digits(6, 0, *codes)
+
+
+def test_a_trail_on_food_is_food_and_counts_for_nothing():
+    foods = [neighbour(A, 0)]
+    trails = [(foods[0], 900), (neighbour(A, 1), 9), (neighbour(A, 2), 3)]
+    world = World((5, 5, 5), FAR, foods=foods, trails=trails, ants=[(A, 1)])
+    assert row_of(world, "trail_levels") == digits(6, 0, 5, 4, 3)
+
+
+# Ant 0 looks up at another one; beside that a rock and the end of the world.
+CROWD = """
+    3
+  #
+    0
+  .   .
+    Q
+"""
+
+
+@pytest.mark.parametrize("carries", [False, True])
+@pytest.mark.parametrize("other_carries", [False, True])
+def test_another_ant_is_told_from_a_rock_whatever_it_carries(carries, other_carries):
+    colony = begun(CROWD, observation="ants_seen")
+    load(colony, *([0] if other_carries else []), *([1] if carries else []))
+    looking = colony.ants[1]
+    assert looking.state == digits(5, int(carries), 1, 4, 1)
+    assert looking.percept == 64 * carries + 16 + 4 + 1
+
+
+def test_an_ant_that_has_just_died_is_not_seen():
+    colony = begun(CROWD, observation="ants_seen", lifespan=5)
+    colony.ants[0].age = 4
+    act(colony, GIVE, GIVE)
+    assert sorted(colony.ants) == [1]
+    assert colony.ants[1].state == digits(5, 0, 1, 0, 1)
+
+
+@pytest.mark.parametrize("name", OBSERVATIONS)
+def test_ants_choose_and_learn_by_the_row_and_act_by_the_percept(name):
+    # Left is a trail. Greedy, the ant goes there by a table with one best value, in the row that
+    # it looks at; the move pays as the percept says, +1; and what it learns stands in that row.
+    n_states = OBSERVATIONS[name].n_states
+    q_values = np.zeros((n_states, 5), np.float32)
+    q_values[row_of(AROUND, name), LEFT] = 4
+    colony = begun(AROUND, training(discount=0.0), "shared", q_values=q_values, observation=name)
+    colony.tick()
+    [step] = colony.transitions
+    assert (step.state, step.action, step.reward) == (row_of(AROUND, name), LEFT, 1)
+    assert step.next_state == colony.ants[0].state
+    learnt = colony.snapshot().q_values
+    assert learnt.shape == (n_states, 5)
+    assert learnt[step.state, LEFT] == 2.5  # 4 + 0.5 * (1 - 4)
+
+
+@pytest.mark.parametrize("sharing", ["shared", "own", "fixed"])
+@pytest.mark.parametrize("name", OBSERVATIONS)
+def test_tables_have_as_many_rows_as_the_observation(name, sharing):
+    n_states = OBSERVATIONS[name].n_states
+    for seed in range(6):
+        colony = ReferenceColony(
+            random_world(seed), Task(observation=name), training(epsilon=1.0), seed, sharing=sharing
+        )
+        assert colony.snapshot().q_values.shape[-2:] == (n_states, 5)
+        rows = {step.next_state for [step] in colony.run_episode(30)}
+        assert max(rows) < n_states
+
+
+def test_each_observation_has_a_twin_of_the_same_size():
+    assert set(OBSERVATIONS) == set(observations.names())
+    for name, twin in OBSERVATIONS.items():
+        assert twin.n_states == observations.get(name).n_states
+
+
+def test_an_unknown_observation_is_refused():
+    with pytest.raises(AntsError, match=r"'papers'.*paper, five_cells"):
+        OBSERVATIONS["papers"]
+    with pytest.raises(AntsError, match="'paper' already"):
+        OBSERVATIONS.register("paper", OBSERVATIONS["paper"])

@@ -1,0 +1,28 @@
+"""Steps for learners, made by hand."""
+
+from __future__ import annotations
+
+from taichi_ants.reference import Event, Transition
+
+
+def transition(
+    state: int, action: int, reward: int, next_state: int, number: int = 0, **given: object
+) -> Transition:
+    """What an ant did; its slot is its number, and nothing ends, unless more is given."""
+    facts = {
+        "slot": number,
+        "next_action": None,
+        "terminated": False,
+        "truncated": False,
+        **{"episode": 0, "step": 0, "event": Event.MOVED},
+        **{"cell": (0, 0, 0), "heading": 0, "next_cell": (0, 0, 0), "next_heading": 0},
+        **given,
+    }
+    return Transition(
+        number=number,
+        state=state,
+        action=action,
+        reward=reward,
+        next_state=next_state,
+        **facts,
+    )
