@@ -8,8 +8,8 @@ import signal
 import numpy as np
 import pytest
 
-from taichi_ants import AntsError, Colony, ColonyConfig, TrainingConfig, worlds
-from taichi_ants.engines.colony import arrays as names
+from taichi_ants import AntsError, Colony, TrainingConfig, worlds
+from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.rendering import writers
 from taichi_ants.studies.one_colony import (
@@ -20,12 +20,14 @@ from taichi_ants.studies.one_colony import (
     stop_requests,
     summary,
 )
+from taichi_ants.task import Life, Task
 
-TRAINING = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0, 0.1, delivery="continuing")
+TRAINING = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0, 0.1)
+TASK = Task(delivery="continuing", evaporation_in_training=True)
 
 
-def begun(**options: object) -> Colony:
-    colony = Colony(worlds.paper(), ColonyConfig(**{"ants": 3, **options}), TRAINING, 4)
+def begun(ants: int = 3) -> Colony:
+    colony = Colony(worlds.paper(), TASK, TRAINING, 4, ants=ants)
     colony.begin_episode()
     return colony
 
@@ -122,7 +124,11 @@ def test_the_summary_counts_in_words() -> None:
     def summed(**counts: int) -> str:
         colony = begun(ants=1)
         colony.tick(1)
-        rows = {"deliveries": names.DELIVERIES, "births": names.BORN, "deaths": names.DIED}
+        rows = {
+            "deliveries": WorldRow.DELIVERIES,
+            "births": WorldRow.BIRTHS,
+            "deaths": WorldRow.DEATHS,
+        }
         for name, count in counts.items():
             colony.arrays["worlds"][rows[name]] = count
         return summary(colony, Pace(ticks=1))
@@ -136,10 +142,12 @@ def test_the_summary_counts_in_words() -> None:
 
 
 def test_the_summary_says_when_all_places_are_taken() -> None:
-    def lived(**options: object) -> str:
-        config = ColonyConfig(**{"ants": 8, "regrowth": 0, **options})
+    def lived(births: bool = False, capacity: int | None = None) -> tuple[str, Colony]:
+        task = Task(life=Life(births=births, regrowth=0))
         training = TrainingConfig("sarsa", 0.1, 0.9, 0.0, 1.0, 0.0)
-        colony = Colony(worlds.paper(), config, training, 4, "fixed", trail_follower())
+        population = {"ants": 8, "capacity": capacity}
+        fixed = {"sharing": "fixed", "q_values": trail_follower()}
+        colony = Colony(worlds.paper(), task, training, 4, **population, **fixed)
         colony.begin_episode()
         pace = Pace()
         for _ in let_time_pass(colony, 400, pace, lambda: 0):
