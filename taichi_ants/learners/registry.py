@@ -138,7 +138,16 @@ def td_learner(
 
 # The package's own: NAME in the file `name.py`, imported when it is asked for, since that starts
 # to import Taichi.
-BUILT_IN = ("q_learning", "sarsa", "expected_sarsa", "dyna_q")
+BUILT_IN = (
+    "q_learning",
+    "sarsa",
+    "expected_sarsa",
+    "dyna_q",
+    "double_q",
+    "sarsa_lambda",
+    "n_step_sarsa",
+    "prioritized_sweeping",
+)
 _LEARNERS: dict[str, Learner] = {}
 
 
