@@ -6,7 +6,6 @@ import taichi as ti
 
 from taichi_ants.learners.hyperparameters import MAX_PLANNING_STEPS, Hyperparameters, whole_number
 from taichi_ants.learners.model import (
-    adds_up,
     model_memory,
     next_state_of,
     pack_outcome,
@@ -70,7 +69,6 @@ DYNA_Q = Learner(
     plans=True,
     hyperparameters=Planning,
     memory=lambda settings, n_states: model_memory(n_states),
-    sound=lambda integers, settings, n_states: adds_up(integers, n_states),
     cost=lambda settings: 1 + 0.25 * settings.planning_steps,
     summary="Q-learning that replays a model of the world",
 )

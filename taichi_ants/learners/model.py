@@ -5,7 +5,6 @@ of first visits, each pair (its offset in the table) and its packed outcome; beh
 pairs, for each pair its place in this order plus 1, or 0.
 """
 
-import numpy as np
 import taichi as ti
 
 from taichi_ants.learners.registry import Memory
@@ -19,24 +18,6 @@ _REWARD_AT, _TERMINATED_AT = 20, 31
 def model_memory(n_states: int) -> Memory:
     """The memory that a model takes."""
     return Memory(integers=2 + 3 * N_ACTIONS * n_states)
-
-
-def adds_up(integers: np.ndarray, n_states: int) -> bool:
-    """Whether arrays (n, model_memory or more) are models, whose numbers kernels use as indices."""
-    n_pairs = N_ACTIONS * n_states
-    counts, slots = integers[:, 0], integers[:, 2 + 2 * n_pairs : 2 + 3 * n_pairs]
-    entries = integers[:, 2 : 2 + 2 * n_pairs].reshape(-1, n_pairs, 2)
-    known = np.arange(n_pairs) < counts[:, None]
-    # Each visited pair has a slot of its own, which holds it.
-    run, key = np.nonzero(slots)
-    slot = slots[run, key] - 1
-    if not ((slot >= 0) & (slot < counts[run])).all() or len(run) != known.sum():
-        return False
-    pairs, outcomes = entries[..., 0], entries[..., 1]
-    return bool(
-        (pairs[run, slot] == key // N_ACTIONS * ROW + key % N_ACTIONS).all()
-        and ((outcomes & (1 << _REWARD_AT) - 1) < n_states).all()
-    )
 
 
 @ti.func

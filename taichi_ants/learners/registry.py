@@ -14,8 +14,6 @@ from dataclasses import asdict, dataclass, fields, replace
 from importlib import import_module
 from typing import Any
 
-import numpy as np
-
 from taichi_ants.errors import AntsError, check_whole, shown
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.hyperparameters import Hyperparameters
@@ -50,11 +48,6 @@ def usual_cost(hyperparameters: Hyperparameters) -> float:
     return 1.0
 
 
-def any_integers(integers: np.ndarray, hyperparameters: Hyperparameters, n_states: int) -> bool:
-    """What learners make sure of that do not use integers of their memory as indices."""
-    return True
-
-
 @dataclass(frozen=True)
 class Learner:
     """A tabular learner; `td_learner` makes one from a TD error alone.
@@ -77,9 +70,6 @@ class Learner:
         hyperparameters: What it has besides the settings of all learners: a dataclass whose fields
             `whole_number` and `number` of `taichi_ants.learners` make, all with usual values.
         memory: A function (hyperparameters, n_states) -> Memory, where a table has n_states rows.
-        sound: A function (integers, hyperparameters, n_states) -> bool: whether the integers of n
-            runs, an i32 array (n, as many or more), can be used as they are. They may come from a
-            file, and kernels believe them; so a learner whose integers are indices checks them.
         cost: A function (hyperparameters) -> float: the time of a step of one ant, in that of
             Q-learning. Launches of kernels are cut by it.
         summary: One line for listings.
@@ -94,7 +84,6 @@ class Learner:
     needs_episode_end: bool = False
     hyperparameters: type[Hyperparameters] = Hyperparameters
     memory: Callable[[Any, int], Memory] = no_memory
-    sound: Callable[[np.ndarray, Any, int], bool] = any_integers
     cost: Callable[[Any], float] = usual_cost
     summary: str = ""
 

@@ -171,25 +171,25 @@ class TrainingResult(Record):
                     f"{runs[1]} seeds it must be an array of shape {shape} and type {kind}."
                 )
         if not ((self.state.epsilon >= 0) & (self.state.epsilon <= 1)).all():
-            raise AntsError("epsilon of a result lies outside of 0 to 1; leave its arrays alone.")
+            raise AntsError(
+                "epsilon of a result lies outside of 0 to 1; leave its arrays as they are."
+            )
 
     def check_memory(self) -> None:
-        """Make sure that the learners, which must be registered, can go on from their memory.
+        """Make sure that there is room for the memory of the learners, which must be registered.
 
         Raises:
-            AntsError: They cannot.
+            AntsError: There is not: a learner of this name needed less when it began.
         """
         state, n_states = self.state, self.task.n_states
         given = (state.q.shape[2] - 1, state.floats.shape[2], state.integers.shape[2])
-        for c, config in enumerate(self.configs):
+        for config in self.configs:
             learner = learners.get(config.learner)
-            settings = learner.settings(config)
-            needed = astuple(learner.memory(settings, n_states))
-            fits = all(map(operator.ge, given, needed))
-            if not fits or not learner.sound(state.integers[c], settings, n_states):
+            needed = astuple(learner.memory(learner.settings(config), n_states))
+            if not all(map(operator.ge, given, needed)):
                 raise AntsError(
-                    f"the memory of a result does not go with learner {config.learner!r}, or does "
-                    "not add up; leave the arrays of a result as they are."
+                    f"learner {config.learner!r} has come to need more memory than when this "
+                    "training began; train anew."
                 )
 
 
