@@ -93,7 +93,7 @@ def _digest(arrays: Mapping[str, np.ndarray]) -> str:
         if name != "facts":
             array = np.ascontiguousarray(arrays[name])
             digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
-            digest.update(array)
+            digest.update(array.data)
     return digest.hexdigest()
 
 

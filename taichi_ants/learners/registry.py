@@ -91,6 +91,10 @@ class Learner:
         """The hyperparameters of a configuration."""
         return self.hyperparameters(**dict(config.hyperparameters))
 
+    def memory_for(self, config: TrainingConfig, n_states: int) -> Memory:
+        """The memory that it needs with a configuration and tables of n_states rows."""
+        return self.memory(self.settings(config), n_states)
+
 
 def td_learner(
     name: str, td_error: Any, draws_next_action: bool = False, summary: str = ""
@@ -230,7 +234,7 @@ def settle(config: TrainingConfig) -> TrainingConfig:
             raise AntsError(
                 f"{shown(name)} is no hyperparameter of learner {config.learner!r}; {allowed}."
             )
-    return replace(config, hyperparameters=asdict(kind(**given)))
+    return replace(config, hyperparameters=tuple(asdict(kind(**given)).items()))
 
 
 def names() -> tuple[str, ...]:

@@ -184,8 +184,7 @@ class TrainingResult(Record):
         state, n_states = self.state, self.task.n_states
         given = (state.q.shape[2] - 1, state.floats.shape[2], state.integers.shape[2])
         for config in self.configs:
-            learner = learners.get(config.learner)
-            needed = astuple(learner.memory(learner.settings(config), n_states))
+            needed = astuple(learners.get(config.learner).memory_for(config, n_states))
             if not all(map(operator.ge, given, needed)):
                 raise AntsError(
                     f"learner {config.learner!r} has come to need more memory than when this "

@@ -78,10 +78,9 @@ class Runs:
 
 def fresh_state(configs: Sequence[TrainingConfig], seeds: Sequence[int], n_states: int) -> RunState:
     """The state of runs that have not begun, leading axes (configurations, seeds)."""
-    memories = []
-    for config in configs:
-        learner = learners.get(config.learner)
-        memories.append(astuple(learner.memory(learner.settings(config), n_states)))
+    memories = [
+        astuple(learners.get(config.learner).memory_for(config, n_states)) for config in configs
+    ]
     state = _empty_state((len(configs), len(seeds)), n_states, Memory(*np.max(memories, axis=0)))
     words = _as_words(np.array(seeds, dtype=object))
     state.random_states[:] = stream_state(words, STREAM_ANT, 0)
