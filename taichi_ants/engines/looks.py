@@ -75,7 +75,7 @@ def _fault_of(observation: Observation, row: Callable[..., Any], dense: bool) ->
     table = ti.types.ndarray(dtype=ti.i32, ndim=2)
 
     @ti.kernel
-    def look_at(  # type: ignore[no-untyped-def, valid-type]
+    def look_at(
         carries: table, grounds: table, ants: table, nearer: table, trails: table, rows: table
     ):
         ti.loop_config(serialize=True)

@@ -154,7 +154,7 @@ def _updates_by(learner: Learner) -> Callable[..., None]:
     has_begin = learner.begin is not None
 
     @ti.kernel
-    def try_updates(  # type: ignore[no-untyped-def, valid-type]
+    def try_updates(
         q: f32, floats: f32, integers: i32, more: f64,
         table: ti.i32, floats_at: ti.i32, integers_at: ti.i32, updates: ti.i32,
     ):  # fmt: skip

@@ -6,7 +6,6 @@ import taichi as ti
 
 from taichi_ants.learners.hyperparameters import MAX_PLANNING_STEPS, Hyperparameters, whole_number
 from taichi_ants.learners.model import (
-    adds_up,
     model_memory,
     next_state_of,
     pack_outcome,
@@ -43,10 +42,10 @@ def learn_and_plan(error_of):
             error_of, memory, at, rates, pair, step.reward, step.terminated, step.next_state, -1
         )
         remember(memory, at, pair, pack_outcome(step.next_state, step.reward, step.terminated))
-        rng = random_state
+        rng, n_visited = random_state, visited(memory, at)
         for _ in range(rates.planning_steps):
             rng = advance(rng)
-            drawn, seen = recall(memory, at, below(high_word(bits_of(rng)), visited(memory, at)))
+            drawn, seen = recall(memory, at, below(high_word(bits_of(rng)), n_visited))
             update(
                 error_of,
                 memory,
@@ -70,7 +69,6 @@ DYNA_Q = Learner(
     plans=True,
     hyperparameters=Planning,
     memory=lambda settings, n_states: model_memory(n_states),
-    sound=lambda integers, settings, n_states: adds_up(integers, n_states),
     cost=lambda settings: 1 + 0.25 * settings.planning_steps,
     summary="Q-learning that replays a model of the world",
 )

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import fields
-from functools import cache
 from typing import Any, NamedTuple
 
 import taichi as ti
@@ -45,7 +44,6 @@ Transition = ti.types.struct(
 )
 
 
-@cache
 def read_rates(kind: type[Hyperparameters]) -> Callable[..., Any]:
     """A `ti.func` (learning_rate, discount, epsilon, numbers, begin) -> the rates of a learner.
 

@@ -1,11 +1,10 @@
 """A model of the world: the outcome that was seen last of each visited pair of row and action.
 
-It lies in the integers of a learner's memory: the number of visited pairs; for each pair its slot
-plus 1, or 0; for each slot, in the order of first visits, the pair (its offset in the table) and
-its packed outcome.
+It lies in the integers of a learner's memory: the number of visited pairs; from 2 on, in the order
+of first visits, each pair (its offset in the table) and its packed outcome; behind the room for all
+pairs, for each pair its place in this order plus 1, or 0.
 """
 
-import numpy as np
 import taichi as ti
 
 from taichi_ants.learners.registry import Memory
@@ -18,25 +17,7 @@ _REWARD_AT, _TERMINATED_AT = 20, 31
 
 def model_memory(n_states: int) -> Memory:
     """The memory that a model takes."""
-    return Memory(integers=1 + 3 * N_ACTIONS * n_states)
-
-
-def adds_up(integers: np.ndarray, n_states: int) -> bool:
-    """Whether arrays (n, model_memory or more) are models, whose numbers kernels use as indices."""
-    n_pairs = N_ACTIONS * n_states
-    counts, slots = integers[:, 0], integers[:, 1 : 1 + n_pairs]
-    entries = integers[:, 1 + n_pairs : 1 + 3 * n_pairs].reshape(-1, n_pairs, 2)
-    known = np.arange(n_pairs) < counts[:, None]
-    # Each visited pair has a slot of its own, which holds it.
-    run, key = np.nonzero(slots)
-    slot = slots[run, key] - 1
-    if not ((slot >= 0) & (slot < counts[run])).all() or len(run) != known.sum():
-        return False
-    pairs, outcomes = entries[..., 0], entries[..., 1]
-    return bool(
-        (pairs[run, slot] == key // N_ACTIONS * ROW + key % N_ACTIONS).all()
-        and ((outcomes & (1 << _REWARD_AT) - 1) < n_states).all()
-    )
+    return Memory(integers=2 + 3 * N_ACTIONS * n_states)
 
 
 @ti.func
@@ -73,24 +54,19 @@ def visited(memory: ti.template(), at):
 @ti.func
 def remember(memory: ti.template(), at, pair, outcome):
     """Store what was seen last of a pair, new pairs behind all others; the pair's slot."""
-    key = at.integers + 1 + pair // ROW * N_ACTIONS + pair % ROW
-    if memory.integers[key] == 0:
-        memory.integers[at.integers] += 1
-        memory.integers[key] = memory.integers[at.integers]
-    slot = memory.integers[key] - 1
-    place = _place_of(memory, at, slot)
-    memory.integers[place] = pair
-    memory.integers[place + 1] = outcome
-    return slot
+    key = at.integers + 2 + 2 * N_ACTIONS * memory.n_states + pair // ROW * N_ACTIONS + pair % ROW
+    number = memory.integers[key]
+    if number == 0:
+        number = memory.integers[at.integers] + 1
+        memory.integers[at.integers] = number
+        memory.integers[key] = number
+        memory.integers[at.integers + 2 * number] = pair
+    memory.integers[at.integers + 2 * number + 1] = outcome
+    return number - 1
 
 
 @ti.func
 def recall(memory: ti.template(), at, slot):
     """The pair in a slot, and its outcome."""
-    place = _place_of(memory, at, slot)
+    place = at.integers + 2 + 2 * slot
     return memory.integers[place], memory.integers[place + 1]
-
-
-@ti.func
-def _place_of(memory: ti.template(), at, slot):
-    return at.integers + 1 + N_ACTIONS * memory.n_states + 2 * slot

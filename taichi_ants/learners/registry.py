@@ -14,8 +14,6 @@ from dataclasses import asdict, dataclass, fields, replace
 from importlib import import_module
 from typing import Any
 
-import numpy as np
-
 from taichi_ants.errors import AntsError, check_whole, shown
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.hyperparameters import Hyperparameters
@@ -50,11 +48,6 @@ def usual_cost(hyperparameters: Hyperparameters) -> float:
     return 1.0
 
 
-def any_integers(integers: np.ndarray, hyperparameters: Hyperparameters, n_states: int) -> bool:
-    """What learners make sure of that do not use integers of their memory as indices."""
-    return True
-
-
 @dataclass(frozen=True)
 class Learner:
     """A tabular learner; `td_learner` makes one from a TD error alone.
@@ -77,9 +70,6 @@ class Learner:
         hyperparameters: What it has besides the settings of all learners: a dataclass whose fields
             `whole_number` and `number` of `taichi_ants.learners` make, all with usual values.
         memory: A function (hyperparameters, n_states) -> Memory, where a table has n_states rows.
-        sound: A function (integers, hyperparameters, n_states) -> bool: whether the integers of n
-            runs, an i32 array (n, as many or more), can be used as they are. They may come from a
-            file, and kernels believe them; so a learner whose integers are indices checks them.
         cost: A function (hyperparameters) -> float: the time of a step of one ant, in that of
             Q-learning. Launches of kernels are cut by it.
         summary: One line for listings.
@@ -94,13 +84,16 @@ class Learner:
     needs_episode_end: bool = False
     hyperparameters: type[Hyperparameters] = Hyperparameters
     memory: Callable[[Any, int], Memory] = no_memory
-    sound: Callable[[np.ndarray, Any, int], bool] = any_integers
     cost: Callable[[Any], float] = usual_cost
     summary: str = ""
 
     def settings(self, config: TrainingConfig) -> Hyperparameters:
         """The hyperparameters of a configuration."""
         return self.hyperparameters(**dict(config.hyperparameters))
+
+    def memory_for(self, config: TrainingConfig, n_states: int) -> Memory:
+        """The memory that it needs with a configuration and tables of n_states rows."""
+        return self.memory(self.settings(config), n_states)
 
 
 def td_learner(
@@ -138,7 +131,16 @@ def td_learner(
 
 # The package's own: NAME in the file `name.py`, imported when it is asked for, since that starts
 # to import Taichi.
-BUILT_IN = ("q_learning", "sarsa", "expected_sarsa", "dyna_q")
+BUILT_IN = (
+    "q_learning",
+    "sarsa",
+    "expected_sarsa",
+    "dyna_q",
+    "double_q",
+    "sarsa_lambda",
+    "n_step_sarsa",
+    "prioritized_sweeping",
+)
 _LEARNERS: dict[str, Learner] = {}
 
 
@@ -232,7 +234,7 @@ def settle(config: TrainingConfig) -> TrainingConfig:
             raise AntsError(
                 f"{shown(name)} is no hyperparameter of learner {config.learner!r}; {allowed}."
             )
-    return replace(config, hyperparameters=asdict(kind(**given)))
+    return replace(config, hyperparameters=tuple(asdict(kind(**given)).items()))
 
 
 def names() -> tuple[str, ...]:

@@ -116,7 +116,7 @@ def _as_f32(result: object) -> object:
 
 
 @ti.func
-def _entry(vector: ti.template(), i: ti.template()):  # type: ignore[no-untyped-def, valid-type]
+def _entry(vector: ti.template(), i: ti.template()):
     return vector[i]
 
 

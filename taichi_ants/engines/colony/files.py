@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +23,7 @@ _KIND = FileKind("taichi-ants colony 4", "colony", "Colony.save")
 def save_colony(colony: Colony, path: files.PathLike) -> None:
     """Write a colony, uncompressed; raises as `files.write_atomically` does."""
     facts, arrays = _contents(colony)
-    _KIND.write(path, {**facts, "digest": _digest(arrays)}, arrays, compress=False)
+    _KIND.write(path, facts, arrays, compress=False)
 
 
 def same_colony(one: Colony, other: Colony) -> bool:
@@ -61,19 +59,6 @@ def _contents(colony: Colony) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     return facts, arrays
 
 
-def _digest(arrays: Mapping[str, np.ndarray]) -> str:
-    """What tells whether arrays are those that were written.
-
-    Kernels write wherever the numbers of an ant, or in the memory of a learner, point.
-    """
-    digest = hashlib.blake2b()
-    for name in sorted(arrays):
-        array = np.ascontiguousarray(arrays[name])
-        digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
-        digest.update(array)
-    return digest.hexdigest()
-
-
 def load_colony(
     cls: type[Colony], path: files.PathLike, threads: int | None, arch: str | None
 ) -> Colony:
@@ -91,9 +76,6 @@ def load_colony(
             raise ValueError("its learner is missing")
     learners.get(training["learner"])
     with _KIND.rebuilding(path):
-        arrays = {name: array for name, array in stored.items() if name != "facts"}
-        if _digest(arrays) != facts["digest"]:
-            raise ValueError("its arrays are not those that were written")
         colony = _rebuild(cls, stored, facts, threads, arch)
         colony.epsilon = checks.checked_share("epsilon", facts["epsilon"])
         colony.episode = checks.checked_count("episode", facts["episode"], least=-1)

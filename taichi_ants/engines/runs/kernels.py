@@ -7,6 +7,7 @@ cache. A launch cannot be interrupted, so that the engine cuts the work into sho
 from collections.abc import Callable
 from dataclasses import fields
 from functools import cache
+from typing import Any
 
 import taichi as ti
 
@@ -20,8 +21,7 @@ from taichi_ants.engines.layout import (
     RETURNS,
     STEPS,
 )
-from taichi_ants.engines.runs.arguments import RunArguments
-from taichi_ants.engines.runs.step import EXTRA_CELLS, Ant, act, percept_of, restore, row_seen
+from taichi_ants.engines.runs.step import EXTRA_CELLS, Ant, act, percept_of, restore, state_seen
 from taichi_ants.engines.trial import tried
 from taichi_ants.learners.hyperparameters import Hyperparameters
 from taichi_ants.learners.memory import At, LearnerArrays, Transition, read_rates, values_of
@@ -34,7 +34,7 @@ from taichi_ants.task.rules.random_bits import advance, bits_of
 
 @cache
 def run_kernel(
-    learner: Learner | None, observation: Observation, deposit: str, traced: bool = False
+    learner: Learner | None, observation: Observation, deposit: str, traced: bool, arguments: Any
 ) -> Callable[..., None]:
     """The kernel for runs that learn, or follow a fixed policy; it is compiled on first use.
 
@@ -43,6 +43,7 @@ def run_kernel(
         observation: What row of its table an ant looks at.
         deposit: How trails are laid, see `Pheromone`.
         traced: Record each step too, in `n_episodes * max_steps` rows for each run.
+        arguments: The type of the argument pack, which `engine` lists.
     """
     learns = learner is not None
     learner = tried(learner) if learns else None
@@ -51,14 +52,15 @@ def run_kernel(
     hyperparameters = learner.hyperparameters if learns else Hyperparameters
     read = read_rates(hyperparameters)
     columns = N_SETTINGS + len(fields(hyperparameters))
-    row_of = row_seen(observation)
+    state_of = state_seen(observation)
     n_states = observation.n_states
+    table = n_states * ROW
 
     @ti.func
-    def decide(a: ti.template(), table, ant, row, explore_below):
+    def decide(a: ti.template(), begin, ant, state, explore_below):
         """The ant's next action, and its stream after the draw."""
         rng = advance(ant.random_state)
-        return choose(values_of(a.q, table, row), bits_of(rng), explore_below), rng
+        return choose(values_of(a.q, begin, state), bits_of(rng), explore_below), rng
 
     @ti.func
     def record(a: ti.template(), n, episode, step, before, percept, taken, after, seen):
@@ -71,12 +73,12 @@ def run_kernel(
         a.trace[n, 10], a.trace[n, 11] = taken.terminated, after.event
 
     @ti.kernel
-    def run(a: RunArguments):
+    def run(a: arguments):
         memory = ti.static(LearnerArrays(a.q, a.floats, a.integers, n_states))
         ti.loop_config(block_dim=1)
         for i in range(a.n_runs):
             base, first = i * (a.size + EXTRA_CELLS), i * columns
-            at = At(i * a.table_size, i * a.floats_size, i * a.integers_size)
+            at = At(i * a.tables * table, i * a.floats_by_8 * 8, i * a.integers_by_8 * 8)
             learning_rate = ti.cast(a.settings[first + LEARNING_RATE], ti.f32)
             discount = ti.cast(a.settings[first + DISCOUNT], ti.f32)
             restore(a, base, 0, a.size - 1)
@@ -98,33 +100,33 @@ def run_kernel(
                 explore_below = ti.cast(exploration * 4294967296.0, ti.u64)
                 step, clock, total, next_action = 0, 0, 0, -1
                 percept = percept_of(a, base, ant, clock)
-                row = row_of(a, base, ant, clock, percept)
+                state = state_of(a, base, ant, clock, percept)
                 if ti.static(on_policy):
-                    next_action, ant.random_state = decide(a, at.table, ant, row, explore_below)
+                    next_action, ant.random_state = decide(a, at.table, ant, state, explore_below)
                 while step < a.max_steps and ant.event != DELIVERED:
                     action = next_action
                     if ti.static(not on_policy):
-                        action, ant.random_state = decide(a, at.table, ant, row, explore_below)
+                        action, ant.random_state = decide(a, at.table, ant, state, explore_below)
                     before = ant
                     ant = act(deposit, a, base, ant, percept, action, clock)
                     clock += a.falls
                     reward = a.rewards[ant.event]
                     total += reward
                     seen = percept_of(a, base, ant, clock)
-                    next_row = row_of(a, base, ant, clock, seen)
+                    next_state = state_of(a, base, ant, clock, seen)
                     delivered = ti.cast(ant.event == DELIVERED, ti.i32)
                     terminated = delivered & (1 - a.continuing)
                     if ti.static(on_policy):
                         next_action = -1
                         if terminated == 0:
                             next_action, ant.random_state = decide(
-                                a, at.table, ant, next_row, explore_below
+                                a, at.table, ant, next_state, explore_below
                             )
                     taken = Transition(
-                        state=row,
+                        state=state,
                         action=action,
                         reward=ti.cast(reward, ti.f32),
-                        next_state=next_row,
+                        next_state=next_state,
                         next_action=next_action,
                         terminated=terminated,
                         truncated=(delivered | ti.cast(step + 1 == a.max_steps, ti.i32))
@@ -136,12 +138,12 @@ def run_kernel(
                         )
                         if ti.static(traced):
                             a.trace_errors[n_recorded] = error
-                            for k in range(n_states * ROW):
-                                a.trace_tables[n_recorded * n_states * ROW + k] = a.q[at.table + k]
+                            for k in range(table):
+                                a.trace_tables[n_recorded * table + k] = a.q[at.table + k]
                     if ti.static(traced):
                         record(a, n_recorded, episode, step, before, percept, taken, ant, seen)
                         n_recorded += 1
-                    percept, row = seen, next_row
+                    percept, state = seen, next_state
                     step += 1
                 rng = ant.random_state
                 a.outcomes[RETURNS, i, episode], a.outcomes[STEPS, i, episode] = total, step

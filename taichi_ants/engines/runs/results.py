@@ -157,8 +157,8 @@ class TrainingResult(Record):
         forms = {
             **dict.fromkeys(OUTCOMES, ("int32", (*runs, episodes))),
             "q": ("float32", (*runs, *np.shape(self.state.q)[2:3], self.task.n_states, ROW)),
-            "floats": ("float32", (*runs, *np.shape(self.state.floats)[2:3])),
-            "integers": ("int32", (*runs, *np.shape(self.state.integers)[2:3])),
+            "floats": ("float32", (*runs, _by_8(self.state.floats))),
+            "integers": ("int32", (*runs, _by_8(self.state.integers))),
             "random_states": ("uint64", runs),
             "epsilon": ("float64", runs),
         }
@@ -171,26 +171,30 @@ class TrainingResult(Record):
                     f"{runs[1]} seeds it must be an array of shape {shape} and type {kind}."
                 )
         if not ((self.state.epsilon >= 0) & (self.state.epsilon <= 1)).all():
-            raise AntsError("epsilon of a result lies outside of 0 to 1; leave its arrays alone.")
+            raise AntsError(
+                "epsilon of a result lies outside of 0 to 1; leave its arrays as they are."
+            )
 
     def check_memory(self) -> None:
-        """Make sure that the learners, which must be registered, can go on from their memory.
+        """Make sure that there is room for the memory of the learners, which must be registered.
 
         Raises:
-            AntsError: They cannot.
+            AntsError: There is not: a learner of this name needed less when it began.
         """
         state, n_states = self.state, self.task.n_states
         given = (state.q.shape[2] - 1, state.floats.shape[2], state.integers.shape[2])
-        for c, config in enumerate(self.configs):
-            learner = learners.get(config.learner)
-            settings = learner.settings(config)
-            needed = astuple(learner.memory(settings, n_states))
-            fits = all(map(operator.ge, given, needed))
-            if not fits or not learner.sound(state.integers[c], settings, n_states):
+        for config in self.configs:
+            needed = astuple(learners.get(config.learner).memory_for(config, n_states))
+            if not all(map(operator.ge, given, needed)):
                 raise AntsError(
-                    f"the memory of a result does not go with learner {config.learner!r}, or does "
-                    "not add up; leave the arrays of a result as they are."
+                    f"learner {config.learner!r} has come to need more memory than when this "
+                    "training began; train anew."
                 )
+
+
+def _by_8(array: np.ndarray) -> int:
+    """The length of the last of three axes, down to a multiple of 8; kernels count by it."""
+    return np.shape(array)[2] // 8 * 8 if np.ndim(array) == 3 else 0
 
 
 @dataclass(frozen=True, eq=False, repr=False)

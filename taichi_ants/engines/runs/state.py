@@ -23,8 +23,9 @@ class RunState(Record):
     Attributes (leading axes: the runs, for example (configurations, seeds)):
         q: float32 (..., 1 + tables, n_states, 8), the table that the ant acts by and the further
             ones of its learner; 5 action values and 3 unused.
-        floats: float32 (..., most of any learner), see `taichi_ants.learners.Memory`.
-        integers: int32 (..., most of any learner).
+        floats: float32 (..., k), as many as any learner here needs, up to the next multiple of 8;
+            see `taichi_ants.learners.Memory`.
+        integers: int32 (..., k), likewise.
         random_states: uint64 (...,), the ants' random streams.
         epsilon: float64 (...,), of the next episode.
     """
@@ -77,10 +78,9 @@ class Runs:
 
 def fresh_state(configs: Sequence[TrainingConfig], seeds: Sequence[int], n_states: int) -> RunState:
     """The state of runs that have not begun, leading axes (configurations, seeds)."""
-    memories = []
-    for config in configs:
-        learner = learners.get(config.learner)
-        memories.append(astuple(learner.memory(learner.settings(config), n_states)))
+    memories = [
+        astuple(learners.get(config.learner).memory_for(config, n_states)) for config in configs
+    ]
     state = _empty_state((len(configs), len(seeds)), n_states, Memory(*np.max(memories, axis=0)))
     words = _as_words(np.array(seeds, dtype=object))
     state.random_states[:] = stream_state(words, STREAM_ANT, 0)
@@ -130,8 +130,8 @@ def fixed_policy_runs(
 def _empty_state(shape: tuple[int, ...], n_states: int, memory: Memory) -> RunState:
     return RunState(
         q=np.zeros((*shape, 1 + memory.tables, n_states, ROW), dtype=np.float32),
-        floats=np.zeros((*shape, memory.floats), dtype=np.float32),
-        integers=np.zeros((*shape, memory.integers), dtype=np.int32),
+        floats=np.zeros((*shape, -(-memory.floats // 8) * 8), dtype=np.float32),
+        integers=np.zeros((*shape, -(-memory.integers // 8) * 8), dtype=np.int32),
         random_states=np.zeros(shape, dtype=np.uint64),
         epsilon=np.zeros(shape, dtype=np.float64),
     )

@@ -120,7 +120,7 @@ def percept_of(a: ti.template(), base, ant, clock):
 
 
 @cache
-def row_seen(observation: Observation) -> Callable[..., Any]:
+def state_seen(observation: Observation) -> Callable[..., Any]:
     """A `ti.func` (a, base, ant, clock, percept) -> the row of the table that the ant looks at."""
     if is_percept(observation):
         return _percept_itself

@@ -33,16 +33,16 @@ class Trace(Record):
         steps: int32 (n,), number of the step in its episode, from 0.
         cells: int32 (n, 3), cube coordinates in normal form.
         headings: int32 (n,), 0 to 5.
-        states: int32 (n,), what the ant sees: the paper's states, `taichi_ants.task.states`.
-        rows: int32 (n,), the row of its table that it looks at; by the paper's observation that is
-            the state.
+        percepts: int32 (n,), what the ant sees, see `taichi_ants.task.states`.
+        states: int32 (n,), the row of its table that it looks at; by the paper's observation that
+            is the percept.
         actions: int32 (n,), 0 to 4.
         rewards: int32 (n,).
-        next_states, next_rows: int32 (n,), what the ant sees after the step.
+        next_percepts, next_states: int32 (n,), what the ant sees after the step.
         terminated: bool (n,), whether the learner took the next state as terminal.
         events: int32 (n,), what came of the action: ENTERED_EMPTY, ENTERED_LURE, FAILED, PICKED_UP
             or DELIVERED, see `taichi_ants.task.constants`.
-        q_values: float32 (n, 5), the action values of the row when the action was chosen.
+        q_values: float32 (n, 5), the action values of the state when the action was chosen.
         td_errors: float32 (n,), of the update after the step; None without learning.
         tables: float32 (n, n_states, 5), the Q-table after the step; None without learning.
     """
@@ -51,12 +51,12 @@ class Trace(Record):
     steps: np.ndarray
     cells: np.ndarray
     headings: np.ndarray
+    percepts: np.ndarray
     states: np.ndarray
-    rows: np.ndarray
     actions: np.ndarray
     rewards: np.ndarray
+    next_percepts: np.ndarray
     next_states: np.ndarray
-    next_rows: np.ndarray
     terminated: np.ndarray
     events: np.ndarray
     q_values: np.ndarray
@@ -181,4 +181,4 @@ def _trace(world: World, task: Task, runs: Runs, max_steps: int, episodes: int =
     recorded["terminated"] = recorded["terminated"].astype(bool)
     if learns:  # the table after the step before
         tables, number = np.concatenate([tables, recorded["tables"][:-1]]), np.arange(len(number))
-    return Trace(**recorded, q_values=tables[number, recorded["rows"]])
+    return Trace(**recorded, q_values=tables[number, recorded["states"]])
