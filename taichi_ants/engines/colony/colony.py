@@ -96,23 +96,25 @@ class Colony:
         seeds: One seed for each of the W worlds.
         ants: How many start each episode, 1 to 2**24: the listed ants of the World first, then
             others on free cells, see `start`.
-        capacity: How many ants can live at once, at least `ants`. None: `ants` if none are born,
-            else 2 * `ants` + 64.
+        capacity: How many ants can live at once, at least `ants`; more than these changes nothing
+            where none are born. None: `ants` if none are born, else 2 * `ants` + 64.
         start: Where ants start that the World does not list: "nest", on the free cells nearest to
             the queen; "spread", on free cells anywhere. The seed decides which, and the headings.
         ends_at_delivery: Whether an episode ends at its first delivery, as when an ant trains
             alone. Only for one ant, without births.
-        sharing: "shared": one table for all ants of a world. "own": one for each slot. "fixed":
-            nobody learns.
-        q_values: Action values to start from, float (128, 5) or (W, 128, 5); None: zeros, but if
-            nobody learns they must be given. If tables are not shared, (W, slots, 128, 5) too.
+        sharing: "shared": one table for all ants of a world, for learners with a TD error. "own":
+            one, and a memory of the learner, for each slot. "fixed": nobody learns.
+        q_values: Action values to start from, float (n_states, 5) or (W, n_states, 5); None: zeros,
+            but if nobody learns they must be given. If tables are not shared, (W, slots, n_states,
+            5) too.
         threads: CPU threads; None keeps what runs, or takes all.
         arch: "cpu" or "cuda"; None keeps what runs, or takes the CPU.
         schedule: "by_world" hands worlds to threads, "by_chunk" groups of ants; None chooses by
             size. Both give the same numbers.
 
     Raises:
-        AntsError: An argument is not allowed, or a world has too few free cells for the ants.
+        AntsError: An argument is not allowed; the learner needs what a colony, or a shared table,
+            does not have; or a world has too few free cells for the ants.
     """
 
     def __init__(
@@ -151,11 +153,13 @@ class Colony:
         self._learner = learners.get(training.learner) if learns else None
         self.memory = Memory()
         self._cost = 1.0  # of a tick of an ant, in that of Q-learning
+        self._plans_together = False
         if self._learner is not None:
             _check_sharing(self._learner, sharing)
             settings = self._learner.settings(self.training)
             self._cost = self._learner.cost(settings)
-            if sharing == "own" or self._learner.plans:
+            self._plans_together = sharing == "shared" and self._learner.plans
+            if sharing == "own" or self._plans_together:
                 self.memory = self._learner.memory(settings, self.task.n_states)
         falls = self.task.evaporation_in_training if learns else self.task.evaporation_in_evaluation
         self.pheromone = self.task.pheromone if falls else self.task.pheromone.lasting
@@ -204,7 +208,7 @@ class Colony:
             if self.ticks % _TICKS_BETWEEN_SORTS == 0:
                 self._sort_ants()
             self._launch("by_chunk", 1)
-            if self.sharing == "shared" and self._learner.plans:
+            if self._plans_together:
                 for _ in range(self.training.planning_steps):
                     self._launch("plan", 1)
             if self.task.life.changes or self.population.ends_at_delivery:
