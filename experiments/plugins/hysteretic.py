@@ -9,7 +9,7 @@ ant's own action, may be to blame. Try it beside Q-learning:
 
 import taichi as ti
 
-from taichi_ants.learners import Learner, register
+from taichi_ants.learners import register, td_learner
 
 PATIENCE = 0.2  # the share of a bad surprise that is learned
 
@@ -21,4 +21,4 @@ def td_error(value, reward, discount, next_values, next_action, epsilon):
     return ti.select(error < 0, PATIENCE * error, error)
 
 
-register(Learner("hysteretic", td_error, summary="Q-learning that is slow to give up"))
+register(td_learner("hysteretic", td_error, summary="Q-learning that is slow to give up"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -44,7 +45,7 @@ class FileKind:
         compress: bool,
     ) -> None:
         """Write a file; raises as `files.write_atomically` does."""
-        text = files.to_json({"format": self.mark, **facts})
+        text = files.to_json({"format": self.mark, "digest": _digest(arrays), **facts})
         files.write_npz(path, {**arrays, "facts": np.array(text)}, compress=compress)
 
     def read(self, path: files.PathLike) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
@@ -63,6 +64,9 @@ class FileKind:
                 f"{str(path)!r} holds no {self.what} of this version; name a file that "
                 f"{self.writer} wrote."
             ) from error
+        with self.rebuilding(path):
+            if _digest(stored) != facts["digest"]:
+                raise ValueError("its arrays are not those that were written")
         return stored, facts
 
     @contextmanager
@@ -77,6 +81,20 @@ class FileKind:
                 f"the {self.what} in {str(path)!r} is damaged ({text or type(error).__name__}); "
                 f"name a file that {self.writer} wrote."
             ) from error
+
+
+def _digest(arrays: Mapping[str, np.ndarray]) -> str:
+    """What tells whether arrays are those that were written.
+
+    Kernels write wherever the numbers of an ant, or in the memory of a learner, point.
+    """
+    digest = hashlib.blake2b()
+    for name in sorted(arrays):
+        if name != "facts":
+            array = np.ascontiguousarray(arrays[name])
+            digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
+            digest.update(array.data)
+    return digest.hexdigest()
 
 
 def world_arrays(world: World, name: str) -> dict[str, np.ndarray]:

@@ -1,7 +1,7 @@
-"""Tries a learner from outside of the package before a kernel takes it up.
+"""Tries functions from outside of the package before a kernel takes them up.
 
 Taichi's compiler ends the process where it meets what it does not expect, and compiled code where
-it reads outside an array. So such a TD error is compiled, and called a thousand times, in a forked
+it reads outside an array. So such a function is compiled, and called a thousand times, in a forked
 process first.
 """
 
@@ -12,50 +12,65 @@ import signal
 import sys
 import warnings
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
 from taichi_ants import runtime
 from taichi_ants.errors import AntsError
+from taichi_ants.learners import registry
 from taichi_ants.learners.registry import Learner
+from taichi_ants.task.constants import N_ACTIONS, ROW
 
 _SECONDS = 30  # until a trial is stopped; it takes less than one
 _UPDATES = 1000
+_STATES = 128  # rows of the tables of a trial
+
+Fault = Callable[[bool], str]  # what is wrong, found out in the Taichi that runs; may end it
 
 
 @cache
-def tried(learner: Learner) -> Callable[..., object]:
-    """The TD error of a learner for kernels; one from outside of the package has passed a trial.
+def tried(learner: Learner) -> Learner:
+    """The learner; one from outside of the package has passed a trial.
 
     Raises:
         AntsError: It cannot be used; the message says why.
     """
-    from taichi_ants.learners.td_errors import guarded
-
-    td_error = guarded(learner)
-    if not learner.td_error.__module__.startswith("taichi_ants."):
-        arch = runtime.start().arch
-        # A forked process has neither the GPU nor the fields of this one. That macOS lets a fork
-        # go on is not sure, and Windows has none.
-        apart = sys.platform == "linux" and arch == "cpu" and not runtime.holds_data()
-        reason = _fault_apart(td_error) if apart else _fault(td_error)
-        if reason:
-            raise AntsError(
-                f"the TD error of learner {learner.name!r} cannot be used: {reason}; see "
-                "taichi_ants.learners.Learner for what it takes and returns."
-            )
-    return td_error
+    if learner.name not in registry.BUILT_IN:
+        fault = partial(_fault_of_learner, learner)
+        refuse_what_fails(f"learner {learner.name!r}", fault, "taichi_ants.learners.Learner")
+    return learner
 
 
-def _fault_apart(td_error: Callable[..., object]) -> str:
-    """What is wrong with a TD error, found out in a forked process; empty if nothing is."""
+def refuse_what_fails(what: str, fault: Fault, where: str) -> None:
+    """Try something, in a forked process where that is possible.
+
+    Args:
+        what: What is tried, for the message.
+        fault: What is wrong with it; empty if nothing is. Called with False and with True, for two
+            kinds of trials.
+        where: What tells more about it.
+
+    Raises:
+        AntsError: It cannot be used; the message says why.
+    """
+    arch = runtime.start().arch
+    # A forked process has neither the GPU nor the fields of this one. That macOS lets a fork go on
+    # is not sure, and Windows has none.
+    apart = sys.platform == "linux" and arch == "cpu" and not runtime.holds_data()
+    reason = _fault_apart(fault) if apart else said_by(fault, False)
+    if reason:
+        raise AntsError(f"{what} cannot be used: {reason}; see {where}.")
+
+
+def _fault_apart(fault: Fault) -> str:
+    """What is wrong, found out in a forked process; empty if nothing is."""
     reader, writer = os.pipe()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # Python's, of a fork beside threads
         child = os.fork()
     if child == 0:
-        _try_in_child(td_error, writer)
+        _try_in_child(fault, writer)
     os.close(writer)
     try:
         with open(reader, encoding="utf-8") as pipe:
@@ -71,7 +86,7 @@ def _fault_apart(td_error: Callable[..., object]) -> str:
     return reason if code == 0 else "it ends the process, as an index outside of an array does"
 
 
-def _try_in_child(td_error: Callable[..., object], writer: int) -> None:
+def _try_in_child(fault: Fault, writer: int) -> None:
     """Write what is wrong and end, with 0 if it came to that; whatever happens, do it silently."""
     import resource
 
@@ -83,50 +98,94 @@ def _try_in_child(td_error: Callable[..., object], writer: int) -> None:
         for stream in (1, 2):
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
         runtime.start_for_trial()
-        os.write(writer, (_fault(td_error) or _fault(td_error, wide=True)).encode())
+        os.write(writer, (said_by(fault, False) or said_by(fault, True)).encode())
         os._exit(0)
     finally:
         os._exit(1)
 
 
-def _fault(td_error: Callable[..., object], wide: bool = False) -> str:
-    """What is wrong with a TD error, in this process and the Taichi that runs; may end it.
+def said_by(fault: Fault, wide: bool) -> str:
+    """What a trial finds, or what Taichi says about it."""
+    import taichi as ti
+
+    try:
+        return fault(wide)
+    except Exception as error:
+        # Assertions of the user's own hold in Taichi's debug mode only, not where it trains.
+        theirs = isinstance(error, ti.TaichiAssertionError) and "Out of bound" not in str(error)
+        return "" if theirs else _last_line(error)
+
+
+def _fault_of_learner(learner: Learner, wide: bool) -> str:
+    """Learn from a thousand steps with the memory of a second run; that of the first must stay.
 
     Args:
-        td_error: As `guarded` returns it.
+        learner: The learner.
         wide: Start from action values up to ten thousand of either sign, not from zeros, to find
             an index that depends on them and is right only while they are small.
     """
+    settings = learner.hyperparameters()
+    memory = learner.memory(settings, _STATES)
+    tables = np.zeros((2, (1 + memory.tables) * _STATES * ROW), np.float32)
+    if wide:
+        numbers = np.arange(tables[0].size)
+        tables[:] = np.where(numbers % 3, 1, -1) * 10.0 ** (numbers % 13 / 2 - 2)
+    floats = np.zeros((2, memory.floats), np.float32)
+    integers = np.zeros((2, memory.integers), np.int32)
+    arrays = (tables, floats, integers)
+    before = [array[0].copy() for array in arrays]
+    more = np.array([*vars(settings).values(), 0.0])
+    sizes = [array.shape[1] for array in arrays]
+    _updates_by(learner)(*(array.reshape(-1) for array in arrays), more, *sizes, _UPDATES)
+    stays = all(map(np.array_equal, before, [array[0] for array in arrays]))
+    return "" if stays else "it writes outside of the memory of its run, which begins at `at`"
+
+
+def _updates_by(learner: Learner) -> Callable[..., None]:
+    """A kernel of many steps of one run, in episodes of fifty or less."""
     import taichi as ti
 
-    from taichi_ants.engines.runs.learning import ROW, TABLE, Rates, update
+    from taichi_ants.learners.memory import At, LearnerArrays, Transition, read_rates
 
     f32 = ti.types.ndarray(dtype=ti.f32, ndim=1)
+    i32 = ti.types.ndarray(dtype=ti.i32, ndim=1)
+    f64 = ti.types.ndarray(dtype=ti.f64, ndim=1)
+    read = read_rates(learner.hyperparameters)
+    has_begin = learner.begin is not None
 
     @ti.kernel
-    def try_updates(q: f32, updates: ti.i32):  # type: ignore[no-untyped-def, valid-type]
+    def try_updates(
+        q: f32, floats: f32, integers: i32, more: f64,
+        table: ti.i32, floats_at: ti.i32, integers_at: ti.i32, updates: ti.i32,
+    ):  # fmt: skip
+        memory = ti.static(LearnerArrays(q, floats, integers, _STATES))
+        at = At(table, floats_at, integers_at)
+        rates = read(0.1, 0.9, 0.3, more, 0)
+        random_state = ti.u64(1)
+        begins = 1
         ti.loop_config(serialize=True)
         for i in range(updates):
-            pair, reward, ended = (
-                i * 11 % 128 * ROW + i % 5,
-                i % 15 - 1,
-                ti.cast(i % 7 == 0, ti.i32),
+            if ti.static(has_begin):
+                if begins == 1:
+                    learner.begin(memory, at)
+            terminated = ti.cast(i % 7 == 0, ti.i32)
+            begins = ti.cast(i % 50 == 49 or terminated == 1, ti.i32)
+            next_action = -1
+            if ti.static(learner.draws_next_action):
+                if terminated == 0:
+                    next_action = (i + 1) // 5 % N_ACTIONS
+            step = Transition(
+                state=i * 7 % _STATES,
+                action=i // 5 % N_ACTIONS,
+                reward=ti.cast(i % 15 - 1, ti.f32),
+                next_state=(i + 1) * 7 % _STATES,
+                next_action=next_action,
+                terminated=terminated,
+                truncated=begins - terminated,
             )
-            action = i // 5 % 5 if ended == 0 else -1
-            rates = Rates(0.1, 0.9, 0.3)
-            update(td_error, q, 0, rates, pair, reward, ended, i * 7 % 128, action)
+            _, random_state = learner.learn(memory, at, step, rates, random_state)
 
-    values = np.zeros(TABLE, np.float32)
-    if wide:
-        signs = np.where(np.arange(TABLE) % 3, 1, -1)
-        values[:] = signs * 10.0 ** (np.arange(TABLE) % 13 / 2 - 2)
-    try:
-        try_updates(values, _UPDATES)
-    except Exception as error:
-        # Assertions of the learner's own hold in Taichi's debug mode only, not where it trains.
-        theirs = isinstance(error, ti.TaichiAssertionError) and "Out of bound" not in str(error)
-        return "" if theirs else _last_line(error)
-    return ""
+    return try_updates
 
 
 def _last_line(error: Exception) -> str:

@@ -2,16 +2,18 @@
 
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.hyperparameters import Hyperparameters, number, whole_number
-from taichi_ants.learners.registry import Learner, get, names, register, settle
+from taichi_ants.learners.registry import Learner, Memory, get, names, register, settle, td_learner
 
 __all__ = [
     "Hyperparameters",
     "Learner",
+    "Memory",
     "TrainingConfig",
     "get",
     "names",
     "number",
     "register",
     "settle",
+    "td_learner",
     "whole_number",
 ]

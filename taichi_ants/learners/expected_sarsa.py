@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from taichi_ants.learners.registry import Learner
+from taichi_ants.learners.registry import td_learner
 
 
 @ti.func
@@ -13,6 +13,6 @@ def td_error(value, reward, discount, next_values, next_action, epsilon):
     return reward + discount * expected - value
 
 
-EXPECTED_SARSA = Learner(
+EXPECTED_SARSA = td_learner(
     "expected_sarsa", td_error, summary="on-policy, towards the mean over the next actions"
 )

@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from taichi_ants.learners.registry import Learner
+from taichi_ants.learners.registry import td_learner
 
 
 @ti.func
@@ -11,4 +11,4 @@ def td_error(value, reward, discount, next_values, next_action, epsilon):
     return reward + discount * max(next_values) - value
 
 
-Q_LEARNING = Learner("q_learning", td_error, summary="off-policy, towards the best next action")
+Q_LEARNING = td_learner("q_learning", td_error, summary="off-policy, towards the best next action")

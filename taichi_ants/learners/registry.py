@@ -1,57 +1,146 @@
 """The one place where learners are registered.
 
-A learner is a pure function that returns a TD error, and what it needs besides. To add one, write
-a file beside this one and add its name to `BUILT_IN`; or call `register` from a file of your own.
+A learner is a function that updates a table of action values after each step, and what it needs
+besides. To add one, write a file beside this one and add its name to `BUILT_IN`; or call `register`
+from a file of your own.
 """
 
 from __future__ import annotations
 
 import dis
 import inspect
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields, replace
 from importlib import import_module
-from types import FunctionType
 from typing import Any
 
-from taichi_ants.errors import AntsError, shown
+from taichi_ants.errors import AntsError, check_whole, shown
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.hyperparameters import Hyperparameters
 
 
 @dataclass(frozen=True)
+class Memory:
+    """What a learner remembers of each run, besides the table that the ant acts by.
+
+    Attributes:
+        tables: Further tables of action values, which start as copies of that one.
+        floats: Further f32 numbers, which start as 0.
+        integers: Further i32 numbers, which start as 0.
+    """
+
+    tables: int = 0
+    floats: int = 0
+    integers: int = 0
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            check_whole(f"{name} of a memory", value, 0, 2**30)
+
+
+def no_memory(hyperparameters: Hyperparameters, n_states: int) -> Memory:
+    """The memory of learners that have none."""
+    return Memory()
+
+
+def usual_cost(hyperparameters: Hyperparameters) -> float:
+    """What a step of a learner costs that does one update after each."""
+    return 1.0
+
+
+@dataclass(frozen=True)
 class Learner:
-    """A tabular temporal-difference learner.
+    """A tabular learner; `td_learner` makes one from a TD error alone.
 
     Attributes:
         name: The name by which configurations call it.
-        td_error: A `ti.func` (value, reward, discount, next_values, next_action, epsilon) -> float:
-            the value of the state-action pair that is updated, the reward, the discount (0 where
-            the transition terminated), the five action values of the next state, the next action
-            and the current epsilon; all f32 but next_action (i32). The engine adds learning_rate
-            times the error to the value. Python's max, min, sum and len work on next_values, and
-            next_values[a] takes any action a; all else is what Taichi allows in a `ti.func`.
+        learn: A `ti.func` (memory, at, step, rates, random_state) -> (TD error f32, random_state
+            u64) that is called after each step; see `taichi_ants.learners.memory` for the
+            arguments, the first of which is a `ti.template()`. It changes the memory of one run,
+            which begins at `at`, and returns the TD error of the step, for traces.
+        begin: A `ti.func` (memory, at) that is called at the start of each episode, or None.
+        td_error: The TD error, if all ants of a world can share a table, see `td_learner`.
         draws_next_action: The next action is drawn before the update and then taken (on-policy
-            learners); only then may td_error look at next_action, which is 0 to 4, and 0 where the
-            transition terminated.
-        plans: The learner keeps a model of the last seen outcome of each visited pair and updates
-            from it `planning_steps` times after each step. These updates have no next action, so
-            td_error may not look at it.
+            learners); only then has a step one.
+        plans: The learner keeps `taichi_ants.learners.model` and has the hyperparameter
+            `planning_steps`; ants that share a table share the model. Its updates from the model
+            have no next action, so td_error may not look at it.
+        needs_episode_end: It looks at whether a step is the last of an episode; colonies, where no
+            ant knows that, refuse it.
         hyperparameters: What it has besides the settings of all learners: a dataclass whose fields
             `whole_number` and `number` of `taichi_ants.learners` make, all with usual values.
+        memory: A function (hyperparameters, n_states) -> Memory, where a table has n_states rows.
+        cost: A function (hyperparameters) -> float: the time of a step of one ant, in that of
+            Q-learning. Launches of kernels are cut by it.
         summary: One line for listings.
     """
 
     name: str
-    td_error: Any
+    learn: Any
+    begin: Any = None
+    td_error: Any = None
     draws_next_action: bool = False
     plans: bool = False
+    needs_episode_end: bool = False
     hyperparameters: type[Hyperparameters] = Hyperparameters
+    memory: Callable[[Any, int], Memory] = no_memory
+    cost: Callable[[Any], float] = usual_cost
     summary: str = ""
+
+    def settings(self, config: TrainingConfig) -> Hyperparameters:
+        """The hyperparameters of a configuration."""
+        return self.hyperparameters(**dict(config.hyperparameters))
+
+    def memory_for(self, config: TrainingConfig, n_states: int) -> Memory:
+        """The memory that it needs with a configuration and tables of n_states rows."""
+        return self.memory(self.settings(config), n_states)
+
+
+def td_learner(
+    name: str, td_error: Any, draws_next_action: bool = False, summary: str = ""
+) -> Learner:
+    """A learner that adds learning_rate * TD error to the value of the pair; ants can share it.
+
+    Args:
+        name: The name by which configurations call it.
+        td_error: A `ti.func` (value, reward, discount, next_values, next_action, epsilon) -> float:
+            the value of the state-action pair that is updated, the reward, the discount (0 where
+            the step terminated), the five action values of the next state, the next action and the
+            current epsilon; all f32 but next_action (i32). Python's max, min, sum and len work on
+            next_values, and next_values[a] takes any action a; all else is what Taichi allows in a
+            `ti.func`.
+        draws_next_action: See `Learner`; only then may td_error look at next_action, which is 0 to
+            4, and 0 where the step terminated.
+        summary: One line for listings.
+
+    Raises:
+        AntsError: The TD error is no `ti.func`, does not take six arguments, or looks at a next
+            action that is not drawn. What it computes is tried when it is first used.
+    """
+    _check_td_error(name, td_error, draws_next_action)
+    from taichi_ants.learners.td_errors import learn_by  # Taichi starts to be imported
+
+    return Learner(
+        name,
+        learn_by(td_error),
+        td_error=td_error,
+        draws_next_action=draws_next_action,
+        summary=summary,
+    )
 
 
 # The package's own: NAME in the file `name.py`, imported when it is asked for, since that starts
 # to import Taichi.
-BUILT_IN = ("q_learning", "sarsa", "expected_sarsa", "dyna_q")
+BUILT_IN = (
+    "q_learning",
+    "sarsa",
+    "expected_sarsa",
+    "dyna_q",
+    "double_q",
+    "sarsa_lambda",
+    "n_step_sarsa",
+    "prioritized_sweeping",
+)
 _LEARNERS: dict[str, Learner] = {}
 
 
@@ -59,45 +148,61 @@ def register(learner: Learner) -> Learner:
     """Make a learner known by its name.
 
     Raises:
-        AntsError: The name is taken, or is not usable in files and on command lines; or the TD
-            error is no `ti.func`, does not take six arguments, or looks at a next action that is
-            not drawn. What it computes is tried when it is first used.
+        AntsError: The name is taken, or is not usable in files and on command lines; or a function
+            is no `ti.func`, does not take the arguments that it must take, or looks at a next
+            action that is not drawn; or a hyperparameter is called as a setting of all learners.
+            What the functions compute is tried when the learner is first used.
     """
     if not isinstance(learner, Learner):
-        raise AntsError(f"{learner!r} is not a Learner; wrap the TD error in Learner(name, ...).")
-    if not isinstance(learner.name, str) or not learner.name.isidentifier():
+        raise AntsError(f"{shown(learner)} is not a Learner; make one by td_learner(name, ...).")
+    name = learner.name
+    if not isinstance(name, str) or not name.isidentifier():
         raise AntsError(
-            f"{learner.name!r} cannot name a learner; use letters, digits and underscores."
+            f"{shown(name)} cannot name a learner; use letters, digits and underscores."
         )
-    # Taichi's own mark; a plain function would be taken apart without its branches and loops.
-    if not getattr(learner.td_error, "_is_taichi_function", False):
-        raise AntsError(
-            f"the TD error of {learner.name!r} is no Taichi function; mark it @ti.func."
-        )
-    if learner.name in names():
-        raise AntsError(f"a learner named {learner.name!r} exists already; choose another name.")
-    _check_arguments(learner, learner.td_error.func.func)
-    _LEARNERS[learner.name] = learner
+    if name in names():
+        raise AntsError(f"a learner named {name!r} exists already; choose another name.")
+    parts = ["memory", "at", "step", "rates", "random_state"]
+    _check_arguments(f"the function learn of {name!r}", learner.learn, parts)
+    if learner.begin is not None:
+        _check_arguments(f"the function begin of {name!r}", learner.begin, parts[:2])
+    if learner.td_error is not None:
+        drawn = learner.draws_next_action and not learner.plans
+        _check_td_error(name, learner.td_error, drawn)
+    taken = {field.name for field in fields(TrainingConfig)}
+    for field in fields(learner.hyperparameters):
+        if field.name in taken:
+            raise AntsError(
+                f"{field.name!r} is a setting of all learners; call this hyperparameter of "
+                f"{name!r} something else."
+            )
+    _LEARNERS[name] = learner
     return learner
 
 
-def _check_arguments(learner: Learner, td_error: FunctionType) -> None:
-    arguments = list(inspect.signature(td_error).parameters)
-    if len(arguments) != 6:
-        raise AntsError(
-            f"the TD error of {learner.name!r} has {len(arguments)} arguments; it needs 6: value, "
-            "reward, discount, next_values, next_action and epsilon."
-        )
+def _check_arguments(what: str, function: Any, wanted: list[str]) -> list[str]:
+    """The names of the arguments of a `ti.func`, which are as many as are wanted."""
+    # Taichi's own mark; a plain function would be taken apart without its branches and loops.
+    if not getattr(function, "_is_taichi_function", False):
+        raise AntsError(f"{what} is no Taichi function; mark it @ti.func.")
+    arguments = list(inspect.signature(function.func.func).parameters)
+    if len(arguments) != len(wanted):
+        listed = f"{', '.join(wanted[:-1])} and {wanted[-1]}"
+        raise AntsError(f"{what} has {len(arguments)} arguments; it needs {len(wanted)}: {listed}.")
+    return arguments
+
+
+def _check_td_error(name: str, td_error: Any, draws_next_action: bool) -> None:
+    wanted = ["value", "reward", "discount", "next_values", "next_action", "epsilon"]
+    next_action = _check_arguments(f"the TD error of {name!r}", td_error, wanted)[4]
     # Some instructions load two variables at once.
-    loaded = [i.argval for i in dis.get_instructions(td_error) if i.opname.startswith("LOAD")]
-    looks = any(arguments[4] in (one if isinstance(one, tuple) else (one,)) for one in loaded)
-    if looks and (learner.plans or not learner.draws_next_action):
-        advice = "register it with draws_next_action=True"
-        if learner.plans:
-            advice = "a learner that plans has none in its updates from the model"
+    instructions = dis.get_instructions(td_error.func.func)
+    loaded = [one.argval for one in instructions if one.opname.startswith("LOAD")]
+    looks = any(next_action in (one if isinstance(one, tuple) else (one,)) for one in loaded)
+    if looks and not draws_next_action:
         raise AntsError(
-            f"the TD error of {learner.name!r} looks at {arguments[4]}, but no next action is "
-            f"drawn; {advice}."
+            f"the TD error of {name!r} looks at {next_action}, but no next action is drawn; give "
+            "draws_next_action=True (a learner that plans has none in its updates from the model)."
         )
 
 
@@ -129,7 +234,7 @@ def settle(config: TrainingConfig) -> TrainingConfig:
             raise AntsError(
                 f"{shown(name)} is no hyperparameter of learner {config.learner!r}; {allowed}."
             )
-    return replace(config, hyperparameters=asdict(kind(**given)))
+    return replace(config, hyperparameters=tuple(asdict(kind(**given)).items()))
 
 
 def names() -> tuple[str, ...]:

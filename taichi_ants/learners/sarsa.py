@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from taichi_ants.learners.registry import Learner
+from taichi_ants.learners.registry import td_learner
 from taichi_ants.task.constants import N_ACTIONS
 
 
@@ -16,6 +16,6 @@ def td_error(value, reward, discount, next_values, next_action, epsilon):
     return reward + discount * next_value - value
 
 
-SARSA = Learner(
+SARSA = td_learner(
     "sarsa", td_error, draws_next_action=True, summary="on-policy, towards the action taken next"
 )

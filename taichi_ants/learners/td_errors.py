@@ -9,18 +9,20 @@ from typing import Any
 import taichi as ti
 from taichi.lang.expr import Expr
 
-from taichi_ants.learners.registry import Learner
+from taichi_ants.learners.memory import discount_of, values_of
+from taichi_ants.task.constants import ROW
 from taichi_ants.task.rules.policy import larger, smaller
 
 _FLOATS = (ti.f16, ti.f32, ti.f64)
 
 
-def guarded(learner: Learner) -> Callable[..., object]:
-    """The TD error of a learner, as a `ti.func` that returns an f32 or raises while it compiles.
+@functools.cache
+def guarded(td_error: Any) -> Callable[..., object]:
+    """A TD error, a `ti.func`, as one that returns an f32 or raises while it compiles.
 
     What is no float would end the process in Taichi's compiler.
     """
-    original = learner.td_error.func.func
+    original = td_error.func.func
     renewed = FunctionType(
         original.__code__,
         {"max": _largest, "min": _smallest, "sum": _sum, **original.__globals__},
@@ -31,12 +33,63 @@ def guarded(learner: Learner) -> Callable[..., object]:
     body = ti.func(functools.update_wrapper(renewed, original))
 
     @ti.func
-    def td_error(value, reward, discount, next_values, next_action, epsilon):
+    def checked(value, reward, discount, next_values, next_action, epsilon):
         # No next action is drawn where the transition terminated; 0 is as good as any there.
         action = ti.max(next_action, 0)
         return _as_f32(body(value, reward, discount, next_values, action, epsilon))
 
-    return td_error
+    return checked
+
+
+@ti.func
+def update(
+    td_error: ti.template(),
+    memory: ti.template(),
+    at,
+    rates,
+    pair,
+    reward,
+    terminated,
+    state,
+    action,
+):
+    """Update a pair (an offset in the table) by its TD error, which is returned.
+
+    `state` is the next row, `action` the next action (-1 where none was drawn).
+    """
+    value = memory.q[at.table + pair]
+    error = td_error(
+        value,
+        reward,
+        discount_of(rates, terminated),
+        values_of(memory.q, at.table, state),
+        action,
+        rates.epsilon,
+    )
+    memory.q[at.table + pair] = value + rates.learning_rate * error
+    return error
+
+
+def learn_by(td_error: Any) -> Callable[..., object]:
+    """The `learn` of a learner that keeps no memory and updates by this TD error."""
+    error_of = guarded(td_error)
+
+    @ti.func
+    def learn(memory: ti.template(), at, step, rates, random_state):
+        error = update(
+            error_of,
+            memory,
+            at,
+            rates,
+            step.state * ROW + step.action,
+            step.reward,
+            step.terminated,
+            step.next_state,
+            step.next_action,
+        )
+        return error, random_state
+
+    return learn
 
 
 def _runs_while_compiling(function: Any) -> Callable[..., object]:
@@ -63,7 +116,7 @@ def _as_f32(result: object) -> object:
 
 
 @ti.func
-def _entry(vector: ti.template(), i: ti.template()):  # type: ignore[no-untyped-def, valid-type]
+def _entry(vector: ti.template(), i: ti.template()):
     return vector[i]
 
 

@@ -22,6 +22,8 @@ QUEEN = SEES_OBSTACLE | SEES_GOAL << 2
 LEFT, FORWARD, RIGHT, PICK_UP, GIVE = 0, 1, 2, 3, 4
 ACTION_NAMES: tuple[str, ...] = ("left", "forward", "right", "pick up", "give")
 N_ACTIONS = 5
+# A row of a table of action values in memory: 5, and 3 unused, so that none straddles a cache line.
+ROW = 8
 
 # State = (carries, left, forward, right); index = 64 * carries + 16 * left + 4 * forward + right.
 N_STATES = 128

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from taichi_ants import AntsError, Colony, Life, Task, TrainingConfig, worlds
-from taichi_ants.engines.colony import arrays as names
+from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.rendering import writers
 from taichi_ants.studies.interruption import held, stoppable
@@ -102,7 +102,11 @@ def test_the_summary_counts_in_words() -> None:
     def summed(**counts: int) -> str:
         colony = begun(ants=1)
         colony.tick(1)
-        rows = {"deliveries": names.DELIVERIES, "births": names.BORN, "deaths": names.DIED}
+        rows = {
+            "deliveries": WorldRow.DELIVERIES,
+            "births": WorldRow.BIRTHS,
+            "deaths": WorldRow.DEATHS,
+        }
         for name, count in counts.items():
             colony.arrays["worlds"][rows[name]] = count
         return summary(colony, Pace(ticks=1))

@@ -10,12 +10,12 @@ from random_worlds import random_world
 
 from taichi_ants import TrainingConfig
 from taichi_ants.engines.colony.population import SHARINGS
-from taichi_ants.task import Life, Pheromone, Rewards, Task
-from taichi_ants.task.constants import EMPTY, GIVE, N_ACTIONS, N_STATES, PICK_UP
+from taichi_ants.task import Life, Pheromone, Rewards, Task, observations
+from taichi_ants.task.constants import EMPTY, GIVE, N_ACTIONS, PICK_UP
 from taichi_ants.worlds import World
 from taichi_ants.worlds.starts import STARTS
 
-LEARNERS = [("q_learning", 0), ("sarsa", 0), ("expected_sarsa", 0), ("dyna_q", 2)]
+LEARNERS = ("q_learning", "sarsa", "expected_sarsa", "dyna_q")  # ants can share their tables
 
 
 @dataclass(frozen=True)
@@ -37,43 +37,57 @@ def random_colony(
     sharing: str | None = None,
     largest_range: int = 5,
     rewards: Rewards | None = None,
+    learner: str | None = None,
+    observation: str = "paper",
+    dense: bool | None = None,
 ) -> RandomColony:
-    """The same seed gives the same colony; `sharing` may be given instead of drawn."""
+    """The same seed gives the same colony.
+
+    `sharing`, `learner` and whether the trail is dense may be given instead of drawn.
+    """
     rng = np.random.default_rng([seed, 2])
     world = random_world(seed, largest_range)
     room = int(np.count_nonzero(world.ground() == EMPTY))
     sharing = str(rng.choice(SHARINGS)) if sharing is None else sharing
-    population, task = _rules(rng, min(room, most_ants))
-    training, delivery = _training(rng)
+    population, task = _rules(rng, min(room, most_ants), dense)
+    training, delivery = _training(rng, learner)
+    given = sharing == "fixed" or rng.random() < 0.6
     return RandomColony(
         world=world,
-        task=replace(task, delivery=delivery, rewards=rewards or Rewards()),
+        task=replace(
+            task, delivery=delivery, rewards=rewards or Rewards(), observation=observation
+        ),
         population=population,
         training=training,
         seed=int(rng.integers(-5, 2**40)),
         sharing=sharing,
-        q_values=forager() if sharing == "fixed" or rng.random() < 0.6 else None,
+        q_values=forager(observation) if given else None,
     )
 
 
-def forager() -> np.ndarray:
+def forager(observation: str = "paper") -> np.ndarray:
     """A table that takes food in view, gives to a queen in view, and follows what lures."""
-    q_values = np.zeros((N_STATES, N_ACTIONS), np.float32)
-    for state in range(N_STATES):
-        codes = (state >> 4 & 3, state >> 2 & 3, state & 3)
-        if 3 in codes:
-            q_values[state, GIVE if state >= 64 else PICK_UP] = 8
-        for side, code in enumerate(codes):
-            q_values[state, side] = {0: 0.5, 1: -1.0, 2: 1.25, 3: -1.0}[code]
+    sees = observations.get(observation)
+    ahead = [sees.cells.index(cell) for cell in (-1, 0, 1)]
+    worth = {"E": 0.5, "-": 0.5, "T": 1.25, "S": 1.25, "1": 0.75, "2": 1.0, "3": 1.25}
+    q_values = np.zeros((sees.n_states, N_ACTIONS), np.float32)
+    for row in range(sees.n_states):
+        task, *cells = sees.name_of(row).split()
+        letters = [cells[k] for k in ahead]
+        if "F" in letters or "Q" in letters:
+            q_values[row, GIVE if task == "carrying" else PICK_UP] = 8
+        q_values[row, :3] = [worth.get(letter, -1.0) for letter in letters]
     return q_values
 
 
-def _rules(rng: np.random.Generator, most_ants: int) -> tuple[dict[str, Any], Task]:
+def _rules(
+    rng: np.random.Generator, most_ants: int, dense: bool | None
+) -> tuple[dict[str, Any], Task]:
     # One ant, any number, or as many as there is room for.
     ants = int(rng.choice([1, rng.integers(1, most_ants + 1), most_ants]))
     births = bool(rng.random() < 0.5)
     capacity = ants + int(rng.integers(0, 6)) if rng.random() < 0.5 else None
-    pheromone = _pheromone(rng)
+    pheromone = _pheromone(rng, dense)
     lifespan = int(rng.integers(1, 30)) if rng.random() < 0.5 else None
     regrowth = int(rng.choice([0, 0, 1, 2, 7])) if rng.random() < 0.7 else None
     wander = int(rng.choice([1, 2, 5])) if rng.random() < 0.5 else None
@@ -87,11 +101,15 @@ def _rules(rng: np.random.Generator, most_ants: int) -> tuple[dict[str, Any], Ta
     return {"ants": ants, "capacity": capacity, "ends_at_delivery": ends, "start": start}, task
 
 
-def _pheromone(rng: np.random.Generator) -> Pheromone:
+def _pheromone(rng: np.random.Generator, dense: bool | None) -> Pheromone:
     evaporation = str(rng.choice(["linear", "exponential", "none"]))
     half_life = float(rng.choice([0.5, 3.0, 50.0]))
     diffusion = float(rng.choice([0.0, 0.0, 0.05, 0.6, 1.0]))
     deposit = str(rng.choice(["set", "add", "none"]))
+    if dense is True and evaporation != "exponential":
+        diffusion = max(diffusion, 0.05)
+    elif dense is False:
+        evaporation, diffusion = "linear" if evaporation == "exponential" else evaporation, 0.0
     return Pheromone(
         evaporation=evaporation,
         half_life=half_life if evaporation == "exponential" else None,
@@ -102,9 +120,10 @@ def _pheromone(rng: np.random.Generator) -> Pheromone:
     )
 
 
-def _training(rng: np.random.Generator) -> tuple[TrainingConfig, str]:
+def _training(rng: np.random.Generator, learner: str | None) -> tuple[TrainingConfig, str]:
     """Values far from each other and from round ones."""
-    learner, planning_steps = LEARNERS[rng.integers(len(LEARNERS))]
+    drawn = LEARNERS[rng.integers(len(LEARNERS))]
+    learner = drawn if learner is None else learner
     config = TrainingConfig(
         learner=learner,
         learning_rate=float(rng.choice([0.001, 0.01, 0.37, 1.0])),
@@ -112,6 +131,6 @@ def _training(rng: np.random.Generator) -> tuple[TrainingConfig, str]:
         epsilon=float(rng.choice([0.0, 0.05, 0.3, 1.0])),
         epsilon_decay=float(rng.choice([0.3, 0.99, 1.0])),
         min_epsilon=float(rng.choice([0.0, 0.01, 0.2])),
-        hyperparameters={"planning_steps": planning_steps} if planning_steps else {},
+        hyperparameters={"planning_steps": 2} if learner == "dyna_q" else {},
     )
     return config, str(rng.choice(["absorbing", "continuing"]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -11,14 +11,16 @@ import numpy as np
 from taichi_ants import checks, learners, runtime
 from taichi_ants.engines.colony import files as colony_files
 from taichi_ants.engines.colony import memory as colony_memory
+from taichi_ants.engines.colony.layout import AntRow, Stage, WorldRow
 from taichi_ants.engines.colony.population import SHARINGS, Population, Start
 from taichi_ants.engines.records import Record
 from taichi_ants.errors import AntsError, check_one_of, shown
 from taichi_ants.files import PathLike
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.learners.registry import Learner, Memory
 from taichi_ants.task import Task
-from taichi_ants.task.constants import EMPTY, MAX_STEPS, N_ACTIONS, N_STATES
+from taichi_ants.task.constants import EMPTY, MAX_STEPS, N_ACTIONS, ROW
 from taichi_ants.worlds.world import World
 
 Progress = Callable[[float], None]
@@ -27,7 +29,7 @@ _LARGE_COLONY = 16_384  # slots from which ants, not worlds, are handed to threa
 _ANTS_PER_CHUNK = 2048
 _MOST_CHUNKS = 256
 _TICKS_BETWEEN_SORTS = 32
-_TICK_NS = 150  # of an ant, on a slow core, planning left out
+_TICK_NS = 150  # of an ant, on a slow core, by Q-learning
 _LAUNCH_SECONDS = 0.4
 
 
@@ -94,23 +96,25 @@ class Colony:
         seeds: One seed for each of the W worlds.
         ants: How many start each episode, 1 to 2**24: the listed ants of the World first, then
             others on free cells, see `start`.
-        capacity: How many ants can live at once, at least `ants`. None: `ants` if none are born,
-            else 2 * `ants` + 64.
+        capacity: How many ants can live at once, at least `ants`; more than these changes nothing
+            where none are born. None: `ants` if none are born, else 2 * `ants` + 64.
         start: Where ants start that the World does not list: "nest", on the free cells nearest to
             the queen; "spread", on free cells anywhere. The seed decides which, and the headings.
         ends_at_delivery: Whether an episode ends at its first delivery, as when an ant trains
             alone. Only for one ant, without births.
-        sharing: "shared": one table for all ants of a world. "own": one for each slot. "fixed":
-            nobody learns.
-        q_values: Action values to start from, float (128, 5) or (W, 128, 5); None: zeros, but if
-            nobody learns they must be given. If tables are not shared, (W, slots, 128, 5) too.
+        sharing: "shared": one table for all ants of a world, for learners with a TD error. "own":
+            one, and a memory of the learner, for each slot. "fixed": nobody learns.
+        q_values: Action values to start from, float (n_states, 5) or (W, n_states, 5); None: zeros,
+            but if nobody learns they must be given. If tables are not shared, (W, slots, n_states,
+            5) too.
         threads: CPU threads; None keeps what runs, or takes all.
         arch: "cpu" or "cuda"; None keeps what runs, or takes the CPU.
         schedule: "by_world" hands worlds to threads, "by_chunk" groups of ants; None chooses by
             size. Both give the same numbers.
 
     Raises:
-        AntsError: An argument is not allowed, or a world has too few free cells for the ants.
+        AntsError: An argument is not allowed; the learner needs what a colony, or a shared table,
+            does not have; or a world has too few free cells for the ants.
     """
 
     def __init__(
@@ -136,77 +140,79 @@ class Colony:
             raise AntsError(f"training is {shown(training)}; it must be one TrainingConfig.")
         (self.training,) = checks.checked_configs(training)
         check_one_of("sharing", sharing, SHARINGS)
-        if sharing == "fixed" and q_values is None:
+        self.sharing, learns = sharing, sharing != "fixed"
+        if not learns and q_values is None:
             raise AntsError(
                 "sharing is 'fixed', but q_values is None; nobody learns, so give the action "
                 "values that the ants follow."
             )
         table = None if q_values is None else checks.checked_q_values(q_values, self.task)
-        learns = sharing != "fixed"
+        self.one_a_slot = sharing == "own" or (
+            sharing == "fixed" and table is not None and table.ndim == 4
+        )
+        self._learner = learners.get(training.learner) if learns else None
+        self.memory = Memory()
+        self._cost = 1.0  # of a tick of an ant, in that of Q-learning
+        self._plans_together = False
+        if self._learner is not None:
+            _check_sharing(self._learner, sharing)
+            settings = self._learner.settings(self.training)
+            self._cost = self._learner.cost(settings)
+            self._plans_together = sharing == "shared" and self._learner.plans
+            if sharing == "own" or self._plans_together:
+                self.memory = self._learner.memory(settings, self.task.n_states)
         falls = self.task.evaporation_in_training if learns else self.task.evaporation_in_evaluation
         self.pheromone = self.task.pheromone if falls else self.task.pheromone.lasting
         self.seeds = checks.checked_seeds(seeds)
-        self.sharing = sharing
-        self._learner = learners.get(training.learner)
+        self.seed_words = np.array([seed % 2**64 for seed in self.seeds], dtype=np.uint64)
         self._settings = runtime.start(threads, arch)
         one = isinstance(world, (str, World)) or not isinstance(world, Iterable)
         given: Any = (world,) * len(self.seeds) if one else world
         several = tuple(given)
         if len(several) != len(self.seeds):
             raise AntsError(f"there are {len(several)} worlds for {len(self.seeds)} seeds.")
-        check_world = checks.checked_world if sharing == "fixed" else checks.checked_food
+        check_world = checks.checked_food if learns else checks.checked_world
         self.layout = colony_memory.Layout(
             [check_world(one) for one in several], self.task.life, self.population, self.seeds
         )
-        self._lively = self.task.life.changes
         slots = self.population.slots
-        large = slots >= _LARGE_COLONY
-        self.schedule = ("by_chunk" if large else "by_world") if schedule is None else schedule
+        usual = "by_chunk" if slots >= _LARGE_COLONY else "by_world"
+        self.schedule = usual if schedule is None else schedule
         check_one_of("schedule", self.schedule, ("by_world", "by_chunk"))
-        chunks = 1
-        if self.schedule == "by_chunk":
-            chunks = min(_MOST_CHUNKS, -(-slots // _ANTS_PER_CHUNK))
-        self.chunks = chunks
-        words = np.array([seed % 2**64 for seed in self.seeds], dtype=np.uint64)
-        plans = self._learner.plans and sharing != "fixed"
-        self.arrays = colony_memory.allocate(self, words, plans, chunks)
-        self.one_a_slot = sharing == "own" or (
-            sharing == "fixed" and table is not None and table.ndim == 4
-        )
-        tables = colony_memory.allocate_tables(len(self.seeds), slots, self.one_a_slot, table)
-        self.arrays["q"] = tables
+        by_chunk = self.schedule == "by_chunk"
+        self.chunks = min(_MOST_CHUNKS, -(-slots // _ANTS_PER_CHUNK)) if by_chunk else 1
+        self.arrays = colony_memory.allocate(self, table)
+        self.stored = tuple(self.arrays)  # the names of those that a file needs to hold
+        self.arrays |= colony_memory.constants(self)
+        self._arguments: Any = None
         self.epsilon = float(self.training.epsilon)
         self.episode = -1
         self.ticks = 0
 
     def begin_episode(self) -> None:
         """Set worlds and ants to their start; the ants look around."""
-        from taichi_ants.engines.colony.kernels import BEGIN
-
         self.episode += 1
         self.ticks = 0
         colony_memory.fill_episode(self)
-        self._launch(BEGIN, 0, 1)
+        self._launch("begin", 1)
 
     def tick(self, n: int = 1) -> None:
         """Let n ticks pass; worlds whose episode has ended stand still."""
-        from taichi_ants.engines.colony.kernels import BY_CHUNK, BY_WORLD, END, PLAN
-
         self._check_begun()
         n = checks.checked_count("n", n)
         if self.schedule == "by_world":
-            self._launch(BY_WORLD, self.ticks, n)
+            self._launch("by_world", n)
             self.ticks += n
             return
         for _ in range(n):
             if self.ticks % _TICKS_BETWEEN_SORTS == 0:
                 self._sort_ants()
-            self._launch(BY_CHUNK, self.ticks, 1)
-            if self._learner.plans and self.sharing == "shared":
+            self._launch("by_chunk", 1)
+            if self._plans_together:
                 for _ in range(self.training.planning_steps):
-                    self._launch(PLAN, self.ticks, 1)
-            if self._lively or self.population.ends_at_delivery:
-                self._launch(END, self.ticks, 1)
+                    self._launch("plan", 1)
+            if self.task.life.changes or self.population.ends_at_delivery:
+                self._launch("end", 1)
             self.ticks += 1
 
     def end_episode(self) -> None:
@@ -215,13 +221,11 @@ class Colony:
         Raises:
             AntsError: The learner has made action values that are not finite.
         """
-        from taichi_ants.engines.colony import arrays as names
-
-        ants = self.arrays["ants"]
-        first = (ants[names.LIFE] != names.VACANT) & (ants[names.NUMBER] < self.population.ants)
-        (columns,) = np.nonzero(first & (ants[names.NUMBER] >= 0))
-        slots = self.population.slots
-        places = columns // slots * slots + ants[names.NUMBER, columns]
+        ants, slots = self.arrays["ants"], self.population.slots
+        number = ants[AntRow.NUMBER]
+        there = ants[AntRow.STAGE] != Stage.VACANT
+        (columns,) = np.nonzero(there & (number >= 0) & (number < self.population.ants))
+        places = columns // slots * slots + number[columns]
         self.arrays["first_streams"][places] = self.arrays["streams"][columns]
         self._check_finite()
         decayed = self.epsilon * float(self.training.epsilon_decay)
@@ -241,7 +245,7 @@ class Colony:
         outcomes = []
         for episode in range(episodes):
             self.begin_episode()
-            while self.ticks < ticks and self.arrays["worlds"][0].any():
+            while self.ticks < ticks and self.arrays["worlds"][WorldRow.RUNNING].any():
                 self.tick(min(self._ticks_per_launch(), ticks - self.ticks))
                 if progress is not None:
                     progress((episode + self.ticks / ticks) / episodes)
@@ -262,35 +266,25 @@ class Colony:
         return self._counted()
 
     def _counted(self) -> ColonyEpisodes:
-        from taichi_ants.engines.colony import arrays as names
-
-        rows = {
-            "ticks": names.TICKS,
-            "deliveries": names.DELIVERIES,
-            "first_delivery": names.FIRST_DELIVERY,
-            "moves": names.MOVES,
-            "blocked": names.BLOCKED,
-            "births": names.BORN,
-            "deaths": names.DIED,
-            "regrown": names.REGROWN,
-            "living": names.LIVING_ANTS,
+        counts = {
+            field.name: self.arrays["worlds"][WorldRow[field.name.upper()]][None].copy()
+            for field in fields(ColonyEpisodes)
+            if field.name != "returns"
         }
-        counts = {name: self.arrays["worlds"][row][None].copy() for name, row in rows.items()}
         return ColonyEpisodes(returns=self.arrays["returns"][None].copy(), **counts)
 
     @property
     def q_values(self) -> np.ndarray:
-        """The action values, float32 (W, 128, 5), or (W, slots, 128, 5) with own tables; a copy."""
+        """The action values, float32 (W, n_states, 5), with own tables (W, slots, n_states, 5)."""
         n = self.population.slots if self.one_a_slot else 1
-        tables = self.arrays["q"].reshape(len(self.seeds), n, N_STATES, -1)[..., :N_ACTIONS]
+        tables = self.arrays["q"].reshape(len(self.seeds), n, -1, self.task.n_states, ROW)
+        tables = tables[:, :, 0, :, :N_ACTIONS]
         return (tables if self.one_a_slot else tables[:, 0]).copy()
 
     @property
     def waiting_foods(self) -> int:
         """Foods that the queens have been given, but could not turn into ants yet."""
-        from taichi_ants.engines.colony import arrays as names
-
-        return int(self.arrays["worlds"][names.STORE].sum())
+        return int(self.arrays["worlds"][WorldRow.STORE].sum())
 
     @property
     def worlds(self) -> tuple[World, ...]:
@@ -303,16 +297,14 @@ class Colony:
         Raises:
             AntsError: There is no such world, or no episode has begun.
         """
-        from taichi_ants.engines.colony import arrays as names
-
         self._check_begun()
         world = checks.checked_count("world", world, len(self.seeds) - 1, least=0)
         cells = slice(world * self.layout.size, (world + 1) * self.layout.size)
         slots = slice(world * self.population.slots, (world + 1) * self.population.slots)
         ants = self.arrays["ants"][:, slots]
-        ants = ants[:, ants[names.LIFE] == names.LIVING]
+        ants = ants[:, ants[AntRow.STAGE] == Stage.LIVING]
         ground = self.arrays["ground"][cells].copy()
-        ground[ants[names.CELL]] = EMPTY
+        ground[ants[AntRow.CELL]] = EMPTY
         if self.pheromone.dense:
             trail = self.arrays["level"][cells].copy()
         else:
@@ -322,9 +314,9 @@ class Colony:
             self.layout.grid,
             ground,
             trail,
-            ants[names.CELL].copy(),
-            ants[names.HEADING].copy(),
-            ants[names.CARRIES].astype(bool),
+            ants[AntRow.CELL].copy(),
+            ants[AntRow.HEADING].copy(),
+            ants[AntRow.CARRIES].astype(bool),
         )
 
     def save(self, path: PathLike) -> None:
@@ -381,7 +373,7 @@ class Colony:
         if self.schedule == "by_chunk":
             return 1
         rounds = -(-len(self.seeds) // self._settings.threads)
-        cost = _TICK_NS * (1 + self.training.planning_steps)
+        cost = _TICK_NS * max(self._cost, 1 + self.training.planning_steps)
         if self.pheromone.dense:
             cost += 2 * self.layout.size / self.population.slots
         return max(1, int(_LAUNCH_SECONDS * 1e9 / (rounds * self.population.slots * cost)))
@@ -393,55 +385,84 @@ class Colony:
         born or have tables of their own, and vacant ones stay behind the others; there the order
         stays.
         """
-        from taichi_ants.engines.colony import arrays as names
-
         life, population = self.task.life, self.population
         spare = population.slots > population.ants
         if life.births or life.lifespan or self.one_a_slot or spare:
             return
         ants = self.arrays["ants"]
-        cells = ants[names.CELL].reshape(len(self.seeds), -1)
+        cells = ants[AntRow.CELL].reshape(len(self.seeds), -1)
         first = np.arange(len(self.seeds))[:, None] * population.slots
         order = (np.argsort(cells, axis=1) + first).ravel()
         for row in ants:
             row[:] = row[order]
         self.arrays["streams"][:] = self.arrays["streams"][order]
 
-    def _launch(self, what: str, tick: int, n: int) -> None:
-        from taichi_ants.engines.colony.arrays import Arrays, Settings
-        from taichi_ants.engines.colony.kernels import colony_kernel
+    def _launch(self, what: str, n_ticks: int) -> None:
+        from taichi_ants.engines.arguments import Arguments
+        from taichi_ants.engines.colony import kernels
 
         self._settings = runtime.start()  # the caller may have reset Taichi, or forked
-        dense = self.pheromone.dense
-        kernel = colony_kernel(
-            self._learner, self.sharing, self.one_a_slot, dense, self._lively, what
+        if self._arguments is None:
+            self._arguments = Arguments()
+        variant = kernels.Variant(
+            self._learner,
+            self.one_a_slot,
+            self.memory.tables,
+            self.task.sees,
+            self.pheromone.dense,
+            self.task.life.changes,
         )
-        numbers = Settings(**self._numbers())
         with runtime.quiet():
-            kernel(tick, n, *numbers, *Arrays(**self.arrays))
+            kind, arguments = self._arguments.pack({**self._numbers(), **self.arrays})
+            kernel = kernels.colony_kernel(getattr(kernels, what), variant, kind)
+            kernel(arguments, self.ticks, n_ticks)
 
-    def _numbers(self) -> dict[str, int | float]:
+    def _numbers(self) -> dict[str, Any]:
+        """What kernels know besides arrays; -1 stands for an option that is off."""
         life, population, pheromone = self.task.life, self.population, self.pheromone
         off = -1
         return {
-            "worlds": len(self.seeds),
-            "ants": population.ants,
-            "slots": population.slots,
-            "chunks": self.chunks,
+            "n_worlds": len(self.seeds),
+            "n_ants": population.ants,  # that start an episode
+            "n_slots": population.slots,
+            "n_chunks": self.chunks,
+            "n_homes": self.layout.homes,  # room for places of food in each world
             "size": self.layout.size,
-            "homes": self.layout.homes,
             "episode": self.episode,
-            "evaporates": int(pheromone.evaporation == "linear"),
-            "adds": {"add": 1, "set": 0, "none": -1}[pheromone.deposit],
-            "level": pheromone.level,
-            "cap": pheromone.cap or 0,
+            "evaporates": int(pheromone.evaporation == "linear"),  # of integer trails: the clock
+            "adds": {"add": 1, "set": 0, "none": off}[pheromone.deposit],
+            "deposit_level": int(pheromone.level),
+            "cap": int(pheromone.cap or 0),
+            # The factor of exponential evaporation, 1 for none, -1 for linear.
             "decay": -1.0 if pheromone.evaporation == "linear" else float(pheromone.decay),
-            "share": float(pheromone.share) if pheromone.diffusion else 0.0,
+            "share": float(pheromone.share),  # what a cell gives to each neighbour
             "births": int(life.births),
             "lifespan": life.lifespan or off,
             "regrowth": off if life.regrowth is None else life.regrowth,
             "wander": life.wander or off,
             "ends_at_delivery": int(population.ends_at_delivery),
-            "planning_steps": self.training.planning_steps,
             "continuing": int(self.task.delivery == "continuing"),
+            "learning_rate": self.training.learning_rate,
+            "discount": self.training.discount,
+            "epsilon": self.epsilon,
+            "explore_below": np.uint64(self.epsilon * 4294967296.0),
+            "planning_steps": self.training.planning_steps,
+            # So that the sum of the errors of all ants is a fixed-point number, see `learning`.
+            "largest_error": 2.0**31 / (population.slots + 1),
+            "floats_size": self.memory.floats,
+            "integers_size": self.memory.integers,
         }
+
+
+def _check_sharing(learner: Learner, sharing: str) -> None:
+    """Refuse a learner that cannot learn in a colony, or not into a table that others share."""
+    if learner.needs_episode_end:
+        raise AntsError(
+            f"learner {learner.name!r} needs to know the last step of an episode, which the ants "
+            "of a colony do not; take another one, or train one ant by train(...)."
+        )
+    if sharing == "shared" and learner.td_error is None:
+        raise AntsError(
+            f"learner {learner.name!r} keeps a memory of its own, so ants cannot share its table; "
+            'take sharing="own".'
+        )

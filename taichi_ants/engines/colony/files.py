@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from taichi_ants import checks, files, learners, runtime
-from taichi_ants.engines.colony.damage import check_contents
 from taichi_ants.engines.records import same
 from taichi_ants.engines.stored import FileKind, world_arrays, world_facts, world_from
 from taichi_ants.learners.config import TrainingConfig
@@ -18,9 +17,7 @@ from taichi_ants.task.constants import N_ACTIONS
 if TYPE_CHECKING:
     from taichi_ants.engines.colony.colony import Colony
 
-_KIND = FileKind("taichi-ants colony 3", "colony", "Colony.save")
-# What the worlds and configurations determine is not stored.
-_DERIVED = frozenset({"walls", "closer", "compass", "rewards", "weights", "spare", "seeds"})
+_KIND = FileKind("taichi-ants colony 4", "colony", "Colony.save")
 
 
 def save_colony(colony: Colony, path: files.PathLike) -> None:
@@ -41,9 +38,7 @@ def same_colony(one: Colony, other: Colony) -> bool:
 
 def _contents(colony: Colony) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """All that a file of a colony holds: facts and arrays."""
-    arrays: dict[str, np.ndarray] = {
-        f"array_{name}": array for name, array in colony.arrays.items() if name not in _DERIVED
-    }
+    arrays = {f"array_{name}": colony.arrays[name] for name in colony.stored}
     numbers = {world: number for number, world in enumerate(dict.fromkeys(colony.worlds))}
     for world, number in numbers.items():
         arrays |= world_arrays(world, f"world{number}")
@@ -56,7 +51,6 @@ def _contents(colony: Colony) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
         "seeds": list(colony.seeds),
         "worlds": [world_facts(world) for world in numbers],
         "world_of": [numbers[world] for world in colony.worlds],
-        "chunks": colony.chunks,
         "schedule": colony.schedule,
         "epsilon": colony.epsilon,
         "episode": colony.episode,
@@ -86,13 +80,11 @@ def load_colony(
         colony.epsilon = checks.checked_share("epsilon", facts["epsilon"])
         colony.episode = checks.checked_count("episode", facts["episode"], least=-1)
         colony.ticks = checks.checked_count("ticks", facts["ticks"], least=0)
-        for name, array in colony.arrays.items():
-            if name not in _DERIVED:
-                kept = stored[f"array_{name}"]
-                if kept.shape != array.shape or kept.dtype != array.dtype:
-                    raise ValueError(f"{name} has another shape or type")
-                colony.arrays[name] = np.ascontiguousarray(kept)
-        check_contents(colony)
+        for name in colony.stored:
+            array, kept = colony.arrays[name], stored[f"array_{name}"]
+            if kept.shape != array.shape or kept.dtype != array.dtype:
+                raise ValueError(f"{name} has another shape or type")
+            array[:] = kept
     return colony
 
 

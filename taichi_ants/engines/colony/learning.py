@@ -8,117 +8,139 @@ in turn towards one target would give. Every chunk of ants sums for itself; noth
 
 import taichi as ti
 
-from taichi_ants.engines.colony.arrays import (
-    ACTION,
-    COUNT,
-    EVENT,
-    LATEST,
-    MODEL_SIZE,
-    NUMBER,
-    OUTCOME,
-    STATE,
-    VISITED,
-)
-from taichi_ants.engines.runs.learning import (
-    MODEL,
-    ROW,
-    TABLE,
-    Rates,
-    entry_ended,
-    entry_event,
-    entry_next_state,
-    entry_pair,
-    pack_entry,
-    plan,
+from taichi_ants.engines.colony.layout import AntRow, Stage, SumRow
+from taichi_ants.learners.memory import At, LearnerArrays, Transition, discount_of, values_of
+from taichi_ants.learners.model import (
+    next_state_of,
+    pack_outcome,
+    recall,
     remember,
-    update,
-    values_of,
+    reward_of,
+    terminated_of,
+    visited,
 )
-from taichi_ants.task.constants import DELIVERED, N_ACTIONS
+from taichi_ants.task.constants import DELIVERED, N_ACTIONS, ROW
 from taichi_ants.task.rules.policy import choose
 from taichi_ants.task.rules.random_bits import advance, below, bits_of, high_word
 
 _ONE = 4294967296.0  # fixed-point numbers have 32 binary places
-_LARGEST = 2147483648.0  # and an error must lie below this
 
 
 @ti.func
-def rates_of(c: ti.template(), w):
-    """Learning rate, discount and epsilon of a world."""
-    return Rates(c.rates[3 * w], c.rates[3 * w + 1], c.rates[3 * w + 2])
+def owner_of_table(v: ti.template(), w, ant):
+    """The number of the table that an ant acts by: its own, or that of its world."""
+    return ant if ti.static(v.own_tables) else w
 
 
 @ti.func
-def draw_action(c: ti.template(), w, table, ant, state):
-    """The ant's choice in a state, by the table that begins at `table`."""
+def memory_of(c: ti.template(), v: ti.template(), owner):
+    """Where the table, and what else the learner keeps, of an ant or a world begins."""
+    return At(v.table_size * owner, c.floats_size * owner, c.integers_size * owner)
+
+
+@ti.func
+def rates_of(c: ti.template(), v: ti.template()):
+    """Learning rate, discount, epsilon and the learner's own hyperparameters."""
+    return v.read_rates(c.learning_rate, c.discount, c.epsilon, c.hyperparameters, 0)
+
+
+@ti.func
+def draw_action(c: ti.template(), v: ti.template(), w, ant, row):
+    """The ant's choice at a row of its table."""
     c.streams[ant] = advance(c.streams[ant])
-    return choose(values_of(c.q, table, state), bits_of(c.streams[ant]), c.explore_below[w])
+    table = v.table_size * owner_of_table(v, w, ant)
+    return choose(values_of(c.q, table, row), bits_of(c.streams[ant]), c.explore_below)
 
 
 @ti.func
-def learn_alone(
-    td_error: ti.template(), plans: ti.template(), c: ti.template(), k: ti.template(), w, ant, seen,
-    next_action,
-):  # fmt: skip
+def begin_to_learn(c: ti.template(), v: ti.template(), ant):
+    """Let the learner of an ant with a table of its own begin an episode."""
+    if ti.static(v.begins):
+        memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.n_states))
+        v.learner.begin(memory, memory_of(c, v, ant))
+
+
+@ti.func
+def forget(c: ti.template(), v: ti.template(), ant):
+    """Empty the tables and the memory of a slot for the ant that was born into it."""
+    at = memory_of(c, v, ant)
+    for i in range(at.table, at.table + v.table_size):
+        c.q[i] = 0.0
+    for i in range(at.floats, at.floats + c.floats_size):
+        c.floats[i] = 0.0
+    for i in range(at.integers, at.integers + c.integers_size):
+        c.integers[i] = 0
+    begin_to_learn(c, v, ant)
+
+
+@ti.func
+def learn_alone(c: ti.template(), v: ti.template(), ant, seen, next_action):
     """Update the ant's own table, as an ant that is alone does."""
-    rates, event = rates_of(c, w), c.ants[EVENT, ant]
-    ended = ti.cast(event == DELIVERED, ti.i32) & (1 - k.continuing)
-    table, model = ant * TABLE, ant * MODEL
-    pair = c.ants[STATE, ant] * ROW + c.ants[ACTION, ant]
-    update(td_error, c.q, table, rates, pair, c.rewards[event], ended, seen, next_action)
-    if ti.static(plans):
-        known = c.ants[VISITED, ant]
-        known = remember(c.entries, c.slots_of, model, known, pair, event, ended, seen)
-        c.ants[VISITED, ant] = known
-        c.streams[ant] = plan(
-            td_error,
-            c.q,
-            c.entries,
-            c.rewards,
-            table,
-            model,
-            rates,
-            known,
-            k.planning_steps,
-            c.streams[ant],
-        )
+    memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.n_states))
+    event = c.ants[AntRow.EVENT, ant]
+    step = Transition(
+        state=c.ants[v.row_at, ant],
+        action=c.ants[AntRow.ACTION, ant],
+        reward=ti.cast(c.rewards[event], ti.f32),
+        next_state=seen,
+        next_action=next_action,
+        terminated=terminates(c, event),
+        truncated=ti.cast(c.ants[AntRow.STAGE, ant] == Stage.DYING, ti.i32),
+    )
+    _, c.streams[ant] = v.learner.learn(
+        memory, memory_of(c, v, ant), step, rates_of(c, v), c.streams[ant]
+    )
 
 
 @ti.func
-def error_of(td_error: ti.template(), c: ti.template(), w, pair, event, ended, seen, next_action):
+def terminates(c: ti.template(), event):
+    """1 if the update does not bootstrap: at a delivery, if that is absorbing."""
+    return ti.cast(event == DELIVERED, ti.i32) & (1 - c.continuing)
+
+
+@ti.func
+def error_of(
+    c: ti.template(), v: ti.template(), w, pair, reward, terminated, seen, next_action
+):  # fmt: skip
     """The TD error of a pair (its offset in the table) by the shared table of a world."""
-    rates, table = rates_of(c, w), w * TABLE
-    discount = rates.discount
-    if ended == 1:
-        discount = 0.0
-    error = td_error(
+    table = v.table_size * w
+    error = v.td_error(
         c.q[table + pair],
-        ti.cast(c.rewards[event], ti.f32),
-        discount,
+        reward,
+        discount_of(rates_of(c, v), terminated),
         values_of(c.q, table, seen),
         next_action,
-        rates.epsilon,
+        c.epsilon,
     )
-    if not ti.abs(error) < _LARGEST:
-        c.q[table + pair] = ti.math.nan  # a fixed-point number would hide it
+    if not ti.abs(error) < c.largest_error:
+        c.q[table + pair] = ti.math.nan  # a fixed-point sum would hide it
     return error
 
 
 @ti.func
-def share_error(
-    td_error: ti.template(), plans: ti.template(), c: ti.template(), k: ti.template(), w, chunk,
-    ant, seen, next_action,
-):  # fmt: skip
+def share_error(c: ti.template(), v: ti.template(), w, chunk, ant, seen, next_action):
     """Add the TD error of an ant to the sums of its chunk, and what it saw."""
-    event = c.ants[EVENT, ant]
-    ended = ti.cast(event == DELIVERED, ti.i32) & (1 - k.continuing)
-    state, action = c.ants[STATE, ant], c.ants[ACTION, ant]
-    pair = state * ROW + action
-    error = error_of(td_error, c, w, pair, event, ended, seen, next_action)
-    place = chunk * MODEL + state * N_ACTIONS + action
-    add_to_sums(c, chunk, state * N_ACTIONS + action, error, fixed(error), 1)
-    if ti.static(plans):
-        note_outcome(c, place, c.ants[NUMBER, ant], pack_entry(pair, event, ended, seen))
+    event = c.ants[AntRow.EVENT, ant]
+    reward, terminated = ti.cast(c.rewards[event], ti.f32), terminates(c, event)
+    state, action = c.ants[v.row_at, ant], c.ants[AntRow.ACTION, ant]
+    key = state * N_ACTIONS + action
+    error = error_of(c, v, w, state * ROW + action, reward, terminated, seen, next_action)
+    add_to_sums(c, v, chunk, key, error, fixed(error), 1)
+    if ti.static(v.learner.plans):
+        outcome = pack_outcome(seen, reward, terminated)
+        note_outcome(c, v.n_pairs * chunk + key, c.ants[AntRow.NUMBER, ant], outcome)
+
+
+@ti.func
+def key_of(pair):
+    """The number of a pair among all pairs, from its offset in the table."""
+    return pair // ROW * N_ACTIONS + pair % ROW
+
+
+@ti.func
+def pair_of(key):
+    """The offset of a pair in the table, from its number."""
+    return key // N_ACTIONS * ROW + key % N_ACTIONS
 
 
 @ti.func
@@ -128,16 +150,22 @@ def fixed(error):
 
 
 @ti.func
-def add_to_sums(c: ti.template(), chunk, key, error, total, count):
+def list_of(v: ti.template(), chunk):
+    """Where the list of a chunk's pairs begins in `touched`: how many, then which."""
+    return (v.n_pairs + 1) * chunk
+
+
+@ti.func
+def add_to_sums(c: ti.template(), v: ti.template(), chunk, key, error, total, count):
     """Add `count` updates of a pair to a chunk's sums, the last of them with this error."""
-    place, listed = chunk * MODEL + key, chunk * (MODEL + 1)
-    known = c.sums_of[COUNT, place]
+    place, listed = v.n_pairs * chunk + key, list_of(v, chunk)
+    known = c.sums_of[SumRow.COUNT, place]
     if known == 0:
         c.touched[listed] += 1
         c.touched[listed + c.touched[listed]] = key
         c.sums[place] = 0
-        c.sums_of[LATEST, place] = -1
-    c.sums_of[COUNT, place] = known + count
+        c.sums_of[SumRow.LATEST, place] = -1
+    c.sums_of[SumRow.COUNT, place] = known + count
     c.sums[place] += total
     c.errors[place] = error
 
@@ -145,54 +173,55 @@ def add_to_sums(c: ti.template(), chunk, key, error, total, count):
 @ti.func
 def note_outcome(c: ti.template(), place, number, outcome):
     """Note what an ant saw of a pair, for the model; the highest ant number's outcome stays."""
-    if number > c.sums_of[LATEST, place]:
-        c.sums_of[LATEST, place] = number
-        c.sums_of[OUTCOME, place] = outcome
+    if number > c.sums_of[SumRow.LATEST, place]:
+        c.sums_of[SumRow.LATEST, place] = number
+        c.sums_of[SumRow.OUTCOME, place] = outcome
 
 
 @ti.func
-def join_sums(c: ti.template(), k: ti.template(), w):
+def join_sums(c: ti.template(), v: ti.template(), w):
     """Bring the sums of all chunks of a world into its first one."""
-    first = w * k.chunks
-    for chunk in range(first + 1, first + k.chunks):
-        listed = chunk * (MODEL + 1)
+    first = w * c.n_chunks
+    for chunk in range(first + 1, first + c.n_chunks):
+        listed = list_of(v, chunk)
         for i in range(c.touched[listed]):
             key = c.touched[listed + 1 + i]
-            place = chunk * MODEL + key
-            count = c.sums_of[COUNT, place]
-            add_to_sums(c, first, key, c.errors[place], c.sums[place], count)
-            latest, outcome = c.sums_of[LATEST, place], c.sums_of[OUTCOME, place]
-            note_outcome(c, first * MODEL + key, latest, outcome)
-            c.sums_of[COUNT, place] = 0
+            place = v.n_pairs * chunk + key
+            count = c.sums_of[SumRow.COUNT, place]
+            add_to_sums(c, v, first, key, c.errors[place], c.sums[place], count)
+            latest, outcome = c.sums_of[SumRow.LATEST, place], c.sums_of[SumRow.OUTCOME, place]
+            note_outcome(c, v.n_pairs * first + key, latest, outcome)
+            c.sums_of[SumRow.COUNT, place] = 0
         c.touched[listed] = 0
 
 
 @ti.func
-def apply_sums(c: ti.template(), k: ti.template(), w):
+def apply_sums(c: ti.template(), v: ti.template(), w):
     """Move the shared values of a world by their joined errors, and forget these."""
-    chunk, table = w * k.chunks, w * TABLE
-    listed = chunk * (MODEL + 1)
+    chunk, table = w * c.n_chunks, v.table_size * w
+    listed = list_of(v, chunk)
     for i in range(c.touched[listed]):
         key = c.touched[listed + 1 + i]
-        place = chunk * MODEL + key
-        pair = table + key // N_ACTIONS * ROW + key % N_ACTIONS
-        count = c.sums_of[COUNT, place]
+        place = v.n_pairs * chunk + key
+        pair = table + pair_of(key)
+        count = c.sums_of[SumRow.COUNT, place]
         error = c.errors[place]
-        rate = c.rates[3 * w]
+        rate = c.learning_rate
         if count > 1:
             mean = ti.cast(c.sums[place], ti.f64) / (ti.cast(count, ti.f64) * _ONE)
             error = ti.cast(mean, ti.f32)
             rate = c.weights[count]
         c.q[pair] += rate * error
-        c.sums_of[COUNT, place] = 0
+        c.sums_of[SumRow.COUNT, place] = 0
     c.touched[listed] = 0
 
 
 @ti.func
-def remember_shared(c: ti.template(), k: ti.template(), w):
+def remember_shared(c: ti.template(), v: ti.template(), w):
     """Store the joined outcomes in the shared model, new pairs in ascending order."""
-    chunk, model = w * k.chunks, w * MODEL
-    listed = chunk * (MODEL + 1)
+    memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.n_states))
+    chunk = w * c.n_chunks
+    listed = list_of(v, chunk)
     n = c.touched[listed]
     for i in range(2, n + 1):  # insertion sort: short lists, nearly always known pairs
         key = c.touched[listed + i]
@@ -203,42 +232,32 @@ def remember_shared(c: ti.template(), k: ti.template(), w):
         c.touched[listed + j + 1] = key
     for i in range(1, n + 1):
         key = c.touched[listed + i]
-        if c.slots_of[model + key] == 0:
-            c.worlds[MODEL_SIZE, w] += 1
-            c.slots_of[model + key] = c.worlds[MODEL_SIZE, w]
-        outcome = c.sums_of[OUTCOME, chunk * MODEL + key]
-        c.entries[model + c.slots_of[model + key] - 1] = outcome
+        outcome = c.sums_of[SumRow.OUTCOME, v.n_pairs * chunk + key]
+        remember(memory, memory_of(c, v, w), pair_of(key), outcome)
 
 
 @ti.func
-def draw_pair(c: ti.template(), w, chunk, ant):
+def draw_pair(c: ti.template(), v: ti.template(), w, chunk, ant):
     """One planning draw of an ant: count an update of a visited pair."""
+    memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.n_states))
+    at = memory_of(c, v, w)
     c.streams[ant] = advance(c.streams[ant])
-    drawn = below(high_word(bits_of(c.streams[ant])), c.worlds[MODEL_SIZE, w])
-    entry = c.entries[w * MODEL + drawn]
-    pair = entry_pair(entry)
-    key = pair // ROW * N_ACTIONS + pair % ROW
-    add_to_sums(c, chunk, key, 0.0, ti.cast(0, ti.i64), 1)
-    note_outcome(c, chunk * MODEL + key, 0, entry)
+    drawn = below(high_word(bits_of(c.streams[ant])), visited(memory, at))
+    pair, outcome = recall(memory, at, drawn)
+    add_to_sums(c, v, chunk, key_of(pair), 0.0, ti.cast(0, ti.i64), 1)
+    note_outcome(c, v.n_pairs * chunk + key_of(pair), 0, outcome)
 
 
 @ti.func
-def price_draws(td_error: ti.template(), c: ti.template(), k: ti.template(), w):
+def price_draws(c: ti.template(), v: ti.template(), w):
     """The errors of all pairs that were drawn, by the table at the start of the round."""
-    chunk = w * k.chunks
-    listed = chunk * (MODEL + 1)
+    chunk = w * c.n_chunks
+    listed = list_of(v, chunk)
     for i in range(c.touched[listed]):
-        place = chunk * MODEL + c.touched[listed + 1 + i]
-        entry = c.sums_of[OUTCOME, place]
-        error = error_of(
-            td_error,
-            c,
-            w,
-            entry_pair(entry),
-            entry_event(entry),
-            entry_ended(entry),
-            entry_next_state(entry),
-            -1,
-        )
+        key = c.touched[listed + 1 + i]
+        place = v.n_pairs * chunk + key
+        seen = c.sums_of[SumRow.OUTCOME, place]
+        reward, terminated = reward_of(seen), terminated_of(seen)
+        error = error_of(c, v, w, pair_of(key), reward, terminated, next_state_of(seen), -1)
         c.errors[place] = error
-        c.sums[place] = fixed(error) * c.sums_of[COUNT, place]
+        c.sums[place] = fixed(error) * c.sums_of[SumRow.COUNT, place]

@@ -9,25 +9,17 @@ each ant writes what it wants into its own cell, and looks at the six cells arou
 import taichi as ti
 from taichi.math import popcnt
 
-from taichi_ants.engines.colony.arrays import (
-    ACTION,
-    AGE,
-    CARRIES,
-    CELL,
-    DYING,
-    EVENT,
-    HEADING,
-    HOME_TAKEN,
-    LIFE,
-    LIVING,
-    STATE,
-    T_BLOCKED,
-    T_DIED,
-    T_GIVES,
-    T_MOVES,
-    WANT,
+from taichi_ants.engines.colony.layout import (
+    ANT_GROUND,
+    ENTER,
+    STANDS,
+    TAKE,
+    AntRow,
+    HomeRow,
+    Stage,
+    TallyRow,
 )
-from taichi_ants.engines.colony.trail import deposit, level_in_view
+from taichi_ants.engines.colony.trail import deposit, level_in_view, level_of
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task.constants import (
     DELIVERED,
@@ -59,43 +51,100 @@ from taichi_ants.task.rules.vision import (
     state_index,
 )
 
-_ENTER, _TAKE = 1, 9  # what an ant wants, plus the heading towards it
+
+@ti.func
+def observe(c: ti.template(), v: ti.template(), base, ant, clock):
+    """What an ant sees: the percept, and the row of its table; its world begins at `base`."""
+    percept, row = 0, 0
+    if ti.static(v.sees_percept):
+        percept = see(c, v, base, ant, clock)
+        row = percept
+    else:
+        look = look_around(c, v, base, ant, clock)
+        percept = look.percept
+        row = v.row(look)
+    return percept, row
 
 
 @ti.func
-def observe(c: ti.template(), k: ti.template(), dense: ti.template(), base, ant, clock):
-    """The state that an ant sees; the cells of its world begin at `base`."""
-    heading = c.ants[HEADING, ant]
-    here = base + c.ants[CELL, ant]
+def see(c: ti.template(), v: ti.template(), base, ant, clock):
+    """The percept alone, without what only other observations need."""
+    heading = c.ants[AntRow.HEADING, ant]
+    here = base + c.ants[AntRow.CELL, ant]
     left = here + step_towards(c.compass, heading, LEFT)
     forward = here + step_towards(c.compass, heading, FORWARD)
     right = here + step_towards(c.compass, heading, RIGHT)
-    ground_left = ti.cast(c.ground[left] & 15, ti.i32)
-    ground_forward = ti.cast(c.ground[forward] & 15, ti.i32)
-    ground_right = ti.cast(c.ground[right] & 15, ti.i32)
-    state = 0
-    if c.ants[CARRIES, ant] == 1:
+    ground_left = looks_of(c.ground[left])
+    ground_forward = looks_of(c.ground[forward])
+    ground_right = looks_of(c.ground[right])
+    percept = 0
+    if c.ants[AntRow.CARRIES, ant] == 1:
         # Six bits, one for each heading, written twice so that the turns need no wrap.
         nearer = ti.cast(c.closer[here], ti.i32)
         nearer = (nearer | nearer << N_HEADINGS) >> heading
-        state = state_index(
+        percept = state_index(
             1,
             see_carrying(ground_left, nearer >> (N_HEADINGS - 1) & 1),
             see_carrying(ground_forward, nearer & 1),
             see_carrying(ground_right, nearer >> 1 & 1),
         )
     else:
-        trail_left = level_in_view(c, k, dense, left, clock)
-        trail_forward = level_in_view(c, k, dense, forward, clock)
-        trail_right = level_in_view(c, k, dense, right, clock)
+        trail_left = level_in_view(c, v, left, clock)
+        trail_forward = level_in_view(c, v, forward, clock)
+        trail_right = level_in_view(c, v, right, clock)
         strongest = ti.max(trail_left, ti.max(trail_forward, trail_right))
-        state = state_index(
+        percept = state_index(
             0,
             see_foraging(ground_left, trail_left, strongest),
             see_foraging(ground_forward, trail_forward, strongest),
             see_foraging(ground_right, trail_right, strongest),
         )
-    return state
+    return percept
+
+
+@ti.func
+def look_around(c: ti.template(), v: ti.template(), base, ant, clock):
+    """All that the ant can look at."""
+    heading, here = c.ants[AntRow.HEADING, ant], base + c.ants[AntRow.CELL, ant]
+    closer = ti.cast(c.closer[here], ti.i32)
+    look = v.look_type(carries=c.ants[AntRow.CARRIES, ant], own_level=level_of(c, v, here, clock))
+    cells = ti.static(v.observation.cells)
+    left, forward, right = ti.static(v.ahead)
+    for k in ti.static(range(len(cells))):
+        towards = (heading + cells[k] + N_HEADINGS) % N_HEADINGS
+        place = here + step_towards(c.compass, towards, FORWARD)
+        look.levels[k] = level_in_view(c, v, place, clock)
+        look.ants[k] = ant_on(c.ground[place])
+        look.nearer[k] = closer >> towards & 1
+        look.codes[k] = looks_of(c.ground[place])
+    look.strongest = ti.max(look.levels[left], look.levels[forward], look.levels[right])
+    for k in ti.static(range(len(cells))):
+        if look.carries == 1:
+            look.codes[k] = see_carrying(look.codes[k], look.nearer[k])
+        else:
+            look.codes[k] = see_foraging(look.codes[k], look.levels[k], look.strongest)
+    look.percept = state_index(
+        look.carries, look.codes[left], look.codes[forward], look.codes[right]
+    )
+    return look
+
+
+@ti.func
+def looks_of(ground):
+    """How a cell looks, without the mark of the ant on it: u8 -> i32."""
+    return ti.cast(ground & 15, ti.i32)
+
+
+@ti.func
+def ant_on(ground):
+    """0 if no ant stands on a cell, 1 if one without food does, 2 if one with food does."""
+    return (ti.cast(ground >> 4, ti.i32) + 1) >> 3
+
+
+@ti.func
+def ground_under(carries):
+    """What the cell of an ant holds when nobody wants anything."""
+    return ti.cast(OBSTACLE | (STANDS << 4) + (carries << 7), ti.u8)
 
 
 @ti.func
@@ -104,13 +153,13 @@ def want(c: ti.template(), base, ant, action):
 
     Hardly a branch: what the next ant does cannot be predicted from what this one did.
     """
-    state, cell = c.ants[STATE, ant], c.ants[CELL, ant]
-    heading = turned_by(c.compass, c.ants[HEADING, ant], action)
-    enters = is_open(code_in_view(state, ti.min(action, RIGHT))) and action <= RIGHT
+    percept, cell = c.ants[AntRow.PERCEPT, ant], c.ants[AntRow.CELL, ant]
+    heading = turned_by(c.compass, c.ants[AntRow.HEADING, ant], action)
+    enters = is_open(code_in_view(percept, ti.min(action, RIGHT))) and action <= RIGHT
     wanted = ti.select(enters, cell + step_towards(c.compass, heading, FORWARD), -1)
-    mark = ti.select(enters, _ENTER + heading, 0)
-    if action == PICK_UP and c.ants[CARRIES, ant] == 0:
-        foods = goals_in_view(state)
+    mark = ti.select(enters, ENTER + heading, 0)
+    if action == PICK_UP and c.ants[AntRow.CARRIES, ant] == 0:
+        foods = goals_in_view(percept)
         if foods != 0:
             position = lowest_bit_number(foods)
             if foods & (foods - 1) != 0:  # several foods in view
@@ -118,10 +167,10 @@ def want(c: ti.template(), base, ant, action):
                 word = high_word(bits_of(c.streams[ant]))
                 position = bit_number(foods, below(word, popcnt(foods)))
             wanted = cell + step_towards(c.compass, heading, position)
-            mark = _TAKE + (heading + position + N_HEADINGS - 1) % N_HEADINGS
-    c.ants[HEADING, ant] = heading
-    c.ants[ACTION, ant] = action
-    c.ants[WANT, ant] = wanted
+            mark = TAKE + (heading + position + N_HEADINGS - 1) % N_HEADINGS
+    c.ants[AntRow.HEADING, ant] = heading
+    c.ants[AntRow.ACTION, ant] = action
+    c.ants[AntRow.WANT, ant] = wanted
     c.ground[base + cell] = ti.cast(OBSTACLE | mark << 4, ti.u8)
 
 
@@ -135,15 +184,17 @@ def conflict_key(cell, tick):
 @ti.func
 def resolve(c: ti.template(), base, ant, tick):
     """Give up what another ant wins."""
-    wanted = c.ants[WANT, ant]
+    wanted = c.ants[AntRow.WANT, ant]
     if wanted >= 0:
-        kind = ti.cast(c.ground[base + c.ants[CELL, ant]] >> 4, ti.i32) & 8  # 8 to take, else 0
+        kind = (
+            ti.cast(c.ground[base + c.ants[AntRow.CELL, ant]] >> 4, ti.i32) & 8
+        )  # 8 to take, else 0
         rivals = -1  # the ant itself is found too
         for heading in ti.static(range(N_HEADINGS)):
             mark = c.ground[base + wanted + c.compass[heading + 1]] >> 4
             rivals += ti.cast(mark == wanting(kind, heading), ti.i32)
-        if rivals > 0 and not wins(c, base, c.ants[CELL, ant], wanted, kind, tick):
-            c.ants[WANT, ant] = -1
+        if rivals > 0 and not wins(c, base, c.ants[AntRow.CELL, ant], wanted, kind, tick):
+            c.ants[AntRow.WANT, ant] = -1
 
 
 @ti.func
@@ -164,58 +215,60 @@ def wins(c: ti.template(), base, cell, wanted, kind, tick):
 
 
 @ti.func
-def commit(c: ti.template(), k: ti.template(), dense: ti.template(), base, ant, chunk, tick):
+def commit(c: ti.template(), v: ti.template(), base, ant, chunk, tick):
     """Do what was won: move, take, give, deposit; the event."""
-    clock = tick * k.evaporates
-    action, cell, wanted = c.ants[ACTION, ant], c.ants[CELL, ant], c.ants[WANT, ant]
+    clock = tick * c.evaporates
+    action, percept = c.ants[AntRow.ACTION, ant], c.ants[AntRow.PERCEPT, ant]
+    cell, wanted = c.ants[AntRow.CELL, ant], c.ants[AntRow.WANT, ant]
     moves = action <= RIGHT
     enters = moves and wanted >= 0
     destination = ti.select(enters, wanted, cell)
-    code = code_in_view(c.ants[STATE, ant], ti.min(action, RIGHT))
-    event = ti.select(enters, move_event(code), FAILED)
+    event = ti.select(enters, move_event(code_in_view(percept, ti.min(action, RIGHT))), FAILED)
     c.ground[base + cell] = EMPTY
-    c.ground[base + destination] = OBSTACLE  # and nothing wanted any more
-    c.ants[CELL, ant] = destination
-    c.tallies[T_MOVES, chunk] += ti.cast(moves, ti.i32)
-    c.tallies[T_BLOCKED, chunk] += ti.cast(moves and not enters, ti.i32)
-    if c.ants[CARRIES, ant] == 1:
+    c.ground[base + destination] = ANT_GROUND
+    c.ants[AntRow.CELL, ant] = destination
+    c.tallies[TallyRow.MOVES, chunk] += ti.cast(moves, ti.i32)
+    c.tallies[TallyRow.BLOCKED, chunk] += ti.cast(moves and not enters, ti.i32)
+    if c.ants[AntRow.CARRIES, ant] == 1:
         if enters:
-            deposit(c, k, dense, base + destination, clock)
-        elif action == GIVE and goals_in_view(c.ants[STATE, ant]) != 0:
+            deposit(c, v, base + destination, clock)
+        elif action == GIVE and goals_in_view(percept) != 0:
             event = DELIVERED
-            c.ants[CARRIES, ant] = 0
-            c.tallies[T_GIVES, chunk] += 1
+            c.ants[AntRow.CARRIES, ant] = 0
+            c.tallies[TallyRow.GIVES, chunk] += 1
     elif action == PICK_UP and wanted >= 0:
         event = PICKED_UP
+        c.ants[AntRow.CARRIES, ant] = 1
         c.ground[base + wanted] = EMPTY
-        take_from_home(c, k, base, wanted, tick)
-        deposit(c, k, dense, base + wanted, clock)
-        deposit(c, k, dense, base + cell, clock)
-        c.ants[HEADING, ant] = turn_round(c.ants[HEADING, ant])
-        c.ants[CARRIES, ant] = 1
-    c.ants[EVENT, ant] = event
+        take_from_home(c, base, wanted, tick)
+        deposit(c, v, base + wanted, clock)
+        deposit(c, v, base + cell, clock)
+        c.ants[AntRow.HEADING, ant] = turn_round(c.ants[AntRow.HEADING, ant])
+    if ti.static(v.sees_ants):
+        c.ground[base + destination] = ground_under(c.ants[AntRow.CARRIES, ant])
+    c.ants[AntRow.EVENT, ant] = event
     return event
 
 
 @ti.func
-def take_from_home(c: ti.template(), k: ti.template(), base, cell, tick):
+def take_from_home(c: ti.template(), base, cell, tick):
     """If the food of a place lay there, the place waits from now on."""
-    if k.homes > 0:
+    if c.n_homes > 0:
         home = c.home_of[base + cell]
         if home >= 0:
-            c.homes[HOME_TAKEN, home] = tick
+            c.homes[HomeRow.TAKEN, home] = tick
             c.home_of[base + cell] = -1
 
 
 @ti.func
-def grow_old(c: ti.template(), k: ti.template(), base, ant, chunk):
+def grow_old(c: ti.template(), base, ant, chunk):
     """Age by one tick; at the end of its life an ant leaves its cell, and its food there."""
-    if c.ants[LIFE, ant] == LIVING:
-        c.ants[AGE, ant] += 1
-        if c.ants[AGE, ant] >= k.lifespan:
-            c.ants[LIFE, ant] = DYING
-            c.tallies[T_DIED, chunk] += 1
+    if c.ants[AntRow.STAGE, ant] == Stage.LIVING:
+        c.ants[AntRow.AGE, ant] += 1
+        if c.ants[AntRow.AGE, ant] >= c.lifespan:
+            c.ants[AntRow.STAGE, ant] = Stage.DYING
+            c.tallies[TallyRow.DEATHS, chunk] += 1
             left_behind = EMPTY
-            if c.ants[CARRIES, ant] == 1:
+            if c.ants[AntRow.CARRIES, ant] == 1:
                 left_behind = FOOD
-            c.ground[base + c.ants[CELL, ant]] = ti.cast(left_behind, ti.u8)
+            c.ground[base + c.ants[AntRow.CELL, ant]] = ti.cast(left_behind, ti.u8)

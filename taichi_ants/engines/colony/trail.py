@@ -13,48 +13,53 @@ LINEAR = -1.0  # the value of `decay` that stands for linear evaporation in dens
 
 
 @ti.func
-def level_in_view(c: ti.template(), k: ti.template(), dense: ti.template(), place, clock):
-    """The trail that an ant can see in a cell: 0 unless the cell is empty. i32, or f32 if dense."""
-    # Always read, never branch: most cells are empty, and nobody can predict which.
-    is_empty = c.ground[place] & 15 == EMPTY
-    level = 0.0 if ti.static(dense) else 0
-    if ti.static(dense):
-        level = ti.select(is_empty, c.level[place], 0.0)
+def level_of(c: ti.template(), v: ti.template(), place, clock):
+    """The trail on a cell: i32, or f32 if dense."""
+    level = 0.0 if ti.static(v.dense) else 0
+    if ti.static(v.dense):
+        level = c.level[place]
     else:
-        level = ti.select(is_empty, ti.max(c.trail[place] - clock, 0), 0)
+        level = ti.max(c.trail[place] - clock, 0)
     return level
 
 
 @ti.func
-def deposit(c: ti.template(), k: ti.template(), dense: ti.template(), place, clock):
-    """Lay a trail on a cell, as the configuration says."""
-    if ti.static(dense):
-        if k.adds == 1:
-            laid = c.level[place] + ti.cast(k.level, ti.f32)
-            c.level[place] = ti.min(laid, ti.cast(k.cap, ti.f32))
-        elif k.adds == 0:
-            c.level[place] = ti.cast(k.level, ti.f32)
-    elif k.adds == 1:
-        c.trail[place] = clock + ti.min(ti.max(c.trail[place] - clock, 0) + k.level, k.cap)
-    elif k.adds == 0:
-        c.trail[place] = clock + k.level
+def level_in_view(c: ti.template(), v: ti.template(), place, clock):
+    """The trail that an ant can see in a cell: 0 unless the cell is empty."""
+    # Always read, never branch: most cells are empty, and nobody can predict which.
+    return ti.select(c.ground[place] & 15 == EMPTY, level_of(c, v, place, clock), 0)
 
 
 @ti.func
-def evaporate(c: ti.template(), k: ti.template(), place):
+def deposit(c: ti.template(), v: ti.template(), place, clock):
+    """Lay a trail on a cell, as the configuration says."""
+    if ti.static(v.dense):
+        if c.adds == 1:
+            laid = c.level[place] + ti.cast(c.deposit_level, ti.f32)
+            c.level[place] = ti.min(laid, ti.cast(c.cap, ti.f32))
+        elif c.adds == 0:
+            c.level[place] = ti.cast(c.deposit_level, ti.f32)
+    elif c.adds == 1:
+        c.trail[place] = clock + ti.min(ti.max(c.trail[place] - clock, 0) + c.deposit_level, c.cap)
+    elif c.adds == 0:
+        c.trail[place] = clock + c.deposit_level
+
+
+@ti.func
+def evaporate(c: ti.template(), place):
     """One tick of evaporation of a cell in dense mode."""
     level = c.level[place]
-    if k.decay == LINEAR:
+    if c.decay == LINEAR:
         level = ti.max(level - 1.0, 0.0)
-    elif k.decay < 1.0:
-        level *= k.decay
+    elif c.decay < 1.0:
+        level *= c.decay
         if level < 1.0:
             level = 0.0
     c.level[place] = level
 
 
 @ti.func
-def diffused(c: ti.template(), k: ti.template(), place):
+def diffused(c: ti.template(), place):
     """The level of a cell after one tick of diffusion; the share aimed at a wall stays."""
     level = c.level[place]
     if c.walls[place] == 0:
@@ -63,7 +68,7 @@ def diffused(c: ti.template(), k: ti.template(), place):
             neighbour = place + c.compass[heading + 1]
             if c.walls[neighbour] == 0:
                 n_open += 1.0
-                received += c.level[neighbour] * k.share
+                received += c.level[neighbour] * c.share
         # At rate 1 all is given away, and rounding could leave less than nothing.
-        level = ti.max(level - level * k.share * n_open + received, 0.0)
+        level = ti.max(level - level * c.share * n_open + received, 0.0)
     return level

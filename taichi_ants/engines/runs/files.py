@@ -15,7 +15,7 @@ from taichi_ants.task import Task
 if TYPE_CHECKING:
     from taichi_ants.engines.runs.results import TrainingResult
 
-_KIND = FileKind("taichi-ants training 2", "training result", "TrainingResult.save")
+_KIND = FileKind("taichi-ants training 3", "training result", "TrainingResult.save")
 _OUTCOMES = ("returns", "steps", "deliveries")
 
 
@@ -41,7 +41,8 @@ def load_training(cls: type[TrainingResult], path: files.PathLike) -> TrainingRe
         AntsError: The file is missing, damaged, or holds no training result.
     """
     from taichi_ants.checks import checked_count, checked_max_steps, checked_seeds
-    from taichi_ants.engines.runs.results import LearnerCost, RunState
+    from taichi_ants.engines.runs.results import LearnerCost
+    from taichi_ants.engines.runs.state import RunState
 
     stored, facts = _KIND.read(path)
     with _KIND.rebuilding(path):

@@ -11,12 +11,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 _SECONDS = 1.0
-_STEP_NS = 25  # of one thread, on a slow core
-_PLANNING_STEP_NS = 6
+_STEP_NS = 25  # of Q-learning in one thread, on a slow core
 _WORKSPACE_BYTES = 256 * 2**20
-# Kernels index the Q-tables (1024 numbers a run) and the episodes of a launch by 32 bits.
-_MOST_RUNS = 2**20
-_MOST_EPISODES = 2**30
+_MOST_NUMBERS = 2**30  # of one array in a launch, which kernels index by 32 bits
 
 
 @dataclass(frozen=True)
@@ -45,7 +42,7 @@ class LaunchPlan:
 
 
 def plan_launches(
-    workers: int, episodes: int, max_steps: int, planning_steps: int, cells: int
+    workers: int, episodes: int, max_steps: int, cost: float, cells: int, widest: int
 ) -> LaunchPlan:
     """Choose the size of a launch.
 
@@ -53,12 +50,14 @@ def plan_launches(
         workers: Runs that progress at the same time (CPU threads).
         episodes: Episodes of each run.
         max_steps: Most steps of an episode.
-        planning_steps: Model updates after each step.
+        cost: What a step takes, 1 for one of Q-learning.
         cells: i32 cells that each run of a launch needs for its world.
+        widest: The most numbers that a run has in one array.
     """
-    steps_each = _SECONDS * 1e9 / (_STEP_NS + _PLANNING_STEP_NS * planning_steps)
+    steps_each = _SECONDS * 1e9 / (_STEP_NS * cost)
     rounds = int(steps_each // (episodes * max_steps))
-    most_runs = max(1, min(_WORKSPACE_BYTES // (4 * cells), _MOST_RUNS, _MOST_EPISODES // episodes))
+    numbers = max(widest, episodes)
+    most_runs = max(1, min(_WORKSPACE_BYTES // (4 * cells), _MOST_NUMBERS // numbers))
     if rounds >= 1:
         return LaunchPlan(min(workers * rounds, most_runs), episodes)
     return LaunchPlan(min(workers, most_runs), max(1, int(steps_each // max_steps)))

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import operator
+from dataclasses import astuple, dataclass, field
 
 import numpy as np
 
-from taichi_ants import files
+from taichi_ants import files, learners
+from taichi_ants.engines.layout import OUTCOMES
 from taichi_ants.engines.records import Record
 from taichi_ants.engines.runs import files as training_files
+from taichi_ants.engines.runs.state import RunState
 from taichi_ants.errors import AntsError, shown
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
-from taichi_ants.task.constants import N_ACTIONS, N_STATES
+from taichi_ants.task.constants import N_ACTIONS, ROW
 from taichi_ants.worlds.world import World
 
 # What the arrays of a result come from.
 _MAKERS = ("world", "task", "configs", "seeds", "max_steps")
-_PAIRS = N_STATES * N_ACTIONS
 _SUMMED_UP, _LISTED = 50, 6  # episodes and configurations that a result shows
 
 
@@ -46,37 +48,6 @@ class LearnerCost:
     def as_row(self) -> dict[str, object]:
         """For tables and manifests."""
         return {**vars(self), "nanoseconds_per_step": self.nanoseconds_per_step}
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class RunState(Record):
-    """Where runs stopped; training goes on from it bit for bit.
-
-    Attributes (leading axes: the runs, for example (configurations, seeds)):
-        q: float32 (..., 128, 8), 5 action values and 3 unused.
-        random_states: uint64 (...,), the ants' random streams.
-        exploration: float64 (..., 3): epsilon of the next episode, its decay, its minimum.
-        settings: int32 (..., 3): planning steps, whether delivery continues, visited pairs.
-        entries: int32 (..., 640), the packed model; (..., 1) where nobody plans.
-        slots: int32 (..., 640), where a pair stands in the model, from 1, 0 if it does not;
-            (..., 1) where nobody plans.
-    """
-
-    q: np.ndarray
-    random_states: np.ndarray
-    exploration: np.ndarray
-    settings: np.ndarray
-    entries: np.ndarray
-    slots: np.ndarray
-
-    def take(self, index: object) -> RunState:
-        """A copy of the runs at an index of the leading axes."""
-        return RunState(**{name: array[index].copy() for name, array in vars(self).items()})
-
-    def put(self, index: object, part: RunState) -> None:
-        """Overwrite the runs at an index."""
-        for name, array in vars(self).items():
-            array[index] = getattr(part, name)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -134,8 +105,8 @@ class TrainingResult(Record):
 
     @property
     def q_values(self) -> np.ndarray:
-        """The action values at the end, float32 (C, S, 128, 5), a copy."""
-        return self.state.q[..., :N_ACTIONS].copy()
+        """The action values at the end, float32 (C, S, n_states, 5), a copy."""
+        return self.state.q[:, :, 0, :, :N_ACTIONS].copy()
 
     def save(self, path: files.PathLike) -> None:
         """Write the result; training goes on from what `load` reads, bit for bit.
@@ -175,20 +146,21 @@ class TrainingResult(Record):
     def _outcomes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return self.returns, self.steps, self.deliveries
 
-    def _check_forms(self) -> None:
-        """Raises AntsError if an array has not the type and shape that it must have."""
+    def check(self) -> None:
+        """Make sure that training can go on from the arrays, which kernels believe.
+
+        Raises:
+            AntsError: It cannot.
+        """
         runs = (len(self.configs), len(self.seeds))
-        plans = any(config.planning_steps for config in self.configs)
-        model = (*runs, _PAIRS if plans or np.shape(self.state.slots)[2:] == (_PAIRS,) else 1)
         episodes = np.shape(self.returns)[2] if np.ndim(self.returns) == 3 else 0
-        outcome = ("int32", (*runs, episodes))
         forms = {
-            **dict.fromkeys(("returns", "steps", "deliveries"), outcome),
-            "q": ("float32", (*runs, N_STATES, 8)),
+            **dict.fromkeys(OUTCOMES, ("int32", (*runs, episodes))),
+            "q": ("float32", (*runs, *np.shape(self.state.q)[2:3], self.task.n_states, ROW)),
+            "floats": ("float32", (*runs, _by_8(self.state.floats))),
+            "integers": ("int32", (*runs, _by_8(self.state.integers))),
             "random_states": ("uint64", runs),
-            "exploration": ("float64", (*runs, 3)),
-            "settings": ("int32", (*runs, 3)),
-            **dict.fromkeys(("entries", "slots"), ("int32", model)),
+            "epsilon": ("float64", runs),
         }
         arrays = {**vars(self), **vars(self.state)}
         for name, (kind, shape) in forms.items():
@@ -198,32 +170,31 @@ class TrainingResult(Record):
                     f"{name} of a result is {shown(array)}; for {runs[0]} configurations and "
                     f"{runs[1]} seeds it must be an array of shape {shape} and type {kind}."
                 )
+        if not ((self.state.epsilon >= 0) & (self.state.epsilon <= 1)).all():
+            raise AntsError(
+                "epsilon of a result lies outside of 0 to 1; leave its arrays as they are."
+            )
 
-    def check(self) -> None:
-        """Make sure that training can go on from the arrays, which kernels believe.
+    def check_memory(self) -> None:
+        """Make sure that there is room for the memory of the learners, which must be registered.
 
         Raises:
-            AntsError: It cannot.
+            AntsError: There is not: a learner of this name needed less when it began.
         """
-        self._check_forms()
-        state = self.state
-        continues = self.task.delivery == "continuing"
-        given = [
-            [(c.epsilon_decay, c.min_epsilon, c.planning_steps, continues)] for c in self.configs
-        ]
-        kept = np.concatenate([state.exploration[..., 1:], state.settings[..., :2]], axis=2)
-        epsilon, visited = state.exploration[..., 0], state.settings[..., 2]
-        seen = np.count_nonzero(state.slots, axis=2)
-        if not (
-            (kept == given).all()
-            and ((epsilon >= 0) & (epsilon <= 1)).all()
-            and (visited == seen).all()
-            and ((state.slots >= 0) & (state.slots <= seen[..., None])).all()
-        ):
-            raise AntsError(
-                "the state of a result does not go with its configurations, or its models do not "
-                "add up; leave the arrays of a result as they are."
-            )
+        state, n_states = self.state, self.task.n_states
+        given = (state.q.shape[2] - 1, state.floats.shape[2], state.integers.shape[2])
+        for config in self.configs:
+            needed = astuple(learners.get(config.learner).memory_for(config, n_states))
+            if not all(map(operator.ge, given, needed)):
+                raise AntsError(
+                    f"learner {config.learner!r} has come to need more memory than when this "
+                    "training began; train anew."
+                )
+
+
+def _by_8(array: np.ndarray) -> int:
+    """The length of the last of three axes, down to a multiple of 8; kernels count by it."""
+    return np.shape(array)[2] // 8 * 8 if np.ndim(array) == 3 else 0
 
 
 @dataclass(frozen=True, eq=False, repr=False)

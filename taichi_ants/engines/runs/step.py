@@ -1,12 +1,16 @@
 """One ant in one world, in the packed cells of the engine of independent runs: see and act."""
 
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
 import taichi as ti
 from taichi.math import popcnt
 
+from taichi_ants.engines.looks import is_percept, look_type, positions_ahead, row_function
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task.constants import (
     DELIVERED,
-    DEPOSIT_LEVEL,
     FAILED,
     FORWARD,
     GIVE,
@@ -15,7 +19,14 @@ from taichi_ants.task.constants import (
     PICKED_UP,
     RIGHT,
 )
-from taichi_ants.task.rules.actions import is_open, move_event, step_towards, turn, turn_round
+from taichi_ants.task.observations import Observation
+from taichi_ants.task.rules.actions import (
+    is_open,
+    move_event,
+    step_towards,
+    turn,
+    turn_round,
+)
 from taichi_ants.task.rules.policy import bit_number, lowest_bit_number
 from taichi_ants.task.rules.random_bits import advance, below, bits_of, high_word
 from taichi_ants.task.rules.vision import (
@@ -40,20 +51,28 @@ EXTRA_CELLS = 2
 
 
 @ti.func
-def restore(cells: ti.template(), world: ti.template(), base, size, first, last):
-    """Set the cells from `first` to `last` back to the world's."""
+def restore(a: ti.template(), base, first, last):
+    """Set the cells from `first` to `last` of a run back to the world's."""
     for c in range(first, last + 1):
-        cells[base + c] = world[c]
-    cells[base + size] = size
-    cells[base + size + 1] = -1
+        a.cells[base + c] = a.world[c]
+    a.cells[base + a.size] = a.size
+    a.cells[base + a.size + 1] = -1
 
 
 @ti.func
-def deposit(cells: ti.template(), base, size, cell, clock):
-    """Set the trail of a cell, as the clock at which it will have evaporated."""
-    cells[base + cell] = clock + DEPOSIT_LEVEL
-    cells[base + size] = ti.min(cells[base + size], cell)
-    cells[base + size + 1] = ti.max(cells[base + size + 1], cell)
+def lay(kind: ti.template(), a: ti.template(), base, cell, clock, trail):
+    """Lay a trail on an empty cell, stored as the clock at which it will have evaporated.
+
+    `kind` is the deposit of the task's pheromone, `trail` what is stored there so far.
+    """
+    if ti.static(kind == "set"):
+        a.cells[base + cell] = clock + a.level
+    elif ti.static(kind == "add"):
+        a.cells[base + cell] = clock + ti.min(ti.max(trail - clock, 0) + a.level, a.cap)
+    else:
+        a.cells[base + cell] = trail
+    a.cells[base + a.size] = ti.min(a.cells[base + a.size], cell)
+    a.cells[base + a.size + 1] = ti.max(a.cells[base + a.size + 1], cell)
 
 
 @ti.func
@@ -63,18 +82,24 @@ def ground_of(packed):
 
 
 @ti.func
-def observe(cells: ti.template(), closer: ti.template(), compass: ti.template(), base, ant, clock):
-    """The state that the ant sees at `clock`; the cells of its run begin at `base`."""
+def nearer_from(a: ti.template(), ant):
+    """A bit for each cell around, the first the one forward, clockwise: is it nearer the queen?"""
+    # Six bits, one for each heading, written twice so that the turns need no wrap.
+    nearer = ti.cast(a.closer[ant.cell], ti.i32)
+    return (nearer | nearer << N_HEADINGS) >> ant.heading
+
+
+@ti.func
+def percept_of(a: ti.template(), base, ant, clock):
+    """The percept of the ant at `clock`; the cells of its run begin at `base`."""
     here = base + ant.cell
-    left = cells[here + step_towards(compass, ant.heading, LEFT)]
-    forward = cells[here + step_towards(compass, ant.heading, FORWARD)]
-    right = cells[here + step_towards(compass, ant.heading, RIGHT)]
-    state = 0
+    left = a.cells[here + step_towards(a.compass, ant.heading, LEFT)]
+    forward = a.cells[here + step_towards(a.compass, ant.heading, FORWARD)]
+    right = a.cells[here + step_towards(a.compass, ant.heading, RIGHT)]
+    percept = 0
     if ant.carries == 1:
-        # Six bits, one for each heading, written twice so that the turns need no wrap.
-        nearer = ti.cast(closer[ant.cell], ti.i32)
-        nearer = (nearer | nearer << N_HEADINGS) >> ant.heading
-        state = state_index(
+        nearer = nearer_from(a, ant)
+        percept = state_index(
             1,
             see_carrying(ground_of(left), nearer >> (N_HEADINGS - 1) & 1),
             see_carrying(ground_of(forward), nearer & 1),
@@ -85,39 +110,78 @@ def observe(cells: ti.template(), closer: ti.template(), compass: ti.template(),
         trail_forward = ti.max(forward - clock, 0)
         trail_right = ti.max(right - clock, 0)
         strongest = ti.max(trail_left, ti.max(trail_forward, trail_right))
-        state = state_index(
+        percept = state_index(
             0,
             see_foraging(ground_of(left), trail_left, strongest),
             see_foraging(ground_of(forward), trail_forward, strongest),
             see_foraging(ground_of(right), trail_right, strongest),
         )
-    return state
+    return percept
+
+
+@cache
+def state_seen(observation: Observation) -> Callable[..., Any]:
+    """A `ti.func` (a, base, ant, clock, percept) -> the row of the table that the ant looks at."""
+    if is_percept(observation):
+        return _percept_itself
+    view = observation.cells
+    left, forward, right = positions_ahead(observation)
+    look_of, row = look_type(observation, False), row_function(observation)
+
+    @ti.func
+    def see(a: ti.template(), base, ant, clock, percept):
+        here, nearer = base + ant.cell, nearer_from(a, ant)
+        look = look_of(
+            carries=ant.carries, percept=percept, own_level=ti.max(a.cells[here] - clock, 0)
+        )
+        for k in ti.static(range(len(view))):
+            towards = (ant.heading + view[k] + N_HEADINGS) % N_HEADINGS
+            cell = a.cells[here + step_towards(a.compass, towards, FORWARD)]
+            look.levels[k] = ti.max(cell - clock, 0)
+            look.nearer[k] = nearer >> (view[k] % N_HEADINGS) & 1
+            look.codes[k] = ground_of(cell)
+        ahead = ti.max(look.levels[left], look.levels[forward])
+        look.strongest = ti.max(ahead, look.levels[right])
+        for k in ti.static(range(len(view))):
+            if ant.carries == 1:
+                look.codes[k] = see_carrying(look.codes[k], look.nearer[k])
+            else:
+                look.codes[k] = see_foraging(look.codes[k], look.levels[k], look.strongest)
+        return row(look)
+
+    return see
 
 
 @ti.func
-def act(cells: ti.template(), compass: ti.template(), base, size, ant, state, action, clock):
+def _percept_itself(a: ti.template(), base, ant, clock, percept):
+    return percept
+
+
+@ti.func
+def act(deposit: ti.template(), a: ti.template(), base, ant, percept, action, clock):
     """The ant after its action, with the event; the cells it changes are changed."""
     after = ant
     after.event = FAILED
     if action <= RIGHT:
-        after.heading = turn(compass, ant.heading, action)
-        code = code_in_view(state, action)
+        after.heading = turn(a.compass, ant.heading, action)
+        code = code_in_view(percept, action)
         after.event = move_event(code)
         if is_open(code):
-            after.cell += step_towards(compass, after.heading, FORWARD)
+            after.cell += step_towards(a.compass, after.heading, FORWARD)
             if ant.carries == 1:
-                deposit(cells, base, size, after.cell, clock)
+                if ti.static(deposit != "none"):
+                    lay(deposit, a, base, after.cell, clock, a.cells[base + after.cell])
     else:
-        goals = goals_in_view(state)
+        goals = goals_in_view(percept)
         if goals != 0 and action == PICK_UP and ant.carries == 0:
             position = lowest_bit_number(goals)
             if goals & (goals - 1) != 0:  # several foods in view
                 after.random_state = advance(ant.random_state)
                 word = high_word(bits_of(after.random_state))
                 position = bit_number(goals, below(word, popcnt(goals)))
-            food = ant.cell + step_towards(compass, ant.heading, position)
-            deposit(cells, base, size, food, clock)
-            deposit(cells, base, size, ant.cell, clock)
+            food = ant.cell + step_towards(a.compass, ant.heading, position)
+            lay(deposit, a, base, food, clock, a.trails[food])
+            lay(deposit, a, base, ant.cell, clock, a.cells[base + ant.cell])
             after.heading = turn_round(ant.heading)
             after.carries = 1
             after.event = PICKED_UP

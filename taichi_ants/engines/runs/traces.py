@@ -10,25 +10,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from taichi_ants import checks, learners, runtime
+from taichi_ants import checks, runtime
 from taichi_ants.engines.records import Record
 from taichi_ants.engines.runs.engine import RunEngine
-from taichi_ants.engines.runs.results import RunState
-from taichi_ants.engines.runs.training import (
-    fixed_policy_state,
-    fresh_state,
-    rates_of,
-    rollout_streams,
-)
+from taichi_ants.engines.runs.state import Runs, fixed_policy_runs, fresh_state, learning_runs
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.learners.registry import Learner
 from taichi_ants.task import Task
 from taichi_ants.task.constants import DELIVERED, N_ACTIONS
 from taichi_ants.worlds.world import World
 
 MAX_ROLLOUT_STEPS = 1_000_000
-MAX_TRAINING_STEPS = 100_000  # each keeps a Q-table of 4 KiB
+MAX_TABLE_ROWS = 12_800_000  # of 32 bytes; each step of training keeps its table
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,25 +33,29 @@ class Trace(Record):
         steps: int32 (n,), number of the step in its episode, from 0.
         cells: int32 (n, 3), cube coordinates in normal form.
         headings: int32 (n,), 0 to 5.
-        states: int32 (n,), state indices, see `taichi_ants.task.states`.
+        percepts: int32 (n,), what the ant sees, see `taichi_ants.task.states`.
+        states: int32 (n,), the row of its table that it looks at; by the paper's observation that
+            is the percept.
         actions: int32 (n,), 0 to 4.
         rewards: int32 (n,).
-        next_states: int32 (n,), what the ant sees after the step.
+        next_percepts, next_states: int32 (n,), what the ant sees after the step.
         terminated: bool (n,), whether the learner took the next state as terminal.
         events: int32 (n,), what came of the action: ENTERED_EMPTY, ENTERED_LURE, FAILED, PICKED_UP
             or DELIVERED, see `taichi_ants.task.constants`.
         q_values: float32 (n, 5), the action values of the state when the action was chosen.
         td_errors: float32 (n,), of the update after the step; None without learning.
-        tables: float32 (n, 128, 5), the Q-table after the step; None without learning.
+        tables: float32 (n, n_states, 5), the Q-table after the step; None without learning.
     """
 
     episodes: np.ndarray
     steps: np.ndarray
     cells: np.ndarray
     headings: np.ndarray
+    percepts: np.ndarray
     states: np.ndarray
     actions: np.ndarray
     rewards: np.ndarray
+    next_percepts: np.ndarray
     next_states: np.ndarray
     terminated: np.ndarray
     events: np.ndarray
@@ -88,7 +85,7 @@ def rollout(
 
     Args:
         world: The world.
-        q_values: float (128, 5), action values; the best action is taken, ties at random.
+        q_values: float (n_states, 5), action values; the best action is taken, ties at random.
         seed: The seed.
         number: Which of the seed's rollouts, from 0.
         max_steps: Steps after which the episode is truncated.
@@ -104,10 +101,8 @@ def rollout(
         raise AntsError(f"q_values has shape {tables.shape}; a rollout follows one table.")
     seeds = checks.checked_seeds_for(seed, ())
     numbers = np.array([checks.checked_count("number", number, least=0)])
-    state = fixed_policy_state(tables[None], checks.checked_share("epsilon", epsilon))
-    streams = rollout_streams(seeds, numbers)
-    rates = np.zeros((1, 2), dtype=np.float32)
-    return _trace(world, task, None, seeds, rates, state, 1, max_steps, streams)
+    epsilon = checks.checked_share("epsilon", epsilon)
+    return _trace(world, task, fixed_policy_runs(tables[None], seeds, numbers, epsilon), max_steps)
 
 
 def trace_policies(
@@ -121,7 +116,7 @@ def trace_policies(
 
     Args:
         world: The world.
-        q_values: float (n, 128, 5), action values of each policy.
+        q_values: float (n, n_states, 5), action values of each policy.
         seeds: Their seeds (n,); a seed may come several times.
         max_steps, task: As in `rollout`.
 
@@ -139,10 +134,8 @@ def trace_policies(
     for first in range(0, len(tables), size := max(1, MAX_ROLLOUT_STEPS // per_policy)):
         some = tables[first : first + size]
         words = np.array(seeds[first : first + size], dtype=object)
-        state = fixed_policy_state(some, epsilon=0.0)
-        streams = rollout_streams(words, np.zeros(1, dtype=int))
-        rates = np.zeros((len(some), 2), dtype=np.float32)
-        trace = _trace(world, task, None, words, rates, state, 1, max_steps, streams)
+        runs = fixed_policy_runs(some, words, np.zeros(1, dtype=int), epsilon=0.0)
+        trace = _trace(world, task, runs, max_steps)
         yield replace(trace, episodes=trace.episodes + first)
 
 
@@ -156,7 +149,7 @@ def trace_training(
 ) -> Trace:
     """The first episodes of one training run, step by step, with the Q-table after each step.
 
-    Args and errors as in `train`; episodes * max_steps may not exceed 100 000.
+    Args and errors as in `train`; episodes * max_steps * n_states may not exceed 12.8 million.
     """
     checks.checked_food(world)
     task = checks.checked_runs_task(task)
@@ -165,51 +158,27 @@ def trace_training(
         raise AntsError(f"config holds {len(several)} configurations; a trace is of one.")
     (config,) = several
     seeds = checks.checked_seeds_for(seed, ())
-    state = fresh_state((config,), seeds.tolist(), task).take(0)
-    episodes = checks.checked_count("episodes", episodes)
-    learner = learners.get(config.learner)
-    rates = rates_of((config,), 1)
-    return _trace(world, task, learner, seeds, rates, state, episodes, max_steps)
+    state = fresh_state((config,), seeds.tolist(), task.n_states)
+    runs = learning_runs((config,), seeds.tolist(), state)
+    return _trace(world, task, runs, max_steps, checks.checked_count("episodes", episodes))
 
 
-def _trace(
-    world: World,
-    task: Task,
-    learner: Learner | None,
-    seeds: np.ndarray,
-    rates: np.ndarray,
-    state: RunState,
-    episodes: int,
-    max_steps: int,
-    streams: np.ndarray | None = None,
-) -> Trace:
+def _trace(world: World, task: Task, runs: Runs, max_steps: int, episodes: int = 1) -> Trace:
+    """The episodes of runs, step by step, the runs' episodes numbered one after the other."""
     capacity = episodes * checks.checked_max_steps(max_steps, task)
-    most = MAX_ROLLOUT_STEPS if learner is None else MAX_TRAINING_STEPS
+    learns = runs.learner is not None
+    most = MAX_TABLE_ROWS // task.n_states if learns else MAX_ROLLOUT_STEPS
     if capacity > most:
         raise AntsError(
             f"episodes * max_steps is {capacity}; at most {most} steps can be traced, so lower one."
         )
-    learns = learner is not None
-    evaporates = task.evaporation_in_training if learns else task.evaporation_in_evaluation
-    engine = RunEngine(checks.checked_world(world), task, max_steps, evaporates, runtime.start())
-    before = state.q.copy()
-    runs, integers, errors, tables = engine.trace(learner, seeds, rates, state, episodes, streams)
-    (episode, step, cell, heading, states, action, reward, seen, ended, event) = integers.T
-    chosen_from, number = before, runs
-    if learner is not None:
-        chosen_from, number = np.concatenate([before, tables[:-1]]), np.arange(len(states))
-    return Trace(
-        episodes=runs.astype(np.int32) * episodes + episode,
-        steps=step,
-        cells=world.grid.cells(cell),
-        headings=heading,
-        states=states,
-        actions=action,
-        rewards=reward,
-        next_states=seen,
-        terminated=ended.astype(bool),
-        events=event,
-        q_values=chosen_from[number, states, :N_ACTIONS],
-        td_errors=None if learner is None else errors,
-        tables=None if learner is None else tables[:, :, :N_ACTIONS],
-    )
+    engine = RunEngine(checks.checked_world(world), task, max_steps, runtime.start())
+    tables = runs.state.q[:, 0, :, :N_ACTIONS].copy()
+    recorded = engine.trace(runs, episodes)
+    number = recorded.pop("runs")
+    recorded["episodes"] += number.astype(np.int32) * episodes
+    recorded["cells"] = world.grid.cells(recorded["cells"])
+    recorded["terminated"] = recorded["terminated"].astype(bool)
+    if learns:  # the table after the step before
+        tables, number = np.concatenate([tables, recorded["tables"][:-1]]), np.arange(len(number))
+    return Trace(**recorded, q_values=tables[number, recorded["states"]])

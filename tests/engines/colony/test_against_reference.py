@@ -6,81 +6,33 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from random_colonies import RandomColony, random_colony
 from random_rewards import random_rewards
-from random_worlds import random_world
 
-from taichi_ants import Colony, TrainingConfig
-from taichi_ants.engines.colony import arrays as names
-from taichi_ants.learners.policies import random_policy
+from taichi_ants import AntsError, Colony, TrainingConfig, learners, worlds
+from taichi_ants.engines.colony.layout import AntRow, HomeRow, Stage, WorldRow
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.task import Life, Pheromone, Task
-from taichi_ants.task.constants import EMPTY
-from taichi_ants.worlds.starts import STARTS
+from taichi_ants.task import Task, observations
 
-# Each entry is a kernel of its own, so that there are few; all options occur in each.
+# Each entry is a kernel of its own, so that there are few: learner, sharing, observation, dense.
 KERNELS = [
-    ("q_learning", 0, "shared", False),
-    ("q_learning", 0, "shared", True),
-    ("sarsa", 0, "shared", False),
-    ("sarsa", 0, "shared", True),
-    ("expected_sarsa", 0, "shared", False),
-    ("expected_sarsa", 0, "shared", True),
-    ("dyna_q", 2, "shared", False),
-    ("dyna_q", 2, "shared", True),
-    ("q_learning", 0, "own", False),
-    ("sarsa", 0, "own", False),
-    ("dyna_q", 2, "own", False),
-    ("q_learning", 0, "fixed", False),
-    ("q_learning", 0, "fixed", True),
+    ("q_learning", "shared", "paper", False),
+    ("sarsa", "shared", "ants_seen", True),
+    ("expected_sarsa", "shared", "five_cells", False),
+    ("dyna_q", "shared", "trail_levels", True),
+    ("q_learning", "own", "trail_levels", False),
+    ("dyna_q", "own", "ants_seen", False),
+    ("double_q", "own", "paper", True),
+    ("sarsa_lambda", "own", "paper", False),
+    ("prioritized_sweeping", "own", "five_cells", False),
+    ("q_learning", "fixed", "six_cells", False),
 ]
 
 
-def random_colony(seed: int, dense: bool):
-    """A crowded micro-world with random options; some food always moves or grows back."""
-    rng = np.random.default_rng([seed, 99])
-    world = random_world(seed, int(rng.integers(2, 6)))
-    free = int((world.ground() == EMPTY).sum())
-    ants = int(min(free, rng.choice([1, 2, 3, 5, 8, 13, 20, 30])))
-    births, lifespan = bool(rng.random() < 0.5), rng.choice([0, 0, 3, 9, 25])
-    evaporations = ["exponential", "linear", "none"] if dense else ["linear", "none"]
-    evaporation, deposit = str(rng.choice(evaporations)), str(rng.choice(["set", "add", "none"]))
-    half_life, cap = float(rng.choice([0.7, 3.0, 40.0])), int(rng.choice([200, 600]))
-    capacity = ants + int(rng.integers(0, 6)) if births else None
-    pheromone = Pheromone(
-        evaporation=evaporation,
-        half_life=half_life if evaporation == "exponential" else None,
-        diffusion=float(rng.choice([0.05, 0.5, 1.0])) if dense else 0.0,
-        deposit=deposit,
-        level=int(rng.choice([3, 250])),
-        cap=cap if deposit == "add" else None,
-    )
-    life = Life(
-        births=births,
-        lifespan=int(lifespan) or None,
-        regrowth=[None, 0, 1, 4][rng.integers(4)],
-        wander=int(rng.choice([1, 2, 5, 1000])),
-    )
-    task = Task(
-        rewards=random_rewards(seed),
-        pheromone=pheromone,
-        evaporation_in_training=True,
-        life=life,
-    )
-    return world, task, {"ants": ants, "capacity": capacity, "start": str(rng.choice(STARTS))}
-
-
-def random_training(seed: int, learner: str, planning_steps: int) -> tuple[TrainingConfig, str]:
-    """Settings, and what a delivery is."""
-    rng = np.random.default_rng([seed, 98])
-    config = TrainingConfig(
-        learner,
-        float(rng.choice([0.01, 0.3, 1.0])),
-        float(rng.choice([0.0, 0.9, 0.99])),
-        float(rng.choice([0.1, 0.5, 1.0])),
-        0.9,
-        hyperparameters={"planning_steps": planning_steps} if planning_steps else {},
-    )
-    return config, str(rng.choice(["absorbing", "continuing"]))
+def both(drawn: RandomColony) -> tuple[Colony, ReferenceColony]:
+    rules = {**drawn.population, "sharing": drawn.sharing, "q_values": drawn.q_values}
+    given = (drawn.world, drawn.task, drawn.training, drawn.seed)
+    return Colony(*given, **rules), ReferenceColony(*given, **rules)
 
 
 def assert_equal(colony: Colony, plain: ReferenceColony) -> None:
@@ -88,17 +40,19 @@ def assert_equal(colony: Colony, plain: ReferenceColony) -> None:
     ours, theirs = colony.snapshot(), plain.snapshot()
     grid, arrays = ours.grid, colony.arrays
     ants = arrays["ants"]
-    (slots,) = np.nonzero(ants[names.LIFE] == names.LIVING)
+    (slots,) = np.nonzero(ants[AntRow.STAGE] == Stage.LIVING)
     assert slots.tolist() == list(theirs.ants)
-    cells = grid.cells(ants[names.CELL, slots]).tolist()
+    cells = grid.cells(ants[AntRow.CELL, slots]).tolist()
+    row_at = AntRow.PERCEPT if colony.task.observation == "paper" else AntRow.STATE
     for slot, cell in zip(slots.tolist(), cells, strict=True):
         ant = theirs.ants[slot]
         mine = ants[:, slot]
         assert tuple(cell) == ant.cell
-        assert (mine[names.HEADING], mine[names.CARRIES]) == (ant.heading, ant.carries)
-        assert (mine[names.NUMBER], mine[names.AGE]) == (ant.number, ant.age)
-        assert (mine[names.STATE], int(arrays["streams"][slot])) == (ant.state, ant.stream.state)
-        assert ant.action < 0 or arrays["rewards"][mine[names.EVENT]] == ant.reward
+        assert (mine[AntRow.HEADING], mine[AntRow.CARRIES]) == (ant.heading, ant.carries)
+        assert (mine[AntRow.NUMBER], mine[AntRow.AGE]) == (ant.number, ant.age)
+        assert (mine[AntRow.PERCEPT], mine[row_at]) == (ant.percept, ant.state)
+        assert int(arrays["streams"][slot]) == ant.stream.state
+        assert ant.action < 0 or arrays["rewards"][mine[AntRow.EVENT]] == ant.reward
     existing = np.array(list(theirs.ground), dtype=np.int64).reshape(-1, 3)
     places = grid.index(existing)
     assert ours.ground[places].tolist() == list(theirs.ground.values())
@@ -116,37 +70,40 @@ def assert_equal_records(colony: Colony, theirs) -> None:
     for name in ("ticks", "deliveries", "first_delivery", "moves", "blocked", "births", "deaths"):
         assert getattr(outcome, name)[0, 0] == getattr(record, name), name
     assert outcome.regrown[0, 0] == record.regrown
-    assert row[names.STORE] == theirs.store
-    homes = colony.arrays["homes"][:, : row[names.HOMES]]
-    assert homes[names.HOME_TAKEN].tolist() == [
-        -1 if since is None else since for _, since in theirs.homes
+    assert row[WorldRow.STORE] == theirs.store
+    homes = colony.arrays["homes"][:, : row[WorldRow.HOMES]]
+    assert homes[HomeRow.TAKEN].tolist() == [
+        -1 if since is None else since for _, since in theirs.homes[: homes.shape[1]]
     ]
-    cells = colony.snapshot().grid.cells(homes[names.HOME_CELL]).tolist()
-    assert cells == [list(cell) for cell, _ in theirs.homes]
-    if colony.sharing == "shared":
-        assert row[names.MODEL_SIZE] == len(theirs.models[0])
+    cells = colony.snapshot().grid.cells(homes[HomeRow.CELL]).tolist()
+    assert cells == [list(cell) for cell, _ in theirs.homes[: homes.shape[1]]]
+    if colony.sharing == "shared" and colony.training.learner == "dyna_q":
+        assert colony.arrays["integers"][0] == len(theirs.models[0])
 
 
-@pytest.mark.parametrize(("learner", "planning_steps", "sharing", "dense"), KERNELS)
-def test_every_tick_in_crowded_micro_worlds(learner, planning_steps, sharing, dense):
-    """More than 1000 micro-worlds in all, two episodes each: something goes on between them."""
+@pytest.mark.parametrize(("learner", "sharing", "observation", "dense"), KERNELS)
+def test_every_tick_in_crowded_micro_worlds(learner, sharing, observation, dense):
+    """Two episodes each: something goes on between them."""
     happened = np.zeros(5, dtype=int)
-    for seed in range(86):
-        world, task, population = random_colony(seed, dense)
-        training, delivery = random_training(seed, learner, planning_steps)
-        task = replace(task, delivery=delivery)
-        table = random_policy() if sharing == "fixed" else None
-        rules = {**population, "sharing": sharing}
-        colony = Colony(world, task, training, seed - 3, **rules, q_values=table)
-        plain = ReferenceColony(world, task, training, seed - 3, **rules)
-        for ticks in (12, 9):
+    for seed in range(40):
+        drawn = random_colony(
+            seed,
+            sharing=sharing,
+            rewards=random_rewards(seed),
+            learner=learner,
+            observation=observation,
+            dense=dense,
+        )
+        colony, plain = both(drawn)
+        for ticks in (11, 8):
             colony.begin_episode()
             plain.begin_episode()
             assert_equal(colony, plain)
             for _ in range(ticks):
-                colony.tick()
-                plain.tick()
-                assert_equal(colony, plain)
+                if not plain.over:
+                    colony.tick()
+                    plain.tick()
+                    assert_equal(colony, plain)
             colony.end_episode()
             plain.end_episode()
             record = plain.records[-1]
@@ -157,4 +114,74 @@ def test_every_tick_in_crowded_micro_worlds(learner, planning_steps, sharing, de
                 record.deliveries > 0,
                 record.blocked > 0,
             ]
-    assert (happened >= [1, 20, 10, 3, 50]).all(), happened
+    assert (happened >= [3, 10, 8, 8, 30]).all(), happened
+
+
+def test_each_learner_and_observation_is_compared():
+    possible = {name for name in learners.names() if not learners.get(name).needs_episode_end}
+    assert {kernel[0] for kernel in KERNELS} == possible
+    assert {kernel[2] for kernel in KERNELS} == set(observations.names()) - {"crowd"}
+
+
+def crowd(look):
+    """What stands in each of the six cells around: 0 no ant, 1 one without food, 2 one with it."""
+    index = 0
+    for k in range(6):
+        index = 3 * index + look.ants[k]
+    return index
+
+
+CROWD = observations.register(observations.Observation("crowd", 3**6, crowd, (-1, 0, 1, 2, 3, -2)))
+
+
+def test_ants_see_which_ants_stand_around_them_and_what_these_carry():
+    """By a registered observation, after moves, pick-ups, gives, births and deaths."""
+    loads = np.zeros(3, dtype=int)
+    for seed in range(40):
+        drawn = random_colony(seed, sharing="fixed", dense=False)
+        task = replace(drawn.task, observation="crowd")
+        given = (drawn.world, task, drawn.training, drawn.seed)
+        table = np.zeros((CROWD.n_states, 5), np.float32)  # any action, at random
+        colony = Colony(*given, **drawn.population, sharing="fixed", q_values=table)
+        colony.begin_episode()
+        for _ in range(15):
+            colony.tick()
+            ants = colony.arrays["ants"]
+            ants = ants[:, ants[AntRow.STAGE] == Stage.LIVING]
+            load = dict(zip(ants[AntRow.CELL].tolist(), ants[AntRow.CARRIES].tolist(), strict=True))
+            for cell, heading, row in ants[[AntRow.CELL, AntRow.HEADING, AntRow.STATE]].T.tolist():
+                steps = [colony.layout.grid.offsets[(heading + k) % 6] for k in CROWD.cells]
+                seen = [1 + load[cell + step] if cell + step in load else 0 for step in steps]
+                assert row == int("".join(map(str, seen)), 3)
+                loads += np.bincount(seen, minlength=3)
+    assert (loads > 100).all()
+
+
+def test_learners_that_cannot_live_in_a_colony_are_refused():
+    for name in learners.names():
+        learner = learners.get(name)
+        training = TrainingConfig(name, 0.1, 0.9, 0.1, 1.0)
+        if learner.needs_episode_end:
+            with pytest.raises(AntsError, match=rf"^learner '{name}' needs to know the last step"):
+                Colony(worlds.paper(), Task(), training, sharing="own")
+        elif learner.td_error is None:
+            with pytest.raises(AntsError, match=rf"^learner '{name}' .* take sharing=\"own\"\.$"):
+                Colony(worlds.paper(), Task(), training)
+
+
+@pytest.mark.parametrize(("learner", "planning_steps"), [("q_learning", 0), ("dyna_q", 1)])
+def test_sums_of_errors_that_do_not_fit_are_refused(learner, planning_steps):
+    """Forty errors of 10^8 each: no fixed-point number holds their sum."""
+    more = {"planning_steps": planning_steps} if planning_steps else {}
+    training = TrainingConfig(learner, 0.1, 0.9, 0.0, 1.0, **more)
+    for worth, fits in ((1e6, True), (1e9, False)):
+        colony = Colony(
+            worlds.paper(), Task(), training, ants=40, q_values=np.full((128, 5), worth)
+        )
+        colony.begin_episode()
+        colony.tick(3)
+        if fits:
+            colony.outcome()
+        else:
+            with pytest.raises(AntsError, match="not finite"):
+                colony.outcome()

@@ -5,22 +5,29 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from taichi_ants import Colony, ColonyConfig, TrainingConfig, World
-from taichi_ants.engines.colony import arrays as names
+from taichi_ants import Colony, TrainingConfig, World
+from taichi_ants.engines.colony.layout import AntRow
 from taichi_ants.grid.randomness import GAMMA, mix
 from taichi_ants.learners.policies import random_policy
+from taichi_ants.task import Life, Task
 from taichi_ants.task.constants import EMPTY, FOOD, FORWARD, GIVE, LEFT, PICK_UP, RIGHT
 
 TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 0.0, 1.0)
 
 
-def act(world: World, actions: list[int], **config: object) -> Colony:
-    """One tick in which the listed ants do these actions."""
-    colony = Colony(
-        world, ColonyConfig(ants=len(actions), **config), TRAINING, 0, "fixed", random_policy()
-    )
+def begun(world: World, ants: int, life: Life = Life()) -> Colony:  # noqa: B008
+    """A colony in its first episode that learns nothing."""
+    task = Task(life=life)
+    table = random_policy()
+    colony = Colony(world, task, TRAINING, ants=ants, sharing="fixed", q_values=table)
     colony.begin_episode()
-    colony.arrays["ants"][names.ACTION] = actions
+    return colony
+
+
+def act(world: World, actions: list[int], life: Life = Life()) -> Colony:  # noqa: B008
+    """One tick in which the listed ants do these actions."""
+    colony = begun(world, len(actions), life)
+    colony.arrays["ants"][AntRow.ACTION] = actions
     colony.tick()
     return colony
 
@@ -28,9 +35,9 @@ def act(world: World, actions: list[int], **config: object) -> Colony:
 def ants(colony: Colony) -> list[tuple[tuple[int, ...], int, int, int]]:
     """Cell, heading, carries and reward of each ant."""
     table = colony.arrays["ants"]
-    cells = colony.snapshot().grid.cells(table[names.CELL]).tolist()
-    rewards = colony.arrays["rewards"][table[names.EVENT]]
-    rows = (table[names.HEADING], table[names.CARRIES], rewards)
+    cells = colony.snapshot().grid.cells(table[AntRow.CELL]).tolist()
+    rewards = colony.arrays["rewards"][table[AntRow.EVENT]]
+    rows = (table[AntRow.HEADING], table[AntRow.CARRIES], rewards)
     return [(tuple(cell), *map(int, row)) for cell, *row in zip(cells, *rows, strict=True)]
 
 
@@ -103,12 +110,11 @@ def test_six_ants_around_the_queen_all_give_in_one_tick():
     steps = [(1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1), (1, 0, 1)]
     around = [(tuple((queen + step).tolist()), (h + 3) % 6) for h, step in enumerate(steps)]
     world = World((8, 8, 1), tuple(queen.tolist()), ants=around)
-    colony = Colony(world, ColonyConfig(ants=6), TRAINING, 0, "fixed", random_policy())
-    colony.begin_episode()
+    colony = begun(world, 6)
     table = colony.arrays["ants"]
-    table[names.CARRIES] = 1
-    table[names.STATE] = 64 | 3 << 2  # the queen ahead
-    table[names.ACTION] = GIVE
+    table[AntRow.CARRIES] = 1
+    table[AntRow.PERCEPT] = 64 | 3 << 2  # the queen ahead
+    table[AntRow.ACTION] = GIVE
     colony.tick()
     assert [ant[2:] for ant in ants(colony)] == [(0, 10)] * 6
     assert [ant[1] for ant in ants(colony)] == [(h + 3) % 6 for h in range(6)]
@@ -123,17 +129,16 @@ def test_a_blocked_move_turns_the_ant():
 
 def test_ants_look_like_obstacles_to_each_other():
     world = World((8, 8, 1), (0, 7, 0), ants=[((2, 2, 0), 0), ((3, 2, 0), 0)])
-    colony = Colony(world, ColonyConfig(ants=2), TRAINING, 0, "fixed", random_policy())
-    colony.begin_episode()
-    assert colony.arrays["ants"][names.STATE, 0] >> 2 & 3 == 1
-    colony.arrays["ants"][names.ACTION] = [PICK_UP, RIGHT]  # the second moves away
+    colony = begun(world, 2)
+    assert colony.arrays["ants"][AntRow.PERCEPT, 0] >> 2 & 3 == 1
+    colony.arrays["ants"][AntRow.ACTION] = [PICK_UP, RIGHT]  # the second moves away
     colony.tick()
-    assert colony.arrays["ants"][names.STATE, 0] >> 2 & 3 == 0
+    assert colony.arrays["ants"][AntRow.PERCEPT, 0] >> 2 & 3 == 0
 
 
 def test_food_that_is_taken_grows_back_at_once():
     world = World((8, 8, 1), (0, 7, 0), foods=[(3, 2, 0)], ants=[((2, 2, 0), 0)])
-    colony = act(world, [PICK_UP], regrowth=0)
+    colony = act(world, [PICK_UP], Life(regrowth=0))
     assert colony.snapshot().ground[world.grid.index((3, 2, 0))] == FOOD
     assert colony.outcome().regrown[0, 0] == 1
 

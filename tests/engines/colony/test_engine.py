@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from taichi_ants import AntsError, Colony, ColonyConfig, Pheromone, TrainingConfig, World, worlds
-from taichi_ants.engines.colony import arrays as names
+from taichi_ants import AntsError, Colony, TrainingConfig, World, worlds
+from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.learners.policies import random_policy
 from taichi_ants.rendering import colony_moments
+from taichi_ants.task import Life, Pheromone, Task
 from taichi_ants.task.constants import FOOD
 
 TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 1.0, 1.0)
@@ -27,8 +28,8 @@ def levels_after(pheromone: Pheromone, ticks: int, level: int = 400) -> np.ndarr
         ants=[((0, 0, 11), 0)],
     )
     training = TrainingConfig("q_learning", 0.1, 0.9, 0.0, 1.0)
-    life = ColonyConfig(ants=1, pheromone=pheromone)
-    colony = Colony(world, life, training, 0, "fixed", random_policy())
+    task = Task(pheromone=pheromone)
+    colony = Colony(world, task, training, sharing="fixed", q_values=random_policy())
     colony.begin_episode()
     colony.tick(ticks)
     return colony.snapshot().trail
@@ -76,10 +77,8 @@ def test_diffusion_keeps_the_mass(rate):
 def test_food_is_conserved(seed, ants, births, lifespan, regrowth, wander):
     """In the ground + carried + delivered = at the start + regrown; no two ants share a cell."""
     world = worlds.open_world(seed=seed % 7, ranges=(6, 6, 6))
-    config = ColonyConfig(
-        ants=ants, births=births, lifespan=lifespan, regrowth=regrowth, wander=wander
-    )
-    colony = Colony(world, config, TRAINING, seed)
+    life = Life(births=births, lifespan=lifespan, regrowth=regrowth, wander=wander)
+    colony = Colony(world, Task(life=life), TRAINING, seed, ants=ants)
     colony.begin_episode()
     for _ in range(6):
         colony.tick(10)
@@ -98,21 +97,34 @@ def test_births_fill_the_slots_and_no_more():
         foods=[(2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 2, 2), (0, 0, 2), (2, 0, 2)],
         ants=[((1, 0, 0), 0)],
     )
-    config = ColonyConfig(ants=1, capacity=4, births=True, regrowth=0)
+    task = Task(life=Life(births=True, regrowth=0))
     training = TrainingConfig("q_learning", 0.3, 0.9, 0.5, 1.0)
-    colony = Colony(world, config, training, 0)
+    colony = Colony(world, task, training, ants=1, capacity=4)
     outcome = colony.run(1, 3000)
     assert outcome.living[0, 0] == 4
     assert outcome.births[0, 0] == 3
-    stored = colony.arrays["worlds"][names.STORE, 0]
+    stored = colony.arrays["worlds"][WorldRow.STORE, 0]
     assert stored == outcome.deliveries[0, 0] - 3 > 0
 
 
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ({"config": ColonyConfig(ants=5000)}, "5000"),
-        ({"config": 3}, "config is 3"),
+        ({"ants": 5000}, "5000"),
+        ({"ants": 8, "capacity": 7}, "capacity is 7, but 8 ants start"),
+        ({"task": 3}, "task is 3"),
+        (
+            {
+                "task": Task("six_cells"),
+                "ants": 2000,
+                "sharing": "own",
+                "start": "spread",
+                "world": worlds.open_world(1, (60, 60, 60)),
+                "seeds": range(30),
+            },
+            "60000 tables, and what learner 'q_learning' keeps with each, take more than",
+        ),
+        ({"task": Task("trail_levels"), "q_values": np.zeros((128, 5))}, "(432, 5)"),
         ({"sharing": "some"}, "'some'"),
         ({"sharing": "fixed"}, "sharing is 'fixed', but q_values is None; nobody learns"),
         ({"world": World((3, 3, 3), (0, 0, 0))}, "the world has no food"),
@@ -132,7 +144,7 @@ def test_births_fill_the_slots_and_no_more():
     ],
 )
 def test_wrong_arguments_are_named(arguments, said):
-    usual = {"world": worlds.paper(), "config": ColonyConfig(), "training": TRAINING}
+    usual = {"world": worlds.paper(), "task": None, "training": TRAINING}
     with pytest.raises(AntsError, match=r"[.]$") as caught:
         Colony(**{**usual, **arguments})
     assert said in str(caught.value)
@@ -140,9 +152,9 @@ def test_wrong_arguments_are_named(arguments, said):
 
 def test_both_schedules_agree_where_places_stay_vacant():
     """The ants are sorted by their cells now and then, but not in among the vacant places."""
-    config, deliveries = ColonyConfig(ants=5, capacity=9, regrowth=0), []
+    task, deliveries = Task(life=Life(regrowth=0)), []
     for schedule in ("by_world", "by_chunk"):
-        colony = Colony(worlds.paper(), config, TRAINING, 3, schedule=schedule)
+        colony = Colony(worlds.paper(), task, TRAINING, 3, ants=5, capacity=9, schedule=schedule)
         colony.begin_episode()
         colony.tick(100)
         deliveries.append(vars(colony.outcome()))
@@ -152,16 +164,7 @@ def test_both_schedules_agree_where_places_stay_vacant():
 
 def test_a_tick_needs_an_episode():
     with pytest.raises(AntsError, match="begin_episode"):
-        Colony(worlds.paper(), ColonyConfig(), TRAINING).tick()
+        Colony(worlds.paper(), None, TRAINING).tick()
     for look in (Colony.snapshot, lambda colony: next(colony_moments(colony))):
         with pytest.raises(AntsError, match="begin_episode"):
-            look(Colony(worlds.paper(), ColonyConfig(), TRAINING))
-
-
-@pytest.mark.parametrize("content", [b"", b"nothing", None])
-def test_damaged_files_are_named(tmp_path, content):
-    path = tmp_path / "colony.npz"
-    if content is not None:
-        path.write_bytes(content)
-    with pytest.raises(AntsError, match=r"colony\.npz"):
-        Colony.load(path)
+            look(Colony(worlds.paper(), None, TRAINING))

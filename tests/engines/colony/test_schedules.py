@@ -5,21 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from taichi_ants import Colony, ColonyConfig, Pheromone, TrainingConfig, train, worlds
-from taichi_ants.engines.colony import arrays as names
-from taichi_ants.engines.colony.colony import colony
+from taichi_ants import Colony, TrainingConfig, train, worlds
+from taichi_ants.engines.colony import colony
+from taichi_ants.engines.colony.layout import AntRow
+from taichi_ants.task import Life, Pheromone, Task
 
-LIVELY = ColonyConfig(
-    ants=30,
-    births=True,
-    lifespan=60,
-    regrowth=2,
-    wander=9,
+LIVELY = Task(
     pheromone=Pheromone("exponential", half_life=20, diffusion=0.2, deposit="add"),
+    evaporation_in_training=True,
+    life=Life(births=True, lifespan=60, regrowth=2, wander=9),
 )
 TRAINING = TrainingConfig("dyna_q", 0.2, 0.9, 0.4, 0.9, planning_steps=2)
-# What a schedule uses for itself.
-SCRATCH = {"tallies", "sums", "errors", "sums_of", "touched", "spare"}
 
 
 def meadow(seed: int = 5):
@@ -28,13 +24,12 @@ def meadow(seed: int = 5):
 
 def history(seeds=(3, 4, 5), threads=2, schedule="by_world", world=None, **options):
     """All arrays after two episodes."""
-    ants = Colony(
-        world or meadow(), LIVELY, TRAINING, seeds, threads=threads, schedule=schedule, **options
-    )
+    where = {"threads": threads, "schedule": schedule}
+    ants = Colony(world or meadow(), LIVELY, TRAINING, seeds, ants=30, **where, **options)
     outcome = ants.run(2, 80)
     assert outcome.deliveries.sum() > 0
     assert outcome.blocked.sum() > 0
-    return {name: array for name, array in ants.arrays.items() if name not in SCRATCH}
+    return {name: ants.arrays[name] for name in ants.stored}
 
 
 def assert_same(first: dict, second: dict) -> None:
@@ -55,18 +50,16 @@ def test_a_colony_does_not_feel_its_neighbours():
     """A world of a batch is what it is alone, and worlds may differ."""
     batch = history(seeds=(3, 8), world=[meadow(5), meadow(6)])
     alone = history(seeds=(8,), world=meadow(6))
-    for name in ("ground", "level", "q", "streams", "returns", "entries"):
+    for name in ("ground", "level", "q", "streams", "returns", "integers"):
         assert np.array_equal(batch[name][len(batch[name]) // 2 :], alone[name]), name
 
 
 @pytest.mark.parametrize("learner", ["q_learning", "dyna_q"])
 def test_the_internal_order_of_the_ants_does_not_matter(learner):
     """Ants that are stored in another order do the same, and the shared table is the same."""
-    training = TrainingConfig(
-        learner, 0.2, 0.9, 0.4, 0.9, planning_steps=2 if learner == "dyna_q" else 0
-    )
-    config = ColonyConfig(ants=60, regrowth=0)
-    plain, shuffled = (Colony(meadow(), config, training, 1) for _ in range(2))
+    training = TrainingConfig(learner, 0.2, 0.9, 0.4, 0.9)
+    task = Task(life=Life(regrowth=0))
+    plain, shuffled = (Colony(meadow(), task, training, 1, ants=60) for _ in range(2))
     plain.begin_episode()
     shuffled.begin_episode()
     rng = np.random.default_rng(0)
@@ -76,29 +69,36 @@ def test_the_internal_order_of_the_ants_does_not_matter(learner):
         shuffled.arrays["streams"] = shuffled.arrays["streams"][order]
         plain.tick()
         shuffled.tick()
-    back = np.argsort(shuffled.arrays["ants"][names.NUMBER])
+    back = np.argsort(shuffled.arrays["ants"][AntRow.NUMBER])
     assert np.array_equal(shuffled.arrays["ants"][:, back], plain.arrays["ants"])
     assert np.array_equal(shuffled.arrays["q"], plain.arrays["q"])
     assert np.array_equal(shuffled.arrays["ground"], plain.arrays["ground"])
     assert plain.outcome().blocked[0, 0] > 0
 
 
-@pytest.mark.parametrize("sharing", ["shared", "own"])
-@pytest.mark.parametrize("delivery", ["absorbing", "continuing"])
 @pytest.mark.parametrize(
-    ("learner", "planning_steps"),
-    [("q_learning", 0), ("sarsa", 0), ("expected_sarsa", 0), ("dyna_q", 2)],
+    ("learner", "sharing"),
+    [
+        ("q_learning", "shared"),
+        ("sarsa", "own"),
+        ("expected_sarsa", "shared"),
+        ("dyna_q", "shared"),
+        ("dyna_q", "own"),
+        ("double_q", "own"),
+        ("sarsa_lambda", "own"),
+        ("prioritized_sweeping", "own"),
+    ],
 )
-def test_one_ant_equals_the_engine_of_independent_runs(learner, planning_steps, delivery, sharing):
-    training = TrainingConfig(
-        learner, 0.1, 0.9, 0.3, 0.95, planning_steps=planning_steps, delivery=delivery
-    )
-    config = ColonyConfig(
-        ants=1, ends_at_delivery=True, pheromone=Pheromone(evaporation="none"), wander=10_000
-    )
+def test_one_ant_equals_the_engine_of_independent_runs(learner, sharing):
+    training = TrainingConfig(learner, 0.1, 0.9, 0.3, 0.95)
+    for delivery in ("absorbing", "continuing"):
+        assert_equal_runs(training, Task(delivery=delivery), sharing)
+
+
+def assert_equal_runs(training: TrainingConfig, task: Task, sharing: str) -> None:
     seeds = (0, 7, -5)
-    expected = train(worlds.paper(), training, seeds, episodes=12, max_steps=150)
-    ants = Colony(worlds.paper(), config, training, seeds, sharing)
+    expected = train(worlds.paper(), training, seeds, episodes=12, max_steps=150, task=task)
+    ants = Colony(worlds.paper(), task, training, seeds, ends_at_delivery=True, sharing=sharing)
     outcome = ants.run(12, 150)
     assert np.array_equal(outcome.returns.T, expected.returns[0])
     assert np.array_equal(outcome.ticks.T, expected.steps[0])
@@ -109,7 +109,7 @@ def test_one_ant_equals_the_engine_of_independent_runs(learner, planning_steps, 
 
 
 def test_a_saved_colony_goes_on_bit_for_bit(tmp_path):
-    ants = Colony(meadow(), LIVELY, TRAINING, (3, 4))
+    ants = Colony(meadow(), LIVELY, TRAINING, (3, 4), ants=30)
     ants.run(1, 40)
     ants.begin_episode()
     ants.tick(30)
@@ -120,8 +120,5 @@ def test_a_saved_colony_goes_on_bit_for_bit(tmp_path):
         one.tick(30)
         one.end_episode()
         one.run(1, 30)
-    assert_same(
-        {name: array for name, array in ants.arrays.items() if name not in SCRATCH},
-        {name: array for name, array in again.arrays.items() if name not in SCRATCH},
-    )
-    assert again.epsilon == ants.epsilon
+    assert again == ants
+    assert_same(ants.arrays, again.arrays)

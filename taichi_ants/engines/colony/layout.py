@@ -1,0 +1,91 @@
+"""Names of what lies in the memory of a colony: the rows of its tables of integers (int32)."""
+
+from __future__ import annotations
+
+from enum import IntEnum, auto
+
+from taichi_ants.task.constants import OBSTACLE
+
+
+class AntRow(IntEnum):
+    """Rows of `ants`, one column for each slot."""
+
+    CELL = 0
+    HEADING = auto()
+    CARRIES = auto()
+    STAGE = auto()  # a `Stage`
+    AGE = auto()
+    NUMBER = auto()  # -1 in a slot that was never used in this episode
+    PERCEPT = auto()  # the paper's state: what acting and rewards go by
+    STATE = auto()  # the row of the table; unused where the percept is the row
+    ACTION = auto()  # the one that is drawn already, -1
+    WANT = auto()  # the cell to enter, or of the food to take, -1
+    EVENT = auto()  # what came of the last action
+
+
+class Stage(IntEnum):
+    """What is in a slot: nothing, an ant, one that dies in this tick, or one born in it."""
+
+    VACANT = 0
+    LIVING = auto()
+    DYING = auto()
+    NEWBORN = auto()
+
+
+class WorldRow(IntEnum):
+    """Rows of `worlds`, one column for each world."""
+
+    RUNNING = 0  # 1, or 0 once the episode has ended
+    TOP = auto()  # slots from here on are vacant
+    FIRST_VACANT = auto()  # no slot below is vacant
+    NEXT_NUMBER = auto()  # of the next ant that is born
+    STORE = auto()  # foods that the queen has not turned into ants yet
+    HOMES = auto()  # how many places of food
+    PILES = auto()
+    QUEEN_CELL = auto()
+    # What `ColonyEpisodes` counts, by the names of its fields.
+    TICKS = auto()
+    DELIVERIES = auto()
+    FIRST_DELIVERY = auto()
+    MOVES = auto()
+    BLOCKED = auto()
+    BIRTHS = auto()
+    DEATHS = auto()
+    REGROWN = auto()
+    LIVING = auto()
+
+
+class TallyRow(IntEnum):
+    """Rows of `tallies`, one column for each chunk: counted in a tick."""
+
+    GIVES = 0
+    MOVES = auto()
+    BLOCKED = auto()
+    DEATHS = auto()
+
+
+class HomeRow(IntEnum):
+    """Rows of `homes`, one column for each place of food."""
+
+    CELL = 0  # where the food lies or lay
+    TAKEN = auto()  # the tick in which it was taken; -1: it is there
+    MOVES = auto()  # whether it does in this tick
+    PILE = auto()
+    LISTED = auto()  # the places (numbers in their world), pile by pile
+
+
+class SumRow(IntEnum):
+    """Rows of `sums_of`, one column for each chunk and pair: updates of the pair in this tick."""
+
+    COUNT = 0
+    LATEST = auto()  # the highest ant number
+    OUTCOME = auto()  # and what that ant saw
+
+
+# What the lower four bits of a cell say is how it looks, see `task.constants`; the upper four, of
+# a cell on which an ant stands, are a mark of that ant. Between two phases of acting it says what
+# the ant wants: nothing (0), to enter the cell at a heading, or to take the food there.
+ENTER, TAKE = 1, 9  # plus the heading
+# Otherwise whether it carries food.
+STANDS, STANDS_WITH_FOOD = 7, 15
+ANT_GROUND = OBSTACLE | STANDS << 4  # the cell of an ant without food

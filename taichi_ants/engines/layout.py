@@ -1,0 +1,26 @@
+"""Names of the columns and rows of arrays that engines and kernels share; no Taichi here."""
+
+# The settings of a run, columns in front of the hyperparameters of its learner.
+SETTINGS = ("learning_rate", "discount", "epsilon_decay", "min_epsilon")
+N_SETTINGS = len(SETTINGS)
+LEARNING_RATE, DISCOUNT, EPSILON_DECAY, MIN_EPSILON = range(N_SETTINGS)
+
+# What the episodes of a run give.
+OUTCOMES = ("returns", "steps", "deliveries")
+RETURNS, STEPS, DELIVERIES = range(len(OUTCOMES))
+
+# The columns of a trace, one row a step; the fields of `Trace` of these names.
+TRACE = (
+    "episodes",
+    "steps",
+    "cells",
+    "headings",
+    "percepts",
+    "states",
+    "actions",
+    "rewards",
+    "next_percepts",
+    "next_states",
+    "terminated",
+    "events",
+)

@@ -1,0 +1,38 @@
+"""Double Q-learning (van Hasselt 2010): one table chooses the best action, the other values it."""
+
+import taichi as ti
+
+from taichi_ants.learners.memory import discount_of, values_of
+from taichi_ants.learners.registry import Learner, Memory
+from taichi_ants.task.constants import N_ACTIONS, ROW
+from taichi_ants.task.rules.random_bits import advance, below, bits_of, high_word
+
+
+@ti.func
+def learn(memory: ti.template(), at, step, rates, random_state):
+    """Update table A or B, by chance; the ant acts by their mean."""
+    rng = advance(random_state)
+    drawn = below(high_word(bits_of(rng)), 2)
+    table = memory.n_states * ROW
+    updated, other = at.table + (1 + drawn) * table, at.table + (2 - drawn) * table
+    next_values = values_of(memory.q, updated, step.next_state)
+    best, largest = 0, next_values[0]
+    for a in ti.static(range(1, N_ACTIONS)):
+        if next_values[a] > largest:
+            best, largest = a, next_values[a]
+    pair = step.state * ROW + step.action
+    value = memory.q[updated + pair]
+    worth = memory.q[other + step.next_state * ROW + best]
+    error = step.reward + discount_of(rates, step.terminated) * worth - value
+    value += rates.learning_rate * error
+    memory.q[updated + pair] = value
+    memory.q[at.table + pair] = (value + memory.q[other + pair]) * 0.5
+    return error, rng
+
+
+DOUBLE_Q = Learner(
+    "double_q",
+    learn,
+    memory=lambda settings, n_states: Memory(tables=2),
+    summary="Q-learning with two tables, which does not overrate the best action",
+)

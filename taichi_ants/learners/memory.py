@@ -1,0 +1,83 @@
+"""What the functions of a learner work on in kernels: its memory, a step, and its numbers."""
+
+from collections.abc import Callable
+from dataclasses import fields
+from typing import Any, NamedTuple
+
+import taichi as ti
+
+from taichi_ants.learners.hyperparameters import Hyperparameters
+from taichi_ants.task.constants import N_ACTIONS, ROW
+
+
+class LearnerArrays(NamedTuple):
+    """The memory of many runs, or ants, one behind the other.
+
+    Attributes:
+        q: f32 array, tables of n_states rows of `ROW` numbers, the first 5 of them action values.
+            The first table of a run is the one that it acts by; its further ones follow.
+        floats: f32 array.
+        integers: i32 array.
+        n_states: Rows of a table, a number of Python's.
+    """
+
+    q: Any
+    floats: Any
+    integers: Any
+    n_states: int
+
+
+# Where the memory of one run begins in each of these arrays. Its further table k, from 1, begins at
+# table + k * n_states * ROW.
+At = ti.types.struct(table=ti.i32, floats=ti.i32, integers=ti.i32)
+
+# One step of an ant, in rows of its table. The next action is -1 where none was drawn. A step is
+# `truncated` if the episode ends with it although it did not terminate.
+Transition = ti.types.struct(
+    state=ti.i32,
+    action=ti.i32,
+    reward=ti.f32,
+    next_state=ti.i32,
+    next_action=ti.i32,
+    terminated=ti.i32,
+    truncated=ti.i32,
+)
+
+
+def read_rates(kind: type[Hyperparameters]) -> Callable[..., Any]:
+    """A `ti.func` (learning_rate, discount, epsilon, numbers, begin) -> the rates of a learner.
+
+    The rates are a struct: learning_rate, discount and epsilon as f32, and the hyperparameters by
+    their names, whole ones as i32, others as f32. These are read from `numbers`, an f64 array that
+    holds them from `begin` on, in the order of the dataclass.
+    """
+    more = {one.name: ti.i32 if one.metadata["kind"] is int else ti.f32 for one in fields(kind)}
+    rates_type = ti.types.struct(learning_rate=ti.f32, discount=ti.f32, epsilon=ti.f32, **more)
+    kinds = tuple(more.values())
+
+    @ti.func
+    def read(learning_rate, discount, epsilon, numbers: ti.template(), begin):
+        return rates_type(
+            learning_rate,
+            discount,
+            epsilon,
+            *[ti.cast(numbers[begin + i], kinds[i]) for i in ti.static(range(len(kinds)))],
+        )
+
+    return read
+
+
+@ti.func
+def values_of(q: ti.template(), table, state):
+    """The five action values of a row in the table that begins at `table`."""
+    row = table + state * ROW
+    return ti.Vector([q[row + a] for a in ti.static(range(N_ACTIONS))])
+
+
+@ti.func
+def discount_of(rates, terminated):
+    """The discount of what comes next: 0 where the step terminated."""
+    discount = rates.discount
+    if terminated == 1:
+        discount = 0.0
+    return discount

@@ -1,0 +1,70 @@
+"""n-step SARSA (Sutton and Barto, chapter 7): targets of n rewards and the value after them."""
+
+from dataclasses import dataclass
+
+import taichi as ti
+
+from taichi_ants.learners.hyperparameters import Hyperparameters, whole_number
+from taichi_ants.learners.memory import discount_of
+from taichi_ants.learners.registry import Learner, Memory
+from taichi_ants.task.constants import ROW
+
+
+@dataclass(frozen=True)
+class Steps(Hyperparameters):
+    """Attributes:
+    n_steps: Rewards in a target, unless the episode ends before.
+    """
+
+    n_steps: int = whole_number(4, 1, 64)
+
+
+@ti.func
+def begin(memory: ti.template(), at):
+    """Forget the pairs that wait."""
+    memory.integers[at.integers] = 0
+    memory.integers[at.integers + 1] = 0
+
+
+@ti.func
+def learn(memory: ti.template(), at, step, rates, random_state):
+    """Update the pair of n steps ago; at the end of an episode, all that wait.
+
+    The integers are the number of pairs that wait, the place of the oldest, then the places; the
+    floats are their rewards. The places are used in a circle.
+    """
+    pair = step.state * ROW + step.action
+    discount = discount_of(rates, step.terminated)
+    after = at.table + step.next_state * ROW + ti.max(step.next_action, 0)
+    error = step.reward + discount * memory.q[after] - memory.q[at.table + pair]
+    waiting, oldest = memory.integers[at.integers] + 1, memory.integers[at.integers + 1]
+    newest = (oldest + waiting - 1) % rates.n_steps
+    memory.integers[at.integers + 2 + newest] = pair
+    memory.floats[at.floats + newest] = step.reward
+    ends = step.terminated | step.truncated
+    while waiting == rates.n_steps or (ends == 1 and waiting > 0):
+        worth = step.reward + discount * memory.q[after]
+        for back in range(1, waiting):
+            place = (oldest + waiting - 1 - back) % rates.n_steps
+            worth = memory.floats[at.floats + place] + rates.discount * worth
+        updated = at.table + memory.integers[at.integers + 2 + oldest]
+        memory.q[updated] += rates.learning_rate * (worth - memory.q[updated])
+        oldest = (oldest + 1) % rates.n_steps
+        waiting -= 1
+    memory.integers[at.integers], memory.integers[at.integers + 1] = waiting, oldest
+    return error, random_state
+
+
+N_STEP_SARSA = Learner(
+    "n_step_sarsa",
+    learn,
+    begin,
+    draws_next_action=True,
+    needs_episode_end=True,
+    hyperparameters=Steps,
+    memory=lambda settings, n_states: Memory(
+        floats=settings.n_steps, integers=2 + settings.n_steps
+    ),
+    cost=lambda settings: 1 + 0.2 * settings.n_steps,
+    summary="SARSA towards several rewards and the value after them",
+)

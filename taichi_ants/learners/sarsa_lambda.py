@@ -1,0 +1,78 @@
+"""SARSA(lambda) with replacing traces (Singh and Sutton 1996), of which a short list is kept."""
+
+from dataclasses import dataclass
+
+import taichi as ti
+
+from taichi_ants.learners.hyperparameters import Hyperparameters, number, whole_number
+from taichi_ants.learners.memory import discount_of
+from taichi_ants.learners.registry import Learner, Memory
+from taichi_ants.task.constants import ROW
+
+
+@dataclass(frozen=True)
+class Traces(Hyperparameters):
+    """Attributes:
+    trace_decay: Lambda: what a trace keeps in each step, besides the discount.
+    trace_length: How many pairs have a trace; the oldest one gives way.
+    """
+
+    trace_decay: float = number(0.9, 0, 1)
+    trace_length: int = whole_number(32, 1, 256)
+
+
+@ti.func
+def begin(memory: ti.template(), at):
+    """Forget the traces."""
+    memory.integers[at.integers] = 0
+
+
+@ti.func
+def learn(memory: ti.template(), at, step, rates, random_state):
+    """Update this pair and those before it, by as much as is left of their traces.
+
+    The integers are the number of traces, then their pairs, the newest first.
+    """
+    pair = step.state * ROW + step.action
+    discount = discount_of(rates, step.terminated)
+    next_value = memory.q[at.table + step.next_state * ROW + ti.max(step.next_action, 0)]
+    error = step.reward + discount * next_value - memory.q[at.table + pair]
+    scaled = rates.learning_rate * error
+    fade = rates.discount * rates.trace_decay
+    known = memory.integers[at.integers]
+    # This pair goes in front; the others move back by one, up to where it stood before.
+    moved, trace = pair, ti.f32(1.0)
+    places = known
+    for i in range(known):
+        there = memory.integers[at.integers + 1 + i]
+        faded = memory.floats[at.floats + i] * fade
+        if i < places:
+            memory.integers[at.integers + 1 + i] = moved
+            memory.floats[at.floats + i] = trace
+            memory.q[at.table + moved] += scaled * trace
+            moved, trace = there, faded
+            if there == pair:
+                places = i + 1
+        else:
+            memory.floats[at.floats + i] = faded
+            memory.q[at.table + there] += scaled * faded
+    if (known == 0 or moved != pair) and known < rates.trace_length:
+        memory.integers[at.integers] = known + 1
+        memory.integers[at.integers + 1 + known] = moved
+        memory.floats[at.floats + known] = trace
+        memory.q[at.table + moved] += scaled * trace
+    return error, random_state
+
+
+SARSA_LAMBDA = Learner(
+    "sarsa_lambda",
+    learn,
+    begin,
+    draws_next_action=True,
+    hyperparameters=Traces,
+    memory=lambda settings, n_states: Memory(
+        floats=settings.trace_length, integers=1 + settings.trace_length
+    ),
+    cost=lambda settings: 1 + 0.1 * settings.trace_length,
+    summary="SARSA that updates the pairs before, too, by their traces",
+)

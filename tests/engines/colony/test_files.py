@@ -1,0 +1,123 @@
+"""Colonies in files: what was saved goes on, and what was changed is refused."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from random_colonies import random_colony
+
+from taichi_ants import AntsError, Colony, TrainingConfig, worlds
+from taichi_ants.task import Life, Task
+
+PLANNING = TrainingConfig("dyna_q", 0.1, 0.9, 0.5, 1.0, planning_steps=2)
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory) -> dict[str, np.ndarray]:
+    """The arrays of a colony in which everything comes and goes."""
+    path = tmp_path_factory.mktemp("kept") / "colony.npz"
+    life = Life(births=True, lifespan=150, regrowth=2, wander=9)
+    task = Task(delivery="continuing", evaporation_in_training=True, life=life)
+    world = worlds.open_world(2, (14, 14, 14))
+    colony = Colony(world, task, PLANNING, (1, 2), ants=12)
+    colony.begin_episode()
+    colony.tick(200)
+    assert colony.outcome().births.sum() > 0
+    colony.save(path)
+    Colony.load(path).tick(5)
+    with np.load(path) as archive:
+        return dict(archive)
+
+
+def refused(arrays: dict[str, np.ndarray], folder) -> str:
+    path = folder / "x.npz"
+    np.savez(path, **arrays)
+    with pytest.raises(AntsError, match=r"[.]$") as caught:
+        Colony.load(path)
+    text = str(caught.value)
+    assert text.startswith(f"the colony in {str(path)!r} is damaged (")
+    assert text.endswith("); name a file that Colony.save wrote.")
+    assert "\n" not in text
+    return text
+
+
+def test_a_number_that_was_changed(kept, tmp_path) -> None:
+    """Anywhere: kernels would write where the cell of an ant or the memory of a learner points."""
+    for name in kept.keys() - {"facts"}:
+        array = kept[name].copy()
+        if array.size:
+            array.flat[array.size // 2] += 1
+            assert "not those that were written" in refused({**kept, name: array}, tmp_path), name
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"task": None}, ""),
+        ({"task": {"traffic": "none"}}, "traffic is 'none'"),
+        ({"task": {"observation": "six_cells"}}, "another shape or type"),
+        ({"population": None}, ""),
+        ({"training": {"learner": "sarsa"}}, ""),
+        ({"training": None}, "its learner is missing"),
+        ({"seeds": []}, ""),
+        ({"seeds": [1]}, ""),
+        ({"worlds": []}, ""),
+        ({"worlds": [{"ranges": [9, 9, 9], "queen": [0, 0, 0]}]}, ""),
+        ({"world_of": [7, 7]}, ""),
+        ({"sharing": "maybe"}, "sharing is 'maybe'"),
+        ({"epsilon": 7}, "epsilon is 7"),
+        ({"episode": 10**12}, "episode is 1000000000000"),
+        ({"ticks": -1}, "ticks is -1"),
+        ({"ticks": "many"}, "ticks is 'many'"),
+        ({"schedule": "never"}, "schedule is 'never'"),
+        ({"digest": None}, "not those that were written"),
+    ],
+)
+def test_wrong_facts(kept, tmp_path, changes, said) -> None:
+    facts = {**json.loads(str(kept["facts"][()])), **changes}
+    assert said in refused({**kept, "facts": np.array(json.dumps(facts))}, tmp_path)
+
+
+def test_other_shapes_and_missing_arrays(kept, tmp_path) -> None:
+    for name in ("array_ants", "array_q", "array_ground", "world0_foods"):
+        for other in (kept[name][:-1], kept[name].astype(float), np.zeros(())):
+            refused({**kept, name: other}, tmp_path)
+        refused({key: array for key, array in kept.items() if key != name}, tmp_path)
+
+
+@pytest.mark.parametrize("content", [b"", b"nothing", None])
+def test_no_colony_at_all(tmp_path, content) -> None:
+    path = tmp_path / "colony.npz"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(AntsError, match=r"colony\.npz"):
+        Colony.load(path)
+
+
+@pytest.mark.parametrize("name", ["dyna_q", "double_q", "sarsa_lambda"])
+def test_what_was_saved_goes_on_bit_for_bit(name, tmp_path) -> None:
+    """At many moments of its life: a model, further tables, or traces are part of it."""
+    one = random_colony(7, sharing="own", learner=name, observation="ants_seen")
+    colony = Colony(
+        *(one.world, one.task, one.training, one.seed),
+        **one.population,
+        sharing="own",
+        q_values=one.q_values,
+    )
+    colony = reread(colony, tmp_path)
+    for _ in range(2):
+        colony.begin_episode()
+        for ticks in (1, 3, 20):
+            again = reread(colony, tmp_path)
+            assert again == colony
+            again.tick(ticks)
+            colony.tick(ticks)
+            assert again == colony
+        colony.end_episode()
+
+
+def reread(colony: Colony, folder) -> Colony:
+    colony.save(folder / "x.npz")
+    return Colony.load(folder / "x.npz")
