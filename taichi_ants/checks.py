@@ -9,7 +9,7 @@ import numpy as np
 from taichi_ants import learners
 from taichi_ants.errors import AntsError, shown, whole
 from taichi_ants.learners.config import TrainingConfig, share_of_one
-from taichi_ants.task import Pheromone, Task
+from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS, N_ACTIONS
 from taichi_ants.worlds.world import World
 
@@ -30,13 +30,16 @@ def checked_task(task: Task) -> Task:
 
 def checked_runs_task(task: Task | None) -> Task:
     """The task, the paper's if it is None, if independent runs can have it."""
-    task = checked_task(task or Task())
+    task = checked_task(Task() if task is None else task)
     if task.life.changes:
         raise AntsError(
             f"life of the task is {task.life}; runs of one ant have none, so use a Colony."
         )
-    if task.pheromone != Pheromone():
-        raise AntsError(f"pheromone of the task is {task.pheromone}; use a Colony for it.")
+    if task.pheromone.dense:
+        raise AntsError(
+            f"pheromone of the task is {task.pheromone}; runs of one ant know neither exponential "
+            "evaporation nor diffusion, so use a Colony."
+        )
     return task
 
 

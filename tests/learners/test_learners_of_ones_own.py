@@ -1,12 +1,30 @@
 """What may stand in a TD error that a user writes, and how the rest is refused."""
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 import pytest
 import taichi as ti
 
-from taichi_ants import AntsError, Colony, ColonyConfig, TrainingConfig, trace_training, train
+from taichi_ants import (
+    AntsError,
+    Colony,
+    TrainingConfig,
+    TrainingResult,
+    continue_training,
+    trace_training,
+    train,
+)
 from taichi_ants.engines import trial
-from taichi_ants.learners import Learner, register, registry
+from taichi_ants.learners import (
+    Hyperparameters,
+    Learner,
+    Memory,
+    number,
+    register,
+    registry,
+    td_learner,
+)
 from taichi_ants.worlds import paper
 
 NUMBERS = np.arange(5, dtype=np.float32)
@@ -26,7 +44,7 @@ def in_runs(name="mine"):
 
 
 def in_a_colony(name="mine", sharing="shared"):
-    colony = Colony(paper(), ColonyConfig(5), config(name), sharing=sharing)
+    colony = Colony(paper(), None, config(name), ants=5, sharing=sharing)
     colony.run(2, 100)
     return colony.q_values
 
@@ -72,7 +90,7 @@ NATURAL = {
 def test_what_is_natural_in_python_works(like, td_error, engine):
     """To the bit what the package's own learners do, which equal the reference."""
     model = registry.get(like)
-    register(Learner("mine", td_error, model.draws_next_action))
+    register(td_learner("mine", td_error, model.draws_next_action))
     values = engine()
     assert np.abs(values).max() > 0.5
     assert np.array_equal(values, engine(like))
@@ -101,18 +119,18 @@ def of_its_own_value_kept_inside(value, reward, discount, next_values, next_acti
 @pytest.mark.filterwarnings("ignore:overflow encountered in exp")
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_number_of_pythons_is_a_td_error(engine):
-    register(Learner("mine", of_zero))
+    register(td_learner("mine", of_zero))
     assert not engine().any()
-    register(Learner("ones", of_one))
+    register(td_learner("ones", of_one))
     values = engine("ones")
     assert np.isclose(values[values != 0].min(), 0.1)  # one update at the learning rate of 0.1
-    register(Learner("infinite", of_infinity))
+    register(td_learner("infinite", of_infinity))
     with pytest.raises(AntsError, match="'infinite' made action values that are not finite"):
         engine("infinite")
 
 
 def test_an_index_that_is_kept_inside_passes():
-    register(Learner("mine", of_its_own_value_kept_inside))
+    register(td_learner("mine", of_its_own_value_kept_inside))
     assert in_runs().any()
 
 
@@ -124,11 +142,11 @@ def checks_the_next_action(value, reward, discount, next_values, next_action, ep
 
 def test_the_next_action_is_always_a_valid_index():
     """Also after a delivery, where none is drawn."""
-    register(Learner("mine", checks_the_next_action, draws_next_action=True))
+    register(td_learner("mine", checks_the_next_action, draws_next_action=True))
     result = train(paper(), config(), range(5), 30)
     assert result.deliveries.any()
     assert not result.q_values.any()
-    colony = Colony(paper(), ColonyConfig(5), config())
+    colony = Colony(paper(), None, config(), ants=5)
     assert colony.run(5, 600).deliveries.any()
     assert not colony.q_values.any()
 
@@ -236,11 +254,11 @@ REFUSED = [
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(("td_error", "says"), REFUSED)
 def test_what_cannot_work_is_refused_and_the_process_lives(td_error, says, engine, capfd):
-    register(Learner("mine", td_error, draws_next_action=True))
+    register(td_learner("mine", td_error, draws_next_action=True))
     with pytest.raises(AntsError) as caught:
         engine()
     message = str(caught.value)
-    assert message.startswith("the TD error of learner 'mine' cannot be used: ")
+    assert message.startswith("learner 'mine' cannot be used: ")
     assert says in message
     assert "\n" not in message
     assert message.endswith(".")
@@ -258,7 +276,7 @@ def that_never_ends(value, reward, discount, next_values, next_action, epsilon):
 
 def test_one_that_never_ends_is_stopped(monkeypatch):
     monkeypatch.setattr(trial, "_SECONDS", 2)
-    register(Learner("mine", that_never_ends))
+    register(td_learner("mine", that_never_ends))
     with pytest.raises(AntsError, match="'mine' cannot be used: it does not come to an end within"):
         in_runs()
 
@@ -268,19 +286,156 @@ def of_three(value, reward, discount):
     return reward - value
 
 
+def plain_function(value, reward, discount, next_values, next_action, epsilon):
+    return reward - value
+
+
 @pytest.mark.parametrize(
-    ("learner", "says"),
+    ("td_error", "says"),
     [
-        (Learner("mine", of_three), "has 3 arguments; it needs 6"),
-        (Learner("mine", natural_sarsa), "register it with draws_next_action=True"),
-        (Learner("mine", natural_sarsa, True, True), "has none in its updates from the model"),
+        (
+            of_three,
+            "has 3 arguments; it needs 6: value, reward, discount, next_values, next_action",
+        ),
+        (
+            natural_sarsa,
+            "looks at next_action, but no next action is drawn; give draws_next_action",
+        ),
+        (plain_function, "is no Taichi function"),
+        (None, "is no Taichi function"),
     ],
 )
-def test_what_is_refused_when_it_is_registered(learner, says):
-    with pytest.raises(AntsError, match="the TD error of 'mine' ") as caught:
-        register(learner)
+def test_td_errors_that_are_refused_at_once(td_error, says):
+    with pytest.raises(AntsError, match="^the TD error of 'mine' ") as caught:
+        td_learner("mine", td_error)
     assert says in str(caught.value)
+
+
+@dataclass(frozen=True)
+class Momentum(Hyperparameters):
+    momentum: float = number(0.5, 0, 1)
+
+
+@ti.func
+def begin(memory: ti.template(), at):
+    memory.floats[at.floats] = 0.0
+
+
+@ti.func
+def learn(memory: ti.template(), at, step, rates, random_state):
+    """SARSA by a TD error that is mixed with the one before, in this episode."""
+    pair = step.state * 8 + step.action
+    discount = rates.discount if step.terminated == 0 else ti.f32(0)
+    next_value = memory.q[at.table + step.next_state * 8 + ti.max(step.next_action, 0)]
+    error = step.reward + discount * next_value - memory.q[at.table + pair]
+    error += rates.momentum * memory.floats[at.floats]
+    memory.floats[at.floats] = error
+    memory.integers[at.integers] += 1
+    memory.q[at.table + pair] += rates.learning_rate * error
+    return error, random_state
+
+
+def with_memory(**changes):
+    given = {
+        "draws_next_action": True,
+        "hyperparameters": Momentum,
+        "memory": lambda settings, n_states: Memory(floats=1, integers=1),
+    }
+    return Learner("mine", learn, begin, **{**given, **changes})
+
+
+def with_momentum(momentum):
+    return TrainingConfig("mine", 0.1, 0.9, 0.3, 0.97, momentum=momentum)
+
+
+def test_a_memory_lives_through_a_run_and_belongs_to_it():
+    register(with_memory())
+    result = train(paper(), [with_momentum(0.5), with_momentum(0.0)], range(3), 8, 200)
+    assert result.state.floats[0, :, 0].all()
+    assert np.array_equal(result.state.integers[:, :, 0], result.steps.sum(axis=2))
+    for c, momentum in enumerate((0.5, 0.0)):
+        for s in range(3):
+            parts = train(paper(), with_momentum(momentum), s, 5, 200)
+            alone = continue_training(parts, 3)
+            assert np.array_equal(alone.q_values[0, 0], result.q_values[c, s])
+    sarsa = train(paper(), config("sarsa"), range(3), 8, 200)
+    assert np.array_equal(result.q_values[1], sarsa.q_values[0])
+    assert not np.array_equal(result.q_values[0], sarsa.q_values[0])
+
+
+def test_a_memory_in_a_colony_belongs_to_an_ant():
+    register(with_memory())
+    kinds = [(with_momentum(0.5), 0), (with_momentum(0.0), 1), (config("sarsa"), 2)]
+    tables = {}
+    for training, number in kinds:
+        colony = Colony(paper(), None, training, ants=5, sharing="own")
+        colony.run(2, 100)
+        tables[number] = colony.q_values
+    assert np.array_equal(tables[1], tables[2])
+    assert not np.array_equal(tables[0], tables[2])
+
+
+@ti.func
+def that_forgets_at(memory: ti.template(), at, step, rates, random_state):
+    memory.q[step.state * 8 + step.action] += rates.learning_rate
+    return ti.f32(1.0), random_state
+
+
+@ti.func
+def beyond_its_memory(memory: ti.template(), at, step, rates, random_state):
+    memory.integers[at.integers + 1] += 1
+    return ti.f32(1.0), random_state
+
+
+@ti.func
+def of_one_value(memory: ti.template(), at, step, rates, random_state):
+    return ti.f32(1.0)
+
+
+@pytest.mark.parametrize(
+    ("function", "says"),
+    [
+        (that_forgets_at, "it writes outside of the memory of its run"),
+        (beyond_its_memory, "it uses an index outside of an array"),
+        (of_one_value, "Cannot unpack"),
+    ],
+)
+def test_memories_that_are_not_ones_own_are_refused(function, says):
+    register(replace(with_memory(), learn=function))
+    with pytest.raises(AntsError, match="^learner 'mine' cannot be used: ") as caught:
+        in_runs()
+    assert says in str(caught.value)
+
+
+@dataclass(frozen=True)
+class Clashing(Hyperparameters):
+    discount: float = number(0.5, 0, 1)
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"learn": of_three}, "the function learn of 'mine' has 3 arguments; it needs 5: memory"),
+        ({"begin": learn}, "the function begin of 'mine' has 5 arguments; it needs 2: memory and"),
+        ({"learn": plain_function}, "the function learn of 'mine' is no Taichi function"),
+        ({"plans": True, "td_error": natural_sarsa}, "the TD error of 'mine' looks at next_action"),
+        ({"hyperparameters": Clashing}, "'discount' is a setting of all learners"),
+    ],
+)
+def test_learners_that_are_refused_when_they_are_registered(changes, says):
+    with pytest.raises(AntsError) as caught:
+        register(replace(with_memory(), **changes))
+    assert str(caught.value).startswith(says)
     assert "mine" not in registry.names()
+
+
+def test_a_learner_that_has_come_to_need_more_memory(tmp_path):
+    register(with_memory())
+    train(paper(), with_momentum(0.5), 0, 2, 50).save(tmp_path / "x.npz")
+    registry._LEARNERS.clear()
+    register(with_memory(memory=lambda settings, n_states: Memory(floats=9, integers=1)))
+    with pytest.raises(AntsError, match="'mine' has come to need more memory than when"):
+        continue_training(TrainingResult.load(tmp_path / "x.npz"), 1)
 
 
 @ti.func
@@ -295,7 +450,7 @@ def that_explodes(value, reward, discount, next_values, next_action, epsilon):
 
 @pytest.mark.parametrize("td_error", [of_a_logarithm, that_explodes])
 def test_values_that_are_not_finite_are_named(td_error):
-    register(Learner("mine", td_error))
+    register(td_learner("mine", td_error))
     named = r"^learner 'mine' made action values that are not finite, with .*rate=0\.1.* seed 0; "
     with pytest.raises(AntsError, match=named):
         in_runs()
@@ -307,9 +462,9 @@ def test_values_that_are_not_finite_are_named(td_error):
 
 
 def test_values_that_are_not_finite_are_named_while_a_colony_is_stepped(tmp_path):
-    register(Learner("mine", of_a_logarithm))
+    register(td_learner("mine", of_a_logarithm))
     for sharing in ("shared", "own"):
-        colony = Colony(paper(), ColonyConfig(5), config(), sharing=sharing)
+        colony = Colony(paper(), None, config(), ants=5, sharing=sharing)
         colony.begin_episode()
         colony.tick(100)
         path = tmp_path / "colony.npz"

@@ -207,7 +207,7 @@ class RunEngine:
             **{name: array[rows].reshape(-1) for name, array in vars(state).items()},
         }
         if runs.streams is not None:
-            of_runs["streams"] = runs.streams[rows, episodes].reshape(-1)
+            of_runs["streams"] = np.ascontiguousarray(runs.streams[rows, episodes]).reshape(-1)
         return of_runs
 
     def _clock(self) -> float:

@@ -94,7 +94,7 @@ def get(name: str) -> Observation:
     Raises:
         AntsError: There is none; the message lists those that exist.
     """
-    if name not in _OBSERVATIONS:
+    if not isinstance(name, str) or name not in _OBSERVATIONS:
         raise AntsError(
             f"there is no observation {shown(name)}; choose one of {', '.join(names())}."
         )

@@ -2,26 +2,49 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+from itertools import cycle
+
 import numpy as np
 import pytest
-from random_rewards import TELLING, random_rewards
+from random_rewards import random_rewards
 from random_worlds import random_world
 
-from taichi_ants import TrainingConfig, evaluate, reference, rollout, trace_training, train
-from taichi_ants.task import Rewards, Task
+from taichi_ants import (
+    AntsError,
+    TrainingConfig,
+    evaluate,
+    learners,
+    reference,
+    rollout,
+    trace_training,
+    train,
+)
+from taichi_ants.task import Life, Pheromone, Task, observations
 from taichi_ants.worlds import World, paper
 
-LEARNERS = [("q_learning", 0), ("sarsa", 0), ("expected_sarsa", 0), ("dyna_q", 3)]
-DELIVERIES = ["absorbing", "continuing"]
+DELIVERIES = ("absorbing", "continuing")
+# Each entry is a kernel of its own, so that there are few: learner, observation, deposit.
+KERNELS = [
+    *zip(
+        learners.names(),
+        cycle(("trail_levels", "five_cells", "ants_seen", "paper", "six_cells")),
+        cycle(("set", "add", "none")),
+        strict=False,
+    ),
+    *((name, "paper", "set") for name in ("q_learning", "sarsa", "expected_sarsa")),
+]
 
 
-def planning(steps: int) -> dict[str, int]:
-    return {"planning_steps": steps} if steps else {}
-
-
-def random_config(seed: int, learner: str, planning_steps: int) -> TrainingConfig:
+def random_config(seed: int, learner: str) -> TrainingConfig:
     """A configuration with values far from each other and from round ones."""
     rng = np.random.default_rng([seed, 1])
+    hyperparameters = {}
+    for field in fields(learners.get(learner).hyperparameters):
+        if field.metadata["kind"] is int:
+            hyperparameters[field.name] = int(rng.choice([1, 2, 3, 5]))
+        else:
+            hyperparameters[field.name] = float(rng.choice([0.0, 0.1, 0.9, 1.0]))
     return TrainingConfig(
         learner=learner,
         learning_rate=float(rng.choice([0.001, 0.01, 0.37, 1.0])),
@@ -29,7 +52,26 @@ def random_config(seed: int, learner: str, planning_steps: int) -> TrainingConfi
         epsilon=float(rng.choice([0.0, 0.05, 0.3, 1.0])),
         epsilon_decay=float(rng.choice([0.3, 0.99, 1.0])),
         min_epsilon=float(rng.choice([0.0, 0.01, 0.2])),
-        hyperparameters=planning(planning_steps),
+        hyperparameters=hyperparameters,
+    )
+
+
+def random_task(seed: int, observation: str = "paper", deposit: str = "set") -> Task:
+    """A task that independent runs can have."""
+    rng = np.random.default_rng([seed, 2])
+    pheromone = Pheromone(
+        evaporation=str(rng.choice(["linear", "none"])),
+        deposit=deposit,
+        level=int(rng.choice([1, 7, 250])),
+        cap=int(rng.choice([1, 10, 1000])) if deposit == "add" else None,
+    )
+    return Task(
+        observation=observation,
+        rewards=random_rewards(seed),
+        pheromone=pheromone,
+        delivery=str(rng.choice(DELIVERIES)),
+        evaporation_in_training=bool(rng.random() < 0.7),
+        evaporation_in_evaluation=bool(rng.random() < 0.7),
     )
 
 
@@ -42,52 +84,51 @@ def assert_equal_steps(world, config, seed, episodes, max_steps, task):
     assert len(ours) == len(plain.trace) > 0
     for k, step in enumerate(plain.trace):
         assert (ours.episodes[k], ours.steps[k]) == (step.episode, step.step)
-        assert (tuple(ours.cells[k]), ours.headings[k]) == (step.cell, step.heading)
-        assert (ours.states[k], ours.actions[k]) == (step.state, step.action)
-        assert (ours.rewards[k], ours.next_states[k]) == (step.reward, step.next_state)
-        assert (ours.terminated[k], ours.delivered[k]) == (step.terminated, step.delivered)
+        assert_equal_step(ours, k, step)
+        assert ours.terminated[k] == step.terminated
         assert ours.td_errors[k] == step.td_error
         assert np.array_equal(ours.tables[k], step.q_values)
     return plain
 
 
-@pytest.mark.parametrize("evaporation", [False, True])
+def assert_equal_step(ours, k, step):
+    assert (tuple(ours.cells[k]), ours.headings[k]) == (step.cell, step.heading)
+    assert (ours.states[k], ours.actions[k]) == (step.state, step.action)
+    assert (ours.rewards[k], ours.next_states[k]) == (step.reward, step.next_state)
+    assert ours.delivered[k] == step.delivered
+
+
+@pytest.mark.parametrize(("learner", "observation", "deposit"), KERNELS)
+def test_every_step_in_random_worlds(learner, observation, deposit):
+    """Several foods, rocks, trails of all strengths; deliveries and choices among foods occur."""
+    delivered = 0
+    n_states = observations.get(observation).n_states
+    for seed in range(40 if n_states < 1000 else 15):
+        task = random_task(seed, observation, deposit)
+        config, world = random_config(seed, learner), random_world(seed)
+        plain = assert_equal_steps(world, config, seed - 7, 4, 25, task)
+        delivered += sum(plain.deliveries)
+    assert delivered > 5
+
+
 @pytest.mark.parametrize("delivery", DELIVERIES)
-@pytest.mark.parametrize(("learner", "planning_steps"), LEARNERS)
-def test_every_step_in_the_papers_world(learner, planning_steps, delivery, evaporation):
+@pytest.mark.parametrize("learner", [one[0] for one in KERNELS if one[1:] == ("paper", "set")])
+def test_every_step_in_the_papers_world(learner, delivery):
     """Long enough to deliver, so that the end of an episode and the next one are compared too."""
-    config = TrainingConfig(learner, 0.01, 0.99, 0.3, 0.9, 0.01, planning(planning_steps))
-    task = Task(delivery=delivery, evaporation_in_training=evaporation)
+    more = {"planning_steps": 3} if learners.get(learner).plans else {}
+    config = TrainingConfig(learner, 0.01, 0.99, 0.3, 0.9, 0.01, more)
+    task = Task(delivery=delivery, evaporation_in_training=delivery == "continuing")
     plain = assert_equal_steps(paper(), config, 3, 12, 120, task)
     assert sum(plain.deliveries) >= 3
     assert min(plain.steps) < 120
 
 
-@pytest.mark.parametrize("delivery", DELIVERIES)
-@pytest.mark.parametrize(("learner", "planning_steps"), LEARNERS)
-def test_every_step_in_random_worlds(learner, planning_steps, delivery):
-    """Several foods, rocks, trails of all strengths; deliveries and choices among foods occur."""
-    delivered = 0
-    for seed in range(60):
-        config = random_config(seed, learner, planning_steps)
-        world = random_world(seed)
-        task = Task(
-            rewards=random_rewards(seed),
-            delivery=delivery,
-            evaporation_in_training=seed % 2 == 0,
-        )
-        plain = assert_equal_steps(world, config, seed - 7, 4, 25, task)
-        delivered += sum(plain.deliveries)
-    assert delivered > 20
-
-
-@pytest.mark.parametrize("delivery", DELIVERIES)
-@pytest.mark.parametrize("table", [Rewards(), *TELLING])
-def test_whole_trainings_of_a_mixed_sweep(table, delivery):
+def test_whole_trainings_of_a_mixed_sweep():
     """The kernel that trains equals the reference too, and runs do not disturb each other."""
-    task = Task(rewards=table, delivery=delivery)
-    configs = [random_config(seed, *LEARNERS[seed % 4]) for seed in range(8)]
-    for world in (paper(), random_world(12), random_world(13, 8)):
+    names = learners.names()
+    for number, world in enumerate((paper(), random_world(12), random_world(13, 8))):
+        task = random_task(number)
+        configs = [random_config(seed, names[seed % len(names)]) for seed in range(2 * len(names))]
         result = train(
             world, configs, seeds=(5, -1, 2**63 + 5), episodes=9, max_steps=70, task=task
         )
@@ -99,18 +140,19 @@ def test_whole_trainings_of_a_mixed_sweep(table, delivery):
                 assert result.deliveries[c, s].tolist() == plain.deliveries
                 assert np.array_equal(result.q_values[c, s], plain.q_values)
                 assert result.state.random_states[c, s] == plain.rng_state
-                assert result.state.exploration[c, s, 0] == plain.epsilon
-                assert result.state.settings[c, s, 2] == len(plain.model)
+                assert result.state.epsilon[c, s] == plain.epsilon
+                if learners.get(config.learner).plans:
+                    assert result.state.integers[c, s, 0] == len(plain.model)
 
 
-@pytest.mark.parametrize("evaporation", [False, True])
-def test_rollouts(evaporation):
+@pytest.mark.parametrize(("observation", "deposit"), [("paper", "set"), ("five_cells", "add")])
+def test_rollouts(observation, deposit):
     """Every step of rollouts, with ties, and the outcomes of `evaluate`."""
     rng = np.random.default_rng(0)
-    task = Task(evaporation_in_evaluation=evaporation)
     for seed in range(40):
         world = random_world(seed + 1000) if seed else paper()
-        table = rng.integers(0, 3, (128, 5)).astype(np.float32)
+        task = random_task(seed, observation, deposit)
+        table = rng.integers(0, 3, (task.n_states, 5)).astype(np.float32)
         outcome = evaluate(world, table, 4, seed, 40, task, epsilon=0.1)
         for number in range(4):
             plain = reference.rollout(world, table, seed, number, 40, task, 0.1)
@@ -119,10 +161,34 @@ def test_rollouts(evaporation):
             assert outcome.steps[number] == plain.steps == len(ours)
             assert outcome.deliveries[number] == plain.deliveries == ours.delivered.sum()
             for k, step in enumerate(plain.trace):
-                assert (tuple(ours.cells[k]), ours.headings[k]) == (step.cell, step.heading)
-                assert (ours.states[k], ours.actions[k]) == (step.state, step.action)
-                assert (ours.rewards[k], ours.next_states[k]) == (step.reward, step.next_state)
+                assert_equal_step(ours, k, step)
                 assert np.array_equal(ours.q_values[k], table[step.state])
+
+
+def test_percepts_are_the_papers_states_whatever_the_observation():
+    table = np.zeros((observations.get("six_cells").n_states, 5), np.float32)
+    for seed in range(20):
+        world = random_world(seed + 1000)
+        other = rollout(world, table, seed, task=Task("six_cells"), max_steps=60)
+        papers = rollout(world, table[:128], seed, max_steps=60)
+        assert np.array_equal(other.percepts, papers.states)
+        assert np.array_equal(other.next_percepts, papers.next_states)
+        assert not np.array_equal(other.states, papers.states)
+
+
+@pytest.mark.parametrize(
+    ("task", "says"),
+    [
+        (Task(pheromone=Pheromone(evaporation="exponential")), "evaporation='exponential'"),
+        (Task(pheromone=Pheromone(diffusion=0.1)), "diffusion=0.1"),
+        (Task(life=Life(births=True)), "births=True"),
+    ],
+)
+def test_what_runs_cannot_do_is_refused_by_name(task, says):
+    for function in (train, trace_training):
+        with pytest.raises(AntsError, match="use a Colony") as caught:
+            function(paper(), random_config(0, "sarsa"), 0, 1, 1, task=task)
+        assert says in str(caught.value)
 
 
 def test_starts_of_ants():

@@ -8,7 +8,8 @@ import pytest
 from taichi_ants import (
     AntsError,
     Colony,
-    ColonyConfig,
+    Life,
+    Task,
     TrainingConfig,
     continue_training,
     evaluate,
@@ -21,7 +22,6 @@ from taichi_ants.checks import checked_count, checked_seeds, checked_seeds_for
 from taichi_ants.engines.runs.launches import plan_launches
 from taichi_ants.errors import shown
 from taichi_ants.rendering import Scene
-from taichi_ants.rendering.learning import learning_stages
 from taichi_ants.worlds import World, paper
 
 CONFIG = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 0.99)
@@ -38,8 +38,8 @@ def says(text, function, *arguments, **options):
     assert "\n" not in str(caught.value)
 
 
-def unplanned(planning_steps, learner="q_learning"):
-    return TrainingConfig(learner, 0.1, 0.9, 0.3, 0.99, planning_steps=planning_steps)
+def with_more(learner, **more):
+    return TrainingConfig(learner, 0.1, 0.9, 0.3, 0.99, **more)
 
 
 @pytest.mark.parametrize(
@@ -51,8 +51,15 @@ def unplanned(planning_steps, learner="q_learning"):
         ("q_learning", "configs holds 'q'"),
         ([CONFIG, None], "configs holds None"),
         (TrainingConfig("td_zero", 0.1, 0.9, 0.3, 0.99), "there is no learner 'td_zero'"),
-        (unplanned(0, "dyna_q"), "planning_steps is 0, but learner 'dyna_q' plans"),
-        ([CONFIG, unplanned(7)], "planning_steps is 7, but learner 'q_learning' does not plan"),
+        (with_more("dyna_q", planning_steps=0), "planning_steps is 0; it must lie between 1 and"),
+        (
+            [CONFIG, with_more("sarsa", n=7)],
+            "'n' is no hyperparameter of learner 'sarsa'; it has none",
+        ),
+        (
+            with_more("sarsa_lambda", trace_decay=1.5),
+            "trace_decay is 1.5; it must lie between 0 and 1",
+        ),
     ],
 )
 def test_configurations(configs, text):
@@ -147,22 +154,26 @@ def test_counts_of_any_kind_of_integer():
 @pytest.mark.parametrize("value", ["none", "off", 0, 1, None, 0.5, [True]])
 def test_flags(value):
     """Text such as "none" would turn evaporation on."""
-    text = f"evaporation is {value!r}; it must be True or False"
-    says(text, train, paper(), CONFIG, 0, 1, 1, value)
-    says(text, evaluate, paper(), TABLE, evaporation=value)
-    says(text, rollout, paper(), TABLE, evaporation=value)
-    says(text, trace_training, paper(), CONFIG, evaporation=value)
-    says(text, learning_stages, paper(), CONFIG, stages=(0,), evaporation=value)
+    text = f"is {value!r}; it must be True or False"
+    for name in ("evaporation_in_training", "evaporation_in_evaluation"):
+        says(f"{name} {text}", Task, **{name: value})
+    says(f"births {text}", Life, births=value)
+    says(f"ends_at_delivery {text}", Colony, paper(), None, CONFIG, ends_at_delivery=value)
     for name in ("hud", "legend", "view"):
         says(f"{name} is {value!r}", Scene, paper().grid, **{name: value})
-    for name in ("births", "ends_at_delivery"):
-        says(f"{name} is {value!r}", ColonyConfig, **{name: value})
 
 
-def test_flags_of_numpy_are_fine():
-    on, off = (train(paper(), CONFIG, 0, 1, 1, flag) for flag in (np.True_, np.False_))
-    assert (on.evaporation, off.evaporation) == (True, False)
-    assert type(on.evaporation) is bool
+@pytest.mark.parametrize("task", ["paper", 3, Task])
+def test_tasks(task):
+    for function in (train, trace_training):
+        says(f"task is {shown(task)}; it must be a Task", function, paper(), CONFIG, 0, 1, 1, task)
+
+
+def test_tables_must_fit_the_observation():
+    task = Task("five_cells")
+    text = "q_values has shape (128, 5); for the observation 'five_cells' it must end in (2048, 5)"
+    says(text, evaluate, paper(), TABLE, task=task)
+    says(text, rollout, paper(), TABLE, task=task)
 
 
 @pytest.mark.parametrize("value", [-0.1, 1.1, float("nan"), "0.5", None, True, [0.5], 10**400])
@@ -289,7 +300,7 @@ def test_progress_can_be_called(progress):
     text = f"progress is {progress!r}; it must be a function"
     says(text, train, paper(), CONFIG, 0, 1, 1, progress=progress)
     says(text, evaluate, paper(), TABLE, 1, progress=progress)
-    says(text, Colony(paper(), ColonyConfig(), CONFIG).run, 1, 1, progress)
+    says(text, Colony(paper(), None, CONFIG).run, 1, 1, progress)
 
 
 def test_a_world_to_learn_in_has_food():
@@ -311,7 +322,7 @@ def test_messages_stay_short_whatever_they_name(value):
         *((train, (value, CONFIG, 0, 1, 1)), (train, (paper(), [value], 0, 1, 1))),
         *((train, (paper(), CONFIG, [value], 1, 1)), (train, (paper(), CONFIG, 0, value, 1))),
         *((evaluate, (paper(), TABLE, value)), (World, ((3, 3, 3), value))),
-        *((worlds.build, (value,)), (worlds.register, (value, None)), (ColonyConfig, (value,))),
+        *((worlds.build, (value,)), (worlds.register, (value, None)), (Task, (value,))),
         *((continue_training, (value, 1)), (Colony, (paper(), value, CONFIG))),
     ):
         with pytest.raises(AntsError) as caught:
@@ -324,21 +335,21 @@ def test_messages_stay_short_whatever_they_name(value):
 @pytest.mark.parametrize("max_steps", [1, 600, 10**7])
 @pytest.mark.parametrize("cells", [11, 500, 10**8])
 def test_launches_are_short_and_can_be_indexed(workers, episodes, max_steps, cells):
-    for planning_steps in (0, 1000):
-        plan = plan_launches(workers, episodes, max_steps, planning_steps, cells)
+    for cost, widest in ((1, 1024), (250, 10**7)):
+        plan = plan_launches(workers, episodes, max_steps, cost, cells, widest)
         assert plan.runs >= 1
         assert 1 <= plan.episodes <= episodes
         assert plan.runs == 1 or plan.runs * cells * 4 <= 2**28
-        assert plan.runs * 1024 < 2**31  # Q-tables
+        assert plan.runs * widest < 2**31
         assert plan.runs * plan.episodes < 2**31
         # A second of a thread, if every episode has its greatest length, or one episode.
         steps = -(-plan.runs // workers) * plan.episodes * max_steps
-        assert plan.episodes == 1 or steps * (25 + 6 * planning_steps) <= 1.1e9
+        assert plan.episodes == 1 or steps * 25 * cost <= 1.1e9
 
 
 @pytest.mark.parametrize(("n_runs", "n_episodes"), [(1, 1), (7, 500), (8, 3), (20, 10)])
 def test_launches_cover_all_work_once_and_episodes_in_order(n_runs, n_episodes):
-    plan = plan_launches(2, 4, 3_000_000, 0, 500)
+    plan = plan_launches(2, 4, 3_000_000, 1, 500, 1024)
     done = np.zeros((n_runs, n_episodes), int)
     for launch in plan.launches(n_runs, n_episodes):
         rows = slice(launch.first, launch.first + launch.count)

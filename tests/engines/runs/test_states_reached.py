@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from random_worlds import random_world
 
-from taichi_ants import TrainingConfig, rollout, trace_training, train
+from taichi_ants import Task, TrainingConfig, rollout, trace_training, train
 from taichi_ants.task.constants import N_STATES, PICK_UP
 from taichi_ants.task.states import REACHABLE_STATES, state_name
 from taichi_ants.worlds import World
@@ -143,7 +143,8 @@ def test_random_worlds_show_no_other_state():
     for number in range(120):
         config = TrainingConfig("sarsa", 0.5, 0.9, 1.0 if number % 2 else 0.3, 1.0)
         world = random_world(number + 3000, 6)
-        trace = trace_training(world, config, number, 3, 40, evaporation=number % 3 == 0)
+        task = Task(evaporation_in_training=number % 3 == 0)
+        trace = trace_training(world, config, number, 3, 40, task)
         met |= {*trace.states.tolist(), *trace.next_states.tolist()}
     assert met <= set(REACHABLE_STATES)
     assert len(met) > 90
@@ -160,7 +161,8 @@ def test_training_touches_no_other_row():
     touched = np.zeros(N_STATES, bool)
     for number in range(40):
         world = random_world(number + 5000, 8)
-        result = train(world, configs, range(6), 15, 80, evaporation=number % 2 == 0)
+        task = Task(evaporation_in_training=number % 2 == 0)
+        result = train(world, configs, range(6), 15, 80, task)
         touched |= result.q_values.any(axis=(0, 1, 3))
     assert not touched[others].any()
     assert touched.sum() > 95
