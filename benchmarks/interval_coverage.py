@@ -15,12 +15,12 @@ import argparse
 import numpy as np
 
 from taichi_ants import Task, TrainingConfig, train, worlds
-from taichi_ants.analysis.markdown import table
 from taichi_ants.analysis.statistics import (
     bootstrap_interval,
     cautious_interval,
     interquartile_mean,
 )
+from taichi_ants.analysis.tables import table
 
 POOL = 4000  # seeds
 SIZES = (10, 20, 50, 100)

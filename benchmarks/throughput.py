@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from taichi_ants import Task, TrainingConfig, World, train, worlds
-from taichi_ants.analysis.paper import GRID
+from taichi_ants.analysis.paper.published import GRID
 from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.studies.command_line import Parser, run_command, whole_number

@@ -19,29 +19,29 @@ ROOT = Path(__file__).parents[1]
 _MAP = str(ROOT / "experiments" / "maps" / "garden.txt")
 
 _COLONY = [
-    *("--show", "colony", "--world", "open", "--world-seed", "3", "--seed", "1"),
+    *("colony", "--world", "open", "--world-seed", "3", "--seed", "1"),
     *("--learning-rate", "0.01", "--epsilon", "0.05"),
     *("--title", "a colony that learned together"),
 ]
 GALLERY: dict[str, list[str]] = {
     "still.png": [*_COLONY, "--step", "400"],
     "colony.gif": [
-        *(*_COLONY, "--max-steps", "300", "--every", "6", "--fps", "10"),
+        *(*_COLONY, "--ticks", "300", "--every", "6", "--fps", "10"),
         *("--size", "800x450", "--no-legend"),
     ],
     "episode.gif": [
-        *("--world", _MAP, "--size", "960x540", "--fps", "4"),
+        *("episode", "--world", _MAP, "--size", "960x540", "--fps", "4"),
         *("--title", "SARSA in a garden"),
     ],
     # Seed 7 is worth a look: after 10 episodes the ant has learned that steps towards the queen
     # pay, but not yet to give the food away, and circles beside her.
     "learning.gif": [
-        *("--show", "learning", "--seed", "7", "--max-steps", "100"),
+        *("learning", "--seed", "7", "--max-steps", "100"),
         *("--size", "1200x480", "--fps", "12"),
         *("--title", "SARSA: the same ant before and after learning"),
     ],
     "policy_sheet.png": [
-        *("--show", "sheet", "--seed", "7"),
+        *("sheet", "--seed", "7"),
         *("--title", "What SARSA has learned in the world of the paper, after 500 episodes"),
     ],
 }
@@ -75,21 +75,19 @@ def make_gallery(settings: argparse.Namespace) -> None:
 
 def make_figures(folder: Path) -> None:
     """Draw the figures of the docs from the two studies, which are run where they are missing."""
-    from taichi_ants import files
-    from taichi_ants.analysis.colony.figures import save_all
     from taichi_ants.commands import colony, compare
-    from taichi_ants.studies.colony_study import from_arrays
 
     comparison = compare.parse_arguments(["--out", str(ROOT / "results" / "compare")])
     compare.compare(comparison)
-    study = colony.parse_arguments(["--out", str(ROOT / "results" / "colony")])
+    study = colony.parse_arguments(["study", "--out", str(ROOT / "results" / "colony")])
     colony.study(study)
+    world = compare.world_name(comparison)
     with tempfile.TemporaryDirectory() as place:
-        compare.draw_figures(compare.build_sweep(comparison), comparison.out, Path(place))
-        keep(Path(place) / compare.FIGURES, COMPARISON, folder)
-        found = files.read_npz(study.out / colony.EPISODES)
-        save_all(from_arrays(colony.build_plan(study), found), Path(place) / colony.FIGURES)
-        keep(Path(place) / colony.FIGURES, COLONY, folder)
+        drawn = Path(place)
+        compare.draw_figures(compare.build_study(comparison), world, comparison.out, drawn)
+        keep(drawn / compare.FIGURES, COMPARISON, folder)
+        colony.draw_figures(colony.build_plan(study), study.out, drawn)
+        keep(drawn / colony.FIGURES, COLONY, folder)
 
 
 def keep(drawn: Path, names: dict[str, str], folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""The one exception that speaks to users, and how its messages name values."""
+"""The one exception that speaks to users, and how messages name values and numbers of things."""
 
 from __future__ import annotations
 
@@ -35,6 +35,13 @@ def shown(value: object, most: int = 80) -> str:
     except ValueError:  # Python writes no integers of more than 4300 digits
         text = "a huge number"
     return text if len(text) <= most else text[: most - 3] + "..."
+
+
+def count(number_of: int, noun: str) -> str:
+    """How many of something: "1 seed", "2 seeds", "3 deliveries"."""
+    if number_of == 1:
+        return f"1 {noun}"
+    return f"{number_of} {noun[:-1]}ies" if noun.endswith("y") else f"{number_of} {noun}s"
 
 
 def check_one_of(name: str, value: object, allowed: Sequence[str]) -> None:
@@ -81,3 +88,17 @@ def check_whole(name: str, value: object, least: int, most: int, otherwise: str 
         raise AntsError(
             f"{name} is {shown(value)}; it must lie between {least} and {most}{otherwise}."
         )
+
+
+def expect(name: str, value: object, *kinds: type) -> None:
+    """Raises AntsError, naming the value `name`, if it is of none of the kinds."""
+    if not isinstance(value, kinds):
+        words = " or ".join(_PLAIN.get(kind.__name__) or _with_article(kind) for kind in kinds)
+        raise AntsError(f"{name} is {shown(value)}; it must be {words}.")
+
+
+_PLAIN = {"str": "text", "NoneType": "None", "ndarray": "an array", "PathLike": "a path"}
+
+
+def _with_article(kind: type) -> str:
+    return f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}"

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taichi_ants.analysis.comparison import Variant
-from taichi_ants.analysis.markdown import baseline_name
-from taichi_ants.analysis.paper import DYNA_P3, DYNA_P5, Q_LEARNING, SARSA
+from taichi_ants.analysis.paper.comparison import Variant
+from taichi_ants.analysis.paper.published import DYNA_P3, DYNA_P5, Q_LEARNING, SARSA
+from taichi_ants.analysis.tables import baseline_name
 from taichi_ants.files import write_atomically
 
 if TYPE_CHECKING:
@@ -184,11 +184,6 @@ def for_setting(baselines: Iterable[Mapping], setting: str) -> list[Mapping]:
     return [
         row for row in baselines if setting == "absorbing" or row["baseline"] != "optimal policy"
     ]
-
-
-def over_seeds(seeds: int, spread: str) -> str:
-    """What marks and bars are, for a caption: one seed has no spread."""
-    return f"mean of {seeds} seeds with {spread}" if seeds > 1 else "one seed"
 
 
 def save(figure: Figure, path: Path) -> None:

@@ -1,6 +1,6 @@
 """Pictures of ants: an episode, a colony, learning made visible, or a policy sheet.
 
-Follows a policy from a file, or trains one on the spot (a colony learns together). The ending of
+All but learning follow a policy from a file, or one that is trained on the spot. The ending of
 --out chooses the kind of file: .gif, .webp, .mp4, .png for a single picture, and without an ending
 a folder of PNG pictures.
 """
@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import signal
 import sys
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,194 +24,22 @@ from taichi_ants.studies.command_line import (
     run_command,
     whole_number,
 )
-from taichi_ants.task import Task
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from taichi_ants import Colony, World
+    from taichi_ants import Task, World
     from taichi_ants.learners.config import TrainingConfig
     from taichi_ants.rendering import Stage
 
-DEFAULT_OUT = {
-    "episode": "results/renders/episode.gif",
-    "colony": "results/renders/colony.gif",
-    "learning": "results/renders/learning.gif",
-    "sheet": "results/renders/policy_sheet.png",
+KINDS = {  # what each subcommand shows, and how it is called
+    "episode": ("One ant that follows a policy", "--policy my.npz --epsilon 0.1 --out ant.mp4"),
+    "colony": ("Many ants that follow one policy", "--ants 200 --out ants.gif"),
+    "learning": ("One ant before and after it learns, side by side", "--stages 0 20 500"),
+    "sheet": ("What a policy does in each state", "--policy my.npz --out sheet.png"),
 }
-DEFAULT_MAX_STEPS = {"episode": 600, "colony": 600, "learning": 150}
-DEFAULT_SIZE = {"colony": (960, 540), "learning": (1280, 520)}  # all others: 1280 x 720
-DEFAULT_EVERY = 4
-DEFAULT_EPISODES = {"colony": 60}  # all others: 500
-DEFAULT_PLANNING_STEPS = 5
-DEFAULT_WORLD = {"colony": "open"}  # all others: the paper's, with one food for them all
 
 _IN_WORDS = {"delivers": "delivered", "other": ""}  # all others speak for themselves
-
-# What is shown, and whether as a single picture or moving.
-_EPISODES, _COLONIES = {"a still episode", "an episode"}, {"a still colony", "a colony"}
-_ROLLOUTS = _EPISODES | _COLONIES | {"learning"}
-# Options that change nothing in all that is shown, by where they do.
-_WHERE_IT_COUNTS: dict[str, set[str]] = {
-    "policy": _EPISODES | _COLONIES | {"a sheet"},
-    "episodes": _EPISODES | _COLONIES | {"a sheet"},
-    "stages": {"learning"},
-    "all_states": {"a sheet"},
-    "greedy": _ROLLOUTS,
-    "epsilon": _ROLLOUTS,
-    "number": _EPISODES,
-    "max_steps": _ROLLOUTS,
-    "ants": _COLONIES,
-    "no_evaporation": _ROLLOUTS,
-    "size": _ROLLOUTS,
-    "fps": {"an episode", "a colony", "learning"},
-    "step": {"a still episode", "a still colony"},
-    "every": {"a colony"},
-    "no_hud": _EPISODES | _COLONIES,
-    "no_legend": _EPISODES | _COLONIES,
-    "no_view": _EPISODES,
-}
-_OF_TRAINING = (
-    *("learner", "episodes", "learning_rate", "discount", "train_epsilon", "epsilon_decay"),
-    "planning_steps",
-)
-
-
-def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
-    """The settings of the command line."""
-    parser = Parser(__doc__.split("\n", 1)[0], epilog=__doc__.split("\n", 1)[1])
-    add = parser.add_argument
-    add("--show", choices=tuple(DEFAULT_OUT), default="episode", help="what to show")
-    add("--world", help="paper, open, or the path of a map file (default: paper, of a colony open)")
-    add(
-        "--world-seed",
-        type=whole_number(),
-        default=0,
-        metavar="N",
-        help="seed of a world drawn at random",
-    )
-    add(
-        "--seed",
-        type=whole_number(),
-        default=0,
-        metavar="N",
-        help="seed of training and of the episode",
-    )
-    add("--plugin", metavar="FILE", help="a Python file that registers learners or worlds")
-    _add_policy(parser)
-    _add_episode(parser)
-    _add_picture(parser)
-    settings, given = parser.parse_given(arguments)
-    settings.world_seed_given = "world_seed" in given
-    settings.out = settings.out or DEFAULT_OUT[settings.show]
-    _refuse_what_changes_nothing(parser, settings, given)
-    settings.world = settings.world or DEFAULT_WORLD.get(settings.show, "paper")
-    settings.episodes = settings.episodes or DEFAULT_EPISODES.get(settings.show, 500)
-    settings.max_steps = settings.max_steps or DEFAULT_MAX_STEPS.get(settings.show)
-    settings.size = settings.size or _default_size(settings)
-    return settings
-
-
-def _refuse_what_changes_nothing(
-    parser: Parser, settings: argparse.Namespace, given: dict[str, str]
-) -> None:
-    shown = _what_is_shown(settings)
-    for name, flag in given.items():
-        counts = _WHERE_IT_COUNTS.get(name, {shown})
-        if shown not in counts:
-            places = ", ".join(sorted(counts))
-            parser.error(f"{flag} changes nothing in {shown}; leave it out (it is for {places})")
-        if name in _OF_TRAINING and settings.policy:
-            parser.error(f"{flag} is for training, but --policy is given; leave out one of the two")
-
-
-def _what_is_shown(settings: argparse.Namespace) -> str:
-    """One of the names in `_WHERE_IT_COUNTS`."""
-    if settings.show in ("learning", "sheet"):
-        return {"learning": "learning", "sheet": "a sheet"}[settings.show]
-    if Path(settings.out).suffix.lower() == ".png":
-        return f"a still {settings.show}"
-    return {"episode": "an episode", "colony": "a colony"}[settings.show]
-
-
-def _default_size(settings: argparse.Namespace) -> tuple[int, int]:
-    """Width and height; a long animation of many ants is smaller, so that its file is."""
-    if settings.show == "colony" and Path(settings.out).suffix.lower() == ".png":
-        return 1280, 720
-    return DEFAULT_SIZE.get(settings.show, (1280, 720))
-
-
-def _add_policy(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("policy, from a file or trained on the spot")
-    add = group.add_argument
-    add("--policy", metavar="FILE", help="a policy file (.npz)")
-    add("--learner", default="sarsa", help="name of the learner to train")
-    add("--episodes", type=whole_number(1), metavar="N", help="of training, 500, of a colony 60")
-    add("--learning-rate", type=number, default=0.001, metavar="X", help="in (0, 1]")
-    add("--discount", type=number, default=0.9, metavar="X", help="in [0, 1]")
-    add("--train-epsilon", type=number, default=0.3, metavar="X", help="in the first episode")
-    add("--epsilon-decay", type=number, default=0.99, metavar="X", help="after each episode")
-    add("--planning-steps", type=whole_number(1), metavar="N", help="of learners that plan")
-    add(
-        "--stages",
-        action=ListAction,
-        item=whole_number(0),
-        unique=False,
-        default=(0, 10, 100, 500),
-        metavar="N",
-        help="numbers of episodes after which --show learning looks at the ant",
-    )
-
-
-def _add_episode(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("episode")
-    choice = group.add_mutually_exclusive_group()
-    choice.add_argument("--greedy", action="store_true", help="always a best action (the default)")
-    choice.add_argument(
-        "--epsilon", type=number, default=0.0, metavar="X", help="probability of a random action"
-    )
-    add = group.add_argument
-    add(
-        "--number",
-        type=whole_number(0),
-        default=0,
-        metavar="N",
-        help="which of the seed's rollouts",
-    )
-    add(
-        "--max-steps",
-        type=whole_number(1, 100_000),
-        metavar="N",
-        help="step limit, by default 600, for --show learning 150",
-    )
-    add("--ants", type=whole_number(1), default=80, metavar="N", help="of a colony")
-    add("--no-evaporation", action="store_true", help="trails stay as they are")
-
-
-def _add_picture(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("picture")
-    add = group.add_argument
-    add(
-        "--size",
-        type=_size,
-        metavar="WxH",
-        help="in pixels, by default 1280x720, of learning 1280x520, of a moving colony 960x540",
-    )
-    add("--fps", type=number, default=8.0, metavar="X", help="steps per second")
-    add("--title", help="a line above all")
-    add("--step", type=whole_number(0), metavar="N", help="of a .png: which step, else the last")
-    add(
-        "--every",
-        type=whole_number(1),
-        default=DEFAULT_EVERY,
-        metavar="N",
-        help=f"ticks of a colony a picture, by default {DEFAULT_EVERY}",
-    )
-    add("--no-hud", action="store_true", help="no head-up lines")
-    add("--no-legend", action="store_true", help="no legend")
-    add("--all-states", action="store_true", help="a sheet of states that were not visited, too")
-    add("--no-view", action="store_true", help="do not mark the cells in view")
-    add("--out", metavar="PATH", help="file or folder, by default in results/renders/")
 
 
 def _size(text: str) -> tuple[int, int]:
@@ -220,14 +49,103 @@ def _size(text: str) -> tuple[int, int]:
     return int(width), int(height)
 
 
+_SEED: dict[str, Any] = {"type": whole_number(), "default": 0, "metavar": "N"}
+_LENGTH: dict[str, Any] = {"type": whole_number(1, 100_000), "default": 600, "metavar": "N"}
+_COUNT: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
+_NUMBER: dict[str, Any] = {"type": number, "metavar": "X"}
+_FLAG: dict[str, Any] = {"action": "store_true"}
+_STAGES = {"action": ListAction, "item": whole_number(0), "unique": False, "metavar": "N"}
+
+# Each option: the kinds of pictures that it is for, by their first letters, what it does, and how
+# it is read.
+_OPTIONS: dict[str, tuple[str, str, dict[str, Any]]] = {
+    "--out": ("ecls", "file or folder", {"metavar": "PATH"}),
+    "--title": ("ecls", "a line above all", {"metavar": "TEXT"}),
+    "--world": ("ecls", "paper, open, or the path of a map file", {"default": "paper"}),
+    "--world-seed": ("ecls", "seed of a world drawn at random", _SEED),
+    "--seed": ("ecls", "seed of training and of what is shown", _SEED),
+    "--plugin": ("ecls", "a Python file that registers learners or worlds", {"metavar": "FILE"}),
+    "--ants": ("c", "how many", {**_COUNT, "default": 80}),
+    "--max-steps": ("el", "step limit of the episode shown", _LENGTH),
+    "--ticks": ("c", "length of an episode", _LENGTH),
+    "--number": ("e", "which of the seed's rollouts", {**_SEED, "type": whole_number(0)}),
+    "--epsilon": ("ecl", "probability of a random action", {**_NUMBER, "default": 0.0}),
+    "--no-evaporation": ("ecl", "trails stay as they are", _FLAG),
+    "--policy": ("ecs", "a policy file (.npz); without one, it is trained", {"metavar": "FILE"}),
+    "--learner": ("ecls", "name of the learner to train", {"default": "sarsa", "metavar": "NAME"}),
+    "--episodes": ("ecs", "of training", {**_COUNT, "default": 500}),
+    "--stages": ("l", "looks at the ant after so many episodes of training", _STAGES),
+    "--learning-rate": ("ecls", "in (0, 1]", {**_NUMBER, "default": 0.001}),
+    "--discount": ("ecls", "in [0, 1]", {**_NUMBER, "default": 0.9}),
+    "--train-epsilon": ("ecls", "epsilon in the first episode", {**_NUMBER, "default": 0.3}),
+    "--epsilon-decay": ("ecls", "a factor after each episode", {**_NUMBER, "default": 0.99}),
+    "--planning-steps": ("ecls", "of learners that plan", _COUNT),
+    "--size": ("ecl", "in pixels", {"type": _size, "metavar": "WxH"}),
+    "--fps": ("ecl", "pictures a second", {**_NUMBER, "default": 8.0}),
+    "--every": ("c", "ticks from one picture to the next", {**_COUNT, "default": 4}),
+    "--step": ("ec", "of a .png: which one, else the last", {**_SEED, "default": None}),
+    "--no-hud": ("ec", "no head-up lines", _FLAG),
+    "--no-legend": ("ec", "no legend", _FLAG),
+    "--no-view": ("e", "do not mark the cells in view", _FLAG),
+    "--all-states": ("s", "also those that were not visited", _FLAG),
+}
+_OF_TRAINING = (
+    *("learner", "episodes", "learning_rate", "discount", "train_epsilon", "epsilon_decay"),
+    "planning_steps",
+)
+# Where a kind has defaults of its own. A still picture has 1280x720 pixels.
+_DEFAULTS: dict[str, dict[str, Any]] = {
+    "episode": {"out": "results/renders/episode.gif", "size": "1280x720"},
+    "colony": {
+        **{"out": "results/renders/colony.gif", "size": "960x540"},
+        **{"world": "open", "episodes": 60},
+    },
+    "learning": {
+        **{"out": "results/renders/learning.gif", "size": "1280x520"},
+        **{"max_steps": 150, "stages": (0, 10, 100, 500)},
+    },
+    "sheet": {"out": "results/renders/policy_sheet.png"},
+}
+
+
+def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
+    """The settings of the command line."""
+    summary, more = __doc__.split("\n", 1)
+    parser = Parser(summary, epilog=f"{more} `%(prog)s episode --help` tells what it has to offer.")
+    kinds = parser.add_subparsers(metavar="|".join(KINDS), required=True)
+    for kind, (shows, example) in KINDS.items():
+        example = f"Example: %(prog)s {example}"
+        one = kinds.add_parser(kind, help=shows, description=f"{shows}.", epilog=example)
+        for flag, (where, words, reading) in _OPTIONS.items():
+            if kind[0] in where:
+                one.add_argument(flag, help=words, **reading)
+        one.set_defaults(**_DEFAULTS[kind])
+    given = sys.argv[1:] if arguments is None else arguments
+    parser.parse_args(given)
+    kind = given[0]
+    settings, named = kinds.choices[kind].parse_given(given[1:])
+    settings.kind, settings.world_seed_given = kind, "world_seed" in named
+    settings.still = Path(settings.out).suffix.lower() == ".png" and kind != "learning"
+    if kind != "sheet" and "size" not in named:
+        settings.size = _size("1280x720" if settings.still else settings.size)
+    for name, flag in named.items():
+        if name in _OF_TRAINING and getattr(settings, "policy", None):
+            parser.error(f"{flag} is for training, but --policy is given; leave out one of the two")
+        if name == "step" and not settings.still:
+            parser.error(f"{flag} is for a single picture; leave it out, or let --out end in .png")
+        if name in ("fps", "every") and settings.still:
+            parser.error(f"{flag} is for an animation, but --out ends in .png; leave out one")
+    return settings
+
+
 def show(settings: argparse.Namespace) -> None:
     """Make what was asked for, and say what it is."""
     from taichi_ants import worlds
     from taichi_ants.rendering import check_animation, check_picture, check_size
 
-    one_picture = Path(settings.out).suffix.lower() == ".png"
-    check_size(settings.size)
-    if settings.show == "sheet" or (settings.show in ("episode", "colony") and one_picture):
+    if settings.kind != "sheet":
+        check_size(settings.size)
+    if settings.still or settings.kind == "sheet":
         check_picture(settings.out)
     else:
         check_animation(settings.out, settings.fps)
@@ -236,100 +154,113 @@ def show(settings: argparse.Namespace) -> None:
     if settings.world_seed_given:
         worlds.check_seed_counts(settings.world)
     world = worlds.build(settings.world, settings.world_seed)
-    if settings.show == "learning":
-        show_learning(settings, world)
-        return
-    if settings.show == "colony":
-        show_colony(settings, world)
-        return
+    kinds = (show_episode, show_colony, show_learning, show_sheet)
+    dict(zip(KINDS, kinds, strict=True))[settings.kind](settings, world)
+
+
+def show_episode(settings: argparse.Namespace, world: World) -> None:
+    """Write an episode as an animation, or one step of it as a picture."""
+    from taichi_ants.rendering import Episode, frames, save_picture
+
     q_values, title = find_policy(settings, world)
-    if settings.show == "sheet":
-        show_sheet(settings, q_values, title)
-    elif one_picture:
-        show_step(settings, world, q_values, title)
+    episode = Episode.play(
+        world, q_values, number=settings.number, max_steps=settings.max_steps, **_acting(settings)
+    )
+    look = {**_look(settings, title), "view": not settings.no_view}
+    if settings.still:
+        last = len(episode) - 1
+        step = last if settings.step is None else settings.step
+        save_picture(settings.out, next(frames([episode.moment(step)], **look)))
+        print(f"{settings.out}: step {step} of {last}")
+        return
+    _save(settings, frames(episode.moments(), **look), len(episode))
+    outcome = "delivered" if episode.delivered else "not delivered"
+    rewards = int(episode.trace.rewards.sum())
+    print(f"{settings.out}: {len(episode.trace)} steps, return {rewards}, {outcome}")
+
+
+def show_colony(settings: argparse.Namespace, world: World) -> None:
+    """Let a colony learn together, then write an episode in which it follows what it has learned.
+
+    As a single picture, the episode is shown at its last tick, or at `--step`.
+    """
+    from taichi_ants import Colony
+    from taichi_ants.errors import count
+    from taichi_ants.rendering import colony_moments, frames, save_picture
+
+    q_values, title = find_policy(settings, world)
+    config = replace(training_config(settings), epsilon=settings.epsilon, min_epsilon=0.0)
+    colony = Colony(
+        *(world, task_of(settings), config, settings.seed, settings.ants),
+        sharing="fixed",
+        q_values=q_values,
+    )
+    colony.begin_episode()
+    look = _look(settings, title)
+    if settings.still:
+        ticks = settings.ticks if settings.step is None else settings.step
+        if ticks:
+            colony.tick(ticks)
+        save_picture(settings.out, next(frames(colony_moments(colony), **look)))
     else:
-        show_episode(settings, world, q_values, title)
+        moments = colony_moments(colony, settings.ticks, settings.every)
+        _save(settings, frames(moments, **look), 1 + -(-settings.ticks // settings.every))
+    delivered = count(int(colony.outcome().deliveries.sum()), "delivery")
+    ants, ticks = count(settings.ants, "ant"), count(colony.ticks, "tick")
+    print(f"{settings.out}: {ants}, {ticks}, {delivered}")
+
+
+def show_learning(settings: argparse.Namespace, world: World) -> None:
+    """Write the same ant after more and more episodes, side by side."""
+    from taichi_ants.rendering import learning_frames
+
+    stages = noted_stages(settings, world)
+    title = settings.title or f"{settings.learner}: the same ant before and after learning"
+    longest = max(len(stage.episode) for stage in stages)
+    _save(settings, learning_frames(stages, settings.size, title), longest)
+    print(f"{settings.out}: {', '.join(stage.title for stage in stages)}")
+
+
+def show_sheet(settings: argparse.Namespace, world: World) -> None:
+    """Write what a policy does in each state."""
+    from taichi_ants.rendering import policy_sheet, save_picture
+
+    q_values, title = find_policy(settings, world)
+    save_picture(settings.out, policy_sheet(q_values, title, complete=settings.all_states))
+    print(f"{settings.out}: the best action in each state")
 
 
 def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray, str]:
     """The action values (128, 5) to follow, and a title that says where they come from."""
-    from taichi_ants import load_policy, train
+    from taichi_ants import Colony, load_policy, train
 
     if settings.policy:
         q_values, _ = load_policy(settings.policy)
         return q_values, settings.title or f"policy {Path(settings.policy).stem}"
+    config, seed, episodes = training_config(settings), settings.seed, settings.episodes
     with progress_bar("Training") as progress:
-        result = train(
-            world, training_config(settings), settings.seed, settings.episodes, progress=progress
-        )
-    title = f"{settings.learner} after {settings.episodes} episodes"
+        if settings.kind == "colony":
+            colony = Colony(world, task_of(settings), config, seed, settings.ants)
+            colony.run(episodes, settings.ticks, progress)
+            title = f"{settings.learner}, {episodes} episodes together"
+            return colony.q_values[0], settings.title or title
+        result = train(world, config, seed, episodes, progress=progress)
+    title = f"{settings.learner} after {episodes} episodes"
     return result.q_values[0, 0], settings.title or title
 
 
 def training_config(settings: argparse.Namespace) -> TrainingConfig:
-    from taichi_ants import TrainingConfig, learners
+    from taichi_ants import TrainingConfig
 
-    planning_steps = settings.planning_steps or 0
-    if not planning_steps and learners.get(settings.learner).plans:
-        planning_steps = DEFAULT_PLANNING_STEPS
+    given = settings.planning_steps
     return TrainingConfig(
         learner=settings.learner,
         learning_rate=settings.learning_rate,
         discount=settings.discount,
         epsilon=settings.train_epsilon,
         epsilon_decay=settings.epsilon_decay,
-        hyperparameters={"planning_steps": planning_steps} if planning_steps else {},
+        hyperparameters={} if given is None else {"planning_steps": given},
     )
-
-
-def show_episode(
-    settings: argparse.Namespace, world: World, q_values: np.ndarray, title: str
-) -> None:
-    """Write an episode as an animation."""
-    from taichi_ants.rendering import render_episode
-
-    with progress_bar("Rendering") as progress:
-        episode = render_episode(
-            settings.out,
-            world,
-            q_values,
-            **_rollout(settings),
-            **_look(settings, title),
-            fps=settings.fps,
-            progress=progress,
-        )
-    outcome = "delivered" if episode.delivered else "not delivered"
-    rewards = int(episode.trace.rewards.sum())
-    print(f"{settings.out}: {len(episode.trace)} steps, return {rewards}, {outcome}")
-
-
-def show_step(settings: argparse.Namespace, world: World, q_values: np.ndarray, title: str) -> None:
-    """Write one step of an episode as a picture."""
-    from taichi_ants.rendering import Episode, episode_picture, save_picture
-
-    episode = Episode.play(world, q_values, **_rollout(settings))
-    last = len(episode) - 1
-    step = last if settings.step is None else settings.step
-    save_picture(settings.out, episode_picture(episode, step, **_look(settings, title)))
-    print(f"{settings.out}: step {step} of {last}")
-
-
-def show_learning(settings: argparse.Namespace, world: World) -> None:
-    """Write the same ant after more and more episodes, side by side."""
-    from taichi_ants.rendering import render_learning
-
-    stages = noted_stages(settings, world)
-    title = settings.title or f"{settings.learner}: the same ant before and after learning"
-    with progress_bar("Rendering") as progress:
-        render_learning(
-            settings.out,
-            stages,
-            size=settings.size,
-            fps=settings.fps,
-            title=title,
-            progress=progress,
-        )
-    print(f"{settings.out}: {', '.join(stage.title for stage in stages)}")
 
 
 def noted_stages(settings: argparse.Namespace, world: World) -> list[Stage]:
@@ -341,12 +272,10 @@ def noted_stages(settings: argparse.Namespace, world: World) -> list[Stage]:
         stages = learning_stages(
             world,
             training_config(settings),
-            seed=settings.seed,
             stages=settings.stages,
             max_steps=settings.max_steps,
-            task=Task(evaporation_in_evaluation=not settings.no_evaporation),
-            epsilon=settings.epsilon,
             progress=progress,
+            **_acting(settings),
         )
     noted = []
     for stage in stages:
@@ -356,87 +285,31 @@ def noted_stages(settings: argparse.Namespace, world: World) -> list[Stage]:
     return noted
 
 
-def show_colony(settings: argparse.Namespace, world: World) -> None:
-    """Let a colony learn together, then write an episode in which it follows what it has learned.
+def task_of(settings: argparse.Namespace) -> Task:
+    """The paper's task; in a colony trails fall while it learns too."""
+    from taichi_ants import Task
 
-    As a single picture, the episode is shown at its last tick, or at `--step`.
-    """
-    from taichi_ants.analysis.markdown import count
-    from taichi_ants.rendering import colony_picture, render_colony, save_picture
-
-    colony, title = settled_colony(settings, world)
-    look = {key: _look(settings, title)[key] for key in ("size", "hud", "legend", "title")}
-    colony.begin_episode()
-    if Path(settings.out).suffix.lower() == ".png":
-        ticks = settings.max_steps if settings.step is None else settings.step
-        if ticks:
-            colony.tick(ticks)
-        save_picture(settings.out, colony_picture(colony, **look))
-    else:
-        with progress_bar("Rendering") as progress:
-            render_colony(
-                settings.out,
-                colony,
-                settings.max_steps,
-                every=settings.every,
-                fps=settings.fps,
-                progress=progress,
-                **look,
-            )
-    delivered = count(int(colony.outcome().deliveries.sum()), "delivery")
-    ants, ticks = count(settings.ants, "ant"), count(colony.ticks, "tick")
-    print(f"{settings.out}: {ants}, {ticks}, {delivered}")
+    falls = not settings.no_evaporation
+    in_training = falls and settings.kind == "colony"
+    return Task(evaporation_in_training=in_training, evaporation_in_evaluation=falls)
 
 
-def settled_colony(settings: argparse.Namespace, world: World) -> tuple[Colony, str]:
-    """A colony that follows a policy from a file or one that it has learned, and a title."""
-    from taichi_ants import Colony, Pheromone, load_policy
-
-    pheromone = Pheromone(evaporation="none" if settings.no_evaporation else "linear")
-    task = Task(pheromone=pheromone, evaporation_in_training=True)
-    training = training_config(settings)
-    if settings.policy:
-        table, _ = load_policy(settings.policy)
-        title = f"policy {Path(settings.policy).stem}"
-    else:
-        learning = Colony(world, task, training, settings.seed, settings.ants)
-        with progress_bar("Training") as progress:
-            learning.run(settings.episodes, settings.max_steps, progress)
-        table = learning.q_values[0]
-        title = f"{settings.learner}, {settings.episodes} episodes together"
-    steady = replace(training, epsilon=settings.epsilon, epsilon_decay=1.0, min_epsilon=0.0)
-    colony = Colony(
-        world, task, steady, settings.seed, settings.ants, sharing="fixed", q_values=table
-    )
-    return colony, settings.title or title
-
-
-def show_sheet(settings: argparse.Namespace, q_values: np.ndarray, title: str) -> None:
-    """Write what a policy does in each state."""
-    from taichi_ants.rendering import policy_sheet, save_picture
-
-    save_picture(settings.out, policy_sheet(q_values, title, complete=settings.all_states))
-    print(f"{settings.out}: the best action in each state")
-
-
-def _rollout(settings: argparse.Namespace) -> dict[str, Any]:
-    return {
-        "seed": settings.seed,
-        "number": settings.number,
-        "max_steps": settings.max_steps,
-        "task": Task(evaporation_in_evaluation=not settings.no_evaporation),
-        "epsilon": settings.epsilon,
-    }
+def _acting(settings: argparse.Namespace) -> dict[str, Any]:
+    return {"seed": settings.seed, "task": task_of(settings), "epsilon": settings.epsilon}
 
 
 def _look(settings: argparse.Namespace, title: str) -> dict[str, Any]:
-    return {
-        "size": settings.size,
-        "hud": not settings.no_hud,
-        "legend": not settings.no_legend,
-        "view": not settings.no_view,
-        "title": title,
-    }
+    hud, legend = not settings.no_hud, not settings.no_legend
+    return {"size": settings.size, "hud": hud, "legend": legend, "title": title}
+
+
+def _save(settings: argparse.Namespace, pictures: Iterable[np.ndarray], n: int) -> None:
+    """Write n pictures as an animation."""
+    from taichi_ants.rendering import PAUSE, save_animation
+
+    with progress_bar("Rendering") as progress:
+        options: dict[str, Any] = {"pause": PAUSE, "n": n, "progress": progress}
+        save_animation(settings.out, pictures, settings.fps, **options)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -1,110 +1,51 @@
 """Pictures of worlds and their ants, without a display: stills, GIF, WebP, MP4.
 
-- `Scene` draws a `Snapshot` of a world, with head-up lines (`Status`) and a legend, as an array.
-- `save_picture` and `save_animation` write such arrays; a file appears when it is whole.
-- `render_episode` rolls a policy out and writes the episode; `Episode`, `episode_frames` and
-  `episode_picture` are its parts.
-- `learning_stages` and `render_learning` show one ant after more and more episodes, side by side.
-- `render_colony` lets time pass in a `Colony` and draws it; `colony_frames` and
-  `colony_picture` are its parts.
+- A moment is a `Snapshot` of a world, as `Colony.snapshot` or `at_start` give it, with a `Status`,
+  what is said of it. `Episode.moments` and `colony_moments` yield them.
+- `frames` draws moments as arrays, one at a time; `Scene` does so with one, and `Viewport` tells
+  which cell a pixel shows.
+- `learning_stages` and `learning_frames` show one ant after more and more episodes, side by side.
 - `policy_sheet` shows what a policy does in each state.
-- `Viewport` tells which cell a pixel shows, and where a cell lies.
-
-The names are imported when they are first used, so that a command line that only needs one of them
-starts quickly.
+- `save_picture` and `save_animation` write arrays; a file appears when it is whole.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from taichi_ants.rendering.colonies import colony_frames, colony_picture, render_colony
-    from taichi_ants.rendering.episodes import (
-        Episode,
-        episode_frames,
-        episode_picture,
-        render_episode,
-    )
-    from taichi_ants.rendering.learning import (
-        Stage,
-        learning_frames,
-        learning_stages,
-        render_learning,
-    )
-    from taichi_ants.rendering.panel import Status
-    from taichi_ants.rendering.scene import Scene, check_size
-    from taichi_ants.rendering.sheet import best_actions, clarity, policy_sheet, usual_spread
-    from taichi_ants.rendering.snapshot import Snapshot
-    from taichi_ants.rendering.viewport import Viewport
-    from taichi_ants.rendering.writers import (
-        check_animation,
-        check_picture,
-        save_animation,
-        save_picture,
-    )
-
-_HOMES = {
-    "Episode": "episodes",
-    "Scene": "scene",
-    "Snapshot": "snapshot",
-    "Stage": "learning",
-    "Status": "panel",
-    "Viewport": "viewport",
-    "best_actions": "sheet",
-    "check_animation": "writers",
-    "check_picture": "writers",
-    "check_size": "scene",
-    "clarity": "sheet",
-    "colony_frames": "colonies",
-    "colony_picture": "colonies",
-    "episode_frames": "episodes",
-    "episode_picture": "episodes",
-    "learning_frames": "learning",
-    "learning_stages": "learning",
-    "policy_sheet": "sheet",
-    "render_colony": "colonies",
-    "render_episode": "episodes",
-    "render_learning": "learning",
-    "save_animation": "writers",
-    "save_picture": "writers",
-    "usual_spread": "sheet",
-}
+from taichi_ants.rendering.learning import Stage, learning_frames, learning_stages
+from taichi_ants.rendering.moments import Episode, colony_moments, frames
+from taichi_ants.rendering.panel import Status
+from taichi_ants.rendering.scene import Scene, check_size
+from taichi_ants.rendering.sheet import best_actions, clarity, policy_sheet, usual_spread
+from taichi_ants.rendering.snapshot import Snapshot, at_start
+from taichi_ants.rendering.viewport import Viewport
+from taichi_ants.rendering.writers import (
+    DEFAULT_FPS,
+    PAUSE,
+    check_animation,
+    check_picture,
+    save_animation,
+    save_picture,
+)
 
 __all__ = [
+    "DEFAULT_FPS",
+    "PAUSE",
     "Episode",
     "Scene",
     "Snapshot",
     "Stage",
     "Status",
     "Viewport",
+    "at_start",
     "best_actions",
     "check_animation",
     "check_picture",
     "check_size",
     "clarity",
-    "colony_frames",
-    "colony_picture",
-    "episode_frames",
-    "episode_picture",
+    "colony_moments",
+    "frames",
     "learning_frames",
     "learning_stages",
     "policy_sheet",
-    "render_colony",
-    "render_episode",
-    "render_learning",
     "save_animation",
     "save_picture",
     "usual_spread",
 ]
-
-
-def __getattr__(name: str) -> object:
-    if name not in _HOMES:
-        raise AttributeError(f"module 'taichi_ants.rendering' has no attribute {name!r}")
-    value = getattr(import_module(f"taichi_ants.rendering.{_HOMES[name]}"), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import struct
 from collections.abc import Iterable, Iterator
+from itertools import chain
 from types import ModuleType
 from typing import BinaryIO
 
@@ -22,56 +23,38 @@ Box = tuple[int, int, int, int]  # left, top, right, bottom
 
 def write_gif(file: BinaryIO, frames: Iterable[np.ndarray], fps: float) -> None:
     """Write frames, uint8 (height, width, 3), as a GIF that repeats for ever."""
-    frames = iter(frames)
-    first = next(frames)
+    from PIL import Image
+    from PIL.GifImagePlugin import getdata
+
+    first, frames = _peeked(frames)
     palette = Palette(first)
     height, width = first.shape[:2]
     file.write(b"GIF89a" + struct.pack("<HHBBB", width, height, 0xF7, 0, 0))
     file.write(palette.table.tobytes())
     file.write(b"\x21\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00")
-    planes = (palette.indices(frame) for frame in _chain(first, frames))
+    planes = map(palette.indices, frames)
     for plane, box, previous, duration in _changes(planes, 100 / fps, align=1):
         left, top, right, bottom = box
         part = plane[top:bottom, left:right]
         if previous is not None:
             same = part == previous[top:bottom, left:right]
             part = np.where(same, np.uint8(TRANSPARENT), part)
-        file.write(
-            struct.pack("<BBBBHBB", 0x21, 0xF9, 4, 0x05, min(duration, 0xFFFF), TRANSPARENT, 0)
-        )
-        file.write(struct.pack("<BHHHHB", 0x2C, left, top, right - left, bottom - top, 0))
-        file.write(_lzw(part))
+        image = Image.fromarray(np.ascontiguousarray(part))
+        # In milliseconds; the picture lies over those before it, which stay (disposal).
+        look = {"duration": 10 * min(duration, 0xFFFF), "transparency": TRANSPARENT, "disposal": 1}
+        file.write(b"".join(getdata(image, (left, top), interlace=0, **look)))
     file.write(b"\x3b")
-
-
-def _lzw(plane: np.ndarray) -> bytes:
-    """The image data of a GIF for palette indices (height, width), by Pillow."""
-    from PIL import Image
-
-    buffer = io.BytesIO()
-    Image.fromarray(np.ascontiguousarray(plane)).save(buffer, "GIF", interlace=0, optimize=False)
-    data = buffer.getvalue()
-    place = 13 + (3 << (data[10] & 7) + 1 if data[10] & 0x80 else 0)
-    while data[place] == 0x21:  # extensions: blocks of a length each, the last has none
-        place += 2
-        while data[place]:
-            place += data[place] + 1
-        place += 1
-    if data[place] != 0x2C or data[place + 9] & 0x80:
-        raise RuntimeError("Pillow wrote a GIF of an unknown form")
-    return data[place + 10 : -1]
 
 
 def write_webp(file: BinaryIO, frames: Iterable[np.ndarray], fps: float) -> None:
     """Write frames, uint8 (height, width, 3), as a lossless WebP that repeats for ever."""
-    frames = iter(frames)
-    first = next(frames)
+    first, frames = _peeked(frames)
     height, width = first.shape[:2]
     file.write(b"RIFF\0\0\0\0WEBP")
     canvas = _three_bytes(width - 1) + _three_bytes(height - 1)
     file.write(_chunk(b"VP8X", bytes([0x02, 0, 0, 0]) + canvas))
     file.write(_chunk(b"ANIM", b"\xff\xff\xff\xff\0\0"))
-    for frame, box, previous, duration in _changes(_chain(first, frames), 1000 / fps, align=2):
+    for frame, box, previous, duration in _changes(frames, 1000 / fps, align=2):
         left, top, right, bottom = box
         part = frame[top:bottom, left:right]
         if previous is not None:
@@ -91,13 +74,8 @@ def write_webp(file: BinaryIO, frames: Iterable[np.ndarray], fps: float) -> None
 
 def _only_changes(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     """A picture with alpha, uint8 (height, width, 4), all 0 where nothing has changed."""
-    differs = before != after
-    opaque = differs[..., 0] | differs[..., 1] | differs[..., 2]
-    rgba = np.empty((*opaque.shape, 4), dtype=np.uint8)
-    rgba[..., :3] = after
-    rgba[..., 3] = 255
-    rgba.view(np.uint32)[..., 0] *= opaque
-    return rgba
+    opaque = (before != after).any(axis=2)
+    return np.dstack([after, np.full_like(opaque, 255, np.uint8)]) * opaque[..., None]
 
 
 def _vp8(part: np.ndarray) -> bytes:
@@ -152,8 +130,7 @@ def _encode_mp4(file: _FailureNote, frames: Iterable[np.ndarray], fps: float) ->
     av = import_av()
     from fractions import Fraction
 
-    frames = iter(frames)
-    first = next(frames)
+    first, frames = _peeked(frames)
     height, width = first.shape[:2]
     padding = ((0, height % 2), (0, width % 2), (0, 0))
     with av.open(file, "w", format="mp4") as container:
@@ -163,7 +140,7 @@ def _encode_mp4(file: _FailureNote, frames: Iterable[np.ndarray], fps: float) ->
         colours = "colorprim=bt709:transfer=bt709:colormatrix=bt709"
         stream.options = {"crf": "17", "preset": "superfast", "tune": "animation"}
         stream.options["x264-params"] = colours
-        for frame in _chain(first, frames):
+        for frame in frames:
             picture = np.pad(frame, padding, mode="edge") if height % 2 or width % 2 else frame
             video = av.VideoFrame.from_ndarray(picture, format="rgb24")
             # Players take pictures of this kind for BT.709, PyAV's default is BT.601.
@@ -188,9 +165,11 @@ def import_av() -> ModuleType:
     return av
 
 
-def _chain(first: np.ndarray, others: Iterator[np.ndarray]) -> Iterator[np.ndarray]:
-    yield first
-    yield from others
+def _peeked(frames: Iterable[np.ndarray]) -> tuple[np.ndarray, Iterator[np.ndarray]]:
+    """The first frame, and all of them."""
+    waiting = iter(frames)
+    first = next(waiting)
+    return first, chain([first], waiting)
 
 
 def _changes(

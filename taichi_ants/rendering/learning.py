@@ -5,21 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
 from taichi_ants.engines.runs.training import continue_training, train
-from taichi_ants.errors import AntsError, whole
+from taichi_ants.errors import AntsError, expect, whole
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.rendering import colours, text
-from taichi_ants.rendering.arguments import expect
-from taichi_ants.rendering.episodes import DEFAULT_FPS, Episode, Progress, with_pause, without_view
+from taichi_ants.rendering.moments import Episode
 from taichi_ants.rendering.panel import Status, draw_swatch
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.rendering.scene import check_size
 from taichi_ants.rendering.viewport import Viewport
-from taichi_ants.rendering.writers import PathLike, check_animation, save_animation
+from taichi_ants.rendering.writers import Progress
 from taichi_ants.task import Task
 from taichi_ants.task.constants import (
     DELIVERED,
@@ -28,7 +28,6 @@ from taichi_ants.task.constants import (
     FAILED,
     FOOD,
     N_ACTIONS,
-    N_STATES,
     OBSTACLE,
     PICKED_UP,
     QUEEN,
@@ -78,8 +77,8 @@ class Stage:
         food picked up, food given to her, and what failed.
         """
         trace = self.episode.trace
-        carries = trace.states >= N_STATES // 2
         events = trace.events
+        carries = np.cumsum(events == PICKED_UP) > np.cumsum(events == DELIVERED)
         sources = np.select(
             [events == FAILED, events == DELIVERED, events == PICKED_UP, carries], [4, 3, 2, 1], 0
         )
@@ -121,13 +120,14 @@ def learning_stages(
     stages = [whole("a stage", stage) for stage in stages]
     if not stages or stages != sorted(stages) or stages[0] < 0:
         raise AntsError(f"stages are {tuple(stages)!r}; they must ascend, from 0 or more.")
+    task = task or Task()
     played, result = [], None
     different = tuple(dict.fromkeys(stages))
     for n in different:
-        table = np.zeros((N_STATES, N_ACTIONS), dtype=np.float32)
+        table = np.zeros((task.n_states, N_ACTIONS), dtype=np.float32)
         if n:
             result = (
-                train(world, config, seed, n, train_steps)
+                train(world, config, seed, n, train_steps, task)
                 if result is None
                 else continue_training(result, n - result.episodes)
             )
@@ -167,42 +167,27 @@ def learning_frames(
     canvas = np.empty((height, width, 3), dtype=np.uint8)
     canvas[:] = colours.channels(colours.PAGE)
     text_size = round(min(width / 60, height / 26))
-    readable = text_size >= text.SMALLEST
-    top = 0
-    if title and readable:
+    if text_size < text.SMALLEST:
+        text_size = 0
+    top, bottom = 0, height - round(_LEGEND_LINES * text_size)
+    if title and text_size:
         line = text.shortened(title, text_size, width - 2 * text_size)
         text.write(canvas, line, width / 2, 1.5 * text_size, text_size, align="middle")
         top = round(2.0 * text_size)
     grid = stages[0].episode.world.grid
-    text_size = text_size if readable else 0
-    bottom = height - round(_LEGEND_LINES * text_size)
     tiles = _tiles(grid, len(stages), (0, top, width, bottom - top), text_size)
-    panels = [
-        _Panel(canvas, stage, tile, text_size) for stage, tile in zip(stages, tiles, strict=True)
-    ]
-    if readable:
-        _draw_legend(canvas, bottom, text_size, panels[0].hexagon)
+    _, _, w, h = tiles[0]
+    margin = max(2, round(min(w, h) / 60))
+    viewport = Viewport.fit(grid, w, h - round(_TILE_LINES * text_size), margin=margin)
+    if text_size:
+        _draw_legend(canvas, bottom, text_size, viewport.hexagon)
+    rasteriser = Rasteriser(grid, viewport)
+    pictures = [_tile_pictures(stage, rasteriser, h, text_size) for stage in stages]
     for _ in range(max(len(stage.episode) for stage in stages)):
-        for panel in panels:
-            panel.go_on()
+        for (x, y, _, _), waiting in zip(tiles, pictures, strict=True):
+            for tile in islice(waiting, 1):
+                canvas[y : y + h, x : x + w] = tile
         yield canvas.copy()
-
-
-def render_learning(
-    path: PathLike,
-    stages: Sequence[Stage],
-    *,
-    size: tuple[int, int] = DEFAULT_SIZE,
-    fps: float = DEFAULT_FPS,
-    title: str = "",
-    progress: Progress | None = None,
-) -> None:
-    """Write the stages as an animation; arguments and errors as in `render_episode`."""
-    check_animation(path, fps)
-    stages = _checked(stages)
-    frames = learning_frames(stages, size, title)
-    longest = max(len(stage.episode) for stage in stages)
-    save_animation(path, with_pause(frames, longest, fps, progress), fps)
 
 
 def _checked(stages: Sequence[Stage]) -> list[Stage]:
@@ -214,71 +199,42 @@ def _checked(stages: Sequence[Stage]) -> list[Stage]:
         expect("a stage", stage, Stage)
     if not stages:
         raise AntsError("there are no stages; give at least one.")
+    if len({stage.episode.world for stage in stages}) > 1:
+        raise AntsError("the stages are of several worlds; give those of one.")
     return stages
 
 
-class _Panel:
+def _tile_pictures(
+    stage: Stage, rasteriser: Rasteriser, height: int, size: int
+) -> Iterator[np.ndarray]:
     """One of the worlds, with a title above and how its ant does below."""
+    view, account = rasteriser.viewport, stage.account().tolist()
+    above, under = round(_TITLE_LINES * size), round(_TILE_LINES * size)
+    tile = np.empty((height, view.width, 3), dtype=np.uint8)
 
-    def __init__(
-        self,
-        canvas: np.ndarray,
-        stage: Stage,
-        place: tuple[int, int, int, int],
-        text_size: int,
-    ) -> None:
-        left, top, width, height = place
-        self._canvas = canvas
-        self._text_size = text_size
-        self._middle = left + width / 2
-        self._width = width
-        above = round(_TITLE_LINES * text_size)
-        below = round(_TILE_LINES * text_size) - above
-        self._footer = top + height - below
-        grid = stage.episode.world.grid
-        margin = max(2, round(min(width, height) / 60))
-        room = (left, top + above, width, height - above - below)
-        viewport = Viewport.fit(grid, *room, margin=margin)
-        self.hexagon = viewport.hexagon
-        self._rasteriser = Rasteriser(grid, viewport)
-        self._moments = stage.episode.moments()
-        self._note = stage.note
-        self._account = stage.account()
-        if text_size:
-            text.write(
-                canvas,
-                text.shortened(stage.title, text_size, width),
-                *(self._middle, top + 1.2 * text_size, text_size),
-                align="middle",
-            )
+    def write(words: tuple[str, ...], baseline: float, ink: int = colours.INK) -> None:
+        """The longest words for which there is room."""
+        room = view.width - size / 2
+        fitting = next((one for one in words if text.width(one, size) <= room), words[-1])
+        text.write(tile, fitting, view.width / 2, baseline, size, ink, align="middle")
 
-    def go_on(self) -> None:
-        """Draw the next moment; nothing once the episode has ended."""
-        moment = next(self._moments, None)
-        if moment is None:
-            return
-        snapshot, status = moment
-        self._rasteriser.draw(self._canvas, without_view(snapshot))
-        if not self._text_size:
-            return
-        left = round(self._middle - self._width / 2)
-        footer = self._canvas[self._footer :, left : left + self._width]
-        footer[: round(3.2 * self._text_size)] = colours.channels(colours.PAGE)
-        ink = colours.INK if status.outcome else colours.FAINT_INK
-        for line, words in enumerate((_lines(status, self._note), self._sources(status.step))):
-            y = self._footer + (1.2 + 1.4 * line) * self._text_size
-            fitting = self._fitting(words)
-            text.write(self._canvas, fitting, self._middle, y, self._text_size, ink, align="middle")
+    for snapshot, status in stage.episode.moments():
+        tile[:] = colours.channels(colours.PAGE)
+        tile[above : above + view.height] = rasteriser.draw(snapshot)
+        if size:
+            write((text.shortened(stage.title, size, view.width),), 1.2 * size)
+            below = height - (under - above) + 1.2 * size
+            ink = colours.INK if status.outcome else colours.FAINT_INK
+            write(_lines(status, stage.note), below, ink)
+            write((_sources(account[status.step]), ""), below + 1.4 * size, ink)
+        yield tile
 
-    def _sources(self, step: int) -> tuple[str, ...]:
-        """Where the return comes from, and nothing where there is no room for it."""
-        earned = zip(_SOURCES, self._account[step].tolist(), strict=True)
-        parts = [f"{'+' if n > 0 else '-'} {name} {abs(n)}" for (name, *_), n in earned if n]
-        return ("= " + " ".join(parts).removeprefix("+ ") if parts else "", "")
 
-    def _fitting(self, lines: tuple[str, ...]) -> str:
-        room = self._width - self._text_size / 2
-        return next((one for one in lines if text.width(one, self._text_size) <= room), lines[-1])
+def _sources(earned: list[int]) -> str:
+    """Where the return comes from."""
+    named = zip(_SOURCES, earned, strict=True)
+    parts = [f"{'+' if n > 0 else '-'} {name} {abs(n)}" for (name, *_), n in named if n]
+    return "= " + " ".join(parts).removeprefix("+ ") if parts else ""
 
 
 def _lines(status: Status, note: str) -> tuple[str, ...]:
@@ -322,7 +278,7 @@ def _tiles(
 
     def fitted(columns: int) -> Viewport:
         rows = math.ceil(n / columns)
-        return Viewport.fit(grid, 0, 0, width // columns, max(1, height // rows - lines))
+        return Viewport.fit(grid, width // columns, max(1, height // rows - lines))
 
     columns = max(range(1, n + 1), key=lambda count: (fitted(count).hexagon, count))
     rows = math.ceil(n / columns)

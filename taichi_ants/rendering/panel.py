@@ -8,11 +8,11 @@ import numpy as np
 
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import colours, text
+from taichi_ants.rendering.observed import PAPER, Observation
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.rendering.snapshot import Snapshot
 from taichi_ants.rendering.viewport import Viewport
 from taichi_ants.task.constants import ACTION_NAMES, EMPTY, FOOD, N_ACTIONS, OBSTACLE, QUEEN
-from taichi_ants.task.states import CELL_LETTERS, TASK_NAMES, state_from_index
 
 # What a cell holds, what an ant on it carries, a letter on it, and what it is called.
 _LEGEND = (
@@ -38,12 +38,15 @@ class Status:
         step: Number of the step in its episode, from 0; for a colony, of the tick.
         episode_return: Sum of the rewards so far; None leaves it out.
         episode: What kind of episode it is, or its number; empty leaves it out.
-        state: Index of the state; None if there is none to speak of.
+        state: Number of the state that ant number 0 is in; None if there is none to speak of.
         action: The chosen action, 0 to 4; None if there is none.
         q_values: float (5,), the action values of the state; None draws no bars.
+        q_range: The action values at both ends of the bars, the first at most 0, the last above;
+            None takes those of `q_values`.
         outcome: How the episode ended; empty while it goes on.
         more: Further lines, (name, value), for example of a colony.
         step_name: What a step is called.
+        observation: What the state is a state of.
     """
 
     step: int
@@ -52,18 +55,20 @@ class Status:
     state: int | None = None
     action: int | None = None
     q_values: np.ndarray | None = None
+    q_range: tuple[float, float] | None = None
     outcome: str = ""
     more: tuple[tuple[str, str], ...] = ()
     step_name: str = "step"
+    observation: Observation = PAPER
 
 
-def draw_status(
-    frame: np.ndarray,
-    status: Status,
-    place: tuple[int, int, int],
-    size: int,
-    q_range: tuple[float, float],
-) -> None:
+def range_with_zero(q_values: np.ndarray) -> tuple[float, float]:
+    """The lowest and the highest of action values and 0, never the same."""
+    low, high = float(np.min(q_values, initial=0.0)), float(np.max(q_values, initial=0.0))
+    return (low, high) if high > low else (0.0, 1.0)
+
+
+def draw_status(frame: np.ndarray, status: Status, place: tuple[int, int, int], size: int) -> None:
     """Draw the head-up lines.
 
     Args:
@@ -71,7 +76,6 @@ def draw_status(
         status: What they say.
         place: Left, top and width in pixels; `STATUS_HEIGHT` sizes of the text high.
         size: Of the text, in pixels.
-        q_range: The action values at both ends of the bars, the first at most 0, the last above.
     """
     left, top, width = place
     y = top + size
@@ -85,6 +89,7 @@ def draw_status(
         y += round(0.8 * size)
         text.write(frame, "action values Q", left, y, size, colours.FAINT_INK)
         place = left, y + round(0.5 * size), width
+        q_range = status.q_range or range_with_zero(status.q_values)
         _draw_bars(frame, status.q_values, status.action, place, size, q_range)
 
 
@@ -94,9 +99,8 @@ def _lines(status: Status) -> list[tuple[str, str]]:
     if status.episode_return is not None:
         lines.append(("return", str(status.episode_return)))
     if status.state is not None:
-        state = state_from_index(status.state)
-        seen = " ".join(CELL_LETTERS[state.carries][code] for code in state.view)
-        lines += [("task", TASK_NAMES[state.carries]), ("sees", seen)]
+        task, _, seen = status.observation.name_of(status.state).partition(" ")
+        lines += [("task", task), ("sees", seen)]
     if status.outcome:
         lines.append(("outcome", status.outcome))
     elif status.action is not None:
@@ -198,10 +202,9 @@ def draw_swatch(
         ant_headings=np.full(n, 1, dtype=np.int32),
         ant_carries=np.full(n, bool(carries)),
     )
-    width = round(1.18 * side)
-    viewport = Viewport.fit(grid, left, top, width, side, margin=1)
-    rasteriser = Rasteriser(grid, viewport, ants_like=hexagon)
-    rasteriser.draw(frame, snapshot)
+    viewport = Viewport.fit(grid, round(1.18 * side), side, margin=1)
+    picture = Rasteriser(grid, viewport, ants_like=hexagon).draw(snapshot)
+    frame[top : top + viewport.height, left : left + viewport.width] = picture
 
 
 def fill(

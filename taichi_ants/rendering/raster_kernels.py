@@ -1,8 +1,8 @@
 """The kernels that turn cells and shapes into pixels. They assume valid arguments.
 
-A frame is uint8 (height, width, 3), colours are 0xRRGGBB. `left`, `top`, `width`, `height`, the
-origin `(x, y)` and the size `hexagon` are those of a `Viewport`; `columns`, `rows` and `z_range`
-those of an `AxialGrid`, whose cell 0 is void. Void cells have the colour of the page.
+A frame is uint8 (height, width, 3), colours are 0xRRGGBB. The origin `(x, y)` and the size
+`hexagon` are those of a `Viewport`; `columns`, `rows` and `z_range` those of an `AxialGrid`, whose
+cell 0 is void. Void cells have the colour of the page.
 """
 
 import math
@@ -14,7 +14,7 @@ from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
 from taichi_ants.rendering import shapes
 from taichi_ants.rendering.colours import CELL_FOOD, PAGE
 
-# Shapes, in the last column of a table of shapes.
+# Shapes, as in a table of shapes.
 FOOD, QUEEN, IN_VIEW, ANT, ANT_WITH_FOOD, DART, DART_WITH_FOOD, DOT, ARROW, RING = range(10)
 
 BAND = 16  # rows that one thread draws
@@ -96,18 +96,18 @@ def map_pixels(
     nearest: ti.types.ndarray(dtype=ti.i32, ndim=2),
     second: ti.types.ndarray(dtype=ti.i32, ndim=2),
     shares: ti.types.ndarray(dtype=ti.i32, ndim=2),
+    line: ti.f32,
     x: ti.f32,
     y: ti.f32,
     hexagon: ti.f32,
-    line: ti.f32,
     columns: ti.i32,
     rows: ti.i32,
     z_range: ti.i32,
 ):
-    """Of each pixel of a viewport the cell at its centre, the next cell, and the shares of both.
+    """Of each pixel the cell at its centre, the next cell, and the shares of both.
 
     `shares` holds 0 to 255 for the cell and, shifted by 8, for the next one; the rest of the pixel
-    is the line of width `line` between them. x and y are relative to the viewport.
+    is the line of width `line` between them.
     """
     ti.loop_config(block_dim=BAND)
     for j in range(nearest.shape[0]):
@@ -138,21 +138,15 @@ def draw_cells(
     second: ti.types.ndarray(dtype=ti.i32, ndim=1),
     shares: ti.types.ndarray(dtype=ti.i32, ndim=1),
     colours: ti.types.ndarray(dtype=ti.u32, ndim=1),
-    frame_width: ti.i32,
-    left: ti.i32,
-    top: ti.i32,
     width: ti.i32,
-    height: ti.i32,
 ):
     """Hexagons of several pixels, from what `map_pixels` found; frame and maps are flat.
 
     Flat arrays with one index each are three times as fast as arrays of several dimensions.
     """
     ti.loop_config(block_dim=BAND)
-    for j in range(height):
-        place = 3 * ((top + j) * frame_width + left)
-        for i in range(width):
-            pixel = j * width + i
+    for j in range(nearest.shape[0] // width):
+        for pixel in range(j * width, (j + 1) * width):
             colour, packed = colours[nearest[pixel]], shares[pixel]
             if packed != _WHOLE:
                 own = ti.cast(packed & 255, ti.f32) / _WHOLE
@@ -160,17 +154,13 @@ def draw_cells(
                 rgb = own * unpack(colour) + other * unpack(colours[second[pixel]])
                 colour = pack(rgb + (1.0 - own - other) * unpack(PAGE))
             for channel in ti.static(range(3)):
-                frame[place + 3 * i + channel] = ti.cast(colour >> 8 * (2 - channel), ti.u8)
+                frame[3 * pixel + channel] = ti.cast(colour >> 8 * (2 - channel), ti.u8)
 
 
 @ti.kernel
 def draw_small_cells(
     frame: ti.types.ndarray(dtype=ti.u8, ndim=3),
     colours: ti.types.ndarray(dtype=ti.u32, ndim=1),
-    left: ti.i32,
-    top: ti.i32,
-    width: ti.i32,
-    height: ti.i32,
     x: ti.f32,
     y: ti.f32,
     hexagon: ti.f32,
@@ -181,12 +171,11 @@ def draw_small_cells(
     """Cells of a few pixels and less: each pixel is the mean of what it covers, by area.
 
     Cells are taken as bricks of the same centres and areas as the hexagons, which nobody can see at
-    this size: the part of a brick within a pixel is a product. x and y are relative to the
-    viewport.
+    this size: the part of a brick within a pixel is a product.
     """
     ti.loop_config(block_dim=BAND)
-    for j in range(height):
-        for i in range(width):
+    for j in range(frame.shape[0]):
+        for i in range(frame.shape[1]):
             # A brick is 1 wide and 1 high here; its column is r, its place in it grows with q.
             x0 = (i - x) / (1.5 * hexagon) + 0.5
             x1 = (i + 1 - x) / (1.5 * hexagon) + 0.5
@@ -207,30 +196,7 @@ def draw_small_cells(
                     weight += area
             rest = (x1 - x0) * (high - low) - weight
             rgb = (rgb + rest * unpack(PAGE)) / (weight + rest)
-            put(frame, top + j, left + i, clamp(rgb, 0.0, 255.0))
-
-
-@ti.kernel
-def colour_cells(
-    colours: ti.types.ndarray(dtype=ti.u32, ndim=1),
-    ground: ti.types.ndarray(dtype=ti.u8, ndim=1),
-    shown: ti.types.ndarray(dtype=ti.u8, ndim=1),
-    trail: ti.types.ndarray(dtype=ti.f32, ndim=1),
-    of_ground: ti.types.ndarray(dtype=ti.u32, ndim=1),
-    ramp: ti.types.ndarray(dtype=ti.u32, ndim=1),
-    full_level: ti.f32,
-    empty: ti.u8,
-):
-    """The colours of cells: by the trail where the ground is `empty` and the trail at least 1."""
-    ti.loop_config(block_dim=4096)
-    for cell in range(colours.shape[0]):
-        colour = ti.cast(PAGE, ti.u32)
-        if shown[cell] != 0:
-            colour = of_ground[ti.cast(ground[cell], ti.i32) & 15]
-            if ground[cell] == empty and trail[cell] >= 1.0:
-                share = ti.min(trail[cell] / full_level, 1.0)
-                colour = ramp[ti.cast(share * (ramp.shape[0] - 1) + 0.5, ti.i32)]
-        colours[cell] = colour
+            put(frame, j, i, clamp(rgb, 0.0, 255.0))
 
 
 @ti.func
@@ -284,31 +250,26 @@ def draw_mark(rgb, p, radius, shape, colour):
 def draw_shapes(
     frame: ti.types.ndarray(dtype=ti.u8, ndim=3),
     table: ti.types.ndarray(dtype=ti.f32, ndim=2),
-    colours: ti.types.ndarray(dtype=ti.u32, ndim=1),
-    left: ti.i32,
-    top: ti.i32,
-    width: ti.i32,
-    height: ti.i32,
 ):
-    """Shapes over a rectangle of a frame, in the order of the table, which later ones cover.
+    """Shapes over a frame, in the order of the table, which later ones cover.
 
-    Rows of `table`: x, y (pixels), radius (pixels), heading, shape, opacity. A band of rows belongs
-    to one thread, so that the order is the same however many there are.
+    Rows of `table`: x, y (pixels), radius (pixels), heading, shape, opacity, colour. A band of rows
+    belongs to one thread, so that the order is the same however many there are.
     """
     ti.loop_config(block_dim=1)
-    for band in range((height + BAND - 1) // BAND):
-        first, last = top + band * BAND, top + ti.min((band + 1) * BAND, height) - 1
+    for band in range((frame.shape[0] + BAND - 1) // BAND):
+        first, last = band * BAND, ti.min((band + 1) * BAND, frame.shape[0]) - 1
         for n in range(table.shape[0]):
             x, y, radius = table[n, 0], table[n, 1], table[n, 2]
-            shape, colour = ti.cast(table[n, 4], ti.i32), colours[n]
+            shape, colour = ti.cast(table[n, 4], ti.i32), ti.cast(table[n, 6], ti.i32)
             reach = radius + ti.select(shape == DOT, 0.5, _HALO + 0.5)  # with its smooth edge
             if y + reach >= first and y - reach <= last + 1:
                 angle = table[n, 3] * (math.pi / 3)
                 cosine, sine = ti.cos(angle), ti.sin(angle)
                 j0, j1 = ti.max(first, ti.cast(y - reach, ti.i32)), ti.cast(y + reach, ti.i32)
-                i0, i1 = ti.max(left, ti.cast(x - reach, ti.i32)), ti.cast(x + reach, ti.i32)
+                i0, i1 = ti.max(0, ti.cast(x - reach, ti.i32)), ti.cast(x + reach, ti.i32)
                 for j in range(j0, ti.min(j1, last) + 1):
-                    for i in range(i0, ti.min(i1, left + width - 1) + 1):
+                    for i in range(i0, ti.min(i1, frame.shape[1] - 1) + 1):
                         dx, dy = (i + 0.5 - x) / radius, (j + 0.5 - y) / radius
                         p = vec2(dx * cosine + dy * sine, dy * cosine - dx * sine)
                         rgb = vec3(frame[j, i, 0], frame[j, i, 1], frame[j, i, 2])

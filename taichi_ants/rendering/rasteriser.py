@@ -1,4 +1,4 @@
-"""Draws the cells and the ants of a world into a frame."""
+"""Draws the cells and the ants of a world."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ _SQRT_3 = math.sqrt(3.0)
 
 
 class Rasteriser:
-    """Draws worlds of one grid into one place of a frame.
+    """Draws worlds of one grid as pictures of one size.
 
-    What depends on the place alone, which cells a pixel shows and by how much, is found once.
+    What depends on these alone, which cells a pixel shows and by how much, is found once.
 
     Args:
         grid: The grid of all worlds to draw.
-        viewport: Where to draw, within the frame.
+        viewport: The size, and where the cells lie.
         full_level: The trail level that has the last colour of the ramp, as stronger ones have.
         shown: bool (grid.size,), cells to draw, all others are page; None draws all that exist.
         ants_like: Draw ants as in hexagons of this size, in pixels, for a legend; None takes that
@@ -58,10 +58,9 @@ class Rasteriser:
     ) -> None:
         self.grid = grid
         self.viewport = viewport
-        self._full_level = full_level
+        self._full_level = np.float32(full_level)
         self._ants_like = viewport.hexagon if ants_like is None else ants_like
-        self._shown = (grid.exists if shown is None else shown).view(np.uint8)
-        self._colours = np.zeros(grid.size, dtype=np.uint32)
+        self._shown = grid.exists if shown is None else shown
         self._map = self._map_pixels() if self.has_hexagons else None
 
     @property
@@ -82,124 +81,96 @@ class Rasteriser:
         """Whether a letter in a cell could be read."""
         return self.viewport.hexagon >= _SMALLEST_LETTERS
 
-    def draw(self, frame: np.ndarray, snapshot: Snapshot) -> None:
-        """Draw a world with its ants.
+    def draw(self, snapshot: Snapshot, in_view: np.ndarray | None = None) -> np.ndarray:
+        """The picture of a world with its ants, uint8 (height, width, 3).
 
         Args:
-            frame: uint8 (height, width, 3), contiguous; all pixels of the viewport are set.
-            snapshot: The world, of this grid. Letters are not drawn, only the cells in view.
+            snapshot: The world, of this grid.
+            in_view: Flat indices of the cells that ant number 0 sees, to be marked.
         """
-        self.draw_ground(frame, snapshot.ground, snapshot.trail)
-        layers = [self._things(snapshot), *self._view(snapshot), self._ants(snapshot)]
+        frame = self.draw_cells(self._colour_cells(snapshot))
+        layers = [*self._things(snapshot), *self._view(snapshot, in_view), self._ants(snapshot)]
         if not self.has_hexagons:
             # Dots overlap. A dot of hers over the ants would hide those beside her, one under them
             # may be hidden by a crowd: they lie over it, and a ring around it over them.
-            layers.append(self._queen_rings(snapshot))
-        self.draw_shapes(frame, *(np.concatenate(parts) for parts in zip(*layers, strict=True)))
-
-    def draw_ground(self, frame: np.ndarray, ground: np.ndarray, trail: np.ndarray) -> None:
-        """Draw the cells: what they hold, uint8 (grid.size,), and the trail, any (grid.size,)."""
-        self.kernels.colour_cells(
-            self._colours,
-            np.ascontiguousarray(ground),
-            self._shown,
-            np.ascontiguousarray(trail, dtype=np.float32),
-            self._colours_of_ground(),
-            colours.TRAIL_RAMP,
-            self._full_level,
-            EMPTY,
-        )
-        self.draw_colours(frame, self._colours)
+            queens = np.flatnonzero(snapshot.ground == QUEEN)
+            ring = {"fill": 0.0, "least": _QUEEN_RING}
+            layers.append(self.shapes(queens, self.kernels.RING, colours.CELL_QUEEN, **ring))
+        self.kernels.draw_shapes(frame, np.concatenate(layers))
+        return frame
 
     def colour_of(self, cells: np.ndarray) -> np.ndarray:
         """The colours, uint32 (...), in which `draw` has just drawn cells (flat indices (...))."""
         return self._colours[cells]
 
-    def draw_colours(self, frame: np.ndarray, of_cells: np.ndarray) -> None:
-        """Draw the cells in the given colours, uint32 (grid.size,)."""
-        view = self.viewport
-        place = (view.left, view.top, view.width, view.height)
+    def draw_cells(self, of_cells: np.ndarray) -> np.ndarray:
+        """The picture of the cells in the given colours, uint32 (grid.size,)."""
+        frame = np.empty((self.viewport.height, self.viewport.width, 3), dtype=np.uint8)
         if self._map is not None:
-            flat = [frame.reshape(-1), *self._map]
-            self.kernels.draw_cells(*flat, of_cells, frame.shape[1], *place)
+            self.kernels.draw_cells(frame.reshape(-1), *self._map, of_cells, self.viewport.width)
         else:
-            outline = self._relative_outline()
-            self.kernels.draw_small_cells(frame, of_cells, *place, *outline, *self._layout())
-
-    def draw_shapes(self, frame: np.ndarray, table: np.ndarray, of_shapes: np.ndarray) -> None:
-        """Draw shapes, rows of `table` as in `raster_kernels`, in colours uint32 (n,)."""
-        view = self.viewport
-        self.kernels.draw_shapes(
-            frame, table, of_shapes, view.left, view.top, view.width, view.height
-        )
+            self.kernels.draw_small_cells(frame, of_cells, *self._layout())
+        return frame
 
     def shapes(
         self,
         cells: np.ndarray,
         shape: int | np.ndarray,
+        colour: int,
         headings: npt.ArrayLike = 0,
         fill: float = _FILL,
+        least: float = 0.0,
     ) -> np.ndarray:
-        """A table of shapes on cells (flat indices (n,)), float32 (n, 6)."""
-        table = np.empty((len(cells), 6), dtype=np.float32)
+        """A table of shapes on cells (flat indices (n,)), float32 (n, 7), see `raster_kernels`.
+
+        Their radius is `fill` sizes of a hexagon, and at least so many pixels.
+        """
+        table = np.empty((len(cells), 7), dtype=np.float32)
         table[:, :2] = self.viewport.centres(self.grid.cells(cells))
-        table[:, 2] = fill * self.viewport.hexagon
+        table[:, 2] = max(fill * self.viewport.hexagon, least)
         table[:, 3] = headings
         table[:, 4] = shape
         table[:, 5] = 1.0
+        table[:, 6] = colour  # below 2^24, so that float32 holds it
         return table
 
-    def _things(self, snapshot: Snapshot) -> tuple[np.ndarray, np.ndarray]:
+    def _things(self, snapshot: Snapshot) -> list[np.ndarray]:
         """Food and queen."""
         kernels = self.kernels
         queens = np.flatnonzero(snapshot.ground == QUEEN)
         if self.viewport.hexagon < _SMALLEST_DRAWING:
-            marks = self.shapes(queens, kernels.DOT)
-            marks[:, 2] = np.maximum(marks[:, 2], _QUEEN_RADIUS)
-            return marks, np.full(len(queens), colours.CELL_QUEEN, dtype=np.uint32)
+            return [self.shapes(queens, kernels.DOT, colours.CELL_QUEEN, least=_QUEEN_RADIUS)]
         foods = np.flatnonzero(snapshot.ground == FOOD)
-        marks = np.concatenate(
-            [
-                self.shapes(foods, kernels.FOOD, fill=0.72),
-                self.shapes(queens, kernels.QUEEN, fill=0.72),
-            ]
-        )
-        of_shapes = np.repeat([colours.CELL_FOOD, colours.CELL_QUEEN], [len(foods), len(queens)])
-        return marks, of_shapes.astype(np.uint32)
+        return [
+            self.shapes(foods, kernels.FOOD, colours.CELL_FOOD, fill=0.72),
+            self.shapes(queens, kernels.QUEEN, colours.CELL_QUEEN, fill=0.72),
+        ]
 
-    def _queen_rings(self, snapshot: Snapshot) -> tuple[np.ndarray, np.ndarray]:
-        rings = self.shapes(np.flatnonzero(snapshot.ground == QUEEN), self.kernels.RING)
-        rings[:, 2] = _QUEEN_RING
-        return rings, np.full(len(rings), colours.CELL_QUEEN, dtype=np.uint32)
-
-    def _view(self, snapshot: Snapshot) -> list[tuple[np.ndarray, np.ndarray]]:
+    def _view(self, snapshot: Snapshot, in_view: np.ndarray | None) -> list[np.ndarray]:
         """The outlines of the cells in view, or around the ant where cells are small."""
-        if snapshot.letters is None:
+        if in_view is None:
             return []
-        if self.viewport.hexagon >= _SMALLEST_OUTLINE:
-            rings = self.shapes(snapshot.cells_in_view(), self.kernels.IN_VIEW, fill=0.98)
-        else:
-            ant = snapshot.ant_cells[[snapshot.watched]]
-            rings = self.shapes(ant, self.kernels.IN_VIEW, fill=_MARK)
-            rings[:, 2] = np.maximum(rings[:, 2], _SMALLEST_MARK)
-        return [(rings, np.full(len(rings), colours.INK, dtype=np.uint32))]
+        cells, size = in_view, {"fill": 0.98}
+        if self.viewport.hexagon < _SMALLEST_OUTLINE:
+            cells, size = snapshot.ant_cells[:1], {"fill": _MARK, "least": _SMALLEST_MARK}
+        return [self.shapes(cells, self.kernels.IN_VIEW, colours.INK, **size)]
 
-    def _ants(self, snapshot: Snapshot) -> tuple[np.ndarray, np.ndarray]:
+    def _ants(self, snapshot: Snapshot) -> np.ndarray:
         kernels, hexagon = self.kernels, self._ants_like
         carries = snapshot.ant_carries
-        of_shapes = np.full(len(carries), colours.ANT, dtype=np.uint32)
-        if hexagon < _SMALLEST_HEXAGON:
+        dots = hexagon < _SMALLEST_HEXAGON
+        if dots:
             shape = np.full(len(carries), kernels.DOT)
-            of_shapes[carries] = _DOT_WITH_FOOD
         elif hexagon < _SMALLEST_ANT:
             shape = np.where(carries, kernels.DART_WITH_FOOD, kernels.DART)
         else:
             shape = np.where(carries, kernels.ANT_WITH_FOOD, kernels.ANT)
-        ants = self.shapes(snapshot.ant_cells, shape, snapshot.ant_headings)
-        if hexagon < _SMALLEST_HEXAGON:
+        ants = self.shapes(snapshot.ant_cells, shape, colours.ANT, snapshot.ant_headings)
+        if dots:
             ants[:, 2] = max(_FILL * hexagon, _DOT_RADIUS)
             ants[:, 5] = self._dot_opacity(len(ants))
-        return ants, of_shapes
+            ants[carries, 6] = _DOT_WITH_FOOD
+        return ants
 
     def _dot_opacity(self, n: int) -> float:
         """How strong n dots are drawn: fully, unless they would hide the world and each other.
@@ -216,33 +187,30 @@ class Rasteriser:
         growth = math.log(covered / _FREE_SHARE) / math.log(most / _FREE_SHARE)
         return min(1.0, (_FREE_SHARE + (1.0 - _FREE_SHARE) * growth) / covered)
 
-    def _colours_of_ground(self) -> np.ndarray:
-        """uint32 (16,), by the code of the ground."""
+    def _colour_cells(self, snapshot: Snapshot) -> np.ndarray:
+        """The colours of all cells, uint32 (grid.size,): by what they hold, else by the trail."""
         small = self.viewport.hexagon < _SMALLEST_DRAWING
-        table = np.full(16, colours.CELL_EMPTY, dtype=np.uint32)
-        table[OBSTACLE] = colours.CELL_OBSTACLE
-        table[FOOD] = colours.CELL_FOOD if small else colours.FLOOR_FOOD
-        table[QUEEN] = colours.CELL_QUEEN if small else colours.FLOOR_QUEEN
-        return table
+        of_ground = np.full(16, colours.CELL_EMPTY, dtype=np.uint32)
+        of_ground[OBSTACLE] = colours.CELL_OBSTACLE
+        of_ground[FOOD] = colours.CELL_FOOD if small else colours.FLOOR_FOOD
+        of_ground[QUEEN] = colours.CELL_QUEEN if small else colours.FLOOR_QUEEN
+        of_cells = of_ground[snapshot.ground & 15]
+        marked = np.flatnonzero((snapshot.ground == EMPTY) & (snapshot.trail >= 1))
+        share = np.minimum(snapshot.trail[marked].astype(np.float32) / self._full_level, 1)
+        of_cells[marked] = colours.TRAIL_RAMP[(share * 255 + 0.5).astype(np.int32)]
+        of_cells[~self._shown] = colours.PAGE
+        self._colours = of_cells
+        return of_cells
 
     def _map_pixels(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         shape = (self.viewport.height, self.viewport.width)
         nearest, second, shares = (np.empty(shape, dtype=np.int32) for _ in range(3))
-        hexagon = self.viewport.hexagon
         # The lines fade away where cells are small, and don't grow with large ones for ever.
-        line = float(np.clip(0.09 * hexagon - 0.25, 0.0, 3.0))
-        self.kernels.map_pixels(
-            *(nearest, second, shares),
-            *self._relative_outline(),
-            line,
-            *self._layout(),
-        )
+        line = float(np.clip(0.09 * self.viewport.hexagon - 0.25, 0.0, 3.0))
+        self.kernels.map_pixels(nearest, second, shares, line, *self._layout())
         return nearest.reshape(-1), second.reshape(-1), shares.reshape(-1)
 
-    def _relative_outline(self) -> tuple[float, float, float]:
-        """The origin relative to the viewport, and the size of a hexagon."""
-        x, y = self.viewport.origin
-        return x - self.viewport.left, y - self.viewport.top, self.viewport.hexagon
-
-    def _layout(self) -> tuple[int, int, int]:
-        return self.grid.width, self.grid.height, self.grid.ranges[2]
+    def _layout(self) -> tuple[float, float, float, int, int, int]:
+        """Origin and size of the hexagons, columns and rows of the grid, and its last range."""
+        grid, viewport = self.grid, self.viewport
+        return (*viewport.origin, viewport.hexagon, grid.width, grid.height, grid.ranges[2])

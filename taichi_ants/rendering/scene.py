@@ -7,13 +7,14 @@ from numbers import Real
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, checked_flag, shown
+from taichi_ants.errors import AntsError, checked_flag, expect, shown
+from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import colours, panel, text
-from taichi_ants.rendering.arguments import expect
+from taichi_ants.rendering.observed import task_and_letters
 from taichi_ants.rendering.panel import Status
 from taichi_ants.rendering.rasteriser import Rasteriser
-from taichi_ants.rendering.snapshot import Snapshot
+from taichi_ants.rendering.snapshot import Snapshot, check_snapshot
 from taichi_ants.rendering.viewport import Viewport
 from taichi_ants.task.constants import DEPOSIT_LEVEL, FOOD, QUEEN
 
@@ -54,9 +55,9 @@ class Scene:
         size: Width and height of the pictures, 64 to 4096 pixels each.
         hud: Whether to draw the head-up lines, of the `Status` given with a snapshot.
         legend: Whether to draw what the colours mean.
+        view: Whether to mark the cells that the ant of a `Status` sees, with its letters for them.
         title: A line above both.
         full_level: The trail level that has the last colour of the ramp, as stronger ones have.
-        q_range: The action values at both ends of the bars; None takes those of each picture.
 
     Raises:
         AntsError: An argument is of the wrong kind, or the size is not allowed.
@@ -69,9 +70,9 @@ class Scene:
         *,
         hud: bool = True,
         legend: bool = True,
+        view: bool = True,
         title: str = "",
         full_level: float = DEPOSIT_LEVEL,
-        q_range: tuple[float, float] | None = None,
     ) -> None:
         expect("grid", grid, AxialGrid)
         width, height = self.size = check_size(size)
@@ -82,7 +83,7 @@ class Scene:
         readable = self._text_size >= text.SMALLEST
         self._hud = checked_flag("hud", hud) and readable
         self._legend = checked_flag("legend", legend) and readable
-        self._q_range = q_range
+        self._view = checked_flag("view", view)
         margin = max(2, round(min(width, height) / 60))
         room = self._world_room(margin)
         self.viewport = Viewport.fit(grid, *room, margin=margin)
@@ -95,56 +96,63 @@ class Scene:
             panel.draw_legend(self._background, place, self._text_size, full_level, hexagon)
 
     def draw(self, snapshot: Snapshot, status: Status | None = None) -> np.ndarray:
-        """A picture, uint8 (height, width, 3), of a world and of what its head-up lines say.
+        """A picture, uint8 (height, width, 3), of a world and of what is said of it.
 
-        `snapshot` may be anything that `Snapshot.of` takes, for example `Colony.snapshot()`.
+        Raises:
+            AntsError: An argument is of the wrong kind, or the snapshot no sound one of this grid.
         """
-        snapshot = Snapshot.of(snapshot)
+        check_snapshot(snapshot)
         expect("status", status, Status, type(None))
         if snapshot.grid.ranges != self._rasteriser.grid.ranges:
             raise AntsError(
                 f"the snapshot is of ranges {snapshot.grid.ranges}, the scene of "
                 f"{self._rasteriser.grid.ranges}; draw it with a Scene of its own grid."
             )
+        world = self._draw_world(snapshot, status)
         frame = self._background.copy()
-        self._rasteriser.draw(frame, snapshot)
-        if snapshot.letters is not None and self._rasteriser.has_room_for_letters:
-            self._write_letters(frame, snapshot)
+        frame[: world.shape[0], : world.shape[1]] = world
         if self._hud and status is not None:
-            panel.draw_status(
-                frame, status, self._places["status"], self._text_size, self._range_of(status)
-            )
+            panel.draw_status(frame, status, self._places["status"], self._text_size)
         return frame
 
-    def _write_letters(self, frame: np.ndarray, snapshot: Snapshot) -> None:
-        cells = snapshot.cells_in_view()
-        centres = self.viewport.centres(self._rasteriser.grid.cells(cells)).tolist()
-        floors = self._rasteriser.colour_of(cells).tolist()
-        taken = np.isin(snapshot.ground[cells], (FOOD, QUEEN)).tolist()  # by their drawings
-        for number, letter in enumerate(snapshot.letters or ""):
-            if not taken[number]:
-                hexagon = self.viewport.hexagon
-                write_letter(frame, letter, centres[number], hexagon, floor=floors[number])
+    def _draw_world(self, snapshot: Snapshot, status: Status | None) -> np.ndarray:
+        """The world; if asked for, with letters in the cells that ant number 0 sees."""
+        state = None if status is None else status.state
+        if not self._view or state is None or status is None or not len(snapshot.ant_cells):
+            return self._rasteriser.draw(snapshot)
+        turned = (snapshot.ant_headings[0] + np.array(status.observation.cells)) % N_HEADINGS
+        cells = snapshot.ant_cells[0] + snapshot.grid.offsets[turned]
+        world = self._rasteriser.draw(snapshot, in_view=cells)
+        _, letters = task_and_letters(status.observation, state)
+        if letters and self._rasteriser.has_room_for_letters:
+            centres = self.viewport.centres(snapshot.grid.cells(cells)).tolist()
+            floors = self._rasteriser.colour_of(cells).tolist()
+            taken = np.isin(snapshot.ground[cells], (FOOD, QUEEN)).tolist()  # by their drawings
+            for number, letter in enumerate(letters):
+                if not taken[number]:
+                    hexagon = self.viewport.hexagon
+                    write_letter(world, letter, centres[number], hexagon, floor=floors[number])
+        return world
 
-    def _world_room(self, margin: int) -> tuple[int, int, int, int]:
-        """Left, top, width and height of the part of the picture for the world."""
+    def _world_room(self, margin: int) -> tuple[int, int]:
+        """Width and height of the upper left part of the picture, which is for the world."""
         width, height = self.size
         if not (self._hud or self._legend):
-            return 0, 0, width, height
+            return width, height
         if width >= height:
-            return 0, 0, width - _PANEL_WIDTH * self._text_size - margin, height
+            return width - _PANEL_WIDTH * self._text_size - margin, height
         lines = max(panel.STATUS_HEIGHT * self._hud, panel.LEGEND_HEIGHT * self._legend)
-        return 0, 0, width, height - round((lines + _TITLE_HEIGHT) * self._text_size) - margin
+        return width, height - round((lines + _TITLE_HEIGHT) * self._text_size) - margin
 
     def _panel_places(
-        self, room: tuple[int, int, int, int], margin: int, title: str
+        self, room: tuple[int, int], margin: int, title: str
     ) -> dict[str, tuple[int, int, int]]:
         """Left, top and width of the head-up lines and of the legend; writes the title."""
         if not (self._hud or self._legend):
             return {}
         size, (width, height) = self._text_size, self.size
         beside = width >= height
-        left, top = (room[2], margin) if beside else (margin, room[3])
+        left, top = (room[0], margin) if beside else (margin, room[1])
         right = width - margin
         if title:
             room_for_title = right - left
@@ -159,12 +167,6 @@ class Scene:
         column = (right - left - 2 * size) // 2
         legend_left = left + column + 2 * size if self._hud else left
         return {"status": (left, top, column), "legend": (legend_left, top, column)}
-
-    def _range_of(self, status: Status) -> tuple[float, float]:
-        """The action values at both ends of the bars, with 0 between them or at one of them."""
-        if self._q_range is not None:
-            return self._q_range
-        return range_with_zero(status.q_values)
 
 
 def write_letter(
@@ -183,11 +185,3 @@ def write_letter(
     dark = 0.30 * red + 0.59 * green + 0.11 * blue < 128
     ink = colours.PAGE if dark else colours.INK
     text.write(frame, letter, x, y + 0.36 * size, size, ink, align="middle")
-
-
-def range_with_zero(q_values: np.ndarray | None) -> tuple[float, float]:
-    """The lowest and the highest of action values and 0, never the same."""
-    if q_values is None or not np.asarray(q_values).size:
-        return 0.0, 1.0
-    low, high = min(0.0, float(np.min(q_values))), max(0.0, float(np.max(q_values)))
-    return (low, high) if high > low else (0.0, 1.0)

@@ -1,45 +1,32 @@
 """A policy on one sheet: what the ant does in each state.
 
-The states stand in two halves, foraging and carrying, ordered by the cell ahead, then by the one to
-the left, then by the one to the right. A sheet shows the states in which something was learned, or
-all 100 that an ant can come into.
+The states stand in two halves, foraging and carrying, ordered by the cell ahead, then by the other
+cells in view. A sheet shows the states in which something was learned, or all that an ant can come
+into; of very many the first.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, checked_flag, shown, whole
-from taichi_ants.grid.hexgrid import AxialGrid
+from taichi_ants.errors import AntsError, checked_flag, expect, shown, whole
+from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
+from taichi_ants.grid.hexgrid import AxialGrid, centre_of
 from taichi_ants.rendering import colours, text
-from taichi_ants.rendering.arguments import expect
+from taichi_ants.rendering.observed import (
+    PAPER,
+    Observation,
+    possible_states,
+    task_and_letters,
+)
 from taichi_ants.rendering.panel import fill
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.rendering.scene import write_letter
 from taichi_ants.rendering.viewport import Viewport
-from taichi_ants.task.constants import (
-    ACTION_NAMES,
-    GIVE,
-    LEFT,
-    N_ACTIONS,
-    N_STATES,
-    PICK_UP,
-    RIGHT,
-    SEES_EMPTY,
-    SEES_GOAL,
-    SEES_LURE,
-    SEES_OBSTACLE,
-)
-from taichi_ants.task.states import (
-    CELL_LETTERS,
-    REACHABLE_STATES,
-    State,
-    state_from_index,
-    state_index,
-)
+from taichi_ants.task.constants import ACTION_NAMES, GIVE, N_ACTIONS, PICK_UP, RIGHT
+from taichi_ants.task.states import TASK_NAMES
 
 # Width in pixels and states side by side, of a sheet of what was learned and of all states. The
 # first is read at the width of a page, the second needs a screen of its own.
@@ -47,11 +34,11 @@ DEFAULT_WIDTH, _COLUMNS = 1280, 9
 COMPLETE_WIDTH, _COMPLETE_COLUMNS = 1920, 16
 SMALLEST_WIDTH, LARGEST_WIDTH = 800, 4096
 HARDLY = 0.01
+MOST = 256  # states of a half that are drawn
 
 _HALVES = ("Foraging (without food)", "Carrying (with food)")
 _EXPLANATION = (
-    "A drawing is a state: what the ant sees to its left, ahead and to its right. "
-    "The arrow and the word are its best action.",
+    "A drawing is a state: what the ant sees{}. The arrow and the word are its best action.",
     "The longer the bar, the worse the second best action; where the bar is empty, it is as good.",
     "E empty, O obstacle (or the outside), T trail, F food, S nearer to the queen, Q queen.",
 )
@@ -59,12 +46,18 @@ _NOTHING = "nothing was learned here"
 # How much of a picture's colours is left, by the words that stand below it.
 _NOT_VISITED, _HARDLY_VISITED = "not visited", "hardly visited"
 _PALE = {_NOT_VISITED: 0.35, _HARDLY_VISITED: 0.55}
-_FLOOR_NEARER = 0xDCE3F2
-_TRAIL = 120  # of the ramp
+# The colours of cells by the letters of states, in which their order is that of the sheet.
+_FLOORS = {
+    "E": colours.CELL_EMPTY,
+    "O": colours.CELL_OBSTACLE,
+    "T": int(colours.TRAIL_RAMP[120]),
+    "S": 0xDCE3F2,
+    "F": colours.FLOOR_FOOD,
+    "Q": colours.FLOOR_QUEEN,
+}
+_LETTERS = "".join(_FLOORS)
+_GOALS = "FQ"
 _ARROW_COLOURS = {PICK_UP: colours.CELL_FOOD, GIVE: colours.CELL_QUEEN}
-# The pictures' cells among those of ranges (2, 2, 2): the ant's, then left, ahead, right.
-_CELLS = np.array([(0, 0, 0), (1, 0, 1), (1, 0, 0), (1, 1, 0)])
-_HEADINGS = np.array([5, 0, 1])
 _SQRT_3 = math.sqrt(3.0)
 
 
@@ -74,14 +67,14 @@ def best_actions(values: np.ndarray) -> list[int]:
     return np.flatnonzero(values == np.max(values)).tolist()
 
 
-def usual_spread(q_values: np.ndarray) -> float:
-    """By how much the action values (128, 5) of a state usually differ.
+def usual_spread(q_values: np.ndarray, observation: Observation = PAPER) -> float:
+    """By how much the action values (n_states, 5) of a state usually differ.
 
-    The mean of the gaps from the best to the worst, over the reachable states with values that
+    The mean of the gaps from the best to the worst, over the possible states with values that
     differ; 0 where there are none.
     """
-    table = _numbers("q_values", q_values, (N_STATES, N_ACTIONS))
-    rows = table.astype(np.float64)[list(REACHABLE_STATES)]
+    table = _numbers("q_values", q_values, (observation.n_states, N_ACTIONS))
+    rows = table.astype(np.float64)[list(possible_states(observation))]
     spreads = np.ptp(rows, axis=1)
     return float(spreads[spreads > 0].mean()) if spreads.any() else 0.0
 
@@ -104,21 +97,27 @@ def hardly_learned(values: np.ndarray, spread: float) -> bool:
 
 
 def policy_sheet(
-    q_values: np.ndarray, title: str = "Policy", width: int | None = None, *, complete: bool = False
+    q_values: np.ndarray,
+    title: str = "Policy",
+    width: int | None = None,
+    *,
+    complete: bool = False,
+    observation: Observation = PAPER,
 ) -> np.ndarray:
     """The sheet of a policy, uint8 (height, width, 3).
 
     Args:
-        q_values: float (128, 5), finite action values.
+        q_values: float (n_states, 5), finite action values.
         title: Stands above it, in ASCII.
         width: In pixels, 800 to 4096; None takes 1280, of a complete sheet 1920.
-        complete: Whether to draw all 100 states that can occur, those not visited pale, and not
-            only those in which something was learned.
+        complete: Whether to draw all states that can occur, those not visited pale, and not only
+            those in which something was learned.
+        observation: Whose states they are.
 
     Raises:
         AntsError: The table is no policy, the title no text, or the width is not allowed.
     """
-    table = _numbers("q_values", q_values, (N_STATES, N_ACTIONS))
+    table = _numbers("q_values", q_values, (observation.n_states, N_ACTIONS))
     expect("title", title, str)
     complete = checked_flag("complete", complete)
     if width is None:
@@ -128,7 +127,7 @@ def policy_sheet(
             f"the width is {width}; it must be a whole number of pixels from {SMALLEST_WIDTH} to "
             f"{LARGEST_WIDTH}."
         )
-    return _Sheet(table, int(width), complete).draw(title)
+    return _Sheet(table, int(width), complete, observation).draw(title)
 
 
 def _numbers(name: str, values: object, shape: tuple[int, ...]) -> np.ndarray:
@@ -148,73 +147,86 @@ def _numbers(name: str, values: object, shape: tuple[int, ...]) -> np.ndarray:
 class _Sheet:
     """Where everything lies; all lengths follow from the width."""
 
-    def __init__(self, table: np.ndarray, width: int, complete: bool) -> None:
+    def __init__(
+        self, table: np.ndarray, width: int, complete: bool, observation: Observation
+    ) -> None:
         self._table = table
-        self._spread = usual_spread(table)
+        self._observation = observation
+        self._spread = usual_spread(table, observation)
         self._width = width
         self._columns = _COMPLETE_COLUMNS if complete else _COLUMNS
         self._margin = round(width / 64)
         self._tile_width = (width - 2 * self._margin) // self._columns
         self._small = round(min(width / 70, self._tile_width / 7))  # sizes of text
         self._large = round(1.5 * self._small)
-        hexagon = self._tile_width / 5.7
-        self._picture_height = round(3.6 * hexagon)
-        self._tile_height = self._picture_height + round(2.6 * self._small)
+        self._picture = _Picture(self._tile_width, observation)
+        self._tile_height = self._picture.height + round(2.6 * self._small)
         self._heading = round(2.6 * self._large)  # of a half
         self._top = round(2.6 * self._large) + len(_EXPLANATION) * round(1.5 * self._small)
-        self._halves = [self._states(carries, complete) for carries in (False, True)]
-        self._picture = _Picture(self._tile_width, self._picture_height, hexagon)
-
-    def _states(self, carries: bool, complete: bool) -> list[State]:
-        """The states of a half that are drawn, in their order."""
-        views = itertools.product(range(4), repeat=3)
-        states = [State(carries, left, ahead, right) for ahead, left, right in views]
-        return [
-            state
-            for state in states
-            if (index := state_index(carries, *state.view)) in REACHABLE_STATES
-            and (complete or not self._doubt(self._table[index]))
+        self._halves: tuple[list[int], list[int]] = ([], [])
+        for state in possible_states(observation):
+            self._halves[self._task(state) == TASK_NAMES[1]].append(state)
+        self._drawn = [
+            sorted(
+                (one for one in states if complete or not self._doubt(self._table[one])),
+                key=self._order,
+            )[:MOST]
+            for states in self._halves
         ]
 
-    def _height(self, states: list[State]) -> int:
+    def _task(self, state: int) -> str:
+        return task_and_letters(self._observation, state)[0]
+
+    def _order(self, state: int) -> list[int]:
+        """Sorts by the cell ahead, then by the others."""
+        _, letters = task_and_letters(self._observation, state)
+        if letters:
+            letters.insert(0, letters.pop(self._observation.cells.index(0)))
+        return [*(_LETTERS.find(letter[0]) for letter in letters), state]
+
+    def _height(self, states: list[int]) -> int:
         rows = max(1, math.ceil(len(states) / self._columns))
         return self._heading + rows * self._tile_height
 
     def draw(self, title: str) -> np.ndarray:
-        height = self._top + sum(map(self._height, self._halves)) + self._margin // 2
+        height = self._top + sum(map(self._height, self._drawn)) + self._margin // 2
         sheet = np.empty((height, self._width, 3), dtype=np.uint8)
         sheet[:] = colours.channels(colours.PAGE)
         y = self._margin + self._large
         title = text.shortened(title, self._large, self._width - 2 * self._margin)
         text.write(sheet, title, self._margin, y, self._large)
         y += round(0.3 * self._large)
+        ahead = " to its left, ahead and to its right"
         for line in _EXPLANATION:
             y += round(1.5 * self._small)
+            line = line.format(ahead if len(self._observation.cells) == 3 else "")
             text.write(sheet, line, self._margin, y, self._small, colours.FAINT_INK)
         top = self._top
-        for carries, states in enumerate(self._halves):
-            self._draw_half(sheet, bool(carries), states, top)
+        for half, states in enumerate(self._drawn):
+            self._draw_half(sheet, half, top)
             top += self._height(states)
         return sheet
 
-    def _draw_half(self, sheet: np.ndarray, carries: bool, states: list[State], top: int) -> None:
+    def _draw_half(self, sheet: np.ndarray, half: int, top: int) -> None:
         y = top + round(1.7 * self._large)
-        text.write(sheet, _HALVES[carries], self._margin, y, self._large)
-        number = sum(not self._doubt(self._table[state_index(carries, *s.view)]) for s in states)
-        of_all = sum(state_from_index(index).carries == carries for index in REACHABLE_STATES)
+        text.write(sheet, _HALVES[half], self._margin, y, self._large)
+        states = self._halves[half]
+        learned = sum(not self._doubt(self._table[state]) for state in states)
+        words = f"{learned} of {len(states)} states learned" if learned else _NOTHING
+        if len(self._drawn[half]) == MOST:
+            words += f"; {MOST} are shown"
         right = self._width - self._margin
-        words = f"{number} of {of_all} states learned" if number else _NOTHING
         text.write(sheet, words, right, y, self._small, colours.FAINT_INK, align="right")
-        for place, state in enumerate(states):
+        for place, state in enumerate(self._drawn[half]):
             row, column = divmod(place, self._columns)
             x = self._margin + column * self._tile_width
             self._draw_tile(sheet, state, x, top + self._heading + row * self._tile_height)
 
-    def _draw_tile(self, sheet: np.ndarray, state: State, left: int, top: int) -> None:
-        values = self._table[state_index(state.carries, *state.view)]
+    def _draw_tile(self, sheet: np.ndarray, state: int, left: int, top: int) -> None:
+        values = self._table[state]
         best, clear = best_actions(values), clarity(values, self._spread)
         doubt = self._doubt(values)
-        width, height = self._tile_width, self._picture_height
+        width, height = self._tile_width, self._picture.height
         picture = self._picture.draw(state, [] if doubt == _NOT_VISITED else best)
         if doubt:
             picture = (_PALE[doubt] * picture + (1 - _PALE[doubt]) * 255).astype(np.uint8)
@@ -224,9 +236,8 @@ class _Sheet:
         if doubt:
             text.write(sheet, doubt, middle, y, self._small, colours.FAINT_INK, align="middle")
             return
-        words = text.shortened(
-            " / ".join(ACTION_NAMES[action] for action in best), self._small, width
-        )
+        names = " / ".join(ACTION_NAMES[action] for action in best)
+        words = text.shortened(names, self._small, width)
         colour = _ARROW_COLOURS.get(best[0], colours.CHOSEN)
         text.write(sheet, words, middle, y, self._small, colour, align="middle")
         y += round(0.45 * self._small)
@@ -242,98 +253,82 @@ class _Sheet:
 
 
 class _Picture:
-    """Draws an ant with the three cells that it sees, and its best actions as arrows."""
+    """Draws an ant with the cells that it sees, and its best actions as arrows."""
 
-    def __init__(self, width: int, height: int, hexagon: float) -> None:
-        grid = AxialGrid((2, 2, 2))
+    def __init__(self, width: int, observation: Observation) -> None:
+        self._observation = observation
+        self._headings = np.array(observation.cells) % N_HEADINGS
+        grid = AxialGrid((2, 2, 2))  # a cell and those around it
+        own, seen = (0, 0, 0), [HEADING_STEPS[heading] for heading in self._headings]
+        cells = np.array([own, *seen])
+        self._cells = grid.index(cells)
         shown = np.zeros(grid.size, dtype=bool)
-        self._cells = grid.index(_CELLS)
         shown[self._cells] = True
-        middle = (height - 2 * _SQRT_3 * hexagon) / 2  # free above and below
-        self._viewport = Viewport(
-            0, 0, width, height, hexagon, (width / 2, height - middle - 0.5 * _SQRT_3 * hexagon)
-        )
-        self._rasteriser = Rasteriser(grid, self._viewport, shown=shown)
-        self._frame = np.empty((height, width, 3), dtype=np.uint8)
-        self._size = grid.size
+        hexagon = width / 5.7
+        rows = centre_of(cells, hexagon)[:, 1]
+        room = float(rows.max() - rows.min()) + _SQRT_3 * hexagon
+        self.height = round(room + 0.136 * hexagon)
+        y = (self.height - room) / 2 + 0.5 * _SQRT_3 * hexagon - float(rows.min())
+        viewport = Viewport(width, self.height, hexagon, (width / 2, y))
+        self._hexagon = hexagon
+        self._centres = viewport.centres(cells)
+        self._rasteriser = Rasteriser(grid, viewport, shown=shown)
+        self._floors = np.full(grid.size, colours.PAGE, dtype=np.uint32)
 
-    def draw(self, state: State, actions: list[int]) -> np.ndarray:
-        """The picture, uint8 (height, width, 3); valid until the next one is drawn."""
-        of_cells = np.full(self._size, colours.PAGE, dtype=np.uint32)
-        of_cells[self._cells[0]] = colours.CELL_EMPTY
-        for cell, code in zip(self._cells[1:], state.view, strict=True):
-            of_cells[cell] = _floor(state.carries, code)
-        self._rasteriser.draw_colours(self._frame, of_cells)
-        self._draw_things(state)
-        self._draw_ant(state.carries)
-        centres = self._viewport.centres(_CELLS[1:]).tolist()
-        for code, centre in zip(state.view, centres, strict=True):
-            write_letter(
-                self._frame,
-                CELL_LETTERS[state.carries][code],
-                (centre[0], centre[1] - _rise(code) * self._viewport.hexagon),
-                self._viewport.hexagon,
-                floor=_floor(state.carries, code),
-                beside=code == SEES_GOAL,
-            )
-        self._draw_arrows(state, actions)
-        return self._frame
+    def draw(self, state: int, actions: list[int]) -> np.ndarray:
+        """The picture, uint8 (height, width, 3)."""
+        task, letters = task_and_letters(self._observation, state)
+        carries, unnamed = task == TASK_NAMES[1], not letters
+        letters = letters or [" "] * len(self._observation.cells)
+        floors = [_FLOORS.get(letter[0], colours.CELL_EMPTY) for letter in letters]
+        self._floors[self._cells] = [colours.CELL_EMPTY, *floors]
+        frame = self._rasteriser.draw_cells(self._floors)
+        self._draw_things(frame, letters)
+        self._draw_ant(frame, carries)
+        for letter, floor, (x, y) in zip(letters, floors, self._centres[1:].tolist(), strict=True):
+            goal = letter in _GOALS
+            place = x, y - _rise(goal) * self._hexagon
+            write_letter(frame, letter, place, self._hexagon, floor=floor, beside=goal)
+        if unnamed:
+            size, width = round(0.6 * self._hexagon), frame.shape[1]
+            name = self._observation.name_of(state).partition(" ")[2]
+            name = text.shortened(name, size, width)
+            text.write(frame, name, width / 2, size, size, align="middle")
+        self._draw_arrows(frame, letters, actions)
+        return frame
 
-    def _draw_things(self, state: State) -> None:
+    def _draw_things(self, frame: np.ndarray, letters: list[str]) -> None:
         kernels = self._rasteriser.kernels
-        shape, colour = (
-            (kernels.QUEEN, colours.CELL_QUEEN)
-            if state.carries
-            else (kernels.FOOD, colours.CELL_FOOD)
-        )
-        cells = self._cells[1:][np.array(state.view) == SEES_GOAL]
-        marks = self._rasteriser.shapes(cells, shape, fill=0.72)
-        marks[:, 0] -= 0.58 * marks[:, 2]  # room for a letter beside them
-        marks[:, 2] *= 0.6
-        marks[:, 1] -= _rise(SEES_GOAL) * self._viewport.hexagon
-        self._rasteriser.draw_shapes(self._frame, marks, _repeated(colour, len(marks)))
+        goals = {"F": (kernels.FOOD, colours.CELL_FOOD), "Q": (kernels.QUEEN, colours.CELL_QUEEN)}
+        for cell, letter in zip(self._cells[1:], letters, strict=True):
+            if letter in goals:
+                mark = self._rasteriser.shapes(cell[None], *goals[letter], fill=0.72)
+                mark[:, 0] -= 0.58 * mark[:, 2]  # room for a letter beside it
+                mark[:, 2] *= 0.6
+                mark[:, 1] -= _rise(True) * self._hexagon
+                kernels.draw_shapes(frame, mark)
 
-    def _draw_ant(self, carries: bool) -> None:
+    def _draw_ant(self, frame: np.ndarray, carries: bool) -> None:
         kernels = self._rasteriser.kernels
         shape = kernels.ANT_WITH_FOOD if carries else kernels.ANT
-        ant = self._rasteriser.shapes(self._cells[:1], shape, fill=0.62)
-        ant[:, 1] += 0.2 * self._viewport.hexagon
-        self._rasteriser.draw_shapes(self._frame, ant, _repeated(colours.ANT, 1))
+        ant = self._rasteriser.shapes(self._cells[:1], shape, colours.ANT, fill=0.62)
+        ant[:, 1] += 0.2 * self._hexagon
+        kernels.draw_shapes(frame, ant)
 
-    def _draw_arrows(self, state: State, actions: list[int]) -> None:
+    def _draw_arrows(self, frame: np.ndarray, letters: list[str], actions: list[int]) -> None:
         """An arrow to where a move goes, from the food that is picked up, or to the queen."""
-        hexagon = self._viewport.hexagon
-        rows, of_rows = [], []
+        kernels, own = self._rasteriser.kernels, self._cells[:1]
         for action in actions:
-            if LEFT <= action <= RIGHT:
-                places = [action]
-            else:
-                places = [place for place, code in enumerate(state.view) if code == SEES_GOAL]
-            for place in places:
-                centres = self._viewport.centres(_CELLS[[0, place + 1]])
-                x, y = (0.5 * centres[0] + 0.5 * centres[1]).tolist()
-                turned = _HEADINGS[place] + (3 if action == PICK_UP else 0)
-                rows.append((x, y, 0.37 * hexagon, turned, self._rasteriser.kernels.ARROW, 1.0))
-                of_rows.append(_ARROW_COLOURS.get(action, colours.CHOSEN))
-        if rows:
-            self._rasteriser.draw_shapes(
-                self._frame, np.array(rows, np.float32), np.array(of_rows, np.uint32)
-            )
+            colour = _ARROW_COLOURS.get(action, colours.CHOSEN)
+            for place, turn in enumerate(self._observation.cells):
+                towards = turn == action - 1 if action <= RIGHT else letters[place] in _GOALS
+                if towards and -1 <= turn <= 1:  # it reaches what lies ahead only
+                    turned = self._headings[place] + (3 if action == PICK_UP else 0)
+                    arrow = self._rasteriser.shapes(own, kernels.ARROW, colour, turned, fill=0.37)
+                    arrow[:, :2] = 0.5 * (self._centres[0] + self._centres[place + 1])
+                    kernels.draw_shapes(frame, arrow)
 
 
-def _rise(code: int) -> float:
+def _rise(goal: bool) -> float:
     """How far what is drawn on a cell moves up for the arrows, in sizes of a hexagon."""
-    return 0.27 if code == SEES_GOAL else 0.12
-
-
-def _floor(carries: bool, code: int) -> int:
-    """The colour of a cell by what the ant sees."""
-    if code == SEES_LURE:
-        return _FLOOR_NEARER if carries else int(colours.TRAIL_RAMP[_TRAIL])
-    if code == SEES_GOAL:
-        return colours.FLOOR_QUEEN if carries else colours.FLOOR_FOOD
-    return {SEES_EMPTY: colours.CELL_EMPTY, SEES_OBSTACLE: colours.CELL_OBSTACLE}[code]
-
-
-def _repeated(colour: int, n: int) -> np.ndarray:
-    return np.full(n, colour, dtype=np.uint32)
+    return 0.27 if goal else 0.12

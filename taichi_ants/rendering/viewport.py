@@ -7,52 +7,46 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, shown
+from taichi_ants.errors import AntsError, expect, shown
 from taichi_ants.grid import hexgrid
 from taichi_ants.grid.hexgrid import AxialGrid
-from taichi_ants.rendering.arguments import expect
 
 _SQRT_3 = math.sqrt(3.0)
 
 
 @dataclass(frozen=True)
 class Viewport:
-    """A rectangle of a picture that shows a world.
+    """Where a picture shows the cells of a world.
 
-    Pixel coordinates are of the whole picture, x to the right and y downwards; the pixel in column
-    i and row j has its centre at (i + 0.5, j + 0.5).
+    Pixel coordinates are x to the right and y downwards; the pixel in column i and row j has its
+    centre at (i + 0.5, j + 0.5).
 
     Attributes:
-        left, top, width, height: The rectangle, in pixels.
+        width, height: Of the picture, in pixels.
         hexagon: Pixels from a hexagon's centre to its corners.
         origin: Pixel coordinates of the centre of the cell (0, 0, 0).
     """
 
-    left: int
-    top: int
     width: int
     height: int
     hexagon: float
     origin: tuple[float, float]
 
     @classmethod
-    def fit(
-        cls, grid: AxialGrid, left: int, top: int, width: int, height: int, margin: float = 0.0
-    ) -> Viewport:
+    def fit(cls, grid: AxialGrid, width: int, height: int, margin: float = 0.0) -> Viewport:
         """The viewport that shows the world whole, centred, and as large as possible.
 
         Args:
             grid: The world's grid.
-            left, top, width, height: The rectangle, in pixels.
+            width, height: Of the picture, in pixels.
             margin: Pixels to leave free at each side.
         """
         expect("grid", grid, AxialGrid)
         low, high = _bounds(grid)
         room = np.array([max(width - 2 * margin, 1.0), max(height - 2 * margin, 1.0)])
         hexagon = float((room / (high - low)).min())
-        middle = np.array([left + width / 2, top + height / 2])
-        x, y = (middle - hexagon * (low + high) / 2).tolist()
-        return cls(left, top, width, height, hexagon, (x, y))
+        x, y = (np.array([width, height]) / 2 - hexagon * (low + high) / 2).tolist()
+        return cls(width, height, hexagon, (x, y))
 
     def height_of(self, grid: AxialGrid) -> float:
         """The height of the whole world in pixels."""

@@ -15,11 +15,14 @@ from typing import BinaryIO
 import numpy as np
 
 from taichi_ants import files
-from taichi_ants.errors import AntsError, shown
+from taichi_ants.errors import AntsError, expect, shown
 from taichi_ants.rendering import animated_files
-from taichi_ants.rendering.arguments import expect
 
 PathLike = str | os.PathLike[str]
+Progress = Callable[[float], None]  # called with the share of the work that is done, 0 to 1
+
+DEFAULT_FPS = 8.0
+PAUSE = 1.5  # seconds, for which episodes are shown as they ended
 
 _ANIMATIONS: dict[str, Callable[[BinaryIO, Iterable[np.ndarray], float], None]] = {
     ".gif": animated_files.write_gif,
@@ -77,17 +80,29 @@ def check_animation(path: PathLike, fps: float) -> Path:
     return target
 
 
-def save_animation(path: PathLike, frames: Iterable[np.ndarray], fps: float) -> None:
+def save_animation(
+    path: PathLike,
+    frames: Iterable[np.ndarray],
+    fps: float = DEFAULT_FPS,
+    *,
+    pause: float = 0.0,
+    n: int = 0,
+    progress: Progress | None = None,
+) -> None:
     """Write frames as they come; raises as `check_animation` does, which it calls first.
 
     Args:
         path: The file or folder, see `check_animation`. A file that exists is replaced.
         frames: At least one, uint8 (height, width, 3), all of one size.
         fps: Frames per second.
+        pause: Seconds for which the last one is shown, so that it can be looked at before all
+            begins anew.
+        n: How many frames there are, for `progress`.
+        progress: Called after each frame with the share of the work that is done.
     """
     target = check_animation(path, fps)
     kind = target.suffix.lower()
-    checked = _checked(frames, kind)
+    checked = _checked(frames, kind, round(pause * fps) - 1, n, progress)
     with _folder_of(target):
         if kind:
             write = _ANIMATIONS[kind]
@@ -154,33 +169,33 @@ def _save_pictures(folder: Path, frames: Iterable[np.ndarray]) -> None:
         shutil.rmtree(temporary, ignore_errors=True)
 
 
-def _checked(frames: Iterable[np.ndarray], kind: str) -> Iterator[np.ndarray]:
-    """The frames, at least one, of a size that the kind of file holds; checks the first at once."""
+def _checked(
+    frames: Iterable[np.ndarray], kind: str, more: int, n: int, progress: Progress | None
+) -> Iterator[np.ndarray]:
+    """The frames, if they are what the kind of file can hold, the last one so many times more."""
     if not isinstance(frames, Iterable):
         raise AntsError(f"frames is {shown(frames)}; it must be several pictures.")
-    frames = iter(frames)
-    first = next(frames, None)
-    if first is None:
-        raise AntsError("there are no frames; an animation needs at least one.")
-    _check_frame(first)
-    height, width = first.shape[:2]
-    most = _LARGEST.get(kind, max(width, height))
-    if max(width, height) > most:
-        raise AntsError(
-            f"the frames are {width} x {height} pixels; a {kind} holds at most {most} in width and "
-            "height, draw them smaller."
-        )
-    return _of_one_size(first, frames)
-
-
-def _of_one_size(first: np.ndarray, frames: Iterator[np.ndarray]) -> Iterator[np.ndarray]:
-    yield first
-    for frame in frames:
+    shape = None
+    for done, frame in enumerate(frames, start=1):
         _check_frame(frame)
-        if frame.shape != first.shape:
+        if shape is None:
+            height, width, _ = shape = frame.shape
+            most = _LARGEST.get(kind, max(width, height))
+            if max(width, height) > most:
+                raise AntsError(
+                    f"the frames are {width} x {height} pixels; a {kind} holds at most {most} in "
+                    "width and height, draw them smaller."
+                )
+        if frame.shape != shape:
             raise AntsError(
-                f"a frame is {frame.shape}, the first one {first.shape}; all must be of one size."
+                f"a frame is {frame.shape}, the first one {shape}; all must be of one size."
             )
+        yield frame
+        if progress is not None:
+            progress(done / max(n, done))
+    if shape is None:
+        raise AntsError("there are no frames; an animation needs at least one.")
+    for _ in range(more):
         yield frame
 
 

@@ -1,21 +1,15 @@
-"""The scaling study of the colony: conditions, trained and evaluated, kept on disk as they finish.
-
-The work is cut into blocks, one for each condition (arena, pheromone, way of sharing, number of
-ants), with all seeds in it. Each finished block is a file, so that a study that was stopped goes on
-where it was.
-"""
+"""The scaling study of the colony as data: its arenas, and what is done for each condition."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, fields, replace
-from pathlib import Path
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from taichi_ants import __version__, files
-from taichi_ants.analysis.colony.limits import Limits, limits_of
+from taichi_ants import files
+from taichi_ants.analysis.bounds.limits import Limits, limits_of
 from taichi_ants.analysis.colony.study import (
     COPIED,
     COPIED_LONG,
@@ -30,10 +24,8 @@ from taichi_ants.analysis.colony.study import (
     Condition,
     Record,
 )
-from taichi_ants.errors import AntsError
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.studies.provenance import world_facts
-from taichi_ants.studies.sweeps import read_block
+from taichi_ants.studies.runner import ColonyPoint, Outcome, Study
 from taichi_ants.task import Life, Pheromone, Task
 from taichi_ants.worlds.world import World
 
@@ -52,12 +44,8 @@ TASKS = {
     )
     for name, pheromone in _PHEROMONES.items()
 }
-# Seeds of the evaluation are those of the training plus this, so that no random number serves both.
-EVALUATION_SEEDS = 1 << 32
 _EXPLORING = 0.7  # of the training episodes, until epsilon has fallen to what evaluation uses
 _ARRAYS = tuple(Record.__dataclass_fields__)
-
-Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True)
@@ -66,10 +54,11 @@ class ArenaPlan:
 
     Attributes:
         name, words: As in `analysis.colony.study.Arena`.
-        worlds: One world for each seed, all of the same ranges.
-        seeds: The seeds; they also pair conditions.
+        world: The world, or one for each seed, all of the same ranges.
         sizes: Numbers of ants, ascending, 1 first.
         ways: The ways of sharing to train, by pheromone.
+        training: The learner; its epsilon is that of the first episode, its `min_epsilon` that of
+            the last 30 % and of the evaluation. The decay follows from these.
         episodes: Training episodes, all of `ticks` ticks.
         ticks: Ticks of each episode.
         rollouts: Evaluation episodes.
@@ -78,280 +67,134 @@ class ArenaPlan:
 
     name: str
     words: str
-    worlds: tuple[World, ...]
-    seeds: tuple[int, ...]
+    world: World | tuple[World, ...]
     sizes: tuple[int, ...]
     ways: Mapping[str, tuple[str, ...]]
+    training: TrainingConfig
     episodes: int
     ticks: int
     rollouts: int
     long_factor: int
 
-    def __post_init__(self) -> None:
-        room = min(int((world.ground() == 0).sum()) for world in self.worlds)
-        if max(self.sizes) > room:
-            raise AntsError(
-                f"{max(self.sizes)} ants do not fit into {self.words}, where there is room for "
-                f"{room}; ask for fewer."
-            )
-
-    def conditions(self) -> Iterator[Condition]:
-        """All of them; those that start from others' tables come after these.
-
-        For a single ant, learning jointly and with a table of its own is learning alone.
-        """
+    def conditions(self) -> Iterator[tuple[Condition, ColonyPoint]]:
+        """All of them, with what is done for each; some have a point in common."""
         for pheromone, ways in self.ways.items():
             for way in ways:
                 for ants in self.sizes:
-                    if ants > 1 or way not in (JOINT, OWN):
-                        yield Condition(self.name, pheromone, way, ants)
+                    condition = Condition(self.name, pheromone, way, ants)
+                    yield condition, self._point(condition)
+
+    def _point(self, condition: Condition) -> ColonyPoint:
+        ants, way = condition.ants, condition.way
+        alone = self._trained(condition.pheromone, self.episodes)
+        if way == COPIED_LONG:
+            alone = self._trained(condition.pheromone, self.episodes * self.long_factor)
+        if way == THEN_JOINT:
+            return replace(alone, ants=ants, after=alone)
+        if ants == 1:  # learning jointly, or with a table of its own, is learning alone
+            return alone
+        if way == OWN:
+            return replace(alone, ants=ants, sharing="own")
+        if way == JOINT:
+            return replace(alone, ants=ants)
+        return replace(alone, ants=ants, episodes=0, after=alone)
+
+    def _trained(self, pheromone: str, episodes: int) -> ColonyPoint:
+        """One ant that learns for so many episodes."""
+        exploring, least = max(1, round(_EXPLORING * episodes)), self.training.min_epsilon
+        low = max(least, 1e-6)
+        decay = min(1.0, (low / max(self.training.epsilon, low)) ** (1 / exploring))
+        return ColonyPoint(
+            *(self.world, TASKS[pheromone], replace(self.training, epsilon_decay=decay)),
+            episodes=episodes,
+            ticks=self.ticks,
+            rollouts=self.rollouts,
+        )
 
 
 @dataclass(frozen=True)
 class StudyPlan:
-    """What to do.
-
-    Attributes:
-        arenas: The kinds of world.
-        training: The learner; its epsilon is that of the first episode, its `min_epsilon` that of
-            the last 30 % and of the evaluation. The decay follows from these.
-    """
+    """What to do: the kinds of world, and the seeds of each."""
 
     arenas: tuple[ArenaPlan, ...]
-    training: TrainingConfig
+    seeds: tuple[int, ...]
 
+    def conditions(self) -> Iterator[tuple[Condition, ColonyPoint]]:
+        """Those of all arenas."""
+        for arena in self.arenas:
+            yield from arena.conditions()
 
-def run_study(
-    plan: StudyPlan,
-    folder: Path,
-    threads: int | None = None,
-    arch: str | None = None,
-    progress: Progress = lambda share: None,
-    notice: Callable[[str], None] = lambda text: None,
-) -> tuple[ColonyStudy, dict[Condition, np.ndarray]]:
-    """Do the blocks that the folder does not hold yet, and join all.
+    def study(self) -> Study:
+        """The work."""
+        return Study(tuple(point for _, point in self.conditions()), self.seeds)
 
-    Args:
-        plan: What to do.
-        folder: Where finished blocks are kept; it must belong to this plan alone.
-        threads, arch: As in `Colony`.
-        progress: Called now and then with the share of the work that is done.
-        notice: As in `run_sweep`.
+    def found(self, outcomes: Mapping[Any, Outcome]) -> ColonyStudy:
+        """What the analysis reads, from what the points gave."""
+        return self._joined({one: outcomes[point] for one, point in self.conditions()})
 
-    Returns:
-        The study, and the tables float32 (seeds, 128, 5) of the ways that share one.
-
-    Raises:
-        AntsError: A block cannot be written, or an argument is not allowed.
-    """
-    work = [(arena, condition) for arena in plan.arenas for condition in arena.conditions()]
-    weights = [_weight(plan, *item) for item in work]
-    total, done = sum(weights), 0.0
-    records: dict[Condition, Record] = {}
-    tables: dict[Condition, np.ndarray] = {}
-    for (arena, condition), weight in zip(work, weights, strict=True):
-        path = folder / f"{_name(condition)}.npz"
-        block = read_block(path, notice)
-        if block is None:
-            runner = _Runner(plan, arena, condition, threads, arch)
-            block = runner.run(tables, _part(progress, done / total, weight / total))
-            files.write_sealed_npz(path, block)
-        records[condition] = Record(**{name: block[name].astype(np.int64) for name in _ARRAYS})
-        if "q_values" in block:
-            tables[condition] = block["q_values"]
-        done += weight
-        progress(done / total)
-    return _joined(plan, records), tables
-
-
-def _part(progress: Progress, begin: float, share: float) -> Progress:
-    """The progress of a part of the work, as that of all."""
-    return lambda done: progress(begin + share * done)
-
-
-def settings_of(plan: StudyPlan) -> dict[str, Any]:
-    """All that determines the numbers of a study; equal settings give equal results."""
-    return {
-        "version": __version__,
-        "training": plan.training.as_dict(),
-        "tasks": {name: task.as_dict() for name, task in TASKS.items()},
-        "arenas": [
+    def read(self, arrays: Mapping[str, np.ndarray]) -> ColonyStudy:
+        """The same from what `to_arrays` gave."""
+        return self._joined(
             {
-                **{field.name: getattr(arena, field.name) for field in fields(arena)},
-                "worlds": [world_facts(world) for world in dict.fromkeys(arena.worlds)],
+                one: {name: arrays[f"{_name(one)}.{name}"] for name in _ARRAYS}
+                for one, _ in self.conditions()
             }
-            for arena in plan.arenas
-        ],
-    }
+        )
+
+    def _joined(self, outcomes: Mapping[Condition, Outcome]) -> ColonyStudy:
+        records = {
+            condition: Record(**{name: outcome[name].astype(np.int64) for name in _ARRAYS})
+            for condition, outcome in outcomes.items()
+        }
+        return ColonyStudy(tuple(_arena(one, self.seeds) for one in self.arenas), records)
+
+    def median_policies(
+        self, study: ColonyStudy, outcomes: Mapping[Any, Outcome]
+    ) -> Iterator[tuple[str, np.ndarray, dict[str, Any]]]:
+        """Policies worth keeping: those of median seeds, trained alone and jointly, with trails.
+
+        Yields:
+            A name, the action values float32 (n_states, 5), and what made them.
+        """
+        arenas = {arena.name: arena for arena in study.arenas}
+        for condition, point in self.conditions():
+            way, ants = condition.way, condition.ants
+            wanted = (way == COPIED and ants == 1) or (way == JOINT and ants > 1)
+            if condition.pheromone != ON or not wanted:
+                continue
+            values = study.values(arenas[condition.arena], ON, way, ants)
+            run = int(np.argsort(values, kind="stable")[(len(self.seeds) - 1) // 2])
+            metadata = {
+                **vars(condition),
+                "task": point.task.as_dict(),
+                "training": point.training.as_dict(),
+                "seed": self.seeds[run],
+                "episodes": point.episodes,
+                "ticks": point.ticks,
+                "deliveries_per_1000_ticks": values[run],
+            }
+            trained = "alone" if way == COPIED else f"joint_{ants}"
+            yield f"{condition.arena}_{trained}", outcomes[point]["q_values"][run], metadata
 
 
-def to_arrays(records: Mapping[Condition, Record]) -> dict[str, np.ndarray]:
+def to_arrays(study: ColonyStudy) -> dict[str, np.ndarray]:
     """What the conditions gave under names for a file, "arena.pheromone.way.ants.what"."""
     return {
         f"{_name(condition)}.{name}": files.smallest(array)
-        for condition, record in records.items()
+        for condition, record in study.records.items()
         for name, array in vars(record).items()
     }
-
-
-def from_arrays(plan: StudyPlan, arrays: Mapping[str, np.ndarray]) -> ColonyStudy:
-    """The study of a plan from what `to_arrays` gave.
-
-    Raises:
-        AntsError: Something is missing.
-    """
-    records: dict[Condition, Record] = {}
-    try:
-        for condition in (one for arena in plan.arenas for one in arena.conditions()):
-            parts = {name: arrays[f"{_name(condition)}.{name}"] for name in _ARRAYS}
-            records[condition] = Record(**{n: part.astype(np.int64) for n, part in parts.items()})
-    except KeyError as error:
-        raise AntsError(f"the results hold no {error}; give --force to make them anew.") from error
-    return _joined(plan, records)
-
-
-def median_policies(
-    plan: StudyPlan, study: ColonyStudy, tables: Mapping[Condition, np.ndarray]
-) -> Iterator[tuple[str, np.ndarray, dict[str, Any]]]:
-    """Policies worth keeping: those of median seeds, trained alone and jointly, with trails.
-
-    Yields:
-        A name, the action values float32 (128, 5), and what made them.
-    """
-    by_name = {arena.name: (arena, place) for place, arena in enumerate(study.arenas)}
-    for condition, q_values in tables.items():
-        if condition.pheromone == ON and condition.way in (COPIED, JOINT):
-            arena, place = by_name[condition.arena]
-            values = study.values(arena, ON, condition.way, condition.ants)
-            run = int(np.argsort(values, kind="stable")[(arena.seeds - 1) // 2])
-            metadata = {
-                **vars(condition),
-                "training": plan.training.as_dict(),
-                "seed": plan.arenas[place].seeds[run],
-                "episodes": arena.episodes,
-                "ticks": arena.ticks,
-                "deliveries_per_1000_ticks": values[run],
-            }
-            trained = "alone" if condition.way == COPIED else f"joint_{condition.ants}"
-            yield f"{arena.name}_{trained}", q_values[run], metadata
 
 
 def _name(condition: Condition) -> str:
     return ".".join(map(str, vars(condition).values()))
 
 
-def _joined(plan: StudyPlan, records: dict[Condition, Record]) -> ColonyStudy:
-    for arena in plan.arenas:
-        _copy_single_ants(arena, records)
-    return ColonyStudy(tuple(_arena(arena) for arena in plan.arenas), records)
-
-
-class _Runner:
-    """Trains and evaluates one condition."""
-
-    def __init__(
-        self,
-        plan: StudyPlan,
-        arena: ArenaPlan,
-        condition: Condition,
-        threads: int | None,
-        arch: str | None,
-    ) -> None:
-        self._plan, self._arena, self._condition = plan, arena, condition
-        self._where: dict[str, Any] = {"threads": threads, "arch": arch}
-        self._task = TASKS[condition.pheromone]
-
-    def run(
-        self, tables: Mapping[Condition, np.ndarray], progress: Progress
-    ) -> dict[str, np.ndarray]:
-        """The block: what the evaluation gave, and the shared table where it was trained here."""
-        training, evaluating = _ant_ticks(self._arena, self._condition)
-        share = training / (training + evaluating)
-        way, alone = self._condition.way, self._trained_alone()
-        if training:
-            start = tables[alone] if way == THEN_JOINT else None
-            q_values = self._train(start, lambda part: progress(share * part))
-        else:
-            q_values = tables[alone]
-        block = self._evaluate(q_values, lambda part: progress(share + (1 - share) * part))
-        return block | ({"q_values": q_values} if training and way != OWN else {})
-
-    def _trained_alone(self) -> Condition:
-        """The condition in which the ant was trained whose table is copied, or trained on."""
-        long = self._condition.way == COPIED_LONG
-        return replace(self._condition, way=COPIED_LONG if long else COPIED, ants=1)
-
-    def _train(self, start: np.ndarray | None, progress: Progress) -> np.ndarray:
-        from taichi_ants.engines.colony.colony import Colony
-
-        arena, training = self._arena, self._plan.training
-        episodes = _episodes(arena, self._condition)
-        exploring = max(1, round(_EXPLORING * episodes))
-        least = max(training.min_epsilon, 1e-6)
-        decay = min(1.0, (least / max(training.epsilon, least)) ** (1 / exploring))
-        colony = Colony(
-            arena.worlds,
-            self._task,
-            replace(training, epsilon_decay=decay),
-            arena.seeds,
-            ants=self._condition.ants,
-            sharing="own" if self._condition.way == OWN else "shared",
-            q_values=start,
-            **self._where,
-        )
-        colony.run(episodes, arena.ticks, progress)
-        return colony.q_values
-
-    def _evaluate(self, q_values: np.ndarray, progress: Progress) -> dict[str, np.ndarray]:
-        from taichi_ants.engines.colony.colony import Colony
-
-        arena = self._arena
-        least = self._plan.training.min_epsilon
-        colony = Colony(
-            arena.worlds,
-            self._task,
-            replace(self._plan.training, epsilon=least, epsilon_decay=1.0),
-            [seed + EVALUATION_SEEDS for seed in arena.seeds],
-            ants=self._condition.ants,
-            sharing="fixed",
-            q_values=q_values,
-            **self._where,
-        )
-        outcome = colony.run(arena.rollouts, arena.ticks, progress)
-        return {name: files.smallest(getattr(outcome, name).T) for name in _ARRAYS}
-
-
-def _episodes(arena: ArenaPlan, condition: Condition) -> int:
-    """Training episodes of a condition, 0 where it uses the tables of another."""
-    if condition.way == COPIED_LONG:
-        return arena.episodes * arena.long_factor if condition.ants == 1 else 0
-    return 0 if condition.way == COPIED and condition.ants > 1 else arena.episodes
-
-
-def _ant_ticks(arena: ArenaPlan, condition: Condition) -> tuple[int, int]:
-    """Ticks of training and of evaluation, of all ants and seeds."""
-    ticks = arena.ticks * condition.ants * len(arena.seeds)
-    return _episodes(arena, condition) * ticks, arena.rollouts * ticks
-
-
-def _weight(plan: StudyPlan, arena: ArenaPlan, condition: Condition) -> float:
-    training, evaluating = _ant_ticks(arena, condition)
-    return training * (1 + plan.training.planning_steps) + evaluating
-
-
-def _copy_single_ants(arena: ArenaPlan, records: dict[Condition, Record]) -> None:
-    """Fill in the conditions of one ant that are no different from being trained alone."""
-    for pheromone, ways in arena.ways.items():
-        alone = Condition(arena.name, pheromone, COPIED, 1)
-        for way in ways:
-            if alone in records:
-                records.setdefault(replace(alone, way=way), records[alone])
-
-
-def _arena(plan: ArenaPlan) -> Arena:
+def _arena(plan: ArenaPlan, seeds: tuple[int, ...]) -> Arena:
     """What the analysis needs to know of an arena, with the limits of its worlds."""
+    worlds = plan.world if isinstance(plan.world, tuple) else (plan.world,) * len(seeds)
     limits: dict[World, Limits] = {}
-    for world, seed in zip(plan.worlds, plan.seeds, strict=True):
+    for world, seed in zip(worlds, seeds, strict=True):
         if world not in limits:
             limits[world] = limits_of(world, seed)
     return Arena(
@@ -361,7 +204,7 @@ def _arena(plan: ArenaPlan) -> Arena:
         episodes=plan.episodes,
         ticks=plan.ticks,
         rollouts=plan.rollouts,
-        seeds=len(plan.seeds),
+        seeds=len(seeds),
         long_factor=plan.long_factor,
-        limits=tuple(limits[world] for world in plan.worlds),
+        limits=tuple(limits[world] for world in worlds),
     )

@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
-import multiprocessing
-import multiprocessing.resource_tracker
 import os
 import re
-import signal
 import sys
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -41,8 +37,8 @@ class Parser(argparse.ArgumentParser):
     program: str | None = None  # what --help calls it; None: the name of the script
 
     def __init__(self, description: str, **settings: Any) -> None:
+        settings.setdefault("prog", self.program)
         super().__init__(
-            self.program,
             description=description,
             formatter_class=_HelpFormatter,
             allow_abbrev=False,
@@ -70,6 +66,23 @@ class Parser(argparse.ArgumentParser):
         self.exit(EXIT_BAD_INPUT, f"error: {text}; see --help.\n")
 
 
+def add_common(parser: argparse.ArgumentParser) -> None:
+    """The options of all commands that compute something."""
+    add = parser.add_argument
+    add("--plugin", metavar="FILE", help="a Python file that registers learners or worlds")
+    add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
+    add("--arch", choices=("cpu", "cuda"), default="cpu", help="where kernels run")
+
+
+def add_results(parser: argparse.ArgumentParser, place: str) -> None:
+    """The options of commands with a folder of results."""
+    add = parser.add_argument
+    add("--out", type=Path, metavar="FOLDER", help=f"for the results (default: {place})")
+    add("--force", action="store_true", help="replace what FOLDER holds")
+    add("--no-figures", action="store_true", help="draw no figures")
+
+
+BESIDE_DEFAULTS = "results/{0}, and behind it what differs from the defaults, as in results/{0}-{1}"
 _NOT_IN_NAMES = ("out", "threads", "force", "no_figures", "no_render")  # they change no results
 _NAMED_BY_VALUE = ("world", "plugin")  # without the flag
 
@@ -94,13 +107,13 @@ def default_folder(
         default = usual.get(action.dest, action.default)
         if value in (argparse.SUPPRESS, default) or action.dest in _NOT_IN_NAMES:
             continue
+        flag = [action.option_strings[0].removeprefix("--")]
         if action.dest in _NAMED_BY_VALUE:
             parts.append(Path(value).stem)
         elif value is True:
-            parts.append(action.option_strings[0].removeprefix("--"))
+            parts += flag
         else:
-            values = value if isinstance(value, tuple) else (value,)
-            parts += [action.option_strings[0].removeprefix("--"), *map(str, values)]
+            parts += flag + [str(one) for one in (value if isinstance(value, tuple) else (value,))]
     return Path("results", re.sub(r"[^\w.+-]+", "_", "-".join(parts)))
 
 
@@ -241,59 +254,6 @@ def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
             bar.update(task, completed=share)
 
         yield update
-
-
-@contextmanager
-def process_beside(work: Callable[..., None], *arguments: object) -> Iterator[None]:
-    """Let a process of its own do some work beside what is done meanwhile; at the end wait for it.
-
-    Args:
-        work: A function of a module, called with the arguments. What it complains of is printed as
-            `run_command` does, and ends this command too.
-        arguments: What can be pickled.
-    """
-    # Spawned, since a fork of a process in which Taichi runs hangs.
-    context = multiprocessing.get_context("spawn")
-    process = context.Process(target=_work_apart, args=(work, arguments), daemon=True)
-    with _interruptions_for_this_process_only():
-        process.start()
-    try:
-        yield
-        process.join()
-    finally:
-        process.kill()
-        process.join()
-    if process.exitcode is not None and process.exitcode < 0:
-        raise AntsError("the system has stopped a process that worked here; make room, try again.")
-    if process.exitcode:
-        sys.exit(process.exitcode)
-
-
-def _work_apart(work: Callable[..., None], arguments: Sequence[object]) -> None:
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    run_command(lambda: work(*arguments))
-
-
-def _end_with_parent() -> None:
-    """A parent that was killed cannot end this process, which would write where others now work."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-    os._exit(EXIT_BAD_INPUT)
-
-
-@contextmanager
-def _interruptions_for_this_process_only() -> Iterator[None]:
-    """A process that is started inside never sees Ctrl-C or SIGTERM, which can be sent to all."""
-    if not hasattr(signal, "pthread_sigmask"):  # on Windows
-        yield
-        return
-    multiprocessing.resource_tracker.ensure_running()  # starting it would unblock signals
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def notice(text: str) -> None:

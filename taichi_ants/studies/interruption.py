@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any
@@ -20,7 +20,7 @@ _holds = 0
 
 def _note(number: int, frame: FrameType | None) -> None:
     _noted.append(number)
-    if not _holds:
+    if not _holds or len(_noted) > 2:  # who insists is not held up
         raise KeyboardInterrupt
 
 
@@ -38,7 +38,7 @@ def stoppable(message: str = "Stopped.") -> Iterator[None]:
     lets nobody watch signals.
 
     Args:
-        message: What to say on standard error.
+        message: What to say on standard error, if the interruption has no message of its own.
     """
     usual: dict[int, Any] = {
         signal.SIGINT: signal.default_int_handler,
@@ -58,7 +58,8 @@ def stoppable(message: str = "Stopped.") -> Iterator[None]:
             raise
         if sys.stderr is not None:
             with suppress(OSError):
-                print(message, file=sys.stderr)
+                own = isinstance(error, KeyboardInterrupt) and str(error)
+                print(own or message, file=sys.stderr)
         sys.exit(128 + (_noted[0] if _noted else signal.SIGINT))
     finally:
         sys.unraisablehook = hook
@@ -70,20 +71,24 @@ def stoppable(message: str = "Stopped.") -> Iterator[None]:
 
 
 @contextmanager
-def held() -> Iterator[None]:
-    """A signal waits until what is inside is done; for what takes a moment and must be whole."""
+def held() -> Iterator[Callable[[], bool]]:
+    """A signal waits until what is inside is done, which must be whole; a third one does not.
+
+    Yields:
+        Whether a signal has come.
+    """
     global _holds
     before = len(_noted)
     _holds += 1
     try:
-        yield
+        yield lambda: len(_noted) > before
     finally:
         _holds -= 1
-    if len(_noted) > before and not _holds:
-        raise KeyboardInterrupt
+    if len(_noted) > before:
+        stop_if_noted()
 
 
 def stop_if_noted() -> None:
-    """Raise KeyboardInterrupt if a signal came, but a library has swallowed it."""
-    if _noted:
+    """Raise KeyboardInterrupt if a signal came that a library has swallowed; not where it waits."""
+    if _noted and not _holds:
         raise KeyboardInterrupt

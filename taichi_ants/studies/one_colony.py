@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import os
-import signal
-import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from taichi_ants import files
-from taichi_ants.analysis.markdown import count
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, count
 
 if TYPE_CHECKING:
     from taichi_ants.engines.colony.colony import Colony
@@ -89,9 +84,13 @@ class Outputs:
 
 
 def live(
-    colony: Colony, ticks: int, outputs: Outputs, progress: Callable[[float], None]
-) -> tuple[Pace, int]:
-    """Let time pass in a colony, then write its files; Ctrl-C or SIGTERM end it at a whole tick.
+    colony: Colony,
+    ticks: int,
+    outputs: Outputs,
+    progress: Callable[[float], None],
+    stopped: Callable[[], bool],
+) -> Pace:
+    """Let time pass in a colony, then write its files.
 
     The colony is saved even if its picture or animation cannot be written.
 
@@ -100,34 +99,38 @@ def live(
         ticks: How many.
         outputs: What to write.
         progress: Called now and then with the share of the work that is done.
-
-    Returns:
-        How much was done, and the signal that stopped it before its end, 0 without one.
+        stopped: Asked between ticks whether to end.
 
     Raises:
         AntsError: A file cannot be written; the message says where the colony is, if it is saved.
     """
-    pace = Pace()
-    with stop_requests() as stop:
-        passing = let_time_pass(colony, ticks, pace, stop, outputs.every * outputs.animated)
-        shown = _with_progress(passing, ticks, progress)
-        try:
-            if outputs.render and outputs.animated:
-                _save_animation(outputs.render, colony, shown)
-            for _ in shown:  # what the animation has left, all without one
-                pass
-        except Exception as error:
-            # Pictures are drawn between ticks, so this one is whole, and may have taken hours.
-            _save(outputs, colony)
-            _report(error, outputs, colony)
-        _save(outputs, colony)
+    pace, failure = Pace(), None
+    passing = let_time_pass(colony, ticks, pace, stopped, outputs.every * outputs.animated)
+    shown = _with_progress(passing, ticks, progress)
+    try:
+        if outputs.animated:
+            _save_animation(str(outputs.render), colony, shown)
+        for _ in shown:  # what the animation has left, all without one
+            pass
         if outputs.render and not outputs.animated:
-            _save_picture(outputs.render, outputs, colony)
-    return pace, stop() if pace.ticks < ticks else 0
+            _save_picture(outputs.render, colony)
+    except Exception as error:
+        # Pictures are drawn between ticks, so this one is whole, and may have taken hours.
+        failure = error
+    if outputs.save:
+        colony.save(outputs.save)
+    if outputs.save and isinstance(failure, (AntsError, OSError)):
+        reason = str(failure).rstrip(".")
+        raise AntsError(
+            f"{reason}; the colony is saved in {outputs.save!r}, at tick {colony.ticks}."
+        ) from failure
+    if failure is not None:
+        raise failure
+    return pace
 
 
 def let_time_pass(
-    colony: Colony, ticks: int, pace: Pace, stop: Callable[[], int], every: int = 0
+    colony: Colony, ticks: int, pace: Pace, stopped: Callable[[], bool], every: int = 0
 ) -> Iterator[int]:
     """Move a colony on, piece by piece.
 
@@ -135,14 +138,14 @@ def let_time_pass(
         colony: In an episode.
         ticks: How many.
         pace: Is kept up to date.
-        stop: Asked before each piece whether to end.
+        stopped: Asked before each piece whether to end.
         every: Ticks of a piece; 0 chooses pieces of about a quarter of a second.
 
     Yields:
         After each piece the ticks that have passed.
     """
     piece, pieces = every or 1, 0
-    while pace.ticks < ticks and not stop():
+    while pace.ticks < ticks and not stopped():
         n = min(piece, ticks - pace.ticks)
         living = int(colony.outcome().living.sum())
         began = time.perf_counter()
@@ -159,63 +162,26 @@ def let_time_pass(
         yield pace.ticks
 
 
-@contextmanager
-def stop_requests() -> Iterator[Callable[[], int]]:
-    """Let Ctrl-C and SIGTERM ask for an end instead of causing it; a second one ends as ever.
-
-    What the parent process ignores, as nohup does, stays ignored. Signals reach the main thread
-    only; in others nothing is asked for.
-
-    Yields:
-        The signal that asked for an end, 0 while there was none.
-    """
-    requests: list[int] = []
-
-    def note(number: int, frame: object) -> None:
-        if requests:
-            _end_at_once(number)
-        requests.append(number)
-
-    main = threading.current_thread() is threading.main_thread()
-    numbers = (signal.SIGINT, signal.SIGTERM) if main else ()
-    heard = [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
-    previous = {number: signal.signal(number, note) for number in heard}
-    try:
-        yield lambda: requests[0] if requests else 0
-    finally:
-        for number, handler in previous.items():
-            signal.signal(number, handler)
-
-
-def _end_at_once(number: int) -> None:
-    if number == signal.SIGINT:
-        raise KeyboardInterrupt
-    raise SystemExit(128 + number)
-
-
 def summary(colony: Colony, pace: Pace) -> str:
     """What happened, in two lines; a third one if no ant can be born any more."""
     outcome = {name: int(array.sum()) for name, array in vars(colony.outcome()).items()}
-    places = colony.config.slots * len(colony.seeds)
-    full = colony.config.births and outcome["living"] == places
     blocked = 100 * outcome["blocked"] / max(1, outcome["moves"])
     changes = [count(outcome[f"{one}s"], one) for one in ("birth", "death") if outcome[f"{one}s"]]
     changes += [f"{outcome['regrown']} regrown"] if outcome["regrown"] else []
     colonies = f" in {len(colony.seeds)} colonies" if len(colony.seeds) > 1 else ""
-    return (
+    lines = [
         f"{count(outcome['living'], 'ant')}{colonies}, {count(pace.ticks, 'tick')}: "
-        f"{pace.steps_per_second / 1e6:.2f} million ant-steps per second.\n"
+        f"{pace.steps_per_second / 1e6:.2f} million ant-steps per second.",
         f"{count(outcome['deliveries'], 'delivery')} by tick {colony.ticks}, "
-        f"{', '.join([f'{blocked:.1f} % of the moves blocked', *changes])}."
-        + (_crowded(places, colony.waiting_foods) if full else "")
-    )
-
-
-def _crowded(places: int, foods: int) -> str:
-    waiting = f"{count(foods, 'food')} {'waits' if foods == 1 else 'wait'}"
-    return (
-        f"\n{places} of {places} places are taken, {waiting} at the queen; --capacity gives more."
-    )
+        f"{', '.join([f'{blocked:.1f} % of the moves blocked', *changes])}.",
+    ]
+    places, foods = colony.population.slots * len(colony.seeds), colony.waiting_foods
+    if colony.task.life.births and outcome["living"] == places:
+        waiting = f"{count(foods, 'food')} {'waits' if foods == 1 else 'wait'}"
+        lines.append(
+            f"{places} of {places} places are taken, {waiting} at the queen; --capacity gives more."
+        )
+    return "\n".join(lines)
 
 
 def _with_progress(
@@ -227,35 +193,13 @@ def _with_progress(
 
 
 def _save_animation(path: str, colony: Colony, passing: Iterator[int]) -> None:
-    from taichi_ants.rendering import colony_picture, save_animation
+    from taichi_ants.rendering import colony_moments, frames, save_animation
 
-    def frames() -> Iterator[np.ndarray]:
-        yield colony_picture(colony)
-        for _ in passing:
-            yield colony_picture(colony)
-
-    save_animation(path, frames(), FRAMES_PER_SECOND)
+    moments = (moment for _ in chain([0], passing) for moment in colony_moments(colony))
+    save_animation(path, frames(moments), FRAMES_PER_SECOND)
 
 
-def _save_picture(path: str, outputs: Outputs, colony: Colony) -> None:
-    from taichi_ants.rendering import colony_picture, save_picture
+def _save_picture(path: str, colony: Colony) -> None:
+    from taichi_ants.rendering import colony_moments, frames, save_picture
 
-    try:
-        save_picture(path, colony_picture(colony))
-    except Exception as error:
-        _report(error, outputs, colony)
-
-
-def _save(outputs: Outputs, colony: Colony) -> None:
-    if outputs.save:
-        colony.save(outputs.save)
-
-
-def _report(error: Exception, outputs: Outputs, colony: Colony) -> NoReturn:
-    """Raise the error, saying where the colony has been saved if it has."""
-    if not outputs.save or not isinstance(error, (AntsError, OSError)):
-        raise error
-    reason = str(error).rstrip(".")
-    raise AntsError(
-        f"{reason}; the colony is saved in {outputs.save!r}, at tick {colony.ticks}."
-    ) from error
+    save_picture(path, next(frames(colony_moments(colony))))

@@ -14,26 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from taichi_ants import __version__
-from taichi_ants.studies.sweeps import Sweep
 from taichi_ants.worlds.world import World
 
 _PACKAGES = ("taichi", "numpy", "scipy", "matplotlib")
-
-
-def sweep_settings(sweep: Sweep) -> dict[str, Any]:
-    """All that determines the numbers of a sweep; equal settings give equal results."""
-    return {
-        "version": __version__,
-        "world": world_facts(sweep.world),
-        "points": [
-            {"task": task.as_dict(), "training": config.as_dict()}
-            for task, config in zip(sweep.tasks, sweep.configs, strict=True)
-        ],
-        "seeds": list(sweep.seeds),
-        "episodes": sweep.episodes,
-        "max_steps": sweep.max_steps,
-        "rollouts": sweep.rollouts,
-    }
 
 
 def world_facts(world: World) -> dict[str, Any]:

@@ -10,7 +10,10 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Collection, Iterable, Iterator, Mapping
+import sys
+import time
+from argparse import Namespace
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
@@ -18,6 +21,7 @@ from typing import IO, Any
 from taichi_ants import files
 from taichi_ants.errors import AntsError
 from taichi_ants.studies.interruption import held
+from taichi_ants.studies.provenance import provenance
 
 try:
     import fcntl
@@ -29,6 +33,49 @@ _UNFINISHED = "unfinished"
 _SETTINGS = "settings.json"
 _LOCK = "lock"
 BLOCKS, READY = "blocks", "ready"
+REPORT = "report.txt"  # what commands print
+PICTURES = ("figures", "renders")  # can be drawn again from the other results
+
+
+def work_or_show(
+    settings: Namespace,
+    determines: Mapping[str, Any],
+    work: Callable[[Path, Path], Mapping[str, Any] | None],
+    pictures: Mapping[str, Callable[[Path, Path], None]],
+) -> None:
+    """Do the work of a command, or show what its folder holds already; print the report.
+
+    Args:
+        settings: The command's `out`, `force`, `plugin` and `arch`.
+        determines: What determines the results besides these.
+        work: Called with a folder for blocks and one for the results, among them the report.
+            Returns what the manifest says besides where the results come from.
+        pictures: What is drawn from the results, at once or later: the folder's name, and a
+            function of the folder of the results and of the one in which to make it.
+
+    Raises:
+        AntsError: The folder holds something else, cannot be written, or was altered.
+    """
+    plugin = files.file_hash(settings.plugin) if settings.plugin else None
+    folder = ResultFolder(settings.out, {**determines, "arch": settings.arch, "plugin": plugin})
+    if folder.is_finished() and not settings.force:
+        folder.check_whole(apart_from=PICTURES)
+        print(files.read_text(folder.path / REPORT))
+        for name, draw in pictures.items():
+            if folder.lacks(name):
+                with folder.addition() as place:
+                    draw(folder.path, place)
+        print(f"{settings.out}/ holds these results already; --force makes them again.")
+        return
+    began = time.perf_counter()
+    with folder.work(settings.force) as (blocks, ready):
+        manifest = work(blocks, ready) or {}
+        for draw in pictures.values():
+            draw(ready, ready)
+        report = files.read_text(ready / REPORT)
+        seconds = time.perf_counter() - began
+        folder.publish({**provenance(sys.argv), "seconds": seconds, **manifest})
+    print(f"{report}\n{seconds:.1f} s; everything is in {settings.out}/")
 
 
 class ResultFolder:

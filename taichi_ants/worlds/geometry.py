@@ -32,28 +32,32 @@ def closer(grid: AxialGrid, cell: tuple[int, int, int]) -> np.ndarray:
     return bits.reshape(-1)
 
 
-def reachable(
-    grid: AxialGrid, ground: np.ndarray, start: tuple[int, int, int], targets: np.ndarray
-) -> np.ndarray:
-    """Which targets have a neighbour that can be walked to over empty cells.
+def walkable(grid: AxialGrid, ground: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """bool (grid.size,): empty cells to which a way over empty cells leads.
 
     Args:
         grid: The world's grid.
         ground: uint8 (grid.size,), what the cells hold.
-        start: The walk begins on any empty neighbour of this cell.
-        targets: Cells, int32 (n, 3).
-
-    Returns:
-        bool (n,).
+        starts: Flat indices of cells; the way begins on any of them that is empty.
     """
     # Importing scipy.ndimage takes longer than all else here, and most worlds never need it.
     from scipy.ndimage import label
 
     regions, _ = label(ground.reshape(grid.height, grid.width) == EMPTY, structure=_NEIGHBOURS)
     regions = regions.reshape(-1)
-    home = regions[grid.index(start) + grid.offsets]
-    around = regions[grid.index(targets)[:, None] + grid.offsets]
-    return np.any(np.isin(around, home[home > 0]), axis=1)
+    home = regions[starts]
+    return np.isin(regions, home[home > 0])
+
+
+def reachable(
+    grid: AxialGrid, ground: np.ndarray, start: tuple[int, int, int], targets: np.ndarray
+) -> np.ndarray:
+    """bool (n,): which targets, cells int32 (n, 3), have a neighbour to which a way leads.
+
+    The way leads over empty cells and begins on any empty neighbour of the cell `start`.
+    """
+    found = walkable(grid, ground, grid.index(start) + grid.offsets)
+    return np.any(found[grid.index(targets)[:, None] + grid.offsets], axis=1)
 
 
 def _distances_with_border(grid: AxialGrid, cell: tuple[int, int, int]) -> np.ndarray:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from taichi_ants.errors import AntsError, shown, whole
 from taichi_ants.worlds.text_map import load_map
 from taichi_ants.worlds.world import World
 
-Builder = Callable[[int], World]
+Builder = Callable[..., World]
 
 _BUILDERS: dict[str, Builder] = {}
 
@@ -21,6 +23,7 @@ def register(name: str, builder: Builder) -> None:
     Args:
         name: A new name.
         builder: Called with a seed (int), returns a `World`; the same seed must give the same.
+            Further arguments, which need defaults, are settings of the world, see `settings`.
 
     Raises:
         AntsError: The name is taken or no name, or the builder cannot be called.
@@ -41,6 +44,13 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(_BUILDERS))
 
 
+def settings(name_or_path: str) -> tuple[str, ...]:
+    """The settings that a registered world has besides its seed; a map has none."""
+    if name_or_path not in _BUILDERS:
+        return ()
+    return tuple(inspect.signature(_BUILDERS[name_or_path]).parameters)[1:]
+
+
 def check_seed_counts(name_or_path: str) -> None:
     """Make sure that a seed can change the world; AntsError if it is the paper's or a map."""
     drawn = [name for name in names() if name != "paper"]
@@ -51,19 +61,25 @@ def check_seed_counts(name_or_path: str) -> None:
         )
 
 
-def build(name_or_path: str | os.PathLike[str], seed: int = 0) -> World:
+def build(name_or_path: str | os.PathLike[str], seed: int = 0, **given: Any) -> World:
     """The world of a registered name, or of the text map in a file.
 
     Args:
         name_or_path: A registered name (it goes before a file of that name) or a path.
         seed: Any whole number; what it changes is up to the builder, a file ignores it.
+        given: Settings of the world, see `settings`.
 
     Raises:
         AntsError: There is neither such a name nor such a file, or building fails.
     """
     seed = whole("seed", seed)
+    allowed = settings(name_or_path) if isinstance(name_or_path, str) else ()
+    for name in given:
+        if name not in allowed:
+            has = f"it has {', '.join(allowed)}" if allowed else "it has none"
+            raise AntsError(f"{name} is no setting of the world {shown(name_or_path)}; {has}.")
     if isinstance(name_or_path, str) and name_or_path in _BUILDERS:
-        world = _build(name_or_path, seed)
+        world = _build(name_or_path, seed, given)
         if not isinstance(world, World):
             raise AntsError(
                 f"the builder of {shown(name_or_path)} returned a {type(world).__name__}; "
@@ -77,9 +93,9 @@ def build(name_or_path: str | os.PathLike[str], seed: int = 0) -> World:
     return load_map(name_or_path)
 
 
-def _build(name: str, seed: int) -> object:
+def _build(name: str, seed: int, given: dict[str, Any]) -> object:
     try:
-        return _BUILDERS[name](seed)
+        return _BUILDERS[name](seed, **given)
     except AntsError:
         raise
     except Exception as error:

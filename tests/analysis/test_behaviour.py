@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from taichi_ants import AntsError, rollout, train
+from taichi_ants import AntsError, Task, rollout, train
 from taichi_ants.analysis.behaviour import (
     BEHAVIOURS,
     CIRCLES,
@@ -23,6 +23,7 @@ from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT, SEES
 from taichi_ants.task.states import parse_state, state_from_index
 from taichi_ants.worlds import paper
 
+STILL = Task(evaporation_in_evaluation=False)
 STEPS = 600
 
 
@@ -71,7 +72,7 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_constructed_policies(name):
     table, expected = CASES[name]
-    trace = rollout(paper(), table, 0, max_steps=STEPS, evaporation=False)
+    trace = rollout(paper(), table, 0, max_steps=STEPS, task=STILL)
     (found,), (earned,) = classify(trace, STEPS)
     assert BEHAVIOURS[found] == BEHAVIOURS[expected]
     assert earned == trace.rewards.sum()
@@ -81,24 +82,24 @@ def test_the_exact_cases():
     """Absorbing Dyna-Q at discount 0.99: runs that reach the bound of trail walking, and others."""
     config = TrainingConfig("dyna_q", 0.01, 0.99, 0.5, 0.995, planning_steps=5)
     tables = train(paper(), config, range(12)).q_values[0]
-    (trace,) = trace_policies(paper(), tables, range(12), STEPS, evaporation=False)
+    (trace,) = trace_policies(paper(), tables, range(12), STEPS, task=STILL)
     found, earned = classify(trace, STEPS)
     assert set(found) == {WALKS, CIRCLES}
     # The optimal policy of that discount returns 476 and never delivers, see baselines.csv.
     assert earned[found == WALKS].max() == 476
     assert earned[found == CIRCLES].min() > 200
     for number, table in enumerate(tables):  # what a single rollout shows
-        alone = rollout(paper(), table, number, max_steps=STEPS, evaporation=False)
+        alone = rollout(paper(), table, number, max_steps=STEPS, task=STILL)
         assert classify(alone, STEPS)[0] == found[number]
 
 
 def test_traces_of_many_policies_are_single_rollouts():
     tables = [table for table, _ in CASES.values()]
     seeds = [3, 4, 3, -1, 2**64 - 2, 5, 6]
-    for evaporation in (False, True):
-        (trace,) = trace_policies(paper(), tables, seeds, 90, evaporation)
+    for task in (STILL, Task()):
+        (trace,) = trace_policies(paper(), tables, seeds, 90, task)
         for number, (table, seed) in enumerate(zip(tables, seeds, strict=True)):
-            alone = rollout(paper(), table, seed, max_steps=90, evaporation=evaporation)
+            alone = rollout(paper(), table, seed, max_steps=90, task=task)
             mine = trace.episodes == number
             assert mine.sum() == len(alone)
             for name in ("steps", "cells", "headings", "states", "actions", "rewards"):

@@ -24,12 +24,24 @@ from command_lines import (
     start,
 )
 
-from taichi_ants import Colony, ColonyConfig, Pheromone, TrainingConfig, load_policy, worlds
+from taichi_ants import Colony, Life, Pheromone, Task, TrainingConfig, load_policy, worlds
 from taichi_ants.learners import registry
 
 SEEDS, EPISODES, TICKS, ROLLOUTS = (3, 4), 4, 80, 2
 SMALL = [
-    *("--arenas", "paper", "open", "--sizes", 1, 3, "--seeds", len(SEEDS), "--seed", SEEDS[0]),
+    *(
+        "study",
+        "--arenas",
+        "paper",
+        "open",
+        "--sizes",
+        1,
+        3,
+        "--seeds",
+        len(SEEDS),
+        "--seed",
+        SEEDS[0],
+    ),
     *("--episodes", EPISODES, "--ticks", TICKS, "--rollouts", ROLLOUTS),
 ]
 FILES = {
@@ -60,32 +72,33 @@ def test_all_files_are_there(finished):
         rows = list(csv.DictReader(file))
     assert len(rows) == 2 * (5 + 4 + 4) * 2
     manifest = json.loads((folder / "manifest.json").read_text("utf-8"))
-    assert manifest["settings"]["training"]["learner"] == "sarsa"
-    assert manifest["settings"]["arenas"][0]["seeds"] == list(SEEDS)
+    assert manifest["settings"]["training.learner"] == "sarsa"
+    assert manifest["settings"]["seeds"] == list(SEEDS)
 
 
-TRAINING = TrainingConfig(
-    "sarsa", 0.1, 0.9, 0.3, (0.01 / 0.3) ** (1 / 3), min_epsilon=0.01, delivery="continuing"
-)
+TRAINING = TrainingConfig("sarsa", 0.1, 0.9, 0.3, (0.01 / 0.3) ** (1 / 3), min_epsilon=0.01)
+GREEDY = TrainingConfig("sarsa", 0.1, 0.9, 0.01, 1.0, min_epsilon=0.01)
+
+
+def task(pheromone=Pheromone(), life=Life(regrowth=0)):  # noqa: B008 - both are frozen
+    return Task(pheromone=pheromone, delivery="continuing", evaporation_in_training=True, life=life)
 
 
 def test_the_numbers_are_those_of_the_library(finished):
     """Three ants in open worlds without trails: trained alone, then jointly, then evaluated."""
     _, folder = finished
     world = [worlds.open_world(seed, (30, 30, 30)) for seed in SEEDS]
-    off = Pheromone(deposit="none")
-    alone = Colony(world, ColonyConfig(1, pheromone=off, regrowth=0), TRAINING, SEEDS)
+    off = task(Pheromone(deposit="none"))
+    alone = Colony(world, off, TRAINING, SEEDS)
     alone.run(EPISODES, TICKS)
-    life = ColonyConfig(3, pheromone=off, regrowth=0)
-    together = Colony(world, life, TRAINING, SEEDS, q_values=alone.q_values)
+    together = Colony(world, off, TRAINING, SEEDS, 3, q_values=alone.q_values)
     together.run(EPISODES, TICKS)
     assert not np.array_equal(alone.q_values, together.q_values)
 
-    greedy = TrainingConfig("sarsa", 0.1, 0.9, 0.01, 1.0, min_epsilon=0.01, delivery="continuing")
     others = [seed + 2**32 for seed in SEEDS]
     with np.load(folder / "episodes.npz") as archive:
         for way, table in (("copied", alone.q_values), ("then_joint", together.q_values)):
-            colony = Colony(world, life, greedy, others, "fixed", table)
+            colony = Colony(world, off, GREEDY, others, 3, sharing="fixed", q_values=table)
             outcome = colony.run(ROLLOUTS, TICKS)
             for name in ("deliveries", "first_delivery", "moves", "blocked", "returns"):
                 stored = archive[f"open.off.{way}.3.{name}"]
@@ -94,12 +107,11 @@ def test_the_numbers_are_those_of_the_library(finished):
 
 def test_tables_of_ones_own_are_trained_and_kept_apart(finished):
     _, folder = finished
-    life = ColonyConfig(3, regrowth=0)
-    own = Colony(worlds.paper(), life, TRAINING, SEEDS, "own")
+    own = Colony(worlds.paper(), task(), TRAINING, SEEDS, 3, sharing="own")
     own.run(EPISODES, TICKS)
-    greedy = TrainingConfig("sarsa", 0.1, 0.9, 0.01, 1.0, min_epsilon=0.01, delivery="continuing")
     others = [seed + 2**32 for seed in SEEDS]
-    colony = Colony(worlds.paper(), life, greedy, others, "fixed", own.q_values)
+    fixed = {"sharing": "fixed", "q_values": own.q_values}
+    colony = Colony(worlds.paper(), task(), GREEDY, others, 3, **fixed)
     outcome = colony.run(ROLLOUTS, TICKS)
     with np.load(folder / "episodes.npz") as archive:
         np.testing.assert_array_equal(archive["paper.on.own.3.moves"], outcome.moves.T)
@@ -119,11 +131,11 @@ def test_a_finished_study_is_shown_and_nothing_is_lost(finished, tmp_path, kerne
     again = run("colony", [*SMALL, "--out", folder], kernels, tmp_path)
     assert again.returncode == 0
     assert again.stdout.startswith((folder / "report.txt").read_text("utf-8"))
-    assert "holds this study already" in again.stdout
+    assert "holds these results already" in again.stdout
     other = run("colony", [*SMALL, "--out", folder, "--learner", "dyna_q"], kernels, tmp_path)
     assert other.returncode == 2
     assert_one_sentence(other.stderr)
-    assert "training" in other.stderr
+    assert "training.learner" in other.stderr
     assert contents(folder) == before
 
 
@@ -134,11 +146,13 @@ def test_a_finished_study_is_shown_and_nothing_is_lost(finished, tmp_path, kerne
         ("--seeds 20 --epsilon 0.3 --threads 1 --no-figures", "colony"),
         ("--quick --seeds 8", "colony-quick"),
         ("--sizes 1 8 --quick", "colony-sizes-1-8-quick"),
-        ("--learner dyna_q --arenas paper", "colony-learner-dyna_q-arenas-paper"),
+        ("--learner dyna_q --arenas paper", "colony-arenas-paper-learner-dyna_q"),
     ],
 )
 def test_default_folders_tell_what_is_run(arguments, folder):
-    assert load("colony").parse_arguments(arguments.split()).out == Path("results", folder)
+    assert load("colony").parse_arguments(["study", *arguments.split()]).out == Path(
+        "results", folder
+    )
 
 
 def blocks_in(folder):
@@ -194,38 +208,40 @@ def test_stopped_and_killed_it_goes_on_to_the_same_results(finished, kernels, tm
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (["--quick", "--ants", 3], "--quick is for the study"),
-        (["--save", "x"], "--save is for one colony"),
-        (["--resume", "x", "--regrowth", 0], "--regrowth cannot change a colony that is resumed"),
-        (["--resume", "x", "--discount", 0.5], "--discount cannot change a colony"),
-        (["--resume", "x", "--seed", 7], "--seed cannot change a colony that is resumed"),
-        (["--resume", "x", "--learner", "sarsa"], "--learner cannot change a colony"),
-        (["--resume", "x", "--births"], "--births cannot change a colony"),
-        (["--every", 2], "--every is for one colony"),
-        (["--ants", 2, "--capacity", 5], "--capacity is for colonies in which ants are born"),
-        (["--ants", 2, "--cap", 5], "cap is 5, but deposit is 'set'"),
-        (["--ants", 2, "--save", "x.png", "--render", "x.png"], "are one place"),
-        (["--resume", "x"], "cannot read 'x'"),
-        (["--arenas", "moon"], "'moon' is no arena, choose of paper, open, large"),
-        (["--sizes", 300, "--arenas", "paper"], "300 ants do not fit into the paper's world"),
-        (["--learner", "none"], "there is no learner 'none'"),
-        (["--epsilon", 2], "epsilon is 2.0"),
-        (["--ants", 0], "0 is not allowed"),
-        (["--ants", 500, "--ranges", 10, 10, 10], "500 ants are asked for"),
-        (["--ants", 2, "--world", "paper", "--ranges", 9, 9, 9], "--ranges are those of an open"),
-        (["--ants", 2, "--world", "nowhere"], "there is no world named 'nowhere'"),
-        (["--ants", 9, "--births", "--capacity", 5], "capacity is 5, but 9 ants start"),
-        (["--ants", 2, "--render", "x.bmp"], "'x.bmp' ends in '.bmp'"),
-        (["--ants", 2, "--save", "/proc/x/y"], "cannot write to the folder '/proc/x'"),
-        (["--ants", 2, "--save", "."], "'.' is a folder"),
-        (["--ants", 2, "--diffusion", 2], "diffusion is 2.0"),
+        ([], "study|live"),
+        (["play"], "invalid choice: 'play'"),
+        (["--ants", 2], "invalid choice: '2'"),
+        (["live", "--quick"], "unrecognized arguments: --quick"),
+        (["study", "--save", "x"], "unrecognized arguments: --save x"),
+        (["live", "--resume", "x", "--regrowth", 0], "--regrowth cannot change a colony that is"),
+        (["live", "--resume", "x", "--discount", 0.5], "--discount cannot change a colony"),
+        (["live", "--resume", "x", "--seed", 0], "--seed cannot change a colony that is resumed"),
+        (["live", "--resume", "x", "--learner", "sarsa"], "--learner cannot change a colony"),
+        (["live", "--resume", "x", "--births"], "--births cannot change a colony"),
+        (["live", "--capacity", 5], "--capacity is for colonies in which ants are born"),
+        (["live", "--cap", 5], "cap is 5, but deposit is 'set'"),
+        (["live", "--save", "x.png", "--render", "x.png"], "are one place"),
+        (["live", "--resume", "x"], "cannot read 'x'"),
+        (["study", "--arenas", "moon"], "'moon' is no arena, choose of paper, open, large"),
+        (["study", "--sizes", 300, "--arenas", "paper"], "300 ants are asked for"),
+        (["study", "--learner", "none"], "there is no learner 'none'"),
+        (["study", "--epsilon", 2], "epsilon is 2.0"),
+        (["live", "--ants", 0], "0 is not allowed"),
+        (["live", "--ants", 500, "--ranges", 10, 10, 10], "500 ants are asked for"),
+        (["live", "--world", "paper", "--ranges", 9, 9, 9], "--ranges are those of an open"),
+        (["live", "--world", "nowhere"], "there is no world named 'nowhere'"),
+        (["live", "--births", "--capacity", 5], "capacity is 5, but 80 ants start"),
+        (["live", "--render", "x.bmp"], "'x.bmp' ends in '.bmp'"),
+        (["live", "--save", "/proc/x/y"], "cannot write to the folder '/proc/x'"),
+        (["live", "--save", "."], "'.' is a folder"),
+        (["live", "--diffusion", 2], "diffusion is 2.0"),
         (
-            ["--ants", 2, "--half-life", 5, "--evaporation", "none"],
+            ["live", "--half-life", 5, "--evaporation", "none"],
             "half_life is 5.0, but evaporation is 'none'",
         ),
-        (["--ants", 2, "--sharing", "fixed"], "sharing is 'fixed', but q_values is None"),
-        (["--ants", 2, "--policy", "x.npz"], "cannot read 'x.npz'"),
-        (["--ants", 2, "--plugin", "x.py"], "cannot read the plugin"),
+        (["live", "--sharing", "fixed"], "sharing is 'fixed', but q_values is None"),
+        (["live", "--policy", "x.npz"], "cannot read 'x.npz'"),
+        (["live", "--plugin", "x.py"], "cannot read the plugin"),
     ],
 )
 def test_mistakes_end_in_one_sentence(arguments, expected, capsys, tmp_path, monkeypatch):
@@ -249,7 +265,7 @@ def test_a_learner_that_makes_no_numbers_is_named(capsys, tmp_path, monkeypatch)
         'register(Learner("lost", td_error))',
     ]
     Path("lost.py").write_text("\n".join(lines), "utf-8")
-    arguments = ["--ants", 10, "--plugin", "lost.py", "--learner", "lost", "--ticks", 100]
+    arguments = ["live", "--ants", 10, "--plugin", "lost.py", "--learner", "lost", "--ticks", 100]
     for more in ([], ["--save", "lost.npz"]):
         status, out, err = call("colony", [*arguments, *more], capsys)
         assert (status, out) == (2, "")
@@ -264,7 +280,7 @@ def test_a_learner_that_makes_no_numbers_is_named(capsys, tmp_path, monkeypatch)
 
 
 LIFE = [
-    *("--ants", 40, "--ranges", 20, 20, 20, "--births", "--capacity", 60, "--lifespan", 90),
+    *("live", "--ants", 40, "--ranges", 20, 20, 20, "--births", "--capacity", 60, "--lifespan", 90),
     *("--regrowth", 3, "--wander", 20, "--half-life", 30, "--diffusion", 0.1, "--deposit", "add"),
     *("--level", 90, "--cap", 170),
     *("--learner", "q_learning", "--seed", 5),
@@ -280,7 +296,7 @@ def test_a_colony_that_is_saved_and_resumed_is_the_one_that_lived_on(capsys, tmp
     assert "million ant-steps per second" in out
     assert "deliveries by tick 120" in out
     assert call("colony", [*LIFE, "--ticks", 50, "--save", "part.npz"], capsys)[0] == 0
-    more = ["--resume", "part.npz", "--ticks", 70, "--save", "part.npz"]
+    more = ["live", "--resume", "part.npz", "--ticks", 70, "--save", "part.npz"]
     status, out, _ = call("colony", [*more, "--render", "rest.gif", "--every", 7], capsys)
     assert status == 0
     assert "ants, 70 ticks: " in out
@@ -299,9 +315,10 @@ def test_a_colony_as_the_library_makes_it(capsys, tmp_path, monkeypatch):
     pheromone = Pheromone(
         "exponential", half_life=30.0, diffusion=0.1, deposit="add", level=90, cap=170
     )
-    life = ColonyConfig(40, 60, pheromone, births=True, lifespan=90, regrowth=3, wander=20)
-    training = TrainingConfig("q_learning", 0.1, 0.9, 0.1, 1.0, 0.1, delivery="continuing")
-    colony = Colony(worlds.open_world(5, (20, 20, 20)), life, training, 5)
+    life = Life(births=True, lifespan=90, regrowth=3, wander=20)
+    training = TrainingConfig("q_learning", 0.1, 0.9, 0.1, 1.0, 0.1)
+    world = worlds.open_world(5, (20, 20, 20))
+    colony = Colony(world, task(pheromone, life), training, 5, 40, 60)
     colony.run(1, 90)
     saved = Colony.load("colony.npz")
     np.testing.assert_array_equal(saved.q_values, colony.q_values)
@@ -310,7 +327,7 @@ def test_a_colony_as_the_library_makes_it(capsys, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(("sent", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_stopped_a_colony_is_saved_at_a_whole_tick(sent, status, kernels, tmp_path, monkeypatch):
-    arguments = ["--ants", 60, "--world", "paper", "--ticks", 10_000_000, "--regrowth", 0]
+    arguments = ["live", "--ants", 60, "--world", "paper", "--ticks", 10_000_000, "--regrowth", 0]
     process = start("colony", [*arguments, "--save", "colony.npz"], kernels, tmp_path)
     time.sleep(5)  # it has begun, and would take half a minute
     began = time.perf_counter()
@@ -322,8 +339,8 @@ def test_stopped_a_colony_is_saved_at_a_whole_tick(sent, status, kernels, tmp_pa
     assert err == f"Stopped at tick {ticks}; --resume colony.npz goes on from there.\n"
     assert f"60 ants, {ticks} ticks: " in out
     monkeypatch.chdir(tmp_path)
-    training = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0, 0.1, delivery="continuing")
-    colony = Colony(worlds.paper(), ColonyConfig(60, regrowth=0), training, 0)
+    training = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0, 0.1)
+    colony = Colony(worlds.paper(), task(), training, 0, 60)
     colony.run(1, ticks)
     saved = Colony.load("colony.npz")
     np.testing.assert_array_equal(saved.q_values, colony.q_values)
@@ -332,7 +349,7 @@ def test_stopped_a_colony_is_saved_at_a_whole_tick(sent, status, kernels, tmp_pa
 
 def test_a_colony_starts_from_a_policy(finished, capsys):
     policy = finished[1] / "policies" / "paper_alone.npz"
-    fixed = ["--ants", 2, "--world", "paper", "--ticks", 60, "--sharing", "fixed"]
+    fixed = ["live", "--ants", 2, "--world", "paper", "--ticks", 60, "--sharing", "fixed"]
     assert call("colony", [*fixed, "--policy", policy, "--regrowth", 0], capsys)[0] == 0
 
 
@@ -340,17 +357,17 @@ def test_colonies_live_side_by_side_and_can_start_spread(capsys, tmp_path, monke
     monkeypatch.chdir(tmp_path)
     where = ["--ranges", 20, 20, 20, "--regrowth", 0, "--ticks", 60, "--seed", 3, "--save", "x.npz"]
     for place in ("nest", "spread"):
-        many = ["--ants", 9, "--colonies", 5, "--start", place]
+        many = ["live", "--ants", 9, "--colonies", 5, "--start", place]
         status, out, err = call("colony", [*many, *where], capsys)
         assert (status, err) == (0, "")
         assert out.startswith("45 ants in 5 colonies, 60 ticks: ")
         colony = Colony.load("x.npz")
-        assert colony.config == ColonyConfig(9, regrowth=0, start=place)
+        assert (colony.task, colony.population.start) == (task(), place)
         assert colony.seeds == (3, 4, 5, 6, 7)
         world = worlds.open_world(3, (20, 20, 20))
         assert set(colony.worlds) == {world}
-        training = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0, 0.1, delivery="continuing")
-        alone = Colony(world, colony.config, training, 5)
+        training = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0, 0.1)
+        alone = Colony(world, task(), training, 5, 9, start=place)
         alone.begin_episode()
         alone.tick(60)
         assert alone.outcome().deliveries[0, 0] == colony.outcome().deliveries[0, 2]
@@ -359,10 +376,18 @@ def test_colonies_live_side_by_side_and_can_start_spread(capsys, tmp_path, monke
         assert np.array_equal(colony.layout.start_cells[2], cells)
 
 
-def test_help_is_quick_and_needs_no_taichi(tmp_path):
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        ("", ("study", "live")),
+        ("study", ("--quick", "--arenas", "--sizes", "--learner", "--force")),
+        ("live", ("--ants", "--ranges", "--save", "--resume", "--render", "--half-life")),
+    ],
+)
+def test_help_is_quick_and_needs_no_taichi(arguments, expected, tmp_path):
     script = (
         "import runpy, sys\n"
-        "sys.argv = ['colony.py', '--help']\n"
+        f"sys.argv = ['colony.py', *{arguments.split()!r}, '--help']\n"
         "try:\n"
         f"    runpy.run_path({str(EXPERIMENTS / 'colony.py')!r}, run_name='__main__')\n"
         "except SystemExit as end:\n"
@@ -378,8 +403,8 @@ def test_help_is_quick_and_needs_no_taichi(tmp_path):
         timeout=60,
     )
     assert done.stdout.endswith("heavy: []\n")
-    for flag in ("--ants", "--ranges", "--save", "--resume", "--render", "--quick", "--arenas"):
-        assert f"  {flag}" in done.stdout
+    for word in expected:
+        assert f"  {word}" in done.stdout
 
 
 def test_the_guides_example_works(capsys):

@@ -6,7 +6,6 @@ import csv
 import json
 import re
 import shutil
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +14,7 @@ import pytest
 from command_lines import EXPERIMENTS, assert_one_sentence, call, contents, load, run
 
 from taichi_ants import (
+    Task,
     TrainingConfig,
     continue_training,
     evaluate,
@@ -25,8 +25,7 @@ from taichi_ants import (
 from taichi_ants.analysis.behaviour import DELIVERS
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.commands import compare as commands
-from taichi_ants.rendering import Episode, episode_frames, save_animation, text
-from taichi_ants.rendering.episodes import DEFAULT_FPS, with_pause
+from taichi_ants.rendering import PAUSE, Episode, frames, save_animation, text
 
 GARDEN = EXPERIMENTS / "maps" / "garden.txt"
 SEEDS, EPISODES, MAX_STEPS, ROLLOUTS = (7, 8, 9), 60, 45, 50
@@ -115,9 +114,25 @@ def config_of(row):
     """The configuration that a row of summary.csv names."""
     numbers = [float(row[name]) for name in COLUMNS[2:6]]
     planning = int(row["planning_steps"])
-    return TrainingConfig(
-        row["learner"], *numbers, planning_steps=planning, delivery=row["delivery"]
+    more = {"planning_steps": planning} if planning else {}
+    return TrainingConfig(row["learner"], *numbers, **more)
+
+
+def task_of(row, training=False, greedy=True):
+    """The task that a row names, with these evaporations."""
+    return Task(
+        delivery=row["delivery"], evaporation_in_training=training, evaporation_in_evaluation=greedy
     )
+
+
+def trained_as(rows, *more):
+    """What the library makes of several rows: returns, steps, deliveries and tables, by name."""
+    runs = [train(worlds.paper(), config_of(row), *more, task_of(row)) for row in rows]
+    names = ("returns", "steps", "deliveries", "q_values")
+    return {name: np.concatenate([getattr(run, name) for run in runs]) for name in names}
+
+
+CALM = Task(evaporation_in_evaluation=False)
 
 
 def test_files(finished):
@@ -129,7 +144,7 @@ def test_summary_lists_the_grid(finished):
     text = (finished / "summary.csv").read_text("utf-8")
     assert text.splitlines()[0] == ",".join(COLUMNS)
     rows = read_csv(finished / "summary.csv")
-    assert len({config_of(row) for row in rows}) == len(rows) == 2 * 3 * 2
+    assert len({(config_of(row), task_of(row)) for row in rows}) == len(rows) == 2 * 3 * 2
     learners = [(row["learner"], row["planning_steps"], row["delivery"]) for row in rows]
     names = ("q_learning", "0"), ("sarsa", "0"), ("dyna_q", "2")
     deliveries = "continuing", "absorbing"
@@ -149,10 +164,10 @@ def test_episodes_are_what_the_library_gives_in_the_order_of_the_summary(finishe
     assert {name: array.shape for name, array in arrays.items()} == shapes
     assert all(array.dtype.kind in "iu" for array in arrays.values())
 
-    trained = train(worlds.paper(), [config_of(row) for row in rows], SEEDS, EPISODES, MAX_STEPS)
-    greedy = evaluate(worlds.paper(), trained.q_values, ROLLOUTS, SEEDS, MAX_STEPS)
+    trained = trained_as(rows, SEEDS, EPISODES, MAX_STEPS)
+    greedy = evaluate(worlds.paper(), trained["q_values"], ROLLOUTS, SEEDS, MAX_STEPS)
     for name in ("returns", "steps", "deliveries"):
-        assert np.array_equal(arrays[name], getattr(trained, name))
+        assert np.array_equal(arrays[name], trained[name])
         assert np.array_equal(arrays[f"greedy_{name}"], getattr(greedy, name))
     assert arrays["deliveries"].any()
     assert arrays["greedy_deliveries"].any()
@@ -205,7 +220,8 @@ def test_baselines(finished):
     assert (float(shortest["return_mean"]), float(shortest["steps_mean"])) == (45, 34)
     uniform = np.zeros((len(SEEDS), 128, 5))
     for setting, evaporation in ((training, False), (greedy, True)):
-        outcome = evaluate(worlds.paper(), uniform, ROLLOUTS, SEEDS, MAX_STEPS, evaporation)
+        task = Task(evaporation_in_evaluation=evaporation)
+        outcome = evaluate(worlds.paper(), uniform, ROLLOUTS, SEEDS, MAX_STEPS, task)
         row = rows["random policy", setting, ""]
         assert float(row["return_mean"]) == pytest.approx(outcome.returns.mean())
         assert float(row["steps_mean"]) == pytest.approx(outcome.steps.mean())
@@ -228,26 +244,29 @@ def test_policies_are_those_of_median_runs_of_each_behaviour(finished):
         else:
             chosen = max(mine, key=lambda row: float(row["return_last50_mean"]))
         assert TrainingConfig(**metadata["config"]) == config_of(chosen)
-        trained = train(worlds.paper(), config_of(chosen), SEEDS, EPISODES, MAX_STEPS)
+        assert Task.from_dict(metadata["task"]) == task_of(chosen)
+        trained = train(
+            worlds.paper(), config_of(chosen), SEEDS, EPISODES, MAX_STEPS, task_of(chosen)
+        )
         number = SEEDS.index(metadata["seed"])
         assert np.array_equal(q_values, trained.q_values[0, number])
         returns = trained.returns[0, :, -50:].mean(axis=1)
         assert metadata["return_last50"] == returns[number]
         # What it does was seen as in training: without evaporation.
-        once = evaluate(worlds.paper(), trained.q_values[0], 1, SEEDS, MAX_STEPS, evaporation=False)
+        once = evaluate(worlds.paper(), trained.q_values[0], 1, SEEDS, MAX_STEPS, CALM)
         alike = once.deliveries[:, 0] == (metadata["behaviour"] == "delivers")
         assert alike[number]
         assert int(chosen[f"runs_{behaviour}"]) == alike.sum()
         assert (returns[alike] < returns[number]).sum() == (alike.sum() - 1) // 2
-        assert metadata["evaporation"] is False
+        assert metadata["task"]["evaporation_in_training"] is False
 
 
 def test_behaviours_are_those_of_the_policies(finished):
     rows = read_csv(finished / "summary.csv")
     with np.load(finished / "episodes.npz") as archive:
         behaviours, returns = archive["behaviours"], archive["policy_returns"]
-    trained = train(worlds.paper(), [config_of(row) for row in rows], SEEDS, EPISODES, MAX_STEPS)
-    once = evaluate(worlds.paper(), trained.q_values, 1, SEEDS, MAX_STEPS, evaporation=False)
+    trained = trained_as(rows, SEEDS, EPISODES, MAX_STEPS)
+    once = evaluate(worlds.paper(), trained["q_values"], 1, SEEDS, MAX_STEPS, CALM)
     assert np.array_equal(returns, once.returns[..., 0])
     assert np.array_equal(behaviours == DELIVERS, once.deliveries[..., 0] == 1)
     lines = read_csv(finished / "behaviours.csv")
@@ -255,7 +274,7 @@ def test_behaviours_are_those_of_the_policies(finished):
     for number, row in enumerate(rows):
         assert int(row["runs_delivers"]) == (behaviours[number] == DELIVERS).sum()
         assert sum(int(row[name]) for name in COLUMNS[-4:]) == len(SEEDS)
-        mine = [line for line in lines if config_of(line) == config_of(row)]
+        mine = [line for line in lines if all(line[name] == row[name] for name in COLUMNS[:7])]
         mean = sum(float(line["policy_return_mean"]) * int(line["runs"]) for line in mine)
         assert mean == pytest.approx(returns[number].sum())
 
@@ -266,16 +285,18 @@ def test_evaporation_is_chosen_told_and_kept_apart(training, greedy, tmp_path, c
     out = tmp_path / "out"
     assert compare(*TINY, "--episodes", 30, *flags, "--out", out)[0] == 0
     (row,) = read_csv(out / "summary.csv")
-    trained = train(worlds.paper(), config_of(row), 0, 30, 30, training == "on")
-    rollouts = evaluate(worlds.paper(), trained.q_values, ROLLOUTS, [0], 30, greedy == "on")
-    once = evaluate(worlds.paper(), trained.q_values, 1, [0], 30, training == "on")
+    task = task_of(row, training == "on", greedy == "on")
+    trained = train(worlds.paper(), config_of(row), 0, 30, 30, task)
+    rollouts = evaluate(worlds.paper(), trained.q_values, ROLLOUTS, [0], 30, task)
+    as_trained = replace(task, evaporation_in_evaluation=training == "on")
+    once = evaluate(worlds.paper(), trained.q_values, 1, [0], 30, as_trained)
     with np.load(out / "episodes.npz") as archive:
         assert np.array_equal(archive["returns"], trained.returns)
         assert np.array_equal(archive["greedy_returns"], rollouts.returns)
         assert np.array_equal(archive["policy_returns"], once.returns[..., 0])
     manifest = json.loads((out / "manifest.json").read_text("utf-8"))
-    assert manifest["settings"]["train_evaporation"] is (training == "on")
-    assert manifest["settings"]["greedy_evaporation"] is (greedy == "on")
+    assert manifest["settings"]["task.evaporation_in_training"] is (training == "on")
+    assert manifest["settings"]["task.evaporation_in_evaluation"] is (greedy == "on")
     words = f"Training {'with' if training == 'on' else 'without'} evaporation of trails, greedy"
     for name in ("report.txt", "table2.md"):
         assert words in (out / name).read_text("utf-8")
@@ -284,8 +305,8 @@ def test_evaporation_is_chosen_told_and_kept_apart(training, greedy, tmp_path, c
     assert settings == {f"training, {first}", "greedy, no evaporation"}
     status, _, err = compare(*TINY, "--episodes", 30, "--out", out)
     assert status == 2
-    assert "greedy_evaporation differ)" in err
-    assert ("train_evaporation," in err) == (training == "on")
+    assert "task.evaporation_in_evaluation differ)" in err
+    assert ("task.evaporation_in_training," in err) == (training == "on")
 
 
 def test_pictures_show_the_episode_that_told_the_behaviour(finished, tmp_path):
@@ -295,10 +316,11 @@ def test_pictures_show_the_episode_that_told_the_behaviour(finished, tmp_path):
     shown = (finished / "renders" / f"{name}.gif").read_bytes()
     for evaporation in (False, True):
         path = tmp_path / f"{evaporation}.gif"
-        more = {"seed": metadata["seed"], "max_steps": MAX_STEPS, "evaporation": evaporation}
+        task = Task(evaporation_in_evaluation=evaporation)
+        more = {"seed": metadata["seed"], "max_steps": MAX_STEPS, "task": task}
         episode = replace(Episode.play(worlds.paper(), q_values, **more), name="circles with food")
-        frames = episode_frames(episode, (720, 480), title="SARSA, continuing")
-        save_animation(path, with_pause(frames, len(episode), DEFAULT_FPS), DEFAULT_FPS)
+        pictures = frames(episode.moments(), (720, 480), title="SARSA, continuing")
+        save_animation(path, pictures, pause=PAUSE)
         assert (path.read_bytes() == shown) == (not evaporation)
 
 
@@ -308,8 +330,8 @@ def test_pictures_name_learner_delivery_and_behaviour(limit, finished, tmp_path,
     monkeypatch.setattr(commands, "RENDERED_STEPS", limit)
     lines = []
     monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
-    sweep = commands.build_sweep(commands.parse_arguments([str(one) for one in SMALL]))
-    commands.render_policies(sweep, finished / "policies", tmp_path)
+    study = commands.build_study(commands.parse_arguments([str(one) for one in SMALL]))
+    commands.render_policies(study, finished, tmp_path)
     for delivery in ("continuing", "absorbing"):
         assert {f"{name}, {delivery}" for name in ("SARSA", "Dyna-Q (p2)")} <= set(lines)
     assert {"delivers", "circles with food", "delivered"} <= set(lines)
@@ -321,10 +343,10 @@ def test_manifest(finished):
     manifest = json.loads((finished / "manifest.json").read_text("utf-8"))
     assert "compare.py --seeds 3 --seed 7" in manifest["command"]
     assert manifest["settings"]["seeds"] == list(SEEDS)
-    assert manifest["settings"]["world"]["ranges"] == [10, 10, 10]
+    assert manifest["settings"]["worlds"][0]["ranges"] == [10, 10, 10]
     assert {"taichi", "numpy", "taichi_ants"} <= set(manifest["packages"])
     assert set(manifest["files"]) == set(FILES) - {"manifest.json"}
-    assert manifest["seconds"]["total"] > 0
+    assert manifest["seconds"] > 0
     costs = {(cost["learner"], cost["planning_steps"]): cost for cost in manifest["cost_per_step"]}
     assert set(costs) == {("q_learning", 0), ("sarsa", 0), ("dyna_q", 2)}
     with np.load(finished / "episodes.npz") as archive:
@@ -338,23 +360,8 @@ def test_the_same_command_shows_the_finished_comparison(copy, compare):
     status, out, err = compare(*SMALL, "--out", copy)
     report = before["report.txt"].decode("utf-8")
     assert (status, err) == (0, "")
-    assert out == f"{report}\n{copy}/ holds this comparison already; --force runs it again.\n"
+    assert out == f"{report}\n{copy}/ holds these results already; --force makes them again.\n"
     assert contents(copy) == before
-
-
-def test_a_terminal_shows_the_finished_comparison_as_wide_as_it_is(copy, compare, monkeypatch):
-    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
-    for name, value in (("COLUMNS", "150"), ("TERM", "xterm-256color"), ("NO_COLOR", "1")):
-        monkeypatch.setenv(name, value)
-    status, out, err = compare(*SMALL, "--out", copy)
-    assert (status, err) == (0, "")
-    numbers = (
-        "12 configurations, 3 seeds, 60 episodes of at most 45 steps, 50 greedy rollouts a run."
-    )
-    assert numbers in out  # one line, two in the file
-    assert numbers not in (copy / "report.txt").read_text("utf-8")
-    for section in ("Table 2", "Greedy evaluation", "Cost per step", "Baselines"):
-        assert section in out
 
 
 def test_force_runs_again_and_leaves_no_old_pictures(copy, compare):
@@ -385,7 +392,7 @@ def test_pictures_that_were_left_out_are_drawn_from_the_files(
     before = contents(copy)
     status, out, err = compare(*SMALL, "--out", copy, flag)
     assert (status, err) == (0, "")
-    assert "holds this comparison already" in out
+    assert "holds these results already" in out
     after = contents(copy)
     assert after == contents(finished)
     assert before.items() <= after.items()  # nothing was computed again
@@ -469,8 +476,8 @@ def test_altered_results_are_not_shown_as_if_whole(name, copy, compare):
         (["--seeds", 4], "seeds"),
         (["--episodes", 61], "episodes"),
         (["--max-steps", 46], "max_steps"),
-        (["--discounts", 0.9], "configurations"),
-        (["--world", "open", "--world-seed", 3], "world"),
+        (["--discounts", 0.9], "training.discount"),
+        (["--world", "open", "--world-seed", 3], "worlds"),
     ],
 )
 def test_other_settings_do_not_mix_with_results(change, named, copy, compare):
@@ -564,9 +571,10 @@ def test_a_learner_of_ones_own_and_a_discount_of_one_are_reported(tmp_path, comp
         best = int(returns.argmax())
         greedy = archive["greedy_returns"][best].mean()
     cells = [line.split() for line in out.splitlines() if line.startswith("hysteretic *")]
-    assert cells[0][3] == f"{returns[best]:.1f}"
-    assert cells[1][2] == "-"  # the paper's steps of a learner that it does not have
-    assert cells[2][3] == f"{greedy:.1f}"
+    # Tables of four figures, then the greedy evaluation.
+    assert cells[0][4] == f"{returns[best]:.1f}"
+    assert cells[1][3] == "-"  # the paper's steps of a learner that it does not have
+    assert cells[4][3] == f"{greedy:.1f}"
     assert f"hysteretic, absorbing: 0.1 / {best} / 0.3 / 0.9" in out
     assert "optimal policy, discount 1: there is no optimal policy" in out
     assert max(len(line) for line in out.splitlines()[:-1]) < 80
@@ -586,7 +594,7 @@ def test_all_learners_of_the_library_can_be_compared(tmp_path, compare):
 def test_training_of_the_comparison_can_be_continued(finished):
     """A run of the comparison is the beginning of any longer one."""
     row = read_csv(finished / "summary.csv")[0]
-    first = train(worlds.paper(), config_of(row), SEEDS, EPISODES, MAX_STEPS)
+    first = train(worlds.paper(), config_of(row), SEEDS, EPISODES, MAX_STEPS, task_of(row))
     longer = continue_training(first, 5)
     with np.load(finished / "episodes.npz") as archive:
         assert np.array_equal(longer.returns[0, :, :EPISODES], archive["returns"][0])

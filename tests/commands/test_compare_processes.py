@@ -133,7 +133,7 @@ def test_a_damaged_block_is_done_again_with_a_word_on_it(kernels, tmp_path):
 
 @pytest.mark.parametrize("seconds", [0.05, 0.6])
 def test_an_interruption_of_the_pictures_keeps_the_runs(seconds, kernels, tmp_path):
-    """Ctrl-C on a terminal goes to the process that draws, too, and that says nothing."""
+    """Ctrl-C on a terminal."""
     arguments = [*PICTURED, "--out", "out"]
     process = start("compare", arguments, kernels, tmp_path, start_new_session=True)
     unfinished = tmp_path / "out" / "unfinished"

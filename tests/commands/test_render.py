@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -13,9 +14,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from taichi_ants import commands
 from taichi_ants.commands import render
 from taichi_ants.learners.policies import save_policy, trail_follower
 from taichi_ants.rendering import colours, learning_frames, text
+from taichi_ants.studies.command_line import Parser
 from taichi_ants.worlds import paper
 
 ROOT = Path(__file__).parents[2]
@@ -57,7 +60,7 @@ def files_in(folder: Path) -> list[str]:
 
 def test_an_episode_without_display_and_home(tmp_path, policy) -> None:
     path = tmp_path / "new" / "a.gif"
-    done = run("--policy", policy, "--size", "400x330", "--out", path, HOME="/proc/nope")
+    done = run("episode", "--policy", policy, "--size", "400x330", "--out", path, HOME="/proc/nope")
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     assert done.stdout == f"{path}: 34 steps, return 45, delivered\n"
@@ -68,7 +71,17 @@ def test_an_episode_without_display_and_home(tmp_path, policy) -> None:
 
 
 def test_training_on_the_spot(tmp_path) -> None:
-    done = run("--episodes", 30, "--out", tmp_path / "frames", "--size", "64x64", "--max-steps", 4)
+    done = run(
+        "episode",
+        "--episodes",
+        30,
+        "--out",
+        tmp_path / "frames",
+        "--size",
+        "64x64",
+        "--max-steps",
+        4,
+    )
     assert done.returncode == 0, done.stderr
     assert files_in(tmp_path / "frames")[0] == "frame_000000.png"
     assert 5 <= len(files_in(tmp_path / "frames")) <= 17
@@ -76,23 +89,25 @@ def test_training_on_the_spot(tmp_path) -> None:
 
 def test_one_step_and_a_sheet(tmp_path, policy) -> None:
     path = tmp_path / "a.png"
-    assert run("--policy", policy, "--step", 3, "--out", path).stdout.endswith("step 3 of 34\n")
+    assert run("episode", "--policy", policy, "--step", 3, "--out", path).stdout.endswith(
+        "step 3 of 34\n"
+    )
     assert Image.open(path).size == (1280, 720)
-    late = run("--policy", policy, "--step", 35, "--out", tmp_path / "b.png")
+    late = run("episode", "--policy", policy, "--step", 35, "--out", tmp_path / "b.png")
     assert late.returncode == 2
     assert "no step 35" in late.stderr
-    done = run("--policy", policy, "--show", "sheet", "--out", tmp_path / "sheet.png")
+    done = run("sheet", "--policy", policy, "--out", tmp_path / "sheet.png")
     assert done.returncode == 0, done.stderr
     assert Image.open(tmp_path / "sheet.png").width == 1280
     assert files_in(tmp_path) == ["a.png", "sheet.png"]
-    done = run("--policy", policy, "--show", "sheet", "--all-states", "--out", tmp_path / "all.png")
+    done = run("sheet", "--policy", policy, "--all-states", "--out", tmp_path / "all.png")
     assert done.returncode == 0, done.stderr
     assert Image.open(tmp_path / "all.png").width == 1920
 
 
 def test_learning_and_a_colony(tmp_path) -> None:
     done = run(
-        *("--show", "learning", "--stages", "0,2", "--max-steps", 9, "--size", "300x200"),
+        *("learning", "--stages", "0,2", "--max-steps", 9, "--size", "300x200"),
         *("--out", tmp_path / "a.webp"),
     )
     assert done.returncode == 0, done.stderr
@@ -100,7 +115,7 @@ def test_learning_and_a_colony(tmp_path) -> None:
     with Image.open(tmp_path / "a.webp") as image:
         assert image.n_frames >= 5
     done = run(
-        *("--show", "colony", "--world", "open", "--ants", 7, "--episodes", 2, "--max-steps", 9),
+        *("colony", "--world", "open", "--ants", 7, "--episodes", 2, "--ticks", 9),
         *("--every", 3, "--size", "300x200", "--out", tmp_path / "b.gif"),
     )
     assert done.returncode == 0, done.stderr
@@ -110,53 +125,54 @@ def test_learning_and_a_colony(tmp_path) -> None:
 
 
 WRONG = {
-    "ending": (["--out", "{}/a.avi"], ".gif, .webp, .mp4"),
-    "ending of a sheet": (["--show", "sheet", "--out", "{}/a.gif"], ".png"),
-    "ending of learning": (["--show", "learning", "--out", "{}/a.png"], ".gif"),
-    "place": (["--out", "/proc/nope/a.gif"], "cannot write"),
-    "size": (["--size", "63x63", "--out", "{}/a.gif"], "64 to 4096"),
-    "large size": (["--size", "5000x100", "--out", "{}/a.gif"], "64 to 4096"),
-    "size of a sheet": (["--show", "sheet", "--size", "400x300"], "--size"),
-    "file as a folder": (["--out", "{}/a.gif/"], "as a folder"),
-    "picture as a folder": (["--show", "sheet", "--out", "{}/a.png/"], "as a folder"),
-    "form of a size": (["--size", "1280*720"], "1280x720"),
-    "speed": (["--fps", "0", "--out", "{}/a.gif"], "fps"),
-    "no number": (["--fps", "fast"], "not a number"),
-    "world": (["--world", "mars", "--out", "{}/a.gif"], "mars"),
-    "policy": (["--policy", "nope.npz", "--out", "{}/a.gif"], "nope.npz"),
-    "policy and learning": (
-        ["--show", "learning", "--policy", "a.npz"],
-        "--policy changes nothing in learning; leave it out (it is for a colony, a",
-    ),
-    "episodes of learning": (["--show", "learning", "--episodes", "500"], "--episodes changes"),
-    "step of a GIF": (
-        ["--step", "3"],
-        "--step changes nothing in an episode; leave it out (it is for a still colony, a",
-    ),
-    "states of an episode": (["--all-states"], "--all-states changes nothing in an episode"),
+    "nothing to show": ([], "episode|colony|learning|sheet"),
+    "something else": (["movie"], "'movie'"),
+    "ending": (["episode", "--out", "{}/a.avi"], ".gif, .webp, .mp4"),
+    "ending of a sheet": (["sheet", "--out", "{}/a.gif"], ".png"),
+    "ending of learning": (["learning", "--out", "{}/a.png"], ".gif"),
+    "place": (["episode", "--out", "/proc/nope/a.gif"], "cannot write"),
+    "size": (["episode", "--size", "63x63", "--out", "{}/a.gif"], "64 to 4096"),
+    "large size": (["colony", "--size", "5000x100", "--out", "{}/a.gif"], "64 to 4096"),
+    "size of a sheet": (["sheet", "--size", "400x300"], "--size"),
+    "file as a folder": (["episode", "--out", "{}/a.gif/"], "as a folder"),
+    "picture as a folder": (["sheet", "--out", "{}/a.png/"], "as a folder"),
+    "form of a size": (["episode", "--size", "1280*720"], "1280x720"),
+    "speed": (["episode", "--fps", "0", "--out", "{}/a.gif"], "fps"),
+    "no number": (["episode", "--fps", "fast"], "not a number"),
+    "world": (["episode", "--world", "mars", "--out", "{}/a.gif"], "mars"),
+    "policy": (["episode", "--policy", "nope.npz", "--out", "{}/a.gif"], "nope.npz"),
+    "policy and learning": (["learning", "--policy", "a.npz"], "--policy"),
+    "episodes of learning": (["learning", "--episodes", "500"], "--episodes"),
+    "step of a GIF": (["episode", "--step", "3"], "let --out end in .png"),
+    "states of an episode": (["episode", "--all-states"], "--all-states"),
     "world seed of the paper": (
-        ["--world-seed", "3"],
+        ["episode", "--world-seed", "3"],
         "--world-seed is for a world drawn at random",
     ),
-    "step of a sheet": (["--show", "sheet", "--step", "3"], "--step changes nothing in a sheet"),
-    "ants of an episode": (["--ants", "80"], "--ants changes nothing in an episode"),
-    "every of a still": (["--show", "colony", "--every", "4", "--out", "a.png"], "--every"),
-    "view of a colony": (["--show", "colony", "--no-view"], "--no-view changes nothing"),
-    "legend of learning": (["--show", "learning", "--no-legend"], "--no-legend changes nothing"),
-    "lines of learning": (["--show", "learning", "--no-hud"], "--no-hud changes nothing"),
-    "speed of a still": (["--fps", "9", "--out", "a.png"], "--fps changes nothing in a still"),
-    "stages of an episode": (["--stages", "1"], "--stages changes nothing in an episode"),
-    "training and policy": (["--policy", "a.npz", "--learner", "sarsa"], "--learner is for"),
-    "greedy and epsilon": (["--greedy", "--epsilon", "0.5"], "--greedy"),
-    "epsilon": (["--policy", "{policy}", "--epsilon", "2", "--out", "{}/a.gif"], "epsilon"),
-    "learner": (["--learner", "magic", "--out", "{}/a.gif"], "magic"),
-    "stages": (["--show", "learning", "--stages", "5,1", "--out", "{}/a.gif"], "ascend"),
+    "step of a sheet": (["sheet", "--step", "3"], "--step"),
+    "ants of an episode": (["episode", "--ants", "80"], "--ants"),
+    "every of a still": (["colony", "--every", "4", "--out", "a.png"], "--every is for an anim"),
+    "view of a colony": (["colony", "--no-view"], "--no-view"),
+    "legend of learning": (["learning", "--no-legend"], "--no-legend"),
+    "lines of learning": (["learning", "--no-hud"], "--no-hud"),
+    "speed of a still": (["episode", "--fps", "9", "--out", "a.png"], "--fps is for an animation"),
+    "stages of an episode": (["episode", "--stages", "1"], "--stages"),
+    "training and policy": (
+        ["sheet", "--policy", "a.npz", "--learner", "sarsa"],
+        "--learner is for training, but --policy is given",
+    ),
+    "epsilon": (
+        ["episode", "--policy", "{policy}", "--epsilon", "2", "--out", "{}/a.gif"],
+        "epsilon",
+    ),
+    "learner": (["episode", "--learner", "magic", "--out", "{}/a.gif"], "magic"),
+    "stages": (["learning", "--stages", "5,1", "--out", "{}/a.gif"], "ascend"),
     "order of stages": (
-        ["--show", "learning", "--stages", "5", "5", "2", "--out", "{}/a.gif"],
+        ["learning", "--stages", "5", "5", "2", "--out", "{}/a.gif"],
         "stages are (5, 5, 2); they must ascend",
     ),
-    "steps": (["--max-steps", "0"], "from 1 to"),
-    "unknown option": (["--colour", "red"], "--colour"),
+    "steps": (["episode", "--max-steps", "0"], "from 1 to"),
+    "unknown option": (["episode", "--colour", "red"], "--colour"),
 }
 
 
@@ -176,7 +192,7 @@ def test_without_pyav(tmp_path, policy) -> None:
     hidden = "import sys, runpy; sys.modules['av'] = None; sys.argv = sys.argv[1:]; "
     hidden += "runpy.run_path(sys.argv[0], run_name='__main__')"
     done = subprocess.run(
-        [sys.executable, "-c", hidden, str(SCRIPT), "--out", str(tmp_path / "a.mp4")],
+        [sys.executable, "-c", hidden, str(SCRIPT), "episode", "--out", str(tmp_path / "a.mp4")],
         env=environment(),
         capture_output=True,
         text=True,
@@ -199,7 +215,7 @@ def test_without_pyav(tmp_path, policy) -> None:
 )
 def test_stopped_midway_it_leaves_nothing_behind(tmp_path, policy, name, sent, status) -> None:
     # An ant that moves at random has far more steps to take than there is time for.
-    arguments = ["--policy", str(policy), "--epsilon", "1", "--max-steps", "100000"]
+    arguments = ["episode", "--policy", str(policy), "--epsilon", "1", "--max-steps", "100000"]
     arguments += ["--world", "open", "--size", "1600x1200", "--out", str(tmp_path / "new" / name)]
     with subprocess.Popen(
         [sys.executable, str(SCRIPT), *arguments],
@@ -227,7 +243,7 @@ def test_trails_of_a_colony_stay_without_evaporation(tmp_path, policy) -> None:
     pictures = []
     for more in ([], ["--no-evaporation"]):
         path = tmp_path / f"{len(more)}.png"
-        colony = ["--show", "colony", "--policy", policy, "--ants", 60, "--max-steps", 150]
+        colony = ["colony", "--policy", policy, "--ants", 60, "--ticks", 150]
         done = run(*colony, "--no-hud", "--no-legend", "--world", "paper", *more, "--out", path)
         assert done.returncode == 0, done.stderr
         pictures.append(np.asarray(Image.open(path)).astype(int))
@@ -240,7 +256,7 @@ def test_trails_of_a_colony_stay_without_evaporation(tmp_path, policy) -> None:
 
 @pytest.mark.parametrize(
     ("arguments", "world"),
-    [([], "paper"), (["--show", "colony"], "open"), (["--show", "colony", "--world", "x"], "x")],
+    [(["episode"], "paper"), (["colony"], "open"), (["colony", "--world", "x"], "x")],
 )
 def test_default_worlds(arguments, world) -> None:
     assert render.parse_arguments(arguments).world == world
@@ -249,24 +265,36 @@ def test_default_worlds(arguments, world) -> None:
 @pytest.mark.parametrize(
     ("arguments", "size"),
     [
-        ([], (1280, 720)),
-        (["--show", "learning"], (1280, 520)),
-        (["--show", "colony"], (960, 540)),
-        (["--show", "colony", "--out", "a.png"], (1280, 720)),
-        (["--show", "colony", "--size", "320x200"], (320, 200)),
+        (["episode"], (1280, 720)),
+        (["learning"], (1280, 520)),
+        (["colony"], (960, 540)),
+        (["colony", "--out", "a.png"], (1280, 720)),
+        (["colony", "--size", "320x200"], (320, 200)),
     ],
 )
 def test_default_sizes(arguments, size) -> None:
     assert render.parse_arguments(arguments).size == size
 
 
+def test_the_command_names_itself_as_it_is_called(capsys, monkeypatch) -> None:
+    monkeypatch.setattr(sys, "argv", ["taichi-ants", "render", "colony", "--help"])
+    monkeypatch.setattr(Parser, "program", None)
+    with pytest.raises(SystemExit):
+        commands.main()
+    shown = capsys.readouterr().out
+    assert shown.startswith("usage: taichi-ants render colony [-h]")
+    assert "Example: taichi-ants render colony --ants 200 --out ants.gif" in shown
+
+
 def test_help_is_quick_and_needs_little() -> None:
     took = []
-    for _ in range(3):
+    for kind in ("episode", "colony", "learning", "sheet"):
         began = time.perf_counter()
-        done = run("--help")
+        done = run(kind, "--help")
         took.append(time.perf_counter() - began)
-        assert "--policy" in done.stdout
+        assert "--learner" in done.stdout
+        example = re.search(r"Example: render.py (.*)", done.stdout)[1].split()
+        assert render.parse_arguments(example).kind == kind
     assert min(took) < 1.0
     heavy = "import sys; sys.path.insert(0, sys.argv[1]); import render, gallery; "
     heavy += "print({'taichi', 'matplotlib', 'PIL', 'av', 'numpy'} & set(sys.modules))"
@@ -307,7 +335,7 @@ def test_the_gallery_is_there_and_small() -> None:
         path = ROOT / "renders" / name
         sizes.append(path.stat().st_size)
         with Image.open(path) as image:
-            if settings.show != "sheet":
+            if settings.kind != "sheet":
                 assert image.size == settings.size
             frames = getattr(image, "n_frames", 1)
             assert (frames > 1) == name.endswith(".gif")
@@ -339,7 +367,7 @@ def test_the_tracked_pictures_are_those_of_the_gallery() -> None:
 
 @pytest.mark.parametrize("shown", ["episode", "colony", "learning", "sheet"])
 def test_by_default_no_tracked_picture_is_replaced(shown) -> None:
-    place = render.parse_arguments(["--show", shown]).out
+    place = render.parse_arguments([shown]).out
     ignored = subprocess.run(
         ["git", "check-ignore", "--no-index", "-q", place],
         cwd=ROOT,

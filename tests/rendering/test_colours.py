@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from taichi_ants.analysis.colony import figures
-from taichi_ants.analysis.paper import VARIANTS
+from taichi_ants.analysis.paper.published import VARIANTS
 from taichi_ants.analysis.style import looks
 from taichi_ants.rendering import colours
 

@@ -13,14 +13,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from taichi_ants import AntsError
+from taichi_ants import AntsError, rendering
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.rendering import (
     Episode,
     animated_files,
     check_animation,
-    episode_frames,
-    render_episode,
     save_animation,
     save_picture,
 )
@@ -32,7 +30,7 @@ SIZE = (330, 324)
 @pytest.fixture(scope="module")
 def frames() -> list[np.ndarray]:
     episode = Episode.play(paper(), trail_follower(), max_steps=24)
-    return list(episode_frames(episode, SIZE, title="a title"))
+    return list(rendering.frames(episode.moments(), SIZE, title="a title"))
 
 
 def decoded(path: Path) -> tuple[list[np.ndarray], list[float]]:
@@ -292,19 +290,10 @@ def test_frames_must_fit(tmp_path, frames) -> None:
     assert leftovers(tmp_path) == []
 
 
-def test_render_episode(tmp_path) -> None:
-    shares = []
-    episode = render_episode(
-        tmp_path / "a.gif", paper(), trail_follower(), size=(96, 64), fps=10, progress=shares.append
-    )
-    assert episode.delivered
-    assert shares == sorted(shares)
-    assert shares[-1] == 1
-    assert len(shares) == len(episode) == 35
-    pictures, durations = decoded(tmp_path / "a.gif")
-    assert len(pictures) == 35
-    # The last picture stays for a second and a half.
-    assert durations == [100] * 34 + [1500]
-    with pytest.raises(AntsError, match="size"):
-        render_episode(tmp_path / "b.gif", paper(), trail_follower(), size=(63, 64))
-    assert leftovers(tmp_path) == ["a.gif"]
+def test_the_last_picture_stays_and_progress_is_told(tmp_path, frames) -> None:
+    shares: list[float] = []
+    options = {"pause": 1.5, "n": len(frames), "progress": shares.append}
+    save_animation(tmp_path / "a.gif", frames, 10, **options)
+    assert shares == [(done + 1) / len(frames) for done in range(len(frames))]
+    _, durations = decoded(tmp_path / "a.gif")
+    assert durations == [100] * (len(frames) - 1) + [1500]

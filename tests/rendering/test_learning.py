@@ -9,26 +9,25 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from taichi_ants import AntsError, Colony, ColonyConfig, TrainingConfig, train
+from taichi_ants import AntsError, Colony, TrainingConfig, train
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.rendering import (
     Episode,
-    Snapshot,
     Stage,
     best_actions,
     clarity,
-    colony_frames,
-    colony_picture,
+    colony_moments,
+    frames,
     learning_frames,
     learning_stages,
     policy_sheet,
-    render_colony,
-    render_learning,
+    save_animation,
     text,
     usual_spread,
 )
-from taichi_ants.rendering.colours import CHOSEN
+from taichi_ants.rendering.colours import CELL_FOOD, CHOSEN
 from taichi_ants.rendering.sheet import hardly_learned
+from taichi_ants.task import Observation, observations
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT
 from taichi_ants.task.states import REACHABLE_STATES, parse_state
 from taichi_ants.worlds import open_world, paper
@@ -104,6 +103,12 @@ def test_stages_that_are_refused(stages) -> None:
         learning_stages(paper(), CONFIG, stages=stages)
 
 
+def test_stages_of_several_worlds_are_refused() -> None:
+    stages = [Stage(1, Episode.play(world, trail_follower())) for world in (paper(), open_world(3))]
+    with pytest.raises(AntsError, match="several worlds"):
+        next(learning_frames(stages))
+
+
 def test_a_stage_that_has_ended_stays() -> None:
     stages = learning_stages(paper(), CONFIG, seed=2, stages=(0, 50), max_steps=60)
     short, long = sorted(stages, key=lambda stage: len(stage.episode))
@@ -121,7 +126,7 @@ def test_a_stage_that_has_ended_stays() -> None:
 @pytest.mark.parametrize("size", [(1280, 720), (400, 900), (64, 64), (4096, 200)])
 def test_all_stages_fit(size, tmp_path) -> None:
     stages = learning_stages(paper(), CONFIG, stages=(0, 1, 2, 3), max_steps=3)
-    render_learning(tmp_path / "a.gif", stages, size=size, fps=10)
+    save_animation(tmp_path / "a.gif", learning_frames(stages, size), 10)
     with Image.open(tmp_path / "a.gif") as image:
         assert image.size == size
         picture = np.asarray(image.convert("RGB")).astype(int)
@@ -267,6 +272,46 @@ def test_text_on_a_sheet_says_what_it_shows(monkeypatch) -> None:
     assert max(map(len, lines)) < 125
 
 
+FIVE = observations.get("five_cells")
+
+
+def test_the_sheet_of_an_observation_of_more_cells(monkeypatch) -> None:
+    """One state is visited: foraging T E F O E, with food ahead and a trail behind to the left."""
+    table = np.zeros((FIVE.n_states, 5), dtype=np.float32)
+    row = next(row for row in range(FIVE.n_states) if FIVE.name_of(row) == "foraging T E F O E")
+    table[row, PICK_UP] = 1.0
+    sheet = policy_sheet(table, observation=FIVE)
+    assert coloured(sheet, CELL_FOOD).sum() > 60
+    lines: list[str] = []
+    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
+    policy_sheet(table, observation=FIVE)
+    assert "1 of 1024 states learned" in lines
+    assert [line for line in lines if len(line) == 1] == list("TEFOE")
+    with pytest.raises(AntsError, match=r"\(2048, 5\)"):
+        policy_sheet(random_policy(), observation=FIVE)
+
+
+def test_of_very_many_states_a_sheet_shows_the_first_and_says_so(monkeypatch) -> None:
+    lines: list[str] = []
+    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
+    table = np.zeros((FIVE.n_states, 5), dtype=np.float32)
+    table[:300, RIGHT] = 1.0
+    policy_sheet(table, observation=FIVE)
+    assert "300 of 1024 states learned; 256 are shown" in lines
+    assert lines.count("right") == 256
+    sheet = policy_sheet(table, complete=True, observation=FIVE)
+    assert sheet.shape[0] < 6000
+
+
+def test_states_with_names_of_another_form_are_written_out(monkeypatch) -> None:
+    own = Observation("own", 4, lambda look: 0, name_of=lambda row: f"carrying crumb number {row}")
+    lines: list[str] = []
+    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
+    policy_sheet(np.eye(4, 5), observation=own)
+    assert {f"crumb number {row}" for row in range(4)} <= set(lines)
+    assert "4 of 4 states learned" in lines
+
+
 def test_sheets_that_are_refused() -> None:
     for wrong in (np.zeros((5, 128)), np.zeros((128, 5), bool), np.full((128, 5), "a")):
         with pytest.raises(AntsError, match="q_values"):
@@ -279,29 +324,18 @@ def test_sheets_that_are_refused() -> None:
 
 
 def colony(ants: int = 30) -> Colony:
-    made = Colony(open_world(3), ColonyConfig(ants=ants), CONFIG, 0, "fixed", trail_follower())
+    made = Colony(open_world(3), None, CONFIG, 0, ants, sharing="fixed", q_values=trail_follower())
     made.begin_episode()
     return made
 
 
-def test_a_colony_on_the_move(tmp_path) -> None:
-    frames = list(colony_frames(colony(), 7, (200, 150), every=3))
-    assert len(frames) == 4
-    assert not any((a == b).all() for a, b in itertools.pairwise(frames))
+def test_a_colony_on_the_move() -> None:
+    pictures = list(frames(colony_moments(colony(), 7, every=3), (200, 150)))
+    assert len(pictures) == 4
+    assert not any((a == b).all() for a, b in itertools.pairwise(pictures))
     other = colony()
     other.tick(7)
-    assert (colony_picture(other, (200, 150)) == frames[-1]).all()
-    render_colony(tmp_path / "a.gif", colony(), 6, (200, 150), every=2, fps=10)
-    with Image.open(tmp_path / "a.gif") as image:
-        assert image.n_frames == 4
-    for wrong in ({"every": 0}, {"ticks": 0}):
-        with pytest.raises(AntsError, match="at least 1"):
-            list(colony_frames(colony(), **{"ticks": 5, **wrong}))
-
-
-def test_the_snapshot_of_a_colony_is_drawn_where_its_ants_are() -> None:
-    moment = colony(12).snapshot()
-    snapshot = Snapshot.of(moment)
-    assert Snapshot.of(snapshot) is snapshot
-    assert (snapshot.ant_cells == moment.ant_cells).all()
-    assert len(snapshot.ant_cells) == 12
+    assert (next(frames(colony_moments(other), (200, 150))) == pictures[-1]).all()
+    for wrong in ({"every": 0}, {"ticks": -1}, {"world": 1}):
+        with pytest.raises(AntsError, match=next(iter(wrong))):
+            list(colony_moments(colony(), **{"ticks": 5, **wrong}))

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from taichi_ants import AntsError
-from taichi_ants.rendering import Scene, Snapshot, Status, panel, text
+from taichi_ants.rendering import Scene, Status, at_start, panel, text
 from taichi_ants.rendering.colours import CHOSEN
-from taichi_ants.rendering.scene import range_with_zero
+from taichi_ants.rendering.panel import range_with_zero
+from taichi_ants.task import Observation
+from taichi_ants.task.states import parse_state
 from taichi_ants.worlds import World, paper
 
 WORLD = paper()
@@ -18,8 +18,7 @@ Q_VALUES = np.array([0.5, 7.0, -1.0, 0.0, 2.0], dtype=np.float32)
 
 
 def picture(size=(640, 400), status: Status | None = None, **look: object) -> np.ndarray:
-    scene = Scene(WORLD.grid, size, **{"q_range": (-1.0, 10.0), **look})
-    return scene.draw(Snapshot.at_start(WORLD), status)
+    return Scene(WORLD.grid, size, **look).draw(at_start(WORLD), status)
 
 
 def blue_columns(frame: np.ndarray, rows: slice = slice(None)) -> np.ndarray:
@@ -29,7 +28,8 @@ def blue_columns(frame: np.ndarray, rows: slice = slice(None)) -> np.ndarray:
 
 
 def status(action: int) -> Status:
-    return Status(step=3, episode_return=4, state=8, action=action, q_values=Q_VALUES)
+    bars = {"q_values": Q_VALUES, "q_range": (-1.0, 10.0)}
+    return Status(step=3, episode_return=4, state=8, action=action, **bars)
 
 
 def test_the_bar_of_the_chosen_action_is_as_long_as_its_value() -> None:
@@ -49,13 +49,13 @@ def test_bars_of_negative_values_lie_on_the_other_side_of_the_axis() -> None:
     assert left.max() < right.min() <= left.max() + 3
     assert len(right) == pytest.approx(7 * (len(left) + 1), abs=8)  # 1: the axis
     view = Scene(WORLD.grid, (640, 400)).viewport
-    assert left.min() > view.left + view.width + text.width("forward", 11)
+    assert left.min() > view.width + text.width("forward", 11)
 
 
 def test_only_what_is_switched_on_is_there() -> None:
     plain = picture(hud=False, legend=False)
     right = Scene(WORLD.grid, (640, 400)).viewport
-    edge = right.left + right.width
+    edge = right.width
     everything = picture(status=status(1), title="x")
     assert (everything[:, edge:] != 255).any()
     without_status = picture()
@@ -106,7 +106,8 @@ def test_text_keeps_off_the_edges(size) -> None:
 
 def test_small_pictures_have_no_text() -> None:
     for size in ((64, 64), (320, 322)):
-        assert (picture(size, status(1), title="x") == picture(size, hud=False, legend=False)).all()
+        small = picture(size, status(1), title="x", view=False)
+        assert (small == picture(size, hud=False, legend=False)).all()
 
 
 @pytest.mark.parametrize(
@@ -119,34 +120,51 @@ def test_sizes_that_are_refused(size) -> None:
 
 def test_a_picture_is_the_callers_own() -> None:
     scene = Scene(WORLD.grid, (128, 96))
-    first = scene.draw(Snapshot.at_start(WORLD))
+    first = scene.draw(at_start(WORLD))
     kept = first.copy()
     first[:] = 0
-    assert (scene.draw(Snapshot.at_start(WORLD)) == kept).all()
+    assert (scene.draw(at_start(WORLD)) == kept).all()
 
 
 def test_ranges_of_bars() -> None:
-    assert range_with_zero(None) == (0.0, 1.0)
     assert range_with_zero(np.zeros(5)) == (0.0, 1.0)
     assert range_with_zero(np.array([2.0, 5.0])) == (0.0, 5.0)
     assert range_with_zero(np.array([-2.0, -5.0])) == (-5.0, 0.0)
 
 
 def test_letters_lie_in_the_cells_in_view() -> None:
-    snapshot = Snapshot.at_start(WORLD)
+    snapshot = at_start(WORLD)
     scene = Scene(WORLD.grid, (500, 500), hud=False, legend=False)
     plain = scene.draw(snapshot)
-    seen = replace(snapshot, letters="ETO")
-    changed = (scene.draw(seen) != plain).any(axis=2)
+    seen = Status(0, state=parse_state("foraging E T O"))
+    changed = (scene.draw(snapshot, seen) != plain).any(axis=2)
     rows, columns = np.nonzero(changed)
-    centres = scene.viewport.centres(WORLD.grid.cells(seen.cells_in_view()))
+    # The ant of the paper's world stands at (0, 8, 8) and looks up.
+    centres = scene.viewport.centres([(0, 7, 8), (0, 7, 7), (0, 8, 7)])
     places = np.stack([columns, rows], axis=-1) + 0.5
     away = np.linalg.norm(places[:, None] - centres, axis=2).min(axis=1)
     assert away.max() < scene.viewport.hexagon + 1
-    for cell in seen.cells_in_view():
-        x, y = scene.viewport.centres(WORLD.grid.cells(cell))
+    for x, y in centres:
         around = changed[int(y) - 6 : int(y) + 6, int(x) - 6 : int(x) + 6]
         assert around.sum() > 12
+
+
+def test_an_observation_of_five_cells_marks_five() -> None:
+    """The ant stands at (0, 8, 8) and looks up."""
+    five = Observation(
+        "five",
+        1,
+        lambda look: 0,
+        cells=(-2, -1, 0, 1, 2),
+        name_of=lambda row: "foraging E T O E T",
+    )
+    scene = Scene(WORLD.grid, (500, 500), hud=False, legend=False)
+    plain = scene.draw(at_start(WORLD))
+    seen = scene.draw(at_start(WORLD), Status(0, state=0, observation=five))
+    for cell, marked in (((0, 8, 9), True), ((0, 9, 8), True), ((0, 9, 9), False)):
+        x, y = scene.viewport.centres(cell).astype(int)
+        part = (slice(y - 6, y + 6), slice(x - 6, x + 6))
+        assert (seen[part] != plain[part]).any() == marked
 
 
 @pytest.mark.parametrize("side", [500, 700])
@@ -154,15 +172,13 @@ def test_no_letter_lies_on_food_or_queen(side) -> None:
     """The ant of a delivered episode sees the queen as an obstacle; her crown stays whole."""
     world = World((3, 3, 3), (0, 0, 0), [(1, 1, 0)], ants=[((0, 1, 0), 5)])
     scene = Scene(world.grid, (side, side), hud=False, legend=False)
-    snapshot = Snapshot.at_start(world)
-    in_view = snapshot.cells_in_view().tolist()
-    taken = [in_view.index(world.grid.index(cell)) for cell in (world.queen, (1, 1, 0))]
-    free = ({0, 1, 2} - set(taken)).pop()
+    snapshot = at_start(world)
+    free = (0, 1, 1)
     plain = scene.draw(snapshot)
-    seen = scene.draw(replace(snapshot, letters="OOO"))
+    seen = scene.draw(snapshot, Status(0, state=parse_state("carrying O O O")))
     reach = int(0.5 * scene.viewport.hexagon)
-    for place in (*taken, free):
-        x, y = scene.viewport.centres(world.grid.cells(in_view[place])).astype(int)
+    for place in (world.queen, (1, 1, 0), free):
+        x, y = scene.viewport.centres(place).astype(int)
         part = (slice(y - reach, y + reach), slice(x - reach, x + reach))
         assert (seen[part] == plain[part]).all() == (place != free)
 

@@ -12,7 +12,7 @@ from PIL import Image
 
 from taichi_ants import runtime
 from taichi_ants.grid.hexgrid import AxialGrid, neighbours
-from taichi_ants.rendering import Scene, Snapshot, Viewport, colours
+from taichi_ants.rendering import Scene, Snapshot, Viewport, at_start, colours
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.worlds import World, paper
 
@@ -33,9 +33,7 @@ def sampled(grid: AxialGrid, view: Viewport, of_cells: np.ndarray, samples: int)
 
 
 def drawn(grid: AxialGrid, view: Viewport, of_cells: np.ndarray) -> np.ndarray:
-    frame = np.zeros((view.height, view.width, 3), dtype=np.uint8)
-    Rasteriser(grid, view).draw_colours(frame, of_cells)
-    return frame
+    return Rasteriser(grid, view).draw_cells(of_cells)
 
 
 def random_colours(grid: AxialGrid, seed: int = 0) -> np.ndarray:
@@ -47,7 +45,7 @@ def random_colours(grid: AxialGrid, seed: int = 0) -> np.ndarray:
 def test_edges_are_smooth() -> None:
     # At this size there are no lines between cells, so the picture is the plain mean.
     grid = AxialGrid((9, 12, 7))
-    view = Viewport(0, 0, 90, 80, 2.7, (40.3, 45.1))
+    view = Viewport(90, 80, 2.7, (40.3, 45.1))
     of_cells = random_colours(grid)
     error = np.abs(drawn(grid, view, of_cells) - sampled(grid, view, of_cells, 8))
     # Where three cells meet in a pixel only two of them count.
@@ -59,7 +57,7 @@ def test_a_straight_edge_is_exact() -> None:
     # Two cells, one above the other, of 30 pixels: the edge between them is covered by a line of
     # 0.09 * 30 - 0.25 = 2.45 pixels, so the rows above and below show how much of them it covers.
     grid = AxialGrid((2, 1, 1))
-    view = Viewport(0, 0, 80, 120, 30.0, (40.0, 80.25))
+    view = Viewport(80, 120, 30.0, (40.0, 80.25))
     of_cells = np.zeros(grid.size, dtype=np.uint32)
     of_cells[~grid.exists] = colours.PAGE
     column = drawn(grid, view, of_cells)[:, 40, 0] / 255
@@ -74,17 +72,9 @@ def test_a_straight_edge_is_exact() -> None:
 def test_small_cells_are_averaged(hexagon) -> None:
     side = round(60 / hexagon)
     grid = AxialGrid((side, side, 1))
-    view = Viewport(3, 5, 40, 36, hexagon, (3.2, 5.0 + 40))
+    view = Viewport(40, 36, hexagon, (0.2, 40.0))
     of_cells = random_colours(grid)
-    frame = np.full((50, 50, 3), 7, dtype=np.uint8)
-    Rasteriser(grid, view).draw_colours(frame, of_cells)
-    assert (frame[:5] == 7).all()
-    assert (frame[5 + 36 :] == 7).all()
-    assert (frame[:, :3] == 7).all()
-    assert (frame[:, 3 + 40 :] == 7).all()
-    shifted = dataclasses.replace(view, left=0, top=0, origin=(0.2, 40.0))
-    expected = sampled(grid, shifted, of_cells, 12)
-    error = np.abs(frame[5 : 5 + 36, 3 : 3 + 40] - expected)
+    error = np.abs(drawn(grid, view, of_cells) - sampled(grid, view, of_cells, 12))
     # Bricks stand for hexagons, which shifts a little colour between neighbours.
     assert error.mean() < (5.0 if hexagon < 0.5 else 9.0)
 
@@ -92,7 +82,7 @@ def test_small_cells_are_averaged(hexagon) -> None:
 def test_a_fine_pattern_does_not_turn_into_noise() -> None:
     """Black and white rows of cells far smaller than a pixel are grey, without a beat."""
     grid = AxialGrid((500, 500, 1))
-    view = Viewport.fit(grid, 0, 0, 128, 128)
+    view = Viewport.fit(grid, 128, 128)
     assert view.hexagon < 0.15
     of_cells = np.where(np.arange(grid.size) % grid.width % 2, 0xFFFFFF, 0).astype(np.uint32)
     of_cells[~grid.exists] = colours.PAGE
@@ -104,7 +94,7 @@ def test_a_fine_pattern_does_not_turn_into_noise() -> None:
 def test_one_colour_stays_that_colour() -> None:
     for hexagon in (0.3, 1.7):
         grid = AxialGrid((200, 200, 1))
-        view = Viewport(0, 0, 40, 40, hexagon, (-10.0, 60.0))
+        view = Viewport(40, 40, hexagon, (-10.0, 60.0))
         frame = drawn(grid, view, np.full(grid.size, 0x336699, dtype=np.uint32))
         inside = view.index_at(grid, np.stack(np.meshgrid(np.arange(41), np.arange(41)), -1)) >= 0
         whole = inside[1:, 1:] & inside[:-1, 1:] & inside[1:, :-1] & inside[:-1, :-1]
@@ -154,7 +144,7 @@ def test_a_crowd_does_not_hide_the_queen() -> None:
     world = World(ranges=(300, 300, 1), queen=(150, 150, 0))
     scene = Scene(world.grid, (100, 100), hud=False, legend=False)
     x, y = scene.viewport.centres(world.queen).astype(int).tolist()
-    frame = scene.draw(Snapshot.at_start(world, n=20_000))
+    frame = scene.draw(at_start(world, n=20_000))
     ring = (frame == colours.channels(colours.CELL_QUEEN)).all(axis=2)
     assert ring[y - 7 : y + 8, x - 7 : x + 8].sum() >= 20
     assert frame[y, x + 10].max() < 130
@@ -165,7 +155,7 @@ def test_the_queen_does_not_hide_the_ants_beside_her() -> None:
     world = World(ranges=(2000, 2000, 1), queen=(1000, 1000, 0))
     scene = Scene(world.grid, (1280, 720), hud=False, legend=False)
     x, y = scene.viewport.centres(world.queen).astype(int).tolist()
-    frame = scene.draw(Snapshot.at_start(world, n=20))
+    frame = scene.draw(at_start(world, n=20))
     near = frame[y - 1 : y + 2, x - 1 : x + 2]
     assert near.max(axis=2).min() < 60  # as dark as an ant
     ring = (frame == colours.channels(colours.CELL_QUEEN)).all(axis=2)
@@ -177,10 +167,8 @@ def test_an_ant_points_where_it_is_heading(hexagon) -> None:
     """Its tip is on the side of the heading, and a crumb there."""
     grid = AxialGrid((3, 3, 3))
     side = 12 * hexagon
-    view = Viewport.fit(grid, 0, 0, side, side)
+    view = Viewport.fit(grid, side, side)
     cell = grid.index((0, 0, 0))
-    empty = np.zeros((side, side, 3), dtype=np.uint8)
-    Rasteriser(grid, view).draw(empty, crowd(grid, np.array([], dtype=np.int32)))
     ahead = view.centres(neighbours((0, 0, 0)))
     middle = view.centres((0, 0, 0))
     for heading, target in enumerate(ahead):
@@ -188,8 +176,7 @@ def test_an_ant_points_where_it_is_heading(hexagon) -> None:
             crowd(grid, np.array([cell]), carries=True),
             ant_headings=np.array([heading], dtype=np.int32),
         )
-        frame = empty.copy()
-        Rasteriser(grid, view).draw(frame, snapshot)
+        frame = Rasteriser(grid, view).draw(snapshot)
         orange = (frame[..., 0].astype(int) - frame[..., 2] > 60).nonzero()
         crumb = np.array([orange[1].mean(), orange[0].mean()]) + 0.5 - middle
         direction = (target - middle) / np.linalg.norm(target - middle)
@@ -201,12 +188,11 @@ def test_an_ant_points_where_it_is_heading(hexagon) -> None:
 def test_the_marks_of_the_view_leave_the_ant_free(hexagon) -> None:
     """What marks the view changes pixels near the ant, but none where it stands."""
     world = World(ranges=(11, 11, 11), queen=(10, 0, 0), ants=[((0, 0, 0), 0)])
-    view = Viewport(0, 0, 200, 200, hexagon, (100.0, 100.0))
-    plain, marked = (np.zeros((200, 200, 3), dtype=np.uint8) for _ in range(2))
-    snapshot = Snapshot.at_start(world)
+    view = Viewport(200, 200, hexagon, (100.0, 100.0))
+    snapshot = at_start(world)
     rasteriser = Rasteriser(world.grid, view)
-    rasteriser.draw(plain, snapshot)
-    rasteriser.draw(marked, dataclasses.replace(snapshot, letters="EEE"))
+    in_view = snapshot.ant_cells + world.grid.offsets[[5, 0, 1]]
+    plain, marked = rasteriser.draw(snapshot), rasteriser.draw(snapshot, in_view)
     rows, columns = np.nonzero((plain != marked).any(axis=2))
     away = np.hypot(rows + 0.5 - 100, columns + 0.5 - 100)
     assert len(away) > 30
@@ -237,9 +223,7 @@ def golden_scene() -> np.ndarray:
         trails=[((1, 0, 0), 250), ((2, 0, 0), 120), ((0, 3, 1), 25), ((0, 4, 1), 1)],
         ants=[((1, 0, 0), 1), ((0, 3, 1), 4), ((3, 4, 0), 2)],
     )
-    snapshot = dataclasses.replace(
-        Snapshot.at_start(world, n=3), ant_carries=np.array([True, False, False])
-    )
+    snapshot = dataclasses.replace(at_start(world, n=3), ant_carries=np.array([True, False, False]))
     return Scene(world.grid, (320, 200), hud=False, legend=False).draw(snapshot)
 
 
@@ -261,15 +245,13 @@ def test_the_golden_picture() -> None:
 def test_text_changes_nothing_of_the_world() -> None:
     """The world's part of a picture with text is the world alone, wherever fonts put the text."""
     world = paper()
-    snapshot = Snapshot.at_start(world)
+    snapshot = at_start(world)
     with_text = Scene(world.grid, (640, 400), title="some title")
     frame = with_text.draw(snapshot)
     view = with_text.viewport
-    alone = np.full_like(frame, 255)
-    Rasteriser(world.grid, view).draw(alone, snapshot)
-    part = slice(view.left, view.left + view.width)
-    assert (frame[:, part] == alone[:, part]).all()
-    assert (frame[:, view.left + view.width :] != 255).any()
+    alone = Rasteriser(world.grid, view).draw(snapshot)
+    assert (frame[:, : view.width] == alone).all()
+    assert (frame[:, view.width :] != 255).any()
 
 
 def test_the_number_of_threads_changes_nothing() -> None:
@@ -287,7 +269,7 @@ def test_the_number_of_threads_changes_nothing() -> None:
 @pytest.mark.parametrize("size", [(64, 64), (3840, 2160), (4096, 64)])
 def test_all_sizes(size) -> None:
     world = paper()
-    frame = Scene(world.grid, size).draw(Snapshot.at_start(world))
+    frame = Scene(world.grid, size).draw(at_start(world))
     assert frame.shape == (size[1], size[0], 3)
     assert frame.dtype == np.uint8
     # The queen is there, whatever the size.
@@ -297,12 +279,11 @@ def test_all_sizes(size) -> None:
 
 def test_rasterising_takes_less_than_8_ms() -> None:
     world = paper()
-    snapshot = Snapshot.at_start(world)
-    rasteriser = Rasteriser(world.grid, Viewport.fit(world.grid, 0, 0, 1280, 720))
-    frame = np.empty((720, 1280, 3), dtype=np.uint8)
+    snapshot = at_start(world)
+    rasteriser = Rasteriser(world.grid, Viewport.fit(world.grid, 1280, 720))
     took = []
     for _ in range(40):
         began = time.perf_counter()
-        rasteriser.draw(frame, snapshot)
+        rasteriser.draw(snapshot)
         took.append(time.perf_counter() - began)
     assert min(took) < 0.008

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import io
-import multiprocessing
-import os
 import signal
 import sys
 import threading
-import time
 
 import pytest
 
@@ -19,7 +16,6 @@ from taichi_ants.studies.command_line import (
     Parser,
     load_plugin,
     number,
-    process_beside,
     progress_bar,
     run_command,
     whole_number,
@@ -213,81 +209,6 @@ def test_commands_run_in_other_threads_too():
     thread.start()
     thread.join()
     assert statuses == [0]
-
-
-def leave_a_note(path):
-    path.write_text("done")
-
-
-def complain(text):
-    raise AntsError(text)
-
-
-def die():
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
-def sleep_for_long(path):
-    path.write_text("asleep")
-    time.sleep(60)
-
-
-def test_work_in_a_process_beside(tmp_path, capfd):
-    with process_beside(leave_a_note, tmp_path / "note"):
-        pass
-    assert (tmp_path / "note").read_text() == "done"
-
-    with pytest.raises(SystemExit) as end, process_beside(complain, "it is dark."):
-        pass
-    assert end.value.code == 2
-    assert capfd.readouterr().err == "error: it is dark.\n"
-
-    with pytest.raises(AntsError, match="stopped a process"), process_beside(die):
-        pass
-
-
-def write_for_long(path):
-    for _ in range(6000):
-        with open(path, "a") as file:
-            file.write(".")
-        time.sleep(0.01)
-
-
-def hold_a_process_beside(path):
-    with process_beside(write_for_long, path):
-        pass
-
-
-def test_a_process_beside_does_not_outlive_a_killed_parent(tmp_path):
-    note = tmp_path / "note"
-    parent = multiprocessing.get_context("spawn").Process(
-        target=hold_a_process_beside, args=(note,)
-    )
-    parent.start()
-    while not note.exists():
-        time.sleep(0.002)
-    parent.kill()
-    parent.join()
-    lengths = []
-    while len(lengths) < 2 or lengths[-1] > lengths[-2]:
-        assert len(lengths) < 20
-        lengths.append(note.stat().st_size)
-        time.sleep(0.5)
-
-
-def test_a_process_beside_does_not_outlive_an_interruption(tmp_path):
-    def command():
-        with process_beside(sleep_for_long, tmp_path / "note"):
-            while not (tmp_path / "note").exists():
-                time.sleep(0.002)
-            raise KeyboardInterrupt
-
-    began = time.perf_counter()
-    with pytest.raises(KeyboardInterrupt):
-        command()
-    assert time.perf_counter() - began < 30
-    assert multiprocessing.active_children() == []
-    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
 
 
 class Terminal(io.StringIO):

@@ -84,6 +84,35 @@ def test_what_is_held_is_done_first():
     assert steps == ["inner", "outer"]
 
 
+def test_what_is_held_can_ask_whether_to_end(capsys):
+    told = []
+
+    def work():
+        with held() as stopped:
+            told.append(stopped())
+            signal.raise_signal(signal.SIGINT)
+            stop_if_noted()  # not where it waits
+            told.append(stopped())
+            raise KeyboardInterrupt("Stopped at tick 3.")
+
+    assert stopped_by(signal.SIGINT, work) == 130
+    assert told == [False, True]
+    assert capsys.readouterr().err == "Stopped at tick 3.\n"
+
+
+def test_a_third_signal_is_not_held_up():
+    steps = []
+
+    def work():
+        with held():
+            for _ in range(3):
+                signal.raise_signal(signal.SIGINT)
+                steps.append("waits")
+
+    assert stopped_by(signal.SIGINT, work) == 130
+    assert steps == ["waits", "waits"]
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_what_is_ignored_on_purpose_stays_ignored(number):
     """As of `nohup`, or of a shell for its background processes."""

@@ -8,28 +8,25 @@ import signal
 import numpy as np
 import pytest
 
-from taichi_ants import AntsError, Colony, TrainingConfig, worlds
+from taichi_ants import AntsError, Colony, Life, Task, TrainingConfig, worlds
 from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.rendering import writers
-from taichi_ants.studies.one_colony import (
-    Outputs,
-    Pace,
-    let_time_pass,
-    live,
-    stop_requests,
-    summary,
-)
-from taichi_ants.task import Life, Task
+from taichi_ants.studies.interruption import held, stoppable
+from taichi_ants.studies.one_colony import Outputs, Pace, let_time_pass, live, summary
 
-TRAINING = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0, 0.1)
 TASK = Task(delivery="continuing", evaporation_in_training=True)
+TRAINING = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0, 0.1)
 
 
 def begun(ants: int = 3) -> Colony:
-    colony = Colony(worlds.paper(), TASK, TRAINING, 4, ants=ants)
+    colony = Colony(worlds.paper(), TASK, TRAINING, 4, ants)
     colony.begin_episode()
     return colony
+
+
+def never() -> bool:
+    return False
 
 
 @pytest.mark.parametrize(
@@ -60,7 +57,7 @@ def test_a_colony_is_saved_although_its_picture_cannot_be(
     outputs = Outputs(str(tmp_path / "keep.npz"), str(tmp_path / render), every=2)
     expected = AntsError if isinstance(error, OSError) else RuntimeError
     with pytest.raises(expected) as caught:
-        live(colony, 20, outputs, lambda share: None)
+        live(colony, 20, outputs, lambda share: None, never)
     if expected is AntsError:
         text = str(caught.value)
         assert "o space left on device" in text
@@ -82,40 +79,21 @@ def test_the_colony_and_its_picture_need_two_places(tmp_path, monkeypatch) -> No
     Outputs("x.npz", "x.gif").check()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_asks_for_an_end_and_a_second_one_ends(number) -> None:
-    before = signal.getsignal(number)
-    with stop_requests() as stop:
-        assert stop() == 0
-        os.kill(os.getpid(), number)
-        assert stop() == number
-        with pytest.raises((KeyboardInterrupt, SystemExit)) as caught:
-            os.kill(os.getpid(), number)
-        if number == signal.SIGTERM:
-            assert caught.value.code == 143
-    assert signal.getsignal(number) is before
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_that_is_ignored_stays_ignored(number) -> None:
-    before = signal.signal(number, signal.SIG_IGN)
-    try:
-        with stop_requests() as stop:
-            assert signal.getsignal(number) is signal.SIG_IGN
-            os.kill(os.getpid(), number)
-            assert stop() == 0
-    finally:
-        signal.signal(number, before)
-
-
-def test_a_stopped_colony_says_by_which_signal(tmp_path) -> None:
+def test_a_stopped_colony_ends_at_a_whole_tick_with_all_its_files(tmp_path, capsys) -> None:
     def progress(share: float) -> None:
         os.kill(os.getpid(), signal.SIGTERM)
 
     colony = begun()
     outputs = Outputs(str(tmp_path / "keep.npz"), str(tmp_path / "a.gif"), every=2)
-    pace, number = live(colony, 10, outputs, progress)
-    assert (pace.ticks, number) == (2, signal.SIGTERM)
+    paces = []
+
+    def work() -> None:
+        with stoppable(), held() as stopped:
+            paces.append(live(colony, 10, outputs, progress, stopped))
+
+    with pytest.raises(SystemExit) as end:
+        work()
+    assert (end.value.code, paces[0].ticks) == (143, 2)
     assert Colony.load(outputs.save).ticks == 2
     assert (tmp_path / "a.gif").exists()
 
@@ -142,23 +120,22 @@ def test_the_summary_counts_in_words() -> None:
 
 
 def test_the_summary_says_when_all_places_are_taken() -> None:
-    def lived(births: bool = False, capacity: int | None = None) -> tuple[str, Colony]:
+    def lived(births: bool, capacity: int | None) -> tuple[str, Colony]:
         task = Task(life=Life(births=births, regrowth=0))
         training = TrainingConfig("sarsa", 0.1, 0.9, 0.0, 1.0, 0.0)
-        population = {"ants": 8, "capacity": capacity}
-        fixed = {"sharing": "fixed", "q_values": trail_follower()}
-        colony = Colony(worlds.paper(), task, training, 4, **population, **fixed)
+        options = {"sharing": "fixed", "q_values": trail_follower()}
+        colony = Colony(worlds.paper(), task, training, 4, 8, capacity, **options)
         colony.begin_episode()
         pace = Pace()
-        for _ in let_time_pass(colony, 400, pace, lambda: 0):
+        for _ in let_time_pass(colony, 400, pace, never):
             pass
         return summary(colony, pace), colony
 
-    text, colony = lived(births=True, capacity=9)
+    text, colony = lived(True, 9)
     waiting = colony.outcome().deliveries.sum() - 1
     assert colony.waiting_foods == waiting > 1
     assert text.endswith(
         f"\n9 of 9 places are taken, {waiting} foods wait at the queen; --capacity gives more."
     )
-    assert "places" not in lived(births=True, capacity=5000)[0]
-    assert "places" not in lived()[0]
+    assert "places" not in lived(True, 5000)[0]
+    assert "places" not in lived(False, None)[0]

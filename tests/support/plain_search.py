@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from taichi_ants.analysis.dynamic_programming import Outcome
+from taichi_ants.analysis.bounds.episodes import Outcome
 from taichi_ants.worlds.world import World
 
 STEPS = [(1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1), (1, 0, 1)]

@@ -6,8 +6,15 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from taichi_ants.analysis.colony import Arena, ColonyStudy, Condition, Limits, Record
-from taichi_ants.analysis.colony.study import PHEROMONES, WAYS
+from taichi_ants.analysis.bounds.limits import Limits
+from taichi_ants.analysis.colony.study import (
+    PHEROMONES,
+    WAYS,
+    Arena,
+    ColonyStudy,
+    Condition,
+    Record,
+)
 
 TICKS = 1000
 SIZES = (1, 2, 4, 8)

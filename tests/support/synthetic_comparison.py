@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from taichi_ants.analysis.behaviour import DELIVERS, WALKS
-from taichi_ants.analysis.comparison import Comparison, Hyperparameters, Row, Variant
-from taichi_ants.analysis.paper import DYNA_P3, GRID, Q_LEARNING, SARSA, VARIANTS
+from taichi_ants.analysis.paper.comparison import Comparison, Hyperparameters, Row, Variant
+from taichi_ants.analysis.paper.published import DYNA_P3, GRID, Q_LEARNING, SARSA, VARIANTS
 
 EARLY = 50  # episodes before the late level is reached
 

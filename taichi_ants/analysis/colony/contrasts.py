@@ -1,102 +1,97 @@
-"""The paired differences on which the findings of the study rest."""
+"""What the scaling study compares: contrasts by the question that they answer, as one table."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import combinations
-from typing import Protocol
 
-import numpy as np
-
-from taichi_ants.analysis.colony.differences import Difference, judge
 from taichi_ants.analysis.colony.study import (
     COPIED,
     COPIED_LONG,
     JOINT,
     LASTING,
+    MEASURES,
     OFF,
     ON,
     OWN,
+    PHEROMONES,
     THEN_JOINT,
+    WAYS,
     Arena,
     ColonyStudy,
 )
+from taichi_ants.analysis.findings import Above, Contrast, Finding, Verdict, Within, judge
 
 # Numbers of ants: of the condition from which is subtracted, and of the one that is.
 Sizes = tuple[int, int]
+# Those of two lists of numbers of ants that are compared.
+Choose = Callable[[Sequence[int], Sequence[int]], list[Sizes]]
 
 
-class Contrast(Protocol):
-    """Differences of one kind, for several numbers of ants."""
-
-    @property
-    def words(self) -> str:
-        """What is subtracted from what."""
-
-    def values(self, study: ColonyStudy, arena: Arena) -> dict[Sizes, np.ndarray]:
-        """Differences float64 (seeds,); none where conditions are missing."""
+def with_smaller(sizes: Sequence[int], others: Sequence[int]) -> list[Sizes]:
+    """Each number of ants with every smaller one."""
+    return [(n, less) for less, n in combinations(sizes, 2) if less in others]
 
 
-@dataclass(frozen=True)
-class Growth:
-    """Each number of ants minus every smaller one, of one way and pheromone."""
+def equally_many(sizes: Sequence[int], others: Sequence[int]) -> list[Sizes]:
+    """From two ants on: for one ant all ways but two trainings in turn are the same."""
+    return [(n, n) for n in sizes if n > 1 and n in others]
 
-    way: str
-    pheromone: str
-    measure: str
 
-    @property
-    def words(self) -> str:
-        return f"{self.measure}, {self.way}, trail {self.pheromone}: minus a smaller colony"
+def equally_many_or_one(sizes: Sequence[int], others: Sequence[int]) -> list[Sizes]:
+    """From one ant on, where it is not the same."""
+    return [(n, n) for n in sizes if n in others]
 
-    def values(self, study: ColonyStudy, arena: Arena) -> dict[Sizes, np.ndarray]:
-        sizes = study.sizes(arena, self.pheromone, self.way)
-        by_size = {n: study.values(arena, self.pheromone, self.way, n, self.measure) for n in sizes}
-        return {(n, less): by_size[n] - by_size[less] for less, n in combinations(sizes, 2)}
+
+def most_with_one(sizes: Sequence[int], others: Sequence[int]) -> list[Sizes]:
+    """The largest colony with a single ant."""
+    return [(n, 1) for n in sizes[-1:] if n > 1 and 1 in others]
 
 
 @dataclass(frozen=True)
-class Pair:
-    """One (way, pheromone) minus another, with equally many ants, from `least` ants on."""
+class Series:
+    """Differences of one kind, for several numbers of ants.
 
+    Attributes:
+        question: What it helps to answer.
+        statement: What is so where the difference is above 0; of `with_smaller` who is meant.
+        first, second: (way, pheromone) from which is subtracted, and which is.
+        measure: A name in `MEASURES`.
+        choose: Which numbers of ants are compared.
+        share: If positive, the statement holds where the first has at least this share of the
+            second's mean.
+    """
+
+    question: str
+    statement: str
     first: tuple[str, str]
     second: tuple[str, str]
-    least: int = 2
     measure: str = "deliveries"
+    choose: Choose = field(default=equally_many)
+    share: float = 0.0
 
     @property
     def words(self) -> str:
-        names = [f"{way}, trail {pheromone}" for way, pheromone in (self.first, self.second)]
-        return f"{self.measure}: {names[0]} minus {names[1]}"
+        """What is computed."""
+        names = [f"{WAYS[way]} ({PHEROMONES[trail]})" for way, trail in (self.first, self.second)]
+        whom = "a smaller colony" if self.choose is with_smaller else names[1]
+        return f"{MEASURES[self.measure].words}: {names[0]} minus {whom}"
 
-    def values(self, study: ColonyStudy, arena: Arena) -> dict[Sizes, np.ndarray]:
-        (way, pheromone), (other_way, other_pheromone) = self.first, self.second
-        return {
-            (n, n): study.values(arena, pheromone, way, n, self.measure)
-            - study.values(arena, other_pheromone, other_way, n, self.measure)
-            for n in study.sizes(arena, pheromone, way)
-            if n >= self.least and study.has(arena, other_pheromone, other_way, [n])
-        }
-
-
-@dataclass(frozen=True)
-class AgainstOne:
-    """The largest colony of a way minus one ant that was trained alone, trails on."""
-
-    way: str
-    measure: str
-
-    @property
-    def words(self) -> str:
-        return f"{self.measure}, trail on: {self.way} minus one ant alone"
-
-    def values(self, study: ColonyStudy, arena: Arena) -> dict[Sizes, np.ndarray]:
-        sizes = study.sizes(arena, ON, self.way)
-        if not sizes or sizes[-1] == 1 or not study.has(arena, ON, COPIED, [1]):
-            return {}
-        alone = study.values(arena, ON, COPIED, 1, self.measure)
-        return {(sizes[-1], 1): study.values(arena, ON, self.way, sizes[-1], self.measure) - alone}
+    def contrasts(self, study: ColonyStudy, arena: Arena) -> dict[Sizes, Contrast]:
+        """The contrasts of an arena; none where conditions are missing."""
+        sides = [(trail, way) for way, trail in (self.first, self.second)]
+        sizes = self.choose(*(study.sizes(arena, *side) for side in sides))
+        found = {}
+        for pair in sizes:
+            one, other = (
+                study.values(arena, *side, n, self.measure)
+                for side, n in zip(sides, pair, strict=True)
+            )
+            least = (self.share - 1) * float(other.mean())
+            criterion = Within(least, float("inf")) if self.share else Above()
+            found[pair] = Contrast(self.words, one - other, criterion)
+        return found
 
 
 COPIES = "Do more copies help?"
@@ -104,85 +99,93 @@ CROWDING = "Where does crowding begin?"
 CURE = "Does joint learning cure it?"
 TRAIL = "Does the trail that ants lay themselves help?"
 FIRST = "Does a crowd find food sooner?"
+# Crowding counts as cured if each ant delivers at least this share of what an ant alone does.
+CURED = 0.9
 
-# By the question that they answer. For one ant all ways but two trainings in turn are the same, so
-# that ways are compared from two ants on.
-CONTRASTS: dict[str, dict[str, Contrast]] = {
-    COPIES: {
-        "copies_total": Growth(COPIED, ON, "deliveries"),
-        "joint_total": Growth(JOINT, ON, "deliveries"),
-    },
-    CROWDING: {
-        "copies_each": Growth(COPIED, ON, "per_ant"),
-        "copies_each_off": Growth(COPIED, OFF, "per_ant"),
-        "joint_each": Growth(JOINT, ON, "per_ant"),
-    },
-    CURE: {
-        "joint_copies": Pair((JOINT, ON), (COPIED, ON)),
-        "joint_long": Pair((JOINT, ON), (COPIED_LONG, ON)),
-        "own_joint": Pair((OWN, ON), (JOINT, ON)),
-        "then_joint": Pair((THEN_JOINT, ON), (JOINT, ON)),
-        "joint_against_one": AgainstOne(JOINT, "per_ant"),
-    },
-    TRAIL: {
-        "trail_joint": Pair((JOINT, ON), (JOINT, OFF)),
-        "trail_copies": Pair((COPIED, ON), (COPIED, OFF), least=1),
-        "evaporation_joint": Pair((JOINT, ON), (JOINT, LASTING)),
-        "evaporation_copies": Pair((COPIED, ON), (COPIED, LASTING), least=1),
-        "trail_reward": Pair((JOINT, ON), (JOINT, OFF), measure="reward"),
-    },
-    FIRST: {
-        "first_copies": AgainstOne(COPIED, "first_delivery"),
-        "first_joint": AgainstOne(JOINT, "first_delivery"),
-    },
-}
+_COPIES, _COPIES_OFF, _COPIES_LASTING = (COPIED, ON), (COPIED, OFF), (COPIED, LASTING)
+_JOINT, _JOINT_OFF, _JOINT_LASTING = (JOINT, ON), (JOINT, OFF), (JOINT, LASTING)
+_COPIED_WORDS = "copies of an ant trained alone"
 
-# Verdicts on the contrasts of a question in an arena.
-Verdicts = Mapping[str, Mapping[Sizes, Difference]]
-# By arena and question.
-Judged = dict[tuple[str, str], Verdicts]
+# fmt: off
+SERIES: tuple[Series, ...] = (
+    Series(COPIES, _COPIED_WORDS, _COPIES, _COPIES, choose=with_smaller),
+    Series(COPIES, "jointly trained ants", _JOINT, _JOINT, choose=with_smaller),
+    Series(CROWDING, _COPIED_WORDS, _COPIES, _COPIES, "per_ant", with_smaller),
+    Series(CROWDING, "copies that lay no trails", _COPIES_OFF, _COPIES_OFF, "per_ant",
+           with_smaller),
+    Series(CROWDING, "jointly trained ants", _JOINT, _JOINT, "per_ant", with_smaller),
+    Series(CURE, f"jointly trained ants deliver more than {_COPIED_WORDS}", _JOINT, _COPIES),
+    Series(CURE, "jointly trained ants deliver more than copies of one trained alone for long",
+           _JOINT, (COPIED_LONG, ON)),
+    Series(CURE, "ants with a table each deliver more than ants that share one",
+           (OWN, ON), _JOINT),
+    Series(CURE, "ants trained alone and then jointly deliver more than ants only trained jointly",
+           (THEN_JOINT, ON), _JOINT),
+    Series(CURE, f"joint learning cures crowding: each of many ants delivers at least {CURED:.0%} "
+                 "of what one alone does",
+           _JOINT, _COPIES, "per_ant", most_with_one, CURED),
+    Series(TRAIL, "jointly trained ants that lay trails deliver more than ants that lay none",
+           _JOINT, _JOINT_OFF),
+    Series(TRAIL, "copies that lay trails deliver more than copies that lay none",
+           _COPIES, _COPIES_OFF, choose=equally_many_or_one),
+    Series(TRAIL, "jointly trained ants deliver more if their trails evaporate",
+           _JOINT, _JOINT_LASTING),
+    Series(TRAIL, "copies deliver more if their trails evaporate",
+           _COPIES, _COPIES_LASTING, choose=equally_many_or_one),
+    Series(TRAIL, "jointly trained ants that lay trails get more reward than ants that lay none",
+           _JOINT, _JOINT_OFF, "reward"),
+    Series(FIRST, "many copies need more ticks to the first delivery than one ant",
+           _COPIES, _COPIES, "first_delivery", most_with_one),
+    Series(FIRST, "many jointly trained ants need more ticks to the first delivery than one ant",
+           _JOINT, _COPIES, "first_delivery", most_with_one),
+)
+# fmt: on
+
+QUESTIONS: tuple[str, ...] = tuple(dict.fromkeys(series.question for series in SERIES))
+# By the name of the arena and the series.
+Judged = dict[tuple[str, Series], dict[Sizes, Finding]]
 
 
 def judge_all(study: ColonyStudy) -> Judged:
-    """All contrasts; those of one question in one arena are judged together."""
-    return {
-        (arena.name, question): _judge_question(study, arena, contrasts)
-        for arena in study.arenas
-        for question, contrasts in CONTRASTS.items()
-    }
+    """The findings on all contrasts; those of one question in one arena are judged together."""
+    judged: Judged = {}
+    for arena in study.arenas:
+        for question in QUESTIONS:
+            contrasts = {
+                (series, sizes): contrast
+                for series in SERIES
+                if series.question == question
+                for sizes, contrast in series.contrasts(study, arena).items()
+            }
+            findings = judge(list(contrasts.values()))
+            for (series, sizes), finding in zip(contrasts, findings, strict=True):
+                judged.setdefault((arena.name, series), {})[sizes] = finding
+    return judged
 
 
-def _judge_question(
-    study: ColonyStudy, arena: Arena, contrasts: Mapping[str, Contrast]
-) -> Verdicts:
-    values = {
-        (name, sizes): differences
-        for name, contrast in contrasts.items()
-        for sizes, differences in contrast.values(study, arena).items()
-    }
-    verdicts: dict[str, dict[Sizes, Difference]] = {name: {} for name in contrasts}
-    for (name, sizes), difference in judge(values).items():
-        verdicts[name][sizes] = difference
-    return verdicts
-
-
-def peak(verdicts: Mapping[Sizes, Difference]) -> int:
+def peak(findings: Mapping[Sizes, Finding]) -> int:
     """The smallest number of ants that no larger one exceeds beyond chance."""
-    sizes = sorted({n for pair in verdicts for n in pair})
-    return next(
-        n for n in sizes if not any(verdicts[more, n].sign > 0 for more in sizes if more > n)
-    )
+    sizes = sorted({n for pair in findings for n in pair})
+    return next(n for n in sizes if not _exceeded(findings, n, sizes))
 
 
-def decline(verdicts: Mapping[Sizes, Difference]) -> Sizes | None:
+def decline(findings: Mapping[Sizes, Finding]) -> Sizes | None:
     """The smallest number of ants that stays below a smaller one beyond chance, and that one.
 
     It stays below if no larger number exceeds it again. Of several smaller ones the one with the
     greatest difference; None if there is none.
     """
-    sizes = sorted({n for pair in verdicts for n in pair})
+    sizes = sorted({n for pair in findings for n in pair})
     for n in sizes:
-        below = [less for less in sizes if less < n and verdicts[n, less].sign < 0]
-        if below and not any(verdicts[more, n].sign > 0 for more in sizes if more > n):
-            return n, min(below, key=lambda less: verdicts[n, less].mean)
+        below = [less for less in sizes if less < n and _falls(findings[n, less])]
+        if below and not _exceeded(findings, n, sizes):
+            return n, min(below, key=lambda less: findings[n, less].effect)
     return None
+
+
+def _exceeded(findings: Mapping[Sizes, Finding], n: int, sizes: Sequence[int]) -> bool:
+    return any(findings[more, n].verdict is Verdict.SUPPORTED for more in sizes if more > n)
+
+
+def _falls(finding: Finding) -> bool:
+    return finding.verdict is Verdict.CONTRADICTED

@@ -41,6 +41,7 @@ from taichi_ants.analysis.style import (
     save,
     styled,
 )
+from taichi_ants.analysis.tables import sentence
 from taichi_ants.files import check_writable_folder
 
 if TYPE_CHECKING:
@@ -56,17 +57,20 @@ _WAY_LOOKS = {
     OWN: (WINE, "^", "-."),
 }
 _PHEROMONE_LOOKS = {ON: (RED, "s", "-"), OFF: (BLUE, "o", "--"), LASTING: (ORANGE, "^", ":")}
+# Pheromone, way, look and label of a line.
+_Line = tuple[str, str, tuple[str, str, str], str]
+_WAY_LINES: list[_Line] = [(ON, way, look, WAYS[way]) for way, look in _WAY_LOOKS.items()]
 _SPREAD = 0.035  # of log10 of the number of ants, between lines, so that their bars stand apart
 
 
 def scaling(study: ColonyStudy) -> Figure:
     """Deliveries of the whole colony and of each ant against the number of ants."""
-    return _by_way(
+    return _by_size(
         study,
-        {
-            "deliveries": "Deliveries\nper 1000 ticks",
-            "per_ant": "Deliveries per ant\nand 1000 ticks",
-        },
+        [
+            ("Deliveries\nper 1000 ticks", "deliveries", _WAY_LINES),
+            ("Deliveries per ant\nand 1000 ticks", "per_ant", _WAY_LINES),
+        ],
         "More ants: what a colony delivers, and each of its ants",
         "Trails evaporate. Dashed grey: no colony can deliver more (shortest cycles, room at food "
         "and queen).",
@@ -76,12 +80,12 @@ def scaling(study: ColonyStudy) -> Figure:
 
 def crowding(study: ColonyStudy) -> Figure:
     """Blocked moves and the time to the first delivery against the number of ants."""
-    return _by_way(
+    return _by_size(
         study,
-        {
-            "blocked": "Blocked moves\n(share of those tried)",
-            "first_delivery": "Ticks to the\nfirst delivery",
-        },
+        [
+            ("Blocked moves\n(share of those tried)", "blocked", _WAY_LINES),
+            ("Ticks to the\nfirst delivery", "first_delivery", _WAY_LINES),
+        ],
         "More ants: how often they block each other, how soon one delivers",
         "Trails evaporate. An episode without a delivery counts with all its ticks.",
     )
@@ -89,25 +93,17 @@ def crowding(study: ColonyStudy) -> Figure:
 
 def trails(study: ColonyStudy) -> Figure:
     """What the trails that ants lay do to deliveries, for copies and for joint training."""
-    with styled():
-        figure = new_figure(5.6)
-        axes = figure.subplots(2, len(study.arenas), sharex="col", sharey="row", squeeze=False)
-        for row, way in zip(axes, (COPIED, JOINT), strict=True):
-            for axis, arena in zip(row, study.arenas, strict=True):
-                for number, (pheromone, look) in enumerate(_PHEROMONE_LOOKS.items()):
-                    style = _style(look, PHEROMONES[pheromone])
-                    line = (study, arena, pheromone, way, "deliveries")
-                    _draw_line(axis, *line, number - 1, style)
-            words = WAYS[way].replace(", ", ",\n")
-            row[0].set_ylabel(f"{words[0].upper()}{words[1:]}\n(deliveries per 1000 ticks)")
-        _finish(figure, axes, study.arenas, by_powers=(True, True))
-        frame(
-            figure,
-            "Do the trails help that ants lay themselves?",
-            f"Each ant was trained under the condition that it is shown in. {_caption(study)}",
-            legend_entries(axes.flat),
-        )
-    return figure
+    rows = []
+    for way in (COPIED, JOINT):
+        lines = [(one, way, look, PHEROMONES[one]) for one, look in _PHEROMONE_LOOKS.items()]
+        words = sentence(WAYS[way].replace(", ", ",\n"))
+        rows.append((f"{words}\n(deliveries per 1000 ticks)", "deliveries", lines))
+    return _by_size(
+        study,
+        rows,
+        "Do the trails help that ants lay themselves?",
+        "Each ant was trained under the condition that it is shown in.",
+    )
 
 
 def joint_learning(study: ColonyStudy) -> Figure:
@@ -150,27 +146,31 @@ def save_all(study: ColonyStudy, folder: str | Path) -> list[Path]:
     return paths
 
 
-def _by_way(
-    study: ColonyStudy, measures: dict[str, str], title: str, caption: str, limits: bool = False
+def _by_size(
+    study: ColonyStudy,
+    rows: Sequence[tuple[str, str, Sequence[_Line]]],
+    title: str,
+    caption: str,
+    limits: bool = False,
 ) -> Figure:
-    """A row of panels for each measure, a line for each way, trails evaporating."""
+    """A row of panels for each (label, measure, lines), a column for each arena."""
     share: Literal["row"] | bool = False if limits else "row"  # limits already set the scale
     with styled():
         figure = new_figure(5.6)
         axes = figure.subplots(
-            len(measures), len(study.arenas), sharex="col", sharey=share, squeeze=False
+            len(rows), len(study.arenas), sharex="col", sharey=share, squeeze=False
         )
-        for row, (measure, label) in zip(axes, measures.items(), strict=True):
+        for row, (label, measure, lines) in zip(axes, rows, strict=True):
             row[0].set_ylabel(label)
             for axis, arena in zip(row, study.arenas, strict=True):
-                for number, (way, look) in enumerate(_WAY_LOOKS.items()):
-                    style = _style(look, WAYS[way])
-                    _draw_line(axis, study, arena, ON, way, measure, number - 2, style)
+                for number, (pheromone, way, look, name) in enumerate(lines):
+                    place, style = number - (len(lines) - 1) / 2, _style(look, name)
+                    _draw_line(axis, study, arena, pheromone, way, measure, place, style)
                 if limits and arena.limits:
                     _draw_limit(axis, arena, each=measure == "per_ant")
         entries = legend_entries(axes.flat)
         entries |= {"limit": entries.pop("limit")} if "limit" in entries else {}  # comes last
-        _finish(figure, axes, study.arenas, [measure != "blocked" for measure in measures])
+        _finish(figure, axes, study.arenas, [measure != "blocked" for _, measure, _ in rows])
         frame(figure, title, f"{caption} {_caption(study)}", entries)
     return figure
 
@@ -263,8 +263,7 @@ def _errorbar(
 
 def _draw_limit(axis: Axes, arena: Arena, each: bool) -> None:
     sizes = np.unique(np.geomspace(arena.sizes[0], arena.sizes[-1], 60).round().astype(int))
-    limits = [np.mean([limit.deliveries(int(n)) for limit in arena.limits]) for n in sizes]
-    values = np.array(limits) / (sizes if each else 1)
+    values = np.array([arena.limit(int(n)) for n in sizes]) / (sizes if each else 1)
     axis.plot(sizes, values, "--", color=GREY, linewidth=1.2, label="limit")
 
 
@@ -282,7 +281,7 @@ def _finish(
             else:
                 axis.margins(y=0.08)
     for column, arena in zip(axes.T, arenas, strict=True):
-        column[0].set_title(f"{arena.words[0].upper()}{arena.words[1:]}", fontsize=9)
+        column[0].set_title(sentence(arena.words), fontsize=9)
         column[-1].set_xlabel("Ants")
         for axis in column:
             logarithmic(axis.xaxis, (1,))

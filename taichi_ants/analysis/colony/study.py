@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_ants.analysis.colony.limits import Limits
+from taichi_ants.analysis.bounds.limits import Limits
 
 # Ways of sharing, with the words of tables and figures.
 COPIED, COPIED_LONG, JOINT, THEN_JOINT, OWN = "copied", "copied_long", "joint", "then_joint", "own"
@@ -86,6 +86,11 @@ class Arena:
     seeds: int
     long_factor: int
     limits: tuple[Limits, ...]
+
+    def limit(self, ants: int) -> float | None:
+        """The most that so many ants can deliver per 1000 ticks, mean over seeds, if known."""
+        each = [limit.deliveries(ants) for limit in self.limits]
+        return float(np.mean(each)) if each else None
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ _LARGE_COLONY = 16_384  # slots from which ants, not worlds, are handed to threa
 _ANTS_PER_CHUNK = 2048
 _MOST_CHUNKS = 256
 _TICKS_BETWEEN_SORTS = 32
-_TICK_NS = 150  # of an ant, on a slow core, planning left out
+_TICK_NS = 150  # of an ant, on a slow core, by Q-learning
 _LAUNCH_SECONDS = 0.4
 
 
@@ -96,23 +96,25 @@ class Colony:
         seeds: One seed for each of the W worlds.
         ants: How many start each episode, 1 to 2**24: the listed ants of the World first, then
             others on free cells, see `start`.
-        capacity: How many ants can live at once, at least `ants`. None: `ants` if none are born,
-            else 2 * `ants` + 64.
+        capacity: How many ants can live at once, at least `ants`; more than these changes nothing
+            where none are born. None: `ants` if none are born, else 2 * `ants` + 64.
         start: Where ants start that the World does not list: "nest", on the free cells nearest to
             the queen; "spread", on free cells anywhere. The seed decides which, and the headings.
         ends_at_delivery: Whether an episode ends at its first delivery, as when an ant trains
             alone. Only for one ant, without births.
-        sharing: "shared": one table for all ants of a world. "own": one for each slot. "fixed":
-            nobody learns.
-        q_values: Action values to start from, float (128, 5) or (W, 128, 5); None: zeros, but if
-            nobody learns they must be given. If tables are not shared, (W, slots, 128, 5) too.
+        sharing: "shared": one table for all ants of a world, for learners with a TD error. "own":
+            one, and a memory of the learner, for each slot. "fixed": nobody learns.
+        q_values: Action values to start from, float (n_states, 5) or (W, n_states, 5); None: zeros,
+            but if nobody learns they must be given. If tables are not shared, (W, slots, n_states,
+            5) too.
         threads: CPU threads; None keeps what runs, or takes all.
         arch: "cpu" or "cuda"; None keeps what runs, or takes the CPU.
         schedule: "by_world" hands worlds to threads, "by_chunk" groups of ants; None chooses by
             size. Both give the same numbers.
 
     Raises:
-        AntsError: An argument is not allowed, or a world has too few free cells for the ants.
+        AntsError: An argument is not allowed; the learner needs what a colony, or a shared table,
+            does not have; or a world has too few free cells for the ants.
     """
 
     def __init__(
@@ -150,10 +152,15 @@ class Colony:
         )
         self._learner = learners.get(training.learner) if learns else None
         self.memory = Memory()
+        self._cost = 1.0  # of a tick of an ant, in that of Q-learning
+        self._plans_together = False
         if self._learner is not None:
             _check_sharing(self._learner, sharing)
-            if sharing == "own" or self._learner.plans:
-                self.memory = self._learner.memory_for(self.training, self.task.n_states)
+            settings = self._learner.settings(self.training)
+            self._cost = self._learner.cost(settings)
+            self._plans_together = sharing == "shared" and self._learner.plans
+            if sharing == "own" or self._plans_together:
+                self.memory = self._learner.memory(settings, self.task.n_states)
         falls = self.task.evaporation_in_training if learns else self.task.evaporation_in_evaluation
         self.pheromone = self.task.pheromone if falls else self.task.pheromone.lasting
         self.seeds = checks.checked_seeds(seeds)
@@ -201,7 +208,7 @@ class Colony:
             if self.ticks % _TICKS_BETWEEN_SORTS == 0:
                 self._sort_ants()
             self._launch("by_chunk", 1)
-            if self.sharing == "shared" and self._learner.plans:
+            if self._plans_together:
                 for _ in range(self.training.planning_steps):
                     self._launch("plan", 1)
             if self.task.life.changes or self.population.ends_at_delivery:
@@ -366,7 +373,7 @@ class Colony:
         if self.schedule == "by_chunk":
             return 1
         rounds = -(-len(self.seeds) // self._settings.threads)
-        cost = _TICK_NS * (1 + self.training.planning_steps)
+        cost = _TICK_NS * max(self._cost, 1 + self.training.planning_steps)
         if self.pheromone.dense:
             cost += 2 * self.layout.size / self.population.slots
         return max(1, int(_LAUNCH_SECONDS * 1e9 / (rounds * self.population.slots * cost)))
@@ -400,6 +407,7 @@ class Colony:
         variant = kernels.Variant(
             self._learner,
             self.one_a_slot,
+            self.memory.tables,
             self.task.sees,
             self.pheromone.dense,
             self.task.life.changes,
@@ -413,7 +421,7 @@ class Colony:
     def _numbers(self) -> dict[str, Any]:
         """What kernels know besides arrays; -1 stands for an option that is off."""
         life, population, pheromone = self.task.life, self.population, self.pheromone
-        owner, off = self.memory, -1
+        off = -1
         return {
             "n_worlds": len(self.seeds),
             "n_ants": population.ants,  # that start an episode
@@ -442,10 +450,8 @@ class Colony:
             "planning_steps": self.training.planning_steps,
             # So that the sum of the errors of all ants is a fixed-point number, see `learning`.
             "largest_error": 2.0**31 / (population.slots + 1),
-            # What a table, and the memory of a learner, take.
-            "table_size": (1 + owner.tables) * self.task.n_states * ROW,
-            "floats_size": owner.floats,
-            "integers_size": owner.integers,
+            "floats_size": self.memory.floats,
+            "integers_size": self.memory.integers,
         }
 
 

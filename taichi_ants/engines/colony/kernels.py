@@ -34,7 +34,7 @@ from taichi_ants.engines.trial import tried
 from taichi_ants.learners.memory import read_rates
 from taichi_ants.learners.registry import Learner
 from taichi_ants.learners.td_errors import guarded
-from taichi_ants.task.constants import N_ACTIONS
+from taichi_ants.task.constants import N_ACTIONS, ROW
 from taichi_ants.task.observations import Observation
 
 
@@ -45,6 +45,7 @@ class Variant:
     Attributes:
         learner: The learner, None if nobody learns.
         own_tables: Whether there is a table for each slot, not one for each world.
+        further_tables: How many the learner keeps behind each.
         observation: The observation.
         dense: Whether levels are f32, see `trail`.
         lively: Whether ants or food come and go; leaving that out halves the time to compile.
@@ -52,6 +53,7 @@ class Variant:
 
     learner: Learner | None
     own_tables: bool
+    further_tables: int
     observation: Observation
     dense: bool
     lively: bool
@@ -97,6 +99,11 @@ class Variant:
         return self.observation.n_states
 
     @property
+    def table_size(self) -> int:
+        """The numbers of a table and the further ones behind it."""
+        return (1 + self.further_tables) * self.n_states * ROW
+
+    @property
     def n_pairs(self) -> int:
         """The pairs of a row and an action."""
         return self.n_states * N_ACTIONS
@@ -105,6 +112,11 @@ class Variant:
     def sees_percept(self) -> bool:
         """Whether the row of the table is the percept itself, as in the paper."""
         return looks.is_percept(self.observation)
+
+    @property
+    def sees_ants(self) -> bool:
+        """Whether the cell of an ant has to tell what the ant carries."""
+        return not self.sees_percept
 
     @property
     def row_at(self) -> AntRow:

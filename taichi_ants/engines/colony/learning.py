@@ -33,9 +33,9 @@ def owner_of_table(v: ti.template(), w, ant):
 
 
 @ti.func
-def memory_of(c: ti.template(), owner):
+def memory_of(c: ti.template(), v: ti.template(), owner):
     """Where the table, and what else the learner keeps, of an ant or a world begins."""
-    return At(c.table_size * owner, c.floats_size * owner, c.integers_size * owner)
+    return At(v.table_size * owner, c.floats_size * owner, c.integers_size * owner)
 
 
 @ti.func
@@ -48,7 +48,7 @@ def rates_of(c: ti.template(), v: ti.template()):
 def draw_action(c: ti.template(), v: ti.template(), w, ant, row):
     """The ant's choice at a row of its table."""
     c.streams[ant] = advance(c.streams[ant])
-    table = c.table_size * owner_of_table(v, w, ant)
+    table = v.table_size * owner_of_table(v, w, ant)
     return choose(values_of(c.q, table, row), bits_of(c.streams[ant]), c.explore_below)
 
 
@@ -57,14 +57,14 @@ def begin_to_learn(c: ti.template(), v: ti.template(), ant):
     """Let the learner of an ant with a table of its own begin an episode."""
     if ti.static(v.begins):
         memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.n_states))
-        v.learner.begin(memory, memory_of(c, ant))
+        v.learner.begin(memory, memory_of(c, v, ant))
 
 
 @ti.func
 def forget(c: ti.template(), v: ti.template(), ant):
     """Empty the tables and the memory of a slot for the ant that was born into it."""
-    at = memory_of(c, ant)
-    for i in range(at.table, at.table + c.table_size):
+    at = memory_of(c, v, ant)
+    for i in range(at.table, at.table + v.table_size):
         c.q[i] = 0.0
     for i in range(at.floats, at.floats + c.floats_size):
         c.floats[i] = 0.0
@@ -88,7 +88,7 @@ def learn_alone(c: ti.template(), v: ti.template(), ant, seen, next_action):
         truncated=ti.cast(c.ants[AntRow.STAGE, ant] == Stage.DYING, ti.i32),
     )
     _, c.streams[ant] = v.learner.learn(
-        memory, memory_of(c, ant), step, rates_of(c, v), c.streams[ant]
+        memory, memory_of(c, v, ant), step, rates_of(c, v), c.streams[ant]
     )
 
 
@@ -103,7 +103,7 @@ def error_of(
     c: ti.template(), v: ti.template(), w, pair, reward, terminated, seen, next_action
 ):  # fmt: skip
     """The TD error of a pair (its offset in the table) by the shared table of a world."""
-    table = c.table_size * w
+    table = v.table_size * w
     error = v.td_error(
         c.q[table + pair],
         reward,
@@ -122,12 +122,13 @@ def share_error(c: ti.template(), v: ti.template(), w, chunk, ant, seen, next_ac
     """Add the TD error of an ant to the sums of its chunk, and what it saw."""
     event = c.ants[AntRow.EVENT, ant]
     reward, terminated = ti.cast(c.rewards[event], ti.f32), terminates(c, event)
-    pair = c.ants[v.row_at, ant] * ROW + c.ants[AntRow.ACTION, ant]
-    error = error_of(c, v, w, pair, reward, terminated, seen, next_action)
-    add_to_sums(c, v, chunk, key_of(pair), error, fixed(error), 1)
+    state, action = c.ants[v.row_at, ant], c.ants[AntRow.ACTION, ant]
+    key = state * N_ACTIONS + action
+    error = error_of(c, v, w, state * ROW + action, reward, terminated, seen, next_action)
+    add_to_sums(c, v, chunk, key, error, fixed(error), 1)
     if ti.static(v.learner.plans):
         outcome = pack_outcome(seen, reward, terminated)
-        note_outcome(c, v.n_pairs * chunk + key_of(pair), c.ants[AntRow.NUMBER, ant], outcome)
+        note_outcome(c, v.n_pairs * chunk + key, c.ants[AntRow.NUMBER, ant], outcome)
 
 
 @ti.func
@@ -197,7 +198,7 @@ def join_sums(c: ti.template(), v: ti.template(), w):
 @ti.func
 def apply_sums(c: ti.template(), v: ti.template(), w):
     """Move the shared values of a world by their joined errors, and forget these."""
-    chunk, table = w * c.n_chunks, c.table_size * w
+    chunk, table = w * c.n_chunks, v.table_size * w
     listed = list_of(v, chunk)
     for i in range(c.touched[listed]):
         key = c.touched[listed + 1 + i]
@@ -232,14 +233,14 @@ def remember_shared(c: ti.template(), v: ti.template(), w):
     for i in range(1, n + 1):
         key = c.touched[listed + i]
         outcome = c.sums_of[SumRow.OUTCOME, v.n_pairs * chunk + key]
-        remember(memory, memory_of(c, w), pair_of(key), outcome)
+        remember(memory, memory_of(c, v, w), pair_of(key), outcome)
 
 
 @ti.func
 def draw_pair(c: ti.template(), v: ti.template(), w, chunk, ant):
     """One planning draw of an ant: count an update of a visited pair."""
     memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.n_states))
-    at = memory_of(c, w)
+    at = memory_of(c, v, w)
     c.streams[ant] = advance(c.streams[ant])
     drawn = below(high_word(bits_of(c.streams[ant])), visited(memory, at))
     pair, outcome = recall(memory, at, drawn)

@@ -31,11 +31,11 @@ from taichi_ants.engines.colony.steps import commit, grow_old, observe, resolve,
 
 @ti.func
 def ants_of(c: ti.template(), chunk):
-    """The world of a chunk, and the range of its ants."""
+    """The world of a chunk, and the range of its ants, empty once the world's episode has ended."""
     w = chunk // c.n_chunks
     per_chunk = (c.n_slots + c.n_chunks - 1) // c.n_chunks
     first = chunk % c.n_chunks * per_chunk
-    last = ti.min(first + per_chunk, c.worlds[WorldRow.TOP, w])
+    last = ti.min(first + per_chunk, c.worlds[WorldRow.TOP, w]) * c.worlds[WorldRow.RUNNING, w]
     return w, w * c.n_slots + first, w * c.n_slots + last
 
 
@@ -43,46 +43,50 @@ def ants_of(c: ti.template(), chunk):
 def begin_all(c: ti.template(), v: ti.template(), chunk):
     """The ants look around, and their learners begin an episode."""
     w, first, last = ants_of(c, chunk)
+    base = w * c.size
     for ant in range(first, last):
-        c.ants[AntRow.PERCEPT, ant], c.ants[v.row_at, ant] = observe(c, v, w * c.size, ant, 0)
+        c.ants[AntRow.PERCEPT, ant], c.ants[v.row_at, ant] = observe(c, v, base, ant, 0)
         begin_to_learn(c, v, ant)
 
 
 @ti.func
 def choose_all(c: ti.template(), v: ti.template(), chunk):
     w, first, last = ants_of(c, chunk)
+    base = w * c.size
     for ant in range(first, last):
-        if c.worlds[WorldRow.RUNNING, w] == 1 and c.ants[AntRow.STAGE, ant] == Stage.LIVING:
+        if c.ants[AntRow.STAGE, ant] == Stage.LIVING:
             action = c.ants[AntRow.ACTION, ant]
             if action < 0:
                 action = draw_action(c, v, w, ant, c.ants[v.row_at, ant])
-            want(c, w * c.size, ant, action)
+            want(c, base, ant, action)
 
 
 @ti.func
 def resolve_all(c: ti.template(), chunk, tick):
     w, first, last = ants_of(c, chunk)
+    base = w * c.size
     for ant in range(first, last):
-        if c.worlds[WorldRow.RUNNING, w] == 1 and c.ants[AntRow.STAGE, ant] == Stage.LIVING:
-            resolve(c, w * c.size, ant, tick)
+        if c.ants[AntRow.STAGE, ant] == Stage.LIVING:
+            resolve(c, base, ant, tick)
 
 
 @ti.func
 def commit_all(c: ti.template(), v: ti.template(), chunk, tick):
     w, first, last = ants_of(c, chunk)
+    base = w * c.size
     total = ti.cast(0, ti.i64)
     for ant in range(first, last):
-        if c.worlds[WorldRow.RUNNING, w] == 1 and c.ants[AntRow.STAGE, ant] == Stage.LIVING:
-            total += c.rewards[commit(c, v, w * c.size, ant, chunk, tick)]
+        if c.ants[AntRow.STAGE, ant] == Stage.LIVING:
+            total += c.rewards[commit(c, v, base, ant, chunk, tick)]
     c.returns[w] += total  # atomic, and integer: the order does not matter
 
 
 @ti.func
 def grow_old_all(c: ti.template(), chunk):
     w, first, last = ants_of(c, chunk)
+    base = w * c.size
     for ant in range(first, last):
-        if c.worlds[WorldRow.RUNNING, w] == 1:
-            grow_old(c, w * c.size, ant, chunk)
+        grow_old(c, base, ant, chunk)
 
 
 @ti.func
@@ -109,11 +113,12 @@ def after_deaths(c: ti.template(), w, tick):
 def observe_all(c: ti.template(), v: ti.template(), chunk, tick):
     """Observe, choose the next action where the learner asks for it, and learn."""
     w, first, last = ants_of(c, chunk)
+    base = w * c.size
     clock = (tick + 1) * c.evaporates
     for ant in range(first, last):
         stage = c.ants[AntRow.STAGE, ant]
-        if c.worlds[WorldRow.RUNNING, w] == 1 and stage != Stage.VACANT:
-            percept, row = observe(c, v, w * c.size, ant, clock)
+        if stage != Stage.VACANT:
+            percept, row = observe(c, v, base, ant, clock)
             next_action = -1
             if stage != Stage.NEWBORN:
                 if ti.static(v.draws_next_action):
@@ -124,7 +129,8 @@ def observe_all(c: ti.template(), v: ti.template(), chunk, tick):
                 elif ti.static(v.together):
                     share_error(c, v, w, chunk, ant, row, next_action)
             c.ants[AntRow.PERCEPT, ant] = percept
-            c.ants[v.row_at, ant] = row
+            if ti.static(not v.sees_percept):
+                c.ants[AntRow.STATE, ant] = row
             c.ants[AntRow.ACTION, ant] = next_action
 
 
@@ -141,8 +147,7 @@ def draw_all(c: ti.template(), v: ti.template(), chunk):
     w, first, last = ants_of(c, chunk)
     for ant in range(first, last):
         stage = c.ants[AntRow.STAGE, ant]
-        acted = stage == Stage.LIVING or stage == Stage.DYING
-        if c.worlds[WorldRow.RUNNING, w] == 1 and acted:
+        if stage == Stage.LIVING or stage == Stage.DYING:
             draw_pair(c, v, w, chunk, ant)
 
 

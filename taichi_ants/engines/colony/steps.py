@@ -9,7 +9,16 @@ each ant writes what it wants into its own cell, and looks at the six cells arou
 import taichi as ti
 from taichi.math import popcnt
 
-from taichi_ants.engines.colony.layout import ENTER, STANDS, TAKE, AntRow, HomeRow, Stage, TallyRow
+from taichi_ants.engines.colony.layout import (
+    ANT_GROUND,
+    ENTER,
+    STANDS,
+    TAKE,
+    AntRow,
+    HomeRow,
+    Stage,
+    TallyRow,
+)
 from taichi_ants.engines.colony.trail import deposit, level_in_view, level_of
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task.constants import (
@@ -211,32 +220,32 @@ def commit(c: ti.template(), v: ti.template(), base, ant, chunk, tick):
     clock = tick * c.evaporates
     action, percept = c.ants[AntRow.ACTION, ant], c.ants[AntRow.PERCEPT, ant]
     cell, wanted = c.ants[AntRow.CELL, ant], c.ants[AntRow.WANT, ant]
-    carries = c.ants[AntRow.CARRIES, ant]
     moves = action <= RIGHT
     enters = moves and wanted >= 0
     destination = ti.select(enters, wanted, cell)
     event = ti.select(enters, move_event(code_in_view(percept, ti.min(action, RIGHT))), FAILED)
+    c.ground[base + cell] = EMPTY
+    c.ground[base + destination] = ANT_GROUND
+    c.ants[AntRow.CELL, ant] = destination
     c.tallies[TallyRow.MOVES, chunk] += ti.cast(moves, ti.i32)
     c.tallies[TallyRow.BLOCKED, chunk] += ti.cast(moves and not enters, ti.i32)
-    if carries == 1:
+    if c.ants[AntRow.CARRIES, ant] == 1:
         if enters:
             deposit(c, v, base + destination, clock)
         elif action == GIVE and goals_in_view(percept) != 0:
             event = DELIVERED
-            carries = 0
+            c.ants[AntRow.CARRIES, ant] = 0
             c.tallies[TallyRow.GIVES, chunk] += 1
     elif action == PICK_UP and wanted >= 0:
         event = PICKED_UP
-        carries = 1
+        c.ants[AntRow.CARRIES, ant] = 1
         c.ground[base + wanted] = EMPTY
         take_from_home(c, base, wanted, tick)
         deposit(c, v, base + wanted, clock)
         deposit(c, v, base + cell, clock)
         c.ants[AntRow.HEADING, ant] = turn_round(c.ants[AntRow.HEADING, ant])
-    c.ground[base + cell] = EMPTY
-    c.ground[base + destination] = ground_under(carries)
-    c.ants[AntRow.CELL, ant] = destination
-    c.ants[AntRow.CARRIES, ant] = carries
+    if ti.static(v.sees_ants):
+        c.ground[base + destination] = ground_under(c.ants[AntRow.CARRIES, ant])
     c.ants[AntRow.EVENT, ant] = event
     return event
 

@@ -11,7 +11,7 @@ from matplotlib.container import ErrorbarContainer
 from PIL import Image
 from synthetic_colony_study import LIMITS, SIZES, build
 
-from taichi_ants.analysis.colony import ColonyStudy, figures
+from taichi_ants.analysis.colony import figures
 from taichi_ants.analysis.colony.study import (
     COPIED,
     COPIED_LONG,
@@ -21,6 +21,7 @@ from taichi_ants.analysis.colony.study import (
     OWN,
     PHEROMONES,
     WAYS,
+    ColonyStudy,
 )
 from taichi_ants.analysis.statistics import bootstrap_interval
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from taichi_ants import AntsError, Colony, TrainingConfig, World, worlds
 from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.learners.policies import random_policy
-from taichi_ants.rendering import colony_picture
+from taichi_ants.rendering import colony_moments
 from taichi_ants.task import Life, Pheromone, Task
 from taichi_ants.task.constants import FOOD
 
@@ -165,6 +165,6 @@ def test_both_schedules_agree_where_places_stay_vacant():
 def test_a_tick_needs_an_episode():
     with pytest.raises(AntsError, match="begin_episode"):
         Colony(worlds.paper(), None, TRAINING).tick()
-    for look in (Colony.snapshot, colony_picture):
+    for look in (Colony.snapshot, lambda colony: next(colony_moments(colony))):
         with pytest.raises(AntsError, match="begin_episode"):
             look(Colony(worlds.paper(), None, TRAINING))

@@ -21,7 +21,7 @@ from taichi_ants import (
 from taichi_ants.checks import checked_count, checked_seeds, checked_seeds_for
 from taichi_ants.engines.runs.launches import plan_launches
 from taichi_ants.errors import shown
-from taichi_ants.rendering import Episode, episode_picture
+from taichi_ants.rendering import Scene
 from taichi_ants.worlds import World, paper
 
 CONFIG = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 0.99)
@@ -159,9 +159,8 @@ def test_flags(value):
         says(f"{name} {text}", Task, **{name: value})
     says(f"births {text}", Life, births=value)
     says(f"ends_at_delivery {text}", Colony, paper(), None, CONFIG, ends_at_delivery=value)
-    episode = Episode(paper(), rollout(paper(), TABLE, max_steps=1))
     for name in ("hud", "legend", "view"):
-        says(f"{name} is {value!r}", episode_picture, episode, 0, **{name: value})
+        says(f"{name} is {value!r}", Scene, paper().grid, **{name: value})
 
 
 @pytest.mark.parametrize("task", ["paper", 3, Task])

@@ -1,0 +1,1 @@
+"""What no ant and no colony can exceed, and simple policies, to hold learned ones against."""

@@ -1,0 +1,222 @@
+"""Contrasts judged: what the seeds say of a difference, and how surely.
+
+A contrast is a number of each seed, mostly the difference of two conditions, with a criterion that
+it shall fulfil. Contrasts that are judged together get intervals at a level corrected for the
+number of intervals (Bonferroni): with a probability of at least 95 % all of them hold at once,
+however they depend on each other. A contrast in reward or steps may rest on the typical run: then
+the interquartile mean decides, and the mean is judged beside it.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+
+from taichi_ants.analysis.statistics import (
+    cautious_interval,
+    interquartile_mean,
+    interquartile_values,
+    jackknife_values,
+    without_noise,
+)
+
+SIMULTANEOUS_LEVEL = 0.95
+WITHIN_MARGIN = "may be within the margin"
+UNBOUNDED = (-np.inf, np.inf)
+
+
+class Verdict(str, Enum):
+    """What the data say, the strongest objection first.
+
+    "Equivalent" is a finding, "undecided" is none: where a criterion asks for a difference, the
+    first says that it is smaller than matters, the second that the data leave open whether there
+    is one.
+    """
+
+    CONTRADICTED = "contradicted"
+    EQUIVALENT = "equivalent"
+    UNDECIDED = "undecided"
+    SUPPORTED = "supported"
+    NOT_TESTED = "not tested"
+
+
+@dataclass(frozen=True)
+class Above:
+    """The effect is above 0, by an amount that matters, and at most a limit.
+
+    Equivalent if the interval lies within the margin on either side of 0. Else supported if it
+    lies above 0 and below the limit, contradicted if it lies below 0 or above the limit.
+    """
+
+    margin: float = 0.0
+    most: float = np.inf
+
+    def judge(self, low: float, high: float) -> tuple[Verdict, str]:
+        """The verdict on an interval, and a note."""
+        if -self.margin <= low and high <= self.margin:
+            return Verdict.EQUIVALENT, ""
+        if low > 0 and high <= self.most:
+            return Verdict.SUPPORTED, "" if low > self.margin else WITHIN_MARGIN
+        if high < 0 or low > self.most:
+            return Verdict.CONTRADICTED, "" if high < -self.margin or low > 0 else WITHIN_MARGIN
+        return Verdict.UNDECIDED, ""
+
+    def slack(self, effect: float) -> float:
+        """How far an effect is on the criterion's side; the smallest is the weakest."""
+        return min(effect, self.most - effect)
+
+    @property
+    def words(self) -> str:
+        limit = "" if self.most == np.inf else f" and at most {self.most:g}"
+        return f"above 0{limit}, margin {self.margin:g}"
+
+
+@dataclass(frozen=True)
+class Within:
+    """The effect lies in a range.
+
+    Supported if the interval lies in it, contradicted if it lies outside entirely.
+    """
+
+    low: float
+    high: float
+
+    def judge(self, low: float, high: float) -> tuple[Verdict, str]:
+        """The verdict on an interval, and a note."""
+        if self.low <= low and high <= self.high:
+            return Verdict.SUPPORTED, ""
+        if high < self.low or low > self.high:
+            return Verdict.CONTRADICTED, ""
+        return Verdict.UNDECIDED, ""
+
+    def slack(self, effect: float) -> float:
+        """Distance to the nearer end of the range, negative outside of it."""
+        return min(effect - self.low, self.high - effect)
+
+    @property
+    def words(self) -> str:
+        if self.low == -np.inf:
+            return f"at most {self.high:g}"
+        if self.high == np.inf:
+            return f"at least {self.low:g}"
+        return f"from {self.low:g} to {self.high:g}"
+
+
+Criterion = Above | Within
+
+
+@dataclass(frozen=True, eq=False)
+class Contrast:
+    """A number of each seed, and what it shall fulfil.
+
+    Attributes:
+        label: What is compared, for example "Q-learning minus SARSA".
+        values: Float64 (seeds,); (k, seeds) with `of_centres`.
+        criterion: What the centre over seeds shall fulfil.
+        typical: Whether it rests on the typical run, that is on the interquartile mean over seeds.
+        possible: The range that the centre cannot leave; its interval is cut off there.
+        of_centres: For a question about the centres themselves (how unequal are the effects of 8
+            configurations?), as the noise of single seeds would be taken for the answer: a smooth
+            function of them, float (k, ...) -> float (...).
+    """
+
+    label: str
+    values: np.ndarray
+    criterion: Criterion
+    typical: bool = False
+    possible: tuple[float, float] = UNBOUNDED
+    of_centres: Callable[[np.ndarray], np.ndarray] | None = None
+
+    @property
+    def seeds(self) -> int:
+        """How many seeds it rests on."""
+        return self.values.shape[-1]
+
+    def reading(self, typical: bool) -> tuple[np.ndarray, bool]:
+        """What is averaged over seeds, float64 (seeds,), and whether by interquartile mean."""
+        if self.of_centres is None:
+            return self.values, typical
+        values = interquartile_values(self.values) if typical else self.values
+        return jackknife_values(self.of_centres, values), False
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What became of a contrast.
+
+    Attributes:
+        contrast: The contrast.
+        verdict: The verdict.
+        note: A word on it, or "".
+        effect: The centre over seeds.
+        low, high: Its interval at the corrected level.
+        level: Confidence level of that one interval.
+        by_mean: What the mean says of a contrast that rests on the typical run, else None.
+    """
+
+    contrast: Contrast
+    verdict: Verdict
+    note: str
+    effect: float
+    low: float
+    high: float
+    level: float
+    by_mean: Finding | None = None
+
+    @property
+    def disagrees(self) -> bool:
+        """Whether the mean gives another verdict than the typical run."""
+        return self.by_mean is not None and self.by_mean.verdict is not self.verdict
+
+
+def judge(contrasts: Sequence[Contrast]) -> list[Finding]:
+    """The findings on contrasts that are judged together, in their order."""
+    readings = {
+        (place, typical): contrast.reading(typical)
+        for place, contrast in enumerate(contrasts)
+        for typical in ((True, False) if contrast.typical else (False,))
+    }
+    level = 1 - (1 - SIMULTANEOUS_LEVEL) / max(1, len(readings))
+    numbers: dict[tuple[int, bool], tuple[float, ...]] = {}
+    # One batch for each number of seeds and each centre.
+    for seeds, iqm in {(len(values), iqm) for values, iqm in readings.values()}:
+        batch = [key for key, (values, by) in readings.items() if (len(values), by) == (seeds, iqm)]
+        rows = np.stack([readings[key][0] for key in batch])
+        centres = interquartile_mean(rows) if iqm else rows.mean(axis=1)
+        columns = (centres, *cautious_interval(rows, level, iqm=iqm))
+        lines = zip(*(without_noise(column, rows).tolist() for column in columns), strict=True)
+        numbers.update(zip(batch, lines, strict=True))
+
+    def finding(place: int, typical: bool) -> Finding:
+        contrast, (effect, *ends) = contrasts[place], numbers[place, typical]
+        low, high = np.clip(ends, *contrast.possible).tolist()
+        return Finding(contrast, *contrast.criterion.judge(low, high), effect, low, high, level)
+
+    found = [finding(place, contrast.typical) for place, contrast in enumerate(contrasts)]
+    return [
+        replace(one, by_mean=finding(place, False)) if one.contrast.typical else one
+        for place, one in enumerate(found)
+    ]
+
+
+def weakest(findings: Sequence[Finding]) -> Finding:
+    """Of contrasts that must all hold, the one with the strongest objection; so for the mean."""
+    first = min(findings, key=_strength)
+    by_mean = [one.by_mean for one in findings if one.by_mean is not None]
+    return replace(first, by_mean=min(by_mean, key=_strength) if by_mean else None)
+
+
+def _strength(finding: Finding) -> tuple[int, float]:
+    slack = finding.contrast.criterion.slack(finding.effect)
+    return list(Verdict).index(finding.verdict), slack
+
+
+def tally(verdicts: Iterable[Verdict]) -> str:
+    """How many verdicts of each kind there are, as a phrase."""
+    counts = Counter(verdicts)
+    order = sorted(Verdict, key=lambda verdict: verdict is not Verdict.SUPPORTED)
+    return ", ".join(f"{counts[verdict]} {verdict.value}" for verdict in order if counts[verdict])

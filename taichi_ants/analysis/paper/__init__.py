@@ -1,0 +1,1 @@
+"""The paper's comparison of learners: its data, tables and figures, and the audit of its claims."""

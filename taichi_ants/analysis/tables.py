@@ -1,0 +1,159 @@
+"""Numbers as text, and tables as data that a terminal and Markdown show alike."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+MISSING = "-"
+# Colours of a terminal, of cells that begin with these words.
+_STYLES = {
+    "supported": "green",
+    "contradicted": "red",
+    "equivalent": "cyan",
+    "undecided": "yellow",
+    "not tested": "dim",
+}
+
+
+def number(value: float, digits: int = 1) -> str:
+    """A number with fixed digits, "-" for nan; never "-0.0"."""
+    if math.isnan(value):
+        return MISSING
+    text = f"{value:.{digits}f}"
+    return text.lstrip("-") if float(text) == 0 else text
+
+
+def figure(value: float) -> str:
+    """A number with about three digits, "-" where it is not finite."""
+    if not math.isfinite(value):
+        return MISSING
+    whole = abs(value) >= 99.95 or value == int(value)
+    return number(value, 0 if whole else 1 if abs(value) >= 9.995 else 2)
+
+
+def interval(low: float, high: float, digits: int = 1) -> str:
+    """An interval as "[low, high]", "-" where an end is nan."""
+    if math.isnan(low) or math.isnan(high):
+        return MISSING
+    return f"[{number(low, digits)}, {number(high, digits)}]"
+
+
+def percent(share: float) -> str:
+    """A share as a percentage, small ones with a decimal place, "-" for nan."""
+    if math.isnan(share):
+        return MISSING
+    return f"{100 * share:.{0 if share >= 0.0995 or share == 0 else 1}f} %"
+
+
+def sentence(words: str) -> str:
+    """Words with a capital in front; the others keep theirs."""
+    return words[:1].upper() + words[1:]
+
+
+def table(headers: Sequence[str], lines: Sequence[Sequence[str]], text_columns: int = 1) -> str:
+    """A Markdown table; the first `text_columns` columns to the left, the others to the right."""
+    rule = ["---" if column < text_columns else "---:" for column in range(len(headers))]
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in (headers, rule, *lines)) + "\n"
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of text.
+
+    Attributes:
+        title: What it shows.
+        columns: The headers. They and the cells may have several lines, where they may break.
+        rows: The cells.
+        notes: Lines that explain it, below.
+        text_columns: How many columns stand to the left; those of numbers stand to the right.
+    """
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    notes: Sequence[str] = ()
+    text_columns: int = 1
+
+    def markdown(self) -> str:
+        """Title, table and notes as Markdown, each cell in one line."""
+        lines = [[" ".join(cell.split("\n")) for cell in row] for row in (self.columns, *self.rows)]
+        parts = [f"**{self.title}**\n"] if self.title else []
+        parts += [table(lines[0], lines[1:], self.text_columns)]
+        parts += ["  \n".join(self.notes) + "\n"] if self.notes else []  # two blanks break a line
+        return "\n".join(parts)
+
+    def print(self, console: Console) -> None:
+        """Title, table and notes in a terminal; without rows the notes alone."""
+        from rich.box import SIMPLE_HEAD
+        from rich.table import Table as RichTable
+        from rich.text import Text
+
+        drawn = RichTable(
+            title=self.title,
+            title_justify="left",
+            title_style="bold",
+            box=SIMPLE_HEAD,
+            show_edge=False,
+            padding=0,
+        )
+        for position, header in enumerate(self.columns):
+            left = position < self.text_columns
+            # No name breaks within a word.
+            least = len("Q-learning") if header == "Learner" else None
+            drawn.add_column(
+                header, justify="left" if left else "right", overflow="fold", min_width=least
+            )
+        for row in self.rows:
+            styles = (
+                next((look for word, look in _STYLES.items() if cell.startswith(word)), "")
+                for cell in row
+            )
+            drawn.add_row(*map(Text, row, styles))
+        if self.rows:
+            console.print(drawn)
+        if self.notes:
+            console.print("\n".join(self.notes))
+
+
+# A paragraph or a table.
+Block = str | Table
+
+
+def markdown(blocks: Sequence[Block]) -> str:
+    """Blocks as a Markdown document."""
+    return "\n".join(one.markdown() if isinstance(one, Table) else f"{one}\n" for one in blocks)
+
+
+def print_blocks(blocks: Sequence[Block], console: Console) -> None:
+    """Print blocks with empty lines between them; a table without rows and notes is left out."""
+    shown = [one for one in blocks if isinstance(one, str) or one.rows or one.notes]
+    for place, block in enumerate(shown):
+        if place:
+            console.print()
+        if isinstance(block, Table):
+            block.print(console)
+        else:
+            console.print(block)
+
+
+def plain_text(blocks: Sequence[Block], width: int) -> str:
+    """Blocks as plain text of at most so many columns."""
+    from rich.console import Console
+
+    text = io.StringIO()
+    options: dict[str, Any] = {"highlight": False, "markup": False, "color_system": None}
+    print_blocks(blocks, Console(file=text, width=width, **options))
+    return "".join(f"{line.rstrip()}\n" for line in text.getvalue().splitlines())
+
+
+def baseline_name(row: Mapping) -> str:
+    """A row of baselines.csv by name, for example "optimal policy, discount 0.9"."""
+    discount = row["discount"]
+    return row["baseline"] + ("" if discount is None else f", discount {discount:g}")

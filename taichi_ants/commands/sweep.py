@@ -1,0 +1,149 @@
+"""A sweep over any settings of the world, the task, the learner or the colony, from a TOML file.
+
+FILE names fixed settings, those that vary with their values, seeds, and what to measure. Every
+combination is done with every seed; tables and a figure go to a folder. See docs/sweeps.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from taichi_ants.studies.command_line import (
+    Parser,
+    add_common,
+    add_results,
+    load_plugin,
+    notice,
+    progress_bar,
+    run_command,
+)
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from taichi_ants.studies.runner import Outcome
+    from taichi_ants.studies.sweep_file import Sweep
+
+FIGURES, RUNS, SUMMARY = "figures", "runs.csv", "summary.csv"
+
+
+def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
+    """The settings of the command line."""
+    summary, more = __doc__.split("\n", 1)
+    parser = Parser(summary, epilog=more)
+    parser.add_argument("file", type=Path, metavar="FILE", help="what to do (.toml)")
+    add_common(parser)
+    add_results(parser, "results/sweep-NAME, by the name of FILE")
+    settings = parser.parse_args(arguments)
+    settings.out = settings.out or Path("results", f"sweep-{settings.file.stem}")
+    return settings
+
+
+def sweep(settings: argparse.Namespace) -> None:
+    """Do the sweep, or show the finished one."""
+    from taichi_ants.studies.result_folder import work_or_show
+    from taichi_ants.studies.sweep_file import read_sweep
+
+    if settings.plugin:
+        load_plugin(settings.plugin)
+    asked = read_sweep(settings.file, {kind: measures(kind) for kind in ("runs", "colony")})
+    pictures = {} if settings.no_figures else {FIGURES: partial(draw_figure, asked)}
+    facts = {
+        **asked.study.settings(),
+        "measures": asked.measures,
+        "varies": asked.settings,
+        "rows": list(map(asked.study.in_order.index, asked.study.points)),
+    }
+    work_or_show(settings, facts, partial(do_sweep, settings, asked), pictures)
+
+
+def do_sweep(settings: argparse.Namespace, asked: Sweep, blocks: Path, ready: Path) -> None:
+    """All but the figure."""
+    from taichi_ants import files
+    from taichi_ants.analysis import sweeps
+    from taichi_ants.studies.result_folder import REPORT
+
+    with progress_bar("sweep") as progress:
+        outcomes = asked.study.run(blocks, settings.threads, settings.arch, progress, notice)
+    values = {name: measured(asked, outcomes, name) for name in asked.measures}
+    rows = sweeps.seed_rows(asked.settings, asked.study.seeds, values)
+    files.write_csv(ready / RUNS, rows, [*sweeps.columns_of(asked.settings), "seed", *values])
+    typical = [name for name in values if getattr(measures(asked.kind)[name], "typical", False)]
+    rows = sweeps.summary_rows(asked.settings, values, typical)
+    files.write_csv(ready / SUMMARY, rows, sweeps.columns_of(rows))
+    files.write_text(ready / REPORT, sweeps.report(asked.settings, values))
+
+
+def draw_figure(asked: Sweep, results: Path, folder: Path) -> None:
+    """Draw the first measure from the table in one folder into `figures` of another."""
+    import csv
+
+    import numpy as np
+
+    from taichi_ants import files
+    from taichi_ants.analysis import sweeps
+
+    name = asked.measures[0]
+    with open(results / RUNS, newline="", encoding="utf-8") as file:
+        values = [float(row[name] or "nan") for row in csv.DictReader(file)]
+    array = np.array(values).reshape(len(asked.settings), len(asked.study.seeds))
+    place = files.check_writable_folder(folder / FIGURES) / f"{name}.png"
+    words = measures(asked.kind)[name].words
+    sweeps.draw(place, asked.settings, array, words, f"{words[0].upper()}{words[1:]}")
+
+
+def measures(kind: str) -> dict[str, Any]:
+    """What can be measured, by name."""
+    if kind == "runs":
+        from taichi_ants.analysis.paper.measures import MEASURES
+
+        return dict(MEASURES)
+    from taichi_ants.analysis.colony.study import MEASURES as OF_COLONIES
+
+    return dict(OF_COLONIES)
+
+
+def measured(asked: Sweep, outcomes: dict[Any, Outcome], name: str) -> np.ndarray:
+    """A measure of each point and seed, float64 (points, seeds)."""
+    import numpy as np
+
+    of = run_values if asked.kind == "runs" else colony_values
+    seeds = asked.study.seeds
+    return np.stack([of(point, seeds, outcomes[point], name) for point in asked.study.points])
+
+
+def run_values(point: Any, seeds: tuple[int, ...], outcome: Outcome, name: str) -> np.ndarray:
+    """A measure of a point's runs, as the comparison has it, float64 (seeds,)."""
+    import numpy as np
+
+    from taichi_ants.analysis.paper.comparison import Comparison, Row
+
+    arrays: Any = {k: array[None].astype(int) for k, array in outcome.items() if array.ndim == 2}
+    unknown = np.zeros((1, len(seeds)), int)
+    alone = Comparison(
+        rows=(Row.of(point.task, point.training),),
+        seeds=seeds,
+        **arrays,
+        max_steps=point.max_steps,
+        behaviours=unknown,
+        policy_returns=unknown,
+    )
+    return alone.measure(name)[0]
+
+
+def colony_values(point: Any, seeds: tuple[int, ...], outcome: Outcome, name: str) -> np.ndarray:
+    """A measure of a point's colonies, as the scaling study has it, float64 (seeds,)."""
+    from taichi_ants.analysis.colony.study import Record, compute
+
+    names = Record.__dataclass_fields__
+    record = Record(**{key: outcome[key].astype(int) for key in names})
+    return compute(record, name, point.ants, point.ticks)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """The command line."""
+    again = "Stopped; finished parts are kept, and the same command goes on from there."
+    run_command(lambda: sweep(parse_arguments(arguments)), again)

@@ -1,0 +1,437 @@
+"""Studies: points over seeds, done in blocks that are kept on disk as they finish.
+
+A point is a world, a task, a learner, and for how long. The work is cut into blocks (some points
+that are alike, some seeds). Each finished block is a file, so that a study that was stopped goes on
+where it was. Since what a seed gives depends only on the point and the seed, blocks can be done in
+any order without changing anything.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from taichi_ants import __version__, checks, files
+from taichi_ants.engines.colony.population import Population
+from taichi_ants.errors import AntsError, check_one_of, count
+from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.studies.provenance import world_facts
+from taichi_ants.task import Task
+from taichi_ants.task.constants import MAX_STEPS, N_ACTIONS
+from taichi_ants.worlds.world import World
+
+# Seeds of a colony's evaluation are those of the training plus this, so that no random number
+# serves both.
+EVALUATION_SEEDS = 1 << 32
+_STEPS_OF_A_BLOCK = 100_000_000  # of runs, at most, if every episode used all its steps
+_RUNS_OF_A_BLOCK = 5000  # at most, each needs about 20 KB while it is trained
+_COPIES = 3  # of the results in memory while they are analysed
+_RUN_ARRAYS = ("returns", "steps", "deliveries")
+_COLONY_ARRAYS = ("deliveries", "first_delivery", "moves", "blocked", "returns")
+
+Progress = Callable[[float], None]
+Outcome = dict[str, np.ndarray]  # by name, first axis the seeds
+
+
+def _done(share: float) -> None:
+    """Nobody wants to know."""
+
+
+@dataclass(frozen=True)
+class RunPoint:
+    """An ant that is alone: trained, then its final policy is followed greedily.
+
+    Its outcome: `returns`, `steps`, `deliveries` of training, integer (seeds, episodes); the same
+    as `greedy_returns` ... of the rollouts, integer (seeds, rollouts); `q_values`, float32 (seeds,
+    n_states, 5); `seconds` of CPU time that the training took, float64 (seeds,).
+
+    Attributes:
+        world, task, training: The world, the rules of the game, and the learner.
+        episodes: Training episodes.
+        max_steps: Step limit of episodes and rollouts.
+        rollouts: Greedy rollouts.
+
+    Raises:
+        AntsError: A value is not allowed.
+    """
+
+    world: World
+    task: Task
+    training: TrainingConfig
+    episodes: int = 500
+    max_steps: int = 600
+    rollouts: int = 50
+
+    def __post_init__(self) -> None:
+        (config,) = checks.checked_configs(self.training)
+        object.__setattr__(self, "training", config)
+        checks.checked_runs_task(checks.checked_task(self.task))
+        checks.checked_count("episodes", self.episodes)
+        checks.checked_max_steps(self.max_steps, self.task)
+        checks.checked_count("rollouts", self.rollouts)
+
+    @property
+    def ants(self) -> int:
+        return 1
+
+    @property
+    def alike(self) -> tuple:
+        """What the points of a block have in common."""
+        which = self.training.learner, self.training.planning_steps
+        return (self.world, self.task, which, self.episodes, self.max_steps, self.rollouts)
+
+    @property
+    def size(self) -> int:
+        """Bytes of the outcome of one seed."""
+        counts = len(_RUN_ARRAYS) * (self.episodes + self.rollouts)
+        return 4 * (counts + self.task.n_states * N_ACTIONS)
+
+    @property
+    def seeds_of_a_block(self) -> int:
+        """How many runs make launches that do not count, and let a stop come soon."""
+        return min(max(1, _STEPS_OF_A_BLOCK // (self.episodes * self.max_steps)), _RUNS_OF_A_BLOCK)
+
+    @property
+    def weight(self) -> float:
+        """About how much work a seed is."""
+        return self.episodes * self.max_steps * (4 + self.training.planning_steps) / 5
+
+
+@dataclass(frozen=True)
+class ColonyPoint:
+    """A colony: it learns, then nobody does, and epsilon stays at its minimum.
+
+    Its outcome: `deliveries`, `first_delivery`, `moves`, `blocked` and `returns` of the evaluation,
+    integer (seeds, rollouts), as in `ColonyEpisodes`; where it learned into one table `q_values`,
+    float32 (seeds, n_states, 5).
+
+    Attributes:
+        world: The world, or one for each seed, all of the same ranges.
+        task, training: The rules of the game, and the learner.
+        ants: How many.
+        sharing: "shared" or "own", of tables while the ants learn.
+        start, capacity: As of a `Colony`.
+        episodes: Training episodes; with 0 the ants follow what the ants of `after` have learned.
+        ticks: Of each episode, of training and evaluation.
+        rollouts: Evaluation episodes.
+        after: The point whose shared table learning goes on from; None: from zeros.
+
+    Raises:
+        AntsError: A value is not allowed.
+    """
+
+    world: World | tuple[World, ...]
+    task: Task
+    training: TrainingConfig
+    ants: int = 1
+    sharing: str = "shared"
+    start: str = "nest"
+    capacity: int | None = None
+    episodes: int = 50
+    ticks: int = 1000
+    rollouts: int = 4
+    after: ColonyPoint | None = None
+
+    def __post_init__(self) -> None:
+        (config,) = checks.checked_configs(self.training)
+        object.__setattr__(self, "training", config)
+        checks.checked_task(self.task)
+        Population.of(self.task, self.ants, self.capacity, self.start, False)  # type: ignore[arg-type]
+        check_one_of("sharing", self.sharing, ("shared", "own"))
+        checks.checked_count("episodes", self.episodes, least=0 if self.after else 1)
+        checks.checked_count("ticks", self.ticks, MAX_STEPS)
+        checks.checked_count("rollouts", self.rollouts)
+        if self.after and (self.after.sharing != "shared" or not self.after.episodes):
+            raise AntsError("a colony can only go on from one that has learned into one table.")
+
+    alike = property(lambda self: self)
+    seeds_of_a_block = property(lambda self: 1 << 32)  # all
+
+    @property
+    def size(self) -> int:
+        return 4 * (len(_COLONY_ARRAYS) * self.rollouts + self.task.n_states * N_ACTIONS)
+
+    @property
+    def weight(self) -> float:
+        learning = self.episodes * (1 + self.training.planning_steps)
+        return self.ants * self.ticks * (learning + self.rollouts)
+
+
+Point = RunPoint | ColonyPoint
+PointKind = TypeVar("PointKind", RunPoint, ColonyPoint)
+
+
+@dataclass(frozen=True)
+class Study(Generic[PointKind]):
+    """What to do.
+
+    Attributes:
+        points: The points.
+        seeds: The seeds of each; they pair the points.
+
+    Raises:
+        AntsError: A world has no room for the ants, or not as many worlds as seeds are given, or
+            the outcomes would not fit into the memory of this machine.
+    """
+
+    points: tuple[PointKind, ...]
+    seeds: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "seeds", checks.checked_seeds(self.seeds))
+        if not self.points:
+            raise AntsError("there are no points to do; give at least one.")
+        most: dict[World | tuple[World, ...], int] = {}
+        for point in self.points:
+            most[point.world] = max(most.get(point.world, 1), point.ants)
+        for world, ants in most.items():
+            self._check_room(world, ants)
+        needed = sum(point.size for point in self.points) * len(self.seeds) * _COPIES
+        if needed > available_memory():
+            longest = max(point.episodes for point in self.points)
+            raise AntsError(
+                f"{count(len(self.points), 'point')} of up to {longest} episodes with "
+                f"{count(len(self.seeds), 'seed')} need about {needed / 1e9:.0f} GB, this machine "
+                f"has {available_memory() / 1e9:.0f} GB of memory; take less of something at once."
+            )
+
+    def _check_room(self, world: World | tuple[World, ...], ants: int) -> None:
+        several = world if isinstance(world, tuple) else (world,)
+        if len(several) not in (1, len(self.seeds)) or not several:
+            raise AntsError(f"there are {len(several)} worlds for {len(self.seeds)} seeds.")
+        for one, seed in zip(several, self.seeds, strict=False):
+            checks.checked_food(one).start(seed, ants)
+
+    @property
+    def in_order(self) -> tuple[PointKind, ...]:
+        """The points, each once, those that others go on from before these."""
+        pairs = ((getattr(point, "after", None), point) for point in self.points)
+        return tuple(dict.fromkeys(point for pair in pairs for point in pair if point))
+
+    def blocks(self) -> Iterator[tuple[slice, slice]]:
+        """The ranges of points (of `in_order`) and seeds of each block; block by block in order."""
+        numbered = enumerate(self.in_order)
+        for _, group in itertools.groupby(numbered, lambda pair: pair[1].alike):
+            numbers, points = zip(*group, strict=True)
+            size = points[0].seeds_of_a_block
+            together = slice(numbers[0], numbers[-1] + 1)
+            for some in _pieces(together, max(1, size // len(self.seeds))):
+                for seeds in _pieces(slice(0, len(self.seeds)), size):
+                    yield some, seeds
+
+    def settings(self) -> dict[str, Any]:
+        """All that determines the numbers; equal settings give equal results.
+
+        What all points have in common is there once, all else as a list with an entry for each.
+        """
+        points = self.in_order
+        worlds = list(dict.fromkeys(point.world for point in points))
+        rows = [_facts(point, worlds, points) for point in points]
+        columns = {name: [row.get(name) for row in rows] for row in rows for name in row}
+        return {
+            "version": __version__,
+            "seeds": list(self.seeds),
+            "worlds": [
+                [world_facts(one) for one in world]
+                if isinstance(world, tuple)
+                else world_facts(world)
+                for world in worlds
+            ],
+            **{
+                name: values[0] if all(one == values[0] for one in values) else values
+                for name, values in columns.items()
+            },
+        }
+
+    def run(
+        self,
+        folder: Path,
+        threads: int | None = None,
+        arch: str | None = None,
+        progress: Progress = _done,
+        notice: Callable[[str], None] = lambda text: None,
+    ) -> dict[PointKind, Outcome]:
+        """Do the blocks that the folder does not hold yet; the outcome of each point.
+
+        Args:
+            folder: Where finished blocks are kept; it must belong to this study alone.
+            threads, arch: As in `train`.
+            progress: Called now and then with the share of the work that is done.
+            notice: Called with what a person should know, as that a block is damaged.
+
+        Raises:
+            AntsError: A block cannot be written, or an argument is not allowed.
+        """
+        points, blocks = self.in_order, list(self.blocks())
+        weights = [
+            sum(point.weight for point in points[some]) * (seeds.stop - seeds.start)
+            for some, seeds in blocks
+        ]
+        total, begun = sum(weights), 0.0
+        pieces: dict[PointKind, list[Outcome]] = {point: [] for point in points}
+        outcomes: dict[PointKind, Outcome] = {}
+        progress(0.0)
+        for (some, seeds), weight in zip(blocks, weights, strict=True):
+            path = folder / f"block-{some.start:04d}-{seeds.start:06d}.npz"
+            block = _read(path, notice)
+            if block is None:
+                part = _part(progress, begun / total, weight / total)
+                block = self._do(points[some], seeds, outcomes, part, threads, arch)
+                files.write_sealed_npz(path, block)
+            for number, point in enumerate(points[some]):
+                pieces[point].append({name: array[number] for name, array in block.items()})
+                if seeds.stop == len(self.seeds):
+                    outcomes[point] = _joined(pieces.pop(point))
+            begun += weight
+            progress(begun / total)
+        return outcomes
+
+    def _do(
+        self,
+        points: Sequence[Any],
+        seeds: slice,
+        outcomes: Mapping[Any, Outcome],
+        progress: Progress,
+        threads: int | None,
+        arch: str | None,
+    ) -> Outcome:
+        """The outcomes of a block: arrays (points, seeds, ...)."""
+        where = {"threads": threads, "arch": arch}
+        chosen = self.seeds[seeds]
+        if isinstance(points[0], RunPoint):
+            return _run(points, chosen, progress, where)
+        (point,) = points
+        learned = outcomes[point.after]["q_values"] if point.after else None
+        outcome = _live(point, chosen, learned, progress, where)
+        return {name: array[None] for name, array in outcome.items()}
+
+
+def _run(
+    points: Sequence[RunPoint],
+    seeds: tuple[int, ...],
+    progress: Progress,
+    where: dict[str, Any],
+) -> Outcome:
+    from taichi_ants.engines.runs.training import evaluate, train
+
+    first = points[0]
+    configs = [point.training for point in points]
+    trained = train(
+        first.world,
+        configs,
+        seeds,
+        first.episodes,
+        first.max_steps,
+        first.task,
+        **where,
+        progress=progress,
+    )
+    greedy = evaluate(
+        *(first.world, trained.q_values, first.rollouts, seeds, first.max_steps, first.task),
+        **where,
+    )
+    steps = trained.steps.sum(axis=2, dtype=float)
+    seconds = sum(cost.seconds for cost in trained.costs)
+    return {
+        **{name: files.smallest(getattr(trained, name)) for name in _RUN_ARRAYS},
+        **{f"greedy_{name}": files.smallest(getattr(greedy, name)) for name in _RUN_ARRAYS},
+        "q_values": trained.q_values,
+        "seconds": seconds * steps / steps.sum(),
+    }
+
+
+def _live(
+    point: ColonyPoint,
+    seeds: tuple[int, ...],
+    learned: np.ndarray | None,
+    progress: Progress,
+    where: dict[str, Any],
+) -> Outcome:
+    from taichi_ants.engines.colony.colony import Colony
+
+    options = {"ants": point.ants, "capacity": point.capacity, "start": point.start, **where}
+    share = point.episodes / (point.episodes + point.rollouts)
+    tables: Any = learned
+    if point.episodes:
+        colony = Colony(
+            *(point.world, point.task, point.training, seeds),
+            **options,
+            sharing=point.sharing,
+            q_values=learned,
+        )
+        colony.run(point.episodes, point.ticks, _part(progress, 0.0, share))
+        tables = colony.q_values
+    least = point.training.min_epsilon
+    training = replace(point.training, epsilon=least, epsilon_decay=1.0)
+    others = [seed + EVALUATION_SEEDS for seed in seeds]
+    colony = Colony(
+        *(point.world, point.task, training, others),
+        **options,
+        sharing="fixed",
+        q_values=tables,
+    )
+    episodes = colony.run(point.rollouts, point.ticks, _part(progress, share, 1 - share))
+    outcome = {name: files.smallest(getattr(episodes, name).T) for name in _COLONY_ARRAYS}
+    if point.episodes and point.sharing == "shared":
+        outcome["q_values"] = tables
+    return outcome
+
+
+def _part(progress: Progress, begin: float, share: float) -> Progress:
+    """The progress of a part of the work, as that of all."""
+    return lambda done: progress(begin + share * done)
+
+
+def _pieces(whole: slice, size: int) -> Iterator[slice]:
+    for first in range(whole.start, whole.stop, size):
+        yield slice(first, min(first + size, whole.stop))
+
+
+def _joined(pieces: list[Outcome]) -> Outcome:
+    if len(pieces) == 1:
+        return pieces[0]
+    return {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
+
+
+def _read(path: Path, notice: Callable[[str], None]) -> Outcome | None:
+    """A finished block; None if there is none, or, with a word on it, if it is damaged."""
+    if not path.exists():
+        return None
+    try:
+        return files.read_sealed_npz(path)
+    except AntsError:
+        notice(f"{str(path)!r} is damaged, so this part is done again.")
+        return None
+
+
+def _facts(point: Point, worlds: list, points: Sequence[Point]) -> dict[str, Any]:
+    """A point as names and values; worlds and other points by their number."""
+    facts = {field.name: getattr(point, field.name) for field in fields(point)}
+    facts["world"] = worlds.index(point.world)
+    if facts.get("after"):
+        facts["after"] = points.index(facts["after"])
+    return flat({**facts, "task": point.task.as_dict(), "training": point.training.as_dict()})
+
+
+def flat(facts: Mapping[str, Any], before: str = "") -> dict[str, Any]:
+    """Mappings in mappings as one, {"task": {"life": {"births": 1}}} as {"task.life.births": 1}."""
+    pairs: dict[str, Any] = {}
+    for name, value in facts.items():
+        inner = isinstance(value, Mapping)
+        pairs |= flat(value, f"{before}{name}.") if inner else {f"{before}{name}": value}
+    return pairs
+
+
+def available_memory() -> float:
+    """Bytes of memory that this machine has; infinite where the system does not tell."""
+    with suppress(AttributeError, ValueError, OSError):
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    return math.inf

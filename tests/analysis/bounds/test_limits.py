@@ -1,0 +1,202 @@
+"""What no colony can exceed: worked by hand, searched plainly, and reached."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from colonies import act, begun
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from random_worlds import random_world
+
+from taichi_ants import worlds
+from taichi_ants.analysis.bounds.episodes import exact_bounds
+from taichi_ants.analysis.bounds.limits import (
+    food_limit,
+    least_mean_cycle,
+    limits_of,
+    queen_limit,
+)
+from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT
+from taichi_ants.worlds import World
+
+STEPS = [(1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1), (1, 0, 1)]
+
+
+def test_the_papers_world() -> None:
+    limits = limits_of(worlds.paper())
+    assert limits.first == exact_bounds(worlds.paper(), []).shortest.steps == 34
+    # There and back are 16 moves each, the food is picked up, and given.
+    assert limits.cycle == limits.crowd_cycle == 36
+    # Food and queen stand in corners, each with three neighbours that serve once in three ticks;
+    # the food is back each tick.
+    assert (limits.food, limits.queen) == (1000, 1000)
+    assert limits.deliveries(1) == pytest.approx(1000 / 36)
+    assert limits.deliveries(10) == pytest.approx(10_000 / 36)
+    assert limits.deliveries(64) == 1000
+
+
+def corridor(length: int) -> World:
+    """A queen and a food at the ends of a corridor one cell wide."""
+    return World((length, 1, 1), (0, 0, 0), [(length - 1, 0, 0)], ants=[((1, 0, 0), 0)])
+
+
+def test_a_corridor_by_hand() -> None:
+    limits = limits_of(corridor(3))
+    # Beside both: pick up (which turns it round), give, turn by a sixth against the wall.
+    assert limits.cycle == 3
+    assert (limits.food, limits.queen) == (1000 / 3, 1000 / 3)
+    assert limits.deliveries(5) == pytest.approx(1000 / 3)
+    long = limits_of(corridor(7))
+    # Four moves each way and a pick-up, which turns it round, and a give, which does not: two more
+    # blocked moves until the way back comes into view at its side.
+    assert long.first == 4 + 1 + 4 + 1
+    assert long.cycle == 4 + 1 + 4 + 1 + 2
+
+
+def test_three_ticks_a_cycle_are_reached() -> None:
+    """The ant between queen and food takes and gives once in three ticks, in the reference."""
+    colony = begun(World((3, 1, 1), (0, 0, 0), [(2, 0, 0)], ants=[((1, 0, 0), 1)]), regrowth=0)
+    act(colony, PICK_UP)  # the food is to its left; it now faces down-left, the queen to its left
+    for turn in (RIGHT, LEFT) * 3:
+        act(colony, GIVE)
+        act(colony, turn)
+        act(colony, PICK_UP)
+    assert colony.record.deliveries == 6
+
+
+def test_a_neighbour_cell_serves_once_in_three_ticks() -> None:
+    """Two ants in turn at the one cell beside the food: pick up, leave, enter, pick up."""
+    world = World(
+        (4, 2, 1), (3, 0, 0), [(0, 0, 0)], [(0, 1, 0)], ants=[((1, 0, 0), 3), ((2, 0, 0), 3)]
+    )
+    colony = begun(world, regrowth=0)
+    act(colony, PICK_UP, FORWARD)  # the second is blocked
+    assert [ant.carries for ant in colony.ants.values()] == [True, False]
+    act(colony, RIGHT, FORWARD)  # the first leaves to (2, 1, 0); its cell was full at the start
+    act(colony, GIVE, FORWARD)
+    act(colony, GIVE, PICK_UP)
+    assert [ant.carries for ant in colony.ants.values()][1]
+    assert colony.record.ticks == 4
+
+
+@pytest.mark.parametrize(
+    ("foods", "obstacles", "regrowth", "expected"),
+    [
+        # In the open a place is limited by its own regrowth, its six neighbours would serve two.
+        ([(3, 0, 0)], [], 0, 1000),
+        ([(3, 0, 0)], [], 1, 500),
+        ([(3, 0, 0)], [], 9, 100),
+        ([(3, 0, 0), (0, 3, 0)], [], 0, 2000),
+        ([], [], 0, 0),
+    ],
+)
+def test_what_food_can_give(foods, obstacles, regrowth, expected) -> None:
+    world = World((8, 8, 8), (0, 0, 0), foods, obstacles)
+    assert food_limit(world, regrowth) == pytest.approx(expected)
+
+
+def test_foods_share_the_cells_around_them() -> None:
+    # queen . . . food food: only one cell from which to take, and only the first food from it.
+    row = World((6, 1, 1), (0, 0, 0), [(4, 0, 0), (5, 0, 0)])
+    assert food_limit(row) == pytest.approx(1000 / 3)
+    # Two foods around one cell at the end of a corridor share it.
+    fork = World(
+        (5, 2, 1),
+        (0, 0, 0),
+        [(4, 0, 0), (4, 1, 0)],
+        [(1, 1, 0), (2, 1, 0), (3, 1, 0), (0, 1, 0)],
+    )
+    assert food_limit(fork) == pytest.approx(1000 / 3)
+    assert food_limit(fork, regrowth=9) == pytest.approx(200)
+    # The same cell beside the queen serves once in two ticks: pick up, give, pick up the other.
+    beside = World((3, 2, 1), (0, 0, 0), [(2, 0, 0), (2, 1, 0)], [(0, 1, 0), (1, 1, 0)])
+    assert food_limit(beside) == pytest.approx(500)
+
+
+def test_what_the_queen_can_take() -> None:
+    assert queen_limit(World((8, 8, 8), (0, 0, 0))) == pytest.approx(2000)
+    walled = World((8, 8, 8), (0, 0, 0), obstacles=[(1, 0, 0), (0, 1, 0), (0, 0, 1)])
+    assert queen_limit(walled) == pytest.approx(1000)
+
+
+def test_without_a_way_nothing_is_possible() -> None:
+    shut = World((6, 1, 1), (0, 0, 0), [(5, 0, 0)], [(3, 0, 0)])
+    limits = limits_of(shut)
+    assert math.isinf(limits.first)
+    assert math.isinf(limits.cycle)
+    assert limits.deliveries(3) == limits.food == 0
+
+
+def test_in_a_crowd_ants_turn_on_the_spot() -> None:
+    """Between food and queen in the open, a turn leads away, unless another ant is in the way."""
+    limits = limits_of(World((9, 9, 9), (0, 0, 0), [(2, 0, 0)]))
+    assert (limits.cycle, limits.crowd_cycle) == (6, 3)
+    # Cycles of 6 and of 7 ticks in turn.
+    assert limits_of(World((9, 9, 9), (0, 0, 0), [(2, 1, 0)])).cycle == 6.5
+    # Farther away, the way there and back is a loop anyway.
+    far = limits_of(World((9, 9, 9), (0, 0, 0), [(6, 0, 0)]))
+    assert far.cycle == far.crowd_cycle == 12
+
+
+def plain_deliveries(world: World, ticks: int) -> list[int]:
+    """The most deliveries within 0 .. `ticks` ticks from any state without food, searched."""
+    foods = set(map(tuple, world.foods.tolist()))
+    rocks = set(map(tuple, world.obstacles.tolist()))
+    cells = [c for c in itertools.product(*map(range, world.ranges)) if min(c) == 0]
+    free = [c for c in cells if c not in foods | rocks | {world.queen}]
+
+    def beside(cell: tuple, heading: int) -> tuple:
+        moved = [a + b for a, b in zip(cell, STEPS[heading % 6], strict=True)]
+        return tuple(value - min(moved) for value in moved)
+
+    after: dict[tuple, list[tuple[tuple, int]]] = {}
+    for cell, heading, carries in itertools.product(free, range(6), (False, True)):
+        view = [beside(cell, heading + turn) for turn in (-1, 0, 1)]
+        options = []
+        for turn, target in zip((-1, 0, 1), view, strict=True):
+            lands = target if target in free else cell
+            options.append(((lands, (heading + turn) % 6, carries), 0))
+        if carries and world.queen in view:
+            options.append(((cell, heading, False), 1))
+        if not carries and foods & set(view):
+            options.append(((cell, (heading + 3) % 6, True), 0))
+        after[cell, heading, carries] = options
+    best = dict.fromkeys(after, 0)
+    most = [0]
+    for _ in range(ticks):
+        best = {
+            state: max(best[then] + gain for then, gain in options)
+            for state, options in after.items()
+        }
+        most.append(max(best[state] for state in best if not state[2]))
+    return most
+
+
+@given(st.integers(0, 10_000))
+@settings(max_examples=25)
+def test_the_cycle_is_what_a_plain_search_delivers_in_the_long_run(seed: int) -> None:
+    world = random_world(seed, largest_range=4)
+    most = plain_deliveries(world, 240)
+    cycle = limits_of(world).cycle
+    if math.isinf(cycle):
+        assert most[-1] <= 1  # none, or the one of an ant that cannot come back for a second
+    else:
+        assert most[240] - most[120] == pytest.approx(120 / cycle, abs=1)
+
+
+@given(st.integers(0, 10_000), st.integers(1, 5))
+@settings(max_examples=60)
+def test_the_least_mean_cycle_is_that_of_all_simple_cycles(seed: int, n: int) -> None:
+    random = np.random.default_rng(seed)
+    lengths = random.integers(1, 30, (n, n)).astype(float)
+    lengths[random.random((n, n)) < 0.4] = np.inf
+    means = [
+        np.mean([lengths[a, b] for a, b in zip(cycle, (*cycle[1:], cycle[0]), strict=True)])
+        for k in range(1, n + 1)
+        for cycle in itertools.permutations(range(n), k)
+    ]
+    assert least_mean_cycle(lengths) == pytest.approx(min(means))

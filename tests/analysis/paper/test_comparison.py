@@ -1,0 +1,149 @@
+"""The data of the analysis, and what is computed from each run."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic_comparison import build, subset, unchanged
+
+from taichi_ants.analysis.paper.comparison import Comparison, Hyperparameters, Row, Variant
+from taichi_ants.analysis.paper.measures import MEASURES
+from taichi_ants.analysis.paper.published import DYNA_P3, FIGURE_1, GRID, SARSA, TABLE_2, VARIANTS
+from taichi_ants.errors import AntsError
+from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.task import Task
+
+ROW = Row("sarsa", 0, 0.01, 0.9, 0.3, 0.995, "continuing")
+
+
+def single_run(returns: list[int], steps: list[int], deliveries: list[int]) -> Comparison:
+    """One configuration, one seed, two rollouts."""
+    runs = (np.array(values)[None, None] for values in (returns, steps, deliveries))
+    greedy = (np.array([[[45, 45]]]), np.array([[[34, 36]]]), np.array([[[1, 0]]]))
+    return Comparison((ROW,), (0,), *runs, *greedy, 600, *np.zeros((2, 1, 1), int))
+
+
+def measured(comparison: Comparison, name: str) -> float:
+    return float(comparison.measure(name)[0, 0])
+
+
+def test_measures_by_hand() -> None:
+    returns = [0] * 50 + [10, 20] * 25 + [30] * 50
+    steps = [600] * 50 + [100, 50] * 25 + [34, 36] * 25
+    deliveries = [0] * 50 + [1, 1, 1, 0, 1] * 10 + [1] * 50
+    run = single_run(returns, steps, deliveries)
+    assert measured(run, "return_last50") == 30
+    assert measured(run, "return_first50") == 0
+    assert measured(run, "steps_last50") == 35
+    assert measured(run, "steps_first50") == 600
+    assert measured(run, "steps_all") == pytest.approx((600 + 75 + 35) / 3)
+    assert measured(run, "deliveries_last50") == 1
+    assert measured(run, "deliveries_second50") == 0.8
+    assert measured(run, "shortest_episode") == 34
+    assert measured(run, "improved") == 1
+    assert measured(run, "return_fluctuation_first50") == 0
+    assert measured(run, "return_fluctuation_last50") == 0
+    # Changes of the return: 10 once, then 10 49 times, 10 once; 149 changes in all.
+    assert measured(run, "return_fluctuation_all") == pytest.approx(np.sqrt(51 * 100 / 149 / 2))
+    # Of the length: 500 once, 50 49 times, 16 once (50 to 34), 2 49 times.
+    squares = 500**2 + 49 * 50**2 + 16**2 + 49 * 2**2
+    assert measured(run, "steps_fluctuation_all") == pytest.approx(np.sqrt(squares / 149 / 2))
+    assert measured(run, "greedy_return") == 45
+    assert measured(run, "greedy_steps") == 35
+    assert measured(run, "greedy_deliveries") == 0.5
+    assert measured(run, "greedy_repeats") == 0
+
+
+def test_independent_episodes_fluctuate_by_their_standard_deviation() -> None:
+    returns = np.random.default_rng(0).normal(0, 20, size=100_000).round().astype(int)
+    run = single_run(returns.tolist(), [1] * 100_000, [1] * 100_000)
+    assert measured(run, "return_fluctuation_all") == pytest.approx(20, rel=0.01)
+
+
+def test_short_runs_use_all_episodes_or_say_that_they_cannot() -> None:
+    run = single_run([1, 2, 6], [3, 4, 5], [0, 0, 1])
+    assert measured(run, "return_last50") == 3
+    assert measured(run, "deliveries_last50") == pytest.approx(1 / 3)
+    for name, measure in MEASURES.items():
+        assert np.isnan(measured(run, name)) == bool(measure.lacks(run)), name
+    assert MEASURES["steps_first50"].lacks(run) == "needs at least 100 episodes, there are 3"
+    assert np.isnan(measured(single_run([1], [1], [0]), "return_fluctuation_all"))
+
+
+def test_measures_have_one_number_per_run_and_are_kept() -> None:
+    comparison = build({"continuing": unchanged}, seeds=5, variants=[SARSA])
+    for name in MEASURES:
+        values = comparison.measure(name)
+        assert values.shape == (16, 5), name
+        assert np.isfinite(values).all(), name
+        assert values is comparison.measure(name)
+        assert not values.flags.writeable
+
+
+def test_rows_are_found_by_what_they_are() -> None:
+    comparison = build({"absorbing": unchanged, "continuing": unchanged}, seeds=2)
+    assert comparison.delivery_settings == ("continuing", "absorbing")
+    assert comparison.variants == VARIANTS
+    position = comparison.position("absorbing", DYNA_P3, FIGURE_1)
+    assert comparison.rows[position] == Row("dyna_q", 3, *FIGURE_1, "absorbing")
+    assert comparison.positions("absorbing", SARSA) == list(range(16, 32))
+    assert comparison.position("absorbing", Variant("dyna_q", 4), FIGURE_1) is None
+    assert comparison.position("elsewhere", DYNA_P3, FIGURE_1) is None
+    assert (comparison.episodes, comparison.rollouts) == (120, 3)
+
+
+def test_values_that_went_through_32_bits_are_found() -> None:
+    rounded = Hyperparameters(*(float(np.float32(value)) for value in FIGURE_1))
+    assert rounded != FIGURE_1
+    comparison = build({"continuing": unchanged}, seeds=2, grid=[rounded])
+    assert comparison.position("continuing", SARSA, FIGURE_1) == 1
+    assert rounded.label == FIGURE_1.label == "0.01 / 0.9 / 0.3 / 0.995"
+
+
+def test_a_training_configuration_becomes_a_row() -> None:
+    config = TrainingConfig("dyna_q", 0.01, 0.9, 0.3, 0.995, planning_steps=3)
+    row = Row.of(Task(), config)
+    assert row == Row("dyna_q", 3, 0.01, 0.9, 0.3, 0.995, "absorbing")
+    assert row.variant.label == "Dyna-Q (p3)"
+
+
+def test_the_papers_numbers_fit_together() -> None:
+    assert len(set(GRID)) == 16
+    assert set(TABLE_2) == set(VARIANTS)
+    assert all(row.hyperparameters in GRID for row in TABLE_2.values())
+    assert FIGURE_1 in GRID
+
+
+def test_importing_the_analysis_is_light() -> None:
+    """Neither Taichi nor what only figures, intervals or the terminal need is imported."""
+    code = """
+import importlib, pkgutil, sys, taichi_ants.analysis as analysis
+for module in pkgutil.walk_packages(analysis.__path__, "taichi_ants.analysis."):
+    importlib.import_module(module.name)
+assert "taichi_ants.analysis.paper.audit" in sys.modules
+print(*{"taichi", "matplotlib", "scipy", "rich"}.intersection(sys.modules))
+"""
+    found = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout
+    assert found.split() == []
+
+
+def test_what_does_not_fit_is_named() -> None:
+    good = build({"continuing": unchanged}, seeds=3, variants=[SARSA])
+    with pytest.raises(AntsError, match=r"steps has the shape \(16, 2, 120\)"):
+        replace(good, steps=good.steps[:, :2])
+    with pytest.raises(AntsError, match="deliveries has the shape"):
+        replace(good, deliveries=good.deliveries[..., 1:])
+    with pytest.raises(AntsError, match="greedy_steps has the shape"):
+        replace(good, greedy_steps=good.greedy_steps[..., 0])
+    with pytest.raises(AntsError, match=r"returns has the shape \(16, 3, 0\)"):
+        subset(good, range(16), 3, 0)
+    with pytest.raises(AntsError, match="1 configurations of the comparison are listed more"):
+        replace(good, rows=(*good.rows[:15], good.rows[0]))
+    with pytest.raises(AntsError, match="16 configurations and 0 seeds"):
+        replace(good, seeds=())

@@ -1,0 +1,96 @@
+"""What the claims read from a comparison."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from synthetic_comparison import build, unchanged
+
+from taichi_ants.analysis.paper.published import FIGURE_1, Q_LEARNING, SARSA
+from taichi_ants.analysis.paper.quantities import (
+    AT_FIGURE_1,
+    MEAN_OF_ALL,
+    NotTestedError,
+    Slice,
+    minus,
+    of,
+    rank_correlation,
+    share_above,
+)
+
+
+def test_a_slice_reads_the_rows_it_is_asked_for() -> None:
+    comparison = build({"absorbing": unchanged, "continuing": unchanged}, seeds=4)
+    part = Slice(comparison, "absorbing")
+    values = AT_FIGURE_1.values(part, "return_last50", SARSA)
+    position = comparison.position("absorbing", SARSA, FIGURE_1)
+    np.testing.assert_array_equal(values, comparison.measure("return_last50")[position])
+    assert part.used == {position}
+    grid = part.grid("steps_all", Q_LEARNING)
+    assert grid.shape == (2, 2, 2, 2, 4)
+    # Learning rate 0.01, discount 0.9, epsilon 0.5, decay 0.99.
+    row = next(
+        number
+        for number, row in enumerate(comparison.rows)
+        if row.variant == Q_LEARNING
+        and row.hyperparameters == (0.01, 0.9, 0.5, 0.99)
+        and row.delivery == "absorbing"
+    )
+    np.testing.assert_array_equal(grid[1, 0, 1, 0], comparison.measure("steps_all")[row])
+    pairs = part.pairs("steps_all", Q_LEARNING, "epsilon")
+    assert pairs.shape == (8, 4)
+    np.testing.assert_allclose(
+        pairs.mean(axis=0), grid[:, :, 1].mean(axis=(0, 1, 2)) - grid[:, :, 0].mean(axis=(0, 1, 2))
+    )
+    assert len(part.used) == 17
+
+
+def test_a_slice_says_what_is_missing() -> None:
+    comparison = build({"continuing": unchanged}, variants=[SARSA], grid=[FIGURE_1])
+    with pytest.raises(NotTestedError, match=r"no SARSA at 0\.01"):
+        AT_FIGURE_1.values(Slice(comparison, "absorbing"), "return_last50", SARSA)
+    with pytest.raises(NotTestedError, match="15 of the paper's 16 configurations of SARSA"):
+        MEAN_OF_ALL.values(Slice(comparison, "continuing"), "return_last50", SARSA)
+
+
+def test_the_held_out_half_does_not_choose() -> None:
+    """The configuration that shines on odd seeds only is not chosen for them."""
+    comparison = build({"continuing": unchanged}, seeds=6, variants=[SARSA], noise=0.0, shared=0.0)
+    comparison.returns[...] = 10
+    comparison.returns[3, ::2] = 20  # best on the seeds that choose, poor on the others
+    comparison.returns[3, 1::2] = 0
+    comparison.returns[5, 1::2] = 99
+    values = Slice(comparison, "continuing").held_out("return_last50", SARSA)
+    assert values.tolist() == [0.0, 0.0, 0.0]
+
+
+def test_shares_count_ties_by_half() -> None:
+    comparison = build({"continuing": unchanged}, seeds=2, variants=[Q_LEARNING, SARSA])
+    comparison.returns[...] = 10
+    comparison.returns[:4, 0] = 20  # four of 16 pairs are above, the others tie
+    part = Slice(comparison, "continuing")
+    for below, expected in ((False, [10 / 16, 0.5]), (True, [6 / 16, 0.5])):
+        quantity = share_above("return_last50", Q_LEARNING, SARSA, below)
+        (share,) = (effect(part) for effect in quantity.effects.values())
+        assert share.tolist() == expected
+
+
+def test_the_rank_correlation_is_spearmans_within_each_seed() -> None:
+    from scipy.stats import spearmanr
+
+    comparison = build({"continuing": unchanged}, seeds=3, variants=[SARSA], noise=20.0)
+    comparison.steps[:, 2] = 50  # constant: no correlation
+    quantity = rank_correlation("return_last50", "steps_last50", SARSA)
+    (found,) = (effect(Slice(comparison, "continuing")) for effect in quantity.effects.values())
+    returns, steps = (comparison.measure(name) for name in ("return_last50", "steps_last50"))
+    for seed in (0, 1):
+        assert found[seed] == pytest.approx(spearmanr(returns[:, seed], steps[:, seed])[0])
+    assert found[2] == 0
+
+
+def test_what_cannot_leave_a_range_rests_on_the_mean() -> None:
+    assert of(MEAN_OF_ALL, "steps_all", SARSA).typical
+    assert of(MEAN_OF_ALL, "improved", SARSA).possible == (0, 1)
+    pair = (Q_LEARNING, SARSA)
+    assert minus(MEAN_OF_ALL, "deliveries_last50", pair).possible == (-1, 1)
+    assert not minus(MEAN_OF_ALL, "deliveries_last50", pair).typical

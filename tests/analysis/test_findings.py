@@ -1,0 +1,208 @@
+"""How intervals become verdicts, for each kind of claim."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from taichi_ants.analysis.findings import (
+    UNBOUNDED,
+    Above,
+    Contrast,
+    Finding,
+    Verdict,
+    Within,
+    judge,
+    tally,
+    weakest,
+)
+
+SUPPORTED, CONTRADICTED = Verdict.SUPPORTED, Verdict.CONTRADICTED
+EQUIVALENT, UNDECIDED = Verdict.EQUIVALENT, Verdict.UNDECIDED
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "verdict", "note"),
+    [
+        (1.5, 3.0, SUPPORTED, ""),
+        (0.1, 1.1, SUPPORTED, "may be within the margin"),
+        (0.1, 0.9, EQUIVALENT, ""),
+        (-0.9, 0.9, EQUIVALENT, ""),
+        (-0.9, -0.1, EQUIVALENT, ""),
+        (-0.5, 1.5, UNDECIDED, ""),
+        (-math.inf, math.inf, UNDECIDED, ""),
+        (0.0, 5.0, UNDECIDED, ""),
+        (-1.1, -0.1, CONTRADICTED, "may be within the margin"),
+        (-3.0, -1.5, CONTRADICTED, ""),
+    ],
+)
+def test_a_directed_claim(low: float, high: float, verdict: Verdict, note: str) -> None:
+    assert Above(1.0).judge(low, high) == (verdict, note)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "verdict"),
+    [
+        (1.5, 9.0, SUPPORTED),
+        (0.1, 10.0, SUPPORTED),
+        (0.1, 10.1, UNDECIDED),
+        (-0.1, 11.0, UNDECIDED),
+        (10.1, 20.0, CONTRADICTED),
+        (-9.0, -2.0, CONTRADICTED),
+        (-0.5, 0.5, EQUIVALENT),
+    ],
+)
+def test_a_directed_claim_with_a_limit(low: float, high: float, verdict: Verdict) -> None:
+    assert Above(1.0, most=10.0).judge(low, high) == (
+        verdict,
+        "may be within the margin" if (low, verdict) == (0.1, SUPPORTED) else "",
+    )
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "verdict"),
+    [
+        (2.0, 4.0, SUPPORTED),
+        (2.5, 3.5, SUPPORTED),
+        (1.9, 4.0, UNDECIDED),
+        (2.0, 4.1, UNDECIDED),
+        (0.0, 9.0, UNDECIDED),
+        (-math.inf, math.inf, UNDECIDED),
+        (4.1, 9.0, CONTRADICTED),
+        (0.0, 1.9, CONTRADICTED),
+    ],
+)
+def test_a_claim_of_a_range(low: float, high: float, verdict: Verdict) -> None:
+    assert Within(2.0, 4.0).judge(low, high)[0] is verdict
+
+
+def test_criteria_say_what_they_are() -> None:
+    assert Above(0.5).words == "above 0, margin 0.5"
+    assert Above(0.5, most=3).words == "above 0 and at most 3, margin 0.5"
+    assert Within(2, 4).words == "from 2 to 4"
+    assert Within(-np.inf, 4).words == "at most 4"
+    assert Within(2, np.inf).words == "at least 2"
+
+
+def verdict_of(
+    effects: dict[str, list[float]], criterion: Above | Within
+) -> tuple[Verdict, str, float]:
+    """Verdict, contrast shown and its effect, of contrasts with these values of 20 seeds."""
+    finding = finding_of(effects, criterion)
+    return finding.verdict, finding.contrast.label, finding.effect
+
+
+def finding_of(
+    effects: dict[str, list[float]],
+    criterion: Above | Within,
+    possible: tuple[float, float] = UNBOUNDED,
+) -> Finding:
+    typical = possible == UNBOUNDED
+    return weakest(
+        judge(
+            [
+                Contrast(label, np.resize(values, 20), criterion, typical, possible)
+                for label, values in effects.items()
+            ]
+        )
+    )
+
+
+HIGH, LOW, WIDE = [4.0, 6.0], [-6.0, -4.0], [-50.0, 60.0]
+NEAR = [-0.1, 0.2]
+
+
+def test_all_contrasts_must_hold() -> None:
+    criterion = Above(1.0)
+    assert verdict_of({"a": HIGH, "b": [8.0, 9.0]}, criterion) == (SUPPORTED, "a", 5.0)
+    assert verdict_of({"a": HIGH, "b": NEAR}, criterion) == (EQUIVALENT, "b", pytest.approx(0.05))
+    assert verdict_of({"a": LOW, "b": HIGH}, criterion) == (CONTRADICTED, "a", -5.0)
+    # One difference that is known not to matter says more than one that is unknown.
+    assert verdict_of({"a": WIDE, "b": NEAR}, criterion)[:2] == (EQUIVALENT, "b")
+    # A contradiction counts more than a contrast that is weaker, but undecided.
+    assert verdict_of({"a": LOW, "b": [-300.0, 280.0]}, criterion) == (CONTRADICTED, "a", -5.0)
+    assert verdict_of({"a": HIGH, "b": WIDE}, criterion) == (UNDECIDED, "b", 5.0)
+
+
+def test_all_contrasts_must_lie_in_the_range() -> None:
+    criterion = Within(0.0, 10.0)
+    assert verdict_of({"a": HIGH, "b": [7.0, 8.0]}, criterion) == (SUPPORTED, "b", 7.5)
+    assert verdict_of({"a": HIGH, "b": NEAR}, criterion)[:2] == (UNDECIDED, "b")
+    assert verdict_of({"a": HIGH, "b": LOW}, criterion) == (CONTRADICTED, "b", -5.0)
+    assert verdict_of({"a": HIGH, "b": [11.0, 12.0]}, criterion) == (CONTRADICTED, "b", 11.5)
+
+
+def test_one_far_run_decides_the_mean_but_not_the_typical_run() -> None:
+    """Twenty pairs that differ by a tenth of the margin, and one run that found something else."""
+    values = [0.1 * (-1) ** seed for seed in range(19)] + [400.0]
+    finding = finding_of({"a": values}, Above(1.0))
+    assert (finding.verdict, finding.by_mean.verdict) == (EQUIVALENT, UNDECIDED)
+    assert finding.disagrees
+    assert abs(finding.effect) < 0.11
+    assert finding.by_mean.effect == pytest.approx(20.0, abs=0.1)
+    # What is bounded has no far runs: it rests on the mean, and there is no other reading.
+    share = finding_of({"a": [0.0] * 3 + [1.0] * 17}, Within(0.9, 1.0), possible=(0.0, 1.0))
+    assert share.effect == 0.85
+    assert share.by_mean is None
+    assert not share.disagrees
+
+
+def test_a_statistic_of_centres_is_that_of_typical_runs() -> None:
+    """The difference of two centres, near 0 and near 3, with a far run in the first."""
+    random = np.random.default_rng(0)
+    rows = random.normal(0, 0.1, size=(2, 40)) + np.array([[0.0], [3.0]])
+    rows[0, 7] = 900.0
+    contrast = Contrast("spread", rows, Above(1.0), True, of_centres=lambda c: c[1] - c[0])
+    (finding,) = judge([contrast])
+    assert finding.effect == pytest.approx(3.0, abs=0.1)
+    assert finding.by_mean.effect == pytest.approx(3 - 900 / 40, abs=0.1)
+
+
+def test_more_contrasts_at_once_need_wider_intervals() -> None:
+    values = np.random.default_rng(0).normal(1, 1, 20)
+    contrast = Contrast("a", values, Above())
+    (one,), many = judge([contrast]), judge([contrast] * 50)
+    assert one.level == 0.95
+    assert many[0].level == pytest.approx(1 - 0.05 / 50)
+    assert one.low > many[0].low
+    assert one.high < many[0].high
+    assert one.effect == many[0].effect == pytest.approx(values.mean())
+    assert judge([]) == []
+
+
+def test_both_readings_of_a_typical_contrast_count_for_the_level() -> None:
+    values = np.random.default_rng(0).normal(1, 1, 20)
+    (finding,) = judge([Contrast("a", values, Above(), typical=True)])
+    assert finding.level == finding.by_mean.level == pytest.approx(1 - 0.05 / 2)
+
+
+def test_contrasts_of_different_numbers_of_seeds_are_judged_together_in_their_order() -> None:
+    random = np.random.default_rng(0)
+    contrasts = [Contrast(str(n), random.normal(n, 1, n), Above()) for n in (9, 30, 9, 5)]
+    together = judge(contrasts)
+    assert [finding.contrast for finding in together] == contrasts
+    for finding, contrast in zip(together, contrasts, strict=True):
+        assert finding.effect == pytest.approx(contrast.values.mean())
+        assert finding.contrast.seeds == len(contrast.values)
+
+
+def test_one_seed_decides_nothing() -> None:
+    for criterion in (Above(), Within(0.0, 10.0)):
+        (finding,) = judge([Contrast("a", np.array([5.0]), criterion)])
+        assert (finding.verdict, finding.effect) == (UNDECIDED, 5.0)
+        assert np.isnan(finding.low)
+
+
+def test_rounding_errors_are_no_effect() -> None:
+    values = 0.1 + 0.2 - 0.3 + np.array([-1.0, 1.0] * 10)
+    (finding,) = judge([Contrast("a", values, Above())])
+    assert finding.effect == 0.0
+
+
+def test_verdicts_are_counted() -> None:
+    assert tally([UNDECIDED, SUPPORTED, SUPPORTED]) == "2 supported, 1 undecided"
+    assert tally(Verdict) == (
+        "1 supported, 1 contradicted, 1 equivalent, 1 undecided, 1 not tested"
+    )

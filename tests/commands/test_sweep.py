@@ -1,0 +1,317 @@
+"""Sweeps as a command: its tables held against the library, and files that are wrong."""
+
+from __future__ import annotations
+
+import csv
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_lines import (
+    EXPERIMENTS,
+    PROMPTLY,
+    assert_one_sentence,
+    call,
+    contents,
+    environment,
+    load,
+    run,
+    start,
+)
+
+from taichi_ants import Colony, Life, Pheromone, Rewards, Task, TrainingConfig, train, worlds
+from taichi_ants.analysis.statistics import bootstrap_interval
+from taichi_ants.studies.runner import EVALUATION_SEEDS
+from taichi_ants.studies.sweep_file import read_sweep
+from taichi_ants.worlds import registry
+
+RUNS = """
+kind = "runs"
+measures = ["return_last50", "greedy_deliveries"]
+seeds = [7, 2, 5]
+episodes = 12
+max_steps = 60
+rollouts = 3
+
+[task]
+delivery = "continuing"
+
+[training]
+learner = "sarsa"
+discount = 0.9
+epsilon_decay = 0.99
+
+[vary]
+learning_rate = [0.01, 0.1]
+training.epsilon = [0.1, 0.5, 1.0]
+task.rewards.lure = [1, 0]
+"""
+COLONY = """
+kind = "colony"
+measures = "deliveries"
+seeds = 2
+ants = 4
+episodes = 2
+ticks = 60
+rollouts = 2
+
+[world]
+preset = "open"
+ranges = [12, 12, 12]
+per_seed = true
+seed = 5
+
+[task]
+evaporation_in_training = true
+life.regrowth = 0
+pheromone.evaporation = "exponential"
+
+[training]
+learner = "sarsa"
+learning_rate = 0.1
+discount = 0.9
+epsilon = 0.3
+epsilon_decay = 0.9
+
+[vary]
+half_life = { from = 5, to = 20, times = 2 }
+"""
+
+
+NAMES = {kind: load("sweep").measures(kind) for kind in ("runs", "colony")}
+
+
+@pytest.fixture
+def sweep(tmp_path, capsys, monkeypatch):
+    """Calls the command on a file of this text, in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+
+    def called(text, *more):
+        Path("my.toml").write_text(text, "utf-8")
+        return call("sweep", ["my.toml", *more], capsys)
+
+    return called
+
+
+def read_csv(path):
+    with open(path, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_row_is_a_point_and_a_seed_as_the_library_has_it(sweep):
+    status, out, err = sweep(RUNS)
+    assert (status, err) == (0, "")
+    folder = Path("results/sweep-my")
+    assert set(contents(folder)) == {
+        *("runs.csv", "summary.csv", "report.txt", "manifest.json", "figures/return_last50.png"),
+    }
+    rows = read_csv(folder / "runs.csv")
+    names = ["training.learning_rate", "training.epsilon", "task.rewards.lure"]
+    assert list(rows[0]) == [*names, "seed", "return_last50", "greedy_deliveries"]
+    assert len(rows) == 2 * 3 * 2 * 3
+    for row in rows[::5]:
+        rate, epsilon = (float(row[name]) for name in names[:2])
+        config = TrainingConfig("sarsa", rate, 0.9, epsilon, 0.99)
+        task = Task(delivery="continuing", rewards=Rewards(lure=int(row[names[2]])))
+        trained = train(worlds.paper(), config, int(row["seed"]), 12, 60, task)
+        assert float(row["return_last50"]) == trained.returns.mean()
+    summary = read_csv(folder / "summary.csv")
+    assert len(summary) == 12
+    for number, line in enumerate(summary):
+        alike = rows[3 * number : 3 * number + 3]
+        assert all(line[name] == row[name] for row in alike for name in names)
+        values = np.array([[float(row["return_last50"]) for row in alike]])
+        assert float(line["return_last50_mean"]) == pytest.approx(values.mean())
+        low, high = bootstrap_interval(values)
+        assert float(line["return_last50_ci_low"]) == pytest.approx(low[0])
+        assert float(line["return_last50_ci_high"]) == pytest.approx(high[0])
+    report = (folder / "report.txt").read_text("utf-8")
+    assert out.startswith(report)
+    assert "learning_rate  epsilon  lure" in report
+    facts = json.loads((folder / "manifest.json").read_text("utf-8"))["settings"]
+    assert (facts["task.delivery"], facts["seeds"]) == ("continuing", [7, 2, 5])
+
+
+def test_a_sweep_of_colonies_is_what_the_library_gives(sweep):
+    status, _, err = sweep(COLONY, "--no-figures")
+    assert (status, err) == (0, "")
+    rows = read_csv("results/sweep-my/runs.csv")
+    assert [row["task.pheromone.half_life"] for row in rows] == ["5", "5", "10", "10", "20", "20"]
+    several = [worlds.open_world(5 + seed, (12, 12, 12)) for seed in (0, 1)]
+    pheromone = Pheromone("exponential", half_life=10)
+    task = Task(pheromone=pheromone, evaporation_in_training=True, life=Life(regrowth=0))
+    colony = Colony(several, task, TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.9), (0, 1), 4)
+    colony.run(2, 60)
+    greedy = TrainingConfig("sarsa", 0.1, 0.9, 0.01, 1.0)
+    others = (EVALUATION_SEEDS, EVALUATION_SEEDS + 1)
+    table = colony.q_values
+    after = Colony(several, task, greedy, others, 4, sharing="fixed", q_values=table).run(2, 60)
+    expected = after.deliveries.mean(axis=0) * 1000 / 60
+    assert [float(row["deliveries"]) for row in rows[2:4]] == pytest.approx(expected.tolist())
+
+
+def test_a_finished_sweep_is_shown_and_its_figure_drawn_later(sweep):
+    assert sweep(RUNS, "--no-figures")[0] == 0
+    before = contents(Path("results/sweep-my"))
+    status, out, _ = sweep(RUNS)
+    assert status == 0
+    assert "holds these results already" in out
+    after = contents(Path("results/sweep-my"))
+    assert set(after) - set(before) == {"figures/return_last50.png"}
+    status, out, err = sweep(RUNS.replace("lure = [1, 0]", "lure = [1, 2]"))
+    assert status == 2
+    assert "task.rewards.lure" in err
+
+
+def test_stopped_and_killed_it_goes_on_to_the_same_results(kernels, tmp_path):
+    long = COLONY.replace("episodes = 2", "episodes = 60").replace("to = 20", "to = 320")
+    (tmp_path / "long.toml").write_text(long)
+    blocks = tmp_path / "out" / "unfinished" / "blocks"
+
+    def stopped(number, least):
+        process = start("sweep", ["long.toml", "--out", "out"], kernels, tmp_path)
+        while process.poll() is None and len(list(blocks.glob("*.npz"))) < least:
+            time.sleep(0.002)
+        sent = time.perf_counter()
+        process.send_signal(number)
+        _, err = process.communicate(timeout=60)
+        assert time.perf_counter() - sent < PROMPTLY
+        return process.returncode, err
+
+    status, err = stopped(signal.SIGINT, 1)
+    assert (status, err.split(";")[0]) == (130, "Stopped")
+    kept = {path: path.stat().st_mtime_ns for path in blocks.glob("*.npz")}
+    assert stopped(signal.SIGKILL, len(kept) + 1)[0] == -signal.SIGKILL
+    assert all(path.stat().st_mtime_ns == stamp for path, stamp in kept.items())
+    for place in ("out", "whole"):
+        arguments = ["long.toml", "--out", place, "--no-figures"]
+        assert run("sweep", arguments, kernels, tmp_path).returncode == 0
+    one, other = contents(tmp_path / "out"), contents(tmp_path / "whole")
+    assert all(one[name] == other[name] for name in one if name != "manifest.json")
+
+
+WRONG = {
+    "kind": ('kind = "runs"', 'kind = "run"', ["kind is 'run'", "runs, colony", "'runs'"]),
+    "no kind": ('kind = "runs"', "", ["kind is None", "runs, colony"]),
+    "measure": ('"return_last50"', '"return_last"', ["'return_last'", "return_last50"]),
+    "no measure": (RUNS[RUNS.index("measures") : RUNS.index("seeds")], "", ["measures is missing"]),
+    "unknown": ("lure =", "lures =", ["'task.rewards.lures' is no setting", "task.rewards.lure"]),
+    "unknown above": ("episodes =", "episode =", ["'episode' is no setting", "episodes"]),
+    "of the other kind": ("rollouts = 3", "ants = 3", ["'ants' is no setting", "known are"]),
+    "hyperparameter": ("discount = 0.9", "discount = 0.9\nplanning_steps = 3", ["planning_steps"]),
+    "missing": ("discount = 0.9", "", ["training.discount is missing"]),
+    "value": ("discount = 0.9", "discount = 1.9", ["discount is 1.9"]),
+    "text": ("episodes = 12", 'episodes = "12"', ["episodes is '12'"]),
+    "list": ("discount = 0.9", "discount = [0.9, 1]", ["training.discount is a list", "[vary]"]),
+    "twice": ("discount = 0.9", "discount = 0.9\nepsilon = 0.1", ["training.epsilon stands among"]),
+    "empty": ("[1, 0]", "[]", ["task.rewards.lure is an empty list"]),
+    "range": ("[1, 0]", "{ from = 1, to = 5 }", ["the range of task.rewards.lure", "by = 10"]),
+    "endless": ("[1, 0]", "{ from = 1, to = 5, by = 0 }", ["does not come to an end"]),
+    "large": ("[1, 0]", "{ from = 1, to = 9000, by = 1 }", ["points; make it 10000 or fewer"]),
+    "seeds": ("seeds = [7, 2, 5]", "seeds = 0", ["seeds is 0", "number"]),
+    "seed twice": ("[7, 2, 5]", "[7, 7]", ["seeds holds 7 more than once"]),
+    "world": ("[task]", '[world]\npreset = "mars"\n[task]', ["'mars'", "open, paper"]),
+    "world's": ("[task]", "[world]\nranges = [9, 9, 9]\n[task]", ["'world.ranges' is no setting"]),
+    "per seed": ("[task]", "[world]\nper_seed = true\n[task]", ["per_seed", "colonies only"]),
+    "observation": ("[task]", '[task]\nobservation = "all"', ["'all'", "paper"]),
+    "learner": ('"sarsa"', '"salsa"', ["'salsa'", "sarsa"]),
+    "for colonies": ("[vary]", "[vary]\nregrowth = [1]", ["use a Colony"]),
+    "no toml": ("[vary]", "[vary", ["is no TOML", "mend the file"]),
+    "nothing varies": (RUNS[RUNS.index("[vary]") :], "", ["[vary] is missing"]),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_mistakes_in_a_file_end_in_one_sentence_that_names_the_key(name, sweep):
+    old, new, words = WRONG[name]
+    assert old in RUNS
+    status, out, err = sweep(RUNS.replace(old, new, 1))
+    assert (status, out) == (2, "")
+    assert_one_sentence(err)
+    assert "my.toml" in err
+    for word in words:
+        assert word in err
+    assert not Path("results").exists()
+
+
+def test_a_file_that_is_missing_is_named(capsys):
+    status, _, err = call("sweep", ["none.toml"], capsys)
+    assert status == 2
+    assert_one_sentence(err)
+    assert "cannot read 'none.toml'" in err
+
+
+def settings_of(text, tmp_path):
+    (tmp_path / "a.toml").write_text(text)
+    return read_sweep(tmp_path / "a.toml", NAMES).settings
+
+
+def test_several_grids_are_joined(tmp_path):
+    """Learners with hyperparameters of their own, and what belongs together."""
+    grids = """
+[[vary]]
+learner = "q_learning"
+learning_rate = [0.1, 0.2]
+[[vary]]
+learner = "dyna_q"
+learning_rate = 0.1
+planning_steps = { from = 2, to = 6, by = 2 }
+"""
+    head = RUNS[: RUNS.index("[vary]")].replace('learner = "sarsa"', "epsilon = 0.3")
+    settings = settings_of(head + grids, tmp_path)
+    names = ("training.learner", "training.learning_rate", "training.planning_steps")
+    assert [tuple(one.get(name) for name in names) for one in settings] == [
+        *(("q_learning", 0.1, None), ("q_learning", 0.2, None)),
+        *(("dyna_q", 0.1, 2), ("dyna_q", 0.1, 4), ("dyna_q", 0.1, 6)),
+    ]
+
+
+def test_ranges_end_where_they_say(tmp_path):
+    def drawn(text):
+        found = settings_of(RUNS.replace("[0.1, 0.5, 1.0]", text), tmp_path)
+        return list(dict.fromkeys(one["training.epsilon"] for one in found))
+
+    assert drawn("{ from = 0.1, to = 0.7, by = 0.2 }") == [0.1, 0.3, 0.5, 0.7]
+    assert drawn("{ from = 0.01, to = 1, times = 10 }") == [0.01, 0.1, 1.0]
+    assert drawn("{ from = 0, to = 1, by = 1 }") == [0, 1]
+
+
+def test_a_preset_of_ones_own_and_its_settings_can_be_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(registry, "_BUILDERS", dict(registry._BUILDERS))
+
+    def line(seed, length=3):
+        return worlds.World((length, 2, 2), (0, 0, 0), foods=[(length - 1, 0, 0)])
+
+    worlds.register("line", line)
+    text = RUNS.replace("[vary]", '[world]\npreset = "line"\n[vary]\nworld.length = [4, 6]')
+    (tmp_path / "a.toml").write_text(text)
+    points = read_sweep(tmp_path / "a.toml", NAMES).study.points
+    assert {point.world for point in points} == {line(0, 4), line(0, 6)}
+
+
+@pytest.mark.parametrize("name", ["crowds", "learning_rates", "trails"])
+def test_the_examples_can_be_read(name):
+    assert len(read_sweep(EXPERIMENTS / "sweeps" / f"{name}.toml", NAMES).settings) > 4
+
+
+def test_help_is_quick_and_needs_no_taichi(tmp_path):
+    script = (
+        "import sys\n"
+        "from taichi_ants.commands import run\n"
+        "try:\n"
+        "    run('sweep', ['--help'])\n"
+        "except SystemExit as end:\n"
+        "    assert end.code == 0\n"
+        "heavy = {'taichi', 'numpy', 'scipy', 'matplotlib', 'rich'} & set(sys.modules)\n"
+        "print('heavy:', sorted(heavy))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], env=environment(tmp_path), capture_output=True, text=True
+    )
+    assert done.stdout.endswith("heavy: []\n")
+    assert "FILE" in done.stdout

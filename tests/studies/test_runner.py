@@ -1,0 +1,334 @@
+"""Studies in blocks: the same results in any order, from any state of the folder."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from taichi_ants import AntsError, Colony, TrainingConfig, evaluate, files, train
+from taichi_ants.studies import runner
+from taichi_ants.studies.provenance import commit, provenance, world_facts
+from taichi_ants.studies.runner import EVALUATION_SEEDS, ColonyPoint, RunPoint, Study
+from taichi_ants.task import Life, Pheromone, Rewards, Task
+from taichi_ants.worlds import World, open_world, paper
+
+ABSORBING, CONTINUING = Task(), Task(delivery="continuing")
+SARSA = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.99)
+DYNA = TrainingConfig("dyna_q", 0.1, 0.9, 0.3, 0.99, planning_steps=2)
+KINDS = (
+    (ABSORBING, SARSA),
+    (CONTINUING, DYNA),
+    (ABSORBING, replace(SARSA, learning_rate=0.2)),
+    (ABSORBING, replace(SARSA, learning_rate=0.3)),
+    (CONTINUING, replace(SARSA, learning_rate=0.4)),
+)
+POINTS = tuple(RunPoint(paper(), task, config, 6, 80, 3) for task, config in KINDS)
+SEEDS = (4, 0, 9, 7, -2)
+NAMES = ("returns", "steps", "deliveries")
+
+
+@pytest.fixture(params=[2, 11], ids=["blocks of some seeds", "blocks of some points"])
+def study(request, monkeypatch):
+    """Five points and five seeds, in blocks of so many runs at most."""
+    monkeypatch.setattr(runner, "_STEPS_OF_A_BLOCK", request.param * 6 * 80)
+    return Study(POINTS, SEEDS)
+
+
+def same(one, other):
+    """Whether two studies gave the same, but for the time that it took."""
+    return one.keys() == other.keys() and all(
+        set(one[point]) == set(other[point])
+        and all(
+            np.array_equal(one[point][name], other[point][name])
+            for name in one[point]
+            if name != "seconds"
+        )
+        for point in one
+    )
+
+
+def test_blocks_cover_all_runs_once_with_one_task_and_learner_each(study):
+    done = np.zeros((5, 5), int)
+    limit = runner._STEPS_OF_A_BLOCK // (6 * 80)
+    for points, seeds in study.blocks():
+        assert done[points, seeds].size <= limit
+        assert len({(p.task, p.training.learner) for p in study.in_order[points]}) == 1
+        done[points, seeds] += 1
+    assert (done == 1).all()
+    assert len(list(study.blocks())) == {2: 5 * 3, 11: 4}[limit]
+
+
+def test_blocks_are_limited_in_runs_too():
+    short = replace(POINTS[0], episodes=1, max_steps=1, rollouts=1)
+    study = Study((short,), tuple(range(9000)))
+    assert max(seeds.stop - seeds.start for _, seeds in study.blocks()) <= 5000
+    long = replace(POINTS[0], episodes=10**6, max_steps=10**7)
+    assert {seeds.stop - seeds.start for _, seeds in Study((long,), (0, 1)).blocks()} == {1}
+
+
+def test_a_study_of_runs_is_training_and_evaluation(study, tmp_path):
+    shares = []
+    outcomes = study.run(tmp_path, progress=shares.append)
+    for point in POINTS:
+        trained = train(paper(), point.training, SEEDS, 6, 80, point.task)
+        greedy = evaluate(paper(), trained.q_values, 3, SEEDS, 80, point.task)
+        for name in NAMES:
+            assert np.array_equal(outcomes[point][name], getattr(trained, name)[0])
+            assert np.array_equal(outcomes[point][f"greedy_{name}"], getattr(greedy, name)[0])
+        assert np.array_equal(outcomes[point]["q_values"], trained.q_values[0])
+        assert (outcomes[point]["seconds"] > 0).all()
+    assert shares[0] == 0
+    assert shares[-1] == pytest.approx(1)
+    assert all(earlier <= later + 1e-9 for earlier, later in itertools.pairwise(shares))
+    assert len(list(study.blocks())) == len(list(tmp_path.iterdir()))
+
+
+@pytest.mark.parametrize(("training", "greedy"), [(True, True), (True, False), (False, False)])
+def test_evaporation_is_a_setting_of_each(training, greedy, tmp_path):
+    task = Task(evaporation_in_training=training, evaporation_in_evaluation=greedy)
+    point = RunPoint(paper(), task, SARSA, 20, 80, 2)
+    outcome = Study((point,), (0, 1)).run(tmp_path)[point]
+    trained = train(paper(), SARSA, (0, 1), 20, 80, Task(evaporation_in_training=training))
+    other = Task(evaporation_in_evaluation=greedy)
+    rollouts = evaluate(paper(), trained.q_values, 2, (0, 1), 80, other)
+    for name in NAMES:
+        assert np.array_equal(outcome[name], getattr(trained, name)[0])
+        assert np.array_equal(outcome[f"greedy_{name}"], getattr(rollouts, name)[0])
+
+
+LIVELY = Task(delivery="continuing", evaporation_in_training=True, life=Life(regrowth=0))
+WORLDS = tuple(open_world(seed, (12, 12, 12)) for seed in (3, 5))
+ALONE = ColonyPoint(WORLDS, LIVELY, SARSA, episodes=2, ticks=60, rollouts=2)
+
+
+def test_a_study_of_colonies_is_learning_and_evaluation(tmp_path):
+    joint = replace(ALONE, ants=4, after=ALONE)
+    own = replace(ALONE, ants=4, sharing="own", start="spread")
+    outcomes = Study((joint, own), (3, 5)).run(tmp_path)
+    assert set(outcomes) == {ALONE, joint, own}
+    first = Colony(WORLDS, LIVELY, SARSA, (3, 5))
+    first.run(2, 60)
+    assert np.array_equal(outcomes[ALONE]["q_values"], first.q_values)
+    calm = replace(SARSA, epsilon=SARSA.min_epsilon, epsilon_decay=1.0)
+    others = [seed + EVALUATION_SEEDS for seed in (3, 5)]
+    for point, more in ((joint, {"q_values": first.q_values}), (own, {})):
+        options = {"ants": 4, "start": point.start}
+        learning = Colony(WORLDS, LIVELY, SARSA, (3, 5), **options, sharing=point.sharing, **more)
+        learning.run(2, 60)
+        table = learning.q_values
+        colony = Colony(WORLDS, LIVELY, calm, others, **options, sharing="fixed", q_values=table)
+        episodes = colony.run(2, 60)
+        for name in ("deliveries", "first_delivery", "moves", "blocked", "returns"):
+            assert np.array_equal(outcomes[point][name], getattr(episodes, name).T)
+    assert "q_values" not in outcomes[own]  # a table for each ant is not kept
+
+
+def test_copies_follow_what_another_point_has_learned_and_train_nothing(tmp_path):
+    copies = replace(ALONE, ants=4, episodes=0, after=ALONE)
+    outcomes = Study((copies,), (3, 5)).run(tmp_path)
+    calm = replace(SARSA, epsilon=SARSA.min_epsilon, epsilon_decay=1.0)
+    others = [seed + EVALUATION_SEEDS for seed in (3, 5)]
+    table = outcomes[ALONE]["q_values"]
+    colony = Colony(WORLDS, LIVELY, calm, others, ants=4, sharing="fixed", q_values=table)
+    assert np.array_equal(outcomes[copies]["moves"], colony.run(2, 60).moves.T)
+
+
+def test_points_in_common_are_done_once(tmp_path):
+    copies = replace(ALONE, ants=4, episodes=0, after=ALONE)
+    study = Study((copies, ALONE, replace(ALONE, ants=1)), (3, 5))
+    assert study.in_order == (ALONE, copies)
+    study.run(tmp_path)
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+@pytest.mark.parametrize("kind", ["runs", "colonies"])
+def test_a_study_goes_on_from_any_blocks(kind, study, tmp_path, monkeypatch):
+    if kind == "colonies":
+        points = (replace(ALONE, ants=3, after=ALONE), replace(ALONE, ants=2))
+        study = Study(points, (3, 5))
+    first = study.run(tmp_path)
+    blocks = sorted(tmp_path.iterdir())
+    stamps = {file: file.stat().st_mtime_ns for file in blocks}
+    calls = []
+    real = Study._do
+    monkeypatch.setattr(Study, "_do", lambda *given: calls.append(given) or real(*given))
+    assert same(study.run(tmp_path), first)
+    assert calls == []
+    for file in blocks[::2]:
+        file.unlink()
+    assert same(study.run(tmp_path), first)
+    assert len(calls) == len(blocks[::2])
+    for file in blocks[1::2]:
+        assert file.stat().st_mtime_ns == stamps[file]
+
+
+DAMAGES = {
+    "empty": lambda path: path.write_bytes(b""),
+    "cut off": lambda path: path.write_bytes(path.read_bytes()[:-40]),
+    "no archive": lambda path: path.write_text("block"),
+    "without a table": lambda path: rewrite(path, "q_values", None),
+    "fewer seeds": lambda path: rewrite(path, "returns", np.zeros((1, 0, 6), int)),
+    "smaller tables": lambda path: rewrite(path, "q_values", np.zeros((1, 2, 64, 5))),
+    "other actions": lambda path: rewrite(path, "q_values", 1 + files.read_npz(path)["q_values"]),
+    "of other seeds": lambda path: path.write_bytes(sorted(path.parent.iterdir())[1].read_bytes()),
+}
+
+
+def rewrite(path, name, array):
+    arrays = {**files.read_npz(path), name: array}
+    files.write_npz(path, {key: value for key, value in arrays.items() if value is not None})
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_damaged_blocks_are_done_again(damage, study, tmp_path):
+    first = study.run(tmp_path)
+    path, said = sorted(tmp_path.iterdir())[2], []
+    DAMAGES[damage](path)
+    assert same(study.run(tmp_path, notice=said.append), first)
+    assert files.read_sealed_npz(path)["returns"].size
+    assert said == [f"{str(path)!r} is damaged, so this part is done again."]
+
+
+def test_an_interruption_loses_one_block_at_most(study, tmp_path):
+    def stop(share):
+        if share > 0.4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        study.run(tmp_path, progress=stop)
+    assert 1 <= len(list(tmp_path.iterdir())) < len(list(study.blocks()))
+    other = tmp_path / "other"
+    other.mkdir()
+    assert same(study.run(tmp_path), study.run(other))
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"training": TrainingConfig("td_zero", 0.1, 0.9, 0.3, 0.99)}, "'td_zero'"),
+        ({"training": None}, "configs is None"),
+        ({"task": "paper"}, "task is 'paper'"),
+        ({"task": Task(life=Life(regrowth=0))}, "use a Colony"),
+        ({"task": Task(pheromone=Pheromone(level=9))}, "use a Colony"),
+        ({"episodes": 0}, "episodes is 0"),
+        ({"max_steps": 10**8}, "max_steps is 100000000"),
+        ({"rollouts": 0}, "rollouts is 0"),
+    ],
+)
+def test_bad_points_of_runs_are_named(change, says):
+    with pytest.raises(AntsError) as caught:
+        replace(POINTS[0], **change)
+    assert says in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"ants": 0}, "ants is 0"),
+        ({"capacity": 3, "ants": 9}, "capacity is 3, but 9 ants start"),
+        ({"start": "there"}, "start is 'there'"),
+        ({"sharing": "fixed"}, "sharing is 'fixed'"),
+        ({"episodes": 0}, "episodes is 0"),
+        ({"ticks": 0}, "ticks is 0"),
+        ({"rollouts": 0}, "rollouts is 0"),
+        ({"after": replace(ALONE, sharing="own")}, "learned into one table"),
+    ],
+)
+def test_bad_points_of_colonies_are_named(change, says):
+    with pytest.raises(AntsError) as caught:
+        replace(ALONE, **change)
+    assert says in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("points", "seeds", "says"),
+    [
+        ((), (0,), "no points"),
+        (POINTS, (), "seeds is empty"),
+        (POINTS, (1, 1), "seeds holds 1 more than once"),
+        ((replace(POINTS[0], world=None),), (0,), "world is None"),
+        ((replace(POINTS[0], world=World((2, 1, 1), (0, 0, 0), [(1, 0, 0)])),), (0,), "room for 0"),
+        ((replace(POINTS[0], world=World((3, 3, 3), (0, 0, 0))),), (0,), "the world has no food"),
+        ((ALONE,), (1, 2, 3), "2 worlds for 3 seeds"),
+        ((replace(ALONE, ants=4000),), (3, 5), "4000 ants are asked for"),
+        (
+            (replace(POINTS[0], episodes=2 * 10**9),),
+            range(1000),
+            "1 point of up to 2000000000 episodes with 1000 seeds need",
+        ),
+    ],
+)
+def test_bad_studies_are_refused_before_any_work(points, seeds, says):
+    with pytest.raises(AntsError) as caught:
+        Study(tuple(points), tuple(seeds))
+    assert says in str(caught.value)
+
+
+def test_memory_bounds_a_study(monkeypatch):
+    monkeypatch.setattr(runner, "available_memory", lambda: 1e6)
+    points = tuple(replace(point, episodes=500) for point in POINTS)
+    Study(points, (0,))
+    with pytest.raises(
+        AntsError, match=r"5 points of up to 500 episodes with 20 seeds need about 0 GB"
+    ):
+        Study(points, tuple(range(20)))
+
+
+def test_settings_tell_all_that_determines_results():
+    first = POINTS[0]
+    settings = Study(POINTS, SEEDS).settings()
+    others = {
+        "world": World((3, 3, 3), (0, 0, 0), foods=[(2, 0, 0)]),
+        "task": Task(rewards=Rewards(give=11)),
+        "training": replace(SARSA, min_epsilon=0.02),
+        **{"episodes": 7, "max_steps": 81, "rollouts": 4},
+    }
+    for name, value in others.items():
+        changed = Study((replace(first, **{name: value}), *POINTS[1:]), SEEDS)
+        assert changed.settings() != settings, name
+    assert Study(POINTS, SEEDS[:-1]).settings() != settings
+    assert Study(POINTS[:-1], SEEDS).settings() != settings
+    assert Study(tuple(map(replace, POINTS)), SEEDS).settings() == settings
+    joint = replace(ALONE, ants=4, after=ALONE)
+    for name, value in {"after": None, "start": "spread", "ticks": 61, "sharing": "own"}.items():
+        changed = Study((ALONE, replace(joint, **{name: value})), (3, 5))
+        assert changed.settings() != Study((ALONE, joint), (3, 5)).settings(), name
+
+
+def test_settings_say_once_what_all_points_have_in_common():
+    settings = Study(POINTS, SEEDS).settings()
+    assert settings["task.delivery"] == [task.delivery for task, _ in KINDS]
+    assert settings["task.rewards.give"] == 10
+    assert settings["training.hyperparameters.planning_steps"] == [None, 2, None, None, None]
+    assert settings["worlds"] == [world_facts(paper())]
+    assert settings["world"] == 0
+
+
+def test_any_difference_of_worlds_is_told():
+    base = {
+        **{"ranges": (5, 5, 5), "queen": (0, 0, 0), "foods": [(2, 0, 0)], "obstacles": [(0, 2, 0)]},
+        **{"trails": [((1, 0, 0), 5)], "ants": [((0, 0, 1), 2)]},
+    }
+    changes = {
+        **{"ranges": (5, 5, 6), "queen": (0, 0, 2), "foods": [(3, 0, 0)], "obstacles": [(0, 3, 0)]},
+        **{"trails": [((1, 0, 0), 6)], "ants": [((0, 0, 1), 3)]},
+    }
+    facts = [world_facts(World(**{**base, name: value})) for name, value in changes.items()]
+    facts.append(world_facts(World(**base)))
+    for one, other in itertools.combinations(facts, 2):
+        assert one != other
+    # A food here and an obstacle there is not the same as the other way round.
+    swapped = {**base, "foods": base["obstacles"], "obstacles": base["foods"]}
+    assert world_facts(World(**swapped)) != facts[-1]
+
+
+def test_provenance(tmp_path):
+    facts = provenance(["compare.py", "--out", "a b"])
+    assert facts["command"] == "compare.py --out 'a b'"
+    assert facts["packages"]["taichi"] == "1.7.4"
+    assert facts["commit"] == commit()
+    (tmp_path / "x").write_bytes(b"abc")
+    assert files.file_hash(tmp_path / "x").startswith("ba7816bf8f01cfea414140de5dae2223")
