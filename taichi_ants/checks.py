@@ -142,7 +142,8 @@ def check_finite(
     for c, s in np.argwhere(~finite)[:1]:
         raise AntsError(
             f"learner {configs[c].learner!r} made action values that are not finite, with "
-            f"{configs[c]} and seed {seeds[s]}; mend its TD error."
+            f"{configs[c]} and seed {seeds[s]}; mend its TD error, or make rewards and action "
+            "values smaller."
         )
 
 

@@ -149,7 +149,7 @@ def test_a_loud_taichi_of_the_callers_is_no_louder_for_our_kernels(tmp_path):
 import contextlib
 import io
 import taichi as ti
-from taichi_ants import Colony, ColonyConfig, trace_training
+from taichi_ants import Colony, trace_training
 from taichi_ants.rendering import Scene
 
 for settings in ({}, {"default_fp": ti.f64}, {"log_level": ti.CRITICAL}):
@@ -158,7 +158,7 @@ for settings in ({}, {"default_fp": ti.f64}, {"log_level": ti.CRITICAL}):
     loud = [ti.is_logging_effective(level) for level in ("debug", "info", "warn", "error")]
     trained()
     trace_training(paper(), config, 0, 2)
-    colony = Colony(paper(), ColonyConfig(4), config)
+    colony = Colony(paper(), None, config, ants=4)
     colony.run(1, 20)
     Scene(paper().grid, (200, 160)).draw(colony.snapshot())
     after = [ti.is_logging_effective(level) for level in ("debug", "info", "warn", "error")]
@@ -228,7 +228,7 @@ def test_all_goes_on_after_a_reset_of_the_callers(tmp_path):
 import contextlib
 import io
 import taichi as ti
-from taichi_ants import Colony, ColonyConfig
+from taichi_ants import Colony
 from taichi_ants.rendering import Scene
 
 def quietly(init, **settings):
@@ -236,7 +236,7 @@ def quietly(init, **settings):
         init(**settings)
 
 def colony():
-    made = Colony(paper(), ColonyConfig(4), config, threads=2)
+    made = Colony(paper(), None, config, ants=4, threads=2)
     made.begin_episode()
     made.tick(40)
     return made
@@ -286,7 +286,7 @@ def test_a_forked_process_is_told_to_be_spawned(tmp_path):
     """All that launches kernels, also what was made before; a fork before the start is fine."""
     script = """
 import multiprocessing
-from taichi_ants import Colony, ColonyConfig, evaluate, rollout, trace_training
+from taichi_ants import Colony, evaluate, rollout, trace_training
 from taichi_ants.rendering import Scene
 
 def in_a_fork(work):
@@ -307,7 +307,7 @@ def said_by(work):
 
 assert in_a_fork(trained) == "done"
 table = trained().q_values[0, 0]
-colony = Colony(paper(), ColonyConfig(4), config)
+colony = Colony(paper(), None, config, ants=4)
 colony.begin_episode()
 colony.tick()
 scene = Scene(paper().grid, (200, 160))
@@ -318,7 +318,7 @@ for work in (
     lambda: evaluate(paper(), table),
     lambda: rollout(paper(), table),
     lambda: trace_training(paper(), config),
-    lambda: Colony(paper(), ColonyConfig(4), config),
+    lambda: Colony(paper(), None, config, ants=4),
     lambda: Colony.load("colony.npz"),
     lambda: colony.tick(),
     lambda: colony.run(1, 10),

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
+from weakref import WeakKeyDictionary, finalize, ref
 
 import numpy as np
 import taichi as ti
+from taichi.lang.argpack import ArgPack
+
+from taichi_ants import runtime
 
 
 class Arguments:
@@ -20,24 +24,57 @@ class Arguments:
     def __init__(self) -> None:
         self._pack: Any = None
         self._values: dict[str, Any] = {}
-        self._program: Any = None
+        self._taichi: Any = lambda: None  # that the pack was made in, as a weak reference
 
-    def pack(self, values: Mapping[str, Any]) -> tuple[Any, Any]:
-        """The type of the pack, to annotate the kernel's argument, and the pack.
+    @staticmethod
+    def type_of(values: Mapping[str, Any]) -> Any:
+        """The type of the pack of these values, to annotate the kernel's argument.
 
         Args:
             values: By name: NumPy arrays, which kernels work on in place; whole numbers, for
-                kernels i32, or u64 if they are `np.uint64`; and floats, for kernels f32. Names and
-                types are the same in each call.
+                kernels i32, or u64 if they are `np.uint64`; and floats, for kernels f32.
         """
-        kind = _pack_type(tuple((name, _kind(value)) for name, value in values.items()))
-        program = ti.lang.impl.get_runtime().prog
-        if self._program is not program:
-            self._pack, self._values, self._program = kind(**values), dict(values), program
+        return _pack_type(tuple((name, _kind(value)) for name, value in values.items()))
+
+    def pack(self, values: Mapping[str, Any]) -> Any:
+        """The pack of these values; names and types are the same in each call."""
+        kind = self.type_of(values)
+        taichi = ti.lang.impl.get_runtime()
+        if self._taichi() is not taichi:
+            self._values, self._taichi = dict(values), ref(taichi)
+            # As `kind(**values)`, which makes two packs.
+            self._pack = ArgPack(kind.members, kind.dtype, dict(values))
+            # Taichi would delete a pack of a program that is gone, which ends the process.
+            type(self._pack).__del__ = _nothing
+            memory = self._pack._ArgPack__argpack
+            finalize(self._pack, _delete, self._taichi, memory).atexit = False
         for name, value in values.items():
             if self._values[name] is not value:
                 self._pack[name] = self._values[name] = value
-        return kind, self._pack
+        return self._pack
+
+
+_LAUNCHED: WeakKeyDictionary[Any, set] = WeakKeyDictionary()
+
+
+def compile_once(kernel: Callable[[Any], None], nothing: Callable[[], Any]) -> None:
+    """Launch a kernel on arguments that are no work, unless the Taichi that runs has done so."""
+    launched = _LAUNCHED.setdefault(ti.lang.impl.get_runtime(), set())
+    if kernel not in launched:
+        with runtime.quiet():
+            kernel(nothing())
+        launched.add(kernel)
+
+
+def _nothing(pack: Any) -> None:
+    pass
+
+
+def _delete(taichi: ref, memory: Any) -> None:
+    """Delete the memory of a pack, if the Taichi that it was made in still runs."""
+    running = ti.lang.impl.get_runtime()
+    if taichi() is running and running.prog is not None:
+        running.prog.delete_argpack(memory)
 
 
 def _kind(value: Any) -> tuple[str, int]:

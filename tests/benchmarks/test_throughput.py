@@ -10,7 +10,7 @@ import pytest
 from command_lines import ROOT
 from random_worlds import random_world
 
-from taichi_ants import TrainingConfig, train
+from taichi_ants import Task, TrainingConfig, train
 from taichi_ants.worlds import paper
 
 
@@ -32,16 +32,17 @@ def yardstick(throughput, tmp_path_factory):
 
 @pytest.mark.parametrize("delivery", ["continuing", "absorbing"])
 def test_c_gives_the_same_runs(delivery, throughput, yardstick):
-    configs = throughput.grid("q_learning", 0, delivery)[::5]
-    configs.append(TrainingConfig("q_learning", 1.0, 0.9, 0.7, 0.5, 0.2, delivery=delivery))
+    configs = throughput.grid("q_learning", 0)[::5]
+    configs.append(TrainingConfig("q_learning", 1.0, 0.9, 0.7, 0.5, 0.2))
     deliveries = 0
     for world in (paper(), *(random_world(seed + 60, 6) for seed in range(12))):
         seeds = (0, 7, 2**63 + 5)
-        result = train(world, configs, seeds, 25, 150)
+        result = train(world, configs, seeds, 25, 150, Task(delivery=delivery))
         deliveries += result.deliveries.sum()
         for c, config in enumerate(configs):
             for s, seed in enumerate(seeds):
-                run = throughput.train_in_c(yardstick, world, config, seed, 25, 150)
+                given = (config, delivery == "continuing", seed, 25, 150)
+                run = throughput.train_in_c(yardstick, world, *given)
                 assert np.array_equal(run[0], result.returns[c, s])
                 assert np.array_equal(run[1], result.steps[c, s])
                 assert np.array_equal(run[2], result.q_values[c, s])
@@ -66,7 +67,7 @@ def test_its_table(throughput, capsys):
     assert [int(line[16:22]) for line in lines[1:6]] == [32, 32, 32, 32, 128]
     steps = [int(line[22:35].replace(",", "")) for line in lines[1:6]]
     assert sum(steps[:4]) == steps[4]
-    expected = train(paper(), throughput.grid("sarsa", 0, "absorbing"), range(2), 5, 50)
+    expected = train(paper(), throughput.grid("sarsa", 0), range(2), 5, 50)
     assert steps[1] == expected.steps.sum()
     if throughput.compiler() is not None:
         assert re.fullmatch(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import pickle
 from dataclasses import FrozenInstanceError, asdict
 from decimal import Decimal
@@ -10,19 +11,22 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from taichi_ants import AntsError, TrainingConfig
+from taichi_ants import AntsError, TrainingConfig, learners
 from taichi_ants.errors import shown
 from taichi_ants.learners.config import share_of_one
 
 GOOD = {
     **{"learner": "dyna_q", "learning_rate": 0.1, "discount": 0.9, "epsilon": 0.3},
-    **{"epsilon_decay": 0.99, "min_epsilon": 0.05, "planning_steps": 3, "delivery": "continuing"},
+    **{"epsilon_decay": 0.99, "min_epsilon": 0.05, "planning_steps": 3},
 }
 
 
 def test_defaults():
     config = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 0.99)
-    assert (config.min_epsilon, config.planning_steps, config.delivery) == (0.01, 0, "absorbing")
+    assert (config.min_epsilon, config.planning_steps, config.hyperparameters) == (0.01, 0, ())
+    assert learners.settle(config) == config
+    config = learners.settle(TrainingConfig("sarsa_lambda", 0.1, 0.9, 0.3, 0.99, trace_length=4))
+    assert config.hyperparameters == (("trace_decay", 0.9), ("trace_length", 4))
 
 
 @pytest.mark.parametrize(
@@ -31,7 +35,6 @@ def test_defaults():
         *((name, value) for name in ("learning_rate", "epsilon_decay") for value in (1, 1e-300)),
         *((name, value) for name in ("discount", "epsilon", "min_epsilon") for value in (0, 1)),
         *(("planning_steps", 0), ("planning_steps", 1000)),
-        *(("delivery", "absorbing"), ("delivery", "continuing")),
         ("learner", "not registered yet"),
     ],
 )
@@ -59,24 +62,43 @@ def test_numbers_that_may_not_be_zero(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "says"),
+    ("changes", "says"),
     [
-        ("planning_steps", -1, "planning_steps is -1; it must lie between 0 and 1000."),
-        ("planning_steps", 1001, "planning_steps is 1001; it must lie between 0 and 1000."),
-        ("planning_steps", 2.0, "planning_steps is 2.0; it must be a whole number."),
-        ("planning_steps", True, "planning_steps is True; it must be a whole number."),
-        ("planning_steps", "3", "planning_steps is '3'; it must be a whole number."),
-        ("planning_steps", None, "planning_steps is None; it must be a whole number."),
-        ("delivery", "never", "delivery is 'never'; it must be one of absorbing, continuing."),
-        ("delivery", None, "delivery is None; it must be one of absorbing, continuing."),
-        ("learner", None, "learner is None; it must be the name of a learner."),
-        ("learner", 3, "learner is 3; it must be the name of a learner."),
+        ({"learner": None}, "learner is None; it must be the name of a learner."),
+        ({"learner": 3}, "learner is 3; it must be the name of a learner."),
+        ({"planning_steps": "3"}, "planning_steps is '3'; it must be a number."),
+        ({"planning_steps": True}, "planning_steps is True; it must be a number."),
+        (
+            {"hyperparameters": 3},
+            "hyperparameters is 3; it must be a mapping of names to numbers.",
+        ),
     ],
 )
-def test_other_mistakes(name, value, says):
+def test_other_mistakes(changes, says):
     with pytest.raises(AntsError) as caught:
-        TrainingConfig(**{**GOOD, name: value})
+        TrainingConfig(**{**GOOD, **changes})
     assert str(caught.value) == says
+
+
+@pytest.mark.parametrize(
+    ("learner", "name", "value", "says"),
+    [
+        ("dyna_q", "planning_steps", 0, "planning_steps is 0; it must lie between 1 and 1000."),
+        ("dyna_q", "planning_steps", 1001, "planning_steps is 1001; it must lie between 1 and 10"),
+        ("dyna_q", "planning_steps", 2.0, "planning_steps is 2.0; it must be a whole number."),
+        ("q_learning", "planning_steps", 3, "'planning_steps' is no hyperparameter of learner"),
+        ("dyna_q", "trace_decay", 0.5, "dyna_q'; it has planning_steps."),
+        ("sarsa_lambda", "trace_decay", 1.1, "trace_decay is 1.1; it must lie between 0 and 1."),
+        ("n_step_sarsa", "n_steps", 65, "n_steps is 65; it must lie between 1 and 64."),
+        ("prioritized_sweeping", "threshold", -1, "threshold is -1; it must lie between 0 and"),
+        ("td_zero", "n_steps", 3, "there is no learner 'td_zero'; choose one of q_learning, "),
+    ],
+)
+def test_hyperparameters_are_those_of_the_learner(learner, name, value, says):
+    config = TrainingConfig(learner, 0.1, 0.9, 0.3, 0.99, hyperparameters={name: value})
+    with pytest.raises(AntsError) as caught:
+        learners.settle(config)
+    assert says in str(caught.value)
 
 
 def test_numbers_of_any_kind_are_stored_as_plain_ones():
@@ -92,9 +114,9 @@ def test_numbers_of_any_kind_are_stored_as_plain_ones():
     assert plain == other
     assert hash(plain) == hash(other)
     assert asdict(plain) == asdict(other)
-    assert [type(value) for value in asdict(other).values()] == [
-        *(str, float, float, float, float, float, int, str)
-    ]
+    assert [type(value) for value in asdict(other).values()] == [str, *[float] * 5, tuple]
+    assert type(dict(other.hyperparameters)["planning_steps"]) is int
+    assert TrainingConfig(**json.loads(json.dumps(other.as_dict()))) == plain
     assert pickle.loads(pickle.dumps(other)) == plain
 
 

@@ -58,8 +58,8 @@ NAMES = (*learners.names(), "clipped_sarsa")
 
 def config_for(name, **changes):
     settings = {"learning_rate": 0.1, "discount": 0.9, "epsilon": 0.3, "epsilon_decay": 0.97}
-    hyperparameters = {"planning_steps": 3} if learners.get(name).plans else {}
-    return TrainingConfig(name, **{**settings, **hyperparameters, **changes})
+    hyperparameters = {"dyna_q": {"planning_steps": 3}, "sarsa_lambda": {"trace_decay": 0.5}}
+    return TrainingConfig(name, **{**settings, **hyperparameters.get(name, {}), **changes})
 
 
 def test_the_registry_lists_them():

@@ -306,7 +306,7 @@ def plain_function(value, reward, discount, next_values, next_action, epsilon):
     ],
 )
 def test_td_errors_that_are_refused_at_once(td_error, says):
-    with pytest.raises(AntsError, match="^the TD error of 'mine' ") as caught:
+    with pytest.raises(AntsError, match=r"^the TD error of 'mine' ") as caught:
         td_learner("mine", td_error)
     assert says in str(caught.value)
 
@@ -325,7 +325,7 @@ def begin(memory: ti.template(), at):
 def learn(memory: ti.template(), at, step, rates, random_state):
     """SARSA by a TD error that is mixed with the one before, in this episode."""
     pair = step.state * 8 + step.action
-    discount = rates.discount if step.terminated == 0 else ti.f32(0)
+    discount = rates.discount if step.terminated == 0 else ti.f32(0.0)
     next_value = memory.q[at.table + step.next_state * 8 + ti.max(step.next_action, 0)]
     error = step.reward + discount * next_value - memory.q[at.table + pair]
     error += rates.momentum * memory.floats[at.floats]
@@ -367,10 +367,10 @@ def test_a_memory_in_a_colony_belongs_to_an_ant():
     register(with_memory())
     kinds = [(with_momentum(0.5), 0), (with_momentum(0.0), 1), (config("sarsa"), 2)]
     tables = {}
-    for training, number in kinds:
+    for training, kind in kinds:
         colony = Colony(paper(), None, training, ants=5, sharing="own")
         colony.run(2, 100)
-        tables[number] = colony.q_values
+        tables[kind] = colony.q_values
     assert np.array_equal(tables[1], tables[2])
     assert not np.array_equal(tables[0], tables[2])
 
@@ -402,7 +402,7 @@ def of_one_value(memory: ti.template(), at, step, rates, random_state):
 )
 def test_memories_that_are_not_ones_own_are_refused(function, says):
     register(replace(with_memory(), learn=function))
-    with pytest.raises(AntsError, match="^learner 'mine' cannot be used: ") as caught:
+    with pytest.raises(AntsError, match=r"^learner 'mine' cannot be used: ") as caught:
         in_runs()
     assert says in str(caught.value)
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from random_rewards import TELLING, put_in_force
+from random_rewards import TELLING
 
-from taichi_ants import AntsError, Colony, ColonyConfig, TrainingConfig, rollout, train
+from taichi_ants import AntsError, Colony, Task, TrainingConfig, rollout, train
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.task.rewards import MOST, Rewards
 from taichi_ants.worlds import paper
@@ -28,19 +28,19 @@ def test_what_a_table_may_hold(name, value, reason):
 
 
 @pytest.mark.parametrize("table", TELLING)
-def test_an_episode_pays_by_the_table_and_ends_with_the_delivery(table, monkeypatch):
+def test_an_episode_pays_by_the_table_and_ends_with_the_delivery(table):
     """The shortest delivery: 32 steps on trail or towards the queen, a pick-up, a give."""
-    put_in_force(monkeypatch, table)
-    trace = rollout(paper(), trail_follower())
+    trace = rollout(paper(), trail_follower(), task=Task(rewards=table))
     assert (len(trace), trace.delivered.nonzero()[0].tolist()) == (34, [33])
     assert trace.rewards.sum() == 32 * table.lure + table.pick_up + table.give
 
 
 @pytest.mark.parametrize("table", TELLING)
-def test_a_colony_pays_by_the_table_and_counts_gives_only(table, monkeypatch):
-    put_in_force(monkeypatch, table)
+def test_a_colony_pays_by_the_table_and_counts_gives_only(table):
     training = TrainingConfig("q_learning", 0.1, 0.9, 0.0, 1.0)
-    colony = Colony(paper(), ColonyConfig(), training, 0, "fixed", trail_follower())
+    colony = Colony(
+        paper(), Task(rewards=table), training, sharing="fixed", q_values=trail_follower()
+    )
     colony.begin_episode()
     colony.tick(34)
     outcome = colony.outcome()
@@ -48,8 +48,7 @@ def test_a_colony_pays_by_the_table_and_counts_gives_only(table, monkeypatch):
     assert outcome.returns[0, 0] == 32 * table.lure + table.pick_up + table.give
 
 
-def test_returns_fit_into_their_integers(monkeypatch):
-    put_in_force(monkeypatch, Rewards(give=MOST))
+def test_returns_fit_into_their_integers():
     config = TrainingConfig("q_learning", 0.1, 0.9, 0.0, 1.0)
     with pytest.raises(AntsError, match="max_steps is 10000000; it must lie between 1 and 2147483"):
-        train(paper(), config, 0, episodes=1, max_steps=10_000_000)
+        train(paper(), config, 0, 1, 10_000_000, Task(rewards=Rewards(give=MOST)))

@@ -15,6 +15,7 @@ from taichi_ants.grid.constants import STREAM_START_CELL, STREAM_START_HEADING
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 from taichi_ants.worlds import World
+from taichi_ants.worlds.starts import STARTS as WHERE
 
 ARRAYS = ("foods", "obstacles", "trails", "ants")
 

@@ -413,9 +413,10 @@ class Colony:
             self.task.life.changes,
         )
         with runtime.quiet():
-            kind, arguments = self._arguments.pack({**self._numbers(), **self.arrays})
+            values = {**self._numbers(), **self.arrays}
+            kind = self._arguments.type_of(values)
             kernel = kernels.colony_kernel(getattr(kernels, what), variant, kind)
-            kernel(arguments, self.ticks, n_ticks)
+            kernel(self._arguments.pack(values), self.ticks, n_ticks)
 
     def _numbers(self) -> dict[str, Any]:
         """What kernels know besides arrays; -1 stands for an option that is off."""

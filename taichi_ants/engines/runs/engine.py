@@ -152,24 +152,25 @@ class RunEngine:
         Also the number of packed cells that each run needs.
         """
         # Taichi is imported once it is configured, see `runtime`.
-        from taichi_ants.engines.arguments import Arguments
+        from taichi_ants.engines.arguments import Arguments, compile_once
         from taichi_ants.engines.runs.kernels import run_kernel
         from taichi_ants.engines.runs.step import EXTRA_CELLS
 
-        # Before the first launch the kernel gets no work, and arrays of a single 0.
-        values = _NO_WORK | self._of_task(runs.learner is not None)
         arguments = Arguments()
-        kind, pack = arguments.pack(values)
         kernel = run_kernel(
-            runs.learner, self._task.sees, self._task.pheromone.deposit, traced, kind
+            runs.learner,
+            self._task.sees,
+            self._task.pheromone.deposit,
+            traced,
+            arguments.type_of(_NO_WORK),
         )
-        with runtime.quiet():
-            kernel(pack)
+        compile_once(kernel, lambda: Arguments().pack(_NO_WORK))
+        values = _NO_WORK | self._of_task(runs.learner is not None)
 
         def launch_on(**others: Any) -> None:
             # An array of length 0 cannot be an argument; the single 0 stays.
             values.update({name: one for name, one in others.items() if getattr(one, "size", 1)})
-            kernel(arguments.pack(values)[1])
+            kernel(arguments.pack(values))
 
         return launch_on, self._world.grid.size + EXTRA_CELLS
 

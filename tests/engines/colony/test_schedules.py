@@ -90,7 +90,8 @@ def test_the_internal_order_of_the_ants_does_not_matter(learner):
     ],
 )
 def test_one_ant_equals_the_engine_of_independent_runs(learner, sharing):
-    training = TrainingConfig(learner, 0.1, 0.9, 0.3, 0.95)
+    more = {"planning_steps": 2} if learner == "dyna_q" else {}
+    training = TrainingConfig(learner, 0.1, 0.9, 0.3, 0.95, hyperparameters=more)
     for delivery in ("absorbing", "continuing"):
         assert_equal_runs(training, Task(delivery=delivery), sharing)
 

@@ -1,0 +1,167 @@
+"""What a task can be, how it is written down, and what is refused."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+from random_rewards import random_rewards
+
+from taichi_ants.errors import AntsError
+from taichi_ants.task import Life, Pheromone, Rewards, Task, observations, paper
+from taichi_ants.task.observations import Observation, registry
+
+
+def test_the_defaults_are_the_rules_of_the_world():
+    task = paper()
+    assert task == Task()
+    assert hash(task) == hash(Task())
+    assert dataclasses.astuple(task.pheromone) == ("linear", None, 0.0, "set", 250, None)
+    assert dataclasses.astuple(task.rewards) == (0, -1, 1, 3, 10)
+    assert task.life == Life(births=False, lifespan=None, regrowth=None, wander=None)
+    assert (task.observation, task.n_states, task.delivery) == ("paper", 128, "absorbing")
+    assert (task.evaporation_in_training, task.evaporation_in_evaluation) == (False, True)
+
+
+def test_a_task_can_be_written_as_json():
+    for task in (
+        Task(),
+        Task("six_cells", random_rewards(3), delivery="continuing", evaporation_in_training=True),
+        Task(pheromone=Pheromone("exponential", 7.5, 0.1, "add", 9, 99), life=Life(True, 5, 0, 2)),
+    ):
+        assert Task.from_dict(json.loads(json.dumps(task.as_dict()))) == task
+    assert Task.from_dict({"rewards": {"give": 5}}) == Task(rewards=Rewards(give=5))
+    with pytest.raises(AntsError, match="a task has no 'evaporation'; choose among delivery, "):
+        Task.from_dict({"evaporation": True})
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"observation": "seven_cells"}, "there is no observation 'seven_cells'; .* six_cells, "),
+        ({"observation": []}, r"there is no observation \[\]"),
+        ({"rewards": 3}, r"rewards is 3; it must be Rewards\(...\)"),
+        ({"pheromone": "linear"}, r"pheromone is 'linear'; it must be Pheromone\(...\)"),
+        ({"life": None}, r"life is None; it must be Life\(...\)"),
+        ({"traffic": "left"}, "traffic is 'left'; it must be one of blocking"),
+        ({"delivery": "never"}, "delivery is 'never'; it must be one of absorbing, continuing"),
+        ({"evaporation_in_training": 1}, "evaporation_in_training is 1; it must be True or False"),
+    ],
+)
+def test_a_task_that_cannot_be(settings, message):
+    with pytest.raises(AntsError, match=message):
+        Task(**settings)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"births": 1}, "births is 1; it must be True or False"),
+        ({"lifespan": 0}, "lifespan is 0; it must lie between 1 and .*, or None"),
+        ({"lifespan": 2.0}, "lifespan is 2.0; it must be a whole number, or None"),
+        ({"regrowth": -1}, "regrowth is -1; it must lie between 0"),
+        ({"wander": 0}, "wander is 0"),
+        ({"wander": "daily"}, "wander is 'daily'"),
+    ],
+)
+def test_a_life_that_cannot_be(settings, message):
+    with pytest.raises(AntsError, match=message):
+        Life(**settings)
+
+
+@pytest.fixture
+def _no_observation_stays(monkeypatch):
+    monkeypatch.setattr(registry, "_OBSERVATIONS", dict(registry._OBSERVATIONS))
+
+
+def always_zero(look):
+    return 0
+
+
+@pytest.mark.usefixtures("_no_observation_stays")
+def test_an_observation_of_ones_own_is_known_by_its_name():
+    mine = observations.register(Observation("mine", 1, always_zero))
+    assert observations.get("mine") is mine
+    assert Task("mine").n_states == 1
+    with pytest.raises(AntsError, match="an observation named 'mine' exists already"):
+        observations.register(mine)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"name": "two words"}, "'two words' cannot name an observation"),
+        ({"name": "paper"}, "an observation named 'paper' exists already"),
+        ({"n_states": 0}, "n_states of 'mine' is 0; it must lie between 1"),
+        ({"row": 3}, "row of 'mine' is 3; it must be a function of one argument"),
+        ({"row": lambda look, more: 0}, "it must be a function of one argument"),
+        ({"cells": (0, 1)}, r"cells of 'mine' is \(0, 1\); it must hold -1, 0 and 1"),
+        ({"cells": (-1, 0, 1, 1)}, "each once"),
+        ({"cells": (-1, 0, 1, 4)}, "may hold -2, 2 and 3"),
+    ],
+)
+@pytest.mark.usefixtures("_no_observation_stays")
+def test_an_observation_that_cannot_be(changes, message):
+    mine = Observation("mine", 1, always_zero)
+    with pytest.raises(AntsError, match=message):
+        observations.register(dataclasses.replace(mine, **changes))
+
+
+@pytest.mark.parametrize("name", observations.names())
+def test_each_row_has_a_name_of_its_own(name):
+    """All but those that cannot be, which have a dash."""
+    one = observations.get(name)
+    names = [name for name in map(one.name_of, range(one.n_states)) if "-" not in name]
+    assert len(set(names)) == len(names) >= 128
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"evaporation": "quick"}, "evaporation is 'quick'; .* linear, exponential, none"),
+        ({"half_life": 0}, "half_life is 0; it must be a number of ticks above 0"),
+        ({"half_life": math.inf}, "half_life is inf"),
+        ({"half_life": math.nan}, "half_life is nan"),
+        ({"half_life": "50"}, "half_life is '50'"),
+        ({"diffusion": 1.01}, "diffusion is 1.01; it must be a number from 0 to 1"),
+        ({"diffusion": -0.1}, "diffusion is -0.1"),
+        ({"diffusion": None}, "diffusion is None"),
+        ({"deposit": "drop"}, "deposit is 'drop'; .* set, add, none"),
+        ({"level": 0}, "level is 0; it must lie between 1 and 1000000"),
+        ({"level": 2.5}, "level is 2.5"),
+        ({"cap": 1_000_001}, "cap is 1000001"),
+        ({"half_life": 10}, "half_life is 10, but evaporation is 'linear'; give evaporation='expo"),
+        ({"half_life": 10, "evaporation": "none"}, "half_life is 10, but evaporation is 'none'"),
+        ({"cap": 10}, "cap is 10, but deposit is 'set'; give deposit='add' with it, or leave"),
+    ],
+)
+def test_a_pheromone_that_cannot_be(settings, message):
+    with pytest.raises(AntsError, match=message):
+        Pheromone(**settings)
+
+
+def test_the_limits_are_allowed():
+    Life(births=np.bool_(True), lifespan=1, regrowth=np.int64(0), wander=1)
+    Pheromone("exponential", 1e-300, 1, "add", 1, 1_000_000)
+
+
+def test_what_is_left_out_is_filled_in_where_it_means_something():
+    assert Pheromone("exponential").half_life == 50
+    assert Pheromone(deposit="add").cap == 1000
+    for option in ({"half_life": 7, "evaporation": "exponential"}, {"cap": 7, "deposit": "add"}):
+        assert dataclasses.replace(Pheromone(**option), level=3) == Pheromone(**option, level=3)
+
+
+def test_the_numbers_that_kernels_take():
+    pheromone = Pheromone("exponential", half_life=1, diffusion=0.6)
+    assert (pheromone.decay, type(pheromone.decay)) == (np.float32(0.5), np.float32)
+    assert (pheromone.share, type(pheromone.share)) == (np.float32(0.1), np.float32)
+    assert Pheromone("exponential", 50).decay == np.float32(0.5**0.02)
+    assert [
+        Pheromone(evaporation, diffusion=diffusion).dense
+        for evaporation in ("linear", "none", "exponential")
+        for diffusion in (0, 0.1)
+    ] == [False, True, False, True, True, True]
