@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import itertools
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from taichi_ants.studies.runner import Outcome, RunPoint, Study
 
 FIGURES, SEEDS_TABLE, SUMMARY, FINDINGS = "figures", "seeds.csv", "summary.csv", "findings.csv"
-RATES = {"learning_rate": 0.1, "discount": 0.9, "epsilon": 0.3, "epsilon_decay": 0.99}
+RATES = (0.1, 0.9, 0.3, 0.99)  # learning rate, discount, epsilon, its decay
 RANGES = (20, 20, 20)
 BUDGET = {"paper": 60_000, "open": 20_000}  # steps of an ant that is alone
 SHORTEST = {"paper": 34, "open": 8}  # steps of an episode, at least
@@ -68,7 +69,7 @@ def configs(shared: bool) -> list[TrainingConfig]:
     from taichi_ants import TrainingConfig, learners
 
     return [
-        TrainingConfig(name, **RATES)
+        TrainingConfig(name, *RATES)
         for name in learners.names()
         if not shared or learners.get(name).td_error is not None
     ]
@@ -82,11 +83,7 @@ def studies(seeds: int) -> dict[str, Study]:
 
     own = tuple(range(seeds))
     open_worlds = tuple(worlds.open_world(seed, RANGES) for seed in own)
-    lasting = {
-        "delivery": "continuing",
-        "evaporation_in_training": True,
-        "life": Life(regrowth=0),
-    }
+    lasting = Task(delivery="continuing", evaporation_in_training=True, life=Life(regrowth=0))
     made: dict[str, Study] = {}
     for where, each in (("paper", (worlds.paper(),)), ("open", open_worlds)):
         alone = [
@@ -105,7 +102,7 @@ def studies(seeds: int) -> dict[str, Study]:
         together = [
             ColonyPoint(
                 each[0] if where == "paper" else each,
-                Task(name, **lasting),
+                replace(lasting, observation=name),
                 config,
                 ants=ANTS,
                 episodes=EPISODES,
@@ -282,8 +279,7 @@ def draw_figure(results: Path, folder: Path) -> None:
         entries = style.legend_entries(every)
         caption = "Means with 95 % bootstrap intervals; all observations at equal steps."
         style.frame(drawn, "What ants gain from seeing more", caption, entries)
-    place = files.check_writable_folder(folder / FIGURES)
-    style.save(drawn, place / "observations.png")
+    style.save(drawn, files.check_writable_folder(folder / FIGURES) / "observations.png")
 
 
 def observations_study(settings: argparse.Namespace) -> None:
