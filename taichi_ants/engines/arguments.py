@@ -72,9 +72,10 @@ def _nothing(pack: Any) -> None:
 
 def _delete(taichi: ref, memory: Any) -> None:
     """Delete the memory of a pack, if the Taichi that it was made in still runs."""
-    running: Any = ti.lang.impl.get_runtime()
-    if running is not None and taichi() is running and running.prog is not None:
-        running.prog.delete_argpack(memory)
+    running = ti.lang.impl.get_runtime()
+    program = getattr(running, "prog", None)
+    if taichi() is running and program is not None:
+        program.delete_argpack(memory)
 
 
 def _kind(value: Any) -> tuple[str, int]:
