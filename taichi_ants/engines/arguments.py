@@ -72,7 +72,7 @@ def _nothing(pack: Any) -> None:
 
 def _delete(taichi: ref, memory: Any) -> None:
     """Delete the memory of a pack, if the Taichi that it was made in still runs."""
-    running = ti.lang.impl.get_runtime()
+    running: Any = ti.lang.impl.get_runtime()
     if taichi() is running and running.prog is not None:
         running.prog.delete_argpack(memory)
 

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import operator
-from dataclasses import astuple, dataclass, field
+from dataclasses import asdict, astuple, dataclass, field, fields
+from typing import Any
 
 import numpy as np
 
 from taichi_ants import files, learners
+from taichi_ants.checks import checked_count, checked_max_steps, checked_seeds
 from taichi_ants.engines.layout import OUTCOMES
 from taichi_ants.engines.records import Record
-from taichi_ants.engines.runs import files as training_files
 from taichi_ants.engines.runs.state import RunState
+from taichi_ants.engines.stored import FileKind, world_arrays, world_facts, world_from
 from taichi_ants.errors import AntsError, shown
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS, ROW
 from taichi_ants.worlds.world import World
 
+_KIND = FileKind("taichi-ants training 3", "training result", "TrainingResult.save")
 # What the arrays of a result come from.
 _MAKERS = ("world", "task", "configs", "seeds", "max_steps")
 _SUMMED_UP, _LISTED = 50, 6  # episodes and configurations that a result shows
@@ -114,16 +117,48 @@ class TrainingResult(Record):
         Raises:
             AntsError: The file cannot be written.
         """
-        training_files.save_training(self, path)
+        facts = {
+            "world": world_facts(self.world),
+            "task": self.task.as_dict(),
+            "configs": [config.as_dict() for config in self.configs],
+            "seeds": self.seeds,
+            "max_steps": self.max_steps,
+            "costs": [asdict(cost) for cost in self.costs],
+        }
+        arrays = {name: getattr(self, name) for name in OUTCOMES}
+        arrays |= {f"state_{name}": array for name, array in vars(self.state).items()}
+        _KIND.write(path, facts, {**arrays, **world_arrays(self.world, "world")}, compress=True)
 
     @classmethod
     def load(cls, path: files.PathLike) -> TrainingResult:
-        """Read a result that `save` wrote.
+        """Read a result that `save` wrote; its learners need not be registered.
 
         Raises:
             AntsError: The file is missing, damaged, or holds no training result.
         """
-        return training_files.load_training(cls, path)
+        stored, facts = _KIND.read(path)
+        with _KIND.rebuilding(path):
+            task = Task.from_dict(facts["task"])
+            costs = tuple(LearnerCost(**cost) for cost in facts["costs"])
+            for cost in costs:
+                checked_count("steps", cost.steps, most=2**63 - 1, least=0)
+            state = {
+                field.name: np.ascontiguousarray(stored[f"state_{field.name}"])
+                for field in fields(RunState)
+            }
+            outcomes: dict[str, Any] = {
+                name: np.ascontiguousarray(stored[name]) for name in OUTCOMES
+            }
+            return cls(
+                world=world_from(stored, "world", facts["world"]),
+                configs=tuple(TrainingConfig(**config) for config in facts["configs"]),
+                seeds=checked_seeds(facts["seeds"]),
+                max_steps=checked_max_steps(facts["max_steps"], task),
+                task=task,
+                **outcomes,
+                costs=costs,
+                state=RunState(**state),
+            )
 
     def __repr__(self) -> str:
         last = slice(-_SUMMED_UP, None)
