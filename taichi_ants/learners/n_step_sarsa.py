@@ -65,6 +65,6 @@ N_STEP_SARSA = Learner(
     memory=lambda settings, n_states: Memory(
         floats=settings.n_steps, integers=2 + settings.n_steps
     ),
-    cost=lambda settings: 1 + 0.2 * settings.n_steps,
+    cost=lambda settings: 1 + 0.25 * settings.n_steps,
     summary="SARSA towards several rewards and the value after them",
 )

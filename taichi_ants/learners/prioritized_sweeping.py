@@ -89,6 +89,6 @@ PRIORITIZED_SWEEPING = Learner(
     memory=lambda settings, n_states: Memory(
         floats=N_ACTIONS * n_states, integers=model_memory(n_states).integers
     ),
-    cost=lambda settings: 1 + 40 * settings.planning_steps,
+    cost=lambda settings: 1 + 12 * settings.planning_steps,
     summary="updates from a model of the world, the largest errors first",
 )

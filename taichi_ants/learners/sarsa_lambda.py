@@ -73,6 +73,6 @@ SARSA_LAMBDA = Learner(
     memory=lambda settings, n_states: Memory(
         floats=settings.trace_length, integers=1 + settings.trace_length
     ),
-    cost=lambda settings: 1 + 0.1 * settings.trace_length,
+    cost=lambda settings: 1 + 0.05 * settings.trace_length,
     summary="SARSA that updates the pairs before, too, by their traces",
 )

@@ -238,7 +238,7 @@ def test_without_a_home(home, kernels, tmp_path):
 HYSTERETIC = """
 import taichi as ti
 
-from taichi_ants.learners import Learner, register
+from taichi_ants.learners import register, td_learner
 from taichi_ants.task.rules.policy import best_value
 
 
@@ -250,7 +250,7 @@ def td_error(value, reward, discount, next_values, next_action, epsilon):
     return error
 
 
-register(Learner("hysteretic", td_error, summary="slow to believe bad news"))
+register(td_learner("hysteretic", td_error, summary="slow to believe bad news"))
 """
 
 

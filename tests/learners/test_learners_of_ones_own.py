@@ -1,10 +1,12 @@
 """What may stand in a TD error that a user writes, and how the rest is refused."""
 
+import runpy
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 import taichi as ti
+from command_lines import ROOT
 
 from taichi_ants import (
     AntsError,
@@ -436,6 +438,18 @@ def test_a_learner_that_has_come_to_need_more_memory(tmp_path):
     register(with_memory(memory=lambda settings, n_states: Memory(floats=9, integers=1)))
     with pytest.raises(AntsError, match="'mine' has come to need more memory than when"):
         continue_training(TrainingResult.load(tmp_path / "x.npz"), 1)
+
+
+def test_the_examples_memory_makes_the_difference():
+    path = ROOT / "experiments" / "plugins" / "eligible.py"
+    runpy.run_path(str(path))
+    configs = [
+        TrainingConfig("eligible", 0.1, 0.9, 0.3, 0.97, trace_decay=decay) for decay in (0, 0.8)
+    ]
+    result = train(paper(), configs, range(3), 20, 200)
+    plain = train(paper(), config("q_learning"), range(3), 20, 200)
+    assert np.array_equal(result.q_values[0], plain.q_values[0])
+    assert not np.array_equal(result.q_values[1], plain.q_values[0])
 
 
 @ti.func
