@@ -143,10 +143,12 @@ def state_seen(observation: Observation) -> Callable[..., Any]:
         ahead = ti.max(look.levels[left], look.levels[forward])
         look.strongest = ti.max(ahead, look.levels[right])
         for k in ti.static(range(len(view))):
-            if ant.carries == 1:
-                look.codes[k] = see_carrying(look.codes[k], look.nearer[k])
-            else:
-                look.codes[k] = see_foraging(look.codes[k], look.levels[k], look.strongest)
+            # No branch: Taichi cannot compile one that is of no use, where a row reads no codes.
+            look.codes[k] = ti.select(
+                ant.carries == 1,
+                see_carrying(look.codes[k], look.nearer[k]),
+                see_foraging(look.codes[k], look.levels[k], look.strongest),
+            )
         return row(look)
 
     return see
