@@ -89,9 +89,11 @@ def _fault_of(observation: Observation, row: Callable[..., Any], dense: bool) ->
             ahead = ti.max(look.levels[left], look.levels[forward])
             look.strongest = ti.max(ahead, look.levels[right])
             for k in ti.static(range(cells)):
-                look.codes[k] = see_foraging(grounds[i, k], look.levels[k], look.strongest)
-                if look.carries == 1:
-                    look.codes[k] = see_carrying(grounds[i, k], nearer[i, k])
+                look.codes[k] = ti.select(
+                    look.carries == 1,
+                    see_carrying(grounds[i, k], nearer[i, k]),
+                    see_foraging(grounds[i, k], look.levels[k], look.strongest),
+                )
             look.percept = state_index(
                 look.carries, look.codes[left], look.codes[forward], look.codes[right]
             )

@@ -143,7 +143,7 @@ def state_seen(observation: Observation) -> Callable[..., Any]:
         ahead = ti.max(look.levels[left], look.levels[forward])
         look.strongest = ti.max(ahead, look.levels[right])
         for k in ti.static(range(len(view))):
-            # Not a branch: where a row needs no codes, Taichi's compiler fails on an empty one.
+            # No branch: Taichi cannot compile one that is of no use, where a row reads no codes.
             look.codes[k] = ti.select(
                 ant.carries == 1,
                 see_carrying(look.codes[k], look.nearer[k]),

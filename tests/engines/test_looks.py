@@ -1,0 +1,132 @@
+"""Observations of a user's own: compiled for the kernels after a trial, or refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from random_worlds import random_world
+
+from taichi_ants import AntsError, Colony, TrainingConfig, rollout, train
+from taichi_ants.task import Observation, Task, observations
+from taichi_ants.task.observations import registry
+from taichi_ants.worlds import paper
+
+CONFIG = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.97)
+
+
+@pytest.fixture(autouse=True)
+def _no_observation_stays(monkeypatch):
+    monkeypatch.setattr(registry, "_OBSERVATIONS", dict(registry._OBSERVATIONS))
+
+
+def of_five_cells(look):
+    """As the package's `five_cells`, but with the cells in view in another order."""
+    index = look.carries
+    for k in range(5):
+        index = 4 * index + look.codes[(k + 3) % 5]
+    return index
+
+
+def of_trails(look):
+    """Which of the cells ahead have more trail than the ant's own, and which are nearer."""
+    index = look.carries
+    for k in range(3):
+        index = 4 * index + 2 * look.nearer[k]
+        if look.levels[k] > look.own_level:
+            index += 1
+    return index
+
+
+def test_one_of_ones_own_works_in_all_engines():
+    observations.register(Observation("mine", 2 * 4**5, of_five_cells, (0, 1, 2, -2, -1)))
+    world, names = random_world(5, 7), ("mine", "five_cells")
+    mine, packages = (train(world, CONFIG, range(3), 9, 60, Task(name)) for name in names)
+    assert np.array_equal(mine.q_values, packages.q_values)
+    assert mine.q_values.any()
+    mine, packages = (Colony(paper(), Task(name), CONFIG, ants=7) for name in names)
+    for colony in (mine, packages):
+        colony.run(2, 100)
+    assert np.array_equal(mine.q_values, packages.q_values)
+
+
+def test_trails_and_distances_are_seen():
+    """In the paper's world the ant starts in the middle of a trail; the queen is at its corner."""
+    observations.register(Observation("trails", 2 * 4**3, of_trails))
+    trace = rollout(paper(), np.zeros((128, 5)), max_steps=200, task=Task("trails"))
+    assert 5 < len(np.unique(trace.states)) <= 128
+    nearer = (trace.states >> 1 & 1) + (trace.states >> 3 & 1) + (trace.states >> 5 & 1)
+    assert set(nearer[trace.percepts < 64].tolist()) == {0, 1, 2}  # without food too
+
+
+def load(look):
+    return look.carries
+
+
+def own_trail(look):
+    on_trail = 0
+    if look.own_level >= 1:
+        on_trail = 1
+    return 2 * look.carries + on_trail
+
+
+def lesser_trail(look):
+    index = 2 * look.percept
+    if look.strongest > 20 and look.levels[1] < look.strongest:
+        index += 1
+    return index
+
+
+@pytest.mark.parametrize(("row", "n_states"), [(load, 2), (own_trail, 4), (lesser_trail, 256)])
+def test_a_row_may_leave_any_part_of_a_look_unread(row, n_states):
+    """Taichi's compiler drops what computes the parts that nobody reads."""
+    task = Task(observations.register(Observation("mine", n_states, row)).name)
+    assert train(paper(), CONFIG, (0, 1), 20, 80, task).q_values.shape == (1, 2, n_states, 5)
+    colony = Colony(paper(), task, CONFIG, ants=5)
+    colony.run(2, 30)
+    assert colony.q_values.shape == (1, n_states, 5)
+    assert colony.q_values.any()
+
+
+def test_a_lambda_is_refused_at_once():
+    with pytest.raises(AntsError, match="written with def"):
+        observations.register(Observation("short", 4, lambda look: 0))
+
+
+def beyond_the_table(look):
+    return look.percept + look.carries
+
+
+def below_the_table(look):
+    return look.percept - 1
+
+
+def of_what_there_is_not(look):
+    return look.smell
+
+
+def of_a_cell_too_far(look):
+    return look.codes[4]
+
+
+def of_a_division_by_zero(look):
+    return 100 // look.strongest
+
+
+@pytest.mark.parametrize(
+    ("row", "says"),
+    [
+        (beyond_the_table, "row gives 128, but it must lie between 0 and 127"),
+        (below_the_table, "row gives -1, but it must lie between 0 and 127"),
+        (of_what_there_is_not, "has no attribute 'smell'"),
+        (of_a_cell_too_far, "it ends the process"),
+        (of_a_division_by_zero, "it ends the process"),
+    ],
+)
+def test_what_cannot_work_is_refused_and_the_process_lives(row, says, capfd):
+    task = Task(observations.register(Observation("mine", 128, row)).name)
+    with pytest.raises(AntsError) as caught:
+        train(paper(), CONFIG, 0, 2, 50, task)
+    assert str(caught.value).startswith("observation 'mine' cannot be used: ")
+    assert says in str(caught.value)
+    assert capfd.readouterr() == ("", "")
+    assert train(paper(), CONFIG, 0, 2, 50).q_values.any()  # Taichi goes on
