@@ -72,8 +72,9 @@ def _nothing(pack: Any) -> None:
 
 def _delete(taichi: ref, memory: Any) -> None:
     """Delete the memory of a pack, if the Taichi that it was made in still runs."""
-    running: Any = ti.lang.impl.get_runtime()
-    if taichi() is running and running.prog is not None:
+    running = ti.lang.impl.get_runtime()
+    same = taichi() is running
+    if same and running.prog is not None:
         running.prog.delete_argpack(memory)
 
 
