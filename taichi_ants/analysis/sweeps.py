@@ -124,7 +124,8 @@ def draw(
         if not numbers:
             axes.set_xticks(list(places), [_shown(mark) for mark in marks])
         axes.set(xlabel=first, ylabel=words)
-        spread = style.over_seeds(values.shape[1], "95 % bootstrap intervals")
+        seeds = values.shape[1]
+        spread = f"mean of {seeds} seeds with 95 % bootstrap intervals" if seeds > 1 else "one seed"
         entries = style.legend_entries([axes])
         style.frame(figure, title, f"{spread[0].upper()}{spread[1:]}.", entries)
     style.save(figure, path)

@@ -12,6 +12,7 @@ from taichi_ants.studies.interruption import stoppable
 COMMANDS = {  # modules beside this one, and what they do
     "compare": "the paper's comparison of learners, over many seeds",
     "colony": "the scaling study of the colony, or one colony of any size",
+    "observations": "what ants gain from seeing more, for all learners",
     "sweep": "any settings against any measure, from a file",
     "render": "pictures of ants: an episode, a colony, learning, a policy",
 }
@@ -43,7 +44,7 @@ def main() -> None:
 
 
 def _help() -> str:
-    lines = "\n".join(f"  {name:9} {summary}" for name, summary in COMMANDS.items())
+    lines = "\n".join(f"  {name:13} {summary}" for name, summary in COMMANDS.items())
     return f"""usage: taichi-ants COMMAND ...
 
 Ants on a hexagonal grid that lay pheromone trails and learn by reinforcement.

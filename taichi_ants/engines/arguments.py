@@ -73,9 +73,9 @@ def _nothing(pack: Any) -> None:
 def _delete(taichi: ref, memory: Any) -> None:
     """Delete the memory of a pack, if the Taichi that it was made in still runs."""
     running = ti.lang.impl.get_runtime()
-    same = taichi() is running
-    if same and running.prog is not None:
-        running.prog.delete_argpack(memory)
+    program = getattr(running, "prog", None)
+    if taichi() is running and program is not None:
+        program.delete_argpack(memory)
 
 
 def _kind(value: Any) -> tuple[str, int]:

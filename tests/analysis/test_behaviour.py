@@ -126,7 +126,7 @@ def test_traces_come_in_pieces_of_bounded_size(monkeypatch):
 def test_bad_arguments_are_refused():
     with pytest.raises(AntsError, match="max_steps is 0"):
         list(trace_policies(paper(), np.zeros((1, 128, 5)), [0], 0))
-    with pytest.raises(AntsError, match="evaporation is 'off'"):
+    with pytest.raises(AntsError, match="task is 'off'"):
         list(trace_policies(paper(), np.zeros((1, 128, 5)), [0], 1, "off"))
 
 

@@ -258,11 +258,11 @@ def test_a_learner_that_makes_no_numbers_is_named(capsys, tmp_path, monkeypatch)
     monkeypatch.setattr(registry, "_LEARNERS", dict(registry._LEARNERS))
     lines = [
         "import taichi as ti",
-        "from taichi_ants.learners import Learner, register",
+        "from taichi_ants.learners import register, td_learner",
         "@ti.func",
         "def td_error(value, reward, discount, next_values, next_action, epsilon):",
         "    return reward - ti.log(value - 0.5)",
-        'register(Learner("lost", td_error))',
+        'register(td_learner("lost", td_error))',
     ]
     Path("lost.py").write_text("\n".join(lines), "utf-8")
     arguments = ["live", "--ants", 10, "--plugin", "lost.py", "--learner", "lost", "--ticks", 100]

@@ -198,7 +198,7 @@ LEARNERS = {
 def test_learners_that_do_not_compile(name, place, kernels):
     """In a process of its own, since what a plugin registers stays registered."""
     text, named = LEARNERS[name]
-    register = "learners.register(learners.Learner('mine', error))\n"
+    register = "learners.register(learners.td_learner('mine', error))\n"
     imports = "import taichi as ti\nfrom taichi_ants import learners\n"
     (place / "plugin.py").write_text(imports + text + register)
     before = everything(place)

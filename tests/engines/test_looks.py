@@ -58,6 +58,40 @@ def test_trails_and_distances_are_seen():
     assert set(nearer[trace.percepts < 64].tolist()) == {0, 1, 2}  # without food too
 
 
+def load(look):
+    return look.carries
+
+
+def own_trail(look):
+    on_trail = 0
+    if look.own_level >= 1:
+        on_trail = 1
+    return 2 * look.carries + on_trail
+
+
+def lesser_trail(look):
+    index = 2 * look.percept
+    if look.strongest > 20 and look.levels[1] < look.strongest:
+        index += 1
+    return index
+
+
+@pytest.mark.parametrize(("row", "n_states"), [(load, 2), (own_trail, 4), (lesser_trail, 256)])
+def test_a_row_may_leave_any_part_of_a_look_unread(row, n_states):
+    """Taichi's compiler drops what computes the parts that nobody reads."""
+    task = Task(observations.register(Observation("mine", n_states, row)).name)
+    assert train(paper(), CONFIG, (0, 1), 20, 80, task).q_values.shape == (1, 2, n_states, 5)
+    colony = Colony(paper(), task, CONFIG, ants=5)
+    colony.run(2, 30)
+    assert colony.q_values.shape == (1, n_states, 5)
+    assert colony.q_values.any()
+
+
+def test_a_lambda_is_refused_at_once():
+    with pytest.raises(AntsError, match="written with def"):
+        observations.register(Observation("short", 4, lambda look: 0))
+
+
 def beyond_the_table(look):
     return look.percept + look.carries
 

@@ -218,7 +218,12 @@ def test_tables_have_as_many_rows_as_the_observation(name, sharing):
 
 
 def test_each_observation_has_a_twin_of_the_same_size():
-    assert set(OBSERVATIONS) == set(observations.names())
+    own = [
+        name
+        for name in observations.names()
+        if observations.get(name).row.__module__.startswith("taichi_ants.")
+    ]
+    assert list(OBSERVATIONS) == own
     for name, twin in OBSERVATIONS.items():
         assert twin.n_states == observations.get(name).n_states
 

@@ -212,7 +212,7 @@ def test_an_interruption_loses_one_block_at_most(study, tmp_path):
         ({"training": None}, "configs is None"),
         ({"task": "paper"}, "task is 'paper'"),
         ({"task": Task(life=Life(regrowth=0))}, "use a Colony"),
-        ({"task": Task(pheromone=Pheromone(level=9))}, "use a Colony"),
+        ({"task": Task(pheromone=Pheromone(diffusion=0.1))}, "use a Colony"),
         ({"episodes": 0}, "episodes is 0"),
         ({"max_steps": 10**8}, "max_steps is 100000000"),
         ({"rollouts": 0}, "rollouts is 0"),

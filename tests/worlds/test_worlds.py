@@ -6,7 +6,6 @@ import pickle
 
 import numpy as np
 import pytest
-from taichi_ants.task.colony import STARTS as WHERE
 
 from taichi_ants import reference, worlds
 from taichi_ants.errors import AntsError

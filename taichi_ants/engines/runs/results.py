@@ -20,9 +20,9 @@ from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS, ROW
 from taichi_ants.worlds.world import World
 
-_KIND = FileKind("taichi-ants training 3", "training result", "TrainingResult.save")
 # What the arrays of a result come from.
 _MAKERS = ("world", "task", "configs", "seeds", "max_steps")
+_KIND = FileKind("taichi-ants training 3", "training result", "TrainingResult.save")
 _SUMMED_UP, _LISTED = 50, 6  # episodes and configurations that a result shows
 
 
@@ -142,12 +142,10 @@ class TrainingResult(Record):
             costs = tuple(LearnerCost(**cost) for cost in facts["costs"])
             for cost in costs:
                 checked_count("steps", cost.steps, most=2**63 - 1, least=0)
+            arrays: dict[str, Any] = {name: np.ascontiguousarray(stored[name]) for name in OUTCOMES}
             state = {
-                field.name: np.ascontiguousarray(stored[f"state_{field.name}"])
-                for field in fields(RunState)
-            }
-            outcomes: dict[str, Any] = {
-                name: np.ascontiguousarray(stored[name]) for name in OUTCOMES
+                one.name: np.ascontiguousarray(stored[f"state_{one.name}"])
+                for one in fields(RunState)
             }
             return cls(
                 world=world_from(stored, "world", facts["world"]),
@@ -155,7 +153,7 @@ class TrainingResult(Record):
                 seeds=checked_seeds(facts["seeds"]),
                 max_steps=checked_max_steps(facts["max_steps"], task),
                 task=task,
-                **outcomes,
+                **arrays,
                 costs=costs,
                 state=RunState(**state),
             )

@@ -72,10 +72,11 @@ def register(observation: Observation) -> Observation:
         raise AntsError(f"an observation named {name!r} exists already; choose another name.")
     check_whole(f"n_states of {name!r}", observation.n_states, 1, MAX_STATES)
     row = observation.row
-    if not inspect.isfunction(row) or len(inspect.signature(row).parameters) != 1:
+    named = inspect.isfunction(row) and row.__name__ != "<lambda>"  # kernels cannot take lambdas
+    if not named or len(inspect.signature(row).parameters) != 1:
         raise AntsError(
-            f"row of {name!r} is {shown(row)}; it must be a function of one argument, see "
-            "taichi_ants.task.Observation."
+            f"row of {name!r} is {shown(row)}; it must be a function of one argument that is "
+            "written with def, see taichi_ants.task.Observation."
         )
     cells = observation.cells
     known = all(isinstance(cell, int) and -2 <= cell <= 3 for cell in cells)

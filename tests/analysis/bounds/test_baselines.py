@@ -20,6 +20,7 @@ from taichi_ants.analysis.bounds.baselines import (
 )
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.policies import random_policy, trail_follower
+from taichi_ants.task import Task
 from taichi_ants.worlds.paper import paper
 from taichi_ants.worlds.world import World
 
@@ -104,7 +105,7 @@ def test_policies_are_evaluated_in_both_settings_with_one_table_for_each_seed() 
             "rollouts": 2,
             "epsilon": 0.0,
             "max_steps": 77,
-            "evaporation": evaporation,
+            "task": Task(evaporation_in_evaluation=evaporation),
             "seeds": [5, 6, 7],
         }
     for row in rows:
@@ -119,7 +120,7 @@ def test_settings_say_where_trails_evaporate() -> None:
     calls = []
 
     def record(*arguments: Any, **options: Any) -> SimpleNamespace:
-        calls.append(options["evaporation"])
+        calls.append(options["task"].evaporation_in_evaluation)
         return evaluate(*arguments, **options)
 
     rows = baseline_rows(paper(), record, [0], 1, (0.9,), 40, True, False)
