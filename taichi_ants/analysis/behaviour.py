@@ -77,8 +77,8 @@ def classify(trace: Steps, max_steps: int) -> tuple[np.ndarray, np.ndarray]:
     def count(which: np.ndarray) -> np.ndarray:
         return np.bincount(episode[which], minlength=episode[-1] + 1)
 
-    carries = trace.states >= N_STATES // 2
-    paid = late & _enters_lure(trace.states, trace.actions)
+    carries = trace.percepts >= N_STATES // 2
+    paid = late & _enters_lure(trace.percepts, trace.actions)
     steps, with_food = count(late), count(late & carries)
     often = count(paid) >= _PAID_SHARE * steps
     walks, circles = often & (with_food == 0), often & (with_food == steps)
