@@ -140,7 +140,7 @@ def made(n=16, name="foraging E T E", every=4, start=0, delivered=False):
     return SimpleNamespace(
         episodes=np.full(n, 5),
         steps=numbers,
-        states=np.full(n, parse_state(name)),
+        percepts=np.full(n, parse_state(name)),
         actions=np.where((numbers - start) % every == 0, FORWARD, LEFT),
         rewards=np.full(n, -7),
         delivered=ends & delivered,
