@@ -187,7 +187,7 @@ def test_the_borders(trace, expected):
 
 def test_food_in_only_a_part_of_the_second_half_is_another_thing():
     early, late = made(), made(name=SEEN)
-    late.states[:12] = early.states[:12]
+    late.percepts[:12] = early.percepts[:12]
     assert classify(late, 16)[0] == [OTHER]
 
 
