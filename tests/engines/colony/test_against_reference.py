@@ -118,7 +118,7 @@ def test_every_tick_in_crowded_micro_worlds(learner, sharing, observation, dense
 
 
 def test_each_learner_and_observation_is_compared():
-    possible = {name for name in learners.names() if not learners.get(name).needs_episode_end}
+    possible = {name for name in learners.registry.BUILT_IN if not learners.get(name).needs_episode_end}
     assert {kernel[0] for kernel in KERNELS} == possible
     assert {kernel[2] for kernel in KERNELS} == set(observations.names()) - {"crowd"}
 
@@ -158,7 +158,7 @@ def test_ants_see_which_ants_stand_around_them_and_what_these_carry():
 
 
 def test_learners_that_cannot_live_in_a_colony_are_refused():
-    for name in learners.names():
+    for name in learners.registry.BUILT_IN:
         learner = learners.get(name)
         training = TrainingConfig(name, 0.1, 0.9, 0.1, 1.0)
         if learner.needs_episode_end:
