@@ -118,7 +118,9 @@ def test_every_tick_in_crowded_micro_worlds(learner, sharing, observation, dense
 
 
 def test_each_learner_and_observation_is_compared():
-    possible = {name for name in learners.registry.BUILT_IN if not learners.get(name).needs_episode_end}
+    possible = {
+        name for name in learners.registry.BUILT_IN if not learners.get(name).needs_episode_end
+    }
     assert {kernel[0] for kernel in KERNELS} == possible
     assert {kernel[2] for kernel in KERNELS} == set(observations.names()) - {"crowd"}
 
