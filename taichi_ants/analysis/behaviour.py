@@ -41,7 +41,7 @@ MIXED = "the runs do different things, and no run has their mean"
 class Steps(Protocol):
     """Steps of one or more episodes in order, as `taichi_ants.rollout` and `trace_policies` give.
 
-    Arrays (n,): the number of the episode, the step in it, the state before the action, the action,
+    Arrays (n,): the number of the episode, the step in it, the percept before the action, the action,
     the reward, whether the step delivered.
     """
 
@@ -50,7 +50,7 @@ class Steps(Protocol):
     @property
     def steps(self) -> np.ndarray: ...
     @property
-    def states(self) -> np.ndarray: ...
+    def percepts(self) -> np.ndarray: ...
     @property
     def actions(self) -> np.ndarray: ...
     @property
