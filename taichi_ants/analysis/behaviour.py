@@ -41,8 +41,8 @@ MIXED = "the runs do different things, and no run has their mean"
 class Steps(Protocol):
     """Steps of one or more episodes in order, as `taichi_ants.rollout` and `trace_policies` give.
 
-    Arrays (n,): the number of the episode, the step in it, the percept before the action, the action,
-    the reward, whether the step delivered.
+    Arrays (n,): the number of the episode, the step in it, the percept before the action, the
+    action, the reward, whether the step delivered.
     """
 
     @property
