@@ -220,7 +220,8 @@ def report(found: dict[str, np.ndarray], findings: list[dict[str, Any]]) -> str:
     marks = {"supported": " +", "contradicted": " -", "equivalent": " =", "undecided": ""}
     blocks: list[Any] = []
     for where, values in found.items():
-        low, high = bootstrap_interval(values)
+        ends = bootstrap_interval(values.reshape(-1, values.shape[-1]))
+        low, high = (end.reshape(values.shape[:2]) for end in ends)
         lines = []
         for row, config in enumerate(configs(where.startswith("together"))):
             cells = [config.learner]
@@ -228,8 +229,8 @@ def report(found: dict[str, np.ndarray], findings: list[dict[str, Any]]) -> str:
                 verdict = verdicts.get(
                     f"{where}: {config.learner}, {name} minus paper", "undecided"
                 )
-                ends = f"[{figure(low[row, column])}, {figure(high[row, column])}]"
-                cells.append(f"{figure(values[row, column].mean())} {ends}{marks[verdict]}")
+                spread = f"[{figure(low[row, column])}, {figure(high[row, column])}]"
+                cells.append(f"{figure(values[row, column].mean())} {spread}{marks[verdict]}")
             lines.append(cells)
         title = f"{PLACES[where]}: {WORDS} of an ant, {values.shape[-1]} replicates"
         blocks.append(Table(title, ["learner", *observations.names()], lines))
