@@ -20,7 +20,7 @@ from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.rendering.scene import check_size
 from taichi_ants.rendering.viewport import Viewport
 from taichi_ants.rendering.writers import Progress
-from taichi_ants.task import Task
+from taichi_ants.task import Rewards, Task
 from taichi_ants.task.constants import (
     DELIVERED,
     DEPOSIT_LEVEL,
@@ -32,7 +32,6 @@ from taichi_ants.task.constants import (
     PICKED_UP,
     QUEEN,
 )
-from taichi_ants.task.rewards import REWARDS
 from taichi_ants.worlds.world import World
 
 STAGES = (0, 10, 100, 500)
@@ -40,13 +39,13 @@ DEFAULT_SIZE = (1280, 520)  # four worlds in a row fill it
 # In sizes of the text: the title of a tile, all its text, and the legend.
 _TITLE_LINES, _TILE_LINES, _LEGEND_LINES = 1.7, 5.6, 2.6
 # What earns or costs reward: its name in the account of a stage; the cell that stands for it in the
-# legend, with its trail and a letter on it; and its words.
+# legend, with its trail and a letter on it; its words; and which of the rewards it is.
 _SOURCES = (
-    ("T", EMPTY, DEPOSIT_LEVEL // 2, "", f"T onto a trail {REWARDS.lure:+}"),
-    ("S", EMPTY, 0, "S", f"S nearer to the queen, with food {REWARDS.lure:+}"),
-    ("F", FOOD, 0, "", f"F food {REWARDS.pick_up:+}"),
-    ("Q", QUEEN, 0, "", f"Q delivery {REWARDS.give:+}"),
-    ("X", OBSTACLE, 0, "", f"X blocked, in vain {REWARDS.failed:+}"),
+    ("T", EMPTY, DEPOSIT_LEVEL // 2, "", "T onto a trail", "lure"),
+    ("S", EMPTY, 0, "S", "S nearer to the queen, with food", "lure"),
+    ("F", FOOD, 0, "", "F food", "pick_up"),
+    ("Q", QUEEN, 0, "", "Q delivery", "give"),
+    ("X", OBSTACLE, 0, "", "X blocked, in vain", "failed"),
 )
 
 
@@ -180,7 +179,7 @@ def learning_frames(
     margin = max(2, round(min(w, h) / 60))
     viewport = Viewport.fit(grid, w, h - round(_TILE_LINES * text_size), margin=margin)
     if text_size:
-        _draw_legend(canvas, bottom, text_size, viewport.hexagon)
+        _draw_legend(canvas, bottom, text_size, viewport.hexagon, stages[0].episode.task.rewards)
     rasteriser = Rasteriser(grid, viewport)
     pictures = [_tile_pictures(stage, rasteriser, h, text_size) for stage in stages]
     for _ in range(max(len(stage.episode) for stage in stages)):
@@ -251,16 +250,17 @@ def _lines(status: Status, note: str) -> tuple[str, ...]:
     )
 
 
-def _draw_legend(canvas: np.ndarray, top: int, size: int, hexagon: float) -> None:
+def _draw_legend(canvas: np.ndarray, top: int, size: int, hexagon: float, rewards: Rewards) -> None:
     """Draw what earns reward in a line across the canvas; shorter where there is little room."""
+    whole = [f"{words} {getattr(rewards, name):+}" for *_, words, name in _SOURCES]
     side, gap = round(1.4 * size), round(0.9 * size)
-    for words in ([source[-1] for source in _SOURCES], [source[0] for source in _SOURCES]):
+    for words in (whole, [source[0] for source in _SOURCES]):
         width = sum(side + 0.5 * size + text.width(one, size) + gap for one in words) - gap
         if width <= canvas.shape[1]:
             break
     x = (canvas.shape[1] - width) / 2
     baseline = top + round(0.5 * side + 0.8 * size)
-    for (_, ground, trail, letter, _), label in zip(_SOURCES, words, strict=True):
+    for (_, ground, trail, letter, *_), label in zip(_SOURCES, words, strict=True):
         y = top + round(0.45 * size)
         draw_swatch(canvas, (round(x), y, side), ground, None, hexagon, trail)
         text.write(canvas, letter, x + 0.59 * side, baseline, size, align="middle")

@@ -48,7 +48,3 @@ class Rewards:
     def largest(self) -> int:
         """The largest absolute value, on which the range of a return depends."""
         return max(map(abs, astuple(self)))
-
-
-# Those in force, everywhere.
-REWARDS = Rewards()

@@ -27,7 +27,7 @@ from taichi_ants.rendering import (
 )
 from taichi_ants.rendering.colours import CELL_FOOD, CHOSEN
 from taichi_ants.rendering.sheet import hardly_learned
-from taichi_ants.task import Observation, observations
+from taichi_ants.task import Observation, Rewards, Task, observations
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT
 from taichi_ants.task.states import REACHABLE_STATES, parse_state
 from taichi_ants.worlds import open_world, paper
@@ -339,3 +339,13 @@ def test_a_colony_on_the_move() -> None:
     for wrong in ({"every": 0}, {"ticks": -1}, {"world": 1}):
         with pytest.raises(AntsError, match=next(iter(wrong))):
             list(colony_moments(colony(), **{"ticks": 5, **wrong}))
+
+
+def test_the_legend_of_learning_tells_the_rewards_of_the_task(monkeypatch) -> None:
+    lines: list[str] = []
+    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
+    task = Task(rewards=Rewards(lure=2, give=50, failed=-4))
+    stages = learning_stages(paper(), CONFIG, stages=(0,), max_steps=5, task=task)
+    next(learning_frames(stages, (1400, 600)))
+    told = {"T onto a trail +2", "Q delivery +50", "F food +3", "X blocked, in vain -4"}
+    assert told <= set(lines)

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from taichi_ants.grid.constants import N_HEADINGS
-from taichi_ants.task import rewards as reward_table
+from taichi_ants.task import Rewards
 from taichi_ants.task.constants import EMPTY, FOOD, GIVE, N_ACTIONS, PICK_UP, QUEEN
 from taichi_ants.worlds.geometry import walkable
 from taichi_ants.worlds.world import World
@@ -71,6 +71,7 @@ class Transitions:
         foods_in_view: int64 (S, 3): for each end the foods to the left, forward and right, numbers
             in 0..n_foods-1, or -1 for none.
         n_foods: Number of foods that the ant can come to see, and so of carrying phases.
+        paid: What each event pays.
     """
 
     start: int
@@ -78,17 +79,18 @@ class Transitions:
     after_pick_up: np.ndarray
     foods_in_view: np.ndarray
     n_foods: int
+    paid: Rewards
     _around: Surroundings
     _food_cells: np.ndarray
 
     def carrying(self, food: int) -> Phase:
         """The phase from the pick-up of a food, which leaves its cell empty, to the delivery."""
-        around = self._around
+        around, paid = self._around, self.paid
         can_enter = around.empty | (around.neighbours == self._food_cells[food])
-        paid = reward_table.REWARDS
         lure = np.where(around.nearer, paid.lure, paid.empty)
         rewards = by_move(np.where(can_enter, lure, paid.failed))
-        return _phase(around, can_enter, rewards, GIVE, around.sees(around.queen), paid.give)
+        gives = around.sees(around.queen)
+        return _phase(around, can_enter, rewards, GIVE, gives, paid.give, paid.failed)
 
     def pick_ups(self, food: int) -> tuple[np.ndarray, np.ndarray]:
         """The ends of `foraging` that can take a food, and the states in which it is carried."""
@@ -164,8 +166,14 @@ def by_move(ahead: np.ndarray) -> np.ndarray:
     return np.stack([np.roll(ahead, turn, axis=0) for turn in (1, 0, -1)])
 
 
-def build_transitions(world: World) -> Transitions:
-    """The tables of a world, for one ant that starts where `world.start(seed=0)` places it."""
+def build_transitions(world: World, paid: Rewards | None = None) -> Transitions:
+    """The tables of a world, for one ant that starts where `world.start(seed=0)` places it.
+
+    Args:
+        world: The world.
+        paid: What each event pays; None is the paper's.
+    """
+    paid = paid or Rewards()
     around = look_around(world)
     start_cells, start_headings = world.start(seed=0)
     start_cell = int(np.searchsorted(around.cells, start_cells[0]))
@@ -176,15 +184,14 @@ def build_transitions(world: World) -> Transitions:
     seen_cells = by_move(around.neighbours).reshape(3, -1)
     food_cells = np.unique(seen_cells[seen])
     foods_in_view = np.where(seen, np.searchsorted(food_cells, seen_cells), -1)[:, exits].T
-    paid = reward_table.REWARDS
+    rewards = _foraging_rewards(around, paid)
     return Transitions(
         start=int(start_headings[0]) * len(around.cells) + start_cell,
-        foraging=_phase(
-            around, around.empty, _foraging_rewards(around), PICK_UP, exits, paid.pick_up
-        ),
+        foraging=_phase(around, around.empty, rewards, PICK_UP, exits, paid.pick_up, paid.failed),
         after_pick_up=around.turned_round(exits),
         foods_in_view=foods_in_view,
         n_foods=len(food_cells),
+        paid=paid,
         _around=around,
         _food_cells=food_cells,
     )
@@ -197,6 +204,7 @@ def _phase(
     exit_action: int,
     exits: np.ndarray,
     exit_reward: int,
+    failed_reward: int,
 ) -> Phase:
     """A phase in which these neighbours can be entered; moves towards them pay (3, 6, n).
 
@@ -207,18 +215,16 @@ def _phase(
     successors[:3] = around.moves(can_enter)
     successors[[PICK_UP, GIVE]] = np.arange(n_states)
     successors[exit_action, exits] = n_states + np.arange(exits.size)
-    paid = reward_table.REWARDS
-    rewards = np.full((N_ACTIONS, n_states), paid.failed, np.int64)
+    rewards = np.full((N_ACTIONS, n_states), failed_reward, np.int64)
     rewards[:3] = move_rewards.reshape(3, -1)
     rewards[exit_action, exits] = exit_reward
-    return Phase(successors, rewards, exits, exit_reward, paid.failed)
+    return Phase(successors, rewards, exits, exit_reward, failed_reward)
 
 
-def _foraging_rewards(around: Surroundings) -> np.ndarray:
+def _foraging_rewards(around: Surroundings, paid: Rewards) -> np.ndarray:
     """Rewards of the moves, (3, 6, n), of an ant without food."""
     # Only empty cells show a trail. 64 bits, because twice the greatest level needs them.
     levels = by_move(np.where(around.empty, around.trail, 0).astype(np.int64))
     is_trail = (levels >= 1) & (2 * levels >= levels.max(axis=0))
-    paid = reward_table.REWARDS
     rewards = np.where(is_trail, paid.lure, paid.empty)
     return np.where(by_move(around.empty), rewards, paid.failed)

@@ -21,7 +21,7 @@ from taichi_ants.analysis.bounds.transitions import build_transitions
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.policies import random_policy, trail_follower
-from taichi_ants.task import Task
+from taichi_ants.task import Rewards, Task
 from taichi_ants.worlds.paper import paper
 from taichi_ants.worlds.world import World
 
@@ -197,6 +197,21 @@ def test_moves_onto_trails_earn_what_the_ant_sees(
     )
     transitions = build_transitions(world)
     assert transitions.foraging.rewards[:, transitions.start].tolist() == [*rewards, -1, -1]
+
+
+def test_moves_earn_what_the_caller_pays() -> None:
+    world = World((4, 1, 1), (0, 0, 0), [(2, 0, 0)], trails=[((1, 0, 0), 9)], ants=[((1, 0, 0), 0)])
+    paid = Rewards(empty=-2, failed=-7, lure=5, pick_up=11, give=40)
+    transitions = build_transitions(world, paid)
+    usual = build_transitions(world)
+    assert (transitions.foraging.exit_reward, transitions.carrying(0).exit_reward) == (11, 40)
+    by_usual = {0: -2, -1: -7, 1: 5, 3: 11, 10: 40}
+    for phase, other in (
+        (transitions.foraging, usual.foraging),
+        (transitions.carrying(0), usual.carrying(0)),
+    ):
+        assert (phase.rewards == np.vectorize(by_usual.get)(other.rewards)).all()
+        assert phase.failed_reward == -7
 
 
 def test_a_food_behind_another_is_never_reached() -> None:
