@@ -14,8 +14,6 @@ from taichi_ants.commands import observations as command
 from taichi_ants.studies.runner import RunPoint
 from taichi_ants.task import observations
 
-NAMES = observations.names()
-
 
 def test_only_episodes_that_end_in_the_last_quarter_of_the_budget_count():
     point = RunPoint(worlds.paper(), Task(), TrainingConfig("sarsa", 0.1, 0.9, 0.3, 1.0))
@@ -54,14 +52,14 @@ def test_its_rows_are_what_the_library_gives(small, capsys):
         "figures/observations.png",
     }
     rows = read(folder / "seeds.csv")
-    assert len(rows) == (2 * 2 + 2 * 1) * len(NAMES) * 4
+    assert len(rows) == (2 * 2 + 2 * 1) * len(observations.names()) * 4
     found = {
         (row["place"], row["learner"], row["observation"], int(row["seed"])): row["deliveries"]
         for row in rows
     }
     point = (command.BUDGET["paper"] // command.SHORTEST["paper"] + 1, command.LONGEST["paper"])
     alone = worlds.paper(), worlds.open_world(2, command.RANGES)
-    for name in NAMES:
+    for name in observations.names():
         config = TrainingConfig("double_q", *command.RATES)
         for where, world, seed, replicate in (
             ("paper", alone[0], 3, 3),
@@ -73,11 +71,11 @@ def test_its_rows_are_what_the_library_gives(small, capsys):
             assert float(found[f"alone, {where}", "double_q", name, replicate]) == value
 
     findings = read(folder / "findings.csv")
-    assert len(findings) == (2 * 2 + 2 * 1) * (len(NAMES) - 1)
+    assert len(findings) == (2 * 2 + 2 * 1) * (len(observations.names()) - 1)
     by_label = {row["contrast"]: float(row["difference"]) for row in findings}
     means = {
         name: np.mean([float(found["together, open", "sarsa", name, seed]) for seed in range(4)])
-        for name in NAMES
+        for name in observations.names()
     }
     label = "together, open: sarsa, ants_seen minus paper"
     assert by_label[label] == pytest.approx(means["ants_seen"] - means["paper"])
@@ -86,7 +84,7 @@ def test_its_rows_are_what_the_library_gives(small, capsys):
 def test_all_ants_live_by_the_same_rules_but_for_what_they_see(small):
     for where, study in command.studies(2).items():
         tasks = [point.task for point in study.points]
-        assert {task.observation for task in tasks} == set(NAMES)
+        assert {task.observation for task in tasks} == set(observations.names())
         life = Life(regrowth=0) if where.startswith("together") else Life()
         assert {task.life for task in tasks} == {life}
         assert len({(task.delivery, task.evaporation_in_training) for task in tasks}) == 1
