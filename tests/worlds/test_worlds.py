@@ -7,11 +7,12 @@ import pickle
 import numpy as np
 import pytest
 
-from taichi_ants import reference, worlds
+from taichi_ants import worlds
 from taichi_ants.errors import AntsError
 from taichi_ants.grid import hexgrid
 from taichi_ants.grid.constants import STREAM_START_CELL, STREAM_START_HEADING
 from taichi_ants.grid.randomness import stream_state
+from taichi_ants.reference.ants import starts
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 from taichi_ants.worlds import World
 from taichi_ants.worlds.starts import STARTS as WHERE
@@ -207,7 +208,7 @@ def test_ants_that_are_spread_start_on_any_free_cells_by_the_seed(seed: int) -> 
         free = int((world.ground() == EMPTY).sum())
         for n in (1, 2, 40, free):
             cells, headings = world.start(seed, n, "spread")
-            plain = reference.start(world, seed, n, "spread")
+            plain = starts(world, seed, n, "spread")
             assert world.grid.cells(cells).tolist() == [list(cell) for cell, _ in plain]
             assert headings.tolist() == [heading for _, heading in plain]
             assert len(set(cells.tolist())) == n
