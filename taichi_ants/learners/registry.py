@@ -38,16 +38,6 @@ class Memory:
             check_whole(f"{name} of a memory", value, 0, 2**30)
 
 
-def no_memory(hyperparameters: Hyperparameters, n_states: int) -> Memory:
-    """The memory of learners that have none."""
-    return Memory()
-
-
-def usual_cost(hyperparameters: Hyperparameters) -> float:
-    """What a step of a learner costs that does one update after each."""
-    return 1.0
-
-
 @dataclass(frozen=True)
 class Learner:
     """A tabular learner; `td_learner` makes one from a TD error alone.
@@ -83,8 +73,8 @@ class Learner:
     plans: bool = False
     needs_episode_end: bool = False
     hyperparameters: type[Hyperparameters] = Hyperparameters
-    memory: Callable[[Any, int], Memory] = no_memory
-    cost: Callable[[Any], float] = usual_cost
+    memory: Callable[[Any, int], Memory] = lambda settings, n_states: Memory()
+    cost: Callable[[Any], float] = lambda settings: 1.0
     summary: str = ""
 
     def settings(self, config: TrainingConfig) -> Hyperparameters:
@@ -105,10 +95,8 @@ def td_learner(
         name: The name by which configurations call it.
         td_error: A `ti.func` (value, reward, discount, next_values, next_action, epsilon) -> float:
             the value of the state-action pair that is updated, the reward, the discount (0 where
-            the step terminated), the five action values of the next state, the next action and the
-            current epsilon; all f32 but next_action (i32). Python's max, min, sum and len work on
-            next_values, and next_values[a] takes any action a; all else is what Taichi allows in a
-            `ti.func`.
+            the step terminated), the vector of the five action values of the next state, the next
+            action and the current epsilon; all f32 but next_action (i32).
         draws_next_action: See `Learner`; only then may td_error look at next_action, which is 0 to
             4, and 0 where the step terminated.
         summary: One line for listings.

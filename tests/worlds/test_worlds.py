@@ -6,10 +6,10 @@ import pickle
 
 import numpy as np
 import pytest
+from hexagons import distance, neighbours
 
 from taichi_ants import worlds
 from taichi_ants.errors import AntsError
-from taichi_ants.grid import hexgrid
 from taichi_ants.grid.constants import STREAM_START_CELL, STREAM_START_HEADING
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.reference.ants import starts
@@ -143,9 +143,9 @@ def test_closer_agrees_with_distances() -> None:
     world = World((5, 4, 6), (2, 0, 1))
     index = np.flatnonzero(world.grid.exists)
     cells = world.grid.cells(index)
-    own = hexgrid.distance(cells, world.queen)
+    own = distance(cells, world.queen)
     assert (world.distances()[index] == own).all()
-    nearer = hexgrid.distance(hexgrid.neighbours(cells), world.queen) < own[:, None]
+    nearer = distance(neighbours(cells), world.queen) < own[:, None]
     assert (world.closer()[index] == (nearer << np.arange(6)).sum(axis=1)).all()
 
 
@@ -178,7 +178,7 @@ def test_further_ants_start_nearest_to_the_queen_ties_by_the_stream(seed: int) -
     every = sorted(map(tuple, world.grid.cells(np.flatnonzero(world.grid.exists)).tolist()))
     taken = {world.queen, (1, 1, 0), (2, 0, 0), (0, 2, 0), (0, 0, 2)}
     order = sorted(
-        (int(hexgrid.distance(cell, world.queen)), stream_state(seed, STREAM_START_CELL, i), cell)
+        (int(distance(cell, world.queen)), stream_state(seed, STREAM_START_CELL, i), cell)
         for i, cell in enumerate(every)
         if cell not in taken
     )
