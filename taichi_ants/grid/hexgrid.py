@@ -198,15 +198,8 @@ class AxialGrid:
 
         A cell's number is its position among all existing cells in lexicographic order of the
         normal form (x, y, z).
-
-        Raises:
-            AntsError: A cell does not exist.
         """
         normal = normal_form(cells)
-        inside = self.contains(normal)
-        if not inside.all():
-            cell = tuple(normal[~inside][0].tolist())
-            raise AntsError(f"the cell {cell} is outside a world of ranges {self.ranges}.")
         _, y_range, z_range = self.ranges
         x, y, z = normal[..., 0], normal[..., 1], normal[..., 2]
         # x = 0 leaves y and z free. Each x > 0 has first y = 0 with any z, then z = 0 with y > 0.

@@ -74,10 +74,6 @@ class Stream:
         self.state = (self.state + size * GAMMA) & _MASK
         return mix(states)
 
-    def below(self, n: int, size: int) -> np.ndarray:
-        """Whole numbers in [0, n), n at most 2^32, int64 (size,)."""
-        return choose(self.bits(size) >> np.uint64(32), n)
-
 
 def choose(words: np.ndarray, n: int) -> np.ndarray:
     """Maps 32-bit words evenly to [0, n), n at most 2^32: `(word * n) >> 32`; int64."""

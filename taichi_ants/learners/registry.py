@@ -58,7 +58,7 @@ class Learner:
         needs_episode_end: It looks at whether a step is the last of an episode; colonies, where no
             ant knows that, refuse it.
         hyperparameters: What it has besides the settings of all learners: a dataclass whose fields
-            `whole_number` and `number` of `taichi_ants.learners` make, all with usual values.
+            `number` of `taichi_ants.learners` makes, all with usual values.
         memory: A function (hyperparameters, n_states) -> Memory, where a table has n_states rows.
         cost: A function (hyperparameters) -> float: the time of a step of one ant, in that of
             Q-learning. Launches of kernels are cut by it.
@@ -136,10 +136,10 @@ def register(learner: Learner) -> Learner:
     """Make a learner known by its name.
 
     Raises:
-        AntsError: The name is taken, or is not usable in files and on command lines; or a function
-            is no `ti.func`, does not take the arguments that it must take, or looks at a next
-            action that is not drawn; or a hyperparameter is called as a setting of all learners.
-            What the functions compute is tried when the learner is first used.
+        AntsError: The name is taken or no identifier; a function is no `ti.func`, has the wrong
+            arguments, or looks at a next action that is not drawn; or a hyperparameter is called
+            as a setting of all learners. What the functions compute is tried when the learner is
+            first used.
     """
     if not isinstance(learner, Learner):
         raise AntsError(f"{shown(learner)} is not a Learner; make one by td_learner(name, ...).")
@@ -157,13 +157,12 @@ def register(learner: Learner) -> Learner:
     if learner.td_error is not None:
         drawn = learner.draws_next_action and not learner.plans
         _check_td_error(name, learner.td_error, drawn)
-    taken = {field.name for field in fields(TrainingConfig)}
-    for field in fields(learner.hyperparameters):
-        if field.name in taken:
-            raise AntsError(
-                f"{field.name!r} is a setting of all learners; call this hyperparameter of "
-                f"{name!r} something else."
-            )
+    taken = {one.name for one in fields(TrainingConfig)}
+    for clash in taken & {one.name for one in fields(learner.hyperparameters)}:
+        raise AntsError(
+            f"{clash!r} is a setting of all learners; call this hyperparameter of {name!r} "
+            "something else."
+        )
     _LEARNERS[name] = learner
     return learner
 

@@ -81,9 +81,10 @@ def build(name_or_path: str | os.PathLike[str], seed: int = 0, **given: Any) -> 
     if name_or_path not in _BUILDERS:
         if os.path.exists(name_or_path):
             return load_map(name_or_path)
+        known = ", ".join(names())
         raise AntsError(
-            f"there is no world named {shown(os.fspath(name_or_path))} and no such file; choose one "
-            f"of {', '.join(names())}, or give the path of a map file."
+            f"there is no world named {shown(os.fspath(name_or_path))} and no such file; choose "
+            f"one of {known}, or give the path of a map file."
         )
     try:
         world = _BUILDERS[str(name_or_path)](seed, **given)

@@ -42,21 +42,15 @@ def load_map(path: str | os.PathLike[str]) -> World:
     """The world drawn in a text file (UTF-8), see `from_text`.
 
     Raises:
-        AntsError: The file is missing, unreadable, too large or not text, or its map is damaged.
+        AntsError: The file cannot be read, or its map is damaged.
     """
     try:
-        file = Path(path)
-        if not file.is_file():
-            # Devices and pipes may never end, so they are no map files either.
-            what = "is no ordinary file" if file.exists() else "does not exist"
-            raise AntsError(f"{file} {what}; give the path of a map file.")
-        with file.open(encoding="utf-8") as lines:
-            text = lines.read(MAX_MAP_CHARACTERS + 1)
-    except UnicodeDecodeError:
-        raise AntsError(f"{path} is no text file; give the path of a map file.") from None
-    except (OSError, TypeError) as error:
+        text = Path(path).read_text("utf-8")
+    except (OSError, TypeError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise AntsError(f"the map file {shown(path)} cannot be read: {reason}.") from None
+        raise AntsError(
+            f"the map file {shown(path)} cannot be read: {reason}; give the path of a text file."
+        ) from None
     return from_text(text, str(path))
 
 

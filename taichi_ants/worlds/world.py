@@ -104,7 +104,9 @@ class World:
 
         Ants walk over empty cells; obstacles and other foods block.
         """
-        return geometry.reachable(self.grid, self.ground(), self.queen, self.foods)
+        beside_queen = self.grid.index(self.queen) + self.grid.offsets
+        found = geometry.walkable(self.grid, self.ground(), beside_queen)
+        return found[self.grid.index(self.foods)[:, None] + self.grid.offsets].any(axis=1)
 
     def start(self, seed: int, n: int = 1, where: str = "nest") -> tuple[np.ndarray, np.ndarray]:
         """Where n ants start: the listed ants first, then ants placed on free cells.

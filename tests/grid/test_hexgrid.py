@@ -121,8 +121,6 @@ def test_cells_beyond_the_array_are_refused() -> None:
     grid.index((0, 0, 1))  # a void border cell has an index
     with pytest.raises(AntsError, match=r"\(9, 0, 0\).*\(3, 3, 1\)"):
         grid.index([(0, 0, 0), (9, 0, 0)])
-    with pytest.raises(AntsError, match=r"\(0, 0, 1\)"):
-        grid.number([(0, 0, 1)])
     for index in (-1, grid.size, 1.0):
         with pytest.raises(AntsError, match="flat indices"):
             grid.cells([index])

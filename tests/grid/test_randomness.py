@@ -64,8 +64,8 @@ def test_a_choice_is_the_scaled_word() -> None:
     assert choose(words, 3).tolist() == [0, 0, 1, 2]
 
 
-def test_below_stays_below_and_is_even() -> None:
-    drawn = Stream(1, 2).below(6, 60_000)
+def test_choices_stay_below_and_are_even() -> None:
+    drawn = choose(Stream(1, 2).bits(60_000) >> np.uint64(32), 6)
     counts = np.bincount(drawn, minlength=6)
     # Six standard deviations of a binomial count with mean 10000.
     assert len(counts) == 6

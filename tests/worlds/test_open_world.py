@@ -107,8 +107,17 @@ def test_more_food_leaves_the_rocks_alone() -> None:
     assert len(little.foods) < len(much.foods)
 
 
-def test_drawn_ranges_fill_their_bounds() -> None:
-    drawn = np.array([module._draw_ranges(Stream(seed, 1)) for seed in range(1000)])
+def test_drawn_ranges_fill_their_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn = []
+
+    def note(grid: AxialGrid, *_: object) -> World:
+        drawn.append(grid.ranges)
+        return World((3, 3, 3), (0, 0, 0), foods=[(1, 0, 0)])
+
+    monkeypatch.setattr(module, "_draw", note)
+    for seed in range(1000):
+        open_world(seed)
+    drawn = np.array(drawn)
     assert drawn.min() == 10
     assert drawn.max() == 100
     # The mean of 1000 numbers drawn evenly from 10 .. 100 has a standard deviation of 0.83.
@@ -145,8 +154,8 @@ def test_a_world_without_reachable_food_is_drawn_again(monkeypatch: pytest.Monke
     monkeypatch.setattr(module, "_draw", shut_in)
     world = open_world(0, (20, 20, 20))
     assert attempts == [0, 1, 2]
-    assert world == draw((20, 20, 20), 0.15, 0.03, 0, 2)
-    assert world != draw((20, 20, 20), 0.15, 0.03, 0, 0)
+    assert world == draw(world.grid, 0.15, 0.03, 0, 2)
+    assert world != draw(world.grid, 0.15, 0.03, 0, 0)
 
 
 @pytest.mark.parametrize("ranges", [(1, 1, 1), (3, 3, 1), (4, 4, 4)])
