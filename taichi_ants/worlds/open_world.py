@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from numbers import Real
+from typing import Any
 
 import numpy as np
 
@@ -72,7 +73,7 @@ def open_world(
     )
 
 
-def _share(name: str, value: object) -> float:
+def _share(name: str, value: Any) -> float:
     number = isinstance(value, Real) and not isinstance(value, bool)
     if not (number and 0 <= value <= MAX_SHARE):
         raise AntsError(f"{name} is {shown(value)}; it must be a number between 0 and {MAX_SHARE}.")
