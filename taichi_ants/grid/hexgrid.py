@@ -68,26 +68,6 @@ def centre_of(cells: object, size: float) -> np.ndarray:
     return np.stack([1.5 * size * r, _SQRT_3 * size * (0.5 * r - q)], axis=-1)
 
 
-def cell_at(pixels: object, size: float) -> np.ndarray:
-    """The cells (normal form, (..., 3), int64) whose hexagons hold pixel coordinates (..., 2).
-
-    The inverse of `centre_of`; on a border of two hexagons, one of the two.
-    """
-    points = np.asarray(pixels, dtype=np.float64)
-    r = points[..., 0] / (1.5 * size)
-    q = 0.5 * r - points[..., 1] / (_SQRT_3 * size)
-    # Cube rounding: q, -r and r - q sum to zero; after rounding, the coordinate that moved most is
-    # the one that gives way to restore the sum.
-    exact = np.stack([q, -r, r - q], axis=-1)
-    near = np.rint(exact)
-    moved = np.abs(near - exact)
-    fixes_q = (moved[..., 0] > moved[..., 1]) & (moved[..., 0] > moved[..., 2])
-    fixes_r = ~fixes_q & (moved[..., 1] > moved[..., 2])
-    whole_q = np.where(fixes_q, -near[..., 1] - near[..., 2], near[..., 0])
-    whole_r = np.where(fixes_r, near[..., 0] + near[..., 2], -near[..., 1])
-    return cube(np.stack([whole_q, whole_r], axis=-1).astype(np.int64))
-
-
 @dataclass(frozen=True)
 class AxialGrid:
     """How the cells of a world lie in a flat array.
@@ -159,10 +139,6 @@ class AxialGrid:
         q = np.arange(-z, self.width - z, dtype=np.int32)
         r = np.arange(-z, self.height - z, dtype=np.int32)
         return q[None, :], r[:, None]
-
-    def contains(self, cells: object) -> np.ndarray:
-        """bool (...): whether cells (..., 3) in any form exist in the world."""
-        return np.all(normal_form(cells) < np.array(self.ranges), axis=-1)
 
     def index(self, cells: object) -> np.ndarray:
         """Flat indices, int32 (...), of cells (..., 3) in any form.

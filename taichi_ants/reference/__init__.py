@@ -8,13 +8,13 @@ but constants, errors, and the types `Task`, `TrainingConfig` (with `update_weig
 of a world it reads only the fields (ranges, queen, foods, obstacles, trails, ants).
 
 Read `colony.py` first: `ReferenceColony.tick` is a tick. One ant that learns, or that follows a
-table, is a colony of one: `lone_learner`, `lone_follower`.
+table, is a colony of one: `beginner`, `follower`.
 """
 
 from __future__ import annotations
 
-from taichi_ants.reference.colony import ReferenceColony, lone_follower, lone_learner
+from taichi_ants.reference.colony import ReferenceColony, beginner, follower
 from taichi_ants.reference.learners import LEARNERS
 from taichi_ants.reference.observations import OBSERVATIONS
 
-__all__ = ["LEARNERS", "OBSERVATIONS", "ReferenceColony", "lone_follower", "lone_learner"]
+__all__ = ["LEARNERS", "OBSERVATIONS", "ReferenceColony", "beginner", "follower"]

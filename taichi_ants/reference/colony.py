@@ -313,7 +313,7 @@ class ReferenceColony:
         self.minds.learn(self.transitions, [ant.stream for ant in after], self.epsilon)
 
 
-def lone_learner(
+def beginner(
     world: World, config: TrainingConfig, seed: int, task: Task | None = None
 ) -> ReferenceColony:
     """One ant, before its training.
@@ -323,7 +323,7 @@ def lone_learner(
     return ReferenceColony(world, task, config, seed, ends_at_delivery=True, sharing="own")
 
 
-def lone_follower(
+def follower(
     world: World,
     q_values: np.ndarray,
     seed: int = 0,

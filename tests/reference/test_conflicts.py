@@ -5,6 +5,8 @@ In the drawings 0 to 5 are ants with that heading, numbered in reading order; F 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from colonies import act, begun, cells_of, foods_of, load
 
@@ -68,7 +70,8 @@ def test_each_of_the_two_wins_at_some_tick():
 
 def test_who_wins_does_not_depend_on_the_numbers_of_the_ants():
     colony = begun(TWO_TO_ONE)
-    renumbered = begun("ants = 1 0\n" + TWO_TO_ONE)
+    world = from_text(TWO_TO_ONE)
+    renumbered = begun(replace(world, ants=world.ants[::-1]))
     assert cells_of(renumbered) == cells_of(colony)[::-1]
     for _ in range(2):
         act(colony, FORWARD, FORWARD)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 
-from taichi_ants.reference import ReferenceColony, lone_follower, lone_learner
+from taichi_ants.reference import ReferenceColony, beginner, follower
 from taichi_ants.reference.ants import Transition
 
 
@@ -25,7 +25,7 @@ class Run:
 
 def train(world, config, seed, episodes, max_steps, task=None, start_from=None) -> Run:
     """Train one ant, or let a run go on; that one is left as it is."""
-    colony, trace = lone_learner(world, config, seed, task), []
+    colony, trace = beginner(world, config, seed, task), []
     if start_from is not None:
         colony, trace = copy.deepcopy((start_from.colony, start_from.trace))
     return Run(colony, trace + colony.run(episodes, max_steps))
@@ -33,7 +33,7 @@ def train(world, config, seed, episodes, max_steps, task=None, start_from=None) 
 
 def train_with_tables(world, config, seed, episodes, max_steps, task=None):
     """A run, and the ant's table after each of its steps."""
-    colony, trace, tables = lone_learner(world, config, seed, task), [], []
+    colony, trace, tables = beginner(world, config, seed, task), [], []
     for _ in range(episodes):
         for [step] in colony.run_episode(max_steps):
             trace.append(step)
@@ -43,5 +43,5 @@ def train_with_tables(world, config, seed, episodes, max_steps, task=None):
 
 def rollout(world, q_values, seed=0, number=0, max_steps=600, task=None, epsilon=0.0) -> Run:
     """One episode by a table."""
-    colony = lone_follower(world, q_values, seed, number, task, epsilon)
+    colony = follower(world, q_values, seed, number, task, epsilon)
     return Run(colony, colony.run(1, max_steps))

@@ -28,7 +28,7 @@ def test_foods_are_reachable_where_a_walk_leads(world: World) -> None:
 
     def beside(cell: tuple) -> list[tuple]:
         around = [tuple(n) for n in neighbours(cell).tolist()]
-        return [n for n in around if world.grid.contains(n)]
+        return [n for n in around if (np.array(n) < world.ranges).all()]
 
     def empty(cell: tuple) -> bool:
         return ground[world.grid.index(cell)] == EMPTY
