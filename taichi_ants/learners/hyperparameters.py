@@ -29,8 +29,6 @@ class Hyperparameters:
             kind, least, most = one.metadata["kind"], one.metadata["least"], one.metadata["most"]
             if kind is int:
                 check_whole(name, value, least, most)
-            elif isinstance(value, bool) or not isinstance(value, (int, float)):
-                raise AntsError(f"{name} is {shown(value)}; it must be a number.")
             elif not least <= value <= most:
                 raise AntsError(
                     f"{name} is {shown(value)}; it must lie between {least} and {most}."

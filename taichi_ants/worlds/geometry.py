@@ -1,4 +1,4 @@
-"""Arrays that follow from where the queen, the food and the obstacles are."""
+"""How far cells are from one, and which can be walked to."""
 
 from __future__ import annotations
 
@@ -9,21 +9,6 @@ from taichi_ants.task.constants import EMPTY
 
 # Which cells of a 3 x 3 window (rows r, columns q) are neighbours on the hexagonal grid.
 _NEIGHBOURS = np.array([[1, 1, 0], [1, 1, 1], [0, 1, 1]])
-
-
-def distances(grid: AxialGrid, cell: tuple[int, int, int]) -> np.ndarray:
-    """int32 (grid.size,): steps from each cell of the world to `cell`; 0 outside."""
-    return _distances_everywhere(grid, cell) * grid.exists
-
-
-def closer(grid: AxialGrid, cell: tuple[int, int, int]) -> np.ndarray:
-    """uint8 (grid.size,): bit h is set if the neighbour at heading h is nearer to `cell`."""
-    here = _distances_everywhere(grid, cell)
-    bits = np.zeros(grid.size, dtype=np.uint8)
-    for heading, offset in enumerate(grid.offsets.tolist()):
-        there = np.roll(here, -offset)
-        bits |= (there < here).astype(np.uint8) << np.uint8(heading)
-    return bits * grid.exists
 
 
 def walkable(grid: AxialGrid, ground: np.ndarray, starts: np.ndarray) -> np.ndarray:
@@ -43,7 +28,7 @@ def walkable(grid: AxialGrid, ground: np.ndarray, starts: np.ndarray) -> np.ndar
     return np.isin(regions, home[home > 0])
 
 
-def _distances_everywhere(grid: AxialGrid, cell: tuple[int, int, int]) -> np.ndarray:
+def distances(grid: AxialGrid, cell: tuple[int, int, int]) -> np.ndarray:
     """int32 (grid.size,): steps to `cell` from every place of the array, void ones too."""
     q, r = grid.axes()
     cell_q, cell_r = axial(cell).astype(np.int32)
