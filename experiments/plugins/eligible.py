@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import taichi as ti
 
 from taichi_ants.learners import Hyperparameters, Learner, Memory, number, register
+from taichi_ants.learners.memory import values_of
 
 ROW = 8  # numbers of a row of a table, the first 5 of them action values
 
@@ -34,23 +35,14 @@ def begin(memory: ti.template(), at):
 
 
 @ti.func
-def largest_of(memory: ti.template(), at, state):
-    """The largest action value of a state."""
-    largest = memory.q[at.table + state * ROW]
-    for a in range(1, 5):
-        largest = ti.max(largest, memory.q[at.table + state * ROW + a])
-    return largest
-
-
-@ti.func
 def learn(memory: ti.template(), at, step, rates, random_state):
     """Update all pairs by this step's TD error, each by its trace."""
     pair = step.state * ROW + step.action
     value = memory.q[at.table + pair]
-    was_best = value >= largest_of(memory, at, step.state)
+    was_best = value >= values_of(memory.q, at.table, step.state).max()
     target = step.reward
     if step.terminated == 0:
-        target += rates.discount * largest_of(memory, at, step.next_state)
+        target += rates.discount * values_of(memory.q, at.table, step.next_state).max()
     error = target - value
     for i in range(memory.n_states * ROW):
         trace = memory.floats[at.floats + i] * rates.discount * rates.trace_decay

@@ -17,7 +17,7 @@ PATIENCE = 0.2  # the share of a bad surprise that is learned
 @ti.func
 def td_error(value, reward, discount, next_values, next_action, epsilon):
     """The TD error of Q-learning, made smaller where it is negative."""
-    error = reward + discount * max(next_values) - value
+    error = reward + discount * next_values.max() - value
     return ti.select(error < 0, PATIENCE * error, error)
 
 

@@ -14,70 +14,42 @@ from functools import cached_property
 import numpy as np
 
 from taichi_ants.errors import AntsError
-from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
+from taichi_ants.grid.constants import HEADING_STEPS
 
 # A grid's arrays are allocated whole; four bytes for each of this many cells are one gibibyte.
 MAX_ARRAY_CELLS = 1 << 28
 
-_STEPS = np.array(HEADING_STEPS, dtype=np.int64)
 _SQRT_3 = math.sqrt(3.0)
 
 
-def _integers(values: object, last_axis: int, what: str) -> np.ndarray:
-    """`values` as an int64 array whose last axis has length `last_axis`."""
+def _cells(values: object) -> np.ndarray:
+    """Cube coordinates in any form as int64 (..., 3)."""
     array = np.asarray(values)
-    if array.dtype.kind not in "iu" or array.ndim == 0 or array.shape[-1] != last_axis:
+    if array.dtype.kind not in "iu" or array.ndim == 0 or array.shape[-1] != 3:
         raise AntsError(
-            f"{what} have shape {array.shape} and type {array.dtype}; "
-            f"they must be whole numbers of shape (..., {last_axis})."
+            f"cells have shape {array.shape} and type {array.dtype}; they must be whole numbers of "
+            "shape (..., 3)."
         )
     return array.astype(np.int64)
 
 
 def normal_form(cells: object) -> np.ndarray:
     """The normal form of cube coordinates (..., 3): the shift whose minimum is 0. int64."""
-    cube = _integers(cells, 3, "cells")
-    return cube - cube.min(axis=-1, keepdims=True)
+    given = _cells(cells)
+    return given - given.min(axis=-1, keepdims=True)
 
 
 def axial(cells: object) -> np.ndarray:
     """Axial coordinates (..., 2) = (q, r) of cube coordinates (..., 3) in any form. int64."""
-    cube = _integers(cells, 3, "cells")
-    return cube[..., :2] - cube[..., 2:]
+    given = _cells(cells)
+    return given[..., :2] - given[..., 2:]
 
 
-def cube(axials: object) -> np.ndarray:
-    """The normal form (..., 3) of axial coordinates (..., 2) = (q, r). int64."""
-    qr = _integers(axials, 2, "axial coordinates")
+def cube(axials: np.ndarray) -> np.ndarray:
+    """The normal form (..., 3) of axial coordinates (..., 2) = (q, r), whole numbers. int64."""
+    qr = np.asarray(axials, dtype=np.int64)
     low = np.minimum(qr.min(axis=-1, keepdims=True), 0)
     return np.concatenate([qr - low, -low], axis=-1)
-
-
-def turn(headings: int | np.ndarray, sixths: int | np.ndarray) -> int | np.ndarray:
-    """Headings after turning clockwise by `sixths` of a full turn (negative: anticlockwise)."""
-    return (headings + sixths) % N_HEADINGS
-
-
-def step(cells: object, headings: int | np.ndarray) -> np.ndarray:
-    """The normal form of the cells one step from `cells` (..., 3) at `headings` (...). int64."""
-    return normal_form(_integers(cells, 3, "cells") + _STEPS[headings])
-
-
-def neighbours(cells: object) -> np.ndarray:
-    """The six neighbours (..., 6, 3) of cells (..., 3), in the order of the headings. int64."""
-    return normal_form(_integers(cells, 3, "cells")[..., None, :] + _STEPS)
-
-
-def distance(cells: object, others: object) -> np.ndarray:
-    """The number of steps from `cells` to `others` (both (..., 3), broadcast), no obstacles."""
-    difference = _integers(cells, 3, "cells") - _integers(others, 3, "cells")
-    return difference.max(axis=-1) - difference.min(axis=-1)
-
-
-def count_cells(ranges: tuple[int, int, int]) -> int:
-    """The number of cells of a world of ranges (X, Y, Z)."""
-    x, y, z = ranges
-    return x * y + y * z + z * x - x - y - z + 1
 
 
 def centre_of(cells: object, size: float) -> np.ndarray:
@@ -94,26 +66,6 @@ def centre_of(cells: object, size: float) -> np.ndarray:
     qr = axial(cells)
     q, r = qr[..., 0], qr[..., 1]
     return np.stack([1.5 * size * r, _SQRT_3 * size * (0.5 * r - q)], axis=-1)
-
-
-def cell_at(pixels: object, size: float) -> np.ndarray:
-    """The cells (normal form, (..., 3), int64) whose hexagons hold pixel coordinates (..., 2).
-
-    The inverse of `centre_of`; on a border of two hexagons, one of the two.
-    """
-    points = np.asarray(pixels, dtype=np.float64)
-    r = points[..., 0] / (1.5 * size)
-    q = 0.5 * r - points[..., 1] / (_SQRT_3 * size)
-    # Cube rounding: q, -r and r - q sum to zero; after rounding, the coordinate that moved most is
-    # the one that gives way to restore the sum.
-    exact = np.stack([q, -r, r - q], axis=-1)
-    near = np.rint(exact)
-    moved = np.abs(near - exact)
-    fixes_q = (moved[..., 0] > moved[..., 1]) & (moved[..., 0] > moved[..., 2])
-    fixes_r = ~fixes_q & (moved[..., 1] > moved[..., 2])
-    whole_q = np.where(fixes_q, -near[..., 1] - near[..., 2], near[..., 0])
-    whole_r = np.where(fixes_r, near[..., 0] + near[..., 2], -near[..., 1])
-    return cube(np.stack([whole_q, whole_r], axis=-1).astype(np.int64))
 
 
 @dataclass(frozen=True)
@@ -158,12 +110,13 @@ class AxialGrid:
     @property
     def count(self) -> int:
         """Number of existing cells."""
-        return count_cells(self.ranges)
+        x, y, z = self.ranges
+        return x * y + y * z + z * x - x - y - z + 1
 
     @cached_property
     def offsets(self) -> np.ndarray:
         """int32 (6,), read-only: what a step at each heading adds to a flat index."""
-        steps = axial(_STEPS)
+        steps = axial(HEADING_STEPS)
         return _frozen((steps[:, 0] + steps[:, 1] * self.width).astype(np.int32))
 
     @cached_property
@@ -186,10 +139,6 @@ class AxialGrid:
         q = np.arange(-z, self.width - z, dtype=np.int32)
         r = np.arange(-z, self.height - z, dtype=np.int32)
         return q[None, :], r[:, None]
-
-    def contains(self, cells: object) -> np.ndarray:
-        """bool (...): whether cells (..., 3) in any form exist in the world."""
-        return np.all(normal_form(cells) < np.array(self.ranges), axis=-1)
 
     def index(self, cells: object) -> np.ndarray:
         """Flat indices, int32 (...), of cells (..., 3) in any form.
@@ -225,15 +174,8 @@ class AxialGrid:
 
         A cell's number is its position among all existing cells in lexicographic order of the
         normal form (x, y, z).
-
-        Raises:
-            AntsError: A cell does not exist.
         """
         normal = normal_form(cells)
-        outside = (normal >= np.array(self.ranges)).any(axis=-1)
-        if outside.any():
-            cell = tuple(normal[outside][0].tolist())
-            raise AntsError(f"the cell {cell} is outside a world of ranges {self.ranges}.")
         _, y_range, z_range = self.ranges
         x, y, z = normal[..., 0], normal[..., 1], normal[..., 2]
         # x = 0 leaves y and z free. Each x > 0 has first y = 0 with any z, then z = 0 with y > 0.

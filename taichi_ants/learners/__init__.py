@@ -1,7 +1,7 @@
 """The learners: one file each, and policies that need no learning."""
 
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.learners.hyperparameters import Hyperparameters, number, whole_number
+from taichi_ants.learners.hyperparameters import Hyperparameters, number
 from taichi_ants.learners.registry import Learner, Memory, get, names, register, settle, td_learner
 
 __all__ = [
@@ -15,5 +15,4 @@ __all__ = [
     "register",
     "settle",
     "td_learner",
-    "whole_number",
 ]

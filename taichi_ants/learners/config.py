@@ -54,14 +54,12 @@ class TrainingConfig:
     ) -> None:
         if not isinstance(learner, str):
             raise AntsError(f"learner is {shown(learner)}; it must be the name of a learner.")
-        above = "above 0 and at most 1"
-        between = "between 0 and 1"
         object.__setattr__(self, "learner", learner)
-        self._set("learning_rate", learning_rate, above)
-        self._set("discount", discount, between)
-        self._set("epsilon", epsilon, between)
-        self._set("epsilon_decay", epsilon_decay, above)
-        self._set("min_epsilon", min_epsilon, between)
+        self._set("learning_rate", learning_rate, "above 0 and at most 1")
+        self._set("discount", discount, "between 0 and 1")
+        self._set("epsilon", epsilon, "between 0 and 1")
+        self._set("epsilon_decay", epsilon_decay, "above 0 and at most 1")
+        self._set("min_epsilon", min_epsilon, "between 0 and 1")
         try:
             pairs = {**dict(hyperparameters), **more}
         except (TypeError, ValueError):
@@ -98,17 +96,11 @@ def share_of_one(value: Any) -> bool:
 
 
 def update_weights(alpha: float, most: int) -> np.ndarray:
-    """How far the mean of n TD errors moves a shared value: 1 - (1 - alpha)^n.
+    """How far the mean of n TD errors moves a shared value: 1 - (1 - alpha)^n, by n up to `most`.
 
     So far n updates in turn, each with learning rate alpha, go towards one target. Kernels and
     reference take these numbers from here, since powers differ in the last bit between libraries.
-
-    Args:
-        alpha: The learning rate, in (0, 1]; taken as float32.
-        most: The largest n.
-
-    Returns:
-        float32 (most + 1,), by n; at 0 it is 0, at 1 alpha itself.
+    float32 (most + 1,); at 1 it is alpha itself, as float32.
     """
     rate = np.float32(alpha)
     weights = (1.0 - (1.0 - np.float64(rate)) ** np.arange(most + 1)).astype(np.float32)

@@ -3,13 +3,14 @@
 import taichi as ti
 
 from taichi_ants.learners.registry import td_learner
+from taichi_ants.task.rules.policy import best_value
 
 
 @ti.func
 def td_error(value, reward, discount, next_values, next_action, epsilon):
     """reward + discount * E Q(s', a') - Q(s, a) under the epsilon-greedy policy."""
-    best = max(next_values)
-    expected = best + epsilon * (sum(next_values) * ti.f32(0.2) - best)
+    best = best_value(next_values)
+    expected = best + epsilon * (next_values.sum() * ti.f32(0.2) - best)
     return reward + discount * expected - value
 
 

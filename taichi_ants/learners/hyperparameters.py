@@ -7,24 +7,17 @@ from typing import Any
 
 from taichi_ants.errors import AntsError, check_whole, shown
 
-MAX_PLANNING_STEPS = 1000
-
-
-def whole_number(usual: int, least: int, most: int) -> Any:
-    """A field that is a whole number from `least` to `most`."""
-    return field(default=usual, metadata={"kind": int, "least": least, "most": most})
-
 
 def number(usual: float, least: float, most: float) -> Any:
-    """A field that is a number from `least` to `most`."""
-    return field(default=usual, metadata={"kind": float, "least": least, "most": most})
+    """A field that is a number from `least` to `most`, a whole one if `usual` is an int."""
+    return field(default=usual, metadata={"kind": type(usual), "least": least, "most": most})
 
 
 @dataclass(frozen=True)
 class Hyperparameters:
     """Base of the hyperparameters of a learner; as such, none.
 
-    Fields are made by `whole_number` and `number`; kernels get them as i32 and f32.
+    Fields are made by `number`; kernels get whole numbers as i32 and others as f32.
 
     Raises:
         AntsError: A value is outside its range.
@@ -32,17 +25,12 @@ class Hyperparameters:
 
     def __post_init__(self) -> None:
         for one in fields(self):
-            value, least, most = (
-                getattr(self, one.name),
-                one.metadata["least"],
-                one.metadata["most"],
-            )
-            if one.metadata["kind"] is int:
-                check_whole(one.name, value, least, most)
-            elif isinstance(value, bool) or not isinstance(value, (int, float)):
-                raise AntsError(f"{one.name} is {shown(value)}; it must be a number.")
+            name, value = one.name, getattr(self, one.name)
+            kind, least, most = one.metadata["kind"], one.metadata["least"], one.metadata["most"]
+            if kind is int:
+                check_whole(name, value, least, most)
             elif not least <= value <= most:
                 raise AntsError(
-                    f"{one.name} is {shown(value)}; it must lie between {least} and {most}."
+                    f"{name} is {shown(value)}; it must lie between {least} and {most}."
                 )
-            object.__setattr__(self, one.name, one.metadata["kind"](value))
+            object.__setattr__(self, name, kind(value))

@@ -5,19 +5,33 @@ of first visits, each pair (its offset in the table) and its packed outcome; beh
 pairs, for each pair its place in this order plus 1, or 0.
 """
 
+from dataclasses import dataclass
+
 import taichi as ti
 
+from taichi_ants.learners.hyperparameters import Hyperparameters, number
+from taichi_ants.learners.memory import discount_of, values_of
 from taichi_ants.learners.registry import Memory
 from taichi_ants.task.constants import N_ACTIONS, ROW
 from taichi_ants.task.rewards import MOST
+from taichi_ants.task.rules.policy import best_value
 
 # An outcome packs the next row (20 bits), the reward (11 bits) and whether the step terminated.
 _REWARD_AT, _TERMINATED_AT = 20, 31
 
 
-def model_memory(n_states: int) -> Memory:
-    """The memory that a model takes."""
-    return Memory(integers=2 + 3 * N_ACTIONS * n_states)
+@dataclass(frozen=True)
+class Planning(Hyperparameters):
+    """Attributes:
+    planning_steps: Updates from the model after each step, at most.
+    """
+
+    planning_steps: int = number(5, 1, 1000)
+
+
+def model_memory(n_states: int, floats: int = 0) -> Memory:
+    """The memory that a model takes, and floats beside it."""
+    return Memory(floats=floats, integers=2 + 3 * N_ACTIONS * n_states)
 
 
 @ti.func
@@ -55,14 +69,14 @@ def visited(memory: ti.template(), at):
 def remember(memory: ti.template(), at, pair, outcome):
     """Store what was seen last of a pair, new pairs behind all others; the pair's slot."""
     key = at.integers + 2 + 2 * N_ACTIONS * memory.n_states + pair // ROW * N_ACTIONS + pair % ROW
-    number = memory.integers[key]
-    if number == 0:
-        number = memory.integers[at.integers] + 1
-        memory.integers[at.integers] = number
-        memory.integers[key] = number
-        memory.integers[at.integers + 2 * number] = pair
-    memory.integers[at.integers + 2 * number + 1] = outcome
-    return number - 1
+    place = memory.integers[key]
+    if place == 0:
+        place = memory.integers[at.integers] + 1
+        memory.integers[at.integers] = place
+        memory.integers[key] = place
+        memory.integers[at.integers + 2 * place] = pair
+    memory.integers[at.integers + 2 * place + 1] = outcome
+    return place - 1
 
 
 @ti.func
@@ -70,3 +84,11 @@ def recall(memory: ti.template(), at, slot):
     """The pair in a slot, and its outcome."""
     place = at.integers + 2 + 2 * slot
     return memory.integers[place], memory.integers[place + 1]
+
+
+@ti.func
+def error_of(memory: ti.template(), at, rates, pair, outcome):
+    """The TD error of Q-learning for an outcome of a pair."""
+    best = best_value(values_of(memory.q, at.table, next_state_of(outcome)))
+    discount = discount_of(rates, terminated_of(outcome))
+    return reward_of(outcome) + discount * best - memory.q[at.table + pair]

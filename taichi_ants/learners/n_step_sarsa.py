@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import taichi as ti
 
-from taichi_ants.learners.hyperparameters import Hyperparameters, whole_number
+from taichi_ants.learners.hyperparameters import Hyperparameters, number
 from taichi_ants.learners.memory import discount_of
 from taichi_ants.learners.registry import Learner, Memory
 from taichi_ants.task.constants import ROW
@@ -16,7 +16,7 @@ class Steps(Hyperparameters):
     n_steps: Rewards in a target, unless the episode ends before.
     """
 
-    n_steps: int = whole_number(4, 1, 64)
+    n_steps: int = number(4, 1, 64)
 
 
 @ti.func

@@ -4,40 +4,29 @@ from dataclasses import dataclass
 
 import taichi as ti
 
-from taichi_ants.learners.dyna_q import Planning
 from taichi_ants.learners.hyperparameters import number
-from taichi_ants.learners.memory import discount_of, values_of
 from taichi_ants.learners.model import (
+    Planning,
+    error_of,
     model_memory,
     next_state_of,
     pack_outcome,
     recall,
     remember,
-    reward_of,
     terminated_of,
     visited,
 )
-from taichi_ants.learners.registry import Learner, Memory
+from taichi_ants.learners.registry import Learner
 from taichi_ants.task.constants import N_ACTIONS, ROW
-from taichi_ants.task.rules.policy import best_value
 
 
 @dataclass(frozen=True)
 class Sweeping(Planning):
     """Attributes:
-    planning_steps: Updates from the model after each step, at most.
     threshold: Errors up to this size wait for no update.
     """
 
     threshold: float = number(0.0001, 0, 1e9)
-
-
-@ti.func
-def error_of(memory: ti.template(), at, rates, pair, outcome):
-    """The TD error of Q-learning for an outcome of a pair."""
-    best = best_value(values_of(memory.q, at.table, next_state_of(outcome)))
-    discount = discount_of(rates, terminated_of(outcome))
-    return reward_of(outcome) + discount * best - memory.q[at.table + pair]
 
 
 @ti.func
@@ -86,9 +75,7 @@ PRIORITIZED_SWEEPING = Learner(
     "prioritized_sweeping",
     learn,
     hyperparameters=Sweeping,
-    memory=lambda settings, n_states: Memory(
-        floats=N_ACTIONS * n_states, integers=model_memory(n_states).integers
-    ),
+    memory=lambda settings, n_states: model_memory(n_states, floats=N_ACTIONS * n_states),
     cost=lambda settings: 1 + 12 * settings.planning_steps,
     summary="updates from a model of the world, the largest errors first",
 )

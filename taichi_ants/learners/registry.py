@@ -38,16 +38,6 @@ class Memory:
             check_whole(f"{name} of a memory", value, 0, 2**30)
 
 
-def no_memory(hyperparameters: Hyperparameters, n_states: int) -> Memory:
-    """The memory of learners that have none."""
-    return Memory()
-
-
-def usual_cost(hyperparameters: Hyperparameters) -> float:
-    """What a step of a learner costs that does one update after each."""
-    return 1.0
-
-
 @dataclass(frozen=True)
 class Learner:
     """A tabular learner; `td_learner` makes one from a TD error alone.
@@ -68,7 +58,7 @@ class Learner:
         needs_episode_end: It looks at whether a step is the last of an episode; colonies, where no
             ant knows that, refuse it.
         hyperparameters: What it has besides the settings of all learners: a dataclass whose fields
-            `whole_number` and `number` of `taichi_ants.learners` make, all with usual values.
+            `number` of `taichi_ants.learners` makes, all with usual values.
         memory: A function (hyperparameters, n_states) -> Memory, where a table has n_states rows.
         cost: A function (hyperparameters) -> float: the time of a step of one ant, in that of
             Q-learning. Launches of kernels are cut by it.
@@ -83,8 +73,8 @@ class Learner:
     plans: bool = False
     needs_episode_end: bool = False
     hyperparameters: type[Hyperparameters] = Hyperparameters
-    memory: Callable[[Any, int], Memory] = no_memory
-    cost: Callable[[Any], float] = usual_cost
+    memory: Callable[[Any, int], Memory] = lambda settings, n_states: Memory()
+    cost: Callable[[Any], float] = lambda settings: 1.0
     summary: str = ""
 
     def settings(self, config: TrainingConfig) -> Hyperparameters:
@@ -105,10 +95,8 @@ def td_learner(
         name: The name by which configurations call it.
         td_error: A `ti.func` (value, reward, discount, next_values, next_action, epsilon) -> float:
             the value of the state-action pair that is updated, the reward, the discount (0 where
-            the step terminated), the five action values of the next state, the next action and the
-            current epsilon; all f32 but next_action (i32). Python's max, min, sum and len work on
-            next_values, and next_values[a] takes any action a; all else is what Taichi allows in a
-            `ti.func`.
+            the step terminated), the vector of the five action values of the next state, the next
+            action and the current epsilon; all f32 but next_action (i32).
         draws_next_action: See `Learner`; only then may td_error look at next_action, which is 0 to
             4, and 0 where the step terminated.
         summary: One line for listings.
@@ -148,10 +136,10 @@ def register(learner: Learner) -> Learner:
     """Make a learner known by its name.
 
     Raises:
-        AntsError: The name is taken, or is not usable in files and on command lines; or a function
-            is no `ti.func`, does not take the arguments that it must take, or looks at a next
-            action that is not drawn; or a hyperparameter is called as a setting of all learners.
-            What the functions compute is tried when the learner is first used.
+        AntsError: The name is taken or no identifier; a function is no `ti.func`, has the wrong
+            arguments, or looks at a next action that is not drawn; or a hyperparameter is called
+            as a setting of all learners. What the functions compute is tried when the learner is
+            first used.
     """
     if not isinstance(learner, Learner):
         raise AntsError(f"{shown(learner)} is not a Learner; make one by td_learner(name, ...).")
@@ -169,13 +157,12 @@ def register(learner: Learner) -> Learner:
     if learner.td_error is not None:
         drawn = learner.draws_next_action and not learner.plans
         _check_td_error(name, learner.td_error, drawn)
-    taken = {field.name for field in fields(TrainingConfig)}
-    for field in fields(learner.hyperparameters):
-        if field.name in taken:
-            raise AntsError(
-                f"{field.name!r} is a setting of all learners; call this hyperparameter of "
-                f"{name!r} something else."
-            )
+    taken = {one.name for one in fields(TrainingConfig)}
+    for clash in taken & {one.name for one in fields(learner.hyperparameters)}:
+        raise AntsError(
+            f"{clash!r} is a setting of all learners; call this hyperparameter of {name!r} "
+            "something else."
+        )
     _LEARNERS[name] = learner
     return learner
 

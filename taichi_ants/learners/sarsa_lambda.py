@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import taichi as ti
 
-from taichi_ants.learners.hyperparameters import Hyperparameters, number, whole_number
+from taichi_ants.learners.hyperparameters import Hyperparameters, number
 from taichi_ants.learners.memory import discount_of
 from taichi_ants.learners.registry import Learner, Memory
 from taichi_ants.task.constants import ROW
@@ -18,7 +18,7 @@ class Traces(Hyperparameters):
     """
 
     trace_decay: float = number(0.9, 0, 1)
-    trace_length: int = whole_number(32, 1, 256)
+    trace_length: int = number(32, 1, 256)
 
 
 @ti.func

@@ -6,15 +6,38 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from taichi_ants.grid.constants import N_HEADINGS
+from taichi_ants.reference.ants import Ant, Event
 from taichi_ants.reference.geometry import Cell, neighbour
-from taichi_ants.reference.random_stream import hash_of, pick
-from taichi_ants.reference.records import Ant, Event
+from taichi_ants.reference.random_stream import RandomStream, hash_of, pick
 from taichi_ants.reference.world_state import WorldState
-from taichi_ants.task.constants import GIVE, N_ACTIONS, PICK_UP, SEES_EMPTY, SEES_GOAL, SEES_LURE
+from taichi_ants.task.constants import (
+    EMPTY,
+    GIVE,
+    N_ACTIONS,
+    PICK_UP,
+    SEES_EMPTY,
+    SEES_GOAL,
+    SEES_LURE,
+)
 
 if TYPE_CHECKING:
     from taichi_ants.task import Rewards
+
+
+def choose_action(values: Sequence[np.float32], epsilon: float, stream: RandomStream) -> int:
+    """With probability epsilon any action, else one with the largest of these 5 values.
+
+    It makes one draw: the high word decides whether to explore, the low word which action it is.
+    """
+    high, low = stream.draw()
+    if high < int(epsilon * 4294967296.0):
+        return pick(low, N_ACTIONS)
+    best_value = max(values)
+    best = [action for action in range(N_ACTIONS) if values[action] == best_value]
+    return best[pick(low, len(best))]
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,37 +63,31 @@ class Intent:
 
 
 def intend(ant: Ant, action: int) -> Intent:
-    """Return what the ant wants by an action, from its percept.
+    """What the ant wants by an action, from its percept.
 
     It draws from its stream where a pick-up has several foods to choose from.
     """
-    if not 0 <= action < N_ACTIONS:
-        raise AssertionError(f"there is no action {action}")
     codes = (ant.percept >> 4 & 3, ant.percept >> 2 & 3, ant.percept & 3)
     if action == GIVE:
         return Intent(ant, action, gives=ant.carries and SEES_GOAL in codes)
     if action == PICK_UP:
-        return _intend_pick_up(ant, codes)
+        foods = [side for side in range(3) if codes[side] == SEES_GOAL]
+        if ant.carries or not foods:
+            return Intent(ant, action)
+        side = foods[0]
+        if len(foods) > 1:
+            high, _ = ant.stream.draw()
+            side = foods[pick(high, len(foods))]
+        heading = (ant.heading + side - 1) % N_HEADINGS
+        return Intent(ant, action, heading, neighbour(ant.cell, heading))
     heading = (ant.heading + action - 1) % N_HEADINGS
     is_open = codes[action] in (SEES_EMPTY, SEES_LURE)
     target = neighbour(ant.cell, heading) if is_open else None
     return Intent(ant, action, heading, target, lured=codes[action] == SEES_LURE)
 
 
-def _intend_pick_up(ant: Ant, codes: tuple[int, int, int]) -> Intent:
-    foods = [side for side in range(3) if codes[side] == SEES_GOAL]
-    if ant.carries or not foods:
-        return Intent(ant, PICK_UP)
-    chosen = foods[0]
-    if len(foods) > 1:
-        high, _ = ant.stream.draw()
-        chosen = foods[pick(high, len(foods))]
-    heading = (ant.heading + chosen - 1) % N_HEADINGS
-    return Intent(ant, PICK_UP, heading, neighbour(ant.cell, heading))
-
-
 def winners(intents: Sequence[Intent], tick: int, index: Callable[[Cell], int]) -> set[int]:
-    """Return the slots of the ants that get the cell, or the food, that they want.
+    """The slots of the ants that get the cell, or the food, that they want.
 
     Of those that want one cell, it is the one whose own cell has the smallest hash with the tick;
     were two equal, the one with the smaller heading towards the cell. So neither numbers of ants
@@ -90,27 +107,12 @@ def winners(intents: Sequence[Intent], tick: int, index: Callable[[Cell], int]) 
     return {slot for _, _, slot in best.values()}
 
 
-def carry_out(
-    world: WorldState, intents: Sequence[Intent], tick: int, rewards: Rewards
-) -> list[Event]:
-    """Resolve the conflicts, let all ants act at once, and lay their trails.
+def carry_out(world: WorldState, intent: Intent, wins: bool, rewards: Rewards) -> Event:
+    """Let one ant act, and lay its trail: change it and the world.
 
-    Args:
-        world: Changed: foods taken, ants moved, trails laid.
-        intents: Of all living ants; the ants are changed: cell, heading, carries, action, reward.
-        tick: Its number in the episode, from 0.
-        rewards: What each event pays.
-
-    Returns:
-        What came of each intent.
+    All wishes are from the start of the tick, so no ant's deed can change another's; and no cell is
+    entered, emptied or marked by two.
     """
-    winning = winners(intents, tick, world.index)
-    # All wishes are from the start of the tick, so no ant's deed can change another's; and no cell
-    # is entered, emptied or marked by two.
-    return [_commit(world, intent, intent.ant.slot in winning, rewards) for intent in intents]
-
-
-def _commit(world: WorldState, intent: Intent, wins: bool, rewards: Rewards) -> Event:
     ant, target = intent.ant, intent.target
     ant.action, ant.reward = intent.action, rewards.failed
     if intent.action == GIVE:
@@ -122,7 +124,7 @@ def _commit(world: WorldState, intent: Intent, wins: bool, rewards: Rewards) -> 
     if intent.action == PICK_UP:
         if not wins or target is None:
             return Event.FAILED
-        world.take_food(target)
+        world.ground[target] = EMPTY
         world.trail.deposit(target)
         world.trail.deposit(ant.cell)
         ant.carries = True

@@ -4,31 +4,59 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from taichi_ants.errors import AntsError
-from taichi_ants.grid.constants import STREAM_ANT, STREAM_BORN, STREAM_QUEEN
-from taichi_ants.reference.actions import carry_out, intend
+from taichi_ants.errors import check_one_of
+from taichi_ants.grid.constants import (
+    N_HEADINGS,
+    STREAM_ANT,
+    STREAM_BORN,
+    STREAM_QUEEN,
+    STREAM_ROLLOUT,
+)
+from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.reference.actions import carry_out, choose_action, intend, winners
+from taichi_ants.reference.ants import Ant, Event, Transition, starts
+from taichi_ants.reference.geometry import neighbour
 from taichi_ants.reference.homes import Homes
 from taichi_ants.reference.learners import LEARNERS
-from taichi_ants.reference.life import Queen, grow_old
 from taichi_ants.reference.observations import OBSERVATIONS
-from taichi_ants.reference.policy import choose_action
-from taichi_ants.reference.random_stream import RandomStream, stream_state
-from taichi_ants.reference.records import Ant, EpisodeRecord, Event, Snapshot, Transition
+from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.reference.sharing import SHARING
-from taichi_ants.reference.start import start as start_of
 from taichi_ants.reference.vision import observe
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task import Task
-from taichi_ants.task.constants import PICK_UP
+from taichi_ants.task.constants import EMPTY, FOOD, PICK_UP
+from taichi_ants.worlds.world import World
 
-if TYPE_CHECKING:
-    from taichi_ants.learners.config import TrainingConfig
-    from taichi_ants.worlds.world import World
+
+@dataclass
+class EpisodeRecord:
+    """What happened in an episode so far.
+
+    Attributes:
+        episode_return: Sum of the rewards of all ants.
+        ticks: How many have passed.
+        deliveries: Foods given to the queen.
+        moves: Moves tried, 0..2 among the actions.
+        blocked: Moves that only turned the ant.
+        first_delivery: Ticks passed when the first food had been given; -1 if none was.
+        births, deaths: Of ants.
+        regrown: Foods that grew back.
+    """
+
+    episode_return: int = 0
+    ticks: int = 0
+    deliveries: int = 0
+    moves: int = 0
+    blocked: int = 0
+    first_delivery: int = -1
+    births: int = 0
+    deaths: int = 0
+    regrown: int = 0
 
 
 class ReferenceColony:
@@ -39,7 +67,8 @@ class ReferenceColony:
         ants: The living ants by slot.
         streams: Of the initial ants; they run on through all episodes.
         homes: The places of the foods of the start.
-        queen: Her store and her stream.
+        store: Foods that wait with the queen to become ants.
+        queen_stream: Her random stream, which runs on; food that wanders draws from it as well.
         minds: The tables; see `sharing`.
         epsilon: Of the present episode, float64.
         episode: Its number in the run, from 0; -1 before the first.
@@ -80,22 +109,23 @@ class ReferenceColony:
                 unknown, the learner cannot share a table, or the world has too few cells for the
                 ants.
         """
-        if sharing not in SHARING:
-            raise AntsError(f"sharing is {sharing!r}; it must be one of {', '.join(SHARING)}.")
         self._task = task = task or Task()
+        check_one_of("sharing", sharing, tuple(SHARING))
+        check_one_of("learner", training.learner, tuple(LEARNERS))
+        check_one_of("observation", task.observation, tuple(OBSERVATIONS))
         falls = (
             task.evaporation_in_evaluation if sharing == "fixed" else task.evaporation_in_training
         )
         self._pheromone = task.pheromone if falls else task.pheromone.lasting
-        self._observation = OBSERVATIONS[task.observation]
+        self._row = OBSERVATIONS[task.observation]
         self._start_world, self._training = world, training
         self._n_ants, self._ends_at_delivery = ants, ends_at_delivery
         self._slots = capacity or (2 * ants + 64 if task.life.births else ants)
         self._seed, self._sharing = seed, sharing
-        self._starts = start_of(world, seed, ants, start)
+        self._starts = starts(world, seed, ants, start)
         self.streams = [RandomStream(stream_state(seed, STREAM_ANT, n)) for n in range(ants)]
-        self.queen = Queen(RandomStream(stream_state(seed, STREAM_QUEEN, 0)))
-        make = partial(LEARNERS[training.learner], training, self._observation.n_states)
+        self.queen_stream = RandomStream(stream_state(seed, STREAM_QUEEN, 0))
+        make = partial(LEARNERS[training.learner], training, task.n_states)
         self.minds = SHARING[sharing](make, self._slots, q_values)
         self.epsilon = float(training.epsilon)
         self.episode = -1
@@ -106,7 +136,7 @@ class ReferenceColony:
         """Put everything that does not outlive an episode where it starts."""
         self.world = WorldState(self._start_world, self._pheromone)
         self.homes = Homes(self._start_world)
-        self.queen.store = 0
+        self.store = 0
         self.record = EpisodeRecord()
         self.over = False
         self.transitions: list[Transition] = []
@@ -120,10 +150,16 @@ class ReferenceColony:
         self.ants[ant.slot] = ant
         self.world.occupied.add(ant.cell)
 
+    @property
+    def q_values(self) -> np.ndarray:
+        """A copy of the table, float32 (n_states, 5), or of all, (slots, n_states, 5)."""
+        tables = np.array([learner.table() for learner in self.minds.tables])
+        return tables if self._sharing == "own" else tables[0]
+
     def look(self, ant: Ant) -> None:
         """Let an ant see what is around it now."""
         ant.percept = observe(self.world, ant)
-        ant.state = self._observation.row(self.world, ant)
+        ant.state = self._row(self.world, ant)
 
     def begin_episode(self) -> None:
         """Start an episode from the world; tables, models, streams and epsilon go on."""
@@ -132,12 +168,11 @@ class ReferenceColony:
         for learner in self.minds.tables:
             learner.begin()
 
-    def end_episode(self) -> EpisodeRecord:
-        """End the episode: epsilon decays. Returns its record."""
+    def end_episode(self) -> None:
+        """End the episode: epsilon decays."""
         decayed = self.epsilon * float(self._training.epsilon_decay)
         self.epsilon = max(float(self._training.min_epsilon), decayed)
         self.records.append(self.record)
-        return self.record
 
     def run_episode(self, ticks: int) -> Iterator[list[Transition]]:
         """Run an episode of so many ticks, fewer where it ends at a delivery.
@@ -151,39 +186,38 @@ class ReferenceColony:
             yield self.transitions
         self.end_episode()
 
-    def run(self, episodes: int, ticks: int) -> list[EpisodeRecord]:
-        """Run episodes; see `run_episode`. Returns the records of these episodes."""
-        for _ in range(episodes):
-            for _ in self.run_episode(ticks):
-                pass
-        return self.records[len(self.records) - episodes :]
+    def run(self, episodes: int, ticks: int) -> list[Transition]:
+        """Run episodes, see `run_episode`; all of their transitions."""
+        ticked = (steps for _ in range(episodes) for steps in self.run_episode(ticks))
+        return [step for steps in ticked for step in steps]
 
     def tick(self, last: bool = False) -> None:
-        """Let one tick pass for all.
-
-        Args:
-            last: Whether the episode ends with it.
-        """
+        """Let one tick pass for all; `last` tells whether the episode ends with it."""
         if self.episode < 0 or self.over:
             raise AssertionError("there is no episode to go on with; begin one")
         tick = self.record.ticks
         acting = [self.ants[slot] for slot in sorted(self.ants)]
         before = [copy.copy(ant) for ant in acting]
         intents = [intend(ant, self._choose(ant)) for ant in acting]
-        events = carry_out(self.world, intents, tick, self._task.rewards)
+        winning = winners(intents, tick, self.world.index)
+        events = [
+            carry_out(self.world, intent, intent.ant.slot in winning, self._task.rewards)
+            for intent in intents
+        ]
         for intent, event in zip(intents, events, strict=True):
             if event is Event.PICKED_UP and intent.target is not None:
                 self.homes.taken(intent.target, tick)
         self.world.trail.tick()
         self._count(acting, events)
-        self._births(events.count(Event.DELIVERED))
+        if self._task.life.births:
+            self.store += events.count(Event.DELIVERED)
+            self._births()
         dying = self._deaths(acting)
         self._food(tick)
         for ant in [*self.ants.values(), *dying]:
             self.look(ant)
         self.over = self._ends_at_delivery and self.record.deliveries > 0
         self._learn(before, acting, events, last or self.over)
-        self.record.living_per_tick.append(len(self.ants))
         self.record.ticks += 1
 
     def _choose(self, ant: Ant) -> int:
@@ -196,33 +230,47 @@ class ReferenceColony:
 
     def _count(self, acting: Sequence[Ant], events: Sequence[Event]) -> None:
         record = self.record
-        gives = events.count(Event.DELIVERED)
         record.episode_return += sum(ant.reward for ant in acting)
         record.moves += sum(ant.action < PICK_UP for ant in acting)
         record.blocked += events.count(Event.BLOCKED)
-        record.deliveries += gives
-        record.deliveries_per_tick.append(gives)
-        if gives and record.first_delivery < 0:
+        record.deliveries += events.count(Event.DELIVERED)
+        if record.deliveries and record.first_delivery < 0:
             record.first_delivery = record.ticks + 1
 
-    def _births(self, gives: int) -> None:
-        if not self._task.life.births:
-            return
-        self.queen.store += gives
-        free_slots = [slot for slot in range(self._slots) if slot not in self.ants]
-        # The slots first: where they end, no further place is asked for, and so none is drawn.
-        for slot, (cell, heading) in zip(free_slots, self.queen.places(self.world), strict=False):
+    def _births(self) -> None:
+        """Let the queen turn food into ants that face away from her, while slots and cells last."""
+        free_slots = (slot for slot in range(self._slots) if slot not in self.ants)
+        while self.store > 0:
+            around = [neighbour(self.world.queen, heading) for heading in range(N_HEADINGS)]
+            free = [h for h in range(N_HEADINGS) if self.world.content(around[h]) == EMPTY]
+            slot = next(free_slots, None)
+            if slot is None or not free:
+                return
+            high, _ = self.queen_stream.draw()
+            heading = free[pick(high, len(free))]
             number = self._n_ants + self.record.births
             state = stream_state(self._seed, STREAM_BORN, (self.episode << 32) + number)
-            self._add(Ant(cell, heading, slot=slot, number=number, stream=RandomStream(state)))
+            stream = RandomStream(state)
+            self._add(Ant(around[heading], heading, slot=slot, number=number, stream=stream))
             self.minds.born(slot)
+            self.store -= 1
             self.record.births += 1
 
-    def _deaths(self, ants: Sequence[Ant]) -> list[Ant]:
-        if self._task.life.lifespan is None:
+    def _deaths(self, acting: Sequence[Ant]) -> list[Ant]:
+        """Take out the ants that die of age; they observe and learn once more.
+
+        A dying ant leaves the food that it carries on its cell.
+        """
+        lifespan = self._task.life.lifespan
+        if lifespan is None:
             return []
-        dying = grow_old(self.world, ants, self._task.life.lifespan)
+        for ant in acting:
+            ant.age += 1
+        dying = [ant for ant in acting if ant.age >= lifespan]
         for ant in dying:
+            self.world.occupied.remove(ant.cell)
+            if ant.carries:
+                self.world.ground[ant.cell] = FOOD
             del self.ants[ant.slot]
         self.record.deaths += len(dying)
         return dying
@@ -232,7 +280,7 @@ class ReferenceColony:
         if life.regrowth is not None:
             self.record.regrown += self.homes.regrow(self.world, life.regrowth, tick)
         if life.wander is not None and (tick + 1) % life.wander == 0:
-            self.homes.wander(self.world, self.queen.stream)
+            self.homes.wander(self.world, self.queen_stream)
 
     def _learn(
         self, before: Sequence[Ant], after: Sequence[Ant], events: Sequence[Event], last: bool
@@ -256,8 +304,6 @@ class ReferenceColony:
                     action=ant.action,
                     reward=ant.reward,
                     event=event,
-                    next_cell=ant.cell,
-                    next_heading=ant.heading,
                     next_state=ant.state,
                     next_action=ant.chosen,
                     terminated=terminated,
@@ -265,24 +311,33 @@ class ReferenceColony:
                 )
             )
         self.minds.learn(self.transitions, [ant.stream for ant in after], self.epsilon)
-        for step, ant in zip(self.transitions, after, strict=True):
-            step.rng_state = ant.stream.state
 
-    def snapshot(self) -> Snapshot:
-        """Return a copy of all that the colony is between two ticks."""
-        tables = np.array([learner.table() for learner in self.minds.tables])
-        return Snapshot(
-            ants={slot: copy.deepcopy(self.ants[slot]) for slot in sorted(self.ants)},
-            ground=dict(self.world.ground),
-            levels=self.world.levels(),
-            homes=[(home.cell, home.waiting_since) for home in self.homes.homes],
-            store=self.queen.store,
-            queen_rng_state=self.queen.stream.state,
-            q_values=tables if self._sharing == "own" else tables[0],
-            models=[
-                [(*pair, *seen.outcome) for pair, seen in learner.model.items()]
-                for learner in self.minds.tables
-            ],
-            epsilon=self.epsilon,
-            record=copy.deepcopy(self.record),
-        )
+
+def beginner(
+    world: World, config: TrainingConfig, seed: int, task: Task | None = None
+) -> ReferenceColony:
+    """One ant, before its training.
+
+    Of the world's listed ants it is the first; if there is none, it is placed by the seed.
+    """
+    return ReferenceColony(world, task, config, seed, ends_at_delivery=True, sharing="own")
+
+
+def follower(
+    world: World,
+    q_values: np.ndarray,
+    seed: int = 0,
+    number: int = 0,
+    task: Task | None = None,
+    epsilon: float = 0.0,
+) -> ReferenceColony:
+    """One ant that goes by a table (n_states, 5), before its episode.
+
+    `number` tells which rollout of the seed it is; each has a random stream of its own.
+    """
+    training = TrainingConfig("q_learning", 1.0, 1.0, epsilon, 1.0)
+    colony = ReferenceColony(
+        world, task, training, seed, ends_at_delivery=True, sharing="fixed", q_values=q_values
+    )
+    colony.streams[0] = RandomStream(stream_state(seed, STREAM_ROLLOUT, number))
+    return colony

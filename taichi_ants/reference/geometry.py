@@ -14,31 +14,26 @@ Cell = tuple[int, int, int]
 
 
 def normal_form(x: int, y: int, z: int) -> Cell:
-    """Return the representative of the cell (x, y, z) whose smallest coordinate is 0."""
+    """The representative of the cell (x, y, z) whose smallest coordinate is 0."""
     low = min(x, y, z)
     return (x - low, y - low, z - low)
 
 
 def neighbour(cell: Cell, heading: int) -> Cell:
-    """Return the cell one step from `cell`; a heading outside 0..5 is taken modulo 6."""
+    """The cell one step from `cell`; a heading outside 0..5 is taken modulo 6."""
     x, y, z = cell
     dx, dy, dz = HEADING_STEPS[heading % N_HEADINGS]
     return normal_form(x + dx, y + dy, z + dz)
 
 
 def distance(a: Cell, b: Cell) -> int:
-    """Return the number of steps from `a` to `b` on a grid without obstacles."""
+    """The number of steps from `a` to `b` on a grid without obstacles."""
     # Each step along one axis, or along two at once, lowers the largest coordinate by one.
     return max(normal_form(a[0] - b[0], a[1] - b[1], a[2] - b[2]))
 
 
-def exists(cell: Cell, ranges: tuple[int, int, int]) -> bool:
-    """Tell whether a world of these ranges has `cell`, given in normal form."""
-    return cell[0] < ranges[0] and cell[1] < ranges[1] and cell[2] < ranges[2]
-
-
 def existing_cells(ranges: tuple[int, int, int]) -> list[Cell]:
-    """Return all cells of a world of these ranges in lexicographic order of (x, y, z)."""
+    """All cells of a world of these ranges in lexicographic order of (x, y, z)."""
     size_x, size_y, size_z = ranges
     cells = {(0, y, z) for y in range(size_y) for z in range(size_z)}
     cells |= {(x, 0, z) for x in range(size_x) for z in range(size_z)}
@@ -47,5 +42,5 @@ def existing_cells(ranges: tuple[int, int, int]) -> list[Cell]:
 
 
 def listed_cells(rows: np.ndarray) -> list[Cell]:
-    """Return the cells that a world lists; int (n, 3), each row in normal form."""
+    """The cells that a world lists; int (n, 3), each row in normal form."""
     return [(x, y, z) for x, y, z in rows.tolist()]

@@ -9,7 +9,7 @@ from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
 from taichi_ants.reference.geometry import Cell, listed_cells, neighbour
 from taichi_ants.reference.random_stream import RandomStream, pick
 from taichi_ants.reference.world_state import WorldState
-from taichi_ants.task.constants import EMPTY, OBSTACLE, QUEEN
+from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
 if TYPE_CHECKING:
     from taichi_ants.worlds.world import World
@@ -59,7 +59,7 @@ class Homes:
             since = home.waiting_since
             if since is None or tick < since + delay or world.content(home.cell) != EMPTY:
                 continue
-            world.put_food(home.cell)
+            world.ground[home.cell] = FOOD
             home.waiting_since = None
             regrown += 1
         return regrown
@@ -80,13 +80,13 @@ class Homes:
                     if world.ground.get(ahead, OBSTACLE) not in (OBSTACLE, QUEEN):
                         home.cell = ahead
                 elif world.content(ahead) == EMPTY:
-                    world.take_food(home.cell)
-                    world.put_food(ahead)
+                    world.ground[home.cell] = EMPTY
+                    world.ground[ahead] = FOOD
                     home.cell = ahead
 
 
 def _connected(homes: list[Home]) -> list[list[Home]]:
-    """Return the piles: the homes that hang together, in the order of the first home of each."""
+    """The piles: the homes that hang together, in the order of the first home of each."""
     missing = {home.cell: home for home in homes}
     piles = []
     for home in homes:
@@ -101,7 +101,7 @@ def _connected(homes: list[Home]) -> list[list[Home]]:
 
 
 def _front_first(pile: list[Home], heading: int) -> list[Home]:
-    """Return the homes of a pile, the foremost in the direction of `heading` first."""
+    """The homes of a pile, the foremost in the direction of `heading` first."""
     step_q, step_r = _axial(HEADING_STEPS[heading])
 
     def progress(home: Home) -> int:

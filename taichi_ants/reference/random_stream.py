@@ -19,7 +19,7 @@ def _mix(z: int) -> int:
 
 
 def hash_of(*numbers: int) -> int:
-    """Return a hash of integers, in their order, in 0 .. 2**64 - 1; each is taken modulo 2**64."""
+    """A hash of integers, in their order, in 0 .. 2**64 - 1; each is taken modulo 2**64."""
     state = 0
     for number in numbers:
         state = _mix(((state ^ number) + _GAMMA) & _MASK_64)
@@ -27,28 +27,18 @@ def hash_of(*numbers: int) -> int:
 
 
 def stream_state(seed: int, purpose: int, number: int) -> int:
-    """Return the first state of a stream, in 0 .. 2**64 - 1.
-
-    Args:
-        seed: The seed of the run, any integer, taken modulo 2**64.
-        purpose: What the stream is for, one of the constants STREAM_*.
-        number: Which of the streams of that purpose, for example the number of the ant.
-    """
+    """The first state of a stream; the purpose is one of the constants STREAM_*."""
     return hash_of(seed, purpose, number)
 
 
 @dataclass(slots=True)
 class RandomStream:
-    """A stream of draws, each of two independent 32-bit words.
-
-    Attributes:
-        state: All that the stream is, in 0 .. 2**64 - 1; a stream made from it goes on from here.
-    """
+    """A stream of draws; its state, in 0 .. 2**64 - 1, is all that it is."""
 
     state: int
 
     def draw(self) -> tuple[int, int]:
-        """Return the high and the low word of the next draw, each in 0 .. 2**32 - 1."""
+        """The high and the low word of the next draw, each in 0 .. 2**32 - 1."""
         self.state = (self.state + _GAMMA) & _MASK_64
         bits = _mix(self.state)
         return bits >> 32, bits & _MASK_32

@@ -9,10 +9,9 @@ import numpy as np
 
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.config import update_weights
-from taichi_ants.reference.learners import Learner
-from taichi_ants.reference.learners.dyna_q import DynaQ
+from taichi_ants.reference.ants import Pair, Transition
+from taichi_ants.reference.learners import DynaQ, Learner
 from taichi_ants.reference.random_stream import RandomStream
-from taichi_ants.reference.records import Pair, Transition
 
 # A table (n_states, 5), or None for zeros -> a learner that begins with a copy of it.
 Make = Callable[[np.ndarray | None], Learner]
@@ -31,11 +30,10 @@ class FixedTable:
     draws_next_action = False
 
     def __init__(self, make: Make, slots: int, q_values: np.ndarray | None) -> None:
-        """Begin with copies of a table (n_states, 5); zeros if not given."""
         self.tables = [make(q_values)]
 
     def of(self, slot: int) -> Learner:
-        """Return the learner of the ant in a slot."""
+        """The learner of the ant in a slot."""
         return self.tables[0]
 
     def born(self, slot: int) -> None:
@@ -44,12 +42,9 @@ class FixedTable:
     def learn(
         self, steps: Sequence[Transition], streams: Sequence[RandomStream], epsilon: float
     ) -> None:
-        """Learn from the transitions of a tick, and note in each its TD error.
+        """Learn from all transitions of a tick, and note in each its TD error.
 
-        Args:
-            steps: Of all ants that acted, in any order.
-            streams: Of each of these ants, for what learners draw.
-            epsilon: Of the policy.
+        `streams` are those of the ants, for what learners draw.
         """
 
 
@@ -63,11 +58,6 @@ class SharedTable(FixedTable):
     """
 
     def __init__(self, make: Make, slots: int, q_values: np.ndarray | None) -> None:
-        """See `FixedTable`.
-
-        Raises:
-            AntsError: The learner needs a table for itself.
-        """
         super().__init__(make, slots, q_values)
         [self._common] = self.tables
         if not self._common.shares:
@@ -81,7 +71,6 @@ class SharedTable(FixedTable):
     def learn(
         self, steps: Sequence[Transition], streams: Sequence[RandomStream], epsilon: float
     ) -> None:
-        """See `FixedTable.learn`."""
         for step, error in zip(steps, self._update(steps, epsilon), strict=True):
             step.td_error = error
         if isinstance(self._common, DynaQ):
@@ -103,7 +92,7 @@ class SharedTable(FixedTable):
 
 
 def mean_error(errors: Sequence[np.float32]) -> np.float32:
-    """Return the mean of TD errors, each rounded to a multiple of 2**-32, rounded once at the end.
+    """The mean of TD errors, each rounded to a multiple of 2**-32, rounded once at the end.
 
     The sum must fit into a signed 64-bit integer.
     """
@@ -117,7 +106,6 @@ class OwnTables(FixedTable):
     """A table for each slot, into which the ant in it learns as if alone."""
 
     def __init__(self, make: Make, slots: int, q_values: np.ndarray | None) -> None:
-        """See `FixedTable`; `q_values` may also be (slots, n_states, 5)."""
         if q_values is None or q_values.ndim == 2:
             self.tables = [make(q_values) for _ in range(slots)]
         else:
@@ -126,17 +114,14 @@ class OwnTables(FixedTable):
         self.draws_next_action = self.tables[0].draws_next_action
 
     def of(self, slot: int) -> Learner:
-        """See `FixedTable.of`."""
         return self.tables[slot]
 
     def born(self, slot: int) -> None:
-        """Let the ant that was born into a slot begin with zeros and without memories."""
-        self.tables[slot] = self._make(None)
+        self.tables[slot] = self._make(None)  # zeros, and no memories
 
     def learn(
         self, steps: Sequence[Transition], streams: Sequence[RandomStream], epsilon: float
     ) -> None:
-        """See `FixedTable.learn`."""
         for step, stream in zip(steps, streams, strict=True):
             step.td_error = self.tables[step.slot].learn(step, epsilon, stream)
 

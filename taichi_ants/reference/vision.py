@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.geometry import Cell, distance, neighbour
-from taichi_ants.reference.records import Ant
-from taichi_ants.reference.world_state import Level, WorldState
+from taichi_ants.reference.trail import Level
+from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task.constants import (
     EMPTY,
     FOOD,
@@ -19,12 +20,12 @@ AHEAD = (-1, 0, 1)  # headings relative to the ant's: left, forward, right
 
 
 def cells_in_view(ant: Ant, turns: tuple[int, ...] = AHEAD) -> list[Cell]:
-    """Return the cells at these headings relative to the ant's."""
+    """The cells at these headings relative to the ant's."""
     return [neighbour(ant.cell, ant.heading + turn) for turn in turns]
 
 
 def levels_in_view(world: WorldState, ant: Ant, turns: tuple[int, ...] = AHEAD) -> list[Level]:
-    """Return the trail that can be seen of each cell: that of empty cells; 0 of all others."""
+    """The trail that can be seen of each cell: that of empty cells; 0 of all others."""
     # A trail on food, or on the queen's cell, is not seen and does not count for the strongest.
     return [
         world.level(cell) if world.content(cell) == EMPTY else 0
@@ -33,7 +34,7 @@ def levels_in_view(world: WorldState, ant: Ant, turns: tuple[int, ...] = AHEAD) 
 
 
 def codes_in_view(world: WorldState, ant: Ant, turns: tuple[int, ...] = AHEAD) -> list[int]:
-    """Return what each cell looks like, SEES_EMPTY, SEES_OBSTACLE, SEES_LURE or SEES_GOAL."""
+    """What each cell looks like, SEES_EMPTY, SEES_OBSTACLE, SEES_LURE or SEES_GOAL."""
     strongest = 0 if ant.carries else max(levels_in_view(world, ant))  # of the cells ahead, always
     return [_code(world, ant, cell, strongest) for cell in cells_in_view(ant, turns)]
 
@@ -53,6 +54,6 @@ def _code(world: WorldState, ant: Ant, cell: Cell, strongest: Level) -> int:
 
 
 def observe(world: WorldState, ant: Ant) -> int:
-    """Return the percept, the paper's state: load, left, forward, right as a number, 0..127."""
+    """The percept, the paper's state: load, left, forward, right as a number, 0..127."""
     left, forward, right = codes_in_view(world, ant)
     return 64 * ant.carries + 16 * left + 4 * forward + right

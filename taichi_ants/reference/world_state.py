@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from taichi_ants.reference.geometry import Cell, existing_cells, listed_cells
-from taichi_ants.reference.trail import make_trail
+from taichi_ants.reference.trail import Level, Trail
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
 if TYPE_CHECKING:
     from taichi_ants.task import Pheromone
     from taichi_ants.worlds.world import World
-
-
-Level = int | np.float32  # of a trail; see `trail`
 
 
 class WorldState:
@@ -36,24 +31,20 @@ class WorldState:
         self.ground.update(dict.fromkeys(listed_cells(world.foods), FOOD))
         self.ground.update(dict.fromkeys(listed_cells(world.obstacles), OBSTACLE))
         self.occupied: set[Cell] = set()
-        self.trail = make_trail(world, pheromone)
+        self.trail = Trail(world, pheromone)
 
     def content(self, cell: Cell) -> int:
-        """Return what a cell looks like: the ground, or an OBSTACLE where an ant stands."""
+        """What a cell looks like: the ground, or an OBSTACLE where an ant stands."""
         if cell in self.occupied:
             return OBSTACLE
         return self.ground.get(cell, OBSTACLE)
 
     def level(self, cell: Cell) -> Level:
-        """Return the trail level of a cell now."""
+        """The trail level of a cell now."""
         return self.trail.level(cell)
 
-    def levels(self) -> dict[Cell, Level]:
-        """Return the trail level of every existing cell."""
-        return {cell: self.trail.level(cell) for cell in self.ground}
-
     def index(self, cell: Cell) -> int:
-        """Return the number of a cell in the flat array with a border of one void cell.
+        """The number of a cell in the flat array with a border of one void cell.
 
         The array holds q = x - z from -Z to X and r = y - z from -Z to Y, row by row (r).
         """
@@ -61,15 +52,3 @@ class WorldState:
         x, y, z = cell
         width = size_x + size_z + 1
         return (y - z + size_z) * width + (x - z + size_z)
-
-    def take_food(self, cell: Cell) -> None:
-        """Empty a cell that holds food."""
-        if self.ground[cell] != FOOD:
-            raise AssertionError(f"there is no food at {cell}")
-        self.ground[cell] = EMPTY
-
-    def put_food(self, cell: Cell) -> None:
-        """Lay food on an empty cell."""
-        if self.content(cell) != EMPTY:
-            raise AssertionError(f"{cell} is not empty")
-        self.ground[cell] = FOOD

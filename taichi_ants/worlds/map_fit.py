@@ -30,21 +30,17 @@ def smallest_world(axials: np.ndarray) -> tuple[tuple[int, int, int], tuple[int,
     q_min, q_max = int(q.min()), int(q.max())
     r_min, r_max = int(r.min()), int(r.max())
     d_min, d_max = int((q - r).min()), int((q - r).max())
-    q_width, r_width, d_width = q_max - q_min, r_max - r_min, d_max - d_min
 
     total = max(q_max - r_min - d_min, d_max - q_min + r_max)
-    caps = (total - r_width, total - q_width, total - d_width)
-    fits = (_filled(total, caps, order) for order in permutations(range(3)))
+    most = (total - (r_max - r_min), total - (q_max - q_min), total - (d_max - d_min))
+    fits = []
+    for order in permutations(range(3)):
+        sizes = [0, 0, 0]
+        for place in order:
+            sizes[place] = min(most[place], total - sum(sizes))
+        fits.append(sizes)
     a, b, c = max(fits, key=lambda fit: (sum(n * n for n in fit), fit))
 
     q_origin = max(q_max - a, d_max - a + r_max - b)
     r_origin = max(r_max - b, q_origin - d_min - b)
     return (a + 1, b + 1, c + 1), (q_origin, r_origin)
-
-
-def _filled(total: int, caps: tuple[int, int, int], order: tuple[int, ...]) -> tuple[int, int, int]:
-    """`total` shared out to three numbers, each up to its cap, in the given order."""
-    shares = [0, 0, 0]
-    for place in order:
-        shares[place] = min(caps[place], total - sum(shares))
-    return shares[0], shares[1], shares[2]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from numbers import Real
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +14,6 @@ from taichi_ants.grid.randomness import Stream, choose
 from taichi_ants.worlds.validation import parse_ranges
 from taichi_ants.worlds.world import World
 
-SMALLEST_RANGE, LARGEST_RANGE = 10, 100  # of ranges that are drawn
 CLEARING_RADIUS = 3
 MAX_SHARE = 0.9  # of the cells, rocks and single foods together
 MAX_DRAWS = 100
@@ -60,8 +61,9 @@ def open_world(
         )
     given = None if ranges is None else parse_ranges(ranges)
     for attempt in range(MAX_DRAWS):
-        world_ranges = given or _draw_ranges(Stream(seed, _STREAM_RANGES, attempt))
-        world = _draw(world_ranges, rock_share, food_share, seed, attempt)
+        words = Stream(seed, _STREAM_RANGES, attempt).bits(3) >> np.uint64(32)
+        grid = AxialGrid(given or parse_ranges(10 + choose(words, 91)))  # from 10 to 100
+        world = _draw(grid, rock_share, food_share, seed, attempt)
         if world.reachable_foods().any():
             return world
     raise AntsError(
@@ -71,30 +73,20 @@ def open_world(
     )
 
 
-def _share(name: str, value: object) -> float:
-    try:
-        share = float(value)  # type: ignore[arg-type]
-    except (OverflowError, TypeError, ValueError):
-        share = np.nan
-    if isinstance(value, (bool, str)) or not 0 <= share <= MAX_SHARE:
+def _share(name: str, value: Any) -> float:
+    number = isinstance(value, Real) and not isinstance(value, bool)
+    if not (number and 0 <= value <= MAX_SHARE):
         raise AntsError(f"{name} is {shown(value)}; it must be a number between 0 and {MAX_SHARE}.")
-    return share
+    return float(value)
 
 
-def _draw_ranges(stream: Stream) -> tuple[int, int, int]:
-    drawn = SMALLEST_RANGE + stream.below(LARGEST_RANGE - SMALLEST_RANGE + 1, 3)
-    x, y, z = drawn.tolist()
-    return x, y, z
-
-
-def _draw(
-    ranges: tuple[int, int, int], rock_share: float, food_share: float, seed: int, attempt: int
-) -> World:
+def _draw(grid: AxialGrid, rock_share: float, food_share: float, seed: int, attempt: int) -> World:
     """One world, whether or not its food can be reached."""
-    grid = AxialGrid(ranges)
     rocks = scatter_rocks(grid, rock_share, Stream(seed, _STREAM_ROCKS, attempt))
     food = np.zeros(grid.size, dtype=bool)
-    food[_pile_cells(grid)] = True
+    ranges = np.array(grid.ranges)
+    _, piles = _hexagons(grid, np.diag(3 * ranges // 4), np.maximum(1, ranges // 16))
+    food[piles] = True
     rocks &= ~food
     _, clearing = _hexagons(grid, np.array([_QUEEN]), np.array([CLEARING_RADIUS]))
     rocks[clearing] = False
@@ -109,7 +101,7 @@ def _draw(
         words = Stream(seed, _STREAM_FOOD, attempt).bits(len(places))
         food[places[np.argpartition(words, singles - 1)[:singles]]] = True
     return World(
-        ranges,
+        grid.ranges,
         _QUEEN,
         foods=grid.cells(np.flatnonzero(food)),
         obstacles=grid.cells(np.flatnonzero(rocks)),
@@ -143,22 +135,10 @@ def scatter_rocks(grid: AxialGrid, share: float, stream: Stream) -> np.ndarray:
     return covered
 
 
-def _pile_cells(grid: AxialGrid) -> np.ndarray:
-    """Flat indices of the three piles' cells."""
-    ranges = np.array(grid.ranges)
-    _, cell = _hexagons(grid, np.diag(3 * ranges // 4), np.maximum(1, ranges // 16))
-    return cell
-
-
 def _hexagons(
     grid: AxialGrid, centres: np.ndarray, radii: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The existing cells of hexagons.
-
-    Args:
-        grid: The world's grid.
-        centres: Cells (n, 3) in any form.
-        radii: int64 (n,), in steps.
+    """The existing cells of hexagons around cells (n, 3) with radii (n,) in steps.
 
     Returns:
         (hexagon, cell): for each covered cell the hexagon's place in `centres`, ascending, and the

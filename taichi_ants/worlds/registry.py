@@ -5,10 +5,9 @@ from __future__ import annotations
 import inspect
 import os
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
-from taichi_ants.errors import AntsError, shown, whole
+from taichi_ants.errors import AntsError, expect, shown, whole
 from taichi_ants.worlds.text_map import load_map
 from taichi_ants.worlds.world import World
 
@@ -73,44 +72,28 @@ def build(name_or_path: str | os.PathLike[str], seed: int = 0, **given: Any) -> 
         AntsError: There is neither such a name nor such a file, or building fails.
     """
     seed = whole("seed", seed)
+    expect("the world", name_or_path, str, os.PathLike)
     allowed = settings(name_or_path) if isinstance(name_or_path, str) else ()
     for name in given:
         if name not in allowed:
             has = f"it has {', '.join(allowed)}" if allowed else "it has none"
             raise AntsError(f"{name} is no setting of the world {shown(name_or_path)}; {has}.")
-    if isinstance(name_or_path, str) and name_or_path in _BUILDERS:
-        world = _build(name_or_path, seed, given)
-        if not isinstance(world, World):
-            raise AntsError(
-                f"the builder of {shown(name_or_path)} returned a {type(world).__name__}; "
-                "it must return a World."
-            )
-        return world
-    if not isinstance(name_or_path, (str, os.PathLike)):
-        raise AntsError(f"the world is {shown(name_or_path)}; {_known()}")
-    if isinstance(name_or_path, str) and not _looks_like_a_path(name_or_path):
-        raise AntsError(f"there is no world named {shown(name_or_path)}; {_known()}")
-    return load_map(name_or_path)
-
-
-def _build(name: str, seed: int, given: dict[str, Any]) -> object:
+    if name_or_path not in _BUILDERS:
+        if os.path.exists(name_or_path):
+            return load_map(name_or_path)
+        known = ", ".join(names())
+        raise AntsError(
+            f"there is no world named {shown(os.fspath(name_or_path))} and no such file; choose "
+            f"one of {known}, or give the path of a map file."
+        )
     try:
-        return _BUILDERS[name](seed, **given)
+        world = _BUILDERS[str(name_or_path)](seed, **given)
     except AntsError:
         raise
     except Exception as error:
         reason = " ".join(f"{type(error).__name__}: {error}".split())
-        raise AntsError(f"the builder of {shown(name)} failed with {reason}; mend it.") from error
-
-
-def _known() -> str:
-    return f"choose one of {', '.join(names())}, or give the path of a map file."
-
-
-def _looks_like_a_path(text: str) -> bool:
-    """Whether a file, rather than a registered name, was probably meant."""
-    try:
-        path = Path(text)
-        return bool(text) and (path.exists() or len(path.parts) > 1 or bool(path.suffix))
-    except (OSError, ValueError):
-        return False
+        raise AntsError(
+            f"the builder of {shown(name_or_path)} failed with {reason}; mend it."
+        ) from error
+    expect(f"what the builder of {shown(name_or_path)} returns", world, World)
+    return world

@@ -9,48 +9,48 @@ line are four columns apart, and neighbouring lines are offset by two.
     t  trail                            (blanks are no cells)
 
 Lines that start with `;` are comments. Above the drawing may stand `trail = 25`, the level of all
-trails, and `ants = 2 0 1`, the numbers of the ants in reading order, if these are not 0, 1, 2.
+trails. Ants are numbered in reading order.
 """
 
 from __future__ import annotations
 
 import os
+import re
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, shown
+from taichi_ants.errors import AntsError, expect, shown
 from taichi_ants.grid.hexgrid import AxialGrid, cube
-from taichi_ants.worlds import drawing as marks
+from taichi_ants.task.constants import MAX_TRAIL_LEVEL
 from taichi_ants.worlds.map_fit import smallest_world
 from taichi_ants.worlds.world import World
 
 DEFAULT_TRAIL_LEVEL = 25
 MAX_MAP_CHARACTERS = 1 << 22
+EMPTY, OBSTACLE, FOOD, QUEEN, TRAIL = ".#FQt"
+ANTS = "012345"  # by heading
+ANTS_ON_TRAIL = "abcdef"
+
+_CELLS = {EMPTY, OBSTACLE, FOOD, QUEEN, TRAIL, *ANTS, *ANTS_ON_TRAIL}
+_ALLOWED = ". # F Q t, 0 to 5, a to f and blanks"
+_SETTING = re.compile(r"\s*([A-Za-z]\w*)\s*=(.*)")
 
 
 def load_map(path: str | os.PathLike[str]) -> World:
     """The world drawn in a text file (UTF-8), see `from_text`.
 
     Raises:
-        AntsError: The file is missing, unreadable, too large or not text, or its map is damaged.
+        AntsError: The file cannot be read, or its map is damaged.
     """
     try:
-        file = Path(path)
-        if not file.is_file():
-            # Devices and pipes may never end, so they are no map files either.
-            what = "is no ordinary file" if file.exists() else "does not exist"
-            raise AntsError(f"{file} {what}; give the path of a map file.")
-        if file.stat().st_size > MAX_MAP_CHARACTERS:
-            raise AntsError(_too_long(str(file), file.stat().st_size))
-        text = file.read_bytes().decode("utf-8")
-    except UnicodeDecodeError:
-        raise AntsError(f"{path} is no text file; give the path of a map file.") from None
-    except (OSError, TypeError) as error:
+        text = Path(path).read_text("utf-8")
+    except (OSError, TypeError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise AntsError(f"the map file {shown(path)} cannot be read: {reason}.") from None
-    if "\0" in text:
-        raise AntsError(f"{path} is no text file; give the path of a map file.")
+        raise AntsError(
+            f"the map file {shown(path)} cannot be read: {reason}; give the path of a text file."
+        ) from None
     return from_text(text, str(path))
 
 
@@ -58,7 +58,7 @@ def from_text(text: str, source: str = "the map") -> World:
     """The world drawn in `text`, in the form that the module's docstring describes.
 
     The ranges are those of the smallest world that holds the drawn cells; cells of it that are not
-    drawn become obstacles. Ants are numbered in reading order unless the map says otherwise.
+    drawn become obstacles.
 
     Args:
         text: The map, at most `MAX_MAP_CHARACTERS` characters.
@@ -70,107 +70,148 @@ def from_text(text: str, source: str = "the map") -> World:
     if not isinstance(text, str):
         raise AntsError(f"{source} is {type(text).__name__}; it must be text.")
     if len(text) > MAX_MAP_CHARACTERS:
-        raise AntsError(_too_long(source, len(text)))
+        raise AntsError(_too_long(source))
     text = text.removeprefix("\ufeff")  # the byte-order mark with which some editors begin a file
-    settings, drawing = marks.read(text, source)
-    axials = drawing.axials()
+    level, drawn = _read(text, source)
+    axials = _axials(drawn, source)
     ranges, origin = smallest_world(axials)
     cells = cube(axials - origin)
     grid = AxialGrid(ranges)
     undrawn = grid.exists.copy()
     undrawn[grid.index(cells)] = False
 
-    on_trail = cells[drawing.are_any(marks.TRAIL + marks.ANTS_ON_TRAIL)]
-    (level,) = settings.get("trail", [DEFAULT_TRAIL_LEVEL])
-    is_ant = drawing.are_any(marks.ANTS + marks.ANTS_ON_TRAIL)
-    codes = drawing.codes[is_ant]
-    headings = codes - np.where(codes < ord("a"), ord("0"), ord("a"))
-    ants = np.column_stack([cells[is_ant], headings])
-    numbers = settings.get("ants", range(len(ants)))
-    if len(numbers) != len(ants):
-        raise AntsError(
-            f"{source} sets the numbers of {len(numbers)} ants but draws {len(ants)}; "
-            "give as many numbers as ants, or none."
-        )
+    marks = np.array([one.mark for one in drawn])
+    trails = cells[np.isin(marks, [TRAIL, *ANTS_ON_TRAIL])]
+    is_ant = np.isin(marks, [*ANTS, *ANTS_ON_TRAIL])
+    headings = [(ANTS + ANTS_ON_TRAIL).index(mark) % len(ANTS) for mark in marks[is_ant]]
     return World(
         ranges,
-        cells[drawing.are_any(marks.QUEEN)][0],
-        foods=cells[drawing.are_any(marks.FOOD)],
-        obstacles=np.concatenate(
-            [cells[drawing.are_any(marks.OBSTACLE)], grid.cells(np.flatnonzero(undrawn))]
-        ),
-        trails=np.column_stack([on_trail, np.full(len(on_trail), level)]),
-        ants=ants[np.argsort(numbers)],
+        cells[marks == QUEEN][0],
+        foods=cells[marks == FOOD],
+        obstacles=np.concatenate([cells[marks == OBSTACLE], grid.cells(np.flatnonzero(undrawn))]),
+        trails=np.column_stack([trails, np.full(len(trails), level)]),
+        ants=np.column_stack([cells[is_ant], np.array(headings, dtype=np.int64)]),
     )
 
 
+@dataclass(slots=True)
+class _Drawn:
+    """A character of the drawing: `line` counts all lines from 1, `row` those of the drawing."""
+
+    mark: str
+    line: int
+    row: int
+    column: int
+
+    def found(self, source: str) -> str:
+        return f"line {self.line}, column {self.column + 1} of {source} has {self.mark!r}"
+
+
+def _read(text: str, source: str) -> tuple[int, list[_Drawn]]:
+    """The level of the trails, and the cells in reading order."""
+    level = None
+    drawn: list[_Drawn] = []
+    row = 0
+    for number, line in enumerate(re.split("\r\n|\r|\n", text), start=1):
+        if line.lstrip().startswith(";"):
+            continue
+        if setting := _SETTING.fullmatch(line):
+            if level is not None or drawn:
+                raise AntsError(
+                    f"line {number} of {source} is {shown(line.strip())}; one such line may stand "
+                    "above the drawing."
+                )
+            level = _read_level(f"line {number} of {source}", *setting.groups())
+            continue
+        row += 1
+        for column, mark in enumerate(line):
+            if mark == " ":
+                continue
+            drawn.append(_Drawn(mark, number, row, column))
+            if mark not in _CELLS:
+                raise AntsError(f"{drawn[-1].found(source)}; allowed are {_ALLOWED}.")
+    if not drawn:
+        raise AntsError(f"{source} draws no cell; draw cells with {_ALLOWED}.")
+    queens = [one for one in drawn if one.mark == QUEEN]
+    if not queens:
+        raise AntsError(f"{source} has no queen; draw one cell as {QUEEN}.")
+    if len(queens) > 1:
+        raise AntsError(f"{queens[1].found(source)}, a second queen; only one is allowed.")
+    return DEFAULT_TRAIL_LEVEL if level is None else level, drawn
+
+
+def _read_level(where: str, name: str, value: str) -> int:
+    if name != "trail":
+        raise AntsError(f"{where} sets {shown(name)}; the only setting is trail.")
+    level = int(value) if re.fullmatch(r"\s*[0-9]{1,10}\s*", value) else 0
+    if not 1 <= level <= MAX_TRAIL_LEVEL:
+        raise AntsError(
+            f"{where} sets trail to {shown(value.strip())}; it must be a whole number "
+            f"from 1 to {MAX_TRAIL_LEVEL}."
+        )
+    return level
+
+
+def _axials(drawn: list[_Drawn], source: str) -> np.ndarray:
+    """int64 (n, 2): the axial coordinates (q, r) of the characters, up to a shift."""
+    # A column is 2 r, a row r - 2 q, both up to a shift. So the parity of the column, and that of
+    # row - r, are the same for all cells; the majority decides which they are.
+    rows = np.array([one.row for one in drawn])
+    columns = np.array([one.column for one in drawn])
+    odd = columns % 2
+    r = (columns - odd) // 2
+    grids = 2 * odd + (rows - r) % 2
+    grid = np.bincount(grids).argmax()
+    stray = np.flatnonzero(grids != grid)
+    if len(stray):
+        raise AntsError(
+            f"{drawn[stray[0]].found(source)} between the hexagons; the cells of a line are four "
+            "columns apart, and neighbouring lines are offset by two."
+        )
+    return np.stack([(r - rows + grid % 2) // 2, r], axis=1)
+
+
 def to_text(world: World) -> str:
-    """The map of a world; `from_text` gives an equal world back.
+    """The map of a world; `from_text` gives it back, its ants numbered in reading order.
 
     Raises:
         AntsError: The world has trails of several levels, or under food or the queen, which a map
             cannot show; or its map would have more than `MAX_MAP_CHARACTERS` characters.
     """
-    if not isinstance(world, World):
-        raise AntsError(f"world is {shown(world)}; it must be a World.")
-    grid = world.grid
-    if grid.count > MAX_MAP_CHARACTERS:
-        raise AntsError(_too_long("the map", grid.count))
-    existing = np.flatnonzero(grid.exists)
-    rows, columns = marks.places(grid.cells(existing))
-    rows, columns = rows - rows.min(), columns - columns.min()
-    height, width = int(rows.max()) + 1, int(columns.max()) + 1
+    expect("world", world, World)
+    size_x, size_y, size_z = world.ranges
+    height, width = 2 * size_x + size_y + size_z - 3, 2 * (size_y + size_z) - 3
     if height * (width + 1) > MAX_MAP_CHARACTERS:
-        raise AntsError(_too_long("the map", height * (width + 1)))
-    page = np.full((height, width), ord(" "), dtype=np.uint8)
-    page[rows, columns] = _marks(world)[existing]
-    drawn = [row.tobytes().decode("ascii").rstrip() for row in page]
-    return "\n".join(_settings(world) + drawn) + "\n"
-
-
-def _marks(world: World) -> np.ndarray:
-    """uint8 (grid.size,): the characters of a world's cells."""
-    index = world.grid.index
-    page = np.full(world.grid.size, ord(marks.EMPTY), dtype=np.uint8)
-    page[index(world.trails[:, :3])] = ord(marks.TRAIL)
-    covered = np.concatenate([[world.queen], world.foods])
-    hidden = covered[page[index(covered)] == ord(marks.TRAIL)]
-    if len(hidden):
-        raise AntsError(
-            f"a trail lies on {tuple(hidden[0].tolist())} under the queen or food, which a map "
-            "cannot show; take it out of the trails."
-        )
-    page[index(world.obstacles)] = ord(marks.OBSTACLE)
-    page[index(world.foods)] = ord(marks.FOOD)
-    page[index(world.queen)] = ord(marks.QUEEN)
-    places = index(world.ants[:, :3])
-    bare = page[places] == ord(marks.EMPTY)
-    page[places] = world.ants[:, 3] + np.where(
-        bare, ord(marks.ANTS[0]), ord(marks.ANTS_ON_TRAIL[0])
-    )
-    return page
-
-
-def _settings(world: World) -> list[str]:
-    """The lines above the drawing."""
-    settings = []
+        raise AntsError(_too_long("the map"))
     levels = np.unique(world.trails[:, 3])
     if len(levels) > 1:
         raise AntsError(
             f"the trails have {len(levels)} levels from {levels[0]} to {levels[-1]}, but a map can "
             "show one only; give all trails the same level."
         )
-    if len(levels):
-        settings.append(f"trail = {levels[0]}")
-    rows, columns = marks.places(world.ants[:, :3])
-    numbers = np.lexsort((columns, rows))
-    if (np.diff(numbers) < 0).any():
-        settings.append("ants = " + " ".join(str(number) for number in numbers))
-    return settings
+    page = np.full((height, width), " ")
+
+    def draw(cells: np.ndarray, mark: str) -> None:
+        x, y, z = cells.T
+        page[y + z - 2 * (x - size_x + 1), 2 * (y - z + size_z - 1)] = mark
+
+    draw(world.grid.cells(np.flatnonzero(world.grid.exists)), EMPTY)
+    draw(world.obstacles, OBSTACLE)
+    draw(world.foods, FOOD)
+    draw(np.array([world.queen]), QUEEN)
+    on_trail = {tuple(cell) for *cell, _ in world.trails.tolist()}
+    hidden = on_trail & {world.queen, *map(tuple, world.foods.tolist())}
+    if hidden:
+        raise AntsError(
+            f"a trail lies on {min(hidden)} under the queen or food, which a map cannot show; "
+            "take it out of the trails."
+        )
+    draw(world.trails[:, :3], TRAIL)
+    for *cell, heading in world.ants.tolist():
+        draw(np.array([cell]), (ANTS_ON_TRAIL if tuple(cell) in on_trail else ANTS)[heading])
+    drawn = ["".join(row).rstrip() for row in page]
+    return "\n".join([f"trail = {level}" for level in levels] + drawn) + "\n"
 
 
-def _too_long(source: str, length: int) -> str:
-    return (
-        f"{source} has {length} characters; a map may have at most {MAX_MAP_CHARACTERS}, "
-        "so choose a smaller one."
-    )
+def _too_long(source: str) -> str:
+    return f"{source} has more than {MAX_MAP_CHARACTERS} characters; choose a smaller one."

@@ -90,21 +90,28 @@ class World:
 
     def distances(self) -> np.ndarray:
         """int32 (grid.size,): steps from each cell to the queen, obstacles ignored; 0 outside."""
-        return geometry.distances(self.grid, self.queen)
+        return geometry.distances(self.grid, self.queen) * self.grid.exists
 
     def closer(self) -> np.ndarray:
         """uint8 (grid.size,): bit h is set if the neighbour at heading h is nearer to the queen.
 
         Pure geometry: the neighbour may be an obstacle or lie outside. 0 for cells outside.
         """
-        return geometry.closer(self.grid, self.queen)
+        here = geometry.distances(self.grid, self.queen)
+        bits = np.zeros(self.grid.size, dtype=np.uint8)
+        for heading, offset in enumerate(self.grid.offsets.tolist()):
+            there = np.roll(here, -offset)
+            bits |= (there < here).astype(np.uint8) << np.uint8(heading)
+        return bits * self.grid.exists
 
     def reachable_foods(self) -> np.ndarray:
         """bool (F,): whether an ant that starts beside the queen can come to stand beside a food.
 
         Ants walk over empty cells; obstacles and other foods block.
         """
-        return geometry.reachable(self.grid, self.ground(), self.queen, self.foods)
+        beside_queen = self.grid.index(self.queen) + self.grid.offsets
+        found = geometry.walkable(self.grid, self.ground(), beside_queen)
+        return found[self.grid.index(self.foods)[:, None] + self.grid.offsets].any(axis=1)
 
     def start(self, seed: int, n: int = 1, where: str = "nest") -> tuple[np.ndarray, np.ndarray]:
         """Where n ants start: the listed ants first, then ants placed on free cells.

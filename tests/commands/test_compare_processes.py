@@ -11,6 +11,7 @@ import sys
 import time
 
 import numpy as np
+import plain_runs
 import pytest
 from command_lines import (
     EXPERIMENTS,
@@ -274,7 +275,7 @@ def test_a_learner_from_a_file_of_ones_own(kernels, tmp_path, monkeypatch):
     with np.load(tmp_path / "out" / "episodes.npz") as archive:
         for row, name in enumerate(("hysteretic", "q_learning")):
             config = TrainingConfig(name, 0.1, 0.9, 0.3, 0.9)
-            plain = reference.train(worlds.paper(), config, 0, 12, 120)
+            plain = plain_runs.train(worlds.paper(), config, 0, 12, 120)
             assert archive["returns"][row, 0].tolist() == plain.returns
             assert archive["steps"][row, 0].tolist() == plain.steps
         assert not np.array_equal(archive["returns"][0], archive["returns"][1])

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from plain_runs import rollout
 
-from taichi_ants import reference
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.policies import load_policy, random_policy, save_policy, trail_follower
 from taichi_ants.task import Task, observations
@@ -75,18 +75,18 @@ def test_the_trail_follower_takes_the_shortest_way_in_the_world_of_the_paper(
     evaporation: bool,
 ) -> None:
     task = Task(evaporation_in_evaluation=evaporation)
-    rollout = reference.rollout(paper(), trail_follower(), task=task)
-    assert (rollout.episode_return, rollout.steps, rollout.deliveries) == (45, 34, 1)
+    run = rollout(paper(), trail_follower(), task=task)
+    assert (run.returns, run.steps, run.deliveries) == ([45], [34], [1])
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_trail_follower_finds_its_way_in_open_worlds(seed: int) -> None:
     world = open_world(seed, (14, 12, 16))
     rollouts = [
-        reference.rollout(world, trail_follower(), seed=seed, number=number, max_steps=2000)
+        rollout(world, trail_follower(), seed=seed, number=number, max_steps=2000)
         for number in range(4)
     ]
-    assert all(rollout.deliveries == 1 for rollout in rollouts)
+    assert all(run.deliveries == [1] for run in rollouts)
 
 
 # Files.

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import pytest
 from colonies import act, begun, load, training
+from plain_runs import train
 from random_worlds import random_world
 
 from taichi_ants import TrainingConfig
-from taichi_ants.reference import LEARNERS, ReferenceColony, train
+from taichi_ants.reference import LEARNERS, ReferenceColony
+from taichi_ants.reference.ants import Event
 from taichi_ants.task import Life, Task
 from taichi_ants.task.constants import FORWARD, GIVE
 from taichi_ants.worlds import World
@@ -24,10 +26,9 @@ def test_one_ant_learns_into_a_shared_table_what_it_learns_into_its_own(learner,
     n_deliveries = 0
     for seed in range(12):
         world, task = random_world(seed), Task(delivery=delivery)
-        alone = train(world, learning, seed, 3, 40, task, trace=True)
+        alone = train(world, learning, seed, 3, 40, task)
         colony = ReferenceColony(world, task, learning, seed, ends_at_delivery=True)
-        trace = [step for _ in range(3) for [step] in colony.run_episode(40)]
-        assert trace == alone.trace
+        assert colony.run(3, 40) == alone.trace
         assert colony.minds.tables[0].rows == alone.learner.rows
         assert list(colony.minds.tables[0].model.items()) == list(alone.model.items())
         n_deliveries += sum(alone.deliveries)
@@ -37,9 +38,8 @@ def test_one_ant_learns_into_a_shared_table_what_it_learns_into_its_own(learner,
 def test_run_stops_at_the_delivery_and_decays_epsilon():
     learning = TrainingConfig("sarsa", 0.1, 0.9, 0.8, 0.5, 0.3)
     colony = ReferenceColony(TWO_STEPS, None, learning, 7, ends_at_delivery=True)
-    colony.run(2, 100)
-    [record] = colony.run(1, 100)
-    assert record is colony.records[2]
+    colony.run(3, 100)
+    assert len(colony.records) == 3
     assert colony.epsilon == 0.3
     for record in colony.records:
         assert record.deliveries == (record.ticks < 100)
@@ -50,13 +50,13 @@ def test_run_stops_at_the_delivery_and_decays_epsilon():
 def test_a_delivery_does_not_end_the_episode_of_a_colony():
     learning = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 1.0)
     colony = ReferenceColony(TWO_STEPS, Task(life=Life(regrowth=0)), learning, 7)
-    [record] = colony.run(1, 2000)
-    assert record.ticks == 2000
+    trace = colony.run(1, 2000)
+    [record] = colony.records
+    assert record.ticks == len(trace) == 2000
     assert record.deliveries > 1
-    assert record.deliveries_per_tick[record.first_delivery - 1] == 1
-    assert sum(record.deliveries_per_tick[: record.first_delivery]) == 1
-    assert sum(record.deliveries_per_tick) == record.deliveries
-    assert record.living_per_tick == [1] * 2000
+    gives = [step.step for step in trace if step.event is Event.DELIVERED]
+    assert len(gives) == record.deliveries
+    assert gives[0] == record.first_delivery - 1
 
 
 def test_after_the_end_there_is_no_tick():
@@ -92,7 +92,8 @@ def test_what_a_delivery_ends(delivery, ends_at_delivery, terminated, truncated)
     load(colony, 0)
     act(colony, GIVE)
     [step] = colony.transitions
-    assert (step.delivered, step.terminated, step.truncated) == (True, terminated, truncated)
+    assert (step.event, step.terminated) == (Event.DELIVERED, terminated)
+    assert step.truncated == truncated
     assert colony.over == ends_at_delivery
 
 
@@ -118,9 +119,9 @@ def test_what_a_learner_remembers_of_an_episode_ends_with_it(learner):
     colony = begun(world, training(learner), sharing="own")
     act(colony, GIVE)
     act(colony, FORWARD)
-    before = colony.snapshot().q_values[0]
+    before = colony.q_values[0]
     colony.begin_episode()
     act(colony, 3)
-    changed = colony.snapshot().q_values[0] != before
+    changed = colony.q_values[0] != before
     assert changed.sum() == (learner == "sarsa_lambda")
     assert changed[:, 3].sum() == changed.sum()

@@ -8,15 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from taichi_ants.reference import (
-    RandomStream,
-    distance,
-    existing_cells,
-    exists,
-    neighbour,
-    normal_form,
-    stream_state,
-)
+from taichi_ants.reference.geometry import distance, existing_cells, neighbour, normal_form
+from taichi_ants.reference.random_stream import RandomStream, stream_state
 
 COORDINATE = st.integers(-50, 50)
 CELL = st.builds(normal_form, COORDINATE, COORDINATE, COORDINATE)
@@ -100,7 +93,11 @@ def test_existing_cells_are_those_in_range(ranges):
     cells = existing_cells(ranges)
     assert len(cells) == x * y + y * z + z * x - x - y - z + 1
     box = itertools.product(range(7), repeat=3)
-    assert cells == [cell for cell in box if min(cell) == 0 and exists(cell, ranges)]
+    assert cells == [
+        cell
+        for cell in box
+        if min(cell) == 0 and all(c < end for c, end in zip(cell, ranges, strict=True))
+    ]
 
 
 def test_draws_are_those_of_splitmix64():

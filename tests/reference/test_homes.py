@@ -8,7 +8,8 @@ import pytest
 from colonies import act, begun, foods_of, load, n_draws
 
 from taichi_ants.grid.constants import STREAM_QUEEN
-from taichi_ants.reference import RandomStream, neighbour, stream_state
+from taichi_ants.reference.geometry import neighbour
+from taichi_ants.reference.random_stream import RandomStream, stream_state
 from taichi_ants.task.constants import FORWARD, GIVE, PICK_UP
 from taichi_ants.worlds import World
 
@@ -153,7 +154,7 @@ def test_it_moves_every_so_many_ticks(wander):
         act(colony, GIVE)
         places += foods_of(colony)
     assert places == [(0, 0, 0)] * (wander - 1) + [(1, 0, 0)] * wander + [(2, 0, 0)]
-    assert n_draws(colony.queen.stream.state, stream_state(seed_of(0, 0), STREAM_QUEEN, 0)) == 2
+    assert n_draws(colony.queen_stream.state, stream_state(seed_of(0, 0), STREAM_QUEEN, 0)) == 2
 
 
 def test_what_is_blocked_stays_and_blocks_what_is_behind():
@@ -254,4 +255,4 @@ def test_trails_do_not_wander():
     colony = begun(place, seed=seed_of(0), wander=1)
     act(colony, GIVE)
     assert foods_of(colony) == {(2, 0, 0)}
-    assert {cell: level for cell, level in colony.world.levels().items() if level} == {(1, 0, 0): 8}
+    assert [cell for cell in colony.world.ground if colony.world.level(cell)] == [(1, 0, 0)]

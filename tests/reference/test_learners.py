@@ -11,7 +11,9 @@ from colonies import GAMMA, training
 from transitions import transition
 
 from taichi_ants.errors import AntsError
-from taichi_ants.reference import LEARNERS, RandomStream, choose_action
+from taichi_ants.reference import LEARNERS
+from taichi_ants.reference.actions import choose_action
+from taichi_ants.reference.random_stream import RandomStream
 
 BY_ERROR = [name for name in LEARNERS if LEARNERS[name].shares]
 
@@ -305,11 +307,7 @@ def test_the_table_given_is_left_as_it_is(name):
     assert learner.table().dtype == np.float32
 
 
-def test_names():
-    with pytest.raises(AntsError, match=r"'q_lerning'.*q_learning, sarsa"):
-        LEARNERS["q_lerning"]
-    with pytest.raises(AntsError, match="'sarsa' already"):
-        LEARNERS.register("sarsa", LEARNERS["sarsa"])
+def test_unknown_hyperparameters_are_refused():
     with pytest.raises(AntsError, match="'n_steps'"):
         made("sarsa", n_steps=3)
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 import pytest
 from colonies import act, begun, cells_of, foods_of, load, n_draws, training
 
 from taichi_ants.grid.constants import STREAM_ANT, STREAM_BORN, STREAM_QUEEN
-from taichi_ants.reference import RandomStream, neighbour, observe, stream_state
+from taichi_ants.reference.geometry import neighbour
+from taichi_ants.reference.random_stream import RandomStream, stream_state
+from taichi_ants.reference.vision import observe
 from taichi_ants.task.constants import FOOD, FORWARD, GIVE
 from taichi_ants.worlds import World
 
@@ -44,10 +48,9 @@ def test_a_food_given_becomes_an_ant_that_faces_away(seed):
     assert (born.carries, born.age, born.action, born.reward) == (False, 0, -1, 0)
     assert born.state == observe(colony.world, born)
     assert born.stream.state == stream_state(seed, STREAM_BORN, 1)
-    assert colony.queen.store == 0
-    assert n_draws(colony.queen.stream.state, stream_state(seed, STREAM_QUEEN, 0)) == 1
+    assert colony.store == 0
+    assert n_draws(colony.queen_stream.state, stream_state(seed, STREAM_QUEEN, 0)) == 1
     assert (colony.record.births, colony.record.deliveries) == (1, 1)
-    assert colony.record.living_per_tick == [2]
     # It did not act in the tick of its birth; in the next one it draws its first action.
     assert [step.slot for step in colony.transitions] == [0]
     colony.tick()
@@ -63,8 +66,8 @@ def test_without_births_the_food_is_just_received():
     colony = begun(around(3), births=False, capacity=5)
     load(colony, 0)
     act(colony, GIVE)
-    assert (len(colony.ants), colony.queen.store, colony.record.births) == (1, 0, 0)
-    assert colony.queen.stream.state == stream_state(0, STREAM_QUEEN, 0)
+    assert (len(colony.ants), colony.store, colony.record.births) == (1, 0, 0)
+    assert colony.queen_stream.state == stream_state(0, STREAM_QUEEN, 0)
 
 
 def test_several_are_born_one_after_the_other():
@@ -83,7 +86,7 @@ def test_the_one_free_neighbour_takes_a_draw_too():
     load(colony, 0)
     act(colony, *[GIVE] * 5)
     assert colony.ants[5].cell == neighbour(QUEEN, 5)
-    assert n_draws(colony.queen.stream.state, stream_state(0, STREAM_QUEEN, 0)) == 1
+    assert n_draws(colony.queen_stream.state, stream_state(0, STREAM_QUEEN, 0)) == 1
 
 
 def test_food_around_the_queen_is_no_free_place():
@@ -97,13 +100,13 @@ def test_the_food_waits_while_no_neighbour_is_free():
     colony = begun(around(*range(6)), births=True)
     load(colony, *range(6))
     act(colony, *[GIVE] * 6)
-    assert (len(colony.ants), colony.queen.store, colony.record.births) == (6, 6, 0)
-    assert colony.queen.stream.state == stream_state(0, STREAM_QUEEN, 0)  # no draw in vain
+    assert (len(colony.ants), colony.store, colony.record.births) == (6, 6, 0)
+    assert colony.queen_stream.state == stream_state(0, STREAM_QUEEN, 0)  # no draw in vain
     # The ant at heading 2 turns round and goes: its cell is free in this very tick, for one.
     colony.ants[2].heading = 2
     colony.look(colony.ants[2])
     act(colony, GIVE, GIVE, FORWARD, GIVE, GIVE, GIVE)
-    assert (len(colony.ants), colony.queen.store, colony.record.births) == (7, 5, 1)
+    assert (len(colony.ants), colony.store, colony.record.births) == (7, 5, 1)
     assert (colony.ants[6].cell, colony.ants[6].heading) == (neighbour(QUEEN, 2), 2)
 
 
@@ -111,19 +114,18 @@ def test_the_food_waits_while_the_colony_is_full_and_slots_are_free_a_tick_after
     colony = begun(around(1, 4), births=True, capacity=3, lifespan=3)
     load(colony, 0, 1)
     act(colony, GIVE, GIVE)
-    assert (sorted(colony.ants), colony.queen.store) == ([0, 1, 2], 1)
+    assert (sorted(colony.ants), colony.store) == ([0, 1, 2], 1)
     act(colony, *[GIVE] * 3)
     act(colony, *[GIVE] * 3)
     # Ticks 0, 1, 2: the first two are 3 ticks old and die, after the births of this tick.
-    assert (sorted(colony.ants), colony.queen.store) == ([2], 1)
+    assert (sorted(colony.ants), colony.store) == ([2], 1)
     assert colony.ants[2].age == 2
     act(colony, GIVE)
     # The newborn takes the lowest slot; the ant in slot 2 has died in turn.
     assert {slot: ant.number for slot, ant in colony.ants.items()} == {0: 3}
-    assert colony.queen.store == 0
+    assert colony.store == 0
     record = colony.record
     assert (record.births, record.deaths) == (2, 3)
-    assert record.living_per_tick == [3, 3, 1, 1]
 
 
 def test_born_ants_of_another_episode_have_other_streams():
@@ -142,16 +144,16 @@ def test_the_queens_stream_runs_on_and_her_store_does_not():
     colony = begun(around(*range(6), ranges=(2, 2, 2)), births=True)
     load(colony, 0)
     act(colony, *[GIVE] * 6)
-    assert colony.queen.store == 1
+    assert colony.store == 1
     colony.end_episode()
     colony.begin_episode()
-    assert colony.queen.store == 0
+    assert colony.store == 0
     colony = begun(around(3), births=True)
     for n_births in (1, 2):
         load(colony, 0)
         act(colony, GIVE)
         start = stream_state(0, STREAM_QUEEN, 0)
-        assert n_draws(colony.queen.stream.state, start) == n_births
+        assert n_draws(colony.queen_stream.state, start) == n_births
         colony.end_episode()
         colony.begin_episode()
 
@@ -178,12 +180,12 @@ def test_an_ant_dies_at_its_lifespan():
     assert cells_of(colony) == [rear]
     assert (colony.ants[1].reward, colony.ants[1].state >> 2 & 3) == (-1, 0)
     assert colony.record.deaths == 1
-    assert colony.record.living_per_tick == [2, 1]
+    assert len(colony.ants) == 1
     assert [step.truncated for step in colony.transitions] == [True, False]
     act(colony, FORWARD)
     assert cells_of(colony) == []  # it has got there, and died of age 2
     assert front not in colony.world.occupied
-    assert colony.record.living_per_tick[-1] == 0
+    assert not colony.ants
     colony.tick()  # an empty world goes on
     assert colony.record.ticks == 4
     assert colony.transitions == []
@@ -229,9 +231,10 @@ def test_a_dying_ant_learns_from_what_it_sees_last_as_if_it_lived_on():
     act(colony, FORWARD)
     assert colony.ants == {}
     [step] = colony.transitions
-    assert (step.pair, step.outcome, step.truncated) == ((0, FORWARD), (0, 4, False), True)
+    assert (step.pair, step.reward, step.next_state) == ((0, FORWARD), 0, 4)
+    assert (step.terminated, step.truncated) == (False, True)
     assert step.td_error == 2
-    assert colony.snapshot().q_values[0, FORWARD] == 1
+    assert colony.q_values[0, FORWARD] == 1
 
 
 def test_a_dying_ant_draws_its_next_action_for_the_target():
@@ -262,17 +265,16 @@ def test_the_stream_of_an_ant_goes_on_in_the_next_episode_though_it_died():
 def test_every_episode_starts_with_the_same_ants_in_the_same_places():
     world = around(1, 4)
     colony = begun(world, training(epsilon=1.0), ants=5, lifespan=7, births=True, seed=9)
-    first = colony.snapshot()
+    first, ground, trail = copy.deepcopy((colony.ants, colony.world.ground, colony.world.trail))
     for _ in range(10):
         colony.tick()
-    assert colony.snapshot().ants.keys() != first.ants.keys()
+    assert colony.ants.keys() != first.keys()
     colony.end_episode()
     colony.begin_episode()
-    second = colony.snapshot()
-    assert len(first.ants) == 5
-    for slot, ant in first.ants.items():
-        again = second.ants[slot]
+    assert len(first) == 5
+    for slot, ant in first.items():
+        again = colony.ants[slot]
         assert (again.number, again.cell, again.heading) == (ant.number, ant.cell, ant.heading)
         assert (again.age, again.action, again.state) == (0, -1, ant.state)
-    assert second.ground == first.ground
-    assert second.levels == first.levels
+    assert colony.world.ground == ground
+    assert all(colony.world.level(cell) == trail.level(cell) for cell in ground)

@@ -6,9 +6,13 @@ import itertools
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from plain_runs import train
 
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.reference import Ant, WorldState, existing_cells, observe, train
+from taichi_ants.reference.ants import Ant
+from taichi_ants.reference.geometry import existing_cells
+from taichi_ants.reference.vision import observe
+from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task import Pheromone, Task
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.worlds.world import World
@@ -66,7 +70,7 @@ def test_no_other_state_is_seen_anywhere(world):
 def test_no_other_state_is_met_in_training(world, seed, evaporation):
     config = TrainingConfig("sarsa", 0.5, 0.9, 0.8, 1.0)
     task = Task(evaporation_in_training=evaporation)
-    run = train(world, config, seed, 3, 40, task, trace=True)
+    run = train(world, config, seed, 3, 40, task)
     met = {step.state for step in run.trace} | {step.next_state for step in run.trace}
     assert met <= REACHABLE
     untouched = [state for state in range(128) if state not in met]

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from plain_runs import rollout, train
 
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import STREAM_START_CELL, STREAM_START_HEADING
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.reference import distance, normal_form, rollout, start, stream_state, train
+from taichi_ants.reference.ants import starts
+from taichi_ants.reference.geometry import distance, normal_form
+from taichi_ants.reference.random_stream import stream_state
 from taichi_ants.task import Task
 from taichi_ants.task.constants import FORWARD, GIVE, PICK_UP
 from taichi_ants.worlds.world import World
@@ -39,7 +42,7 @@ def test_along_the_papers_trail(evaporation):
     # 16 moves from (0, 8, 8) to (8, 0, 0) at +1, +3, 16 moves back at +1, +10.
     task = Task(evaporation_in_evaluation=evaporation)
     played = rollout(PAPER, followers_policy(), task=task)
-    assert (played.episode_return, played.steps, played.deliveries) == (45, 34, 1)
+    assert (played.returns, played.steps, played.deliveries) == ([45], [34], [1])
     assert [step.cell for step in played.trace[:17]] == [normal_form(i, 0, 0) for i in range(-8, 9)]
     assert [step.cell for step in played.trace[17:]] == [
         normal_form(i, 0, 0) for i in range(8, -9, -1)
@@ -50,10 +53,10 @@ def test_along_the_papers_trail(evaporation):
 
 def test_the_step_limit_truncates_a_rollout():
     played = rollout(PAPER, followers_policy(), max_steps=33)
-    assert (played.episode_return, played.steps, played.deliveries) == (35, 33, 0)
+    assert (played.returns, played.steps, played.deliveries) == ([35], [33], [0])
     assert played.trace[-1].truncated
     assert not any(step.truncated for step in played.trace[:-1])
-    assert rollout(PAPER, followers_policy(), max_steps=34).deliveries == 1
+    assert rollout(PAPER, followers_policy(), max_steps=34).deliveries == [1]
 
 
 @pytest.mark.parametrize(("evaporation", "then"), [(True, 0), (False, 8)])
@@ -75,7 +78,7 @@ def test_training_can_evaporate_too(evaporation):
     task = Task(evaporation_in_training=evaporation)
     # A seed whose first action leaves the ant where it is: pick up or give.
     for seed in range(100):
-        [step] = train(world, config, seed, 1, 1, task, trace=True).trace
+        [step] = train(world, config, seed, 1, 1, task).trace
         if step.action in (PICK_UP, GIVE):
             assert (step.state, step.next_state) == (8, 0 if evaporation else 8)
             return
@@ -95,15 +98,14 @@ def test_a_rollout_with_epsilon_one_ignores_the_table():
     walked = rollout(PAPER, followers_policy(), max_steps=50, epsilon=1.0)
     wandered = rollout(PAPER, np.zeros((128, 5)), max_steps=50, epsilon=1.0)
     assert walked.trace == wandered.trace
-    assert rollout(PAPER, followers_policy(), trace=False).trace == []
 
 
 def test_listed_ants_start_first():
     listed = [((0, 8, 8), 0), ((0, 1, 1), 4)]
     world = World((10, 10, 10), (0, 9, 9), ants=listed)
-    assert start(world, 0) == listed[:1]
-    assert start(world, 0, 2) == listed
-    placed = start(world, 0, 4)
+    assert starts(world, 0) == listed[:1]
+    assert starts(world, 0, 2) == listed
+    placed = starts(world, 0, 4)
     assert placed[:2] == listed
     assert all(distance(cell, (0, 9, 9)) == 1 for cell, _ in placed[2:])
 
@@ -118,7 +120,7 @@ def test_the_others_start_on_the_free_cells_nearest_to_the_queen():
         ants=[((0, 1, 0), 2)],
     )
     for seed in range(20):
-        cells = [cell for cell, _ in start(world, seed, 5)]
+        cells = [cell for cell, _ in starts(world, seed, 5)]
         assert cells[0] == (0, 1, 0)
         assert set(cells[1:4]) == {(0, 1, 1), (0, 0, 1), (1, 0, 1)}
         assert distance(cells[4], (0, 0, 0)) == 2
@@ -127,12 +129,12 @@ def test_the_others_start_on_the_free_cells_nearest_to_the_queen():
 def test_ties_and_headings_are_up_to_the_seed():
     world = World((4, 4, 4), (0, 0, 0))
     seeds = range(200)
-    firsts = [start(world, seed)[0] for seed in seeds]
-    assert {cell for cell, _ in firsts} == {cell for cell, _ in start(world, 0, 6)}
+    firsts = [starts(world, seed)[0] for seed in seeds]
+    assert {cell for cell, _ in firsts} == {cell for cell, _ in starts(world, 0, 6)}
     assert {heading for _, heading in firsts} == set(range(6))
-    assert firsts == [start(world, seed)[0] for seed in seeds]
+    assert firsts == [starts(world, seed)[0] for seed in seeds]
     # More ants do not move those that are there already.
-    assert start(world, 7, 20)[:5] == start(world, 7, 5)
+    assert starts(world, 7, 20)[:5] == starts(world, 7, 5)
 
 
 def test_the_order_of_ties_and_the_headings_come_from_named_streams():
@@ -146,20 +148,20 @@ def test_the_order_of_ties_and_the_headings_come_from_named_streams():
         headings = [word * 6 >> 32 for word in words]
         # The ant that is listed is ant 0, so the first one placed is ant 1.
         expected = list(zip([free[number] for number in order], headings[1:], strict=True))
-        assert start(world, seed, 6)[1:] == expected
+        assert starts(world, seed, 6)[1:] == expected
 
 
 def test_too_few_free_cells_are_refused():
     # Ranges (2, 2, 2) have 7 cells: queen, obstacle, 5 free.
     world = World((2, 2, 2), (0, 0, 0), obstacles=[(1, 0, 0)])
-    assert len(start(world, 0, 5)) == 5
+    assert len(starts(world, 0, 5)) == 5
     with pytest.raises(AntsError, match=r"n is 6; .* 5 free cells"):
-        start(world, 0, 6)
+        starts(world, 0, 6)
 
 
 def test_an_ant_that_is_not_listed_is_placed_for_every_episode():
     world = World((4, 4, 4), (0, 0, 0), foods=[(3, 0, 0)])
     config = TrainingConfig("q_learning", 0.1, 0.9, 1.0, 1.0)
-    run = train(world, config, 5, 3, 10, trace=True)
+    run = train(world, config, 5, 3, 10)
     firsts = {(step.cell, step.heading) for step in run.trace if step.step == 0}
-    assert firsts == set(start(world, 5))
+    assert firsts == set(starts(world, 5))

@@ -16,7 +16,8 @@ from transitions import transition
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.learners.config import update_weights
-from taichi_ants.reference import LEARNERS, RandomStream, ReferenceColony, stream_state
+from taichi_ants.reference import LEARNERS, ReferenceColony
+from taichi_ants.reference.random_stream import RandomStream, stream_state
 from taichi_ants.reference.sharing import OwnTables, SharedTable, mean_error
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP
 from taichi_ants.worlds import World
@@ -159,14 +160,14 @@ def test_two_ants_that_meet_update_one_pair():
     colony = begun(MEETING, sharing="shared")
     act(colony, FORWARD, FORWARD)
     assert sorted(errors_of(colony)) == [-1, 0]
-    assert colony.snapshot().q_values[0, FORWARD] == -0.375
-    assert np.count_nonzero(colony.snapshot().q_values) == 1
+    assert colony.q_values[0, FORWARD] == -0.375
+    assert np.count_nonzero(colony.q_values) == 1
 
 
 def test_with_own_tables_each_learns_its_own():
     colony = begun(MEETING, sharing="own", capacity=3)
     act(colony, FORWARD, FORWARD)
-    tables = colony.snapshot().q_values
+    tables = colony.q_values
     assert tables.shape == (3, 128, 5)
     loser = [ant.reward for ant in colony.ants.values()].index(-1)
     assert tables[loser, 0, FORWARD] == -0.5
@@ -178,7 +179,7 @@ def test_a_fixed_table_stays_as_it_is():
     colony = begun(MEETING, sharing="fixed", q_values=q_values, seed=4)
     for _ in range(3):
         colony.tick()
-    np.testing.assert_array_equal(colony.snapshot().q_values, q_values)
+    np.testing.assert_array_equal(colony.q_values, q_values)
     assert errors_of(colony) == [None, None]
     assert len(colony.transitions) == 2
 
@@ -202,7 +203,7 @@ def test_sarsa_chooses_by_the_table_before_the_update(learner, then):
     colony = begun(world, training(learner), "shared", q_values=q_values)
     act(colony, FORWARD, FORWARD)
     assert errors_of(colony) == [-0.125, -0.125]
-    assert colony.snapshot().q_values[0, FORWARD] == 0.15625
+    assert colony.q_values[0, FORWARD] == 0.15625
     drawn = then if learner == "sarsa" else None
     assert [step.next_action for step in colony.transitions] == [drawn] * 2
     colony.tick()
@@ -231,7 +232,10 @@ def test_sarsa_after_a_delivery():
 
 
 def entries(minds):
-    return [(*pair, *seen.outcome) for pair, seen in minds.tables[0].model.items()]
+    return [
+        (*pair, seen.reward, seen.next_state, seen.terminated)
+        for pair, seen in minds.tables[0].model.items()
+    ]
 
 
 def test_the_model_of_all():
@@ -309,25 +313,26 @@ def test_an_ant_born_into_a_slot_begins_with_nothing():
     learning = training("dyna_q", planning_steps=1)
     q_values = table(s127a0=9)
     colony = begun(world, learning, "own", q_values=q_values, births=True, capacity=3, lifespan=50)
-    assert (colony.snapshot().q_values[:, 127, 0] == 9).all()
+    assert (colony.q_values[:, 127, 0] == 9).all()
     colony.ants[1].age = 49
     load(colony, 0)
     act(colony, GIVE, FORWARD)
     assert sorted(colony.ants) == [0, 2]
-    assert len(colony.snapshot().models[1]) == 1
+    assert len(colony.minds.tables[1].model) == 1
     load(colony, 0)
     act(colony, GIVE, PICK_UP)
-    snapshot = colony.snapshot()
-    assert {slot: ant.number for slot, ant in snapshot.ants.items()} == {0: 0, 1: 3, 2: 2}
-    assert not snapshot.q_values[1].any()
-    assert snapshot.models[1] == []
+    tables, minds = colony.q_values, colony.minds.tables
+    assert {slot: ant.number for slot, ant in colony.ants.items()} == {0: 0, 1: 3, 2: 2}
+    assert not tables[1].any()
+    assert minds[1].model == {}
     # The one that was born first has learnt since: a pick-up in vain.
-    assert snapshot.models[2] == [(*colony.transitions[1].pair, -1, *snapshot.models[2][0][3:])]
-    assert snapshot.q_values[2].min() == -0.75
+    [(pair, seen)] = minds[2].model.items()
+    assert (pair, seen.reward) == (colony.transitions[1].pair, -1)
+    assert tables[2].min() == -0.75
     # A table stays with its slot in the next episode.
     colony.end_episode()
     colony.begin_episode()
-    np.testing.assert_array_equal(colony.snapshot().q_values, snapshot.q_values)
+    np.testing.assert_array_equal(colony.q_values, tables)
 
 
 def test_tables_and_models_live_through_the_episodes_and_epsilon_decays():
@@ -337,7 +342,7 @@ def test_tables_and_models_live_through_the_episodes_and_epsilon_decays():
     for _ in range(3):
         epsilons.append(colony.epsilon)
         colony.run(1, 20)
-        sizes.append(len(colony.snapshot().models[0]))
+        sizes.append(len(colony.minds.tables[0].model))
     assert epsilons == [0.8, 0.4, 0.3]
     assert 0 < sizes[0] <= sizes[1] <= sizes[2]
     assert [record.ticks for record in colony.records] == [20] * 3
@@ -345,7 +350,7 @@ def test_tables_and_models_live_through_the_episodes_and_epsilon_decays():
     again = ReferenceColony(MEETING, None, learning, 5, ants=4)
     again.run(3, 20)
     assert again.records == colony.records
-    assert again.snapshot().models == colony.snapshot().models
+    assert entries(again.minds) == entries(colony.minds)
 
 
 def test_with_own_tables_an_ant_far_from_others_is_an_ant_alone():
@@ -358,7 +363,7 @@ def test_with_own_tables_an_ant_far_from_others_is_an_ant_alone():
     for place, n in ((world, 2), (alone, 1)):
         colony = ReferenceColony(place, None, learning, 8, ants=n, sharing="own")
         colony.run(2, 60)
-        runs.append(colony.snapshot())
+        runs.append(colony)
     np.testing.assert_array_equal(runs[0].q_values[0], runs[1].q_values[0])
     assert runs[0].ants[0] == runs[1].ants[0]
 
@@ -366,7 +371,7 @@ def test_with_own_tables_an_ant_far_from_others_is_an_ant_alone():
 def test_a_table_for_each_slot_may_be_given():
     each = np.arange(2 * 640, dtype=np.float32).reshape(2, 128, 5)
     colony = ReferenceColony(MEETING, None, training(), 0, ants=2, sharing="own", q_values=each)
-    np.testing.assert_array_equal(colony.snapshot().q_values, each)
+    np.testing.assert_array_equal(colony.q_values, each)
 
 
 @pytest.mark.parametrize(
@@ -385,7 +390,7 @@ def test_learners_with_a_memory_of_their_own_cannot_share_a_table(learner):
     colony = begun(MEETING, training(learner), "own")
     for _ in range(3):
         colony.tick()
-    assert colony.snapshot().q_values.shape == (2, 128, 5)
+    assert colony.q_values.shape == (2, 128, 5)
 
 
 def test_learners_of_a_td_error_share_a_table():

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_worlds import random_world
 
-from taichi_ants.reference import existing_cells, neighbour
-from taichi_ants.reference.trail import DenseTrail, IntegerTrail, make_trail
+from taichi_ants.reference.geometry import existing_cells, neighbour
+from taichi_ants.reference.trail import Trail
 from taichi_ants.task import Pheromone
 from taichi_ants.task.constants import FORWARD, GIVE, PICK_UP
 from taichi_ants.worlds import World
@@ -30,21 +30,16 @@ def after(trail, ticks):
 
 
 def test_levels_are_integers_only_where_they_fall_by_one_or_stay():
-    kinds = {
-        (evaporation, diffusion): type(
-            make_trail(plain_world(), Pheromone(evaporation, diffusion=diffusion))
-        )
-        for evaporation in ("linear", "exponential", "none")
-        for diffusion in (0.0, 0.1)
-    }
-    integer = {("linear", 0.0), ("none", 0.0)}
-    assert {key for key, kind in kinds.items() if kind is IntegerTrail} == integer
-    assert set(kinds.values()) == {IntegerTrail, DenseTrail}
+    for evaporation in ("linear", "exponential", "none"):
+        for diffusion in (0.0, 0.1):
+            level = Trail(plain_world(), Pheromone(evaporation, diffusion=diffusion)).level(MIDDLE)
+            dense = evaporation == "exponential" or diffusion > 0
+            assert isinstance(level, np.float32 if dense else np.integer)
 
 
 @pytest.mark.parametrize("diffusion", [0.0, 1e-9])
 def test_linear_evaporation(diffusion):
-    trail = make_trail(plain_world(level=3), Pheromone(diffusion=diffusion))
+    trail = Trail(plain_world(level=3), Pheromone(diffusion=diffusion))
     levels = []
     for _ in range(5):
         levels.append(float(trail.level(MIDDLE)))
@@ -53,14 +48,14 @@ def test_linear_evaporation(diffusion):
 
 
 def test_without_evaporation_levels_stay():
-    trail = after(make_trail(plain_world(level=3), Pheromone("none")), 100)
+    trail = after(Trail(plain_world(level=3), Pheromone("none")), 100)
     assert trail.level(MIDDLE) == 3
 
 
 @pytest.mark.parametrize("half_life", [1, 7.5, 50])
 def test_exponential_evaporation_halves(half_life):
     pheromone = Pheromone("exponential", half_life)
-    trail = make_trail(plain_world(level=2**20), pheromone)
+    trail = Trail(plain_world(level=2**20), pheromone)
     for ticks in range(1, 61):
         trail.tick()
         expected = 2**20 * 0.5 ** (ticks / half_life)
@@ -72,7 +67,7 @@ def test_exponential_evaporation_halves(half_life):
 
 
 def test_what_falls_below_one_is_gone():
-    trail = make_trail(plain_world(level=8), Pheromone("exponential", half_life=1))
+    trail = Trail(plain_world(level=8), Pheromone("exponential", half_life=1))
     levels = []
     for _ in range(5):
         levels.append(float(trail.level(MIDDLE)))
@@ -85,7 +80,7 @@ def test_one_tick_of_diffusion_by_hand():
     # to each of five neighbours; the sixth stays.
     rock = neighbour(MIDDLE, 0)
     world = plain_world(level=768, obstacles=[rock])
-    trail = after(make_trail(world, Pheromone("none", diffusion=0.75)), 1)
+    trail = after(Trail(world, Pheromone("none", diffusion=0.75)), 1)
     assert float(trail.level(MIDDLE)) == 768 - 5 * 96
     assert [float(trail.level(neighbour(MIDDLE, h))) for h in range(6)] == [0, 96, 96, 96, 96, 96]
     assert float(trail.level(neighbour(neighbour(MIDDLE, 2), 2))) == 0
@@ -93,7 +88,7 @@ def test_one_tick_of_diffusion_by_hand():
 
 def test_what_is_aimed_out_of_the_world_stays():
     # The corner (4, 0, 0) of ranges (5, 5, 5): headings 0, 1, 5 lead out.
-    trail = after(make_trail(plain_world(768, (4, 0, 0)), Pheromone("none", diffusion=0.75)), 1)
+    trail = after(Trail(plain_world(768, (4, 0, 0)), Pheromone("none", diffusion=0.75)), 1)
     assert float(trail.level((4, 0, 0))) == 768 - 3 * 96
     around = [float(trail.level(neighbour((4, 0, 0), h))) for h in range(6)]
     assert around == [0, 0, 96, 96, 96, 0]
@@ -102,7 +97,7 @@ def test_what_is_aimed_out_of_the_world_stays():
 def test_food_and_queen_are_no_walls():
     queen, food = neighbour(MIDDLE, 0), neighbour(MIDDLE, 3)
     world = World((5, 5, 5), queen, foods=[food], trails=[(MIDDLE, 768)])
-    trail = after(make_trail(world, Pheromone("none", diffusion=0.75)), 1)
+    trail = after(Trail(world, Pheromone("none", diffusion=0.75)), 1)
     assert float(trail.level(queen)) == float(trail.level(food)) == 96
 
 
@@ -112,13 +107,13 @@ def test_evaporation_comes_before_diffusion():
         (Pheromone("linear", diffusion=0.75), 769),
         (Pheromone("exponential", 1, diffusion=0.75), 1536),
     ):
-        trail = after(make_trail(plain_world(level), pheromone), 1)
+        trail = after(Trail(plain_world(level), pheromone), 1)
         assert float(trail.level(neighbour(MIDDLE, 2))) == 96
 
 
 def test_a_level_below_one_that_was_spread_lasts_until_the_next_evaporation():
     # 8 falls to 4, of which 0.5 goes to each neighbour and 1 stays; all that halves to below 1.
-    trail = after(make_trail(plain_world(8), Pheromone("exponential", 1, diffusion=0.75)), 1)
+    trail = after(Trail(plain_world(8), Pheromone("exponential", 1, diffusion=0.75)), 1)
     assert [float(trail.level(cell)) for cell in (MIDDLE, neighbour(MIDDLE, 2))] == [1, 0.5]
     assert total(after(trail, 1), plain_world(8)) == 0
 
@@ -131,7 +126,7 @@ def total(trail, world):
 @settings(max_examples=50, deadline=None, derandomize=True)
 def test_diffusion_conserves_the_sum(seed, rate):
     world = random_world(seed)
-    trail = make_trail(world, Pheromone("none", diffusion=rate))
+    trail = Trail(world, Pheromone("none", diffusion=rate))
     at_start = total(trail, world)
     assert at_start == sum(world.trails[:, 3].tolist())
     assert total(after(trail, 30), world) == pytest.approx(at_start, rel=1e-5, abs=1e-5)
@@ -140,7 +135,7 @@ def test_diffusion_conserves_the_sum(seed, rate):
 def test_diffusion_ends_in_evenness():
     # Shares are the same both ways, so an even level is what stays, rocks and edges or not.
     world = plain_world(level=6100, obstacles=[(1, 0, 0), (0, 3, 0)])
-    trail = after(make_trail(world, Pheromone("none", diffusion=0.9)), 400)
+    trail = after(Trail(world, Pheromone("none", diffusion=0.9)), 400)
     open_cells = [
         cell for cell in existing_cells(world.ranges) if cell not in [(1, 0, 0), (0, 3, 0)]
     ]
@@ -155,7 +150,7 @@ def test_the_mean_squared_distance_grows_by_the_rate(rate):
     # grows by exactly `rate` per tick, until the edge is reached.
     ticks = 9
     world = plain_world(level=10**6, ranges=(11, 11, 11))
-    trail = after(make_trail(world, Pheromone("none", diffusion=rate)), ticks)
+    trail = after(Trail(world, Pheromone("none", diffusion=rate)), ticks)
     spread = 0.0
     for cell in existing_cells(world.ranges):
         q, r = cell[0] - cell[2], cell[1] - cell[2]
@@ -218,7 +213,7 @@ def test_an_ant_that_does_not_move_or_does_not_carry_lays_nothing():
     act(colony, FORWARD)
     load(colony, 0)
     act(colony, GIVE)
-    assert set(colony.world.levels().values()) == {0, 598}
+    assert {colony.world.level(cell) for cell in colony.world.ground} == {0, 598}
 
 
 @pytest.mark.parametrize(

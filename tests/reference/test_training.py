@@ -20,9 +20,11 @@ import itertools
 import numpy as np
 import pytest
 from colonies import GAMMA, training
+from plain_runs import train, train_with_tables
 
 from taichi_ants.errors import AntsError
-from taichi_ants.reference import LEARNERS, Event, train
+from taichi_ants.reference import LEARNERS
+from taichi_ants.reference.ants import Event
 from taichi_ants.task import Task
 from taichi_ants.task.constants import GIVE, PICK_UP
 from taichi_ants.worlds.world import World
@@ -43,11 +45,13 @@ def prepared(learning, task=None, rng_state=0):
 def train_once(learning, delivery="absorbing", max_steps=600, rng_state=0):
     task = Task(delivery=delivery)
     begun = prepared(learning, task, rng_state)
-    return train(TWO_STEPS, learning, 0, 1, max_steps, task, trace=True, start_from=begun)
+    return train(TWO_STEPS, learning, 0, 1, max_steps, task, start_from=begun)
 
 
 def outcomes_of(run):
-    return [(pair, seen.outcome) for pair, seen in run.model.items()]
+    return [
+        (pair, (seen.reward, seen.next_state, seen.terminated)) for pair, seen in run.model.items()
+    ]
 
 
 def draws(run):
@@ -61,14 +65,11 @@ def test_the_record_of_the_episode():
     first, second = run.trace
     assert (first.cell, first.heading, first.state) == ((0, 0, 0), 1, 12)
     assert (first.action, first.reward, first.event) == (PICK_UP, 3, Event.PICKED_UP)
-    assert (first.next_cell, first.next_heading, first.next_state) == ((0, 0, 0), 4, 76)
-    assert (first.delivered, first.terminated, first.truncated) == (False, False, False)
+    assert (first.next_state, first.terminated, first.truncated) == (76, False, False)
     assert (second.cell, second.heading, second.state) == ((0, 0, 0), 4, 76)
     assert (second.action, second.reward, second.event) == (GIVE, 10, Event.DELIVERED)
-    assert (second.next_cell, second.next_heading, second.next_state) == ((0, 0, 0), 4, 4)
-    assert (second.delivered, second.terminated, second.truncated) == (True, True, False)
+    assert (second.next_state, second.terminated, second.truncated) == (4, True, False)
     assert [(step.episode, step.step) for step in run.trace] == [(0, 0), (0, 1)]
-    assert second.rng_state == run.rng_state
 
 
 # All learners see the same errors here: a' is the best action, and epsilon is 0.
@@ -100,14 +101,14 @@ def test_the_table_moves_by_the_learning_rate(learner, delivery, given):
 def test_truncation_bootstraps(learner, delivery):
     run = train_once(training(learner), delivery, max_steps=1)
     [step] = run.trace
-    assert (step.truncated, step.delivered, step.terminated) == (True, False, False)
+    assert (step.truncated, step.terminated) == (True, False)
     assert step.td_error == 3.0  # as without the limit
     assert (run.returns, run.steps, run.deliveries) == ([3], [1], [0])
 
 
 def test_a_delivery_in_the_last_step_is_no_truncation():
     last = train_once(training(), max_steps=2).trace[-1]
-    assert (last.delivered, last.terminated, last.truncated) == (True, True, False)
+    assert (last.event, last.terminated, last.truncated) == (Event.DELIVERED, True, False)
 
 
 @pytest.mark.parametrize(
@@ -157,7 +158,7 @@ def test_planning_draws_one_of_the_visited_pairs(rng_state, pick_up, give):
 
 def test_the_model_holds_the_last_outcome_in_the_order_of_first_visit():
     learning = training("dyna_q", epsilon=1.0)
-    run = train(TWO_STEPS, learning, 3, 8, 40, Task(delivery="continuing"), trace=True)
+    run = train(TWO_STEPS, learning, 3, 8, 40, Task(delivery="continuing"))
     outcomes, changed = {}, 0
     for step in run.trace:
         pair, outcome = (step.state, step.action), (step.reward, step.next_state, False)
@@ -170,11 +171,10 @@ def test_the_model_holds_the_last_outcome_in_the_order_of_first_visit():
 @pytest.mark.parametrize("delivery", ["absorbing", "continuing"])
 def test_sarsa_executes_the_action_it_learned_from(delivery):
     learning, task = training("sarsa", epsilon=0.7), Task(delivery=delivery)
-    run = train(TWO_STEPS, learning, 1, 6, 30, task, trace=True, trace_tables=True)
+    run, tables = train_with_tables(TWO_STEPS, learning, 1, 6, 30, task)
     followed = 0
-    for before, step, after in zip(run.trace, run.trace[1:], run.trace[2:], strict=False):
+    for table, step, after in zip(tables, run.trace[1:], run.trace[2:], strict=False):
         if step.episode == after.episode:
-            table = before.q_values
             target = step.reward + 0.5 * float(table[step.next_state, after.action])
             expected = target - float(table[step.state, step.action])
             assert float(step.td_error) == pytest.approx(expected, abs=1e-5)
@@ -183,11 +183,11 @@ def test_sarsa_executes_the_action_it_learned_from(delivery):
 
 
 def test_the_table_of_each_step_leads_to_the_next():
-    run = train(TWO_STEPS, training(epsilon=0.5), 1, 3, 30, trace=True, trace_tables=True)
+    run, tables = train_with_tables(TWO_STEPS, training(epsilon=0.5), 1, 3, 30)
     table = np.zeros((128, 5), np.float32)
-    for step in run.trace:
+    for step, after in zip(run.trace, tables, strict=True):
         table[step.state, step.action] += np.float32(0.5) * step.td_error
-        np.testing.assert_array_equal(step.q_values, table)
+        np.testing.assert_array_equal(after, table)
     np.testing.assert_array_equal(run.q_values, table)
 
 
@@ -206,10 +206,10 @@ def test_an_epsilon_below_the_floor_is_raised_after_the_first_episode():
 def test_going_on_gives_what_training_in_one_go_gives(learner):
     learning = training(learner, epsilon=0.6, epsilon_decay=0.9)
     task = Task(delivery="continuing")
-    whole = train(TWO_STEPS, learning, 9, 12, 40, task, trace=True)
-    half = train(TWO_STEPS, learning, 9, 5, 40, task, trace=True)
+    whole = train(TWO_STEPS, learning, 9, 12, 40, task)
+    half = train(TWO_STEPS, learning, 9, 5, 40, task)
     table_before, model_before = half.q_values.copy(), dict(half.model)
-    resumed = train(TWO_STEPS, learning, 9, 7, 40, task, trace=True, start_from=half)
+    resumed = train(TWO_STEPS, learning, 9, 7, 40, task, start_from=half)
     for run_field in ("returns", "steps", "deliveries", "epsilon", "rng_state", "trace"):
         assert getattr(resumed, run_field) == getattr(whole, run_field)
     assert list(resumed.model.items()) == list(whole.model.items())
@@ -228,7 +228,7 @@ def test_a_run_depends_on_its_seed():
 
 
 def test_every_episode_starts_from_the_same_world():
-    run = train(TWO_STEPS, training(epsilon=1.0), 2, 20, 100, trace=True)
+    run = train(TWO_STEPS, training(epsilon=1.0), 2, 20, 100)
     assert sum(run.deliveries) > 1
     starts = [step for step in run.trace if step.step == 0]
     assert {(step.cell, step.heading, step.state) for step in starts} == {((0, 0, 0), 1, 12)}
@@ -239,22 +239,14 @@ def test_a_hyperparameter_of_another_learner_is_refused():
         train(TWO_STEPS, training("q_learning", planning_steps=3), 0, 1, 1)
 
 
-def test_the_trace_is_kept_on_request_only():
-    assert train(TWO_STEPS, training(), 0, 2, 10).trace == []
-    traced = train(TWO_STEPS, training(), 0, 2, 10, trace=True)
-    assert len(traced.trace) == sum(traced.steps)
-    assert all(step.q_values is None for step in traced.trace)
-
-
 def test_each_step_begins_where_the_last_one_ended():
-    run = train(TWO_STEPS, training(epsilon=0.8), 4, 4, 30, trace=True)
+    run = train(TWO_STEPS, training(epsilon=0.8), 4, 4, 30)
     for step, after in itertools.pairwise(run.trace):
-        if step.delivered or step.truncated:
+        if step.event is Event.DELIVERED or step.truncated:
             assert (after.episode, after.step) == (step.episode + 1, 0)
         else:
             assert (after.episode, after.step) == (step.episode, step.step + 1)
-            ended = (step.next_cell, step.next_heading, step.next_state)
-            assert (after.cell, after.heading, after.state) == ended
+            assert after.state == step.next_state
     for episode, (gained, length) in enumerate(zip(run.returns, run.steps, strict=True)):
         steps = [step for step in run.trace if step.episode == episode]
         assert (sum(step.reward for step in steps), len(steps)) == (gained, length)

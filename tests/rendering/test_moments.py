@@ -45,13 +45,13 @@ def check(world: World, seed: int, number: int, evaporation: bool, epsilon: floa
 
     colony = reference.follower(world, table, seed, number, task, epsilon)
     colony.begin_episode()
-    existing = reference.existing_cells(world.ranges)
-    index = world.grid.index(np.array(list(existing)))
+    existing = list(colony.world.ground)
+    index = world.grid.index(np.array(existing))
     choices = 0
     for step, (snapshot, status) in enumerate(moments):
-        ant, levels = colony.ants[0], colony.world.levels()
+        ant = colony.ants[0]
         assert snapshot.ground[index].tolist() == [colony.world.ground[cell] for cell in existing]
-        assert snapshot.trail[index].tolist() == [levels[cell] for cell in existing]
+        assert snapshot.trail[index].tolist() == [colony.world.level(cell) for cell in existing]
         assert snapshot.ant_cells[0] == world.grid.index(normal_form(ant.cell))
         assert snapshot.ant_headings[0] == ant.heading
         assert snapshot.ant_carries[0] == ant.carries

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hexagons import neighbours
 from PIL import Image
 
 from taichi_ants import runtime
-from taichi_ants.grid.hexgrid import AxialGrid, neighbours
+from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import Scene, Snapshot, Viewport, at_start, colours
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.worlds import World, paper

@@ -7,7 +7,8 @@ from dataclasses import fields
 import numpy as np
 
 from taichi_ants import TrainingConfig
-from taichi_ants.reference import Cell, ReferenceColony
+from taichi_ants.reference import ReferenceColony
+from taichi_ants.reference.geometry import Cell
 from taichi_ants.task import Life, Task
 from taichi_ants.task.constants import FOOD
 from taichi_ants.worlds import World, from_text

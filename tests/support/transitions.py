@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from taichi_ants.reference import Event, Transition
+from taichi_ants.reference.ants import Event, Transition
 
 
 def transition(
@@ -15,7 +15,7 @@ def transition(
         "terminated": False,
         "truncated": False,
         **{"episode": 0, "step": 0, "event": Event.MOVED},
-        **{"cell": (0, 0, 0), "heading": 0, "next_cell": (0, 0, 0), "next_heading": 0},
+        **{"cell": (0, 0, 0), "heading": 0},
         **given,
     }
     return Transition(

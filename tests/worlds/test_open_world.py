@@ -4,9 +4,9 @@ import importlib
 
 import numpy as np
 import pytest
+from hexagons import distance
 
 from taichi_ants.errors import AntsError
-from taichi_ants.grid import hexgrid
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.grid.randomness import Stream
 from taichi_ants.task.constants import EMPTY
@@ -29,7 +29,7 @@ def pile_cells(world: World) -> set[tuple]:
     for axis, n in enumerate(world.ranges):
         centre = [0, 0, 0]
         centre[axis] = 3 * n // 4
-        near = hexgrid.distance(cells, centre) <= max(1, n // 16)
+        near = distance(cells, centre) <= max(1, n // 16)
         found |= set(map(tuple, cells[near].tolist()))
     return found
 
@@ -44,7 +44,7 @@ def test_what_every_open_world_guarantees(ranges: tuple, seed: int) -> None:
     assert world.reachable_foods().any()
 
     cells = all_cells(world)
-    clearing = cells[hexgrid.distance(cells, world.queen) <= 3]
+    clearing = cells[distance(cells, world.queen) <= 3]
     beside = [cell for cell in clearing.tolist() if cell != [0, 0, 0]]
     assert (world.ground()[world.grid.index(beside)] == EMPTY).all()
 
@@ -70,10 +70,10 @@ def test_rocks_are_placed_one_by_one_in_the_order_of_the_draws() -> None:
     cells = grid.cells(np.flatnonzero(grid.exists))
     stream, covered = Stream(1, 2, 3), np.zeros(len(cells), dtype=bool)
     while covered.sum() < 0.15 * len(cells):
-        word = stream.bits()
+        word = int(stream.bits(1)[0])
         centre = cells[((word >> 32) * len(cells)) >> 32]
         radius = ((word & 0xFFFF_FFFF) * 3) >> 32
-        covered |= hexgrid.distance(cells, centre) <= radius
+        covered |= distance(cells, centre) <= radius
     found = module.scatter_rocks(grid, 0.15, Stream(1, 2, 3))
     assert (found[grid.index(cells)] == covered).all()
 
@@ -90,7 +90,7 @@ def test_rocks_make_way_for_the_clearing_and_the_piles_only() -> None:
     cells = all_cells(world)
     scattered = module.scatter_rocks(world.grid, 0.15, Stream(5, module._STREAM_ROCKS, 0))
     rocks = set(map(tuple, world.grid.cells(np.flatnonzero(scattered)).tolist()))
-    clearing = set(map(tuple, cells[hexgrid.distance(cells, (0, 0, 0)) <= 3].tolist()))
+    clearing = set(map(tuple, cells[distance(cells, (0, 0, 0)) <= 3].tolist()))
     assert clearing & rocks
     assert set(map(tuple, world.obstacles.tolist())) == rocks - clearing - pile_cells(world)
 
@@ -107,8 +107,17 @@ def test_more_food_leaves_the_rocks_alone() -> None:
     assert len(little.foods) < len(much.foods)
 
 
-def test_drawn_ranges_fill_their_bounds() -> None:
-    drawn = np.array([module._draw_ranges(Stream(seed, 1)) for seed in range(1000)])
+def test_drawn_ranges_fill_their_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn = []
+
+    def note(grid: AxialGrid, *_: object) -> World:
+        drawn.append(grid.ranges)
+        return World((3, 3, 3), (0, 0, 0), foods=[(1, 0, 0)])
+
+    monkeypatch.setattr(module, "_draw", note)
+    for seed in range(1000):
+        open_world(seed)
+    drawn = np.array(drawn)
     assert drawn.min() == 10
     assert drawn.max() == 100
     # The mean of 1000 numbers drawn evenly from 10 .. 100 has a standard deviation of 0.83.
@@ -145,8 +154,8 @@ def test_a_world_without_reachable_food_is_drawn_again(monkeypatch: pytest.Monke
     monkeypatch.setattr(module, "_draw", shut_in)
     world = open_world(0, (20, 20, 20))
     assert attempts == [0, 1, 2]
-    assert world == draw((20, 20, 20), 0.15, 0.03, 0, 2)
-    assert world != draw((20, 20, 20), 0.15, 0.03, 0, 0)
+    assert world == draw(world.grid, 0.15, 0.03, 0, 2)
+    assert world != draw(world.grid, 0.15, 0.03, 0, 0)
 
 
 @pytest.mark.parametrize("ranges", [(1, 1, 1), (3, 3, 1), (4, 4, 4)])

@@ -1,6 +1,5 @@
 """Maps in text: what they mean, what is refused, and that drawing undoes reading."""
 
-import os
 import re
 from pathlib import Path
 
@@ -68,7 +67,6 @@ def test_the_papers_world_round_trip() -> None:
         "; drawn by hand\n" + RING + "  ; end",
         RING.replace("  5", "; a comment is no line of the drawing\n  5"),
         "trail = 3\n" + RING,
-        "ants = 0 1 2 3 4 5\n" + RING,
     ],
 )
 def test_what_does_not_matter(changed: str) -> None:
@@ -78,8 +76,6 @@ def test_what_does_not_matter(changed: str) -> None:
 def test_settings() -> None:
     assert from_text("trail = 7\n  t\nQ").trails[:, 3].tolist() == [7]
     assert from_text("  t\nQ").trails[:, 3].tolist() == [25]
-    renumbered = from_text("  ants=3 2 1 0 5 4\n" + RING)
-    assert renumbered.ants[:, 3].tolist() == [4, 1, 5, 0, 3, 2]
 
 
 @pytest.mark.parametrize(
@@ -104,14 +100,9 @@ def test_settings() -> None:
         ("trail = ٣\nQ", "sets trail to '٣'"),
         ("trail =\nQ", "sets trail to ''"),
         ("trail = 1 2\nQ", "sets trail to '1 2'"),
-        ("; c\ntrails = 3\nQ", "line 2 of the map sets 'trails'; the settings are trail and ants"),
-        ("trail = 3\ntrail = 3\nQ", "line 2 of the map sets trail a second time"),
-        ("Q\ntrail = 3", "line 2 of the map sets trail below the drawing"),
-        ("ants = 1 2\n0\n  1\nQ", "sets ants to '1 2'"),
-        ("ants = 0 0\n0\n  1\nQ", "sets ants to '0 0'"),
-        ("ants = one\n0\nQ", "sets ants to 'one'"),
-        ("ants = 0 1\n0\n  .\nQ", "the numbers of 2 ants but draws 1"),
-        ("ants = 0\n0\n  1\nQ", "the numbers of 1 ants but draws 2"),
+        ("; c\ntrails = 3\nQ", "line 2 of the map sets 'trails'; the only setting is trail"),
+        ("trail = 3\ntrail = 3\nQ", "line 2 of the map is 'trail = 3'; one such line may"),
+        ("Q\ntrail = 3", "line 2 of the map is 'trail = 3'; one such line may stand above"),
         ("Q" + " " * 200_003 + "." + "\n" * 200_000 + ".", "ranges are"),
     ],
 )
@@ -128,7 +119,7 @@ def test_a_map_is_text(text: object) -> None:
 
 
 def test_a_map_has_a_sane_size() -> None:
-    with pytest.raises(AntsError, match="has 4194305 characters"):
+    with pytest.raises(AntsError, match="has more than 4194304 characters"):
         from_text("Q" + " " * text_map.MAX_MAP_CHARACTERS)
 
 
@@ -148,16 +139,14 @@ def test_trails_under_the_queen_or_food_cannot_be_drawn(cell: tuple) -> None:
 
 @pytest.mark.parametrize("ranges", [(1500, 1500, 1), (3000, 3000, 1)])
 def test_worlds_too_large_for_a_map(ranges: tuple) -> None:
-    with pytest.raises(AntsError, match="at most 4194304"):
+    with pytest.raises(AntsError, match="more than 4194304"):
         to_text(World(ranges, (0, 0, 0)))
 
 
-def test_the_numbers_of_ants_survive() -> None:
+def test_ants_are_numbered_in_reading_order() -> None:
     world = World((3, 3, 3), (0, 0, 0), ants=[((0, 2, 0), 1), ((2, 0, 0), 2), ((0, 0, 1), 3)])
-    assert from_text(to_text(world)) == world
-    assert "ants = 1 2 0" in to_text(world).splitlines()
     in_reading_order = World((3, 3, 3), (0, 0, 0), ants=world.ants[[1, 2, 0]])
-    assert "ants" not in to_text(in_reading_order)
+    assert from_text(to_text(world)) == in_reading_order
 
 
 def test_the_garden_loads() -> None:
@@ -189,11 +178,11 @@ def test_the_examples_of_the_guide_work() -> None:
     ("content", "message"),
     [
         (b"", "map.txt draws no cell"),
-        (b"\x89PNG\r\n\x1a\n", "map.txt is no text file"),
-        (b"Q\n\x00\n", "map.txt is no text file"),
-        ("Q\n  .".encode("utf-16"), "map.txt is no text file"),
+        (b"\x89PNG\r\n\x1a\n", "map.txt.* cannot be read: .utf-8"),
+        (b"Q\n\x00\n", r"line 2, column 1 of .*map.txt has '\\x00'"),
+        ("Q\n  .".encode("utf-16"), "map.txt.* cannot be read: .utf-8"),
         (b"Q\n  x", "line 2, column 3 of .*map.txt has 'x'"),
-        (b" " * (text_map.MAX_MAP_CHARACTERS + 1), "map.txt has 4194305 characters"),
+        (b" " * (text_map.MAX_MAP_CHARACTERS + 1), "map.txt has more than 4194304 characters"),
     ],
 )
 def test_damaged_files(tmp_path: Path, content: bytes, message: str) -> None:
@@ -230,28 +219,21 @@ def test_only_worlds_are_drawn(world: object) -> None:
 
 
 def test_files_that_cannot_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(AntsError, match=r"nothing\.txt does not exist"):
+    with pytest.raises(AntsError, match=r"nothing\.txt.* cannot be read: No such file"):
         load_map(tmp_path / "nothing.txt")
-    with pytest.raises(AntsError, match="is no ordinary file"):
+    with pytest.raises(AntsError, match="cannot be read: Is a directory"):
         load_map(tmp_path)
     with pytest.raises(AntsError, match="the map file 5 cannot be read"):
         load_map(5)
-    with pytest.raises(AntsError, match=r"cannot be read|does not exist"):
+    with pytest.raises(AntsError, match="cannot be read"):
         load_map("x" * 10_000)
 
-    def refuse(self: Path) -> bytes:
+    def refuse(self: Path, encoding: str) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(Path, "read_bytes", refuse)
+    monkeypatch.setattr(Path, "read_text", refuse)
     with pytest.raises(AntsError, match=r"garden\.txt.* cannot be read: Permission denied"):
         load_map(GARDEN)
-
-
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes")
-def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(AntsError, match="is no ordinary file"):
-        load_map(tmp_path / "pipe")
 
 
 def test_undrawn_cells_become_obstacles() -> None:

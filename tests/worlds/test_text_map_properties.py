@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from taichi_ants.grid.hexgrid import AxialGrid, count_cells, cube
+from taichi_ants.grid.hexgrid import AxialGrid, cube
 from taichi_ants.worlds import World, from_text, to_text
 from taichi_ants.worlds.map_fit import smallest_world
 
@@ -39,21 +39,26 @@ def drawable_worlds(draw: st.DrawFn) -> World:
 
 @given(drawable_worlds())
 def test_reading_undoes_drawing(world: World) -> None:
-    assert from_text(to_text(world)) == world
+    drawn = to_text(world)
+    again = from_text(drawn)
+    assert to_text(again) == drawn
+    assert sorted(again.ants.tolist()) == sorted(world.ants.tolist())
+    contents = (world.foods, world.obstacles, world.trails)
+    assert again == World(world.ranges, world.queen, *contents, again.ants)
 
 
 @given(axial_cells)
 def test_no_world_that_holds_the_cells_is_smaller(cells: list[tuple[int, int]]) -> None:
     axials = np.array(cells)
     ranges, origin = smallest_world(axials)
-    assert AxialGrid(ranges).contains(cube(axials - origin)).all()
+    assert (cube(axials - origin) < ranges).all()
     # Origins beyond the bounding box are tried as well; for each, the ranges follow.
     low, high = axials.min(axis=0) - 4, axials.max(axis=0) + 4
     origins = itertools.product(*(range(a, b + 1) for a, b in zip(low, high, strict=True)))
     smallest = min(
-        count_cells(tuple((cube(axials - other).max(axis=0) + 1).tolist())) for other in origins
+        AxialGrid(tuple((cube(axials - other).max(axis=0) + 1).tolist())).count for other in origins
     )
-    assert count_cells(ranges) == smallest
+    assert AxialGrid(ranges).count == smallest
 
 
 @given(axial_cells, coordinates, coordinates)

@@ -1,10 +1,10 @@
 """What a world computes, against plain walks over its cells."""
 
 import numpy as np
+from hexagons import neighbours
 from hypothesis import given
 from hypothesis import strategies as st
 
-from taichi_ants.grid import hexgrid
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.worlds import World
@@ -27,8 +27,8 @@ def test_foods_are_reachable_where_a_walk_leads(world: World) -> None:
     ground = world.ground()
 
     def beside(cell: tuple) -> list[tuple]:
-        around = [tuple(n) for n in hexgrid.neighbours(cell).tolist()]
-        return [n for n in around if world.grid.contains(n)]
+        around = [tuple(n) for n in neighbours(cell).tolist()]
+        return [n for n in around if (np.array(n) < world.ranges).all()]
 
     def empty(cell: tuple) -> bool:
         return ground[world.grid.index(cell)] == EMPTY

@@ -6,12 +6,13 @@ import pickle
 
 import numpy as np
 import pytest
+from hexagons import distance, neighbours
 
-from taichi_ants import reference, worlds
+from taichi_ants import worlds
 from taichi_ants.errors import AntsError
-from taichi_ants.grid import hexgrid
 from taichi_ants.grid.constants import STREAM_START_CELL, STREAM_START_HEADING
 from taichi_ants.grid.randomness import stream_state
+from taichi_ants.reference.ants import starts
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 from taichi_ants.worlds import World
 from taichi_ants.worlds.starts import STARTS as WHERE
@@ -142,9 +143,9 @@ def test_closer_agrees_with_distances() -> None:
     world = World((5, 4, 6), (2, 0, 1))
     index = np.flatnonzero(world.grid.exists)
     cells = world.grid.cells(index)
-    own = hexgrid.distance(cells, world.queen)
+    own = distance(cells, world.queen)
     assert (world.distances()[index] == own).all()
-    nearer = hexgrid.distance(hexgrid.neighbours(cells), world.queen) < own[:, None]
+    nearer = distance(neighbours(cells), world.queen) < own[:, None]
     assert (world.closer()[index] == (nearer << np.arange(6)).sum(axis=1)).all()
 
 
@@ -177,7 +178,7 @@ def test_further_ants_start_nearest_to_the_queen_ties_by_the_stream(seed: int) -
     every = sorted(map(tuple, world.grid.cells(np.flatnonzero(world.grid.exists)).tolist()))
     taken = {world.queen, (1, 1, 0), (2, 0, 0), (0, 2, 0), (0, 0, 2)}
     order = sorted(
-        (int(hexgrid.distance(cell, world.queen)), stream_state(seed, STREAM_START_CELL, i), cell)
+        (int(distance(cell, world.queen)), stream_state(seed, STREAM_START_CELL, i), cell)
         for i, cell in enumerate(every)
         if cell not in taken
     )
@@ -207,7 +208,7 @@ def test_ants_that_are_spread_start_on_any_free_cells_by_the_seed(seed: int) -> 
         free = int((world.ground() == EMPTY).sum())
         for n in (1, 2, 40, free):
             cells, headings = world.start(seed, n, "spread")
-            plain = reference.start(world, seed, n, "spread")
+            plain = starts(world, seed, n, "spread")
             assert world.grid.cells(cells).tolist() == [list(cell) for cell, _ in plain]
             assert headings.tolist() == [heading for _, heading in plain]
             assert len(set(cells.tolist())) == n

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from taichi_ants.reference.learners.learner import Learner, rows_of
+from taichi_ants.reference.ants import Transition
+from taichi_ants.reference.learners.learner import Learner
 from taichi_ants.reference.random_stream import RandomStream, pick
-from taichi_ants.reference.records import Transition
 
 
 class DoubleQ(Learner):
@@ -16,10 +16,9 @@ class DoubleQ(Learner):
 
     def begin_run(self) -> None:
         """Let A and B begin as copies of the table."""
-        self._tables = (rows_of(self.table()), rows_of(self.table()))
+        self._tables = [[list(row) for row in self.rows] for _ in "AB"]
 
     def learn(self, step: Transition, epsilon: float, stream: RandomStream) -> np.float32:
-        """See `Learner.learn`."""
         high, _ = stream.draw()
         chosen = pick(high, 2)
         updated, other = self._tables[chosen], self._tables[1 - chosen]

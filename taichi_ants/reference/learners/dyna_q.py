@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
 
+from taichi_ants.reference.ants import Transition
 from taichi_ants.reference.learners.q_learning import QLearning
 from taichi_ants.reference.random_stream import RandomStream, pick
-from taichi_ants.reference.records import Transition
 
 
 class DynaQ(QLearning):
     """Q-learning, and `planning_steps` updates from drawn pairs of the model."""
 
-    hyperparameters: ClassVar[Mapping[str, float]] = {"planning_steps": 5}
+    hyperparameters: ClassVar = {"planning_steps": 5}
 
     def learn(self, step: Transition, epsilon: float, stream: RandomStream) -> np.float32:
-        """See `Learner.learn`."""
         error = super().learn(step, epsilon, stream)
         self.remember(step)
         for _ in range(int(self.settings["planning_steps"])):

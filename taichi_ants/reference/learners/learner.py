@@ -8,15 +8,12 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from taichi_ants.errors import AntsError
+from taichi_ants.reference.ants import Pair, Transition
 from taichi_ants.reference.random_stream import RandomStream
-from taichi_ants.reference.records import Pair, Transition
-from taichi_ants.reference.registry import Registry
 from taichi_ants.task.constants import N_ACTIONS
 
 if TYPE_CHECKING:
     from taichi_ants.learners.config import TrainingConfig
-
-Rows = list[list[np.float32]]
 
 
 class Learner:
@@ -33,7 +30,7 @@ class Learner:
         hyperparameters: What it has besides the settings of all learners, with the usual values.
         settings: The values of these.
         learning_rate, discount: Of the configuration.
-        rows: The table as rows of np.float32 scalars: plain lists are several times faster here
+        rows: The table, n_states lists of 5 np.float32: plain lists are several times faster here
             than an array.
         model: Of each visited pair, in the order of first visit, the last seen transition; filled
             by learners that plan.
@@ -46,11 +43,7 @@ class Learner:
     def __init__(
         self, config: TrainingConfig, n_states: int, q_values: np.ndarray | None = None
     ) -> None:
-        """Begin with a copy of a table (n_states, 5), zeros if not given, and without memories.
-
-        Raises:
-            AntsError: The learner has no hyperparameter of a name that is given.
-        """
+        """Begin with a copy of a table (n_states, 5), zeros if not given, and without memories."""
         self.name = config.learner
         given = dict(config.hyperparameters)
         for name in given.keys() - self.hyperparameters.keys():
@@ -59,14 +52,14 @@ class Learner:
         self.learning_rate = np.float32(config.learning_rate)
         self.discount = np.float32(config.discount)
         if q_values is None:
-            q_values = np.zeros((n_states, N_ACTIONS), np.float32)
-        self.rows = rows_of(q_values)
+            q_values = np.zeros((n_states, N_ACTIONS))
+        self.rows = [list(row) for row in np.asarray(q_values, np.float32)]
         self.model: dict[Pair, Transition] = {}
         self.begin_run()
         self.begin()
 
     def table(self) -> np.ndarray:
-        """Return a copy of the table; (n_states, 5), float32."""
+        """A copy of the table; (n_states, 5), float32."""
         return np.array(self.rows, np.float32)
 
     def begin_run(self) -> None:
@@ -76,7 +69,7 @@ class Learner:
         """Make the memory of an episode, at its start."""
 
     def learn(self, step: Transition, epsilon: float, stream: RandomStream) -> np.float32:
-        """Learn from a transition; return its TD error.
+        """Learn from a transition; its TD error.
 
         Args:
             step: What the ant did, and what came of it.
@@ -88,28 +81,20 @@ class Learner:
         return error
 
     def error(self, step: Transition, epsilon: float) -> np.float32:
-        """Return the TD error of a transition by the table of now."""
+        """The TD error of a transition by the table of now."""
         next_value = self.next_value(step, np.float32(epsilon))
         target = np.float32(step.reward) + self.discount_of(step) * next_value
         return target - self.rows[step.state][step.action]
 
     def next_value(self, step: Transition, epsilon: np.float32) -> np.float32:
-        """Return what the next state is worth by the table of now."""
+        """What the next state is worth by the table of now."""
         raise NotImplementedError
 
     def discount_of(self, step: Transition) -> np.float32:
-        """Return the discount of what comes after a step: 0 where it terminated."""
+        """The discount of what comes after a step: 0 where it terminated."""
         return np.float32(0) if step.terminated else self.discount
 
     def update(self, pair: Pair, weight: np.float32, error: np.float32) -> None:
         """Add weight * error to the value of a pair."""
         state, action = pair
         self.rows[state][action] = self.rows[state][action] + weight * error
-
-
-def rows_of(q_values: np.ndarray) -> Rows:
-    """Return a table (n_states, 5) as rows of np.float32 scalars."""
-    return [list(row) for row in np.asarray(q_values, np.float32)]
-
-
-LEARNERS: Registry[type[Learner]] = Registry("learner")

@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
 
+from taichi_ants.reference.ants import Transition
 from taichi_ants.reference.learners.sarsa import Sarsa
 from taichi_ants.reference.random_stream import RandomStream
-from taichi_ants.reference.records import Transition
 
 
 class NStepSarsa(Sarsa):
     """SARSA that updates a pair n steps later, or at the end of the episode."""
 
     shares = False
-    hyperparameters: ClassVar[Mapping[str, float]] = {"n_steps": 4}
+    hyperparameters: ClassVar = {"n_steps": 4}
 
     def begin(self) -> None:
         """Forget the steps that wait for their update."""
         self._waiting: list[Transition] = []  # oldest first
 
     def learn(self, step: Transition, epsilon: float, stream: RandomStream) -> np.float32:
-        """See `Learner.learn`; the error returned is that of one-step SARSA, before the update."""
+        # The error returned is that of one-step SARSA, before the update.
         error = self.error(step, epsilon)
         self._waiting.append(step)
         ends = step.terminated or step.truncated

@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
 
+from taichi_ants.reference.ants import Pair, Transition
 from taichi_ants.reference.learners.dyna_q import DynaQ
 from taichi_ants.reference.random_stream import RandomStream
-from taichi_ants.reference.records import Pair, Transition
 
 
 class PrioritizedSweeping(DynaQ):
     """All updates come from the model, that of the present step too."""
 
     shares = False
-    hyperparameters: ClassVar[Mapping[str, float]] = {"planning_steps": 5, "threshold": 0.0001}
+    hyperparameters: ClassVar = {"planning_steps": 5, "threshold": 0.0001}
 
     def begin_run(self) -> None:
         """Begin without priorities."""
         self._priorities: dict[Pair, np.float32] = {}  # in the order of the model
 
     def learn(self, step: Transition, epsilon: float, stream: RandomStream) -> np.float32:
-        """See `Learner.learn`."""
         error = self.error(step, epsilon)
         self.remember(step)
         self._priorities.setdefault(step.pair, np.float32(0))

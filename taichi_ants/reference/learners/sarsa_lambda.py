@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
 
+from taichi_ants.reference.ants import Pair, Transition
 from taichi_ants.reference.learners.sarsa import Sarsa
 from taichi_ants.reference.random_stream import RandomStream
-from taichi_ants.reference.records import Pair, Transition
 
 
 class SarsaLambda(Sarsa):
     """SARSA that updates the last pairs of the episode too."""
 
     shares = False
-    hyperparameters: ClassVar[Mapping[str, float]] = {"trace_decay": 0.9, "trace_length": 32}
+    hyperparameters: ClassVar = {"trace_decay": 0.9, "trace_length": 32}
 
     def begin(self) -> None:
         """Forget the traces."""
         self._traces: list[tuple[Pair, np.float32]] = []  # newest first
 
     def learn(self, step: Transition, epsilon: float, stream: RandomStream) -> np.float32:
-        """See `Learner.learn`."""
         error = self.error(step, epsilon)
         fade = self.discount * np.float32(self.settings["trace_decay"])
         older = [(pair, trace * fade) for pair, trace in self._traces if pair != step.pair]

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from plain_runs import rollout
 
-from taichi_ants import reference
 from taichi_ants.analysis.bounds import episodes as dynamic_programming
 from taichi_ants.analysis.bounds.baselines import (
     BASELINE_COLUMNS,
@@ -29,7 +29,7 @@ def evaluate(world: World, q_values: np.ndarray, **options: Any) -> SimpleNamesp
     """Rollouts of the reference, in the form of the engine's."""
     rollouts = [
         [
-            reference.rollout(
+            rollout(
                 world,
                 table,
                 seed=seed,
@@ -43,9 +43,9 @@ def evaluate(world: World, q_values: np.ndarray, **options: Any) -> SimpleNamesp
         for table, seed in zip(q_values, options["seeds"], strict=True)
     ]
     return SimpleNamespace(
-        returns=np.array([[r.episode_return for r in row] for row in rollouts]),
-        steps=np.array([[r.steps for r in row] for row in rollouts]),
-        deliveries=np.array([[r.deliveries for r in row] for row in rollouts]),
+        returns=np.array([[r.returns[0] for r in row] for row in rollouts]),
+        steps=np.array([[r.steps[0] for r in row] for row in rollouts]),
+        deliveries=np.array([[r.deliveries[0] for r in row] for row in rollouts]),
     )
 
 

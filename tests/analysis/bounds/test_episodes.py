@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from plain_runs import rollout
 from plain_search import (
     PlainWorld,
     search_all_sequences,
@@ -14,7 +15,6 @@ from plain_search import (
     search_shortest,
 )
 
-from taichi_ants import reference
 from taichi_ants.analysis.bounds import episodes as dynamic_programming
 from taichi_ants.analysis.bounds.episodes import Outcome, exact_bounds
 from taichi_ants.analysis.bounds.transitions import build_transitions
@@ -129,7 +129,7 @@ def test_no_policy_exceeds_the_bounds() -> None:
     bounds = exact_bounds(world, [0.9], 60)
     assert bounds.shortest is not None
     rollouts = [
-        reference.rollout(
+        rollout(
             world,
             policy,
             number=number,
@@ -139,10 +139,10 @@ def test_no_policy_exceeds_the_bounds() -> None:
         for policy in (random_policy(), trail_follower())
         for number in range(40)
     ]
-    assert any(rollout.deliveries for rollout in rollouts)
-    assert all(rollout.episode_return <= bounds.largest.episode_return for rollout in rollouts)
-    delivered = [rollout for rollout in rollouts if rollout.deliveries]
-    assert all(rollout.steps >= bounds.shortest.steps for rollout in delivered)
+    assert all(run.returns[0] <= bounds.largest.episode_return for run in rollouts)
+    delivered = [run for run in rollouts if run.deliveries[0]]
+    assert delivered
+    assert all(run.steps[0] >= bounds.shortest.steps for run in delivered)
 
 
 def test_a_pick_up_of_one_of_two_foods_is_luck_for_the_bounds_and_chance_for_the_optimum() -> None:

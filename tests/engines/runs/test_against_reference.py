@@ -6,7 +6,9 @@ from dataclasses import fields
 from itertools import cycle
 
 import numpy as np
+import plain_runs
 import pytest
+from plain_runs import train_with_tables
 from random_rewards import random_rewards
 from random_worlds import random_world
 
@@ -15,11 +17,11 @@ from taichi_ants import (
     TrainingConfig,
     evaluate,
     learners,
-    reference,
     rollout,
     trace_training,
     train,
 )
+from taichi_ants.reference.ants import Event, starts
 from taichi_ants.task import Life, Pheromone, Task, observations
 from taichi_ants.worlds import World, paper
 
@@ -78,16 +80,14 @@ def random_task(seed: int, observation: str = "paper", deposit: str = "set") -> 
 def assert_equal_steps(world, config, seed, episodes, max_steps, task):
     """Compare each step of a training run: what happened, the TD error, the whole Q-table."""
     ours = trace_training(world, config, seed, episodes, max_steps, task)
-    plain = reference.train(
-        world, config, seed, episodes, max_steps, task, trace=True, trace_tables=True
-    )
+    plain, tables = train_with_tables(world, config, seed, episodes, max_steps, task)
     assert len(ours) == len(plain.trace) > 0
     for k, step in enumerate(plain.trace):
         assert (ours.episodes[k], ours.steps[k]) == (step.episode, step.step)
         assert_equal_step(ours, k, step)
         assert ours.terminated[k] == step.terminated
         assert ours.td_errors[k] == step.td_error
-        assert np.array_equal(ours.tables[k], step.q_values)
+        assert np.array_equal(ours.tables[k], tables[k])
     return plain
 
 
@@ -95,7 +95,7 @@ def assert_equal_step(ours, k, step):
     assert (tuple(ours.cells[k]), ours.headings[k]) == (step.cell, step.heading)
     assert (ours.states[k], ours.actions[k]) == (step.state, step.action)
     assert (ours.rewards[k], ours.next_states[k]) == (step.reward, step.next_state)
-    assert ours.delivered[k] == step.delivered
+    assert ours.delivered[k] == (step.event is Event.DELIVERED)
 
 
 @pytest.mark.parametrize(("learner", "observation", "deposit"), KERNELS)
@@ -134,7 +134,7 @@ def test_whole_trainings_of_a_mixed_sweep():
         )
         for c, config in enumerate(configs):
             for s, seed in enumerate(result.seeds):
-                plain = reference.train(world, config, seed, 9, 70, task)
+                plain = plain_runs.train(world, config, seed, 9, 70, task)
                 assert result.returns[c, s].tolist() == plain.returns
                 assert result.steps[c, s].tolist() == plain.steps
                 assert result.deliveries[c, s].tolist() == plain.deliveries
@@ -155,11 +155,11 @@ def test_rollouts(observation, deposit):
         table = rng.integers(0, 3, (task.n_states, 5)).astype(np.float32)
         outcome = evaluate(world, table, 4, seed, 40, task, epsilon=0.1)
         for number in range(4):
-            plain = reference.rollout(world, table, seed, number, 40, task, 0.1)
+            plain = plain_runs.rollout(world, table, seed, number, 40, task, 0.1)
             ours = rollout(world, table, seed, number, 40, task, 0.1)
-            assert outcome.returns[number] == plain.episode_return == ours.rewards.sum()
-            assert outcome.steps[number] == plain.steps == len(ours)
-            assert outcome.deliveries[number] == plain.deliveries == ours.delivered.sum()
+            assert outcome.returns[number] == plain.returns[0] == ours.rewards.sum()
+            assert outcome.steps[number] == plain.steps[0] == len(ours)
+            assert outcome.deliveries[number] == plain.deliveries[0] == ours.delivered.sum()
             for k, step in enumerate(plain.trace):
                 assert_equal_step(ours, k, step)
                 assert np.array_equal(ours.q_values[k], table[step.state])
@@ -196,7 +196,7 @@ def test_starts_of_ants():
     for seed in range(200):
         world = random_world(seed + 500)
         cells, headings = world.start(seed)
-        [(cell, heading)] = reference.start(world, seed)
+        [(cell, heading)] = starts(world, seed)
         assert tuple(world.grid.cells(cells[0])) == cell
         assert headings[0] == heading
 
