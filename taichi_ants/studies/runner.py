@@ -338,12 +338,11 @@ def _run(
         **where,
     )
     steps = trained.steps.sum(axis=2, dtype=float)
-    seconds = sum(cost.seconds for cost in trained.costs)
     return {
         **{name: files.smallest(getattr(trained, name)) for name in _RUN_ARRAYS},
         **{f"greedy_{name}": files.smallest(getattr(greedy, name)) for name in _RUN_ARRAYS},
         "q_values": trained.q_values,
-        "seconds": seconds * steps / steps.sum(),
+        "seconds": trained.seconds * steps / steps.sum(),
     }
 
 

@@ -179,8 +179,10 @@ class Colony:
             raise AntsError(f"the worlds have the ranges {sorted(ranges)}; all must have the same.")
         self.grid = self.worlds[0].grid
         life = self.task.life
-        moving = life.regrowth is not None or life.wander is not None
-        self.n_homes = max(len(world.foods) for world in self.worlds) if moving else 0
+        self._ants_change = life.births or life.lifespan is not None
+        self._food_changes = life.regrowth is not None or life.wander is not None
+        most = max(len(world.foods) for world in self.worlds)
+        self.n_homes = most if self._food_changes else 0
         usual = "by_chunk" if self.capacity >= _LARGE_COLONY else "by_world"
         self.schedule = usual if schedule is None else schedule
         check_one_of("schedule", self.schedule, ("by_world", "by_chunk"))
@@ -234,7 +236,7 @@ class Colony:
             self._launch("tick_phases")
             for _ in range(rounds):
                 self._launch("planning_phases")
-            if self.task.life.changes or self.ends_at_delivery:
+            if self._ants_change or self.ends_at_delivery:
                 self._launch("last_phases")
             self.ticks += 1
 
@@ -396,8 +398,7 @@ class Colony:
         born or have tables of their own, and vacant ones stay behind the others; there the order
         stays.
         """
-        life, spare = self.task.life, self.capacity > self.ants
-        if life.births or life.lifespan or self.one_a_slot or spare:
+        if self._ants_change or self.one_a_slot or self.capacity > self.ants:
             return
         ants = self.arrays["ants"]
         cells = ants[AntRow.CELL].reshape(len(self.seeds), -1)
@@ -420,7 +421,8 @@ class Colony:
             self.one_a_slot,
             self.task.sees,
             self.pheromone.dense,
-            self.task.life.changes,
+            self._ants_change,
+            self._food_changes,
         )
         values = {**self._numbers(), **self.arrays}
         kind = self._arguments.type_of(values)

@@ -48,7 +48,8 @@ class Variant:
         own_tables: Whether there is a table for each slot, not one for each world.
         observation: The observation.
         dense: Whether levels are f32, see `trail`.
-        lively: Whether ants or food come and go; leaving that out halves the time to compile.
+        ants_change, food_changes: Whether ants, or foods, come and go; leaving that out saves time,
+            more so while this compiles.
     """
 
     def __init__(
@@ -57,9 +58,11 @@ class Variant:
         own_tables: bool,
         observation: Observation,
         dense: bool,
-        lively: bool,
+        ants_change: bool,
+        food_changes: bool,
     ) -> None:
-        self.own_tables, self.dense, self.lively = own_tables, dense, lively
+        self.own_tables, self.dense = own_tables, dense
+        self.ants_change, self.food_changes = ants_change, food_changes
         self.learner = None if learner is None else tried(learner)
         self.draws_next_action = learner is not None and learner.draws_next_action
         # Each ant learns into a table of its own, or all ants of a world into one.
@@ -99,10 +102,11 @@ def tick_phases(v: Variant) -> Iterator[Phase]:
         yield Phase(CELLS, trail.diffuse)
         yield Phase(CELLS, trail.settle)
     yield Phase(WORLD, life.count)
-    if v.lively:
+    if v.ants_change:
         yield Phase(WORLD, life.give_birth)
         yield Phase(ANTS, life.grow_old)
         yield Phase(WORLD, life.count)
+    if v.food_changes:
         yield Phase(WORLD, life.regrow)
         yield Phase(WORLD, life.wander)
     yield Phase(ANTS, learning.observe_and_learn)
@@ -118,7 +122,7 @@ def planning_phases(v: Variant) -> Iterator[Phase]:
 
 def last_phases(v: Variant) -> Iterator[Phase]:
     """What ends a tick."""
-    if v.lively:
+    if v.ants_change:
         yield Phase(ANTS, life.retire)
     yield Phase(WORLD, life.stop_at_delivery)
 

@@ -66,7 +66,7 @@ class TallyRow(IntEnum):
 
 
 class HomeRow(IntEnum):
-    """Rows of `homes`, one column for each: the place of a food of the start, where it grows back."""
+    """Rows of `homes`, one column for each food of the start: where it lies, or grows back."""
 
     CELL = 0
     TAKEN = auto()  # the tick in which it was taken; -1: it is there

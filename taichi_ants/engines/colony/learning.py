@@ -20,7 +20,7 @@ from taichi_ants.learners.model import (
     terminated_of,
     visited,
 )
-from taichi_ants.task.constants import DELIVERED, N_ACTIONS, ROW
+from taichi_ants.task.constants import DELIVERED, ROW
 from taichi_ants.task.rules.random_bits import draw_below
 
 _ONE = 4294967296.0  # fixed-point numbers have 32 binary places

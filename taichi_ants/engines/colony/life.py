@@ -186,13 +186,13 @@ def can_move(c: ti.template(), w, home, step):
 @ti.func
 def retire(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """At the end of the tick the dead leave their slots, and the newborn are ants."""
-    if c.ants[AntRow.STAGE, ant] == Stage.DYING:
+    if c.ants[AntRow.STAGE, ant] == Stage.NEWBORN:
+        c.ants[AntRow.STAGE, ant] = Stage.LIVING
+    elif c.ants[AntRow.STAGE, ant] == Stage.DYING:
         c.ants[AntRow.STAGE, ant] = Stage.VACANT
         ti.atomic_min(c.worlds[WorldRow.FIRST_VACANT, w], ant - w * c.n_slots)
         if c.ants[AntRow.NUMBER, ant] < c.n_ants:
             c.first_streams[w * c.n_slots + c.ants[AntRow.NUMBER, ant]] = c.streams[ant]
-    else:
-        c.ants[AntRow.STAGE, ant] = Stage.LIVING
 
 
 @ti.func
