@@ -121,10 +121,10 @@ def measure(seeds: int, episodes: int, max_steps: int, delivery: str, threads: i
         train(worlds.paper(), configs, 0, 1, 1, threads=threads)
         began = time.perf_counter()
         result = train(worlds.paper(), configs, range(seeds), episodes, max_steps, task)
-        (cost,) = result.costs
-        figures = [len(configs) * seeds, cost.steps, time.perf_counter() - began, cost.seconds]
+        wall, done = time.perf_counter() - began, int(result.steps.sum(dtype=np.int64))
+        figures = [len(configs) * seeds, done, wall, result.seconds]
         sums = [one + other for one, other in zip(sums, figures, strict=True)]
-        fastest = fastest or cost.nanoseconds_per_step
+        fastest = fastest or result.seconds * 1e9 / done
         label = learner + (f" (p{planning_steps})" if planning_steps else "")
         _, steps, wall, cpu = figures
         print(line.format(label, *figures, steps / wall / 1e6, cpu * 1e9 / steps))

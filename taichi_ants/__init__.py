@@ -12,7 +12,7 @@ from taichi_ants.environment import prepare_for_taichi
 if TYPE_CHECKING:
     from taichi_ants import analysis, learners, reference, rendering, task, worlds
     from taichi_ants.engines.colony.colony import Colony, ColonyEpisodes
-    from taichi_ants.engines.runs.results import LearnerCost, Rollouts, TrainingResult
+    from taichi_ants.engines.runs.results import Rollouts, TrainingResult
     from taichi_ants.engines.runs.traces import Trace, rollout, trace_training
     from taichi_ants.engines.runs.training import continue_training, evaluate, train
     from taichi_ants.errors import AntsError
@@ -28,7 +28,6 @@ _HOMES = {
     "Colony": "taichi_ants.engines.colony.colony",
     "ColonyEpisodes": "taichi_ants.engines.colony.colony",
     **dict.fromkeys(("Life", "Observation", "Pheromone", "Rewards", "Task"), "taichi_ants.task"),
-    "LearnerCost": "taichi_ants.engines.runs.results",
     "Rollouts": "taichi_ants.engines.runs.results",
     "Trace": "taichi_ants.engines.runs.traces",
     "TrainingConfig": "taichi_ants.learners.config",
@@ -51,7 +50,6 @@ __all__ = [
     "AntsError",
     "Colony",
     "ColonyEpisodes",
-    "LearnerCost",
     "Life",
     "Observation",
     "Pheromone",

@@ -7,11 +7,14 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from taichi_ants import learners
-from taichi_ants.errors import AntsError, shown, whole
+from taichi_ants.errors import AntsError, check_one_of, check_whole, checked_flag, shown, whole
 from taichi_ants.learners.config import TrainingConfig, share_of_one
 from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS, N_ACTIONS
+from taichi_ants.worlds.starts import STARTS
 from taichi_ants.worlds.world import World
+
+MAX_ANTS = 1 << 24
 
 
 def checked_world(world: World) -> World:
@@ -41,6 +44,29 @@ def checked_runs_task(task: Task | None) -> Task:
             "evaporation nor diffusion, so use a Colony."
         )
     return task
+
+
+def checked_capacity(
+    task: Task, ants: int, capacity: int | None, start: str, ends_at_delivery: bool
+) -> int:
+    """How many ants a colony can have at once; the arguments are those of `Colony`."""
+    check_whole("ants", ants, 1, MAX_ANTS)
+    check_one_of("start", start, STARTS)
+    births = task.life.births
+    if checked_flag("ends_at_delivery", ends_at_delivery) and (ants != 1 or births):
+        raise AntsError(
+            f"ends_at_delivery is set with {ants} ants and births {births}; it is for one ant "
+            "without births, so leave it out."
+        )
+    if capacity is None:
+        return min(2 * ants + 64, MAX_ANTS) if births else int(ants)
+    check_whole("capacity", capacity, 1, MAX_ANTS)
+    if capacity < ants:
+        raise AntsError(
+            f"capacity is {capacity}, but {ants} ants start; give a capacity of at least {ants}, "
+            "or None."
+        )
+    return int(capacity)
 
 
 def checked_food(world: World) -> World:

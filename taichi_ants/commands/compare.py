@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
     from taichi_ants import World
     from taichi_ants.analysis.paper.comparison import Comparison
-    from taichi_ants.engines.runs.results import LearnerCost
     from taichi_ants.studies.runner import Outcome, RunPoint, Study
     from taichi_ants.task import Task
 
@@ -176,17 +175,24 @@ def to_comparison(study: Study[RunPoint], arrays: dict[str, np.ndarray], world: 
     )
 
 
-def costs_of(study: Study[RunPoint], outcomes: dict[RunPoint, Outcome]) -> list[LearnerCost]:
+def costs_of(study: Study[RunPoint], outcomes: dict[RunPoint, Outcome]) -> list[dict[str, Any]]:
     """What each learner's training took."""
-    from taichi_ants.engines.runs.results import LearnerCost
-
-    costs: dict[tuple[str, int], LearnerCost] = {}
+    sums: dict[tuple[str, int], tuple[float, float]] = {}
     for point in study.points:
         key = point.training.learner, point.training.planning_steps
-        known = costs.get(key, LearnerCost(*key, steps=0, seconds=0.0))
-        steps, seconds = (outcomes[point][name].sum(dtype=float) for name in ("steps", "seconds"))
-        costs[key] = LearnerCost(*key, known.steps + int(steps), known.seconds + float(seconds))
-    return list(costs.values())
+        steps, seconds = sums.get(key, (0.0, 0.0))
+        outcome = outcomes[point]
+        sums[key] = (steps + outcome["steps"].sum(), seconds + outcome["seconds"].sum())
+    return [
+        {
+            "learner": learner,
+            "planning_steps": planning_steps,
+            "steps": int(steps),
+            "seconds": float(seconds),
+            "nanoseconds_per_step": float(seconds * 1e9 / steps) if steps else float("nan"),
+        }
+        for (learner, planning_steps), (steps, seconds) in sums.items()
+    ]
 
 
 def as_in_training(task: Task) -> Task:
@@ -306,7 +312,7 @@ def do_comparison(
         first.task.evaporation_in_evaluation,
     )
     files.write_csv(ready / BASELINES, baselines, BASELINE_COLUMNS)
-    costs = [cost.as_row() for cost in costs_of(study, outcomes)]
+    costs = costs_of(study, outcomes)
     write_tables(ready, comparison, baselines, costs)
     write_policies(ready / POLICIES, study, comparison, q_values)
     return {"cost_per_step": costs}

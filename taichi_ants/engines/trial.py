@@ -1,8 +1,8 @@
-"""Tries functions from outside of the package before a kernel takes them up.
+"""Tries learners from outside of the package before a kernel takes them up.
 
 Taichi's compiler ends the process where it meets what it does not expect, and compiled code where
-it reads outside an array. So such a function is compiled, and called a thousand times, in a forked
-process first.
+it reads outside an array. So such a learner is compiled, and learns from a thousand steps, in a
+forked process first.
 """
 
 import faulthandler
@@ -11,8 +11,7 @@ import re
 import signal
 import sys
 import warnings
-from collections.abc import Callable
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
 
@@ -26,8 +25,6 @@ _SECONDS = 30  # until a trial is stopped; it takes less than one
 _UPDATES = 1000
 _STATES = 128  # rows of the tables of a trial
 
-Fault = Callable[[bool], str]  # what is wrong, found out in the Taichi that runs; may end it
-
 
 @cache
 def tried(learner: Learner) -> Learner:
@@ -36,45 +33,32 @@ def tried(learner: Learner) -> Learner:
     Raises:
         AntsError: It cannot be used; the message says why.
     """
-    if learner.name not in registry.BUILT_IN:
-        fault = partial(_fault_of_learner, learner)
-        refuse_what_fails(f"learner {learner.name!r}", fault, "taichi_ants.learners.Learner")
-    return learner
-
-
-def refuse_what_fails(what: str, fault: Fault, where: str) -> None:
-    """Try something, in a forked process where that is possible.
-
-    Args:
-        what: What is tried, for the message.
-        fault: What is wrong with it; empty if nothing is. Called with False and with True, for two
-            kinds of trials.
-        where: What tells more about it.
-
-    Raises:
-        AntsError: It cannot be used; the message says why.
-    """
+    if learner.name in registry.BUILT_IN:
+        return learner
     arch = runtime.start().arch
     # A forked process has neither the GPU nor the fields of this one. That macOS lets a fork go on
     # is not sure, and Windows has none.
     apart = sys.platform == "linux" and arch == "cpu" and not runtime.holds_data()
-    reason = _fault_apart(fault) if apart else said_by(fault, False)
-    if reason:
-        raise AntsError(f"{what} cannot be used: {reason}; see {where}.")
+    fault = _fault_apart(learner) if apart else _fault_of(learner, False)
+    if fault:
+        raise AntsError(
+            f"learner {learner.name!r} cannot be used: {fault}; see taichi_ants.learners.Learner."
+        )
+    return learner
 
 
-def _fault_apart(fault: Fault) -> str:
+def _fault_apart(learner: Learner) -> str:
     """What is wrong, found out in a forked process; empty if nothing is."""
     reader, writer = os.pipe()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # Python's, of a fork beside threads
         child = os.fork()
     if child == 0:
-        _try_in_child(fault, writer)
+        _try_in_child(learner, writer)
     os.close(writer)
     try:
         with open(reader, encoding="utf-8") as pipe:
-            reason = pipe.read()
+            fault = pipe.read()
     except BaseException:
         os.kill(child, signal.SIGKILL)
         raise
@@ -83,10 +67,10 @@ def _fault_apart(fault: Fault) -> str:
     code = os.waitstatus_to_exitcode(status)
     if code == -signal.SIGALRM:
         return f"it does not come to an end within {_SECONDS} seconds"
-    return reason if code == 0 else "it ends the process, as an index outside of an array does"
+    return fault if code == 0 else "it ends the process, as an index outside of an array does"
 
 
-def _try_in_child(fault: Fault, writer: int) -> None:
+def _try_in_child(learner: Learner, writer: int) -> None:
     """Write what is wrong and end, with 0 if it came to that; whatever happens, do it silently."""
     import resource
 
@@ -98,25 +82,13 @@ def _try_in_child(fault: Fault, writer: int) -> None:
         for stream in (1, 2):
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
         runtime.start_for_trial()
-        os.write(writer, (said_by(fault, False) or said_by(fault, True)).encode())
+        os.write(writer, (_fault_of(learner, False) or _fault_of(learner, True)).encode())
         os._exit(0)
     finally:
         os._exit(1)
 
 
-def said_by(fault: Fault, wide: bool) -> str:
-    """What a trial finds, or what Taichi says about it."""
-    import taichi as ti
-
-    try:
-        return fault(wide)
-    except Exception as error:
-        # Assertions of the user's own hold in Taichi's debug mode only, not where it trains.
-        theirs = isinstance(error, ti.TaichiAssertionError) and "Out of bound" not in str(error)
-        return "" if theirs else _last_line(error)
-
-
-def _fault_of_learner(learner: Learner, wide: bool) -> str:
+def _fault_of(learner: Learner, wide: bool) -> str:
     """Learn from a thousand steps with the memory of a second run; that of the first must stay.
 
     Args:
@@ -124,25 +96,32 @@ def _fault_of_learner(learner: Learner, wide: bool) -> str:
         wide: Start from action values up to ten thousand of either sign, not from zeros, to find
             an index that depends on them and is right only while they are small.
     """
+    import taichi as ti
+
     settings = learner.hyperparameters()
     memory = learner.memory(settings, _STATES)
-    tables = np.zeros((2, (1 + memory.tables) * _STATES * ROW), np.float32)
+    sizes = ((1 + memory.tables) * _STATES * ROW, memory.floats, memory.integers)
+    types = (np.float32, np.float32, np.int32)
+    arrays = [np.zeros((2, size), dtype) for size, dtype in zip(sizes, types, strict=True)]
     if wide:
-        numbers = np.arange(tables[0].size)
-        tables[:] = np.where(numbers % 3, 1, -1) * 10.0 ** (numbers % 13 / 2 - 2)
-    floats = np.zeros((2, memory.floats), np.float32)
-    integers = np.zeros((2, memory.integers), np.int32)
-    arrays = (tables, floats, integers)
+        numbers = np.arange(sizes[0])
+        arrays[0][:] = np.where(numbers % 3, 1, -1) * 10.0 ** (numbers % 13 / 2 - 2)
     before = [array[0].copy() for array in arrays]
     more = np.array([*vars(settings).values(), 0.0])
-    sizes = [array.shape[1] for array in arrays]
-    _updates_by(learner)(*(array.reshape(-1) for array in arrays), more, *sizes, _UPDATES)
+    try:
+        _learn_by(learner, [array.reshape(-1) for array in arrays], more, sizes)
+    except Exception as error:
+        # Assertions of the user's own hold in Taichi's debug mode only, not where it trains.
+        theirs = isinstance(error, ti.TaichiAssertionError) and "Out of bound" not in str(error)
+        return "" if theirs else last_line(error)
     stays = all(map(np.array_equal, before, [array[0] for array in arrays]))
     return "" if stays else "it writes outside of the memory of its run, which begins at `at`"
 
 
-def _updates_by(learner: Learner) -> Callable[..., None]:
-    """A kernel of many steps of one run, in episodes of fifty or less."""
+def _learn_by(
+    learner: Learner, arrays: list[np.ndarray], hyperparameters: np.ndarray, sizes: tuple
+) -> None:
+    """Many steps of the second of two runs, in episodes of fifty or less."""
     import taichi as ti
 
     from taichi_ants.learners.memory import At, LearnerArrays, Transition, read_rates
@@ -154,17 +133,14 @@ def _updates_by(learner: Learner) -> Callable[..., None]:
     has_begin = learner.begin is not None
 
     @ti.kernel
-    def try_updates(
-        q: f32, floats: f32, integers: i32, more: f64,
-        table: ti.i32, floats_at: ti.i32, integers_at: ti.i32, updates: ti.i32,
-    ):  # fmt: skip
+    def learn(q: f32, floats: f32, integers: i32, numbers: f64):
         memory = ti.static(LearnerArrays(q, floats, integers, _STATES))
-        at = At(table, floats_at, integers_at)
-        rates = read(0.1, 0.9, 0.3, more, 0)
+        at = At(*sizes)
+        rates = read(0.1, 0.9, 0.3, numbers, 0)
         random_state = ti.u64(1)
         begins = 1
         ti.loop_config(serialize=True)
-        for i in range(updates):
+        for i in range(_UPDATES):
             if ti.static(has_begin):
                 if begins == 1:
                     learner.begin(memory, at)
@@ -185,10 +161,10 @@ def _updates_by(learner: Learner) -> Callable[..., None]:
             )
             _, random_state = learner.learn(memory, at, step, rates, random_state)
 
-    return try_updates
+    learn(*arrays, hyperparameters)
 
 
-def _last_line(error: Exception) -> str:
+def last_line(error: Exception) -> str:
     """What Taichi says, without the place in the source around it."""
     lines = str(error).splitlines()
     for line in lines:

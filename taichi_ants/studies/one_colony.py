@@ -175,7 +175,7 @@ def summary(colony: Colony, pace: Pace) -> str:
         f"{count(outcome['deliveries'], 'delivery')} by tick {colony.ticks}, "
         f"{', '.join([f'{blocked:.1f} % of the moves blocked', *changes])}.",
     ]
-    places, foods = colony.population.slots * len(colony.seeds), colony.waiting_foods
+    places, foods = colony.capacity * len(colony.seeds), colony.waiting_foods
     if colony.task.life.births and outcome["living"] == places:
         waiting = f"{count(foods, 'food')} {'waits' if foods == 1 else 'wait'}"
         lines.append(

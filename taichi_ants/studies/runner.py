@@ -20,7 +20,6 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from taichi_ants import __version__, checks, files
-from taichi_ants.engines.colony.population import Population
 from taichi_ants.errors import AntsError, check_one_of, count
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.provenance import world_facts
@@ -144,7 +143,7 @@ class ColonyPoint:
         (config,) = checks.checked_configs(self.training)
         object.__setattr__(self, "training", config)
         checks.checked_task(self.task)
-        Population.of(self.task, self.ants, self.capacity, self.start, False)  # type: ignore[arg-type]
+        checks.checked_capacity(self.task, self.ants, self.capacity, self.start, False)
         check_one_of("sharing", self.sharing, ("shared", "own"))
         checks.checked_count("episodes", self.episodes, least=0 if self.after else 1)
         checks.checked_count("ticks", self.ticks, MAX_STEPS)
@@ -339,12 +338,11 @@ def _run(
         **where,
     )
     steps = trained.steps.sum(axis=2, dtype=float)
-    seconds = sum(cost.seconds for cost in trained.costs)
     return {
         **{name: files.smallest(getattr(trained, name)) for name in _RUN_ARRAYS},
         **{f"greedy_{name}": files.smallest(getattr(greedy, name)) for name in _RUN_ARRAYS},
         "q_values": trained.q_values,
-        "seconds": seconds * steps / steps.sum(),
+        "seconds": trained.seconds * steps / steps.sum(),
     }
 
 

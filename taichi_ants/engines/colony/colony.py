@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from taichi_ants import checks, learners, runtime
 from taichi_ants.engines.colony import files as colony_files
-from taichi_ants.engines.colony import memory as colony_memory
+from taichi_ants.engines.colony import memory
 from taichi_ants.engines.colony.layout import AntRow, Stage, WorldRow
-from taichi_ants.engines.colony.population import SHARINGS, Population, Start
+from taichi_ants.engines.packing import padded
 from taichi_ants.engines.records import Record
 from taichi_ants.errors import AntsError, check_one_of, shown
 from taichi_ants.files import PathLike
@@ -21,16 +22,18 @@ from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.registry import Learner, Memory
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, MAX_STEPS, N_ACTIONS, ROW
+from taichi_ants.worlds.starts import Start
 from taichi_ants.worlds.world import World
 
 Progress = Callable[[float], None]
+Sharing = Literal["shared", "own", "fixed"]
+SHARINGS: tuple[str, ...] = get_args(Sharing)
 
 _LARGE_COLONY = 16_384  # slots from which ants, not worlds, are handed to threads
 _ANTS_PER_CHUNK = 2048
 _MOST_CHUNKS = 256
 _TICKS_BETWEEN_SORTS = 32
-_TICK_NS = 150  # of an ant, on a slow core, by Q-learning
-_LAUNCH_SECONDS = 0.4
+_PIECE_SECONDS = 0.4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -135,7 +138,9 @@ class Colony:
         schedule: str | None = None,
     ) -> None:
         self.task = checks.checked_task(Task() if task is None else task)
-        self.population = Population.of(self.task, ants, capacity, start, ends_at_delivery)
+        self.capacity = checks.checked_capacity(self.task, ants, capacity, start, ends_at_delivery)
+        self.ants, self.start = int(ants), start
+        self.ends_at_delivery = bool(ends_at_delivery)
         if not isinstance(training, TrainingConfig):
             raise AntsError(f"training is {shown(training)}; it must be one TrainingConfig.")
         (self.training,) = checks.checked_configs(training)
@@ -151,40 +156,45 @@ class Colony:
             sharing == "fixed" and table is not None and table.ndim == 4
         )
         self._learner = learners.get(training.learner) if learns else None
-        self.memory = Memory()
-        self._cost = 1.0  # of a tick of an ant, in that of Q-learning
         self._plans_together = False
+        self.memory = Memory()
         if self._learner is not None:
             _check_sharing(self._learner, sharing)
-            settings = self._learner.settings(self.training)
-            self._cost = self._learner.cost(settings)
             self._plans_together = sharing == "shared" and self._learner.plans
             if sharing == "own" or self._plans_together:
-                self.memory = self._learner.memory(settings, self.task.n_states)
+                self.memory = padded(self._learner.memory_for(self.training, self.task.n_states))
         falls = self.task.evaporation_in_training if learns else self.task.evaporation_in_evaluation
         self.pheromone = self.task.pheromone if falls else self.task.pheromone.lasting
         self.seeds = checks.checked_seeds(seeds)
         self.seed_words = np.array([seed % 2**64 for seed in self.seeds], dtype=np.uint64)
-        self._settings = runtime.start(threads, arch)
+        runtime.start(threads, arch)
         one = isinstance(world, (str, World)) or not isinstance(world, Iterable)
-        given: Any = (world,) * len(self.seeds) if one else world
-        several = tuple(given)
+        several: Any = (world,) * len(self.seeds) if one else tuple(world)
         if len(several) != len(self.seeds):
             raise AntsError(f"there are {len(several)} worlds for {len(self.seeds)} seeds.")
         check_world = checks.checked_food if learns else checks.checked_world
-        self.layout = colony_memory.Layout(
-            [check_world(one) for one in several], self.task.life, self.population, self.seeds
-        )
-        slots = self.population.slots
-        usual = "by_chunk" if slots >= _LARGE_COLONY else "by_world"
+        self.worlds: tuple[World, ...] = tuple(check_world(one) for one in several)
+        ranges = {world.ranges for world in self.worlds}
+        if len(ranges) > 1:
+            raise AntsError(f"the worlds have the ranges {sorted(ranges)}; all must have the same.")
+        self.grid = self.worlds[0].grid
+        life = self.task.life
+        self._ants_change = life.births or life.lifespan is not None
+        self._food_changes = life.regrowth is not None or life.wander is not None
+        most = max(len(world.foods) for world in self.worlds)
+        self.n_homes = most if self._food_changes else 0
+        usual = "by_chunk" if self.capacity >= _LARGE_COLONY else "by_world"
         self.schedule = usual if schedule is None else schedule
         check_one_of("schedule", self.schedule, ("by_world", "by_chunk"))
         by_chunk = self.schedule == "by_chunk"
-        self.chunks = min(_MOST_CHUNKS, -(-slots // _ANTS_PER_CHUNK)) if by_chunk else 1
-        self.arrays = colony_memory.allocate(self, table)
+        self.chunks = min(_MOST_CHUNKS, -(-self.capacity // _ANTS_PER_CHUNK)) if by_chunk else 1
+        self.at_start = memory.start_of_episode(self)
+        self.arrays = {name: array.copy() for name, array in self.at_start.items()}
+        self.arrays |= memory.lasting(self, table)
         self.stored = tuple(self.arrays)  # the names of those that a file needs to hold
-        self.arrays |= colony_memory.constants(self)
+        self.arrays |= memory.constants(self)
         self._arguments: Any = None
+        self._piece = 1  # ticks that take less than _PIECE_SECONDS
         self.epsilon = float(self.training.epsilon)
         self.episode = -1
         self.ticks = 0
@@ -193,26 +203,41 @@ class Colony:
         """Set worlds and ants to their start; the ants look around."""
         self.episode += 1
         self.ticks = 0
-        colony_memory.fill_episode(self)
-        self._launch("begin", 1)
+        memory.begin_episode(self)
+        self._launch("begin_phases")
 
     def tick(self, n: int = 1) -> None:
         """Let n ticks pass; worlds whose episode has ended stand still."""
         self._check_begun()
-        n = checks.checked_count("n", n)
+        for _ in self._pass(checks.checked_count("n", n)):
+            pass
+
+    def _pass(self, n: int) -> Iterator[None]:
+        """Let n ticks pass, in short pieces: a launch of a kernel cannot be interrupted."""
+        end = self.ticks + n
+        while self.ticks < end:
+            piece = min(self._piece, end - self.ticks)
+            began = time.perf_counter()
+            self._advance(piece)
+            if piece == self._piece:
+                pace = (time.perf_counter() - began) / piece
+                self._piece = max(1, min(2 * piece, int(_PIECE_SECONDS / pace)))
+            yield
+
+    def _advance(self, n: int) -> None:
         if self.schedule == "by_world":
-            self._launch("by_world", n)
+            self._launch("", n)
             self.ticks += n
             return
+        rounds = self.training.planning_steps if self._plans_together else 0
         for _ in range(n):
             if self.ticks % _TICKS_BETWEEN_SORTS == 0:
                 self._sort_ants()
-            self._launch("by_chunk", 1)
-            if self._plans_together:
-                for _ in range(self.training.planning_steps):
-                    self._launch("plan", 1)
-            if self.task.life.changes or self.population.ends_at_delivery:
-                self._launch("end", 1)
+            self._launch("tick_phases")
+            for _ in range(rounds):
+                self._launch("planning_phases")
+            if self._ants_change or self.ends_at_delivery:
+                self._launch("last_phases")
             self.ticks += 1
 
     def end_episode(self) -> None:
@@ -221,10 +246,10 @@ class Colony:
         Raises:
             AntsError: The learner has made action values that are not finite.
         """
-        ants, slots = self.arrays["ants"], self.population.slots
+        ants, slots = self.arrays["ants"], self.capacity
         number = ants[AntRow.NUMBER]
         there = ants[AntRow.STAGE] != Stage.VACANT
-        (columns,) = np.nonzero(there & (number >= 0) & (number < self.population.ants))
+        (columns,) = np.nonzero(there & (number >= 0) & (number < self.ants))
         places = columns // slots * slots + number[columns]
         self.arrays["first_streams"][places] = self.arrays["streams"][columns]
         self._check_finite()
@@ -245,10 +270,11 @@ class Colony:
         outcomes = []
         for episode in range(episodes):
             self.begin_episode()
-            while self.ticks < ticks and self.arrays["worlds"][WorldRow.RUNNING].any():
-                self.tick(min(self._ticks_per_launch(), ticks - self.ticks))
+            for _ in self._pass(ticks):
                 if progress is not None:
                     progress((episode + self.ticks / ticks) / episodes)
+                if not self.arrays["worlds"][WorldRow.RUNNING].any():
+                    break
             outcomes.append(self.outcome())
             self.end_episode()
         return ColonyEpisodes(
@@ -263,9 +289,6 @@ class Colony:
             AntsError: The learner has made action values that are not finite.
         """
         self._check_finite()
-        return self._counted()
-
-    def _counted(self) -> ColonyEpisodes:
         counts = {
             field.name: self.arrays["worlds"][WorldRow[field.name.upper()]][None].copy()
             for field in fields(ColonyEpisodes)
@@ -276,7 +299,7 @@ class Colony:
     @property
     def q_values(self) -> np.ndarray:
         """The action values, float32 (W, n_states, 5), with own tables (W, slots, n_states, 5)."""
-        n = self.population.slots if self.one_a_slot else 1
+        n = self.capacity if self.one_a_slot else 1
         tables = self.arrays["q"].reshape(len(self.seeds), n, -1, self.task.n_states, ROW)
         tables = tables[:, :, 0, :, :N_ACTIONS]
         return (tables if self.one_a_slot else tables[:, 0]).copy()
@@ -286,11 +309,6 @@ class Colony:
         """Foods that the queens have been given, but could not turn into ants yet."""
         return int(self.arrays["worlds"][WorldRow.STORE].sum())
 
-    @property
-    def worlds(self) -> tuple[World, ...]:
-        """The worlds as they are at the start of an episode."""
-        return self.layout.worlds
-
     def snapshot(self, world: int = 0) -> ColonySnapshot:
         """World number `world` as it is now; arrays are copies.
 
@@ -299,19 +317,19 @@ class Colony:
         """
         self._check_begun()
         world = checks.checked_count("world", world, len(self.seeds) - 1, least=0)
-        cells = slice(world * self.layout.size, (world + 1) * self.layout.size)
-        slots = slice(world * self.population.slots, (world + 1) * self.population.slots)
-        ants = self.arrays["ants"][:, slots]
+        cells = slice(world * self.grid.size, (world + 1) * self.grid.size)
+        ants = self.arrays["ants"][:, world * self.capacity : (world + 1) * self.capacity]
         ants = ants[:, ants[AntRow.STAGE] == Stage.LIVING]
         ground = self.arrays["ground"][cells].copy()
         ground[ants[AntRow.CELL]] = EMPTY
         if self.pheromone.dense:
             trail = self.arrays["level"][cells].copy()
         else:
-            clock = self.ticks if self.pheromone.evaporation == "linear" else 0
+            falls = self.pheromone.evaporation == "linear"
+            clock = self.arrays["worlds"][WorldRow.TICKS, world] if falls else 0
             trail = np.maximum(self.arrays["trail"][cells] - clock, 0)
         return ColonySnapshot(
-            self.layout.grid,
+            self.grid,
             ground,
             trail,
             ants[AntRow.CELL].copy(),
@@ -349,16 +367,20 @@ class Colony:
     def __repr__(self) -> str:
         others = len(dict.fromkeys(self.worlds)) - 1
         more = f" and {others} more" if others else ""
-        lines = [f"world: {self.worlds[0]}{more}", f"task: {self.task}"]
-        lines += [f"population: {self.population}"]
-        lines += [f"training: {self.training}", f"seeds: {shown(self.seeds)}"]
-        lines += [f"sharing: {self.sharing!r}, epsilon: {self.epsilon:.4g}"]
+        lines = [
+            f"world: {self.worlds[0]}{more}",
+            f"task: {self.task}",
+            f"training: {self.training}",
+            f"seeds: {shown(self.seeds)}",
+            f"ants: {self.ants}, capacity: {self.capacity}, start: {self.start!r}",
+            f"sharing: {self.sharing!r}, epsilon: {self.epsilon:.4g}",
+        ]
         if self.episode >= 0:
-            now = self._counted()
-            lines += [
-                f"episode: {self.episode}, ticks: {self.ticks}, living: {now.living.sum()}, "
-                f"deliveries: {now.deliveries.sum()}"
-            ]
+            now = self.arrays["worlds"].sum(axis=1)
+            lines.append(
+                f"episode: {self.episode}, ticks: {self.ticks}, living: {now[WorldRow.LIVING]}, "
+                f"deliveries: {now[WorldRow.DELIVERIES]}"
+            )
         return "\n    ".join(["Colony(", *lines]) + "\n)"
 
     def _check_begun(self) -> None:
@@ -369,15 +391,6 @@ class Colony:
         tables = self.arrays["q"].reshape(len(self.seeds), -1)
         checks.check_finite(tables, [self.training], self.seeds)
 
-    def _ticks_per_launch(self) -> int:
-        if self.schedule == "by_chunk":
-            return 1
-        rounds = -(-len(self.seeds) // self._settings.threads)
-        cost = _TICK_NS * max(self._cost, 1 + self.training.planning_steps)
-        if self.pheromone.dense:
-            cost += 2 * self.layout.size / self.population.slots
-        return max(1, int(_LAUNCH_SECONDS * 1e9 / (rounds * self.population.slots * cost)))
-
     def _sort_ants(self) -> None:
         """Store the ants of a world in the order of their cells, so that neighbours share caches.
 
@@ -385,55 +398,58 @@ class Colony:
         born or have tables of their own, and vacant ones stay behind the others; there the order
         stays.
         """
-        life, population = self.task.life, self.population
-        spare = population.slots > population.ants
-        if life.births or life.lifespan or self.one_a_slot or spare:
+        if self._ants_change or self.one_a_slot or self.capacity > self.ants:
             return
         ants = self.arrays["ants"]
         cells = ants[AntRow.CELL].reshape(len(self.seeds), -1)
-        first = np.arange(len(self.seeds))[:, None] * population.slots
+        first = np.arange(len(self.seeds))[:, None] * self.capacity
         order = (np.argsort(cells, axis=1) + first).ravel()
         for row in ants:
             row[:] = row[order]
         self.arrays["streams"][:] = self.arrays["streams"][order]
 
-    def _launch(self, what: str, n_ticks: int) -> None:
+    def _launch(self, phases: str, n_ticks: int = 0) -> None:
+        """Do some phases by chunk, or whole ticks by world."""
         from taichi_ants.engines.arguments import Arguments
         from taichi_ants.engines.colony import kernels
 
-        self._settings = runtime.start()  # the caller may have reset Taichi, or forked
+        runtime.start()  # the caller may have reset Taichi, or forked
         if self._arguments is None:
             self._arguments = Arguments()
-        variant = kernels.Variant(
+        variant = kernels.variant(
             self._learner,
             self.one_a_slot,
-            self.memory.tables,
             self.task.sees,
             self.pheromone.dense,
-            self.task.life.changes,
+            self._ants_change,
+            self._food_changes,
         )
+        values = {**self._numbers(), **self.arrays}
+        kind = self._arguments.type_of(values)
         with runtime.quiet():
-            values = {**self._numbers(), **self.arrays}
-            kind = self._arguments.type_of(values)
-            kernel = kernels.colony_kernel(getattr(kernels, what), variant, kind)
-            kernel(self._arguments.pack(values), self.ticks, n_ticks)
+            pack = self._arguments.pack(values)
+            if phases:
+                kernels.by_chunk(variant, getattr(kernels, phases), kind)(pack, self.ticks)
+            else:
+                kernels.by_world(variant, kind)(pack, self.ticks, n_ticks)
 
     def _numbers(self) -> dict[str, Any]:
         """What kernels know besides arrays; -1 stands for an option that is off."""
-        life, population, pheromone = self.task.life, self.population, self.pheromone
-        off = -1
+        life, pheromone, memory, off = self.task.life, self.pheromone, self.memory, -1
+        level = float if pheromone.dense else int
         return {
             "n_worlds": len(self.seeds),
-            "n_ants": population.ants,  # that start an episode
-            "n_slots": population.slots,
+            "n_ants": self.ants,  # that start an episode
+            "n_slots": self.capacity,
             "n_chunks": self.chunks,
-            "n_homes": self.layout.homes,  # room for places of food in each world
-            "size": self.layout.size,
+            "n_homes": self.n_homes,  # room for homes in each world
+            "size": self.grid.size,
             "episode": self.episode,
             "evaporates": int(pheromone.evaporation == "linear"),  # of integer trails: the clock
-            "adds": {"add": 1, "set": 0, "none": off}[pheromone.deposit],
-            "deposit_level": int(pheromone.level),
-            "cap": int(pheromone.cap or 0),
+            "deposits": int(pheromone.deposit != "none"),
+            "adds": int(pheromone.deposit == "add"),
+            "deposit_level": level(pheromone.level),
+            "cap": level(pheromone.cap or 0),
             # The factor of exponential evaporation, 1 for none, -1 for linear.
             "decay": -1.0 if pheromone.evaporation == "linear" else float(pheromone.decay),
             "share": float(pheromone.share),  # what a cell gives to each neighbour
@@ -441,7 +457,7 @@ class Colony:
             "lifespan": life.lifespan or off,
             "regrowth": off if life.regrowth is None else life.regrowth,
             "wander": life.wander or off,
-            "ends_at_delivery": int(population.ends_at_delivery),
+            "ends_at_delivery": int(self.ends_at_delivery),
             "continuing": int(self.task.delivery == "continuing"),
             "learning_rate": self.training.learning_rate,
             "discount": self.training.discount,
@@ -449,9 +465,10 @@ class Colony:
             "explore_below": np.uint64(self.epsilon * 4294967296.0),
             "planning_steps": self.training.planning_steps,
             # So that the sum of the errors of all ants is a fixed-point number, see `learning`.
-            "largest_error": 2.0**31 / (population.slots + 1),
-            "floats_size": self.memory.floats,
-            "integers_size": self.memory.integers,
+            "largest_error": 2.0**31 / (self.capacity + 1),
+            "tables": 1 + memory.tables,
+            "floats_by_8": memory.floats // 8,  # see the runs' `engine`
+            "integers_by_8": memory.integers // 8,
         }
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +16,9 @@ from taichi_ants.task.constants import N_ACTIONS
 if TYPE_CHECKING:
     from taichi_ants.engines.colony.colony import Colony
 
-_KIND = FileKind("taichi-ants colony 4", "colony", "Colony.save")
+_KIND = FileKind("taichi-ants colony 5", "colony", "Colony.save")
+_OPTIONS = ("seeds", "ants", "capacity", "start", "ends_at_delivery", "sharing", "schedule")
+_MOMENT = ("epsilon", "episode", "ticks")
 
 
 def save_colony(colony: Colony, path: files.PathLike) -> None:
@@ -44,17 +45,11 @@ def _contents(colony: Colony) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
         arrays |= world_arrays(world, f"world{number}")
     facts = {
         "task": colony.task.as_dict(),
-        "population": asdict(colony.population),
         "training": colony.training.as_dict(),
-        "sharing": colony.sharing,
-        "one_a_slot": colony.one_a_slot,
-        "seeds": list(colony.seeds),
         "worlds": [world_facts(world) for world in numbers],
         "world_of": [numbers[world] for world in colony.worlds],
-        "schedule": colony.schedule,
-        "epsilon": colony.epsilon,
-        "episode": colony.episode,
-        "ticks": colony.ticks,
+        "one_a_slot": colony.one_a_slot,
+        **{name: getattr(colony, name) for name in (*_OPTIONS, *_MOMENT)},
     }
     return facts, arrays
 
@@ -71,12 +66,17 @@ def load_colony(
     stored, facts = _KIND.read(path)
     runtime.start(threads, arch)  # what is wrong with these says nothing about the file
     with _KIND.rebuilding(path):
-        training = facts["training"] or {}
-        if not isinstance(training.get("learner"), str):
-            raise ValueError("its learner is missing")
-    learners.get(training["learner"])
+        training = TrainingConfig(**facts["training"])
+    learners.get(training.learner)
     with _KIND.rebuilding(path):
-        colony = _rebuild(cls, stored, facts, threads, arch)
+        worlds = [
+            world_from(stored, f"world{number}", one) for number, one in enumerate(facts["worlds"])
+        ]
+        task, options = Task.from_dict(facts["task"]), {name: facts[name] for name in _OPTIONS}
+        if options["sharing"] == "fixed":  # tables of the right shape, until its own are put in
+            leading = (len(facts["seeds"]), facts["capacity"]) if facts["one_a_slot"] else ()
+            options["q_values"] = np.zeros((*leading, task.n_states, N_ACTIONS), np.float32)
+        colony = cls([worlds[number] for number in facts["world_of"]], task, training, **options)
         colony.epsilon = checks.checked_share("epsilon", facts["epsilon"])
         colony.episode = checks.checked_count("episode", facts["episode"], least=-1)
         colony.ticks = checks.checked_count("ticks", facts["ticks"], least=0)
@@ -86,32 +86,3 @@ def load_colony(
                 raise ValueError(f"{name} has another shape or type")
             array[:] = kept
     return colony
-
-
-def _rebuild(
-    cls: type[Colony],
-    stored: dict[str, np.ndarray],
-    facts: dict[str, Any],
-    threads: int | None,
-    arch: str | None,
-) -> Colony:
-    worlds = [
-        world_from(stored, f"world{number}", one) for number, one in enumerate(facts["worlds"])
-    ]
-    task, population = Task.from_dict(facts["task"]), dict(facts["population"])
-    population["capacity"] = population.pop("slots")
-    # A colony that does not learn needs tables of the right shape, until its own are put in.
-    leading = (len(facts["seeds"]), population["capacity"]) if facts["one_a_slot"] else ()
-    fixed = facts["sharing"] == "fixed"
-    return cls(
-        [worlds[number] for number in facts["world_of"]],
-        task,
-        TrainingConfig(**facts["training"]),
-        facts["seeds"],
-        **population,
-        sharing=facts["sharing"],
-        q_values=np.zeros((*leading, task.n_states, N_ACTIONS), np.float32) if fixed else None,
-        threads=threads,
-        arch=arch,
-        schedule=facts["schedule"],
-    )

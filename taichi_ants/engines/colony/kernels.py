@@ -1,272 +1,199 @@
-"""The kernels of a colony: what a tick does, in phases, under two schedules.
+"""The kernels of a colony: the phases of a tick, in order, under two schedules.
 
-Many small worlds: one task a world, all ticks and phases serial inside it. Few large worlds: each
-phase a parallel loop over chunks of ants. Both call the same functions in the same order, so that
-they give the same numbers. The order is that of `taichi_ants.reference.ReferenceColony.tick`.
+Many small worlds: one task a world, all ticks and phases in turn inside it. Few large worlds: each
+phase a parallel loop over chunks, which are ranges of the ants, or of the cells, of one world. Both
+do the same phases in the same order, so that they give the same numbers. The order is that of
+`taichi_ants.reference.ReferenceColony.tick`.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import taichi as ti
 
 from taichi_ants.engines import looks
-from taichi_ants.engines.colony.layout import AntRow, WorldRow
-from taichi_ants.engines.colony.phases import (
-    after_deaths,
-    before_deaths,
-    begin_all,
-    choose_all,
-    commit_all,
-    draw_all,
-    grow_old_all,
-    learn_together,
-    observe_all,
-    plan_together,
-    resolve_all,
-    retire_all,
-    stop_at_delivery,
-)
-from taichi_ants.engines.colony.trail import diffused, evaporate
+from taichi_ants.engines.colony import learning, life, steps, trail
+from taichi_ants.engines.colony.layout import AntRow, Stage, WorldRow
 from taichi_ants.engines.trial import tried
 from taichi_ants.learners.memory import read_rates
 from taichi_ants.learners.registry import Learner
 from taichi_ants.learners.td_errors import guarded
-from taichi_ants.task.constants import N_ACTIONS, ROW
+from taichi_ants.task.constants import ROW
 from taichi_ants.task.observations import Observation
 
+ANTS, CELLS, WORLD = "ants", "cells", "world"
 
-@dataclass(frozen=True)
+
+class Phase(NamedTuple):
+    """What happens to all ants, cells or worlds before the next phase begins.
+
+    It must not read what another chunk writes in the same phase.
+
+    Attributes:
+        of: ANTS, all that are in a slot; CELLS; or WORLD, a whole one, where there is little to do.
+        do: A `ti.func` (c, v, w, chunk, ant, tick) of one ant, (c, place) of one cell, or
+            (c, v, w, tick) of one world.
+    """
+
+    of: str
+    do: Callable[..., None]
+
+
 class Variant:
     """What is compiled into a kernel; all functions of the colony call it `v`.
 
-    Attributes:
+    Args:
         learner: The learner, None if nobody learns.
         own_tables: Whether there is a table for each slot, not one for each world.
-        further_tables: How many the learner keeps behind each.
         observation: The observation.
         dense: Whether levels are f32, see `trail`.
-        lively: Whether ants or food come and go; leaving that out halves the time to compile.
+        ants_change, food_changes: Whether ants, or foods, come and go; leaving that out saves time,
+            more so while this compiles.
     """
 
-    learner: Learner | None
-    own_tables: bool
-    further_tables: int
-    observation: Observation
-    dense: bool
-    lively: bool
+    def __init__(
+        self,
+        learner: Learner | None,
+        own_tables: bool,
+        observation: Observation,
+        dense: bool,
+        ants_change: bool,
+        food_changes: bool,
+    ) -> None:
+        self.own_tables, self.dense = own_tables, dense
+        self.ants_change, self.food_changes = ants_change, food_changes
+        self.learner = None if learner is None else tried(learner)
+        self.draws_next_action = learner is not None and learner.draws_next_action
+        # Each ant learns into a table of its own, or all ants of a world into one.
+        self.alone = learner is not None and own_tables
+        self.together = learner is not None and not own_tables
+        self.begins = self.alone and learner.begin is not None
+        self.plans_together = self.together and learner.plans
+        if learner is not None:
+            self.read_rates = read_rates(learner.hyperparameters)
+        if self.together:
+            self.td_error = guarded(learner.td_error)
+        self.observation = observation
+        self.n_pairs = observation.n_states * ROW  # of a row and an action, and some of no meaning
+        self.sees_percept = looks.is_percept(observation)
+        # Where an ant keeps the row of its table.
+        self.row_at = AntRow.PERCEPT if self.sees_percept else AntRow.STATE
+        if not self.sees_percept:
+            self.row = looks.row_function(observation)
+            self.look_type = looks.look_type(observation, dense)
 
-    @property
-    def alone(self) -> bool:
-        """Whether each ant learns into a table of its own."""
-        return self.learner is not None and self.own_tables
 
-    @property
-    def begins(self) -> bool:
-        """Whether the learner of each ant prepares for an episode."""
-        return self.alone and self.learner.begin is not None
+variant = cache(Variant)
 
-    @property
-    def together(self) -> bool:
-        """Whether all ants of a world learn into one table."""
-        return self.learner is not None and not self.own_tables
 
-    @property
-    def plans_together(self) -> bool:
-        """Whether they do so from a model too."""
-        return self.together and self.learner.plans
+def begin_phases(v: Variant) -> Iterator[Phase]:
+    """The beginning of an episode."""
+    yield Phase(ANTS, learning.begin)
 
-    @property
-    def draws_next_action(self) -> bool:
-        """Whether ants draw their next action before they learn."""
-        return self.learner is not None and self.learner.draws_next_action
 
-    @property
-    def td_error(self) -> Callable[..., Any]:
-        """The TD error of a learner whose table is shared."""
-        return guarded(self.learner.td_error)
+def tick_phases(v: Variant) -> Iterator[Phase]:
+    """A tick; rounds of `planning_phases` and the `last_phases` follow."""
+    yield Phase(ANTS, steps.want)
+    yield Phase(ANTS, steps.resolve)
+    yield Phase(ANTS, steps.commit)
+    if v.dense:
+        yield Phase(CELLS, trail.evaporate)
+        yield Phase(CELLS, trail.diffuse)
+        yield Phase(CELLS, trail.settle)
+    yield Phase(WORLD, life.count)
+    if v.ants_change:
+        yield Phase(WORLD, life.give_birth)
+        yield Phase(ANTS, life.grow_old)
+        yield Phase(WORLD, life.count)
+    if v.food_changes:
+        yield Phase(WORLD, life.regrow)
+        yield Phase(WORLD, life.wander)
+    yield Phase(ANTS, learning.observe_and_learn)
+    if v.together:
+        yield Phase(WORLD, learning.learn_together)
 
-    @property
-    def read_rates(self) -> Callable[..., Any]:
-        """Makes the rates of the learner."""
-        return read_rates(self.learner.hyperparameters)
 
-    @property
-    def n_states(self) -> int:
-        """The rows of a table."""
-        return self.observation.n_states
+def planning_phases(v: Variant) -> Iterator[Phase]:
+    """One round of updates from the models that ants share."""
+    yield Phase(ANTS, learning.draw_pair)
+    yield Phase(WORLD, learning.plan_together)
 
-    @property
-    def table_size(self) -> int:
-        """The numbers of a table and the further ones behind it."""
-        return (1 + self.further_tables) * self.n_states * ROW
 
-    @property
-    def n_pairs(self) -> int:
-        """The pairs of a row and an action."""
-        return self.n_states * N_ACTIONS
-
-    @property
-    def sees_percept(self) -> bool:
-        """Whether the row of the table is the percept itself, as in the paper."""
-        return looks.is_percept(self.observation)
-
-    @property
-    def sees_ants(self) -> bool:
-        """Whether the cell of an ant has to tell what the ant carries."""
-        return not self.sees_percept
-
-    @property
-    def row_at(self) -> AntRow:
-        """Where an ant keeps the row of its table."""
-        return AntRow.PERCEPT if self.sees_percept else AntRow.STATE
-
-    @property
-    def row(self) -> Callable[..., Any]:
-        """The row of a look."""
-        return looks.row_function(self.observation)
-
-    @property
-    def look_type(self) -> Any:
-        """The struct of a look."""
-        return looks.look_type(self.observation, self.dense)
-
-    @property
-    def ahead(self) -> tuple[int, ...]:
-        """Where the cells ahead stand among those in view."""
-        return looks.positions_ahead(self.observation)
+def last_phases(v: Variant) -> Iterator[Phase]:
+    """What ends a tick."""
+    if v.ants_change:
+        yield Phase(ANTS, life.retire)
+    yield Phase(WORLD, life.stop_at_delivery)
 
 
 @ti.func
-def begin(c: ti.template(), v: ti.template(), first_tick, n_ticks):
-    """Begin an episode."""
-    ti.loop_config(block_dim=1)
-    for chunk in range(c.n_worlds * c.n_chunks):
-        begin_all(c, v, chunk)
+def do(phase: ti.template(), c: ti.template(), v: ti.template(), chunk, tick):
+    """A phase of a chunk, or of the world of that number; nothing if its episode has ended."""
+    w = chunk
+    if ti.static(phase.of != WORLD):
+        w = chunk // c.n_chunks
+    running = c.worlds[WorldRow.RUNNING, w]
+    if ti.static(phase.of == ANTS):
+        first, last = share_of(c, chunk, c.n_slots)
+        last = ti.min(last, c.worlds[WorldRow.TOP, w]) * running
+        for ant in range(w * c.n_slots + first, w * c.n_slots + last):
+            if c.ants[AntRow.STAGE, ant] != Stage.VACANT:
+                phase.do(c, v, w, chunk, ant, tick)
+    elif ti.static(phase.of == CELLS):
+        first, last = share_of(c, chunk, c.size)
+        for place in range(w * c.size + first, w * c.size + last * running):
+            phase.do(c, place)
+    elif running == 1:
+        phase.do(c, v, w, tick)
 
 
 @ti.func
-def by_world(c: ti.template(), v: ti.template(), first_tick, n_ticks):
-    """Any number of ticks of worlds with a single chunk each, all phases in turn."""
-    ti.loop_config(block_dim=1)
-    for w in range(c.n_worlds):
-        for tick in range(first_tick, first_tick + n_ticks):
-            if c.worlds[WorldRow.RUNNING, w] == 1:
-                tick_of_world(c, v, w, tick)
-
-
-@ti.func
-def tick_of_world(c: ti.template(), v: ti.template(), w, tick):
-    choose_all(c, v, w)
-    resolve_all(c, w, tick)
-    commit_all(c, v, w, tick)
-    if ti.static(v.dense):
-        for place in range(w * c.size, (w + 1) * c.size):
-            evaporate(c, place)
-        if c.share > 0.0:
-            for place in range(w * c.size, (w + 1) * c.size):
-                c.spare[place] = diffused(c, place)
-            for place in range(w * c.size, (w + 1) * c.size):
-                c.level[place] = c.spare[place]
-    before_deaths(c, v, w, tick)
-    if ti.static(v.lively):
-        if c.lifespan > 0:
-            grow_old_all(c, w)
-        after_deaths(c, w, tick)
-    observe_all(c, v, w, tick)
-    if ti.static(v.together):
-        learn_together(c, v, w)
-    if ti.static(v.plans_together):
-        for _ in range(c.planning_steps):
-            draw_all(c, v, w)
-            plan_together(c, v, w)
-    if ti.static(v.lively):
-        retire_all(c, w)
-    stop_at_delivery(c, w)
-
-
-@ti.func
-def by_chunk(c: ti.template(), v: ti.template(), tick, n_ticks):
-    """One tick; `plan` and `end` follow where there is something for them to do."""
-    ti.loop_config(block_dim=1)
-    for chunk in range(c.n_worlds * c.n_chunks):
-        choose_all(c, v, chunk)
-    ti.loop_config(block_dim=1)
-    for chunk in range(c.n_worlds * c.n_chunks):
-        resolve_all(c, chunk, tick)
-    ti.loop_config(block_dim=1)
-    for chunk in range(c.n_worlds * c.n_chunks):
-        commit_all(c, v, chunk, tick)
-    if ti.static(v.dense):
-        ti.loop_config(block_dim=4096)
-        for place in range(c.n_worlds * c.size):
-            evaporate(c, place)
-        ti.loop_config(block_dim=4096)
-        for place in range(c.n_worlds * c.size):
-            c.spare[place] = diffused(c, place)
-        ti.loop_config(block_dim=4096)
-        for place in range(c.n_worlds * c.size):
-            c.level[place] = c.spare[place]
-    ti.loop_config(block_dim=1)
-    for w in range(c.n_worlds):
-        before_deaths(c, v, w, tick)
-    if ti.static(v.lively):
-        ti.loop_config(block_dim=1)
-        for chunk in range(c.n_worlds * c.n_chunks):
-            if c.lifespan > 0:
-                grow_old_all(c, chunk)
-        ti.loop_config(block_dim=1)
-        for w in range(c.n_worlds):
-            after_deaths(c, w, tick)
-    ti.loop_config(block_dim=1)
-    for chunk in range(c.n_worlds * c.n_chunks):
-        observe_all(c, v, chunk, tick)
-    if ti.static(v.together):
-        ti.loop_config(block_dim=1)
-        for w in range(c.n_worlds):
-            learn_together(c, v, w)
-
-
-@ti.func
-def plan(c: ti.template(), v: ti.template(), tick, n_ticks):
-    """One round of updates from the models that worlds share."""
-    ti.loop_config(block_dim=1)
-    for chunk in range(c.n_worlds * c.n_chunks):
-        draw_all(c, v, chunk)
-    ti.loop_config(block_dim=1)
-    for w in range(c.n_worlds):
-        plan_together(c, v, w)
-
-
-@ti.func
-def end(c: ti.template(), v: ti.template(), tick, n_ticks):
-    """What ends a tick by chunks."""
-    ti.loop_config(block_dim=1)
-    for chunk in range(c.n_worlds * c.n_chunks):
-        retire_all(c, chunk)
-    ti.loop_config(serialize=True)
-    for w in range(c.n_worlds):
-        stop_at_delivery(c, w)
+def share_of(c: ti.template(), chunk, n):
+    """Which of n ants or cells of a world are those of a chunk."""
+    each = (n + c.n_chunks - 1) // c.n_chunks
+    first = chunk % c.n_chunks * each
+    return first, ti.min(first + each, n)
 
 
 @cache
-def colony_kernel(what: Callable[..., None], v: Variant, arguments: Any) -> Callable[..., None]:
-    """A kernel (arguments, first tick, ticks); it is compiled on first use.
+def by_chunk(
+    v: Variant, phases_of: Callable[[Variant], Iterator[Phase]], arguments: Any
+) -> Callable[..., None]:
+    """A kernel (arguments, tick) of some phases, each a parallel loop over chunks or worlds."""
+    phases = tuple(phases_of(v))
 
-    Args:
-        what: `begin`, `by_world`, `by_chunk`, `plan` or `end`.
-        v: The variant.
-        arguments: The type of the argument pack, see `Colony.arguments`.
-    """
-    if v.learner is not None:
-        tried(v.learner)
-    if not v.sees_percept:
-        looks.row_function(v.observation)  # tries it
+    @ti.kernel
+    def advance_colony(c: arguments, tick: ti.i32):
+        for phase in ti.static(phases):
+            ti.loop_config(block_dim=1)
+            for chunk in range(
+                c.n_worlds if ti.static(phase.of == WORLD) else c.n_worlds * c.n_chunks
+            ):
+                do(phase, c, v, chunk, tick)
+
+    return advance_colony
+
+
+@cache
+def by_world(v: Variant, arguments: Any) -> Callable[..., None]:
+    """A kernel (arguments, first tick, ticks) of whole ticks of worlds with a single chunk each."""
+    phases, last = tuple(tick_phases(v)), tuple(last_phases(v))
+    planning = tuple(planning_phases(v))
 
     @ti.kernel
     def advance_colony(c: arguments, first_tick: ti.i32, n_ticks: ti.i32):
-        what(c, v, first_tick, n_ticks)
+        ti.loop_config(block_dim=1)
+        for w in range(c.n_worlds):
+            for tick in range(first_tick, first_tick + n_ticks):
+                if c.worlds[WorldRow.RUNNING, w] == 1:
+                    for phase in ti.static(phases):
+                        do(phase, c, v, w, tick)
+                    if ti.static(v.plans_together):
+                        for _ in range(c.planning_steps):
+                            for phase in ti.static(planning):
+                                do(phase, c, v, w, tick)
+                    for phase in ti.static(last):
+                        do(phase, c, v, w, tick)
 
     return advance_colony

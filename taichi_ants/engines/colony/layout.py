@@ -40,7 +40,7 @@ class WorldRow(IntEnum):
     FIRST_VACANT = auto()  # no slot below is vacant
     NEXT_NUMBER = auto()  # of the next ant that is born
     STORE = auto()  # foods that the queen has not turned into ants yet
-    HOMES = auto()  # how many places of food
+    HOMES = auto()
     PILES = auto()
     QUEEN_CELL = auto()
     # What `ColonyEpisodes` counts, by the names of its fields.
@@ -58,20 +58,21 @@ class WorldRow(IntEnum):
 class TallyRow(IntEnum):
     """Rows of `tallies`, one column for each chunk: counted in a tick."""
 
-    GIVES = 0
+    RETURNS = 0
+    DELIVERIES = auto()
     MOVES = auto()
     BLOCKED = auto()
     DEATHS = auto()
 
 
 class HomeRow(IntEnum):
-    """Rows of `homes`, one column for each place of food."""
+    """Rows of `homes`, one column for each food of the start: where it lies, or grows back."""
 
-    CELL = 0  # where the food lies or lay
+    CELL = 0
     TAKEN = auto()  # the tick in which it was taken; -1: it is there
     MOVES = auto()  # whether it does in this tick
     PILE = auto()
-    LISTED = auto()  # the places (numbers in their world), pile by pile
+    LISTED = auto()  # the homes (numbers in their world), pile by pile
 
 
 class SumRow(IntEnum):

@@ -9,6 +9,7 @@ in turn towards one target would give. Every chunk of ants sums for itself; noth
 import taichi as ti
 
 from taichi_ants.engines.colony.layout import AntRow, Stage, SumRow
+from taichi_ants.engines.colony.steps import draw_action, observe, table_of
 from taichi_ants.learners.memory import At, LearnerArrays, Transition, discount_of, values_of
 from taichi_ants.learners.model import (
     next_state_of,
@@ -19,23 +20,42 @@ from taichi_ants.learners.model import (
     terminated_of,
     visited,
 )
-from taichi_ants.task.constants import DELIVERED, N_ACTIONS, ROW
-from taichi_ants.task.rules.policy import choose
-from taichi_ants.task.rules.random_bits import advance, below, bits_of, high_word
+from taichi_ants.task.constants import DELIVERED, ROW
+from taichi_ants.task.rules.random_bits import draw_below
 
 _ONE = 4294967296.0  # fixed-point numbers have 32 binary places
 
 
 @ti.func
-def owner_of_table(v: ti.template(), w, ant):
-    """The number of the table that an ant acts by: its own, or that of its world."""
-    return ant if ti.static(v.own_tables) else w
+def begin(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
+    """An ant looks around, and its learner begins an episode."""
+    c.ants[AntRow.PERCEPT, ant], c.ants[v.row_at, ant] = observe(c, v, w, ant, 0)
+    begin_to_learn(c, v, ant)
+
+
+@ti.func
+def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
+    """Observe, choose the next action where the learner asks for it, and learn."""
+    percept, row = observe(c, v, w, ant, (tick + 1) * c.evaporates)
+    next_action = -1
+    if c.ants[AntRow.STAGE, ant] != Stage.NEWBORN:
+        if ti.static(v.draws_next_action):
+            if terminates(c, c.ants[AntRow.EVENT, ant]) == 0:
+                next_action = draw_action(c, v, w, ant, row)
+        if ti.static(v.alone):
+            learn_alone(c, v, ant, row, next_action)
+        elif ti.static(v.together):
+            share_error(c, v, w, chunk, ant, row, next_action)
+    c.ants[AntRow.PERCEPT, ant] = percept
+    if ti.static(not v.sees_percept):
+        c.ants[AntRow.STATE, ant] = row
+    c.ants[AntRow.ACTION, ant] = next_action
 
 
 @ti.func
 def memory_of(c: ti.template(), v: ti.template(), owner):
-    """Where the table, and what else the learner keeps, of an ant or a world begins."""
-    return At(v.table_size * owner, c.floats_size * owner, c.integers_size * owner)
+    """Where the tables, and what else the learner keeps, of an ant or a world begin."""
+    return At(table_of(c, v, owner), owner * c.floats_by_8 * 8, owner * c.integers_by_8 * 8)
 
 
 @ti.func
@@ -45,18 +65,10 @@ def rates_of(c: ti.template(), v: ti.template()):
 
 
 @ti.func
-def draw_action(c: ti.template(), v: ti.template(), w, ant, row):
-    """The ant's choice at a row of its table."""
-    c.streams[ant] = advance(c.streams[ant])
-    table = v.table_size * owner_of_table(v, w, ant)
-    return choose(values_of(c.q, table, row), bits_of(c.streams[ant]), c.explore_below)
-
-
-@ti.func
 def begin_to_learn(c: ti.template(), v: ti.template(), ant):
     """Let the learner of an ant with a table of its own begin an episode."""
     if ti.static(v.begins):
-        memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.n_states))
+        memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
         v.learner.begin(memory, memory_of(c, v, ant))
 
 
@@ -64,11 +76,11 @@ def begin_to_learn(c: ti.template(), v: ti.template(), ant):
 def forget(c: ti.template(), v: ti.template(), ant):
     """Empty the tables and the memory of a slot for the ant that was born into it."""
     at = memory_of(c, v, ant)
-    for i in range(at.table, at.table + v.table_size):
+    for i in range(at.table, table_of(c, v, ant + 1)):
         c.q[i] = 0.0
-    for i in range(at.floats, at.floats + c.floats_size):
+    for i in range(at.floats, at.floats + c.floats_by_8 * 8):
         c.floats[i] = 0.0
-    for i in range(at.integers, at.integers + c.integers_size):
+    for i in range(at.integers, at.integers + c.integers_by_8 * 8):
         c.integers[i] = 0
     begin_to_learn(c, v, ant)
 
@@ -76,7 +88,7 @@ def forget(c: ti.template(), v: ti.template(), ant):
 @ti.func
 def learn_alone(c: ti.template(), v: ti.template(), ant, seen, next_action):
     """Update the ant's own table, as an ant that is alone does."""
-    memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.n_states))
+    memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
     event = c.ants[AntRow.EVENT, ant]
     step = Transition(
         state=c.ants[v.row_at, ant],
@@ -103,7 +115,7 @@ def error_of(
     c: ti.template(), v: ti.template(), w, pair, reward, terminated, seen, next_action
 ):  # fmt: skip
     """The TD error of a pair (its offset in the table) by the shared table of a world."""
-    table = v.table_size * w
+    table = table_of(c, v, w)
     error = v.td_error(
         c.q[table + pair],
         reward,
@@ -122,25 +134,12 @@ def share_error(c: ti.template(), v: ti.template(), w, chunk, ant, seen, next_ac
     """Add the TD error of an ant to the sums of its chunk, and what it saw."""
     event = c.ants[AntRow.EVENT, ant]
     reward, terminated = ti.cast(c.rewards[event], ti.f32), terminates(c, event)
-    state, action = c.ants[v.row_at, ant], c.ants[AntRow.ACTION, ant]
-    key = state * N_ACTIONS + action
-    error = error_of(c, v, w, state * ROW + action, reward, terminated, seen, next_action)
-    add_to_sums(c, v, chunk, key, error, fixed(error), 1)
+    pair = c.ants[v.row_at, ant] * ROW + c.ants[AntRow.ACTION, ant]
+    error = error_of(c, v, w, pair, reward, terminated, seen, next_action)
+    add_to_sums(c, v, chunk, pair, error, fixed(error), 1)
     if ti.static(v.learner.plans):
         outcome = pack_outcome(seen, reward, terminated)
-        note_outcome(c, v.n_pairs * chunk + key, c.ants[AntRow.NUMBER, ant], outcome)
-
-
-@ti.func
-def key_of(pair):
-    """The number of a pair among all pairs, from its offset in the table."""
-    return pair // ROW * N_ACTIONS + pair % ROW
-
-
-@ti.func
-def pair_of(key):
-    """The offset of a pair in the table, from its number."""
-    return key // N_ACTIONS * ROW + key % N_ACTIONS
+        note_outcome(c, v.n_pairs * chunk + pair, c.ants[AntRow.NUMBER, ant], outcome)
 
 
 @ti.func
@@ -156,13 +155,13 @@ def list_of(v: ti.template(), chunk):
 
 
 @ti.func
-def add_to_sums(c: ti.template(), v: ti.template(), chunk, key, error, total, count):
+def add_to_sums(c: ti.template(), v: ti.template(), chunk, pair, error, total, count):
     """Add `count` updates of a pair to a chunk's sums, the last of them with this error."""
-    place, listed = v.n_pairs * chunk + key, list_of(v, chunk)
+    place, listed = v.n_pairs * chunk + pair, list_of(v, chunk)
     known = c.sums_of[SumRow.COUNT, place]
     if known == 0:
         c.touched[listed] += 1
-        c.touched[listed + c.touched[listed]] = key
+        c.touched[listed + c.touched[listed]] = pair
         c.sums[place] = 0
         c.sums_of[SumRow.LATEST, place] = -1
     c.sums_of[SumRow.COUNT, place] = known + count
@@ -179,31 +178,59 @@ def note_outcome(c: ti.template(), place, number, outcome):
 
 
 @ti.func
+def learn_together(c: ti.template(), v: ti.template(), w, tick):
+    """Update the table of a world by what all of its ants have done."""
+    join_sums(c, v, w)
+    if ti.static(v.learner.plans):
+        remember_shared(c, v, w)
+    apply_sums(c, v, w)
+
+
+@ti.func
 def join_sums(c: ti.template(), v: ti.template(), w):
     """Bring the sums of all chunks of a world into its first one."""
     first = w * c.n_chunks
     for chunk in range(first + 1, first + c.n_chunks):
         listed = list_of(v, chunk)
         for i in range(c.touched[listed]):
-            key = c.touched[listed + 1 + i]
-            place = v.n_pairs * chunk + key
+            pair = c.touched[listed + 1 + i]
+            place = v.n_pairs * chunk + pair
             count = c.sums_of[SumRow.COUNT, place]
-            add_to_sums(c, v, first, key, c.errors[place], c.sums[place], count)
+            add_to_sums(c, v, first, pair, c.errors[place], c.sums[place], count)
             latest, outcome = c.sums_of[SumRow.LATEST, place], c.sums_of[SumRow.OUTCOME, place]
-            note_outcome(c, v.n_pairs * first + key, latest, outcome)
+            note_outcome(c, v.n_pairs * first + pair, latest, outcome)
             c.sums_of[SumRow.COUNT, place] = 0
         c.touched[listed] = 0
 
 
 @ti.func
+def remember_shared(c: ti.template(), v: ti.template(), w):
+    """Store the joined outcomes in the shared model, new pairs in ascending order."""
+    memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
+    chunk = w * c.n_chunks
+    listed = list_of(v, chunk)
+    n = c.touched[listed]
+    for i in range(2, n + 1):  # insertion sort: short lists, nearly always known pairs
+        pair = c.touched[listed + i]
+        j = i - 1
+        while j >= 1 and c.touched[listed + ti.max(j, 1)] > pair:
+            c.touched[listed + j + 1] = c.touched[listed + j]
+            j -= 1
+        c.touched[listed + j + 1] = pair
+    for i in range(1, n + 1):
+        pair = c.touched[listed + i]
+        outcome = c.sums_of[SumRow.OUTCOME, v.n_pairs * chunk + pair]
+        remember(memory, memory_of(c, v, w), pair, outcome)
+
+
+@ti.func
 def apply_sums(c: ti.template(), v: ti.template(), w):
     """Move the shared values of a world by their joined errors, and forget these."""
-    chunk, table = w * c.n_chunks, v.table_size * w
+    chunk, table = w * c.n_chunks, table_of(c, v, w)
     listed = list_of(v, chunk)
     for i in range(c.touched[listed]):
-        key = c.touched[listed + 1 + i]
-        place = v.n_pairs * chunk + key
-        pair = table + pair_of(key)
+        pair = c.touched[listed + 1 + i]
+        place = v.n_pairs * chunk + pair
         count = c.sums_of[SumRow.COUNT, place]
         error = c.errors[place]
         rate = c.learning_rate
@@ -211,53 +238,35 @@ def apply_sums(c: ti.template(), v: ti.template(), w):
             mean = ti.cast(c.sums[place], ti.f64) / (ti.cast(count, ti.f64) * _ONE)
             error = ti.cast(mean, ti.f32)
             rate = c.weights[count]
-        c.q[pair] += rate * error
+        c.q[table + pair] += rate * error
         c.sums_of[SumRow.COUNT, place] = 0
     c.touched[listed] = 0
 
 
 @ti.func
-def remember_shared(c: ti.template(), v: ti.template(), w):
-    """Store the joined outcomes in the shared model, new pairs in ascending order."""
-    memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.n_states))
-    chunk = w * c.n_chunks
-    listed = list_of(v, chunk)
-    n = c.touched[listed]
-    for i in range(2, n + 1):  # insertion sort: short lists, nearly always known pairs
-        key = c.touched[listed + i]
-        j = i - 1
-        while j >= 1 and c.touched[listed + ti.max(j, 1)] > key:
-            c.touched[listed + j + 1] = c.touched[listed + j]
-            j -= 1
-        c.touched[listed + j + 1] = key
-    for i in range(1, n + 1):
-        key = c.touched[listed + i]
-        outcome = c.sums_of[SumRow.OUTCOME, v.n_pairs * chunk + key]
-        remember(memory, memory_of(c, v, w), pair_of(key), outcome)
-
-
-@ti.func
-def draw_pair(c: ti.template(), v: ti.template(), w, chunk, ant):
+def draw_pair(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """One planning draw of an ant: count an update of a visited pair."""
-    memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.n_states))
-    at = memory_of(c, v, w)
-    c.streams[ant] = advance(c.streams[ant])
-    drawn = below(high_word(bits_of(c.streams[ant])), visited(memory, at))
-    pair, outcome = recall(memory, at, drawn)
-    add_to_sums(c, v, chunk, key_of(pair), 0.0, ti.cast(0, ti.i64), 1)
-    note_outcome(c, v.n_pairs * chunk + key_of(pair), 0, outcome)
+    if c.ants[AntRow.STAGE, ant] != Stage.NEWBORN:
+        memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
+        at = memory_of(c, v, w)
+        drawn, c.streams[ant] = draw_below(c.streams[ant], visited(memory, at))
+        pair, outcome = recall(memory, at, drawn)
+        add_to_sums(c, v, chunk, pair, 0.0, ti.cast(0, ti.i64), 1)
+        note_outcome(c, v.n_pairs * chunk + pair, 0, outcome)
 
 
 @ti.func
-def price_draws(c: ti.template(), v: ti.template(), w):
-    """The errors of all pairs that were drawn, by the table at the start of the round."""
+def plan_together(c: ti.template(), v: ti.template(), w, tick):
+    """Update the pairs that were drawn, by the table at the start of the round."""
+    join_sums(c, v, w)
     chunk = w * c.n_chunks
     listed = list_of(v, chunk)
     for i in range(c.touched[listed]):
-        key = c.touched[listed + 1 + i]
-        place = v.n_pairs * chunk + key
+        pair = c.touched[listed + 1 + i]
+        place = v.n_pairs * chunk + pair
         seen = c.sums_of[SumRow.OUTCOME, place]
         reward, terminated = reward_of(seen), terminated_of(seen)
-        error = error_of(c, v, w, pair_of(key), reward, terminated, next_state_of(seen), -1)
+        error = error_of(c, v, w, pair, reward, terminated, next_state_of(seen), -1)
         c.errors[place] = error
         c.sums[place] = fixed(error) * c.sums_of[SumRow.COUNT, place]
+    apply_sums(c, v, w)

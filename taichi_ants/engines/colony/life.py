@@ -8,10 +8,11 @@ from taichi.math import popcnt
 
 from taichi_ants.engines.colony.layout import ANT_GROUND, AntRow, HomeRow, Stage, TallyRow, WorldRow
 from taichi_ants.engines.colony.learning import forget
+from taichi_ants.engines.colony.steps import tally
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_BORN
 from taichi_ants.task.constants import EMPTY, FOOD, QUEEN
 from taichi_ants.task.rules.policy import bit_number
-from taichi_ants.task.rules.random_bits import advance, below, bits_of, high_word
+from taichi_ants.task.rules.random_bits import advance, bits_of, draw_below
 
 
 @ti.func
@@ -23,31 +24,24 @@ def stream_of(seed, purpose, number):
 
 
 @ti.func
-def count_gives(c: ti.template(), w, tick):
-    """Add up what the ants gave in this tick."""
+def count(c: ti.template(), v: ti.template(), w, tick):
+    """Add up what the chunks have counted since this was done last."""
     gives = 0
     for chunk in range(w * c.n_chunks, (w + 1) * c.n_chunks):
-        gives += c.tallies[TallyRow.GIVES, chunk]
-        c.worlds[WorldRow.MOVES, w] += c.tallies[TallyRow.MOVES, chunk]
-        c.worlds[WorldRow.BLOCKED, w] += c.tallies[TallyRow.BLOCKED, chunk]
-        c.tallies[TallyRow.GIVES, chunk] = 0
-        c.tallies[TallyRow.MOVES, chunk] = 0
-        c.tallies[TallyRow.BLOCKED, chunk] = 0
-    c.worlds[WorldRow.DELIVERIES, w] += gives
+        c.returns[w] += c.tallies[TallyRow.RETURNS, chunk]
+        gives += ti.cast(c.tallies[TallyRow.DELIVERIES, chunk], ti.i32)
+        c.worlds[WorldRow.MOVES, w] += ti.cast(c.tallies[TallyRow.MOVES, chunk], ti.i32)
+        c.worlds[WorldRow.BLOCKED, w] += ti.cast(c.tallies[TallyRow.BLOCKED, chunk], ti.i32)
+        deaths = ti.cast(c.tallies[TallyRow.DEATHS, chunk], ti.i32)
+        c.worlds[WorldRow.DEATHS, w] += deaths
+        c.worlds[WorldRow.LIVING, w] -= deaths
+        for row in ti.static(range(len(TallyRow))):
+            c.tallies[row, chunk] = 0
     c.worlds[WorldRow.TICKS, w] = tick + 1
+    c.worlds[WorldRow.DELIVERIES, w] += gives
+    c.worlds[WorldRow.STORE, w] += gives * c.births
     if gives > 0 and c.worlds[WorldRow.FIRST_DELIVERY, w] < 0:
         c.worlds[WorldRow.FIRST_DELIVERY, w] = tick + 1
-    if c.births == 1:
-        c.worlds[WorldRow.STORE, w] += gives
-
-
-@ti.func
-def count_deaths(c: ti.template(), w):
-    """Add up the ants that die in this tick."""
-    for chunk in range(w * c.n_chunks, (w + 1) * c.n_chunks):
-        c.worlds[WorldRow.DEATHS, w] += c.tallies[TallyRow.DEATHS, chunk]
-        c.worlds[WorldRow.LIVING, w] -= c.tallies[TallyRow.DEATHS, chunk]
-        c.tallies[TallyRow.DEATHS, chunk] = 0
 
 
 @ti.func
@@ -61,16 +55,15 @@ def free_around(c: ti.template(), base, cell):
 
 
 @ti.func
-def give_birth(c: ti.template(), v: ti.template(), w):
-    """Turn stored food into ants beside the queen, while there is room."""
+def give_birth(c: ti.template(), v: ti.template(), w, tick):
+    """Turn stored food into ants beside the queen, while there is room; without births none is."""
     base, queen = w * c.size, c.worlds[WorldRow.QUEEN_CELL, w]
     free = free_around(c, base, queen)
     while (
         c.worlds[WorldRow.STORE, w] > 0 and c.worlds[WorldRow.LIVING, w] < c.n_slots and free != 0
     ):
-        c.queen_streams[w] = advance(c.queen_streams[w])
-        word = high_word(bits_of(c.queen_streams[w]))
-        heading = bit_number(free, below(word, popcnt(free)))
+        k, c.queen_streams[w] = draw_below(c.queen_streams[w], popcnt(free))
+        heading = bit_number(free, k)
         slot = c.worlds[WorldRow.FIRST_VACANT, w]
         while c.ants[AntRow.STAGE, w * c.n_slots + slot] != Stage.VACANT:
             slot += 1
@@ -102,12 +95,24 @@ def place_newborn(c: ti.template(), w, ant, cell, heading):
 
 
 @ti.func
-def regrow(c: ti.template(), w, tick):
-    """Food grows back at places that have waited long enough and are empty."""
+def grow_old(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
+    """Age by one tick; at the end of its life an ant leaves its cell, and its food there."""
+    if c.lifespan > 0 and c.ants[AntRow.STAGE, ant] == Stage.LIVING:
+        c.ants[AntRow.AGE, ant] += 1
+        if c.ants[AntRow.AGE, ant] >= c.lifespan:
+            c.ants[AntRow.STAGE, ant] = Stage.DYING
+            tally(c, TallyRow.DEATHS, chunk, 1)
+            left_behind = ti.select(c.ants[AntRow.CARRIES, ant] == 1, FOOD, EMPTY)
+            c.ground[w * c.size + c.ants[AntRow.CELL, ant]] = ti.cast(left_behind, ti.u8)
+
+
+@ti.func
+def regrow(c: ti.template(), v: ti.template(), w, tick):
+    """Food grows back in homes that have waited long enough and are empty."""
     base = w * c.size
     for home in range(w * c.n_homes, w * c.n_homes + c.worlds[WorldRow.HOMES, w]):
         taken = c.homes[HomeRow.TAKEN, home]
-        if taken >= 0 and tick >= taken + c.regrowth:
+        if c.regrowth >= 0 and taken >= 0 and tick >= taken + c.regrowth:
             place = base + c.homes[HomeRow.CELL, home]
             if c.ground[place] == EMPTY:
                 c.ground[place] = FOOD
@@ -117,44 +122,51 @@ def regrow(c: ti.template(), w, tick):
 
 
 @ti.func
-def wander(c: ti.template(), w):
-    """Every pile takes a step: its foods one after the other, the front ones first."""
-    for pile in range(c.worlds[WorldRow.PILES, w]):
-        c.queen_streams[w] = advance(c.queen_streams[w])
-        heading = below(high_word(bits_of(c.queen_streams[w])), N_HEADINGS)
-        step = c.compass[heading + 1]
-        begins = w * (c.n_homes + 1) + pile
-        for i in range(c.piles[begins], c.piles[begins + 1]):
-            home = listed_home(c, w, i)
-            c.homes[HomeRow.MOVES, home] = ti.cast(can_move(c, w, home, step), ti.i32)
-        for i in range(c.piles[begins], c.piles[begins + 1]):
-            home = listed_home(c, w, i)
-            if c.homes[HomeRow.MOVES, home] == 1 and c.homes[HomeRow.TAKEN, home] < 0:
+def wander(c: ti.template(), v: ti.template(), w, tick):
+    """Now and then every pile takes a step."""
+    if c.wander > 0:
+        if (tick + 1) % c.wander == 0:
+            for pile in range(c.worlds[WorldRow.PILES, w]):
+                move_pile(c, w, pile)
+
+
+@ti.func
+def move_pile(c: ti.template(), w, pile):
+    """A pile takes a step: its foods one after the other, the front ones first."""
+    heading, c.queen_streams[w] = draw_below(c.queen_streams[w], N_HEADINGS)
+    step = c.compass[heading + 1]
+    begins = w * (c.n_homes + 1) + pile
+    for i in range(c.piles[begins], c.piles[begins + 1]):
+        home = listed_home(c, w, i)
+        c.homes[HomeRow.MOVES, home] = ti.cast(can_move(c, w, home, step), ti.i32)
+    for i in range(c.piles[begins], c.piles[begins + 1]):
+        home = listed_home(c, w, i)
+        if c.homes[HomeRow.MOVES, home] == 1 and c.homes[HomeRow.TAKEN, home] < 0:
+            place = w * c.size + c.homes[HomeRow.CELL, home]
+            c.ground[place] = EMPTY
+            c.home_of[place] = -1
+    for i in range(c.piles[begins], c.piles[begins + 1]):
+        home = listed_home(c, w, i)
+        if c.homes[HomeRow.MOVES, home] == 1:
+            c.homes[HomeRow.CELL, home] += step
+            if c.homes[HomeRow.TAKEN, home] < 0:
                 place = w * c.size + c.homes[HomeRow.CELL, home]
-                c.ground[place] = EMPTY
-                c.home_of[place] = -1
-        for i in range(c.piles[begins], c.piles[begins + 1]):
-            home = listed_home(c, w, i)
-            if c.homes[HomeRow.MOVES, home] == 1:
-                c.homes[HomeRow.CELL, home] += step
-                if c.homes[HomeRow.TAKEN, home] < 0:
-                    place = w * c.size + c.homes[HomeRow.CELL, home]
-                    c.ground[place] = FOOD
-                    c.home_of[place] = home
+                c.ground[place] = FOOD
+                c.home_of[place] = home
 
 
 @ti.func
 def listed_home(c: ti.template(), w, i):
-    """The column in `homes` of the i-th place in the order of piles."""
+    """The column in `homes` of the i-th home in the order of piles."""
     return w * c.n_homes + c.homes[HomeRow.LISTED, w * c.n_homes + i]
 
 
 @ti.func
 def can_move(c: ti.template(), w, home, step):
-    """Whether a place of food can take the step.
+    """Whether a home can take the step.
 
-    Food can if the cell ahead is empty, or holds food of the same pile that can itself: the foods
-    in a row move together. A place that waits for its food can unless rock or queen is ahead.
+    One with food can if the cell ahead is empty, or holds food of the same pile that can itself:
+    the foods in a row move together. One that waits can unless rock or queen is ahead.
     """
     ahead = w * c.size + c.homes[HomeRow.CELL, home] + step
     can = c.walls[ahead] == 0 and c.ground[ahead] & 15 != QUEEN
@@ -169,3 +181,22 @@ def can_move(c: ti.template(), w, home, step):
                 ahead += step
         can = c.ground[ahead] == EMPTY
     return can
+
+
+@ti.func
+def retire(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
+    """At the end of the tick the dead leave their slots, and the newborn are ants."""
+    if c.ants[AntRow.STAGE, ant] == Stage.NEWBORN:
+        c.ants[AntRow.STAGE, ant] = Stage.LIVING
+    elif c.ants[AntRow.STAGE, ant] == Stage.DYING:
+        c.ants[AntRow.STAGE, ant] = Stage.VACANT
+        ti.atomic_min(c.worlds[WorldRow.FIRST_VACANT, w], ant - w * c.n_slots)
+        if c.ants[AntRow.NUMBER, ant] < c.n_ants:
+            c.first_streams[w * c.n_slots + c.ants[AntRow.NUMBER, ant]] = c.streams[ant]
+
+
+@ti.func
+def stop_at_delivery(c: ti.template(), v: ti.template(), w, tick):
+    """End the episode of a world, if it is one that ends so."""
+    if c.ends_at_delivery == 1 and c.worlds[WorldRow.DELIVERIES, w] > 0:
+        c.worlds[WorldRow.RUNNING, w] = 0

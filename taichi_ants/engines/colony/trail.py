@@ -15,12 +15,7 @@ LINEAR = -1.0  # the value of `decay` that stands for linear evaporation in dens
 @ti.func
 def level_of(c: ti.template(), v: ti.template(), place, clock):
     """The trail on a cell: i32, or f32 if dense."""
-    level = 0.0 if ti.static(v.dense) else 0
-    if ti.static(v.dense):
-        level = c.level[place]
-    else:
-        level = ti.max(c.trail[place] - clock, 0)
-    return level
+    return c.level[place] if ti.static(v.dense) else ti.max(c.trail[place] - clock, 0)
 
 
 @ti.func
@@ -32,17 +27,15 @@ def level_in_view(c: ti.template(), v: ti.template(), place, clock):
 
 @ti.func
 def deposit(c: ti.template(), v: ti.template(), place, clock):
-    """Lay a trail on a cell, as the configuration says."""
-    if ti.static(v.dense):
+    """Lay a trail on a cell, as the task says."""
+    if c.deposits == 1:
+        laid = c.deposit_level
         if c.adds == 1:
-            laid = c.level[place] + ti.cast(c.deposit_level, ti.f32)
-            c.level[place] = ti.min(laid, ti.cast(c.cap, ti.f32))
-        elif c.adds == 0:
-            c.level[place] = ti.cast(c.deposit_level, ti.f32)
-    elif c.adds == 1:
-        c.trail[place] = clock + ti.min(ti.max(c.trail[place] - clock, 0) + c.deposit_level, c.cap)
-    elif c.adds == 0:
-        c.trail[place] = clock + c.deposit_level
+            laid = ti.min(level_of(c, v, place, clock) + laid, c.cap)
+        if ti.static(v.dense):
+            c.level[place] = laid
+        else:
+            c.trail[place] = clock + laid
 
 
 @ti.func
@@ -59,16 +52,27 @@ def evaporate(c: ti.template(), place):
 
 
 @ti.func
-def diffused(c: ti.template(), place):
-    """The level of a cell after one tick of diffusion; the share aimed at a wall stays."""
-    level = c.level[place]
-    if c.walls[place] == 0:
-        n_open, received = 0.0, 0.0
-        for heading in ti.static(range(N_HEADINGS)):
-            neighbour = place + c.compass[heading + 1]
-            if c.walls[neighbour] == 0:
-                n_open += 1.0
-                received += c.level[neighbour] * c.share
-        # At rate 1 all is given away, and rounding could leave less than nothing.
-        level = ti.max(level - level * c.share * n_open + received, 0.0)
-    return level
+def diffuse(c: ti.template(), place):
+    """Compute the level of a cell after one tick of diffusion.
+
+    The share that is aimed at a wall stays.
+    """
+    if c.share > 0.0:
+        level = c.level[place]
+        if c.walls[place] == 0:
+            n_open, received = 0.0, 0.0
+            for heading in ti.static(range(N_HEADINGS)):
+                neighbour = place + c.compass[heading + 1]
+                if c.walls[neighbour] == 0:
+                    n_open += 1.0
+                    received += c.level[neighbour] * c.share
+            # At rate 1 all is given away, and rounding could leave less than nothing.
+            level = ti.max(level - level * c.share * n_open + received, 0.0)
+        c.spare[place] = level
+
+
+@ti.func
+def settle(c: ti.template(), place):
+    """Take over what `diffuse` has computed for all cells."""
+    if c.share > 0.0:
+        c.level[place] = c.spare[place]

@@ -1,31 +1,43 @@
-"""A world and a task laid out for the kernel of independent runs, and the loop over launches."""
+"""A world and a task laid out for the kernel of independent runs, and the loop over launches.
+
+A launch cannot be interrupted, so that Ctrl-C, progress and checkpoints wait for its end: even if
+every episode uses all of its steps, a launch should take about a second. Within that bound few
+large launches are best, since threads wait for the last run of each.
+"""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import astuple, dataclass
 from functools import cache
 from typing import Any
 
 import numpy as np
 
-from taichi_ants import runtime
-from taichi_ants.engines.layout import OUTCOMES, STEPS, TRACE
+from taichi_ants import learners, runtime
+from taichi_ants.engines.layout import OUTCOMES
 from taichi_ants.engines.packing import compass_of, pack_cells
-from taichi_ants.engines.runs.launches import plan_launches
-from taichi_ants.engines.runs.state import Runs
+from taichi_ants.engines.runs.results import RunState
+from taichi_ants.grid.constants import STREAM_ROLLOUT
+from taichi_ants.grid.randomness import stream_state
+from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.learners.registry import Learner
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.worlds.world import World
 
 Progress = Callable[[float], None]  # called with the share of the work that is done, 0 to 1
 
+_SECONDS = 1.0
+_STEP_NS = 25  # of Q-learning in one thread, on a slow core
+_WORKSPACE_BYTES = 256 * 2**20
+_MOST_NUMBERS = 2**30  # of one array in a launch, which kernels index by 32 bits
 _PARALLEL_RUNS_ON_GPU = 4096
 
 # The arguments of the kernel, n runs of one learner with tables of n_states rows. Arrays of runs
 # are flat, one run behind the other. Each has so many tables, and so many times 8 floats and
-# integers: then compilers know that neighbouring addresses differ in their last bits alone, which
-# saves Dyna-Q a tenth of its time.
+# integers, see `packing.padded`.
 _NO_WORK: dict[str, Any] = {
     "n_runs": 0,
     "n_episodes": 0,
@@ -64,126 +76,93 @@ _NO_WORK: dict[str, Any] = {
 }
 
 
-class RunEngine:
-    """Does the episodes of many runs in one world.
+@dataclass(frozen=True)
+class Runs:
+    """Runs of one learner.
 
     Attributes:
-        seconds: What kernels have taken so far, without compilation: CPU seconds of all threads
-            together, or wall-clock seconds on a GPU.
+        learner: The learner; None to follow the tables without learning.
+        seeds: The seed of each run, Python integers (n,), for worlds that do not list their ant.
+        settings: float64 (n, columns), `layout.SETTINGS` and the hyperparameters of the learner.
+        state: Where the runs stand, arrays (n, ...), contiguous; the kernel moves it on.
+        streams: uint64 (n, episodes), a random stream for each episode without learning.
+        cost: What a step takes, 1 for one of Q-learning.
     """
 
-    def __init__(self, world: World, task: Task, max_steps: int, settings: runtime.Runtime) -> None:
-        self.seconds = 0.0
-        self._world = world
-        self._start = cache(world.start)
-        self._task = task
-        self._max_steps = max_steps
-        self._settings = settings
+    learner: Learner | None
+    seeds: np.ndarray
+    settings: np.ndarray
+    state: RunState
+    streams: np.ndarray | None = None
+    cost: float = 1.0
 
-    def run(self, runs: Runs, episodes: int, progress: Progress | None = None) -> np.ndarray:
-        """Do the next episodes of n runs.
-
-        Args:
-            runs: The runs; their state is moved on.
-            episodes: How many episodes.
-            progress: Called after each launch.
-
-        Returns:
-            int32 (3, n, episodes): returns, steps, deliveries.
-        """
-        launch_on, per_run = self._prepare(runs)
-        on_cpu = self._settings.arch == "cpu"
-        workers = self._settings.threads if on_cpu else _PARALLEL_RUNS_ON_GPU
-        widest = max(per_run, *(array[0].size for array in vars(runs.state).values()))
-        plan = plan_launches(workers, episodes, self._max_steps, runs.cost, per_run, widest)
-        cells = np.empty(min(plan.runs, len(runs)) * per_run, np.int32)
-        outcomes = np.empty((len(OUTCOMES), len(runs), episodes), dtype=np.int32)
-        for launch in plan.launches(len(runs), episodes):
-            rows = slice(launch.first, launch.first + launch.count)
-            block = np.empty((len(OUTCOMES), launch.count, launch.end - launch.begin), np.int32)
-            some = self._of_runs(runs, rows, slice(launch.begin, launch.end))
-            began = self._clock()
-            launch_on(**some, cells=cells, outcomes=block)
-            self.seconds += self._clock() - began
-            outcomes[:, rows, launch.begin : launch.end] = block
-            if progress is not None:
-                progress((launch.first + launch.count * launch.end / episodes) / len(runs))
-        return outcomes
-
-    def trace(self, runs: Runs, episodes: int) -> dict[str, np.ndarray]:
-        """Do the episodes of runs in one launch and record each of their n steps, run by run.
-
-        Args:
-            runs: The runs, one run if it learns; the state is moved on.
-            episodes: How many episodes.
-
-        Returns:
-            `TRACE` by name, int32 (n,), with cells as in `AxialGrid`; "runs", the run of each
-            step, int64 (n,); with learning also "td_errors", float32 (n,), and "tables", float32
-            (n, n_states, 5), after each step.
-        """
-        launch_on, per_run = self._prepare(runs, traced=True)
-        n_runs, capacity = len(runs), episodes * self._max_steps
-        integers = np.zeros((n_runs * capacity, len(TRACE)), dtype=np.int32)
-        learned = capacity if runs.learner is not None else 0
-        errors = np.zeros(learned, dtype=np.float32)
-        tables = np.empty((learned, *runs.state.q.shape[2:]), dtype=np.float32)
-        outcomes = np.zeros((len(OUTCOMES), n_runs, episodes), dtype=np.int32)
-        launch_on(
-            **self._of_runs(runs, slice(0, n_runs), slice(0, episodes)),
-            cells=np.empty(n_runs * per_run, np.int32),
-            outcomes=outcomes,
-            trace=integers,
-            trace_errors=errors,
-            trace_tables=tables.reshape(-1),
+    @classmethod
+    def learning(
+        cls, configs: Sequence[TrainingConfig], seeds: Sequence[int], state: RunState
+    ) -> Runs:
+        """Configurations that differ in the settings of all learners alone, times seeds."""
+        learner = learners.get(configs[0].learner)
+        more = learner.settings(configs[0])
+        settings = [
+            (one.learning_rate, one.discount, one.epsilon_decay, one.min_epsilon, *astuple(more))
+            for one in configs
+        ]
+        return cls(
+            learner,
+            np.tile(np.array(seeds, dtype=object), len(configs)),
+            np.repeat(np.array(settings, dtype=np.float64), len(seeds), axis=0),
+            state,
+            cost=learner.cost(more),
         )
-        lengths = outcomes[STEPS].sum(axis=1)
-        number = np.repeat(np.arange(n_runs), lengths)
-        n = len(number)
-        rows = np.arange(n) + (np.arange(n_runs) * capacity - (lengths.cumsum() - lengths))[number]
-        recorded = dict(zip(TRACE, integers[rows].T, strict=True)) | {"runs": number}
-        if runs.learner is not None:
-            recorded |= {"td_errors": errors[:n], "tables": tables[:n, :, :N_ACTIONS]}
-        return recorded
 
-    def _prepare(self, runs: Runs, traced: bool = False) -> tuple[Callable[..., None], int]:
-        """A function that launches the compiled kernel on arguments that are given by name.
+    @classmethod
+    def following(
+        cls, tables: np.ndarray, seeds: np.ndarray, numbers: np.ndarray, epsilon: float
+    ) -> Runs:
+        """Runs that follow tables (n, n_states, 5) with a constant epsilon.
 
-        Also the number of packed cells that each run needs.
+        Args:
+            tables: The action values.
+            seeds: Python integers (n,).
+            numbers: Which rollouts of a seed, (episodes,); each has a stream of its own.
+            epsilon: Probability of a random action.
         """
+        state = RunState.empty((len(tables),), tables.shape[-2])
+        state.q[:, 0, :, :N_ACTIONS] = tables
+        state.epsilon[:] = epsilon
+        words = np.array([seed % 2**64 for seed in seeds.tolist()], dtype=np.uint64)
+        streams = stream_state(words[:, None], STREAM_ROLLOUT, numbers[None, :])
+        settings = np.tile([0.0, 0.0, 1.0, 0.0], (len(tables), 1))  # epsilon does not decay
+        return cls(None, seeds, settings, state, streams)
+
+    def __len__(self) -> int:
+        return len(self.seeds)
+
+
+class Launcher:
+    """The compiled kernel of some runs in one world, and its arguments."""
+
+    def __init__(
+        self, world: World, task: Task, max_steps: int, runs: Runs, traced: bool = False
+    ) -> None:
         # Taichi is imported once it is configured, see `runtime`.
         from taichi_ants.engines.arguments import Arguments, compile_once
         from taichi_ants.engines.runs.kernels import run_kernel
         from taichi_ants.engines.runs.step import EXTRA_CELLS
 
-        arguments = Arguments()
-        kernel = run_kernel(
-            runs.learner,
-            self._task.sees,
-            self._task.pheromone.deposit,
-            traced,
-            arguments.type_of(_NO_WORK),
-        )
-        compile_once(kernel, lambda: Arguments().pack(_NO_WORK))
-        values = _NO_WORK | self._of_task(runs.learner is not None)
-
-        def launch_on(**others: Any) -> None:
-            # An array of length 0 cannot be an argument; the single 0 stays.
-            values.update({name: one for name, one in others.items() if getattr(one, "size", 1)})
-            kernel(arguments.pack(values))
-
-        return launch_on, self._world.grid.size + EXTRA_CELLS
-
-    def _of_task(self, learns: bool) -> dict[str, Any]:
-        """The arguments of the kernel that belong to the task and the world."""
-        task, world = self._task, self._world
+        self._runs, self._start, self._arguments = runs, cache(world.start), Arguments()
+        self.cells_of_a_run = world.grid.size + EXTRA_CELLS
+        learns, pheromone = runs.learner is not None, task.pheromone
+        kind = self._arguments.type_of(_NO_WORK)
+        self._kernel = run_kernel(runs.learner, task.sees, pheromone.deposit, traced, kind)
+        compile_once(self._kernel, lambda: Arguments().pack(_NO_WORK))
         falls = task.evaporation_in_training if learns else task.evaporation_in_evaluation
-        return {
-            "max_steps": self._max_steps,
+        self._values = _NO_WORK | {
+            "max_steps": max_steps,
             "size": world.grid.size,
-            "falls": int(falls and task.pheromone.evaporation == "linear"),
-            "level": task.pheromone.level,
-            "cap": task.pheromone.cap or 0,
+            "falls": int(falls and pheromone.evaporation == "linear"),
+            "level": pheromone.level,
+            "cap": pheromone.cap or 0,
             "continuing": int(task.delivery == "continuing"),
             "rewards": task.rewards.by_event(),
             "world": pack_cells(world),
@@ -192,25 +171,93 @@ class RunEngine:
             "compass": compass_of(world.grid),
         }
 
-    def _of_runs(self, runs: Runs, rows: slice, episodes: slice) -> dict[str, Any]:
-        """The arguments that belong to some runs; the kernel moves their state on."""
-        starts = np.array([self._start(seed) for seed in runs.seeds[rows].tolist()])
-        state = runs.state
-        of_runs = {
+    def launch(self, some: slice, episodes: slice, **arrays: np.ndarray) -> None:
+        """Do some episodes of some runs; what comes out is written into the arrays."""
+        runs, state = self._runs, self._runs.state
+        starts = np.array([self._start(seed) for seed in runs.seeds[some].tolist()])
+        values = {
             "n_runs": len(starts),
             "n_episodes": episodes.stop - episodes.start,
             "start_cells": starts[:, 0, 0].astype(np.int32),
             "start_headings": starts[:, 1, 0].astype(np.int32),
-            "settings": runs.settings[rows].reshape(-1),
+            "settings": runs.settings[some].reshape(-1),
             "tables": state.q.shape[1],
             "floats_by_8": state.floats.shape[1] // 8,
             "integers_by_8": state.integers.shape[1] // 8,
-            **{name: array[rows].reshape(-1) for name, array in vars(state).items()},
+            "cells": np.empty(len(starts) * self.cells_of_a_run, np.int32),
+            **{name: array[some].reshape(-1) for name, array in vars(state).items()},
+            **arrays,
         }
         if runs.streams is not None:
-            of_runs["streams"] = np.ascontiguousarray(runs.streams[rows, episodes]).reshape(-1)
-        return of_runs
+            values["streams"] = np.ascontiguousarray(runs.streams[some, episodes]).reshape(-1)
+        # An array of length 0 cannot be an argument; the single 0 stays.
+        self._values.update({name: one for name, one in values.items() if getattr(one, "size", 1)})
+        self._kernel(self._arguments.pack(self._values))
 
-    def _clock(self) -> float:
-        """Seconds of all threads of this process on the CPU, which other processes do not slow."""
-        return time.process_time() if self._settings.arch == "cpu" else time.perf_counter()
+
+def do_episodes(
+    world: World,
+    task: Task,
+    max_steps: int,
+    runs: Runs,
+    episodes: int,
+    progress: Progress | None = None,
+) -> tuple[np.ndarray, float]:
+    """Do the next episodes of n runs, whose state is moved on.
+
+    Returns:
+        int32 (3, n, episodes): returns, steps, deliveries; and what it took without compilation, in
+        CPU seconds of all threads together, or wall-clock seconds on a GPU.
+    """
+    settings = runtime.start()
+    # Seconds of all threads of this process on the CPU, which other processes do not slow.
+    clock = time.process_time if settings.arch == "cpu" else time.perf_counter
+    workers = settings.threads if settings.arch == "cpu" else _PARALLEL_RUNS_ON_GPU
+    launcher = Launcher(world, task, max_steps, runs)
+    widest = max(array[0].size for array in vars(runs.state).values())
+    size = size_of_launch(workers, episodes, max_steps, runs.cost, launcher.cells_of_a_run, widest)
+    outcomes, seconds = np.empty((len(OUTCOMES), len(runs), episodes), dtype=np.int32), 0.0
+    for some, part in pieces(len(runs), episodes, *size):
+        block = np.empty((len(OUTCOMES), some.stop - some.start, part.stop - part.start), np.int32)
+        began = clock()
+        launcher.launch(some, part, outcomes=block)
+        seconds += clock() - began
+        outcomes[:, some, part] = block
+        if progress is not None:
+            done = some.start + (some.stop - some.start) * part.stop / episodes
+            progress(done / len(runs))
+    return outcomes, seconds
+
+
+def size_of_launch(
+    workers: int, episodes: int, max_steps: int, cost: float, cells: int, widest: int
+) -> tuple[int, int]:
+    """How many runs, and how many episodes of each, go into one launch.
+
+    Args:
+        workers: Runs that progress at the same time (CPU threads).
+        episodes: Episodes of each run.
+        max_steps: Most steps of an episode.
+        cost: What a step takes, 1 for one of Q-learning.
+        cells: i32 cells that each run of a launch needs for its world.
+        widest: The most numbers that the state of a run has in one array.
+    """
+    steps_each = _SECONDS * 1e9 / (_STEP_NS * cost)
+    rounds = int(steps_each // (episodes * max_steps))
+    numbers = max(widest, cells, episodes)
+    most_runs = max(1, min(_WORKSPACE_BYTES // (4 * cells), _MOST_NUMBERS // numbers))
+    if rounds >= 1:
+        return min(workers * rounds, most_runs), episodes
+    return min(workers, most_runs), max(1, int(steps_each // max_steps))
+
+
+def pieces(
+    n_runs: int, n_episodes: int, runs_each: int, episodes_each: int
+) -> Iterator[tuple[slice, slice]]:
+    """The runs and the episodes of all launches, the episodes of a run in order."""
+    for first in range(0, n_runs, runs_each):
+        for begin in range(0, n_episodes, episodes_each):
+            yield (
+                slice(first, min(first + runs_each, n_runs)),
+                slice(begin, min(begin + episodes_each, n_episodes)),
+            )

@@ -2,62 +2,105 @@
 
 from __future__ import annotations
 
-import operator
-from dataclasses import asdict, astuple, dataclass, field, fields
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass, field, fields
 from typing import Any
 
 import numpy as np
 
 from taichi_ants import files, learners
-from taichi_ants.checks import checked_count, checked_max_steps, checked_seeds
+from taichi_ants.checks import checked_max_steps, checked_seeds
 from taichi_ants.engines.layout import OUTCOMES
+from taichi_ants.engines.packing import padded
 from taichi_ants.engines.records import Record
-from taichi_ants.engines.runs.state import RunState
 from taichi_ants.engines.stored import FileKind, world_arrays, world_facts, world_from
 from taichi_ants.errors import AntsError, shown
+from taichi_ants.grid.constants import STREAM_ANT
+from taichi_ants.grid.randomness import stream_state
 from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.learners.registry import Memory
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS, ROW
 from taichi_ants.worlds.world import World
 
-# What the arrays of a result come from.
-_MAKERS = ("world", "task", "configs", "seeds", "max_steps")
-_KIND = FileKind("taichi-ants training 3", "training result", "TrainingResult.save")
+_KIND = FileKind("taichi-ants training 4", "training result", "TrainingResult.save")
 _SUMMED_UP, _LISTED = 50, 6  # episodes and configurations that a result shows
 
 
-@dataclass(frozen=True)
-class LearnerCost:
-    """What the runs of one learner took.
+@dataclass(frozen=True, eq=False, repr=False)
+class RunState(Record):
+    """Where runs stopped; training goes on from it bit for bit.
 
-    Attributes:
-        learner: Its name.
-        planning_steps: Model updates after each step.
-        steps: Environment steps that were taken, learning included.
-        seconds: CPU seconds of all threads together, without compilation; wall-clock seconds on a
-            GPU.
+    Attributes (leading axes: the runs, for example (configurations, seeds)):
+        q: float32 (..., 1 + tables, n_states, 8), the table that the ant acts by and the further
+            ones of its learner; 5 action values and 3 unused.
+        floats: float32 (..., k), as many as any learner here needs, up to the next multiple of 8;
+            see `taichi_ants.learners.Memory`.
+        integers: int32 (..., k), likewise.
+        random_states: uint64 (...,), the ants' random streams.
+        epsilon: float64 (...,), of the next episode.
     """
 
-    learner: str
-    planning_steps: int
-    steps: int
-    seconds: float
+    q: np.ndarray
+    floats: np.ndarray
+    integers: np.ndarray
+    random_states: np.ndarray
+    epsilon: np.ndarray
 
-    @property
-    def nanoseconds_per_step(self) -> float:
-        """CPU time of one environment step with its learning, in nanoseconds."""
-        return self.seconds * 1e9 / self.steps if self.steps else float("nan")
+    @classmethod
+    def empty(
+        cls,
+        shape: tuple[int, ...],
+        n_states: int,
+        memory: Memory = Memory(),  # noqa: B008
+    ) -> RunState:
+        """Zeros for runs of this shape."""
+        return cls(
+            q=np.zeros((*shape, 1 + memory.tables, n_states, ROW), dtype=np.float32),
+            floats=np.zeros((*shape, memory.floats), dtype=np.float32),
+            integers=np.zeros((*shape, memory.integers), dtype=np.int32),
+            random_states=np.zeros(shape, dtype=np.uint64),
+            epsilon=np.zeros(shape, dtype=np.float64),
+        )
 
-    def as_row(self) -> dict[str, object]:
-        """For tables and manifests."""
-        return {**vars(self), "nanoseconds_per_step": self.nanoseconds_per_step}
+    @classmethod
+    def fresh(
+        cls, configs: Sequence[TrainingConfig], seeds: Sequence[int], n_states: int
+    ) -> RunState:
+        """Of runs that have not begun, leading axes (configurations, seeds)."""
+        state = cls.empty((len(configs), len(seeds)), n_states, memory_for(configs, n_states))
+        words = np.array([seed % 2**64 for seed in seeds], dtype=np.uint64)
+        state.random_states[:] = stream_state(words, STREAM_ANT, 0)
+        state.epsilon[:] = np.array([config.epsilon for config in configs])[:, None]
+        return state
+
+    def take(self, configs: Sequence[int]) -> RunState:
+        """A copy of the runs of some configurations, with one leading axis."""
+        chosen, n = list(configs), len(configs) * self.epsilon.shape[1]
+        arrays = vars(self).items()
+        return RunState(
+            **{name: array[chosen].reshape(n, *array.shape[2:]) for name, array in arrays}
+        )
+
+    def put(self, configs: Sequence[int], part: RunState) -> None:
+        """Overwrite the runs of some configurations with such a copy."""
+        for name, array in vars(self).items():
+            array[list(configs)] = getattr(part, name).reshape(len(configs), *array.shape[1:])
+
+
+def memory_for(configs: Sequence[TrainingConfig], n_states: int) -> Memory:
+    """As much as any of the learners needs, which must be registered."""
+    memories = [
+        astuple(learners.get(config.learner).memory_for(config, n_states)) for config in configs
+    ]
+    return padded(Memory(*np.max(memories, axis=0).tolist()))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TrainingResult(Record):
     """What `train` returns.
 
-    C configurations, S seeds, E episodes. Two results are equal if all but their costs are.
+    C configurations, S seeds, E episodes. Two results are equal if all but their seconds are.
 
     Attributes:
         world: The world trained in.
@@ -68,12 +111,12 @@ class TrainingResult(Record):
         returns: int32 (C, S, E), undiscounted sum of the rewards of each episode.
         steps: int32 (C, S, E), length of each episode.
         deliveries: int32 (C, S, E), 1 where the food was given to the queen.
-        costs: What the learners took, one entry for each learner and number of planning steps.
+        seconds: What the last training took without compilation: CPU seconds of all threads
+            together, or wall-clock seconds on a GPU.
         state: Where the runs stopped, leading axes (C, S).
 
     Raises:
-        AntsError: The arrays do not belong to the configurations and seeds; or a copy by
-            `dataclasses.replace` claims to be of another training.
+        AntsError: The arrays do not belong to the configurations and seeds.
     """
 
     world: World
@@ -84,22 +127,31 @@ class TrainingResult(Record):
     returns: np.ndarray
     steps: np.ndarray
     deliveries: np.ndarray
-    costs: tuple[LearnerCost, ...] = field(compare=False)
+    seconds: float = field(compare=False)
     state: RunState
-    # What the arrays come from; a copy keeps it, so that it cannot claim to be something else.
-    _made_by: tuple = field(default=(), compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        for name, was in zip(_MAKERS, self._made_by, strict=False):
-            if getattr(self, name) != was:
+        """Refuse arrays that training, where kernels believe them, could not go on from."""
+        runs, state = (len(self.configs), len(self.seeds)), self.state
+        if not isinstance(state, RunState):
+            raise AntsError(f"state of a result is {shown(state)}; it must be a RunState.")
+        forms = {
+            **dict.fromkeys(OUTCOMES, ("int32", (*runs, *np.shape(self.returns)[2:3]))),
+            "q": ("float32", (*runs, *np.shape(state.q)[2:3], self.task.n_states, ROW)),
+            # Kernels count the numbers of a memory by 8.
+            "floats": ("float32", (*runs, *(n // 8 * 8 for n in np.shape(state.floats)[2:3]))),
+            "integers": ("int32", (*runs, *(n // 8 * 8 for n in np.shape(state.integers)[2:3]))),
+            "random_states": ("uint64", runs),
+            "epsilon": ("float64", runs),
+        }
+        arrays = {**vars(self), **vars(state)}
+        for name, (kind, shape) in forms.items():
+            array = arrays[name]
+            if not isinstance(array, np.ndarray) or (array.dtype, array.shape) != (kind, shape):
                 raise AntsError(
-                    f"{name} cannot be replaced in a result, whose arrays come from others; train "
-                    "anew with the ones that you want."
+                    f"{name} of a result is {shown(array)}; for {runs[0]} configurations and "
+                    f"{runs[1]} seeds it must be an array of shape {shape} and type {kind}."
                 )
-        object.__setattr__(self, "_made_by", tuple(getattr(self, name) for name in _MAKERS))
-        if not isinstance(self.state, RunState):
-            raise AntsError(f"state of a result is {shown(self.state)}; it must be a RunState.")
-        self.check()
 
     @property
     def episodes(self) -> int:
@@ -123,7 +175,7 @@ class TrainingResult(Record):
             "configs": [config.as_dict() for config in self.configs],
             "seeds": self.seeds,
             "max_steps": self.max_steps,
-            "costs": [asdict(cost) for cost in self.costs],
+            "seconds": self.seconds,
         }
         arrays = {name: getattr(self, name) for name in OUTCOMES}
         arrays |= {f"state_{name}": array for name, array in vars(self.state).items()}
@@ -139,22 +191,16 @@ class TrainingResult(Record):
         stored, facts = _KIND.read(path)
         with _KIND.rebuilding(path):
             task = Task.from_dict(facts["task"])
-            costs = tuple(LearnerCost(**cost) for cost in facts["costs"])
-            for cost in costs:
-                checked_count("steps", cost.steps, most=2**63 - 1, least=0)
-            arrays: dict[str, Any] = {name: np.ascontiguousarray(stored[name]) for name in OUTCOMES}
-            state = {
-                one.name: np.ascontiguousarray(stored[f"state_{one.name}"])
-                for one in fields(RunState)
-            }
+            outcomes: dict[str, Any] = {name: stored[name] for name in OUTCOMES}
+            state = {one.name: stored[f"state_{one.name}"] for one in fields(RunState)}
             return cls(
                 world=world_from(stored, "world", facts["world"]),
                 configs=tuple(TrainingConfig(**config) for config in facts["configs"]),
                 seeds=checked_seeds(facts["seeds"]),
                 max_steps=checked_max_steps(facts["max_steps"], task),
                 task=task,
-                **arrays,
-                costs=costs,
+                **outcomes,
+                seconds=float(facts["seconds"]),
                 state=RunState(**state),
             )
 
@@ -168,66 +214,12 @@ class TrainingResult(Record):
             f"means over seeds and the last {min(_SUMMED_UP, self.episodes)} episodes:",
         ]
         for c, config in enumerate(self.configs[:_LISTED]):
-            means = (array[c, :, last].mean() for array in self._outcomes)
+            means = (getattr(self, name)[c, :, last].mean() for name in OUTCOMES)
             line = "    {}\n        return {:.4g}, steps {:.4g}, deliveries {:.3g}"
             lines.append(line.format(config, *means))
         if len(self.configs) > _LISTED:
             lines.append(f"    and {len(self.configs) - _LISTED} more configurations")
         return "\n    ".join(["TrainingResult(", *lines]) + "\n)"
-
-    @property
-    def _outcomes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return self.returns, self.steps, self.deliveries
-
-    def check(self) -> None:
-        """Make sure that training can go on from the arrays, which kernels believe.
-
-        Raises:
-            AntsError: It cannot.
-        """
-        runs = (len(self.configs), len(self.seeds))
-        episodes = np.shape(self.returns)[2] if np.ndim(self.returns) == 3 else 0
-        forms = {
-            **dict.fromkeys(OUTCOMES, ("int32", (*runs, episodes))),
-            "q": ("float32", (*runs, *np.shape(self.state.q)[2:3], self.task.n_states, ROW)),
-            "floats": ("float32", (*runs, _by_8(self.state.floats))),
-            "integers": ("int32", (*runs, _by_8(self.state.integers))),
-            "random_states": ("uint64", runs),
-            "epsilon": ("float64", runs),
-        }
-        arrays = {**vars(self), **vars(self.state)}
-        for name, (kind, shape) in forms.items():
-            array = arrays[name]
-            if not isinstance(array, np.ndarray) or (array.dtype, array.shape) != (kind, shape):
-                raise AntsError(
-                    f"{name} of a result is {shown(array)}; for {runs[0]} configurations and "
-                    f"{runs[1]} seeds it must be an array of shape {shape} and type {kind}."
-                )
-        if not ((self.state.epsilon >= 0) & (self.state.epsilon <= 1)).all():
-            raise AntsError(
-                "epsilon of a result lies outside of 0 to 1; leave its arrays as they are."
-            )
-
-    def check_memory(self) -> None:
-        """Make sure that there is room for the memory of the learners, which must be registered.
-
-        Raises:
-            AntsError: There is not: a learner of this name needed less when it began.
-        """
-        state, n_states = self.state, self.task.n_states
-        given = (state.q.shape[2] - 1, state.floats.shape[2], state.integers.shape[2])
-        for config in self.configs:
-            needed = astuple(learners.get(config.learner).memory_for(config, n_states))
-            if not all(map(operator.ge, given, needed)):
-                raise AntsError(
-                    f"learner {config.learner!r} has come to need more memory than when this "
-                    "training began; train anew."
-                )
-
-
-def _by_8(array: np.ndarray) -> int:
-    """The length of the last of three axes, down to a multiple of 8; kernels count by it."""
-    return np.shape(array)[2] // 8 * 8 if np.ndim(array) == 3 else 0
 
 
 @dataclass(frozen=True, eq=False, repr=False)

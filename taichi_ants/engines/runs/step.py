@@ -7,7 +7,7 @@ from typing import Any
 import taichi as ti
 from taichi.math import popcnt
 
-from taichi_ants.engines.looks import is_percept, look_type, positions_ahead, row_function
+from taichi_ants.engines.looks import is_percept, judge, look_type, row_function
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task.constants import (
     DELIVERED,
@@ -28,13 +28,13 @@ from taichi_ants.task.rules.actions import (
     turn_round,
 )
 from taichi_ants.task.rules.policy import bit_number, lowest_bit_number
-from taichi_ants.task.rules.random_bits import advance, below, bits_of, high_word
+from taichi_ants.task.rules.random_bits import draw_below
 from taichi_ants.task.rules.vision import (
     code_in_view,
     goals_in_view,
-    see_carrying,
-    see_foraging,
-    state_index,
+    nearer_from,
+    percept_carrying,
+    percept_foraging,
 )
 
 # An ant, and what came of its last action.
@@ -82,14 +82,6 @@ def ground_of(packed):
 
 
 @ti.func
-def nearer_from(a: ti.template(), ant):
-    """A bit for each cell around, the first the one forward, clockwise: is it nearer the queen?"""
-    # Six bits, one for each heading, written twice so that the turns need no wrap.
-    nearer = ti.cast(a.closer[ant.cell], ti.i32)
-    return (nearer | nearer << N_HEADINGS) >> ant.heading
-
-
-@ti.func
 def percept_of(a: ti.template(), base, ant, clock):
     """The percept of the ant at `clock`; the cells of its run begin at `base`."""
     here = base + ant.cell
@@ -98,23 +90,16 @@ def percept_of(a: ti.template(), base, ant, clock):
     right = a.cells[here + step_towards(a.compass, ant.heading, RIGHT)]
     percept = 0
     if ant.carries == 1:
-        nearer = nearer_from(a, ant)
-        percept = state_index(
-            1,
-            see_carrying(ground_of(left), nearer >> (N_HEADINGS - 1) & 1),
-            see_carrying(ground_of(forward), nearer & 1),
-            see_carrying(ground_of(right), nearer >> 1 & 1),
-        )
+        nearer = nearer_from(a.closer[ant.cell], ant.heading)
+        percept = percept_carrying(ground_of(left), ground_of(forward), ground_of(right), nearer)
     else:
-        trail_left = ti.max(left - clock, 0)
-        trail_forward = ti.max(forward - clock, 0)
-        trail_right = ti.max(right - clock, 0)
-        strongest = ti.max(trail_left, ti.max(trail_forward, trail_right))
-        percept = state_index(
-            0,
-            see_foraging(ground_of(left), trail_left, strongest),
-            see_foraging(ground_of(forward), trail_forward, strongest),
-            see_foraging(ground_of(right), trail_right, strongest),
+        percept = percept_foraging(
+            ground_of(left),
+            ground_of(forward),
+            ground_of(right),
+            ti.max(left - clock, 0),
+            ti.max(forward - clock, 0),
+            ti.max(right - clock, 0),
         )
     return percept
 
@@ -125,30 +110,19 @@ def state_seen(observation: Observation) -> Callable[..., Any]:
     if is_percept(observation):
         return _percept_itself
     view = observation.cells
-    left, forward, right = positions_ahead(observation)
     look_of, row = look_type(observation, False), row_function(observation)
 
     @ti.func
     def see(a: ti.template(), base, ant, clock, percept):
-        here, nearer = base + ant.cell, nearer_from(a, ant)
-        look = look_of(
-            carries=ant.carries, percept=percept, own_level=ti.max(a.cells[here] - clock, 0)
-        )
+        here, nearer = base + ant.cell, nearer_from(a.closer[ant.cell], ant.heading)
+        look = look_of(carries=ant.carries, own_level=ti.max(a.cells[here] - clock, 0))
         for k in ti.static(range(len(view))):
             towards = (ant.heading + view[k] + N_HEADINGS) % N_HEADINGS
             cell = a.cells[here + step_towards(a.compass, towards, FORWARD)]
             look.levels[k] = ti.max(cell - clock, 0)
             look.nearer[k] = nearer >> (view[k] % N_HEADINGS) & 1
             look.codes[k] = ground_of(cell)
-        ahead = ti.max(look.levels[left], look.levels[forward])
-        look.strongest = ti.max(ahead, look.levels[right])
-        for k in ti.static(range(len(view))):
-            # No branch: Taichi cannot compile one that is of no use, where a row reads no codes.
-            look.codes[k] = ti.select(
-                ant.carries == 1,
-                see_carrying(look.codes[k], look.nearer[k]),
-                see_foraging(look.codes[k], look.levels[k], look.strongest),
-            )
+        judge(look, observation)
         return row(look)
 
     return see
@@ -178,9 +152,8 @@ def act(deposit: ti.template(), a: ti.template(), base, ant, percept, action, cl
         if goals != 0 and action == PICK_UP and ant.carries == 0:
             position = lowest_bit_number(goals)
             if goals & (goals - 1) != 0:  # several foods in view
-                after.random_state = advance(ant.random_state)
-                word = high_word(bits_of(after.random_state))
-                position = bit_number(goals, below(word, popcnt(goals)))
+                k, after.random_state = draw_below(ant.random_state, popcnt(goals))
+                position = bit_number(goals, k)
             food = ant.cell + step_towards(a.compass, ant.heading, position)
             lay(deposit, a, base, food, clock, a.trails[food])
             lay(deposit, a, base, ant.cell, clock, a.cells[base + ant.cell])

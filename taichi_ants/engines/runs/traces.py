@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from taichi_ants import checks, runtime
+from taichi_ants.engines.layout import OUTCOMES, STEPS, TRACE
 from taichi_ants.engines.records import Record
-from taichi_ants.engines.runs.engine import RunEngine
-from taichi_ants.engines.runs.state import Runs, fixed_policy_runs, fresh_state, learning_runs
+from taichi_ants.engines.runs.engine import Launcher, Runs
+from taichi_ants.engines.runs.results import RunState
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
@@ -102,7 +103,7 @@ def rollout(
     seeds = checks.checked_seeds_for(seed, ())
     numbers = np.array([checks.checked_count("number", number, least=0)])
     epsilon = checks.checked_share("epsilon", epsilon)
-    return _trace(world, task, fixed_policy_runs(tables[None], seeds, numbers, epsilon), max_steps)
+    return _trace(world, task, Runs.following(tables[None], seeds, numbers, epsilon), max_steps)
 
 
 def trace_policies(
@@ -134,7 +135,7 @@ def trace_policies(
     for first in range(0, len(tables), size := max(1, MAX_ROLLOUT_STEPS // per_policy)):
         some = tables[first : first + size]
         words = np.array(seeds[first : first + size], dtype=object)
-        runs = fixed_policy_runs(some, words, np.zeros(1, dtype=int), epsilon=0.0)
+        runs = Runs.following(some, words, np.zeros(1, dtype=int), epsilon=0.0)
         trace = _trace(world, task, runs, max_steps)
         yield replace(trace, episodes=trace.episodes + first)
 
@@ -156,15 +157,14 @@ def trace_training(
     several = checks.checked_configs(config)
     if len(several) > 1:
         raise AntsError(f"config holds {len(several)} configurations; a trace is of one.")
-    (config,) = several
     seeds = checks.checked_seeds_for(seed, ())
-    state = fresh_state((config,), seeds.tolist(), task.n_states)
-    runs = learning_runs((config,), seeds.tolist(), state)
+    state = RunState.fresh(several, seeds.tolist(), task.n_states).take([0])
+    runs = Runs.learning(several, seeds.tolist(), state)
     return _trace(world, task, runs, max_steps, checks.checked_count("episodes", episodes))
 
 
 def _trace(world: World, task: Task, runs: Runs, max_steps: int, episodes: int = 1) -> Trace:
-    """The episodes of runs, step by step, the runs' episodes numbered one after the other."""
+    """The episodes of runs, one run if it learns, numbered one after the other; in one launch."""
     capacity = episodes * checks.checked_max_steps(max_steps, task)
     learns = runs.learner is not None
     most = MAX_TABLE_ROWS // task.n_states if learns else MAX_ROLLOUT_STEPS
@@ -172,13 +172,32 @@ def _trace(world: World, task: Task, runs: Runs, max_steps: int, episodes: int =
         raise AntsError(
             f"episodes * max_steps is {capacity}; at most {most} steps can be traced, so lower one."
         )
-    engine = RunEngine(checks.checked_world(world), task, max_steps, runtime.start())
-    tables = runs.state.q[:, 0, :, :N_ACTIONS].copy()
-    recorded = engine.trace(runs, episodes)
-    number = recorded.pop("runs")
-    recorded["episodes"] += number.astype(np.int32) * episodes
+    checks.checked_world(world)
+    runtime.start()
+    before = runs.state.q[:, 0, :, :N_ACTIONS].copy()
+    n_runs, learned = len(runs), capacity if learns else 0
+    integers = np.zeros((n_runs * capacity, len(TRACE)), dtype=np.int32)
+    errors = np.zeros(learned, dtype=np.float32)
+    tables = np.empty((learned, *runs.state.q.shape[2:]), dtype=np.float32)
+    outcomes = np.zeros((len(OUTCOMES), n_runs, episodes), dtype=np.int32)
+    Launcher(world, task, max_steps, runs, traced=True).launch(
+        slice(0, n_runs),
+        slice(0, episodes),
+        outcomes=outcomes,
+        trace=integers,
+        trace_errors=errors,
+        trace_tables=tables.reshape(-1),
+    )
+    steps_of_run = outcomes[STEPS].sum(axis=1)
+    run = np.repeat(np.arange(n_runs), steps_of_run)
+    taken = np.arange(capacity) < steps_of_run[:, None]  # each run has room for `capacity` steps
+    recorded = dict(zip(TRACE, integers[taken.reshape(-1)].T, strict=True))
+    recorded["episodes"] += run.astype(np.int32) * episodes
     recorded["cells"] = world.grid.cells(recorded["cells"])
     recorded["terminated"] = recorded["terminated"].astype(bool)
-    if learns:  # the table after the step before
-        tables, number = np.concatenate([tables, recorded["tables"][:-1]]), np.arange(len(number))
-    return Trace(**recorded, q_values=tables[number, recorded["states"]])
+    if not learns:
+        return Trace(**recorded, q_values=before[run, recorded["states"]])
+    n = len(run)
+    after = tables[:n, :, :N_ACTIONS]
+    values = np.concatenate([before, after[:-1]])[np.arange(n), recorded["states"]]
+    return Trace(**recorded, q_values=values, td_errors=errors[:n], tables=after)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import copy
+import operator
 from collections.abc import Sequence
-from dataclasses import replace
-from functools import partial
+from dataclasses import astuple, replace
 
 import numpy as np
 
@@ -23,10 +24,8 @@ from taichi_ants.checks import (
     checked_share,
     checked_world,
 )
-from taichi_ants.engines.layout import STEPS
-from taichi_ants.engines.runs.engine import Progress, RunEngine
-from taichi_ants.engines.runs.results import LearnerCost, Rollouts, TrainingResult
-from taichi_ants.engines.runs.state import fixed_policy_runs, fresh_state, learning_runs
+from taichi_ants.engines.runs.engine import Progress, Runs, do_episodes
+from taichi_ants.engines.runs.results import Rollouts, RunState, TrainingResult, memory_for
 from taichi_ants.errors import AntsError, shown
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
@@ -78,8 +77,8 @@ def train(
         returns=none_yet,
         steps=none_yet,
         deliveries=none_yet,
-        costs=(),
-        state=fresh_state(configs, seeds, task.n_states),
+        seconds=0.0,
+        state=RunState.fresh(configs, seeds, task.n_states),
     )
     return continue_training(start, episodes, threads, arch=arch, progress=progress)
 
@@ -103,52 +102,59 @@ def continue_training(
         threads, arch, progress: As in `train`.
 
     Returns:
-        All episodes, old and new; `costs` holds what the new ones took.
+        All episodes, old and new; `seconds` is what the new ones took.
 
     Raises:
         AntsError: An argument is not allowed; the message names it.
     """
     if not isinstance(result, TrainingResult):
         raise AntsError(f"result is {shown(result)}; give what train has returned.")
-    result.check()
     checked_configs(result.configs)
-    result.check_memory()
+    _check_memory(result)
     episodes = checked_count("episodes", episodes)
     progress = checked_progress(progress)
-    settings = runtime.start(threads, arch)
-    state = result.state.take(...)
+    runtime.start(threads, arch)
+    state = copy.deepcopy(result.state)
     shape = (len(result.configs), len(result.seeds))
     outcomes = np.zeros((3, *shape, episodes), dtype=np.int32)
-    costs = []
-    groups = [
-        (group, learning_runs([result.configs[c] for c in group], result.seeds, state.take(group)))
-        for group in _groups(result.configs)
+    # One kernel and one cost for each learner with its hyperparameters.
+    groups: dict[tuple, list[int]] = {}
+    for c, config in enumerate(result.configs):
+        groups.setdefault((config.learner, config.hyperparameters), []).append(c)
+    several = [
+        Runs.learning([result.configs[c] for c in group], result.seeds, state.take(group))
+        for group in groups.values()
     ]
-    work, done = sum(runs.cost * len(runs) for _, runs in groups), 0.0
-    for group, runs in groups:
+    work, done, seconds = sum(runs.cost * len(runs) for runs in several), 0.0, 0.0
+    for group, runs in zip(groups.values(), several, strict=True):
         share = runs.cost * len(runs) / work
-        part = progress and partial(_report, progress, done, share)
-        engine = RunEngine(result.world, result.task, result.max_steps, settings)
-        given = engine.run(runs, episodes, part)
+        given, took = do_episodes(
+            *(result.world, result.task, result.max_steps, runs, episodes),
+            progress and (lambda part, done=done, share=share: progress(done + share * part)),
+        )
         outcomes[:, group] = given.reshape(3, len(group), shape[1], episodes)
         check_finite(runs.state.q, [result.configs[c] for c in group], result.seeds)
         state.put(group, runs.state)
-        config = result.configs[group[0]]
-        spent = int(given[STEPS].sum(dtype=np.int64))
-        costs.append(LearnerCost(config.learner, config.planning_steps, spent, engine.seconds))
+        seconds += took
         done += share
     before = (result.returns, result.steps, result.deliveries)
     returns, steps, deliveries = (
         np.concatenate(pair, axis=2) for pair in zip(before, outcomes, strict=True)
     )
     return replace(
-        result,
-        returns=returns,
-        steps=steps,
-        deliveries=deliveries,
-        costs=tuple(costs),
-        state=state,
+        result, returns=returns, steps=steps, deliveries=deliveries, seconds=seconds, state=state
     )
+
+
+def _check_memory(result: TrainingResult) -> None:
+    """Refuse learners for whose memory there is no room; kernels would write outside of it."""
+    state, needed = result.state, memory_for(result.configs, result.task.n_states)
+    given = (state.q.shape[2] - 1, state.floats.shape[2], state.integers.shape[2])
+    if not all(map(operator.ge, given, astuple(needed))):
+        raise AntsError(
+            "a learner of this result has come to need more memory than when its training began; "
+            "train anew."
+        )
 
 
 def evaluate(
@@ -187,21 +193,8 @@ def evaluate(
     epsilon = checked_share("epsilon", epsilon)
     max_steps = checked_max_steps(max_steps, task)
     progress = checked_progress(progress)
-    settings = runtime.start(threads, arch)
-    engine = RunEngine(checked_world(world), task, max_steps, settings)
+    runtime.start(threads, arch)
     flat = tables.reshape(-1, *tables.shape[-2:])
-    runs = fixed_policy_runs(flat, run_seeds, np.arange(rollouts), epsilon)
-    return Rollouts(*engine.run(runs, rollouts, progress).reshape(3, *shape, rollouts))
-
-
-def _groups(configs: Sequence[TrainingConfig]) -> list[list[int]]:
-    """The configurations of each learner and its hyperparameters: one kernel, one cost."""
-    groups: dict[tuple, list[int]] = {}
-    for c, config in enumerate(configs):
-        groups.setdefault((config.learner, config.hyperparameters), []).append(c)
-    return list(groups.values())
-
-
-def _report(progress: Progress, done: float, share: float, part: float) -> None:
-    """Report the progress of one group among all."""
-    progress(done + share * part)
+    runs = Runs.following(flat, run_seeds, np.arange(rollouts), epsilon)
+    outcomes, _ = do_episodes(checked_world(world), task, max_steps, runs, rollouts, progress)
+    return Rollouts(*outcomes.reshape(3, *shape, rollouts))

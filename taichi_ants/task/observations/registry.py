@@ -9,15 +9,21 @@ own.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from operator import index
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
+
 from taichi_ants.errors import AntsError, check_whole, shown
+from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN, SEES_LURE
 
 # Tables of this many rows hold 5 * 2**20 values; kernels index many of them by 32 bits.
 MAX_STATES = 1 << 20
 AHEAD = (-1, 0, 1)
+_LOOKS = 3000  # of a trial
 
 
 @dataclass(frozen=True)
@@ -50,6 +56,11 @@ class Observation:
     name_of: Callable[[int], str] = str
     summary: str = ""
 
+    @property
+    def ahead(self) -> tuple[int, ...]:
+        """Where the cells left, forward and right stand among the cells in view."""
+        return tuple(self.cells.index(cell) for cell in AHEAD)
+
 
 _OBSERVATIONS: dict[str, Observation] = {}
 
@@ -58,8 +69,8 @@ def register(observation: Observation) -> Observation:
     """Make an observation known by its name.
 
     Raises:
-        AntsError: The name is taken or not usable in files and on command lines, or a field has
-            not the form that it must have.
+        AntsError: The name is taken or not usable in files and on command lines, a field has not
+            the form that it must have, or a row lies outside of the table.
     """
     if not isinstance(observation, Observation):
         raise AntsError(f"{shown(observation)} is not an Observation; wrap it in Observation(...).")
@@ -85,6 +96,8 @@ def register(observation: Observation) -> Observation:
             f"cells of {name!r} is {shown(cells)}; it must hold -1, 0 and 1, and may hold -2, 2 "
             "and 3, each once."
         )
+    if not row.__module__.startswith("taichi_ants."):
+        _refuse_wrong_rows(observation)
     _OBSERVATIONS[name] = observation
     return observation
 
@@ -105,3 +118,59 @@ def get(name: str) -> Observation:
 def names() -> tuple[str, ...]:
     """The names of all registered observations, in the order of registration."""
     return tuple(_OBSERVATIONS)
+
+
+def _refuse_wrong_rows(observation: Observation) -> None:
+    """Compute the rows of many looks, in Python: a kernel would not notice what is wrong."""
+    with np.errstate(all="raise"):
+        for look in _drawn_looks(observation):
+            try:
+                row = observation.row(look)
+                right = 0 <= index(row) < observation.n_states
+                fault = f"row gives {row}, but it must lie between 0 and {observation.n_states - 1}"
+            except Exception as error:
+                right, fault = False, f"row fails ({error})"
+            if not right:
+                raise AntsError(
+                    f"observation {observation.name!r} cannot be used: {fault}; see "
+                    "taichi_ants.task.Observation."
+                )
+
+
+def _drawn_looks(observation: Observation) -> Iterator[SimpleNamespace]:
+    """What ants could look at, in numbers of the types that kernels have."""
+    rng, shape = np.random.default_rng(0), (_LOOKS, len(observation.cells))
+    ants = rng.integers(0, 3, shape) * (rng.random(shape) < 0.3)
+    drawn = rng.choice([EMPTY, EMPTY, OBSTACLE, FOOD, QUEEN], shape)
+    ground = np.where(ants > 0, OBSTACLE, drawn)
+    nearer, carries = rng.integers(0, 2, shape), rng.integers(0, 2, _LOOKS)
+    trails = rng.integers(0, 2, shape) * 10.0 ** rng.uniform(-1, 6, shape)
+    for n in range(_LOOKS):
+        number = (np.int32, np.float32)[n % 2]  # of levels
+        levels = np.where(ground[n] == EMPTY, trails[n], 0).astype(number)
+        strongest = levels[list(observation.ahead)].max()
+        if carries[n]:
+            lure, codes = (ground[n] == EMPTY) & (nearer[n] == 1), ground[n] >> 2
+        else:
+            lure, codes = 2 * levels >= max(strongest, 2), ground[n] & 3
+        codes = np.where(lure, SEES_LURE, codes)
+        left, forward, right = codes[list(observation.ahead)]
+        yield SimpleNamespace(
+            carries=np.int32(carries[n]),
+            percept=np.int32(carries[n] << 6 | left << 4 | forward << 2 | right),
+            codes=_Vector(np.int32(codes)),
+            levels=_Vector(levels),
+            strongest=strongest,
+            ants=_Vector(np.int32(ants[n])),
+            nearer=_Vector(np.int32(nearer[n])),
+            own_level=number(trails[n, 0]),
+        )
+
+
+class _Vector(tuple):
+    """A vector that does not count from its end, as in kernels."""
+
+    def __getitem__(self, k: Any) -> Any:
+        if k < 0:
+            raise IndexError(f"there is no entry {k}")
+        return super().__getitem__(k)

@@ -45,3 +45,10 @@ def below(word, n):
     With n up to a few thousand, no number is favoured by more than one part in a million.
     """
     return ti.cast((word * ti.cast(n, ti.u64)) >> ti.u64(32), ti.i32)
+
+
+@ti.func
+def draw_below(state, n):
+    """A whole number in [0, n) from the upper word of the next draw, and the stream after it."""
+    after = advance(state)
+    return below(high_word(bits_of(after)), n), after

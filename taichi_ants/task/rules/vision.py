@@ -1,7 +1,8 @@
-"""What an ant sees in the three cells in front of it, and the index of its state."""
+"""What an ant sees in the three cells in front of it: the percept, as an index from 0 to 127."""
 
 import taichi as ti
 
+from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task.constants import EMPTY, SEES_LURE
 
 
@@ -26,6 +27,40 @@ def see_carrying(ground, nearer):
     if ground == EMPTY and nearer == 1:
         code = SEES_LURE
     return code
+
+
+@ti.func
+def percept_foraging(left, forward, right, trail_left, trail_forward, trail_right):
+    """The percept of an ant without food, from what the three cells hold and their levels."""
+    strongest = ti.max(trail_left, ti.max(trail_forward, trail_right))
+    return state_index(
+        0,
+        see_foraging(left, trail_left, strongest),
+        see_foraging(forward, trail_forward, strongest),
+        see_foraging(right, trail_right, strongest),
+    )
+
+
+@ti.func
+def percept_carrying(left, forward, right, nearer):
+    """The percept of an ant with food, from what the three cells hold; `nearer` is as below."""
+    return state_index(
+        1,
+        see_carrying(left, nearer >> (N_HEADINGS - 1) & 1),
+        see_carrying(forward, nearer & 1),
+        see_carrying(right, nearer >> 1 & 1),
+    )
+
+
+@ti.func
+def nearer_from(closer, heading):
+    """A bit for each cell around, the first the one forward, clockwise: is it nearer the queen?
+
+    `closer` has a bit for each heading, the first that of heading 0.
+    """
+    # Six bits, written twice so that the turns need no wrap.
+    nearer = ti.cast(closer, ti.i32)
+    return (nearer | nearer << N_HEADINGS) >> heading
 
 
 @ti.func
