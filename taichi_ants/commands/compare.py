@@ -366,8 +366,7 @@ def render_policies(study: Study[RunPoint], results: Path, folder: Path) -> None
                 max_steps=min(first.max_steps, RENDERED_STEPS),
                 task=as_in_training(first.task),
             )
-            whole = episode.delivered or len(episode.trace) == first.max_steps
-            episode = replace(episode, name=metadata["behaviour"], whole=whole)
+            episode = replace(episode, name=metadata["behaviour"])
             title = f"{Variant(config['learner'], depth).label}, {metadata['task']['delivery']}"
             pictures = frames(episode.moments(), (720, 480), title=title)
             save_animation(place / f"{path.stem}.gif", pictures, pause=PAUSE)

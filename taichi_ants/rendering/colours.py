@@ -13,6 +13,7 @@ CELL_EMPTY = 0xE9ECEF
 CELL_OBSTACLE = 0x464B52
 CELL_FOOD = 0xD55E00
 CELL_QUEEN = 0xA312DC
+CELL_NEARER = 0xDCE3F2  # to the queen; on the policy sheet only
 # Under the drawings of food and queen, where cells are large enough for them.
 FLOOR_FOOD = 0xFBE6D4
 FLOOR_QUEEN = 0xF0DDFA

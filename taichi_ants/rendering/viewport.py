@@ -1,4 +1,4 @@
-"""Where the cells of a world lie in a picture, and which cell a pixel shows."""
+"""Where the cells of a world lie in a picture."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, expect, shown
 from taichi_ants.grid import hexgrid
 from taichi_ants.grid.hexgrid import AxialGrid
 
@@ -41,51 +40,16 @@ class Viewport:
             width, height: Of the picture, in pixels.
             margin: Pixels to leave free at each side.
         """
-        expect("grid", grid, AxialGrid)
-        low, high = _bounds(grid)
+        x_range, y_range, z_range = grid.ranges
+        # The lowest and the highest (x, y), in sizes of a hexagon from the origin. By
+        # `hexgrid.centre_of`, x grows with y and falls with z, y falls with x.
+        low = np.array([-1.5 * (z_range - 1) - 1, -_SQRT_3 * (x_range - 0.5)])
+        high = np.array([1.5 * (y_range - 1) + 1, _SQRT_3 * (y_range + z_range - 1) / 2])
         room = np.array([max(width - 2 * margin, 1.0), max(height - 2 * margin, 1.0)])
         hexagon = float((room / (high - low)).min())
         x, y = (np.array([width, height]) / 2 - hexagon * (low + high) / 2).tolist()
         return cls(width, height, hexagon, (x, y))
 
-    def height_of(self, grid: AxialGrid) -> float:
-        """The height of the whole world in pixels."""
-        low, high = _bounds(grid)
-        return float(high[1] - low[1]) * self.hexagon
-
     def centres(self, cells: object) -> np.ndarray:
         """Pixel coordinates, float64 (..., 2), of the centres of cells (..., 3) in any form."""
         return hexgrid.centre_of(cells, self.hexagon) + np.array(self.origin)
-
-    def cell_at(self, pixels: object) -> np.ndarray:
-        """The cells, normal forms int64 (..., 3), at pixel coordinates (..., 2).
-
-        They may lie outside the world; see `AxialGrid.contains`.
-
-        Raises:
-            AntsError: They are no such coordinates.
-        """
-        places = np.asarray(pixels)
-        if places.dtype.kind not in "iuf" or places.shape[-1:] != (2,):
-            raise AntsError(
-                f"pixels is {shown(pixels)}; give coordinates (x, y), or an array of them."
-            )
-        return hexgrid.cell_at(places - np.array(self.origin), self.hexagon)
-
-    def index_at(self, grid: AxialGrid, pixels: object) -> np.ndarray:
-        """Flat indices, int32 (...), of the world's cells at pixel coordinates (..., 2).
-
-        -1 where there is no cell.
-        """
-        cells = self.cell_at(pixels)
-        inside = grid.contains(cells)
-        return np.where(inside, grid.index(np.where(inside[..., None], cells, 0)), np.int32(-1))
-
-
-def _bounds(grid: AxialGrid) -> tuple[np.ndarray, np.ndarray]:
-    """The lowest and the highest (x, y) of a world, in sizes of a hexagon from the origin."""
-    x_range, y_range, z_range = grid.ranges
-    # By `hexgrid.centre_of`, x grows with y and falls with z, y falls with x.
-    low = np.array([-1.5 * (z_range - 1) - 1, -_SQRT_3 * (x_range - 0.5)])
-    high = np.array([1.5 * (y_range - 1) + 1, _SQRT_3 * (y_range + z_range - 1) / 2])
-    return low, high
