@@ -127,8 +127,9 @@ def learning_stages(
             result = continue_training(result, n - result.episodes)
         if result is not None:
             table = result.q_values[0, 0]
-        rules = {"task": task, "epsilon": epsilon}
-        episode = Episode.play(world, table, seed=seed, max_steps=max_steps, **rules)
+        episode = Episode.play(
+            world, table, seed=seed, max_steps=max_steps, task=task, epsilon=epsilon
+        )
         played.append(Stage(n, episode, "delivered" if episode.delivered else ""))
         if progress is not None:
             progress(len(played) / len(different))

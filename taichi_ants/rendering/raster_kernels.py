@@ -1,8 +1,6 @@
-"""The kernels that turn cells and shapes into pixels. They assume valid arguments.
+"""The kernels that turn cells and marks into pixels. They assume valid arguments.
 
-A frame is uint8 (height, width, 3), colours are 0xRRGGBB. The origin `(x, y)` and the size
-`hexagon` are those of a `Viewport`; `columns`, `rows` and `z_range` those of an `AxialGrid`, whose
-cell 0 is void. Void cells have the colour of the page.
+A frame is uint8 (height, width, 3), colours are 0xRRGGBB.
 """
 
 import math
@@ -10,16 +8,12 @@ import math
 import taichi as ti
 from taichi.math import clamp, mix, vec2, vec3
 
-from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
 from taichi_ants.rendering import shapes
 from taichi_ants.rendering.colours import CELL_FOOD, PAGE
 from taichi_ants.rendering.marks import Mark
 
 BAND = 16  # rows that one thread draws
 _SQRT_3 = math.sqrt(3.0)
-# Of the six headings, clockwise from straight up: unit vectors, and steps in axial coordinates.
-_OUTWARD = [(math.sin(h * math.pi / 3), -math.cos(h * math.pi / 3)) for h in range(N_HEADINGS)]
-_STEPS = [(x - z, y - z) for x, y, z in HEADING_STEPS]
 _HALO = 1.2  # pixels around an ant in the colour of the page
 
 
@@ -36,83 +30,6 @@ def put(frame: ti.template(), y, x, rgb):
         frame[y, x, channel] = ti.cast(rgb[channel] + 0.5, ti.u8)
 
 
-@ti.func
-def covered(distance, slope_x, slope_y):
-    """The share of a pixel on the inner side of a straight edge.
-
-    `distance` is that of the pixel's centre, positive inside; the slopes are the absolute values of
-    the edge's unit normal.
-    """
-    flat = ti.max(slope_x, slope_y)
-    steep = ti.max(ti.min(slope_x, slope_y), 1e-6)
-    reach = distance + 0.5 * (flat + steep)
-    share = (reach - 0.5 * steep) / flat
-    if reach < steep:
-        share = ti.max(reach, 0.0) ** 2 / (2.0 * flat * steep)
-    elif reach > flat:
-        share = 1.0 - ti.max(flat + steep - reach, 0.0) ** 2 / (2.0 * flat * steep)
-    return share
-
-
-@ti.func
-def cell_number(q, r, columns, rows, z_range):
-    """The flat index of axial coordinates, 0 (void) beyond the array."""
-    column, row = q + z_range, r + z_range
-    inside = 0 <= column < columns and 0 <= row < rows
-    return ti.select(inside, row * columns + column, 0)
-
-
-@ti.func
-def nearest_cell(x, y, hexagon):
-    """Axial coordinates of the hexagon at (x, y) from the origin, by cube rounding."""
-    r = x / (1.5 * hexagon)
-    q = 0.5 * r - y / (_SQRT_3 * hexagon)
-    near_q, near_r, near_s = ti.round(q), ti.round(r), ti.round(r - q)
-    moved_q, moved_r = ti.abs(near_q - q), ti.abs(near_r - r)
-    moved_s = ti.abs(near_s - (r - q))
-    if moved_q > moved_r and moved_q > moved_s:
-        near_q = near_r - near_s
-    elif moved_r > moved_s:
-        near_r = near_q + near_s
-    return ti.cast(near_q, ti.i32), ti.cast(near_r, ti.i32)
-
-
-@ti.kernel
-def draw_cells(
-    frame: ti.types.ndarray(dtype=ti.u8, ndim=3),
-    colours: ti.types.ndarray(dtype=ti.u32, ndim=1),
-    line: ti.f32,
-    x: ti.f32,
-    y: ti.f32,
-    hexagon: ti.f32,
-    columns: ti.i32,
-    rows: ti.i32,
-    z_range: ti.i32,
-):
-    """Cells of several pixels, with smooth edges and lines of the width `line` between them."""
-    ti.loop_config(block_dim=BAND)
-    for j in range(frame.shape[0]):
-        for i in range(frame.shape[1]):
-            px, py = i + 0.5 - x, j + 0.5 - y
-            q, r = nearest_cell(px, py, hexagon)
-            p = vec2(px - 1.5 * hexagon * r, py - _SQRT_3 * hexagon * (0.5 * r - q))
-            rgb = unpack(colours[cell_number(q, r, columns, rows, z_range)])
-            if hexagon * shapes.hexagon(p / hexagon) > -0.5 * line - 1.0:
-                # The edge that is nearest, one for each heading.
-                distance, normal, dq, dr = 1e9, vec2(0.0), 0, 0
-                for h in ti.static(range(N_HEADINGS)):
-                    outward = vec2(_OUTWARD[h][0], _OUTWARD[h][1])
-                    inside = 0.5 * _SQRT_3 * hexagon - p.dot(outward)
-                    if inside < distance:
-                        distance, normal = inside, ti.abs(outward)
-                        dq, dr = _STEPS[h][0], _STEPS[h][1]
-                own = covered(distance - 0.5 * line, normal.x, normal.y)
-                other = covered(-distance - 0.5 * line, normal.x, normal.y)
-                beyond = unpack(colours[cell_number(q + dq, r + dr, columns, rows, z_range)])
-                rgb = own * rgb + other * beyond + (1.0 - own - other) * unpack(PAGE)
-            put(frame, j, i, rgb)
-
-
 @ti.kernel
 def draw_small_cells(
     frame: ti.types.ndarray(dtype=ti.u8, ndim=3),
@@ -127,7 +44,8 @@ def draw_small_cells(
     """Cells of a few pixels and less: each pixel is the mean of what it covers, by area.
 
     Cells are taken as bricks of the same centres and areas as the hexagons, which nobody can see at
-    this size: the part of a brick within a pixel is a product.
+    this size: the part of a brick within a pixel is a product. The origin `(x, y)` and the size
+    `hexagon` are those of a `Viewport`; `columns`, `rows` and `z_range` those of an `AxialGrid`.
     """
     ti.loop_config(block_dim=BAND)
     for j in range(frame.shape[0]):
@@ -181,18 +99,19 @@ def draw_ant(rgb, p, radius, shape, colour):
 @ti.func
 def draw_mark(rgb, p, radius, shape, colour):
     """A pixel with any other mark over it; `p` in units of the mark."""
-    distance, halo = radius * shapes.hexagon(p), 0.0
+    # A halo of the page around it; none at all, not even on smooth edges, around a cell.
+    distance, halo = radius * shapes.hexagon(p), -1.0
     if shape == Mark.OUTLINE:
         half_width = ti.max(0.06 * radius, 0.6)
-        distance = ti.abs(distance + half_width) - half_width
+        distance, halo = ti.abs(distance + half_width) - half_width, 0.5 * _HALO
     elif shape == Mark.FOOD:
-        distance = radius * shapes.crumbs(p)
+        distance, halo = radius * shapes.crumbs(p), 0.0
     elif shape == Mark.QUEEN:
-        distance = radius * shapes.crown(p)
+        distance, halo = radius * shapes.crown(p), 0.0
     elif shape == Mark.ARROW:
         distance, halo = radius * shapes.arrow(p), _HALO
     elif shape == Mark.DOT:
-        distance = radius * shapes.disc(p, 0.0, 0.0, 1.0)
+        distance, halo = radius * shapes.disc(p, 0.0, 0.0, 1.0), 0.0
     return blend(blend(rgb, PAGE, distance - halo, 1.0), colour, distance, 1.0)
 
 

@@ -61,10 +61,15 @@ class Rasteriser:
             snapshot: The world, of this grid.
             in_view: Flat indices of the cells that ant number 0 sees, to be marked.
         """
-        hexagon = self.viewport.hexagon
-        frame = self.draw_cells(self.cell_colours(snapshot))
+        grid, view, hexagon = self.grid, self.viewport, self.viewport.hexagon
+        frame = np.full((view.height, view.width, 3), colours.channels(colours.PAGE))
+        of_cells, tables = self.cell_colours(snapshot), []
+        if hexagon < DOTS_BELOW:
+            layout = (*view.origin, hexagon, grid.width, grid.height, grid.ranges[2])
+            kernels().draw_small_cells(frame, of_cells, *layout)
+        else:
+            tables.append(self._cells(of_cells))
         queens = self._places(np.flatnonzero(snapshot.ground == QUEEN))
-        tables = []
         if hexagon < _SMALLEST_DRAWING:
             tables.append(marks(queens, max(hexagon, _QUEEN), Mark.DOT, colours.CELL_QUEEN))
         else:
@@ -84,18 +89,15 @@ class Rasteriser:
         draw_marks(frame, *tables)
         return frame
 
-    def draw_cells(self, of_cells: np.ndarray) -> np.ndarray:
-        """The picture of the cells in the given colours, uint32 (grid.size,)."""
-        grid, viewport = self.grid, self.viewport
-        frame = np.empty((viewport.height, viewport.width, 3), dtype=np.uint8)
-        layout = (*viewport.origin, viewport.hexagon, grid.width, grid.height, grid.ranges[2])
-        if viewport.hexagon < DOTS_BELOW:
-            kernels().draw_small_cells(frame, of_cells, *layout)
-        else:
-            # The lines fade away where cells are small, and don't grow with large ones for ever.
-            line = float(np.clip(0.09 * viewport.hexagon - 0.25, 0.0, 3.0))
-            kernels().draw_cells(frame, of_cells, line, *layout)
-        return frame
+    def _cells(self, of_cells: np.ndarray) -> np.ndarray:
+        """Marks of the cells in the given colours, uint32 (grid.size,)."""
+        hexagon, existing = self.viewport.hexagon, np.flatnonzero(self.grid.exists)
+        # The lines between cells fade away where these are small, and do not grow for ever.
+        line = min(max(0.09 * hexagon - 0.25, 0.0), 3.0)
+        # Through two smooth edges side by side the page shines, so narrow lines need less room.
+        gap = line if line > 1 else 2 * math.sqrt(line) - 1
+        radius = hexagon - gap / math.sqrt(3.0)
+        return marks(self._places(existing), radius, Mark.HEXAGON, of_cells[existing])
 
     def cell_colours(self, snapshot: Snapshot) -> np.ndarray:
         """The colours of all cells, uint32 (grid.size,): by what they hold, else by the trail."""

@@ -29,7 +29,7 @@ MOST = 256  # states of a half that are drawn
 _HARDLY = 0.01  # of the usual spread: below, nothing was learned
 
 # Lengths in pixels.
-WIDTH, _MARGIN, _COLUMNS = 1280, 20, 9
+WIDTH, _MARGIN, _COLUMNS = 1280, 20, 8
 _TILE = (WIDTH - 2 * _MARGIN) // _COLUMNS
 _HEXAGON = _TILE / 5.7
 _SMALL, _LARGE = 18, 27  # sizes of text

@@ -14,6 +14,7 @@ from itertools import chain
 from numbers import Real
 from pathlib import Path
 from types import ModuleType
+from typing import BinaryIO
 
 import numpy as np
 
@@ -133,7 +134,11 @@ def _existing_folder(target: Path) -> Path:
 
 def _write(target: Path, content: bytes) -> None:
     files.check_writable_folder(target.parent)
-    files.write_atomically(target, lambda file: file.write(content))
+
+    def write(file: BinaryIO) -> None:
+        file.write(content)
+
+    files.write_atomically(target, write)
 
 
 def _write_folder(folder: Path, frames: Iterable[np.ndarray]) -> None:
