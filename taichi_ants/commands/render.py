@@ -8,9 +8,7 @@ folder of PNG pictures.
 from __future__ import annotations
 
 import argparse
-import signal
-import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,7 +26,7 @@ from taichi_ants.studies.command_line import (
 if TYPE_CHECKING:
     import numpy as np
 
-    from taichi_ants import Task, World
+    from taichi_ants import World
     from taichi_ants.learners.config import TrainingConfig
     from taichi_ants.rendering import Stage
     from taichi_ants.rendering.moments import Moment
@@ -68,7 +66,6 @@ _OPTIONS: dict[str, tuple[str, str, dict[str, Any]]] = {
     "--max-steps": ("el", "step limit of the episode shown", _LENGTH),
     "--ticks": ("c", "length of an episode", _LENGTH),
     "--epsilon": ("ecl", "probability of a random action", {**_NUMBER, "default": 0.0}),
-    "--no-evaporation": ("ecl", "trails stay as they are", _FLAG),
     "--policy": ("ecs", "a policy file (.npz); without one, it is trained", {"metavar": "FILE"}),
     "--learner": ("ecls", "name of the learner to train", {"default": "sarsa", "metavar": "NAME"}),
     "--episodes": ("ecs", "of training", {**_COUNT, "default": 500}),
@@ -83,10 +80,6 @@ _OPTIONS: dict[str, tuple[str, str, dict[str, Any]]] = {
     "--plain": ("ec", "the world alone, without text and marks", _FLAG),
     "--all-states": ("s", "also those that were not visited", _FLAG),
 }
-_OF_TRAINING = (
-    *("--learner", "--episodes", "--learning-rate", "--discount"),
-    *("--train-epsilon", "--epsilon-decay"),
-)
 # Where a kind has defaults of its own.
 _DEFAULTS: dict[str, dict[str, Any]] = {
     "episode": {"out": "results/renders/episode.gif", "size": "1280x720"},
@@ -114,21 +107,14 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
             if kind[0] in where:
                 one.add_argument(flag, help=words, **reading)
         one.set_defaults(kind=kind, **_DEFAULTS[kind])
-    settings = parser.parse_args(arguments)
-    words = [word.split("=")[0] for word in (arguments or sys.argv[1:])]
-    for flag in _OF_TRAINING:
-        if flag in words and getattr(settings, "policy", None):
-            parser.error(f"{flag} is for training, but --policy is given; leave out one of the two")
-    return settings
+    return parser.parse_args(arguments)
 
 
 def show(settings: argparse.Namespace) -> None:
     """Make what was asked for, and say what it is."""
     from taichi_ants import worlds
-    from taichi_ants.rendering import check_animation, check_picture, check_size
+    from taichi_ants.rendering import check_animation, check_picture
 
-    if settings.kind != "sheet":
-        check_size(settings.size)
     if settings.kind == "sheet" or (settings.kind != "learning" and _is_still(settings)):
         check_picture(settings.out)
     else:
@@ -147,7 +133,8 @@ def show_episode(settings: argparse.Namespace, world: World) -> None:
     from taichi_ants.rendering import Episode
 
     q_values, title = find_policy(settings, world)
-    episode = Episode.play(world, q_values, max_steps=settings.max_steps, **_acting(settings))
+    rules = {"seed": settings.seed, "max_steps": settings.max_steps, "epsilon": settings.epsilon}
+    episode = Episode.play(world, q_values, **rules)
     _save_moments(settings, episode.moments(), len(episode), title)
     outcome = "delivered" if episode.delivered else "not delivered"
     rewards = int(episode.trace.rewards.sum())
@@ -165,11 +152,8 @@ def show_colony(settings: argparse.Namespace, world: World) -> None:
 
     q_values, title = find_policy(settings, world)
     config = replace(training_config(settings), epsilon=settings.epsilon, min_epsilon=0.0)
-    colony = Colony(
-        *(world, task_of(settings), config, settings.seed, settings.ants),
-        sharing="fixed",
-        q_values=q_values,
-    )
+    who = (config, settings.seed, settings.ants)
+    colony = Colony(world, None, *who, sharing="fixed", q_values=q_values)
     colony.begin_episode()
     moments = colony_moments(colony, settings.ticks, settings.every)
     _save_moments(settings, moments, 1 + -(-settings.ticks // settings.every), title)
@@ -200,7 +184,7 @@ def show_sheet(settings: argparse.Namespace, world: World) -> None:
 
 def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray, str]:
     """The action values (128, 5) to follow, and a title that says where they come from."""
-    from taichi_ants import Colony, load_policy, train
+    from taichi_ants import Colony, Task, load_policy, train
 
     if settings.policy:
         q_values, _ = load_policy(settings.policy)
@@ -208,7 +192,8 @@ def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray,
     config, seed, episodes = training_config(settings), settings.seed, settings.episodes
     with progress_bar("Training") as progress:
         if settings.kind == "colony":
-            colony = Colony(world, task_of(settings), config, seed, settings.ants)
+            task = Task(evaporation_in_training=True)  # trails fall while it learns too
+            colony = Colony(world, task, config, seed, settings.ants)
             colony.run(episodes, settings.ticks, progress)
             title = f"{settings.learner}, {episodes} episodes together"
             return colony.q_values[0], settings.title or title
@@ -238,10 +223,11 @@ def noted_stages(settings: argparse.Namespace, world: World) -> list[Stage]:
         stages = learning_stages(
             world,
             training_config(settings),
+            seed=settings.seed,
             stages=settings.stages,
             max_steps=settings.max_steps,
+            epsilon=settings.epsilon,
             progress=progress,
-            **_acting(settings),
         )
     noted = []
     for stage in stages:
@@ -249,19 +235,6 @@ def noted_stages(settings: argparse.Namespace, world: World) -> list[Stage]:
         plain = number in (DELIVERS, OTHER)
         noted.append(stage if plain else replace(stage, note=BEHAVIOURS[number]))
     return noted
-
-
-def task_of(settings: argparse.Namespace) -> Task:
-    """The paper's task; in a colony trails fall while it learns too."""
-    from taichi_ants import Task
-
-    falls = not settings.no_evaporation
-    in_training = falls and settings.kind == "colony"
-    return Task(evaporation_in_training=in_training, evaporation_in_evaluation=falls)
-
-
-def _acting(settings: argparse.Namespace) -> dict[str, Any]:
-    return {"seed": settings.seed, "task": task_of(settings), "epsilon": settings.epsilon}
 
 
 def _is_still(settings: argparse.Namespace) -> bool:
@@ -286,13 +259,15 @@ def _save(settings: argparse.Namespace, pictures: Iterable[np.ndarray], n: int) 
     """Write n pictures as an animation."""
     from taichi_ants.rendering import PAUSE, save_animation
 
+    def counted() -> Iterator[np.ndarray]:
+        for done, picture in enumerate(pictures, start=1):
+            yield picture
+            progress(done / n)
+
     with progress_bar("Rendering") as progress:
-        options: dict[str, Any] = {"pause": PAUSE, "n": n, "progress": progress}
-        save_animation(settings.out, pictures, settings.fps, **options)
+        save_animation(settings.out, counted(), settings.fps, pause=PAUSE)
 
 
 def main(arguments: list[str] | None = None) -> None:
     """The command line."""
-    # A polite request to end leaves nothing behind either.
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     run_command(lambda: show(parse_arguments(arguments)), "Stopped; nothing was left behind.")

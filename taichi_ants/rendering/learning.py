@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
 
-from taichi_ants.engines.runs.training import continue_training, train
+from taichi_ants.engines.runs.training import train
 from taichi_ants.errors import AntsError, expect, whole
-from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.rendering import colours, text
 from taichi_ants.rendering.marks import cell
 from taichi_ants.rendering.moments import Episode
 from taichi_ants.rendering.rasteriser import Rasteriser, draw_marks
 from taichi_ants.rendering.scene import check_size
-from taichi_ants.rendering.viewport import Viewport
-from taichi_ants.rendering.writers import Progress
 from taichi_ants.task import Rewards, Task
 from taichi_ants.task.constants import DELIVERED, FAILED, N_ACTIONS, PICKED_UP
 from taichi_ants.worlds.world import World
@@ -95,7 +92,7 @@ def learning_stages(
     max_steps: int = 150,
     task: Task | None = None,
     epsilon: float = 0.0,
-    progress: Progress | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> list[Stage]:
     """Train one ant, and roll its policy out whenever it has had a given number of episodes.
 
@@ -103,7 +100,7 @@ def learning_stages(
         world: The world.
         config: The learner and its settings.
         seed: Of training and rollouts.
-        stages: Numbers of episodes, ascending, of equal ones one counts; 0 is before learning.
+        stages: Numbers of episodes, ascending; 0 is before learning.
         max_steps: Step limit of a rollout.
         task: The rules of the game; None is the paper's.
         epsilon: Probability of a random action in the rollouts.
@@ -114,25 +111,19 @@ def learning_stages(
     """
     expect("stages", stages, Iterable)
     stages = [whole("a stage", stage) for stage in stages]
-    if not stages or stages != sorted(stages) or stages[0] < 0:
+    if not stages or stages != sorted(set(stages)) or stages[0] < 0:
         raise AntsError(f"stages are {tuple(stages)!r}; they must ascend, from 0 or more.")
-    task = task or Task()
-    played, result = [], None
-    different = tuple(dict.fromkeys(stages))
-    for n in different:
+    task, played = task or Task(), []
+    for n in stages:
         table = np.zeros((task.n_states, N_ACTIONS), dtype=np.float32)
-        if n and result is None:
-            result = train(world, config, seed, n, task=task)
-        elif n and result is not None:
-            result = continue_training(result, n - result.episodes)
-        if result is not None:
-            table = result.q_values[0, 0]
+        if n:
+            table = train(world, config, seed, n, task=task).q_values[0, 0]
         episode = Episode.play(
             world, table, seed=seed, max_steps=max_steps, task=task, epsilon=epsilon
         )
         played.append(Stage(n, episode, "delivered" if episode.delivered else ""))
         if progress is not None:
-            progress(len(played) / len(different))
+            progress(len(played) / len(stages))
     return played
 
 
@@ -151,7 +142,11 @@ def learning_frames(
     Raises:
         AntsError: The size is not allowed.
     """
-    stages = _checked(stages)
+    expect("stages", stages, list, tuple)
+    for stage in stages:
+        expect("a stage", stage, Stage)
+    if len({stage.episode.world for stage in stages}) != 1:
+        raise AntsError("the stages are of no world or of several; give one or more of one world.")
     width, height = check_size(size)
     expect("title", title, str)
     canvas = np.full((height, width, 3), colours.channels(colours.PAGE))
@@ -160,13 +155,16 @@ def learning_frames(
     top, bottom = 2 * letters * bool(title), height - round(_LEGEND_LINES * letters)
     room = width - 2 * letters
     text.write(canvas, title, width / 2, 1.5 * letters, letters, align="middle", room=room)
-    grid = stages[0].episode.world.grid
-    columns, w, h = _tiling(grid, len(stages), width, bottom - top, letters)
-    top += (bottom - top - math.ceil(len(stages) / columns) * h) // 2
-    view = _view(grid, w, h, letters)
     if letters:
         _draw_legend(canvas, bottom, letters, stages[0].episode.task.rewards)
-    rasteriser = Rasteriser(grid, view)
+    columns = math.ceil(len(stages) / max(1, math.isqrt(len(stages) * height // width)))
+    rows, lines = math.ceil(len(stages) / columns), round(_TILE_LINES * letters)
+    w = width // columns
+    # No higher than wide, so that a title stays near to what it speaks of.
+    h = min((bottom - top) // rows, w + lines)
+    top += (bottom - top - rows * h) // 2
+    grid, margin = stages[0].episode.world.grid, max(2, round(min(w, h) / 60))
+    rasteriser = Rasteriser(grid, w, max(1, h - lines), margin)
     pictures = [_tile_pictures(stage, rasteriser, h, letters) for stage in stages]
     for _ in range(max(len(stage.episode) for stage in stages)):
         for place, waiting in enumerate(pictures):
@@ -176,44 +174,16 @@ def learning_frames(
         yield canvas.copy()
 
 
-def _checked(stages: Sequence[Stage]) -> list[Stage]:
-    """The stages, at least one, of one world."""
-    expect("stages", stages, list, tuple)
-    for stage in stages:
-        expect("a stage", stage, Stage)
-    if len({stage.episode.world for stage in stages}) != 1:
-        raise AntsError("the stages are of no world or of several; give one or more of one world.")
-    return list(stages)
-
-
-def _tiling(grid: AxialGrid, n: int, width: int, height: int, letters: int) -> tuple[int, int, int]:
-    """In how many columns n worlds are largest; width and height of each with its text."""
-
-    def tile(columns: int) -> tuple[int, int]:
-        w = width // columns
-        # No higher than wide, so that a title stays near to what it speaks of.
-        return w, min(height // math.ceil(n / columns), w + round(_TILE_LINES * letters))
-
-    columns = max(range(1, n + 1), key=lambda count: _view(grid, *tile(count), letters).hexagon)
-    return columns, *tile(columns)
-
-
-def _view(grid: AxialGrid, width: int, height: int, letters: int) -> Viewport:
-    """Where a world lies in its tile, below its title."""
-    room = max(1, height - round(_TILE_LINES * letters))
-    return Viewport.fit(grid, width, room, margin=max(2, round(min(width, room) / 60)))
-
-
 def _tile_pictures(
     stage: Stage, rasteriser: Rasteriser, height: int, letters: int
 ) -> Iterator[np.ndarray]:
     """One of the worlds, with a title above and how its ant does below."""
-    view, account = rasteriser.viewport, stage.account()
+    account, width = stage.account(), rasteriser.width
     above = round(_TITLE_LINES * letters)
-    tile = np.empty((height, view.width, 3), dtype=np.uint8)
+    tile = np.empty((height, width, 3), dtype=np.uint8)
     for step, (snapshot, _) in enumerate(stage.episode.moments()):
         tile[:] = colours.channels(colours.PAGE)
-        tile[above : above + view.height] = rasteriser.draw(snapshot)
+        tile[above : above + rasteriser.height] = rasteriser.draw(snapshot)
         result, ink = f"step {step}, return {account[step].sum()}", colours.FAINT_INK
         if step == len(stage.episode.trace):
             result, ink = f"{result}: {stage.note}".removesuffix(": "), colours.INK
@@ -223,14 +193,14 @@ def _tile_pictures(
             if earned
         ]
         sources = f"= {' '.join(parts).removeprefix('+ ')}" if parts else ""
-        below = above + view.height + 1.2 * letters
+        below = above + rasteriser.height + 1.2 * letters
         for line, baseline, colour in (
             (stage.title, 1.2 * letters, colours.INK),
             (result, below, ink),
             (sources, below + 1.4 * letters, ink),
         ):
-            room = view.width - letters / 2
-            text.write(tile, line, view.width / 2, baseline, letters, colour, "middle", room)
+            room = width - letters / 2
+            text.write(tile, line, width / 2, baseline, letters, colour, "middle", room)
         yield tile
 
 

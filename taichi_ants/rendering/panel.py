@@ -23,9 +23,7 @@ _LEGEND = (
     ("E", True, "", "ant with food"),
 )
 
-# Heights in sizes of the text.
-STATUS_HEIGHT = 18.2
-LEGEND_HEIGHT = 14.8
+LEGEND_HEIGHT = 14.8  # in sizes of the text
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,10 +50,7 @@ class Status:
 def draw_status(
     frame: np.ndarray, status: Status, left: int, top: int, width: int, size: int
 ) -> None:
-    """Draw what is said, in text of a size in pixels, `STATUS_HEIGHT` of them high.
-
-    `frame` is uint8 (height, width, 3), its part begins at (left, top).
-    """
+    """Draw what is said into a part of a frame, uint8 (height, width, 3), in text of a size."""
     y = top + size
     for label, value in status.lines:
         text.write(frame, label, left, y, size, colours.FAINT_INK)

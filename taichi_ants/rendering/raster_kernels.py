@@ -45,7 +45,7 @@ def draw_small_cells(
 
     Cells are taken as bricks of the same centres and areas as the hexagons, which nobody can see at
     this size: the part of a brick within a pixel is a product. The origin `(x, y)` and the size
-    `hexagon` are those of a `Viewport`; `columns`, `rows` and `z_range` those of an `AxialGrid`.
+    `hexagon` are those of a `Rasteriser`; `columns`, `rows` and `z_range` those of an `AxialGrid`.
     """
     ti.loop_config(block_dim=BAND)
     for j in range(frame.shape[0]):

@@ -8,11 +8,11 @@ from types import ModuleType
 import numpy as np
 
 from taichi_ants import runtime
+from taichi_ants.grid import hexgrid
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import colours
 from taichi_ants.rendering.marks import DOT, DOTS_BELOW, Mark, ants, marks, thing
 from taichi_ants.rendering.snapshot import Snapshot
-from taichi_ants.rendering.viewport import Viewport
 from taichi_ants.task.constants import DEPOSIT_LEVEL, EMPTY, FOOD, OBSTACLE, QUEEN
 
 # From this size on, food and queen are drawings on a light floor, below the whole cell is coloured.
@@ -22,6 +22,7 @@ _SMALLEST_OUTLINE = 7.0
 _MARK = 2.7  # its radius in sizes of the hexagon, and in pixels at least
 _SMALLEST_MARK = 8.0
 
+_SQRT_3 = math.sqrt(3.0)
 _QUEEN, _QUEEN_OUTLINE = 2.5, 7.0  # pixels, her radius where cells are small
 
 
@@ -39,20 +40,44 @@ def draw_marks(frame: np.ndarray, *tables: np.ndarray) -> None:
 
 
 class Rasteriser:
-    """Draws worlds of one grid as pictures of one size.
+    """Draws worlds of one grid as pictures of one size, whole, centred, and as large as possible.
+
+    Pixel coordinates are x to the right and y downwards; the pixel in column i and row j has its
+    centre at (i + 0.5, j + 0.5).
 
     Args:
         grid: The grid of all worlds to draw.
-        viewport: The size, and where the cells lie.
+        width, height: Of the pictures, in pixels.
+        margin: Pixels to leave free at each side.
         full_level: The trail level that has the last colour of the ramp, as stronger ones have.
+
+    Attributes:
+        hexagon: Pixels from the centre of a cell to its corners.
     """
 
     def __init__(
-        self, grid: AxialGrid, viewport: Viewport, full_level: float = DEPOSIT_LEVEL
+        self,
+        grid: AxialGrid,
+        width: int,
+        height: int,
+        margin: float = 0.0,
+        full_level: float = DEPOSIT_LEVEL,
     ) -> None:
         self.grid = grid
-        self.viewport = viewport
+        self.width, self.height = width, height
         self._full_level = np.float32(full_level)
+        x_range, y_range, z_range = grid.ranges
+        # The lowest and the highest (x, y), in sizes of a hexagon from the cell (0, 0, 0). By
+        # `hexgrid.centre_of`, x grows with y and falls with z, y falls with x.
+        low = np.array([-1.5 * (z_range - 1) - 1, -_SQRT_3 * (x_range - 0.5)])
+        high = np.array([1.5 * (y_range - 1) + 1, _SQRT_3 * (y_range + z_range - 1) / 2])
+        size = np.array([width, height])
+        self.hexagon = float((np.maximum(size - 2 * margin, 1) / (high - low)).min())
+        self._origin = size / 2 - self.hexagon * (low + high) / 2
+
+    def centres(self, cells: object) -> np.ndarray:
+        """Pixel coordinates, float64 (..., 2), of the centres of cells (..., 3) in any form."""
+        return hexgrid.centre_of(cells, self.hexagon) + self._origin
 
     def draw(self, snapshot: Snapshot, in_view: np.ndarray | None = None) -> np.ndarray:
         """The picture of a world with its ants, uint8 (height, width, 3).
@@ -61,11 +86,11 @@ class Rasteriser:
             snapshot: The world, of this grid.
             in_view: Flat indices of the cells that ant number 0 sees, to be marked.
         """
-        grid, view, hexagon = self.grid, self.viewport, self.viewport.hexagon
-        frame = np.full((view.height, view.width, 3), colours.channels(colours.PAGE))
+        grid, hexagon = self.grid, self.hexagon
+        frame = np.full((self.height, self.width, 3), colours.channels(colours.PAGE))
         of_cells, tables = self.cell_colours(snapshot), []
         if hexagon < DOTS_BELOW:
-            layout = (*view.origin, hexagon, grid.width, grid.height, grid.ranges[2])
+            layout = (*self._origin.tolist(), hexagon, grid.width, grid.height, grid.ranges[2])
             kernels().draw_small_cells(frame, of_cells, *layout)
         else:
             tables.append(self._cells(of_cells))
@@ -91,17 +116,17 @@ class Rasteriser:
 
     def _cells(self, of_cells: np.ndarray) -> np.ndarray:
         """Marks of the cells in the given colours, uint32 (grid.size,)."""
-        hexagon, existing = self.viewport.hexagon, np.flatnonzero(self.grid.exists)
+        hexagon, existing = self.hexagon, np.flatnonzero(self.grid.exists)
         # The lines between cells fade away where these are small, and do not grow for ever.
         line = min(max(0.09 * hexagon - 0.25, 0.0), 3.0)
         # Through two smooth edges side by side the page shines, so narrow lines need less room.
         gap = line if line > 1 else 2 * math.sqrt(line) - 1
-        radius = hexagon - gap / math.sqrt(3.0)
+        radius = hexagon - gap / _SQRT_3
         return marks(self._places(existing), radius, Mark.HEXAGON, of_cells[existing])
 
     def cell_colours(self, snapshot: Snapshot) -> np.ndarray:
         """The colours of all cells, uint32 (grid.size,): by what they hold, else by the trail."""
-        small = self.viewport.hexagon < _SMALLEST_DRAWING
+        small = self.hexagon < _SMALLEST_DRAWING
         of_ground = np.full(16, colours.CELL_EMPTY, dtype=np.uint32)
         of_ground[OBSTACLE] = colours.CELL_OBSTACLE
         of_ground[FOOD] = colours.CELL_FOOD if small else colours.FLOOR_FOOD
@@ -115,14 +140,14 @@ class Rasteriser:
 
     def _places(self, cells: np.ndarray) -> np.ndarray:
         """Pixel coordinates (n, 2) of flat indices (n,)."""
-        return self.viewport.centres(self.grid.cells(cells))
+        return self.centres(self.grid.cells(cells))
 
     def _ants(self, snapshot: Snapshot) -> np.ndarray:
-        hexagon, opacity = self.viewport.hexagon, 1.0
+        hexagon, opacity = self.hexagon, 1.0
         places = self._places(snapshot.ant_cells)
         if hexagon < DOTS_BELOW:
             # Dots that would hide the world and each other become a shade, which grows with them.
-            world = self.grid.count * 1.5 * math.sqrt(3.0) * hexagon**2
+            world = self.grid.count * 1.5 * _SQRT_3 * hexagon**2
             covered = len(places) * math.pi * DOT**2 / world
             opacity = min(1.0, 0.5 * max(covered, 1e-9) ** -0.6)
         looks = (snapshot.ant_headings, snapshot.ant_carries, hexagon)

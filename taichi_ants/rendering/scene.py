@@ -15,7 +15,6 @@ from taichi_ants.rendering.observed import task_and_letters
 from taichi_ants.rendering.panel import Status
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.rendering.snapshot import Snapshot
-from taichi_ants.rendering.viewport import Viewport
 from taichi_ants.task.constants import DEPOSIT_LEVEL, FOOD, QUEEN
 
 SMALLEST_SIDE, LARGEST_SIDE = 64, 4096
@@ -67,40 +66,23 @@ class Scene:
         expect("title", title, str)
         if not isinstance(full_level, (float, Real)) or not 0 < full_level < math.inf:
             raise AntsError(f"full_level is {shown(full_level)}; it must be a number above 0.")
-        self._marks_view = not checked_flag("plain", plain)
-        self._text_size = letters = round(min(width, height) / 38)
-        self._has_panel = not plain and letters >= text.SMALLEST
+        self._plain = checked_flag("plain", plain)
+        self._letters = letters = round(min(width, height) / 38)
         self._background = np.full((height, width, 3), colours.channels(colours.PAGE))
         margin = max(2, round(min(width, height) / 60))
-        room = width, height  # for the world, in the upper left
-        if self._has_panel and width >= height:
-            room = width - _PANEL_WIDTH * letters - margin, height
-        elif self._has_panel:
-            room = width, height - round((panel.STATUS_HEIGHT + _TITLE_HEIGHT) * letters) - margin
-        self.viewport = Viewport.fit(grid, *room, margin=margin)
-        self._rasteriser = Rasteriser(grid, self.viewport, full_level)
+        self._has_panel = not plain and letters >= text.SMALLEST
+        room = width  # of the world, on the left
         if self._has_panel:
-            self._draw_background(room, margin, title, full_level)
-
-    def _draw_background(
-        self, room: tuple[int, int], margin: int, title: str, full_level: float
-    ) -> None:
-        """Draw title and legend, and note where the status goes: beside the world, or below."""
-        height, width, _ = self._background.shape
-        size, beside = self._text_size, width >= height
-        left, top = (room[0], margin) if beside else (margin, room[1])
-        column = width - margin - left
-        if title:
-            text.write(self._background, title, left, top + size, size, room=column)
-            top += round(_TITLE_HEIGHT * size)
-        if beside:
-            legend = left, height - margin - round(panel.LEGEND_HEIGHT * size)
-        else:
-            column = column // 2 - size
-            legend = left + column + 2 * size, top
-        self._status_place = left, top, column, size
-        hexagon = self.viewport.hexagon
-        panel.draw_legend(self._background, *legend, column, size, full_level, hexagon)
+            room -= _PANEL_WIDTH * letters + margin
+        self._rasteriser = Rasteriser(grid, room, height, margin, full_level)
+        if self._has_panel:
+            column = width - margin - room
+            bottom = height - margin - round(panel.LEGEND_HEIGHT * letters)
+            text.write(self._background, title, room, margin + letters, letters, room=column)
+            top = margin + round(_TITLE_HEIGHT * letters) * bool(title)
+            self._status_place = room, top, column, letters
+            looks = (letters, full_level, self._rasteriser.hexagon)
+            panel.draw_legend(self._background, room, bottom, column, *looks)
 
     def draw(self, snapshot: Snapshot, status: Status | None = None) -> np.ndarray:
         """A picture, uint8 (height, width, 3), of a world and of what is said of it.
@@ -115,35 +97,28 @@ class Scene:
                 f"the snapshot is of ranges {snapshot.grid.ranges}, the scene of "
                 f"{self._rasteriser.grid.ranges}; draw it with a Scene of its own grid."
             )
-        in_view = self._cells_in_view(snapshot, status)
-        world = self._rasteriser.draw(snapshot, in_view)
-        if in_view is not None and status is not None and status.state is not None:
-            _, letters = task_and_letters(status.observation, status.state)
-            self._write_letters(world, snapshot, in_view, letters)
+        world = self._draw_world(snapshot, status)
         frame = self._background.copy()
-        frame[: world.shape[0], : world.shape[1]] = world
+        frame[:, : world.shape[1]] = world
         if self._has_panel and status is not None:
             panel.draw_status(frame, status, *self._status_place)
         return frame
 
-    def _cells_in_view(self, snapshot: Snapshot, status: Status | None) -> np.ndarray | None:
-        """Flat indices of the cells that ant number 0 sees, if they are to be marked."""
-        if not self._marks_view or status is None or status.state is None:
-            return None
-        if not len(snapshot.ant_cells):
-            return None
+    def _draw_world(self, snapshot: Snapshot, status: Status | None) -> np.ndarray:
+        """The world; the cells that ant number 0 sees are marked, with its letters for them."""
+        rasteriser, hexagon = self._rasteriser, self._rasteriser.hexagon
+        state = None if status is None or self._plain else status.state
+        if status is None or state is None or not len(snapshot.ant_cells):
+            return rasteriser.draw(snapshot)
         turned = (snapshot.ant_headings[0] + np.array(status.observation.cells)) % N_HEADINGS
-        return snapshot.ant_cells[0] + snapshot.grid.offsets[turned]
-
-    def _write_letters(
-        self, world: np.ndarray, snapshot: Snapshot, cells: np.ndarray, letters: list[str]
-    ) -> None:
-        hexagon = self.viewport.hexagon
-        if hexagon < _SMALLEST_LETTERS:
-            return
-        floors = self._rasteriser.cell_colours(snapshot)[cells].tolist()
-        centres = self.viewport.centres(snapshot.grid.cells(cells)).tolist()
-        taken = np.isin(snapshot.ground[cells], (FOOD, QUEEN)).tolist()  # by their drawings
-        for letter, centre, floor, drawing in zip(letters, centres, floors, taken, strict=False):
-            if not drawing:
-                text.write_on(world, letter, centre, hexagon, floor)
+        cells = snapshot.ant_cells[0] + snapshot.grid.offsets[turned]
+        world = rasteriser.draw(snapshot, in_view=cells)
+        if hexagon >= _SMALLEST_LETTERS:
+            _, letters = task_and_letters(status.observation, state)
+            floors = rasteriser.cell_colours(snapshot)[cells].tolist()
+            centres = rasteriser.centres(snapshot.grid.cells(cells)).tolist()
+            taken = np.isin(snapshot.ground[cells], (FOOD, QUEEN))  # by their drawings
+            for number, letter in enumerate(letters):
+                if not taken[number]:
+                    text.write_on(world, letter, centres[number], hexagon, floors[number])
+        return world

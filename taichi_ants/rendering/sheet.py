@@ -99,62 +99,38 @@ def policy_sheet(
     table = checked_q_values(q_values, task)
     expect("title", title, str)
     complete = checked_flag("complete", complete)
-    spread = usual_spread(table, task.sees)
-    states = [_State(row, table[row], spread, task.sees) for row in possible_states(task.sees)]
-    view = _View(task.sees)
-    halves = [[one for one in states if one.carries == carries] for carries in (False, True)]
+    observation, spread = task.sees, usual_spread(table, task.sees)
+    picture = _Picture(observation)
+    halves: tuple[list[int], list[int]] = ([], [])
+    for state in possible_states(observation):
+        halves[observation.name_of(state).startswith(TASK_NAMES[1])].append(state)
+    known = {state for half in halves for state in half if learned(table[state], spread)}
     drawn = [
-        sorted((one for one in half if complete or one.learned), key=view.order)[:MOST]
+        sorted((state for state in half if complete or state in known), key=picture.order)[:MOST]
         for half in halves
     ]
-    tile_height = view.height + _BELOW
-    heights = [_HEADING + max(1, math.ceil(len(some) / _COLUMNS)) * tile_height for some in drawn]
+    tile = picture.height + _BELOW
+    heights = [_HEADING + max(1, math.ceil(len(states) / _COLUMNS)) * tile for states in drawn]
     sheet = np.full((_TOP + sum(heights) + _MARGIN, WIDTH, 3), colours.channels(colours.PAGE))
-    _write_head(sheet, title, task.sees)
+    _write_head(sheet, title, observation)
     top = _TOP
-    for half, some, name, height in zip(halves, drawn, _HALVES, heights, strict=True):
-        _write_heading(sheet, top, name, half, len(some))
-        for place, state in enumerate(some):
+    for half, states, name, height in zip(halves, drawn, _HALVES, heights, strict=True):
+        n = len(known.intersection(half))
+        words = f"{n} of {len(half)} states learned" if n else "nothing was learned here"
+        if len(states) == MOST:
+            words += f"; {MOST} are shown"
+        y = top + round(1.7 * _LARGE)
+        text.write(sheet, name, _MARGIN, y, _LARGE)
+        text.write(sheet, words, WIDTH - _MARGIN, y, _SMALL, colours.FAINT_INK, align="right")
+        for place, state in enumerate(states):
             row, column = divmod(place, _COLUMNS)
-            y = top + _HEADING + row * tile_height
-            _draw_tile(sheet, state, view, _MARGIN + column * _TILE, y, spread)
+            x, y = _MARGIN + column * _TILE, top + _HEADING + row * tile
+            part, values = sheet[y : y + tile, x : x + _TILE], table[state]
+            best = np.flatnonzero(values == values.max()).tolist() if state in known else []
+            part[: picture.height] = picture.draw(state, best)
+            _write_action(part, picture.height, best, clarity(values, spread) if best else 0.0)
         top += height
     return sheet
-
-
-class _State:
-    """A state with its action values (5,); no letters where its name has another form."""
-
-    def __init__(
-        self, row: int, values: np.ndarray, spread: float, observation: Observation
-    ) -> None:
-        self.row = row
-        self.values = values
-        self.learned = learned(values, spread)
-        self.name = observation.name_of(row)
-        task, self.letters = task_and_letters(observation, row)
-        self.carries = task == TASK_NAMES[1]
-
-
-class _View:
-    """Where an ant and the cells that it sees lie in the picture of a state."""
-
-    def __init__(self, observation: Observation) -> None:
-        self.turns = observation.cells
-        self.headings = np.array(observation.cells) % N_HEADINGS
-        steps = [HEADING_STEPS[heading] for heading in self.headings]
-        centres = centre_of([(0, 0, 0), *steps], _HEXAGON)
-        low, high = centres[:, 1].min(), centres[:, 1].max()
-        self.height = round(float(high - low) + 1.87 * _HEXAGON)
-        middle = np.array([_TILE / 2, (self.height - high - low) / 2])
-        self.own, self.seen = centres[0] + middle, centres[1:] + middle
-
-    def order(self, state: _State) -> list[int]:
-        """Sorts by the cell ahead, then by the others."""
-        letters = list(state.letters)
-        if letters:
-            letters.insert(0, letters.pop(self.turns.index(0)))
-        return [*(CELL_LETTERS.find(letter[0]) for letter in letters), state.row]
 
 
 def _write_head(sheet: np.ndarray, title: str, observation: Observation) -> None:
@@ -166,74 +142,68 @@ def _write_head(sheet: np.ndarray, title: str, observation: Observation) -> None
         text.write(sheet, line.format(ahead), _MARGIN, y + 7, _SMALL, colours.FAINT_INK)
 
 
-def _write_heading(
-    sheet: np.ndarray, top: int, name: str, states: list[_State], drawn: int
-) -> None:
-    y = top + round(1.7 * _LARGE)
-    text.write(sheet, name, _MARGIN, y, _LARGE)
-    n = sum(state.learned for state in states)
-    words = f"{n} of {len(states)} states learned" if n else "nothing was learned here"
-    if drawn == MOST:
-        words += f"; {MOST} are shown"
-    text.write(sheet, words, WIDTH - _MARGIN, y, _SMALL, colours.FAINT_INK, align="right")
+def _write_action(tile: np.ndarray, top: int, best: list[int], clear: float) -> None:
+    """Write the best actions below a state, with a bar of how clear they are."""
+    words, ink = "not learned", colours.FAINT_INK
+    if best:
+        words = " / ".join(ACTION_NAMES[action] for action in best)
+        ink = _ARROW_COLOURS.get(best[0], colours.CHOSEN)
+        length = 0.72 * _TILE
+        fill(tile, (_TILE - length) / 2, top + 23, length, 6, colours.CELL_EMPTY)
+        fill(tile, (_TILE - length) / 2, top + 23, length * clear, 6, ink)
+    text.write(tile, words, _TILE / 2, top + 15, _SMALL, ink, align="middle", room=_TILE)
 
 
-def _draw_tile(
-    sheet: np.ndarray, state: _State, view: _View, left: int, top: int, spread: float
-) -> None:
-    """Draw a state, and below it the best action and how clear it is."""
-    corner, middle = np.array([left, top]), left + _TILE / 2
-    best = np.flatnonzero(state.values == state.values.max()).tolist() if state.learned else []
-    _draw_cells(sheet, state, view, corner)
-    own = corner + view.own
-    ant = ants(own + (0, 0.2 * _HEXAGON), 0, np.array([state.carries]), _HEXAGON, 0.62 * _HEXAGON)
-    draw_marks(sheet, ant, *_arrows(state, view, corner, best))
-    y = top + view.height + 15
-    if not state.learned:
-        picture = sheet[top : top + view.height, left : left + _TILE]
-        picture[:] = _PALE * picture + (1 - _PALE) * 255
-        text.write(sheet, "not learned", middle, y, _SMALL, colours.FAINT_INK, align="middle")
-        return
-    words = " / ".join(ACTION_NAMES[action] for action in best)
-    colour = _ARROW_COLOURS.get(best[0], colours.CHOSEN)
-    text.write(sheet, words, middle, y, _SMALL, colour, align="middle", room=_TILE)
-    length = 0.72 * _TILE
-    fill(sheet, middle - length / 2, y + 8, length, 6, colours.CELL_EMPTY)
-    filled = length * clarity(state.values, spread)
-    fill(sheet, middle - length / 2, y + 8, filled, 6, colour)
+class _Picture:
+    """Draws states: an ant, the cells that it sees, and its best actions as arrows."""
 
+    def __init__(self, observation: Observation) -> None:
+        self._observation = observation
+        self._headings = np.array(observation.cells) % N_HEADINGS
+        steps = [HEADING_STEPS[heading] for heading in self._headings]
+        centres = centre_of([(0, 0, 0), *steps], _HEXAGON)
+        low, high = centres[:, 1].min(), centres[:, 1].max()
+        self.height = round(float(high - low) + 1.87 * _HEXAGON)
+        centres += (_TILE / 2, (self.height - high - low) / 2)
+        self._own, *self._seen = centres
 
-def _draw_cells(sheet: np.ndarray, state: _State, view: _View, corner: np.ndarray) -> None:
-    """Draw the ant's cell and those in view, with their letters, or with the state's name."""
-    radius = 0.96 * _HEXAGON
-    letters = state.letters or ["E"] * len(view.seen)
-    tables = [cell("E", corner + view.own, radius)]
-    tables += [
-        cell(letter, corner + centre, radius)
-        for letter, centre in zip(letters, view.seen, strict=True)
-    ]
-    draw_marks(sheet, *tables)
-    for letter, centre in zip(state.letters, view.seen, strict=False):
-        if letter not in _GOALS:
-            x, y = (corner + centre).tolist()
-            text.write_on(sheet, letter, (x, y - 0.12 * _HEXAGON), _HEXAGON, cell_colour(letter))
-    if not state.letters:
-        (x, y), name = corner.tolist(), state.name.partition(" ")[2]
-        size = round(0.6 * _HEXAGON)
-        text.write(sheet, name, x + _TILE / 2, y + size, size, align="middle", room=_TILE)
+    def order(self, state: int) -> list[int]:
+        """Sorts by the cell ahead, then by the others."""
+        _, letters = task_and_letters(self._observation, state)
+        if letters:
+            letters.insert(0, letters.pop(self._observation.cells.index(0)))
+        return [*(CELL_LETTERS.find(letter[0]) for letter in letters), state]
 
+    def draw(self, state: int, actions: list[int]) -> np.ndarray:
+        """The picture, uint8 (height, width, 3); pale without actions."""
+        frame = np.full((self.height, _TILE, 3), colours.channels(colours.PAGE))
+        task, letters = task_and_letters(self._observation, state)
+        carries, radius = np.array([task == TASK_NAMES[1]]), 0.96 * _HEXAGON
+        seen = list(zip(letters or ["E"] * len(self._seen), self._seen, strict=True))
+        cells = [cell(letter, centre, radius) for letter, centre in [("E", self._own), *seen]]
+        ant = ants(self._own + (0, 0.2 * _HEXAGON), 0, carries, _HEXAGON, 0.62 * _HEXAGON)
+        draw_marks(frame, *cells, ant, *self._arrows(letters, actions))
+        if not letters:  # a name of another form
+            name = self._observation.name_of(state).partition(" ")[2]
+            text.write(frame, name, _TILE / 2, _SMALL, _SMALL, align="middle", room=_TILE)
+        for letter, (x, y) in seen if letters else ():
+            if letter not in _GOALS:
+                place = x, y - 0.12 * _HEXAGON
+                text.write_on(frame, letter, place, _HEXAGON, cell_colour(letter))
+        if not actions:
+            frame[:] = _PALE * frame + (1 - _PALE) * 255
+        return frame
 
-def _arrows(
-    state: _State, view: _View, corner: np.ndarray, actions: list[int]
-) -> Iterator[np.ndarray]:
-    """An arrow to where a move goes, from the food that is picked up, or to the queen."""
-    for action in actions:
-        colour = _ARROW_COLOURS.get(action, colours.CHOSEN)
-        for place, turn in enumerate(view.turns):
-            towards = state.letters[place : place + 1] == ["Q" if action == GIVE else "F"]
-            if action <= RIGHT:
+    def _arrows(self, letters: list[str], actions: list[int]) -> Iterator[np.ndarray]:
+        """An arrow to where a move goes, from the food that is picked up, or to the queen."""
+        for action in actions:
+            for place, turn in enumerate(self._observation.cells):
                 towards = turn == action - 1
-            if towards and -1 <= turn <= 1:  # it reaches what lies ahead only
-                heading = view.headings[place] + (3 if action == PICK_UP else 0)
-                middle = corner + 0.55 * view.own + 0.45 * view.seen[place]
-                yield marks(middle, 0.37 * _HEXAGON, Mark.ARROW, colour, heading)
+                if action > RIGHT:  # it reaches what lies ahead only
+                    goal = letters[place : place + 1] == [_GOALS[action == GIVE]]
+                    towards = goal and -1 <= turn <= 1
+                if towards:
+                    heading = self._headings[place] + (3 if action == PICK_UP else 0)
+                    middle = 0.55 * self._own + 0.45 * self._seen[place]
+                    colour = _ARROW_COLOURS.get(action, colours.CHOSEN)
+                    yield marks(middle, 0.37 * _HEXAGON, Mark.ARROW, colour, heading)

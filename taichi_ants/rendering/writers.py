@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import os
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from itertools import chain
 from numbers import Real
 from pathlib import Path
@@ -21,9 +21,6 @@ import numpy as np
 from taichi_ants import files
 from taichi_ants.errors import AntsError, expect, shown
 from taichi_ants.rendering import colours
-
-PathLike = str | os.PathLike[str]
-Progress = Callable[[float], None]  # called with the share of the work that is done, 0 to 1
 
 DEFAULT_FPS = 8.0
 PAUSE = 1.5  # seconds, for which episodes are shown as they ended
@@ -38,7 +35,7 @@ _KEPT = (
 )
 
 
-def check_animation(path: PathLike, fps: float = DEFAULT_FPS) -> Path:
+def check_animation(path: files.PathLike, fps: float = DEFAULT_FPS) -> Path:
     """Make sure, before the work begins, that an animation can be written.
 
     Args:
@@ -72,7 +69,7 @@ def check_animation(path: PathLike, fps: float = DEFAULT_FPS) -> Path:
     return target
 
 
-def check_picture(path: PathLike) -> Path:
+def check_picture(path: files.PathLike) -> Path:
     """Make sure that a picture can be written; raises as `save_picture` does."""
     target = _writable(path)
     if target.suffix.lower() != ".png":
@@ -81,13 +78,11 @@ def check_picture(path: PathLike) -> Path:
 
 
 def save_animation(
-    path: PathLike,
+    path: files.PathLike,
     frames: Iterable[np.ndarray],
     fps: float = DEFAULT_FPS,
     *,
     pause: float = 0.0,
-    n: int = 0,
-    progress: Progress | None = None,
 ) -> None:
     """Write frames as they come; raises as `check_animation` does, which it calls first.
 
@@ -97,11 +92,9 @@ def save_animation(
         fps: Frames per second.
         pause: Seconds for which the last one is shown, so that it can be looked at before all
             begins anew.
-        n: How many frames there are, for `progress`.
-        progress: Called after each frame with the share of the work that is done.
     """
     target = check_animation(path, fps)
-    checked = _checked(frames, round(pause * fps) - 1, n, progress)
+    checked = _checked(frames, round(pause * fps) - 1)
     if target.suffix:
         encoded = _mp4 if target.suffix.lower() == ".mp4" else _gif
         _write(target, encoded(checked, fps))
@@ -109,7 +102,7 @@ def save_animation(
         _write_folder(target, checked)
 
 
-def save_picture(path: PathLike, frame: np.ndarray) -> None:
+def save_picture(path: files.PathLike, frame: np.ndarray) -> None:
     """Write a picture, uint8 (height, width, 3), as PNG.
 
     Raises:
@@ -120,7 +113,7 @@ def save_picture(path: PathLike, frame: np.ndarray) -> None:
     _write(target, _png(frame, optimize=True))
 
 
-def _writable(path: PathLike) -> Path:
+def _writable(path: files.PathLike) -> Path:
     """The path, if files can be written to the folder that holds it, or is to hold it."""
     expect("path", path, str, os.PathLike)
     target = Path(path)
@@ -154,13 +147,11 @@ def _write_folder(folder: Path, frames: Iterable[np.ndarray]) -> None:
         os.replace(whole, folder)
 
 
-def _checked(
-    frames: Iterable[np.ndarray], more: int, n: int, progress: Progress | None
-) -> Iterator[np.ndarray]:
+def _checked(frames: Iterable[np.ndarray], more: int) -> Iterator[np.ndarray]:
     """The frames, if they fit together, the last one so many times more."""
     expect("frames", frames, Iterable)
     shape = None
-    for done, frame in enumerate(frames, start=1):
+    for frame in frames:
         _check_frame(frame)
         shape = shape or frame.shape
         if frame.shape != shape:
@@ -168,8 +159,6 @@ def _checked(
                 f"a frame is {frame.shape}, the first one {shape}; all must be of one size."
             )
         yield frame
-        if progress is not None:
-            progress(done / max(n, done))
     if shape is None:
         raise AntsError("there are no frames; an animation needs at least one.")
     for _ in range(more):
