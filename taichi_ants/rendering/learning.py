@@ -146,7 +146,7 @@ def learning_frames(
     for stage in stages:
         expect("a stage", stage, Stage)
     if len({stage.episode.world for stage in stages}) != 1:
-        raise AntsError("the stages are of no world or of several; give one or more of one world.")
+        raise AntsError("the stages are of several worlds, or there are none; give those of one.")
     width, height = check_size(size)
     expect("title", title, str)
     canvas = np.full((height, width, 3), colours.channels(colours.PAGE))

@@ -102,7 +102,7 @@ def draw_mark(rgb, p, radius, shape, colour):
     # A halo of the page around it; none at all, not even on smooth edges, around a cell.
     distance, halo = radius * shapes.hexagon(p), -1.0
     if shape == Mark.OUTLINE:
-        half_width = ti.max(0.06 * radius, 0.6)
+        half_width = ti.max(0.06 * radius, 0.8)
         distance, halo = ti.abs(distance + half_width) - half_width, 0.5 * _HALO
     elif shape == Mark.FOOD:
         distance, halo = radius * shapes.crumbs(p), 0.0

@@ -86,14 +86,8 @@ class Rasteriser:
             snapshot: The world, of this grid.
             in_view: Flat indices of the cells that ant number 0 sees, to be marked.
         """
-        grid, hexagon = self.grid, self.hexagon
-        frame = np.full((self.height, self.width, 3), colours.channels(colours.PAGE))
-        of_cells, tables = self.cell_colours(snapshot), []
-        if hexagon < DOTS_BELOW:
-            layout = (*self._origin.tolist(), hexagon, grid.width, grid.height, grid.ranges[2])
-            kernels().draw_small_cells(frame, of_cells, *layout)
-        else:
-            tables.append(self._cells(of_cells))
+        hexagon, tables = self.hexagon, []
+        frame = self.draw_cells(self.cell_colours(snapshot))
         queens = self._places(np.flatnonzero(snapshot.ground == QUEEN))
         if hexagon < _SMALLEST_DRAWING:
             tables.append(marks(queens, max(hexagon, _QUEEN), Mark.DOT, colours.CELL_QUEEN))
@@ -114,15 +108,23 @@ class Rasteriser:
         draw_marks(frame, *tables)
         return frame
 
-    def _cells(self, of_cells: np.ndarray) -> np.ndarray:
-        """Marks of the cells in the given colours, uint32 (grid.size,)."""
-        hexagon, existing = self.hexagon, np.flatnonzero(self.grid.exists)
+    def draw_cells(self, of_cells: np.ndarray) -> np.ndarray:
+        """The picture of the cells in the given colours, uint32 (grid.size,)."""
+        grid, hexagon = self.grid, self.hexagon
+        frame = np.full((self.height, self.width, 3), colours.channels(colours.PAGE))
+        if hexagon < DOTS_BELOW:
+            layout = (*self._origin.tolist(), hexagon, grid.width, grid.height, grid.ranges[2])
+            kernels().draw_small_cells(frame, of_cells, *layout)
+            return frame
         # The lines between cells fade away where these are small, and do not grow for ever.
         line = min(max(0.09 * hexagon - 0.25, 0.0), 3.0)
         # Through two smooth edges side by side the page shines, so narrow lines need less room.
         gap = line if line > 1 else 2 * math.sqrt(line) - 1
+        existing = np.flatnonzero(grid.exists)
         radius = hexagon - gap / _SQRT_3
-        return marks(self._places(existing), radius, Mark.HEXAGON, of_cells[existing])
+        places = self._places(existing)
+        draw_marks(frame, marks(places, radius, Mark.HEXAGON, of_cells[existing]))
+        return frame
 
     def cell_colours(self, snapshot: Snapshot) -> np.ndarray:
         """The colours of all cells, uint32 (grid.size,): by what they hold, else by the trail."""

@@ -25,7 +25,7 @@ from taichi_ants.task import Task
 from taichi_ants.task.constants import ACTION_NAMES, GIVE, PICK_UP, RIGHT
 from taichi_ants.task.states import TASK_NAMES
 
-MOST = 256  # states of a half that are drawn
+MOST = 128  # states of a half that are drawn
 _HARDLY = 0.01  # of the usual spread: below, nothing was learned
 
 # Lengths in pixels.
