@@ -11,7 +11,7 @@
 from taichi_ants.rendering.learning import Stage, learning_frames, learning_stages
 from taichi_ants.rendering.moments import Episode, colony_moments, frames
 from taichi_ants.rendering.panel import Status
-from taichi_ants.rendering.scene import Scene, check_size
+from taichi_ants.rendering.scene import Scene
 from taichi_ants.rendering.sheet import policy_sheet
 from taichi_ants.rendering.snapshot import Snapshot, at_start
 from taichi_ants.rendering.writers import (
@@ -32,7 +32,6 @@ __all__ = [
     "at_start",
     "check_animation",
     "check_picture",
-    "check_size",
     "colony_moments",
     "frames",
     "learning_frames",

@@ -60,7 +60,6 @@ CALLS: dict[str, list[tuple[str, Callable[[object], object]]]] = {
         ("fps", lambda wrong: rendering.check_animation("a.gif", wrong)),
     ],
     "check_picture": [("path", of(rendering.check_picture))],
-    "check_size": [("size", of(rendering.check_size))],
     "colony_moments": [
         ("colony", of(rendering.colony_moments, 3)),
         ("ticks", lambda wrong: next(rendering.colony_moments(colony(), wrong))),
