@@ -344,7 +344,7 @@ def render_policies(study: Study[RunPoint], results: Path, folder: Path) -> None
 
     Each picture is the beginning of the episode that told the behaviour: with evaporation as in
     training, not as in the greedy evaluation. The title names learner and delivery, the first of
-    the head-up lines what the ant does.
+    the lines beside the world what the ant does.
     """
     from dataclasses import replace
 

@@ -8,6 +8,7 @@ folder of PNG pictures.
 from __future__ import annotations
 
 import argparse
+from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -190,16 +191,15 @@ def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray,
         q_values, _ = load_policy(settings.policy)
         return q_values, settings.title or f"policy {Path(settings.policy).stem}"
     config, seed, episodes = training_config(settings), settings.seed, settings.episodes
+    title = settings.title or f"{settings.learner} after {episodes} episodes"
     with progress_bar("Training") as progress:
-        if settings.kind == "colony":
-            task = Task(evaporation_in_training=True)  # trails fall while it learns too
-            colony = Colony(world, task, config, seed, settings.ants)
-            colony.run(episodes, settings.ticks, progress)
-            title = f"{settings.learner}, {episodes} episodes together"
-            return colony.q_values[0], settings.title or title
-        result = train(world, config, seed, episodes, progress=progress)
-    title = f"{settings.learner} after {episodes} episodes"
-    return result.q_values[0, 0], settings.title or title
+        if settings.kind != "colony":
+            result = train(world, config, seed, episodes, progress=progress)
+            return result.q_values[0, 0], title
+        task = Task(evaporation_in_training=True)  # trails fall while it learns too
+        colony = Colony(world, task, config, seed, settings.ants)
+        colony.run(episodes, settings.ticks, progress)
+    return colony.q_values[0], title
 
 
 def training_config(settings: argparse.Namespace) -> TrainingConfig:
@@ -229,12 +229,11 @@ def noted_stages(settings: argparse.Namespace, world: World) -> list[Stage]:
             epsilon=settings.epsilon,
             progress=progress,
         )
-    noted = []
-    for stage in stages:
-        (number,), _ = classify(stage.episode.trace, settings.max_steps)
-        plain = number in (DELIVERS, OTHER)
-        noted.append(stage if plain else replace(stage, note=BEHAVIOURS[number]))
-    return noted
+    numbers = [classify(stage.episode.trace, settings.max_steps)[0][0] for stage in stages]
+    return [
+        stage if number in (DELIVERS, OTHER) else replace(stage, note=BEHAVIOURS[number])
+        for stage, number in zip(stages, numbers, strict=True)
+    ]
 
 
 def _is_still(settings: argparse.Namespace) -> bool:
@@ -249,7 +248,7 @@ def _save_moments(
 
     look: dict[str, Any] = {"size": settings.size, "title": title, "plain": settings.plain}
     if _is_still(settings):
-        *_, last = moments
+        (last,) = deque(moments, maxlen=1)
         save_picture(settings.out, next(frames([last], **look)))
     else:
         _save(settings, frames(moments, **look), n)

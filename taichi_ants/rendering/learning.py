@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
-from typing import NamedTuple
 
 import numpy as np
 
@@ -26,23 +25,13 @@ STAGES = (0, 10, 100, 500)
 DEFAULT_SIZE = (1280, 520)  # four worlds in a row fill it
 # In sizes of the text: the title of a tile, all its text, and the legend.
 _TITLE_LINES, _TILE_LINES, _LEGEND_LINES = 1.7, 5.6, 2.6
-
-
-class _Source(NamedTuple):
-    """What earns or costs reward: its letter, that of a cell, its words, and which reward it is."""
-
-    letter: str
-    cell: str
-    words: str
-    reward: str
-
-
+# What earns or costs reward: its letter, that of a cell, its words, and which reward it is.
 _SOURCES = (
-    _Source("T", "T", "onto a trail", "lure"),
-    _Source("S", "S", "nearer to the queen", "lure"),
-    _Source("F", "F", "food", "pick_up"),
-    _Source("Q", "Q", "delivery", "give"),
-    _Source("X", "O", "blocked, in vain", "failed"),
+    ("T", "T", "onto a trail", "lure"),
+    ("S", "S", "nearer to the queen", "lure"),
+    ("F", "F", "food", "pick_up"),
+    ("Q", "Q", "delivery", "give"),
+    ("X", "O", "blocked, in vain", "failed"),
 )
 
 
@@ -184,37 +173,33 @@ def _tile_pictures(
     for step, (snapshot, _) in enumerate(stage.episode.moments()):
         tile[:] = colours.channels(colours.PAGE)
         tile[above : above + rasteriser.height] = rasteriser.draw(snapshot)
-        result, ink = f"step {step}, return {account[step].sum()}", colours.FAINT_INK
-        if step == len(stage.episode.trace):
-            result, ink = f"{result}: {stage.note}".removesuffix(": "), colours.INK
+        note = f": {stage.note}" if stage.note and step == len(stage.episode.trace) else ""
+        result = f"step {step}, return {account[step].sum()}{note}"
         parts = [
-            f"{'+' if earned > 0 else '-'} {source.letter} {abs(earned)}"
-            for source, earned in zip(_SOURCES, account[step].tolist(), strict=True)
+            f"{'+' if earned > 0 else '-'} {letter} {abs(earned)}"
+            for (letter, *_), earned in zip(_SOURCES, account[step].tolist(), strict=True)
             if earned
         ]
         sources = f"= {' '.join(parts).removeprefix('+ ')}" if parts else ""
         below = above + rasteriser.height + 1.2 * letters
-        for line, baseline, colour in (
-            (stage.title, 1.2 * letters, colours.INK),
-            (result, below, ink),
-            (sources, below + 1.4 * letters, ink),
-        ):
+        baselines = 1.2 * letters, below, below + 1.4 * letters
+        for line, baseline in zip((stage.title, result, sources), baselines, strict=True):
             room = width - letters / 2
-            text.write(tile, line, width / 2, baseline, letters, colour, "middle", room)
+            text.write(tile, line, width / 2, baseline, letters, align="middle", room=room)
         yield tile
 
 
 def _draw_legend(canvas: np.ndarray, top: int, letters: int, rewards: Rewards) -> None:
     """Draw what earns reward in a line across the canvas."""
-    lines = [f"{one.letter} {one.words} {getattr(rewards, one.reward):+}" for one in _SOURCES]
+    lines = [f"{letter} {words} {getattr(rewards, name):+}" for letter, _, words, name in _SOURCES]
     before, after = 1.9 * letters, 0.9 * letters  # room for a cell, and to the next one
     width = sum(before + text.width(line, letters) + after for line in lines) - after
     x, y = (canvas.shape[1] - width) / 2, top + 1.2 * letters
     baseline = y + 0.36 * letters
-    for source, line in zip(_SOURCES, lines, strict=True):
+    for (_, kind, *_), line in zip(_SOURCES, lines, strict=True):
         middle = x + 0.8 * letters
-        draw_marks(canvas, cell(source.cell, (middle, y), 0.8 * letters))
-        if source.cell == "S":
+        draw_marks(canvas, cell(kind, (middle, y), 0.8 * letters))
+        if kind == "S":
             text.write(canvas, "S", middle, baseline, letters, align="middle")
         x += before
         text.write(canvas, line, x, baseline, letters, colours.FAINT_INK)

@@ -129,16 +129,13 @@ class Episode:
         )
 
 
-def colony_moments(
-    colony: Colony, ticks: int = 0, every: int = 1, world: int = 0
-) -> Iterator[Moment]:
-    """A world of a colony as it is now, then every few ticks while time passes.
+def colony_moments(colony: Colony, ticks: int = 0, every: int = 1) -> Iterator[Moment]:
+    """The first world of a colony as it is now, then every few ticks while time passes.
 
     Args:
         colony: In an episode; it is moved on by `ticks`.
         ticks: How many; 0 gives the moment as it is. The last step is shorter if need be.
         every: Ticks from one moment to the next, at least 1.
-        world: Number of the world.
 
     Raises:
         AntsError: A number is not allowed, or no episode has begun.
@@ -146,18 +143,18 @@ def colony_moments(
     expect("colony", colony, Colony)
     ticks = checked_count("ticks", ticks, least=0)
     every = checked_count("every", every)
-    yield _moment(colony, world)
+    yield _moment(colony)
     for done in range(0, ticks, every):
         colony.tick(min(every, ticks - done))
-        yield _moment(colony, world)
+        yield _moment(colony)
 
 
-def _moment(colony: Colony, world: int) -> Moment:
-    snapshot = colony.snapshot(world)
+def _moment(colony: Colony) -> Moment:
+    snapshot = colony.snapshot()
     numbers = {
         "tick": colony.ticks,
         "ants": len(snapshot.ant_cells),
         "with food": snapshot.ant_carries.sum(),
-        "delivered": colony.outcome().deliveries[0, world],
+        "delivered": colony.outcome().deliveries[0, 0],
     }
     return snapshot, Status(tuple((name, str(number)) for name, number in numbers.items()))

@@ -152,5 +152,4 @@ class Rasteriser:
             world = self.grid.count * 1.5 * _SQRT_3 * hexagon**2
             covered = len(places) * math.pi * DOT**2 / world
             opacity = min(1.0, 0.5 * max(covered, 1e-9) ** -0.6)
-        looks = (snapshot.ant_headings, snapshot.ant_carries, hexagon)
-        return ants(places, *looks, opacity=opacity)
+        return ants(places, snapshot.ant_headings, snapshot.ant_carries, hexagon, opacity=opacity)

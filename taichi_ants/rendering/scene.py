@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from numbers import Real
-
 import numpy as np
 
 from taichi_ants.errors import AntsError, check_whole, checked_flag, expect, shown
@@ -29,8 +26,8 @@ def check_size(size: tuple[int, int]) -> tuple[int, int]:
     """Width and height of a picture; AntsError if they are no two numbers from 64 to 4096."""
     if not isinstance(size, (tuple, list)) or len(size) != 2:
         raise AntsError(f"the size is {shown(size)}; it must be a width and a height in pixels.")
-    for name, side in zip(("width", "height"), size, strict=True):
-        check_whole(f"the {name} of the size", side, SMALLEST_SIDE, LARGEST_SIDE, " pixels")
+    for side in size:
+        check_whole("a side of the size", side, SMALLEST_SIDE, LARGEST_SIDE, " pixels")
     return size[0], size[1]
 
 
@@ -64,10 +61,8 @@ class Scene:
         expect("grid", grid, AxialGrid)
         width, height = check_size(size)
         expect("title", title, str)
-        if not isinstance(full_level, (float, Real)) or not 0 < full_level < math.inf:
-            raise AntsError(f"full_level is {shown(full_level)}; it must be a number above 0.")
         self._plain = checked_flag("plain", plain)
-        self._letters = letters = round(min(width, height) / 38)
+        letters = round(min(width, height) / 38)
         self._background = np.full((height, width, 3), colours.channels(colours.PAGE))
         margin = max(2, round(min(width, height) / 60))
         self._has_panel = not plain and letters >= text.SMALLEST

@@ -37,7 +37,7 @@ _TOP, _HEADING, _BELOW = 145, 70, 47  # heights of what stands above all, a half
 
 _HALVES = ("Foraging (without food)", "Carrying (with food)")
 _EXPLANATION = (
-    "A drawing is a state: what the ant sees{}. The arrow and the word are its best action.",
+    "A drawing is a state: what the ant sees. The arrow and the word are its best action.",
     "The longer the bar, the worse the second best action; where the bar is empty, it is as good.",
     "E empty, O obstacle (or the outside), T trail, S nearer to the queen.",
 )
@@ -112,7 +112,7 @@ def policy_sheet(
     tile = picture.height + _BELOW
     heights = [_HEADING + max(1, math.ceil(len(states) / _COLUMNS)) * tile for states in drawn]
     sheet = np.full((_TOP + sum(heights) + _MARGIN, WIDTH, 3), colours.channels(colours.PAGE))
-    _write_head(sheet, title, observation)
+    _write_head(sheet, title)
     top = _TOP
     for half, states, name, height in zip(halves, drawn, _HALVES, heights, strict=True):
         n = len(known.intersection(half))
@@ -133,13 +133,12 @@ def policy_sheet(
     return sheet
 
 
-def _write_head(sheet: np.ndarray, title: str, observation: Observation) -> None:
+def _write_head(sheet: np.ndarray, title: str) -> None:
     room = WIDTH - 2 * _MARGIN
     text.write(sheet, title, _MARGIN, _MARGIN + _LARGE, _LARGE, room=room)
-    ahead = " to its left, ahead and to its right" if len(observation.cells) == 3 else ""
     for number, line in enumerate(_EXPLANATION):
         y = _MARGIN + 2 * _LARGE + number * 1.5 * _SMALL
-        text.write(sheet, line.format(ahead), _MARGIN, y + 7, _SMALL, colours.FAINT_INK)
+        text.write(sheet, line, _MARGIN, y + 7, _SMALL, colours.FAINT_INK)
 
 
 def _write_action(tile: np.ndarray, top: int, best: list[int], clear: float) -> None:

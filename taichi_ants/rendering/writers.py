@@ -24,9 +24,8 @@ from taichi_ants.rendering import colours
 
 DEFAULT_FPS = 8.0
 PAUSE = 1.5  # seconds, for which episodes are shown as they ended
-_SLOWEST, _FASTEST = 0.1, 50.0  # viewers slow a GIF down that is faster
 
-_N_FREE_COLOURS = 200  # of a palette's 256
+# The colours of scenes, which all palettes hold.
 _KEPT = (
     *(colours.PAGE, colours.CELL_EMPTY, colours.CELL_OBSTACLE, colours.CELL_FOOD),
     *(colours.CELL_QUEEN, colours.FLOOR_FOOD, colours.FLOOR_QUEEN, colours.ANT),
@@ -42,9 +41,6 @@ def check_animation(path: files.PathLike, fps: float = DEFAULT_FPS) -> Path:
         path: The file, .gif or .mp4; without an ending a folder for numbered PNG pictures.
         fps: Frames per second, 0.1 to 50.
 
-    Returns:
-        The path.
-
     Raises:
         AntsError: The ending or the speed is not allowed, PyAV is missing for an .mp4, the folder
             holds something, or the place cannot be written to.
@@ -55,10 +51,9 @@ def check_animation(path: files.PathLike, fps: float = DEFAULT_FPS) -> Path:
             f"{str(path)!r} ends in {target.suffix!r}; an animation ends in .gif, .mp4, or in "
             "nothing for a folder of PNG pictures."
         )
-    if isinstance(fps, bool) or not isinstance(fps, Real) or not _SLOWEST <= fps <= _FASTEST:
-        raise AntsError(
-            f"fps is {shown(fps)}; it must be a number from {_SLOWEST:g} to {_FASTEST:g}."
-        )
+    if isinstance(fps, bool) or not isinstance(fps, Real) or not 0.1 <= fps <= 50:
+        # Viewers slow a GIF down that is faster.
+        raise AntsError(f"fps is {shown(fps)}; it must be a number from 0.1 to 50.")
     if target.suffix.lower() == ".mp4":
         _import_av()
     if not target.suffix and target.exists() and (not target.is_dir() or any(target.iterdir())):
@@ -206,19 +201,12 @@ def _gif(frames: Iterable[np.ndarray], fps: float) -> bytes:
 
 
 def _palette(first: np.ndarray) -> np.ndarray:
-    """Colours for all frames, uint8 (n, 3): those of scenes, and what else represents the first.
-
-    With their mixtures along edges, since later frames show what the first one does not.
-    """
+    """Colours for all frames, uint8 (n, 3): those of scenes, and what else represents the first."""
     from PIL import Image
 
     kept = colours.channels(np.array(_KEPT))
-    shares = np.array([0.25, 0.5, 0.75])[:, None, None, None]
-    over = colours.channels(np.array([colours.PAGE, colours.ANT]))
-    mixed = (shares * kept[:, None] + (1 - shares) * over).astype(np.uint8)
-    sample = np.concatenate([mixed.reshape(-1, 3), first.reshape(-1, 3)[::7]])
-    sample = np.unique(sample, axis=0)
-    free = Image.fromarray(sample[None]).quantize(_N_FREE_COLOURS).getpalette()
+    sample = np.unique(first.reshape(-1, 3), axis=0)
+    free = Image.fromarray(sample[None]).quantize(200).getpalette()
     others = np.array(free, dtype=np.uint8).reshape(-1, 3)
     # Pillow looks colours up by their upper bits, so one close by would take a kept one's place.
     away = np.abs(others[:, None].astype(int) - kept).sum(axis=2).min(axis=1)
@@ -238,9 +226,10 @@ def _mp4(frames: Iterable[np.ndarray], fps: float) -> bytes:
         stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1000))
         stream.width, stream.height = width, height
         stream.pix_fmt = "yuv420p"
-        colour_space = "colorprim=bt709:transfer=bt709:colormatrix=bt709"
-        stream.options = {"crf": "17", "preset": "superfast", "tune": "animation"}
-        stream.options["x264-params"] = colour_space
+        stream.options = {
+            **{"crf": "17", "preset": "superfast", "tune": "animation"},
+            "x264-params": "colorprim=bt709:transfer=bt709:colormatrix=bt709",
+        }
         for frame in chain([first], waiting):
             picture = np.ascontiguousarray(frame[:height, :width])
             video = av.VideoFrame.from_ndarray(picture, format="rgb24")

@@ -47,7 +47,6 @@ CALLS: dict[str, list[tuple[str, Callable[[object], object]]]] = {
         ("size", lambda wrong: Scene(WORLD.grid, wrong)),
         ("title", lambda wrong: Scene(WORLD.grid, title=wrong)),
         ("plain", lambda wrong: Scene(WORLD.grid, plain=wrong)),
-        ("full_level", lambda wrong: Scene(WORLD.grid, full_level=wrong)),
         ("snapshot", lambda wrong: Scene(WORLD.grid).draw(wrong)),
         ("status", lambda wrong: Scene(WORLD.grid).draw(at_start(WORLD), wrong)),
     ],
@@ -64,7 +63,6 @@ CALLS: dict[str, list[tuple[str, Callable[[object], object]]]] = {
         ("colony", of(rendering.colony_moments, 3)),
         ("ticks", lambda wrong: next(rendering.colony_moments(colony(), wrong))),
         ("every", lambda wrong: next(rendering.colony_moments(colony(), 3, every=wrong))),
-        ("world", lambda wrong: next(rendering.colony_moments(colony(), 3, world=wrong))),
     ],
     "frames": [
         ("snapshot", lambda wrong: next(rendering.frames([(wrong, Status(()))]))),
@@ -115,7 +113,7 @@ def test_a_wrong_kind_is_named_in_one_sentence(
     called, named, call, wrong, tmp_path, monkeypatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    if named in ("fps", "full_level") and isinstance(wrong, float):
+    if named == "fps" and isinstance(wrong, float):
         wrong = "7.5"
     with pytest.raises(AntsError) as caught:
         call(wrong)

@@ -1,4 +1,4 @@
-"""Head-up lines, legend and text: what is there, and where it may be."""
+"""The panel, marks of the view and text: what is there, and where it may be."""
 
 from __future__ import annotations
 
