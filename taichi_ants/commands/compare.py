@@ -356,7 +356,7 @@ def render_policies(study: Study[RunPoint], results: Path, folder: Path) -> None
     with progress_bar("rendering") as report_progress:
         paths = sorted((results / POLICIES).glob("*.npz"))
         for done, path in enumerate(paths):
-            q_values, metadata = load_policy(path)
+            q_values, _, metadata = load_policy(path)
             config = metadata["config"]
             depth = config["hyperparameters"].get("planning_steps", 0)
             episode = Episode.play(

@@ -188,7 +188,7 @@ def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray,
     from taichi_ants import Colony, Task, load_policy, train
 
     if settings.policy:
-        q_values, _ = load_policy(settings.policy)
+        q_values = load_policy(settings.policy).q_values
         return q_values, settings.title or f"policy {Path(settings.policy).stem}"
     config, seed, episodes = training_config(settings), settings.seed, settings.episodes
     title = settings.title or f"{settings.learner} after {episodes} episodes"

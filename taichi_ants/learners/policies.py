@@ -1,21 +1,22 @@
 """Policies: tables of action values, two that need no learning, and their files.
 
-A policy is a float32 array of shape (128, 5): the value of each action in each state. An ant takes
-a best action, ties at random with equal probability. So a table can state a random choice, but no
-other probabilities.
+A policy is a float32 array of shape (n_states, 5): the value of each action in each state of an
+observation. An ant takes a best action, ties at random with equal probability. So a table can state
+a random choice, but no other probabilities.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from taichi_ants.errors import AntsError, shown
 from taichi_ants.files import PathLike, read_npz, to_json, write_npz
+from taichi_ants.task import observations
 from taichi_ants.task.constants import (
     FORWARD,
     GIVE,
@@ -30,16 +31,32 @@ from taichi_ants.task.constants import (
 )
 from taichi_ants.task.states import State, state_from_index
 
-Policy = npt.NDArray[np.float32]
+ActionValues = npt.NDArray[np.float32]
 
 
-def random_policy() -> Policy:
+class Policy(NamedTuple):
+    """What a policy file holds.
+
+    Attributes:
+        q_values: Action values, float32 (n_states, 5).
+        observation: Name of the registered observation whose states are the rows.
+        metadata: What made the policy.
+    """
+
+    q_values: ActionValues
+    observation: str
+    metadata: dict[str, Any]
+
+
+def random_policy(observation: str = "paper") -> ActionValues:
     """The policy that takes each of the five actions with equal probability, in every state."""
-    return np.zeros((N_STATES, N_ACTIONS), np.float32)
+    return np.zeros((observations.get(observation).n_states, N_ACTIONS), np.float32)
 
 
-def trail_follower() -> Policy:
-    """A hand-written policy that forages well: 1 for the actions that it takes, 0 for the others.
+def trail_follower() -> ActionValues:
+    """A hand-written policy of the paper's observation that forages well.
+
+    Values are 1 for the actions that it takes, 0 for the others.
 
     Without food it picks up what it sees, follows a trail (straight on where it can), and
     otherwise walks straight over open ground and turns at random beside anything that blocks.
@@ -70,20 +87,26 @@ def _choices(state: State) -> list[int]:
     return [FORWARD] if in_the_open and not state.carries else empty
 
 
-def save_policy(path: PathLike, q_values: npt.ArrayLike, metadata: Mapping[str, Any]) -> None:
-    """Write a policy file: an .npz with the action values and what made them.
+def save_policy(
+    path: PathLike,
+    q_values: npt.ArrayLike,
+    metadata: Mapping[str, Any],
+    observation: str = "paper",
+) -> None:
+    """Write a policy file: an .npz with the action values, their observation and what made them.
 
     Args:
         path: The file; the whole name, no ending is added.
-        q_values: Action values of shape (128, 5), finite as float32.
+        q_values: Action values of shape (n_states, 5), finite as float32.
         metadata: What made the policy (configuration, seed, world ...), anything that
             `files.write_json` can write.
+        observation: Name of the registered observation whose states are the rows.
 
     Raises:
-        AntsError: The values are no policy, the metadata cannot be written as JSON, or the file
-            cannot be written.
+        AntsError: The observation is unknown, the values are no policy of it, the metadata cannot
+            be written as JSON, or the file cannot be written.
     """
-    table = _checked(q_values, "q_values")
+    table = _checked(q_values, observation, "q_values")
     if not isinstance(metadata, Mapping):
         raise AntsError(f"metadata is {shown(metadata)}; it must be a mapping of names to values.")
     try:
@@ -94,20 +117,19 @@ def save_policy(path: PathLike, q_values: npt.ArrayLike, metadata: Mapping[str, 
             f"metadata is {shown(metadata)}, which JSON cannot hold ({reason}); use numbers, text, "
             "lists and mappings."
         ) from error
-    write_npz(path, {"q_values": table, "metadata": np.array(text)})
+    arrays = {"q_values": table, "observation": np.array(observation), "metadata": np.array(text)}
+    write_npz(path, arrays)
 
 
-def load_policy(path: PathLike) -> tuple[Policy, dict[str, Any]]:
+def load_policy(path: PathLike) -> Policy:
     """Read a policy file that `save_policy` wrote.
 
-    Returns:
-        The action values, float32 of shape (128, 5), and the metadata.
-
     Raises:
-        AntsError: The file is missing, damaged, no policy file, or its values are no policy.
+        AntsError: The file is missing, damaged, no policy file, of an observation that is not
+            registered, or its values are no policy of it.
     """
     arrays = read_npz(path)
-    missing = [name for name in ("q_values", "metadata") if name not in arrays]
+    missing = [name for name in ("q_values", "observation", "metadata") if name not in arrays]
     if missing:
         raise AntsError(
             f"{str(path)!r} holds no {' and no '.join(missing)}; name a policy file that "
@@ -122,20 +144,29 @@ def load_policy(path: PathLike) -> tuple[Policy, dict[str, Any]]:
             f"the metadata in {str(path)!r} is not a JSON object; name a policy file that "
             "save_policy wrote."
         )
-    return _checked(arrays["q_values"], f"q_values in {str(path)!r}"), metadata
+    observation = str(arrays["observation"][()])
+    if observation not in observations.names():
+        raise AntsError(
+            f"{str(path)!r} holds a policy of the observation {shown(observation)}, which is not "
+            "registered; name the file that registers it with --plugin, or import it."
+        )
+    table = _checked(arrays["q_values"], observation, f"q_values in {str(path)!r}")
+    return Policy(table, observation, metadata)
 
 
-def _checked(q_values: npt.ArrayLike, what: str) -> Policy:
+def _checked(q_values: npt.ArrayLike, observation: str, what: str) -> ActionValues:
     """A float32 copy of action values, or an AntsError that says what is wrong with them."""
+    shape = (observations.get(observation).n_states, N_ACTIONS)
     try:
         table = np.asarray(q_values)
     except ValueError as error:  # rows of different lengths
         raise AntsError(f"{what} is no array ({error}); it must hold real numbers.") from error
     if table.dtype.kind not in "fiu":
         raise AntsError(f"{what} has the type {table.dtype}; it must hold real numbers.")
-    if table.shape != (N_STATES, N_ACTIONS):
+    if table.shape != shape:
         raise AntsError(
-            f"{what} has the shape {table.shape}; it must be ({N_STATES}, {N_ACTIONS})."
+            f"{what} has the shape {table.shape}; for the observation {observation!r} it must be "
+            f"{shape}."
         )
     # A float64 beyond the range of float32 becomes infinite, which the next check reports.
     with np.errstate(over="ignore"):

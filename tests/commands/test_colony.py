@@ -119,7 +119,7 @@ def test_tables_of_ones_own_are_trained_and_kept_apart(finished):
 
 def test_policies_say_where_they_come_from(finished):
     _, folder = finished
-    q_values, metadata = load_policy(folder / "policies" / "open_joint_3.npz")
+    q_values, _, metadata = load_policy(folder / "policies" / "open_joint_3.npz")
     assert q_values.any()
     assert (metadata["way"], metadata["ants"], metadata["arena"]) == ("joint", 3, "open")
     assert metadata["seed"] in SEEDS

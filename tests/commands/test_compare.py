@@ -230,7 +230,7 @@ def test_baselines(finished):
 def test_policies_are_those_of_median_runs_of_each_behaviour(finished):
     rows = read_csv(finished / "summary.csv")
     for name in SHOWN:
-        q_values, metadata = load_policy(finished / "policies" / f"{name}.npz")
+        q_values, _, metadata = load_policy(finished / "policies" / f"{name}.npz")
         behaviour = metadata["behaviour"].replace(" ", "_")
         delivery, learner = name.removesuffix(f"_{behaviour}").split("_", 1)
         mine = [
@@ -312,7 +312,7 @@ def test_evaporation_is_chosen_told_and_kept_apart(training, greedy, tmp_path, c
 def test_pictures_show_the_episode_that_told_the_behaviour(finished, tmp_path):
     """Without evaporation, as in training."""
     name = "continuing_sarsa_circles_with_food"
-    q_values, metadata = load_policy(finished / "policies" / f"{name}.npz")
+    q_values, _, metadata = load_policy(finished / "policies" / f"{name}.npz")
     shown = (finished / "renders" / f"{name}.gif").read_bytes()
     for evaporation in (False, True):
         path = tmp_path / f"{evaporation}.gif"

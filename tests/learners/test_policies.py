@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from taichi_ants import reference
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.policies import load_policy, random_policy, save_policy, trail_follower
-from taichi_ants.task import Task
+from taichi_ants.task import Task, observations
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, N_STATES, PICK_UP, RIGHT
 from taichi_ants.task.states import parse_state
 from taichi_ants.worlds.open_world import open_world
@@ -97,11 +97,51 @@ def test_a_policy_comes_back_from_its_file(tmp_path: Path) -> None:
     metadata = {"learner": "sarsa", "seed": np.int64(3), "world": "world of é", "none": None}
     path = tmp_path / "policy"
     save_policy(path, q_values, metadata)
-    loaded, loaded_metadata = load_policy(path)
+    loaded, observation, loaded_metadata = load_policy(path)
     np.testing.assert_array_equal(loaded, q_values)
     assert loaded.dtype == np.float32
+    assert observation == "paper"
     assert loaded_metadata == {"learner": "sarsa", "seed": 3, "world": "world of é", "none": None}
     assert [entry.name for entry in tmp_path.iterdir()] == ["policy"]
+
+
+def write(path: Path, **arrays: np.ndarray) -> None:
+    """Write a policy file with some of its arrays exchanged."""
+    whole = {
+        "q_values": random_policy(),
+        "observation": np.array("paper"),
+        "metadata": np.array("{}"),
+    }
+    np.savez(path, **(whole | arrays))
+
+
+@pytest.mark.parametrize("observation", observations.names())
+def test_a_policy_of_any_observation_comes_back_with_its_name(
+    tmp_path: Path, observation: str
+) -> None:
+    n_states = observations.get(observation).n_states
+    q_values = np.random.default_rng(2).normal(size=(n_states, 5)).astype(np.float32)
+    save_policy(tmp_path / "policy.npz", q_values, {}, observation)
+    policy = load_policy(tmp_path / "policy.npz")
+    assert policy.observation == observation
+    np.testing.assert_array_equal(policy.q_values, q_values)
+
+
+def test_a_policy_of_an_observation_that_nobody_registered_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "policy.npz"
+    with pytest.raises(AntsError, match="there is no observation 'smell'"):
+        save_policy(path, random_policy(), {}, "smell")
+    assert list(tmp_path.iterdir()) == []
+    write(path, observation=np.array("smell"))
+    with pytest.raises(AntsError, match=r"policy\.npz.*'smell', which is not registered; .*plugin"):
+        load_policy(path)
+
+
+def test_a_policy_of_another_size_than_its_observation_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "policy.npz"
+    write(path, observation=np.array("ants_seen"))
+    with pytest.raises(AntsError, match=r"\(128, 5\); .*'ants_seen' it must be \(250, 5\)"):
+        load_policy(path)
 
 
 def test_other_number_types_are_converted(tmp_path: Path) -> None:
@@ -109,7 +149,7 @@ def test_other_number_types_are_converted(tmp_path: Path) -> None:
     save_policy(path, np.ones((128, 5), np.int64).tolist(), {})
     assert load_policy(path)[0].dtype == np.float32
     big_endian = np.ones((128, 5), ">f8")
-    np.savez(path, q_values=big_endian, metadata=np.array("{}"))
+    write(path, q_values=big_endian)
     np.testing.assert_array_equal(load_policy(path)[0], np.ones((128, 5), np.float32))
 
 
@@ -133,7 +173,7 @@ def test_values_that_are_no_policy_are_refused_both_ways(
     with pytest.raises(AntsError, match=message):
         save_policy(path, q_values, {})
     assert list(tmp_path.iterdir()) == []
-    np.savez(path, q_values=q_values, metadata=np.array("{}"))
+    write(path, q_values=q_values)
     with pytest.raises(AntsError, match=message) as raised:
         load_policy(path)
     assert str(path) in str(raised.value)
@@ -150,14 +190,14 @@ def test_one_value_that_is_not_finite_is_named(tmp_path: Path, bad: float) -> No
 @pytest.mark.parametrize("text", ["", "{", "[]", "3", '"x"'])
 def test_metadata_that_is_no_object_is_refused(tmp_path: Path, text: str) -> None:
     path = tmp_path / "policy.npz"
-    np.savez(path, q_values=random_policy(), metadata=np.array(text))
+    write(path, metadata=np.array(text))
     with pytest.raises(AntsError, match="not a JSON object"):
         load_policy(path)
 
 
 def test_metadata_of_another_form_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "policy.npz"
-    np.savez(path, q_values=random_policy(), metadata=np.zeros(3))
+    write(path, metadata=np.zeros(3))
     with pytest.raises(AntsError, match="not a JSON object"):
         load_policy(path)
 
@@ -165,9 +205,9 @@ def test_metadata_of_another_form_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arrays", "missing"),
     [
-        ({"metadata": np.array("{}")}, "no q_values"),
-        ({"q_values": random_policy()}, "no metadata"),
-        ({"weights": random_policy()}, "no q_values and no metadata"),
+        ({"metadata": np.array("{}")}, "no q_values and no observation"),
+        ({"q_values": random_policy()}, "no observation and no metadata"),
+        ({"weights": random_policy()}, "no q_values and no observation and no metadata"),
     ],
 )
 def test_a_foreign_archive_is_refused(tmp_path: Path, arrays: dict, missing: str) -> None:
@@ -180,7 +220,7 @@ def test_a_foreign_archive_is_refused(tmp_path: Path, arrays: dict, missing: str
 @pytest.mark.parametrize("deep", ["[" * 100_000, '{"a":' * 100_000])
 def test_metadata_nested_beyond_reason_is_damaged(tmp_path: Path, deep: str) -> None:
     path = tmp_path / "policy.npz"
-    np.savez(path, q_values=random_policy(), metadata=np.array(deep))
+    write(path, metadata=np.array(deep))
     with pytest.raises(AntsError, match="not a JSON object"):
         load_policy(path)
 
@@ -246,4 +286,4 @@ def test_a_damaged_file_gives_one_clear_error_or_the_same_policy(
         assert str(path) in str(outcome)
     else:
         np.testing.assert_array_equal(outcome[0], trail_follower())
-        assert outcome[1] == metadata
+        assert outcome[1:] == ("paper", metadata)
