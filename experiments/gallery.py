@@ -24,10 +24,10 @@ _COLONY = [
     *("--title", "a colony that learned together"),
 ]
 GALLERY: dict[str, list[str]] = {
-    "still.png": [*_COLONY, "--step", "400"],
+    "still.png": [*_COLONY, "--ticks", "400", "--every", "400", "--size", "1280x720"],
     "colony.gif": [
         *(*_COLONY, "--ticks", "300", "--every", "6", "--fps", "10"),
-        *("--size", "800x450", "--no-legend"),
+        *("--size", "800x450"),
     ],
     "episode.gif": [
         *("episode", "--world", _MAP, "--size", "960x540", "--fps", "4"),

@@ -350,7 +350,7 @@ def render_policies(study: Study[RunPoint], results: Path, folder: Path) -> None
 
     Each picture is the beginning of the episode that told the behaviour: with evaporation as in
     training, not as in the greedy evaluation. The title names learner and delivery, the first of
-    the head-up lines what the ant does.
+    the lines beside the world what the ant does.
     """
     from dataclasses import replace
 
@@ -372,8 +372,7 @@ def render_policies(study: Study[RunPoint], results: Path, folder: Path) -> None
                 max_steps=min(first.max_steps, RENDERED_STEPS),
                 task=as_in_training(first.task),
             )
-            whole = episode.delivered or len(episode.trace) == first.max_steps
-            episode = replace(episode, name=metadata["behaviour"], whole=whole)
+            episode = replace(episode, name=metadata["behaviour"])
             title = f"{Variant(config['learner'], depth).label}, {metadata['task']['delivery']}"
             pictures = frames(episode.moments(), (720, 480), title=title)
             save_animation(place / f"{path.stem}.gif", pictures, pause=PAUSE)

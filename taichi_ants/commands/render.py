@@ -1,16 +1,15 @@
 """Pictures of ants: an episode, a colony, learning made visible, or a policy sheet.
 
 All but learning follow a policy from a file, or one that is trained on the spot. The ending of
---out chooses the kind of file: .gif, .webp, .mp4, .png for a single picture, and without an ending
-a folder of PNG pictures.
+--out chooses the kind of file: .gif, .mp4, .png for a picture of the end, and without an ending a
+folder of PNG pictures.
 """
 
 from __future__ import annotations
 
 import argparse
-import signal
-import sys
-from collections.abc import Iterable
+from collections import deque
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,9 +27,10 @@ from taichi_ants.studies.command_line import (
 if TYPE_CHECKING:
     import numpy as np
 
-    from taichi_ants import Task, World
+    from taichi_ants import World
     from taichi_ants.learners.config import TrainingConfig
     from taichi_ants.rendering import Stage
+    from taichi_ants.rendering.moments import Moment
 
 KINDS = {  # what each subcommand shows, and how it is called
     "episode": ("One ant that follows a policy", "--policy my.npz --epsilon 0.1 --out ant.mp4"),
@@ -38,8 +38,6 @@ KINDS = {  # what each subcommand shows, and how it is called
     "learning": ("One ant before and after it learns, side by side", "--stages 0 20 500"),
     "sheet": ("What a policy does in each state", "--policy my.npz --out sheet.png"),
 }
-
-_IN_WORDS = {"delivers": "delivered", "other": ""}  # all others speak for themselves
 
 
 def _size(text: str) -> tuple[int, int]:
@@ -62,15 +60,13 @@ _OPTIONS: dict[str, tuple[str, str, dict[str, Any]]] = {
     "--out": ("ecls", "file or folder", {"metavar": "PATH"}),
     "--title": ("ecls", "a line above all", {"metavar": "TEXT"}),
     "--world": ("ecls", "paper, open, or the path of a map file", {"default": "paper"}),
-    "--world-seed": ("ecls", "seed of a world drawn at random", _SEED),
+    "--world-seed": ("ecls", "seed of a world drawn at random", {**_SEED, "default": None}),
     "--seed": ("ecls", "seed of training and of what is shown", _SEED),
     "--plugin": ("ecls", "a Python file that registers learners or worlds", {"metavar": "FILE"}),
     "--ants": ("c", "how many", {**_COUNT, "default": 80}),
     "--max-steps": ("el", "step limit of the episode shown", _LENGTH),
     "--ticks": ("c", "length of an episode", _LENGTH),
-    "--number": ("e", "which of the seed's rollouts", {**_SEED, "type": whole_number(0)}),
     "--epsilon": ("ecl", "probability of a random action", {**_NUMBER, "default": 0.0}),
-    "--no-evaporation": ("ecl", "trails stay as they are", _FLAG),
     "--policy": ("ecs", "a policy file (.npz); without one, it is trained", {"metavar": "FILE"}),
     "--learner": ("ecls", "name of the learner to train", {"default": "sarsa", "metavar": "NAME"}),
     "--episodes": ("ecs", "of training", {**_COUNT, "default": 500}),
@@ -79,21 +75,13 @@ _OPTIONS: dict[str, tuple[str, str, dict[str, Any]]] = {
     "--discount": ("ecls", "in [0, 1]", {**_NUMBER, "default": 0.9}),
     "--train-epsilon": ("ecls", "epsilon in the first episode", {**_NUMBER, "default": 0.3}),
     "--epsilon-decay": ("ecls", "a factor after each episode", {**_NUMBER, "default": 0.99}),
-    "--planning-steps": ("ecls", "of learners that plan", _COUNT),
     "--size": ("ecl", "in pixels", {"type": _size, "metavar": "WxH"}),
     "--fps": ("ecl", "pictures a second", {**_NUMBER, "default": 8.0}),
     "--every": ("c", "ticks from one picture to the next", {**_COUNT, "default": 4}),
-    "--step": ("ec", "of a .png: which one, else the last", {**_SEED, "default": None}),
-    "--no-hud": ("ec", "no head-up lines", _FLAG),
-    "--no-legend": ("ec", "no legend", _FLAG),
-    "--no-view": ("e", "do not mark the cells in view", _FLAG),
+    "--plain": ("ec", "the world alone, without text and marks", _FLAG),
     "--all-states": ("s", "also those that were not visited", _FLAG),
 }
-_OF_TRAINING = (
-    *("learner", "episodes", "learning_rate", "discount", "train_epsilon", "epsilon_decay"),
-    "planning_steps",
-)
-# Where a kind has defaults of its own. A still picture has 1280x720 pixels.
+# Where a kind has defaults of its own.
 _DEFAULTS: dict[str, dict[str, Any]] = {
     "episode": {"out": "results/renders/episode.gif", "size": "1280x720"},
     "colony": {
@@ -119,61 +107,36 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
         for flag, (where, words, reading) in _OPTIONS.items():
             if kind[0] in where:
                 one.add_argument(flag, help=words, **reading)
-        one.set_defaults(**_DEFAULTS[kind])
-    given = sys.argv[1:] if arguments is None else arguments
-    parser.parse_args(given)
-    kind = given[0]
-    settings, named = kinds.choices[kind].parse_given(given[1:])
-    settings.kind, settings.world_seed_given = kind, "world_seed" in named
-    settings.still = Path(settings.out).suffix.lower() == ".png" and kind != "learning"
-    if kind != "sheet" and "size" not in named:
-        settings.size = _size("1280x720" if settings.still else settings.size)
-    for name, flag in named.items():
-        if name in _OF_TRAINING and getattr(settings, "policy", None):
-            parser.error(f"{flag} is for training, but --policy is given; leave out one of the two")
-        if name == "step" and not settings.still:
-            parser.error(f"{flag} is for a single picture; leave it out, or let --out end in .png")
-        if name in ("fps", "every") and settings.still:
-            parser.error(f"{flag} is for an animation, but --out ends in .png; leave out one")
-    return settings
+        one.set_defaults(kind=kind, **_DEFAULTS[kind])
+    return parser.parse_args(arguments)
 
 
 def show(settings: argparse.Namespace) -> None:
     """Make what was asked for, and say what it is."""
     from taichi_ants import worlds
-    from taichi_ants.rendering import check_animation, check_picture, check_size
+    from taichi_ants.rendering import check_animation, check_picture
 
-    if settings.kind != "sheet":
-        check_size(settings.size)
-    if settings.still or settings.kind == "sheet":
+    if settings.kind == "sheet" or (settings.kind != "learning" and _is_still(settings)):
         check_picture(settings.out)
     else:
         check_animation(settings.out, settings.fps)
     if settings.plugin:
         load_plugin(settings.plugin)
-    if settings.world_seed_given:
+    if settings.world_seed is not None:
         worlds.check_seed_counts(settings.world)
-    world = worlds.build(settings.world, settings.world_seed)
+    world = worlds.build(settings.world, settings.world_seed or 0)
     kinds = (show_episode, show_colony, show_learning, show_sheet)
     dict(zip(KINDS, kinds, strict=True))[settings.kind](settings, world)
 
 
 def show_episode(settings: argparse.Namespace, world: World) -> None:
-    """Write an episode as an animation, or one step of it as a picture."""
-    from taichi_ants.rendering import Episode, frames, save_picture
+    """Write an episode as an animation, or its end as a picture."""
+    from taichi_ants.rendering import Episode
 
     q_values, title = find_policy(settings, world)
-    episode = Episode.play(
-        world, q_values, number=settings.number, max_steps=settings.max_steps, **_acting(settings)
-    )
-    look = {**_look(settings, title), "view": not settings.no_view}
-    if settings.still:
-        last = len(episode) - 1
-        step = last if settings.step is None else settings.step
-        save_picture(settings.out, next(frames([episode.moment(step)], **look)))
-        print(f"{settings.out}: step {step} of {last}")
-        return
-    _save(settings, frames(episode.moments(), **look), len(episode))
+    rules = {"seed": settings.seed, "max_steps": settings.max_steps, "epsilon": settings.epsilon}
+    episode = Episode.play(world, q_values, **rules)
+    _save_moments(settings, episode.moments(), len(episode), title)
     outcome = "delivered" if episode.delivered else "not delivered"
     rewards = int(episode.trace.rewards.sum())
     print(f"{settings.out}: {len(episode.trace)} steps, return {rewards}, {outcome}")
@@ -182,29 +145,19 @@ def show_episode(settings: argparse.Namespace, world: World) -> None:
 def show_colony(settings: argparse.Namespace, world: World) -> None:
     """Let a colony learn together, then write an episode in which it follows what it has learned.
 
-    As a single picture, the episode is shown at its last tick, or at `--step`.
+    As a single picture, the episode is shown at its last tick.
     """
     from taichi_ants import Colony
     from taichi_ants.errors import count
-    from taichi_ants.rendering import colony_moments, frames, save_picture
+    from taichi_ants.rendering import colony_moments
 
     q_values, title = find_policy(settings, world)
     config = replace(training_config(settings), epsilon=settings.epsilon, min_epsilon=0.0)
-    colony = Colony(
-        *(world, task_of(settings), config, settings.seed, settings.ants),
-        sharing="fixed",
-        q_values=q_values,
-    )
+    who = (config, settings.seed, settings.ants)
+    colony = Colony(world, None, *who, sharing="fixed", q_values=q_values)
     colony.begin_episode()
-    look = _look(settings, title)
-    if settings.still:
-        ticks = settings.ticks if settings.step is None else settings.step
-        if ticks:
-            colony.tick(ticks)
-        save_picture(settings.out, next(frames(colony_moments(colony), **look)))
-    else:
-        moments = colony_moments(colony, settings.ticks, settings.every)
-        _save(settings, frames(moments, **look), 1 + -(-settings.ticks // settings.every))
+    moments = colony_moments(colony, settings.ticks, settings.every)
+    _save_moments(settings, moments, 1 + -(-settings.ticks // settings.every), title)
     delivered = count(int(colony.outcome().deliveries.sum()), "delivery")
     ants, ticks = count(settings.ants, "ant"), count(colony.ticks, "tick")
     print(f"{settings.out}: {ants}, {ticks}, {delivered}")
@@ -232,88 +185,88 @@ def show_sheet(settings: argparse.Namespace, world: World) -> None:
 
 def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray, str]:
     """The action values (128, 5) to follow, and a title that says where they come from."""
-    from taichi_ants import Colony, load_policy, train
+    from taichi_ants import Colony, Task, load_policy, train
 
     if settings.policy:
         q_values = load_policy(settings.policy).q_values
         return q_values, settings.title or f"policy {Path(settings.policy).stem}"
     config, seed, episodes = training_config(settings), settings.seed, settings.episodes
+    title = settings.title or f"{settings.learner} after {episodes} episodes"
     with progress_bar("Training") as progress:
-        if settings.kind == "colony":
-            colony = Colony(world, task_of(settings), config, seed, settings.ants)
-            colony.run(episodes, settings.ticks, progress)
-            title = f"{settings.learner}, {episodes} episodes together"
-            return colony.q_values[0], settings.title or title
-        result = train(world, config, seed, episodes, progress=progress)
-    title = f"{settings.learner} after {episodes} episodes"
-    return result.q_values[0, 0], settings.title or title
+        if settings.kind != "colony":
+            result = train(world, config, seed, episodes, progress=progress)
+            return result.q_values[0, 0], title
+        task = Task(evaporation_in_training=True)  # trails fall while it learns too
+        colony = Colony(world, task, config, seed, settings.ants)
+        colony.run(episodes, settings.ticks, progress)
+    return colony.q_values[0], title
 
 
 def training_config(settings: argparse.Namespace) -> TrainingConfig:
     from taichi_ants import TrainingConfig
 
-    given = settings.planning_steps
     return TrainingConfig(
         learner=settings.learner,
         learning_rate=settings.learning_rate,
         discount=settings.discount,
         epsilon=settings.train_epsilon,
         epsilon_decay=settings.epsilon_decay,
-        hyperparameters={} if given is None else {"planning_steps": given},
     )
 
 
 def noted_stages(settings: argparse.Namespace, world: World) -> list[Stage]:
     """The stages of an ant that learns, each with what it does then in words."""
-    from taichi_ants.analysis.behaviour import BEHAVIOURS, classify
+    from taichi_ants.analysis.behaviour import BEHAVIOURS, DELIVERS, OTHER, classify
     from taichi_ants.rendering import learning_stages
 
     with progress_bar("Training") as progress:
         stages = learning_stages(
             world,
             training_config(settings),
+            seed=settings.seed,
             stages=settings.stages,
             max_steps=settings.max_steps,
+            epsilon=settings.epsilon,
             progress=progress,
-            **_acting(settings),
         )
-    noted = []
-    for stage in stages:
-        (number,), _ = classify(stage.episode.trace, settings.max_steps)
-        behaviour = BEHAVIOURS[number]
-        noted.append(replace(stage, note=_IN_WORDS.get(behaviour, behaviour)))
-    return noted
+    numbers = [classify(stage.episode.trace, settings.max_steps)[0][0] for stage in stages]
+    return [
+        stage if number in (DELIVERS, OTHER) else replace(stage, note=BEHAVIOURS[number])
+        for stage, number in zip(stages, numbers, strict=True)
+    ]
 
 
-def task_of(settings: argparse.Namespace) -> Task:
-    """The paper's task; in a colony trails fall while it learns too."""
-    from taichi_ants import Task
-
-    falls = not settings.no_evaporation
-    in_training = falls and settings.kind == "colony"
-    return Task(evaporation_in_training=in_training, evaporation_in_evaluation=falls)
+def _is_still(settings: argparse.Namespace) -> bool:
+    return Path(settings.out).suffix.lower() == ".png"
 
 
-def _acting(settings: argparse.Namespace) -> dict[str, Any]:
-    return {"seed": settings.seed, "task": task_of(settings), "epsilon": settings.epsilon}
+def _save_moments(
+    settings: argparse.Namespace, moments: Iterable[Moment], n: int, title: str
+) -> None:
+    """Write n moments as an animation, or the last one as a picture."""
+    from taichi_ants.rendering import frames, save_picture
 
-
-def _look(settings: argparse.Namespace, title: str) -> dict[str, Any]:
-    hud, legend = not settings.no_hud, not settings.no_legend
-    return {"size": settings.size, "hud": hud, "legend": legend, "title": title}
+    look: dict[str, Any] = {"size": settings.size, "title": title, "plain": settings.plain}
+    if _is_still(settings):
+        (last,) = deque(moments, maxlen=1)
+        save_picture(settings.out, next(frames([last], **look)))
+    else:
+        _save(settings, frames(moments, **look), n)
 
 
 def _save(settings: argparse.Namespace, pictures: Iterable[np.ndarray], n: int) -> None:
     """Write n pictures as an animation."""
     from taichi_ants.rendering import PAUSE, save_animation
 
+    def counted() -> Iterator[np.ndarray]:
+        for done, picture in enumerate(pictures, start=1):
+            yield picture
+            progress(done / n)
+
     with progress_bar("Rendering") as progress:
-        options: dict[str, Any] = {"pause": PAUSE, "n": n, "progress": progress}
-        save_animation(settings.out, pictures, settings.fps, **options)
+        save_animation(settings.out, counted(), settings.fps, pause=PAUSE)
 
 
 def main(arguments: list[str] | None = None) -> None:
     """The command line."""
-    # A polite request to end leaves nothing behind either.
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     run_command(lambda: show(parse_arguments(arguments)), "Stopped; nothing was left behind.")

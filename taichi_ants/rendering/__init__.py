@@ -1,9 +1,8 @@
-"""Pictures of worlds and their ants, without a display: stills, GIF, WebP, MP4.
+"""Pictures of worlds and their ants, without a display: stills, GIF, MP4.
 
 - A moment is a `Snapshot` of a world, as `Colony.snapshot` or `at_start` give it, with a `Status`,
   what is said of it. `Episode.moments` and `colony_moments` yield them.
-- `frames` draws moments as arrays, one at a time; `Scene` does so with one, and `Viewport` tells
-  which cell a pixel shows.
+- `frames` draws moments as arrays, one at a time; `Scene` does so with one.
 - `learning_stages` and `learning_frames` show one ant after more and more episodes, side by side.
 - `policy_sheet` shows what a policy does in each state.
 - `save_picture` and `save_animation` write arrays; a file appears when it is whole.
@@ -12,12 +11,10 @@
 from taichi_ants.rendering.learning import Stage, learning_frames, learning_stages
 from taichi_ants.rendering.moments import Episode, colony_moments, frames
 from taichi_ants.rendering.panel import Status
-from taichi_ants.rendering.scene import Scene, check_size
-from taichi_ants.rendering.sheet import best_actions, clarity, policy_sheet, usual_spread
+from taichi_ants.rendering.scene import Scene
+from taichi_ants.rendering.sheet import policy_sheet
 from taichi_ants.rendering.snapshot import Snapshot, at_start
-from taichi_ants.rendering.viewport import Viewport
 from taichi_ants.rendering.writers import (
-    DEFAULT_FPS,
     PAUSE,
     check_animation,
     check_picture,
@@ -26,20 +23,15 @@ from taichi_ants.rendering.writers import (
 )
 
 __all__ = [
-    "DEFAULT_FPS",
     "PAUSE",
     "Episode",
     "Scene",
     "Snapshot",
     "Stage",
     "Status",
-    "Viewport",
     "at_start",
-    "best_actions",
     "check_animation",
     "check_picture",
-    "check_size",
-    "clarity",
     "colony_moments",
     "frames",
     "learning_frames",
@@ -47,5 +39,4 @@ __all__ = [
     "policy_sheet",
     "save_animation",
     "save_picture",
-    "usual_spread",
 ]

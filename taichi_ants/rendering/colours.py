@@ -13,6 +13,7 @@ CELL_EMPTY = 0xE9ECEF
 CELL_OBSTACLE = 0x464B52
 CELL_FOOD = 0xD55E00
 CELL_QUEEN = 0xA312DC
+CELL_NEARER = 0xDCE3F2  # to the queen; on the policy sheet only
 # Under the drawings of food and queen, where cells are large enough for them.
 FLOOR_FOOD = 0xFBE6D4
 FLOOR_QUEEN = 0xF0DDFA
@@ -33,17 +34,12 @@ def channels(colours: int | np.ndarray) -> np.ndarray:
     return (words >> np.array([16, 8, 0], dtype=np.uint32)).astype(np.uint8)
 
 
-def pack(rgb: np.ndarray) -> np.ndarray:
-    """Colours 0xRRGGBB, uint32 (...), of red, green and blue (..., 3) from 0 to 255."""
-    red, green, blue = np.moveaxis(np.asarray(rgb).astype(np.uint32), -1, 0)
-    return red << 16 | green << 8 | blue
-
-
 def _ramp() -> np.ndarray:
     samples = channels(np.array([int(word, 16) for word in _TRAIL_SAMPLES.split()]))
     places = np.linspace(0, len(samples) - 1, 256)
     steps = [np.interp(places, np.arange(len(samples)), channel) for channel in samples.T]
-    table = pack(np.rint(np.stack(steps, axis=-1)))
+    red, green, blue = np.rint(steps).astype(np.uint32)
+    table = red << 16 | green << 8 | blue
     table.setflags(write=False)
     return table
 

@@ -1,8 +1,6 @@
-"""The kernels that turn cells and shapes into pixels. They assume valid arguments.
+"""The kernels that turn cells and marks into pixels. They assume valid arguments.
 
-A frame is uint8 (height, width, 3), colours are 0xRRGGBB. The origin `(x, y)` and the size
-`hexagon` are those of a `Viewport`; `columns`, `rows` and `z_range` those of an `AxialGrid`, whose
-cell 0 is void. Void cells have the colour of the page.
+A frame is uint8 (height, width, 3), colours are 0xRRGGBB.
 """
 
 import math
@@ -10,21 +8,13 @@ import math
 import taichi as ti
 from taichi.math import clamp, mix, vec2, vec3
 
-from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
 from taichi_ants.rendering import shapes
 from taichi_ants.rendering.colours import CELL_FOOD, PAGE
-
-# Shapes, as in a table of shapes.
-FOOD, QUEEN, IN_VIEW, ANT, ANT_WITH_FOOD, DART, DART_WITH_FOOD, DOT, ARROW, RING = range(10)
+from taichi_ants.rendering.marks import Mark
 
 BAND = 16  # rows that one thread draws
 _SQRT_3 = math.sqrt(3.0)
-# Of the six headings, clockwise from straight up: unit vectors, and steps in axial coordinates.
-_OUTWARD = [(math.sin(h * math.pi / 3), -math.cos(h * math.pi / 3)) for h in range(N_HEADINGS)]
-_STEPS = [(x - z, y - z) for x, y, z in HEADING_STEPS]
 _HALO = 1.2  # pixels around an ant in the colour of the page
-_HALF_RING = 1.0  # pixels, half the width of a ring
-_WHOLE = 255  # a share of a pixel
 
 
 @ti.func
@@ -35,126 +25,9 @@ def unpack(colour):
 
 
 @ti.func
-def pack(rgb):
-    """A colour from red, green and blue, 0 to 255."""
-    return (
-        ti.cast(rgb.x + 0.5, ti.u32) << 16
-        | ti.cast(rgb.y + 0.5, ti.u32) << 8
-        | ti.cast(rgb.z + 0.5, ti.u32)
-    )
-
-
-@ti.func
 def put(frame: ti.template(), y, x, rgb):
     for channel in ti.static(range(3)):
         frame[y, x, channel] = ti.cast(rgb[channel] + 0.5, ti.u8)
-
-
-@ti.func
-def covered(distance, slope_x, slope_y):
-    """The share of a pixel on the inner side of a straight edge.
-
-    `distance` is that of the pixel's centre, positive inside; the slopes are the absolute values of
-    the edge's unit normal.
-    """
-    flat = ti.max(slope_x, slope_y)
-    steep = ti.max(ti.min(slope_x, slope_y), 1e-6)
-    reach = distance + 0.5 * (flat + steep)
-    share = (reach - 0.5 * steep) / flat
-    if reach < steep:
-        share = ti.max(reach, 0.0) ** 2 / (2.0 * flat * steep)
-    elif reach > flat:
-        share = 1.0 - ti.max(flat + steep - reach, 0.0) ** 2 / (2.0 * flat * steep)
-    return share
-
-
-@ti.func
-def cell_number(q, r, columns, rows, z_range):
-    """The flat index of axial coordinates, 0 (void) beyond the array."""
-    column, row = q + z_range, r + z_range
-    inside = 0 <= column < columns and 0 <= row < rows
-    return ti.select(inside, row * columns + column, 0)
-
-
-@ti.func
-def nearest_cell(x, y, hexagon):
-    """Axial coordinates of the hexagon at (x, y) from the origin, by cube rounding."""
-    r = x / (1.5 * hexagon)
-    q = 0.5 * r - y / (_SQRT_3 * hexagon)
-    near_q, near_r, near_s = ti.round(q), ti.round(r), ti.round(r - q)
-    moved_q, moved_r = ti.abs(near_q - q), ti.abs(near_r - r)
-    moved_s = ti.abs(near_s - (r - q))
-    if moved_q > moved_r and moved_q > moved_s:
-        near_q = near_r - near_s
-    elif moved_r > moved_s:
-        near_r = near_q + near_s
-    return ti.cast(near_q, ti.i32), ti.cast(near_r, ti.i32)
-
-
-@ti.kernel
-def map_pixels(
-    nearest: ti.types.ndarray(dtype=ti.i32, ndim=2),
-    second: ti.types.ndarray(dtype=ti.i32, ndim=2),
-    shares: ti.types.ndarray(dtype=ti.i32, ndim=2),
-    line: ti.f32,
-    x: ti.f32,
-    y: ti.f32,
-    hexagon: ti.f32,
-    columns: ti.i32,
-    rows: ti.i32,
-    z_range: ti.i32,
-):
-    """Of each pixel the cell at its centre, the next cell, and the shares of both.
-
-    `shares` holds 0 to 255 for the cell and, shifted by 8, for the next one; the rest of the pixel
-    is the line of width `line` between them.
-    """
-    ti.loop_config(block_dim=BAND)
-    for j in range(nearest.shape[0]):
-        for i in range(nearest.shape[1]):
-            px, py = i + 0.5 - x, j + 0.5 - y
-            q, r = nearest_cell(px, py, hexagon)
-            from_centre = vec2(px - 1.5 * hexagon * r, py - _SQRT_3 * hexagon * (0.5 * r - q))
-            # The edge that is nearest, one for each heading.
-            distance, normal, dq, dr = 1e9, vec2(0.0), 0, 0
-            for h in ti.static(range(N_HEADINGS)):
-                outward = vec2(_OUTWARD[h][0], _OUTWARD[h][1])
-                inside = 0.5 * _SQRT_3 * hexagon - from_centre.dot(outward)
-                if inside < distance:
-                    distance, normal = inside, ti.abs(outward)
-                    dq, dr = _STEPS[h][0], _STEPS[h][1]
-            own = covered(distance - 0.5 * line, normal.x, normal.y)
-            other = covered(-distance - 0.5 * line, normal.x, normal.y)
-            nearest[j, i] = cell_number(q, r, columns, rows, z_range)
-            second[j, i] = cell_number(q + dq, r + dr, columns, rows, z_range)
-            packed = ti.cast(own * _WHOLE + 0.5, ti.i32)
-            shares[j, i] = packed | ti.cast(other * _WHOLE + 0.5, ti.i32) << 8
-
-
-@ti.kernel
-def draw_cells(
-    frame: ti.types.ndarray(dtype=ti.u8, ndim=1),
-    nearest: ti.types.ndarray(dtype=ti.i32, ndim=1),
-    second: ti.types.ndarray(dtype=ti.i32, ndim=1),
-    shares: ti.types.ndarray(dtype=ti.i32, ndim=1),
-    colours: ti.types.ndarray(dtype=ti.u32, ndim=1),
-    width: ti.i32,
-):
-    """Hexagons of several pixels, from what `map_pixels` found; frame and maps are flat.
-
-    Flat arrays with one index each are three times as fast as arrays of several dimensions.
-    """
-    ti.loop_config(block_dim=BAND)
-    for j in range(nearest.shape[0] // width):
-        for pixel in range(j * width, (j + 1) * width):
-            colour, packed = colours[nearest[pixel]], shares[pixel]
-            if packed != _WHOLE:
-                own = ti.cast(packed & 255, ti.f32) / _WHOLE
-                other = ti.cast(packed >> 8, ti.f32) / _WHOLE
-                rgb = own * unpack(colour) + other * unpack(colours[second[pixel]])
-                colour = pack(rgb + (1.0 - own - other) * unpack(PAGE))
-            for channel in ti.static(range(3)):
-                frame[3 * pixel + channel] = ti.cast(colour >> 8 * (2 - channel), ti.u8)
 
 
 @ti.kernel
@@ -171,7 +44,8 @@ def draw_small_cells(
     """Cells of a few pixels and less: each pixel is the mean of what it covers, by area.
 
     Cells are taken as bricks of the same centres and areas as the hexagons, which nobody can see at
-    this size: the part of a brick within a pixel is a product.
+    this size: the part of a brick within a pixel is a product. The origin `(x, y)` and the size
+    `hexagon` are those of a `Rasteriser`; `columns`, `rows` and `z_range` those of an `AxialGrid`.
     """
     ti.loop_config(block_dim=BAND)
     for j in range(frame.shape[0]):
@@ -208,17 +82,14 @@ def blend(rgb, colour, distance, opacity):
 @ti.func
 def draw_ant(rgb, p, radius, shape, colour):
     """A pixel with an ant over it; `p` in units of the ant, which looks up."""
-    body = shapes.FAR
-    if shape >= DART:
-        body = radius * shapes.dart(p)
-    else:
+    body = radius * shapes.dart(p)
+    if shape >= Mark.ANT:
         limb = ti.max(0.032 * radius, 0.45)
-        body = radius * shapes.ant_body(p)
-        body = ti.min(body, radius * shapes.ant_limbs(p) - limb)
+        body = radius * ti.min(shapes.ant_body(p), shapes.ant_limbs(p) - limb / radius)
     result = blend(rgb, PAGE, body - _HALO, 0.8)
     result = blend(result, colour, body, 1.0)
-    if shape == ANT_WITH_FOOD or shape == DART_WITH_FOOD:
-        scale = ti.select(shape == DART_WITH_FOOD, 1.5, 1.0)
+    if shape == Mark.ANT_WITH_FOOD or shape == Mark.DART_WITH_FOOD:
+        scale = ti.select(shape == Mark.DART_WITH_FOOD, 1.5, 1.0)
         crumb = radius * shapes.disc(p, 0.0, shapes.CRUMB_AT, scale * shapes.CRUMB_RADIUS)
         result = blend(result, PAGE, crumb - _HALO, 1.0)
         result = blend(result, CELL_FOOD, crumb, 1.0)
@@ -227,33 +98,31 @@ def draw_ant(rgb, p, radius, shape, colour):
 
 @ti.func
 def draw_mark(rgb, p, radius, shape, colour):
-    """A pixel with anything but an ant over it; `p` in units of the shape."""
-    distance, halo = shapes.FAR, 0.0
-    if shape == FOOD:
-        distance = radius * shapes.crumbs(p)
-    elif shape == QUEEN:
-        distance = radius * shapes.crown(p)
-    elif shape == IN_VIEW:
-        ring = ti.max(0.06 * radius, 0.6)
-        distance = ti.abs(radius * shapes.hexagon(p) + ring) - ring
-    elif shape == RING:
-        disc = radius * shapes.disc(p, 0.0, 0.0, 1.0)
-        distance, halo = ti.abs(disc + _HALF_RING) - _HALF_RING, 0.5 * _HALO
-    elif shape == ARROW:
+    """A pixel with any other mark over it; `p` in units of the mark."""
+    # A halo of the page around it; none at all, not even on smooth edges, around a cell.
+    distance, halo = radius * shapes.hexagon(p), -1.0
+    if shape == Mark.OUTLINE:
+        half_width = ti.max(0.06 * radius, 0.8)
+        distance, halo = ti.abs(distance + half_width) - half_width, 0.5 * _HALO
+    elif shape == Mark.FOOD:
+        distance, halo = radius * shapes.crumbs(p), 0.0
+    elif shape == Mark.QUEEN:
+        distance, halo = radius * shapes.crown(p), 0.0
+    elif shape == Mark.ARROW:
         distance, halo = radius * shapes.arrow(p), _HALO
-    else:
-        distance = radius * shapes.disc(p, 0.0, 0.0, 1.0)
+    elif shape == Mark.DOT:
+        distance, halo = radius * shapes.disc(p, 0.0, 0.0, 1.0), 0.0
     return blend(blend(rgb, PAGE, distance - halo, 1.0), colour, distance, 1.0)
 
 
 @ti.kernel
-def draw_shapes(
+def draw_marks(
     frame: ti.types.ndarray(dtype=ti.u8, ndim=3),
     table: ti.types.ndarray(dtype=ti.f32, ndim=2),
 ):
-    """Shapes over a frame, in the order of the table, which later ones cover.
+    """Marks over a frame, in the order of the table: later ones cover others.
 
-    Rows of `table`: x, y (pixels), radius (pixels), heading, shape, opacity, colour. A band of rows
+    Rows of `table`: x, y (pixels), radius (pixels), heading, mark, opacity, colour. A band of rows
     belongs to one thread, so that the order is the same however many there are.
     """
     ti.loop_config(block_dim=1)
@@ -262,7 +131,7 @@ def draw_shapes(
         for n in range(table.shape[0]):
             x, y, radius = table[n, 0], table[n, 1], table[n, 2]
             shape, colour = ti.cast(table[n, 4], ti.i32), ti.cast(table[n, 6], ti.i32)
-            reach = radius + ti.select(shape == DOT, 0.5, _HALO + 0.5)  # with its smooth edge
+            reach = radius + ti.select(shape == Mark.DOT, 0.5, _HALO + 0.5)  # with its smooth edge
             if y + reach >= first and y - reach <= last + 1:
                 angle = table[n, 3] * (math.pi / 3)
                 cosine, sine = ti.cos(angle), ti.sin(angle)
@@ -274,7 +143,7 @@ def draw_shapes(
                         p = vec2(dx * cosine + dy * sine, dy * cosine - dx * sine)
                         rgb = vec3(frame[j, i, 0], frame[j, i, 1], frame[j, i, 2])
                         drawn = rgb
-                        if ANT <= shape < DOT:
+                        if shape >= Mark.DART:
                             drawn = draw_ant(rgb, p, radius, shape, colour)
                         else:
                             drawn = draw_mark(rgb, p, radius, shape, colour)

@@ -7,7 +7,6 @@ unit circle; an ant looks up, towards negative y.
 import taichi as ti
 from taichi.math import vec2
 
-FAR = 1e6
 CRUMB_AT = -0.70  # where an ant carries food, before its head
 CRUMB_RADIUS = 0.25
 

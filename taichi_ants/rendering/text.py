@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from taichi_ants.rendering.colours import INK, channels
+from taichi_ants.rendering.colours import INK, PAGE, channels
 
 if TYPE_CHECKING:
     from PIL.ImageFont import FreeTypeFont, ImageFont
@@ -24,23 +24,45 @@ def write(
     size: int,
     colour: int = INK,
     align: str = "left",
+    room: float | None = None,
 ) -> None:
     """Write a line of text into a frame; what lies beyond its edges is cut off.
 
     Args:
         frame: uint8 (height, width, 3).
-        text: The text; the font has little but ASCII, so accents are left out, and other letters
-            become question marks.
+        text: The text; the font has little but ASCII, so accents and other letters are left out.
         x: The left edge, the middle or the right edge of the text, in pixels.
         baseline: Where its letters stand, in pixels from the top.
-        size: Of the font, in pixels.
+        size: Of the font, in pixels; what is smaller than 9 cannot be read and is left out.
         colour: 0xRRGGBB.
         align: "left", "middle" or "right", what `x` is.
+        room: Pixels for the text, which is shortened; None is without bounds.
     """
-    if not text:
+    if size < SMALLEST:
         return
+    text = text if room is None else shortened(text, size, room)
     moved = {"left": 0.0, "middle": 0.5, "right": 1.0}[align] * width(text, size)
-    _stamp(frame, _mask(text, size), x - moved, baseline, colour)
+    mask, dx, dy = _mask(text, size)
+    left, top = round(x - moved) + dx, round(baseline) + dy
+    y0, x0 = max(0, -top), max(0, -left)
+    y1 = min(mask.shape[0], frame.shape[0] - top)
+    x1 = min(mask.shape[1], frame.shape[1] - left)
+    if y0 < y1 and x0 < x1:
+        share = mask[y0:y1, x0:x1]
+        part = frame[top + y0 : top + y1, left + x0 : left + x1]
+        ink = channels(colour).astype(np.float32)
+        part[:] = part + share * (ink - part) + np.float32(0.5)
+
+
+def write_on(
+    frame: np.ndarray, letter: str, centre: tuple[float, float], hexagon: float, floor: int
+) -> None:
+    """Write a letter on a cell of the colour `floor`, dark or light as can be read."""
+    x, y = centre
+    size = round(0.85 * hexagon)
+    red, green, blue = channels(floor).tolist()
+    ink = PAGE if 0.30 * red + 0.59 * green + 0.11 * blue < 128 else INK
+    write(frame, letter, x, y + 0.36 * size, size, ink, align="middle")
 
 
 @lru_cache(maxsize=4096)
@@ -60,9 +82,7 @@ def shortened(text: str, size: int, room: float) -> str:
 
 
 def _plain(text: str) -> str:
-    parts = unicodedata.normalize("NFKD", text)
-    bare = "".join(one for one in parts if not unicodedata.combining(one))
-    return bare.encode("ascii", "replace").decode("ascii")
+    return unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
 
 
 @lru_cache(maxsize=64)
@@ -83,27 +103,3 @@ def _mask(text: str, size: int) -> tuple[np.ndarray, int, int]:
     image = Image.new("L", (int(right) - x + 2, int(bottom) - y + 2))
     ImageDraw.Draw(image).text((-x, -y), text, fill=255, font=_font(size), anchor="ls")
     return np.asarray(image, dtype=np.float32)[:, :, None] / np.float32(255), x, y
-
-
-def _stamp(
-    frame: np.ndarray,
-    mask: tuple[np.ndarray, int, int],
-    x: float,
-    baseline: float,
-    colour: int,
-) -> None:
-    coverage, dx, dy = mask
-    left, top = round(x) + dx, round(baseline) + dy
-    y0, x0 = max(0, -top), max(0, -left)
-    y1 = min(coverage.shape[0], frame.shape[0] - top)
-    x1 = min(coverage.shape[1], frame.shape[1] - left)
-    if y0 >= y1 or x0 >= x1:
-        return
-    share = coverage[y0:y1, x0:x1]
-    part = frame[top + y0 : top + y1, left + x0 : left + x1]
-    part[:] = part + share * (_ink(colour) - part) + np.float32(0.5)
-
-
-@lru_cache(maxsize=64)
-def _ink(colour: int) -> np.ndarray:
-    return channels(colour).astype(np.float32)

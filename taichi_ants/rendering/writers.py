@@ -1,93 +1,83 @@
-"""Files of pictures: they appear when they are whole, or not at all."""
+"""Files of pictures: they appear when they are whole, or not at all.
+
+A GIF or MP4 is made in memory and written at the end. A GIF holds all frames until then, as indices
+of one palette; an MP4 does not, so it is the kind for very long animations.
+"""
 
 from __future__ import annotations
 
-import math
+import io
 import os
-import secrets
-import shutil
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+import tempfile
+from collections.abc import Iterable, Iterator
+from itertools import chain
 from numbers import Real
 from pathlib import Path
+from types import ModuleType
 from typing import BinaryIO
 
 import numpy as np
 
 from taichi_ants import files
 from taichi_ants.errors import AntsError, expect, shown
-from taichi_ants.rendering import animated_files
-
-PathLike = str | os.PathLike[str]
-Progress = Callable[[float], None]  # called with the share of the work that is done, 0 to 1
+from taichi_ants.rendering import colours
 
 DEFAULT_FPS = 8.0
 PAUSE = 1.5  # seconds, for which episodes are shown as they ended
 
-_ANIMATIONS: dict[str, Callable[[BinaryIO, Iterable[np.ndarray], float], None]] = {
-    ".gif": animated_files.write_gif,
-    ".webp": animated_files.write_webp,
-    ".mp4": animated_files.write_mp4,
-}
-# The widest and highest picture that a kind of file can hold.
-_LARGEST = {".gif": 65_535, ".webp": 16_383, ".mp4": 16_384}
-# Viewers slow a GIF down whose frames are shorter than two hundredths of a second.
-_FASTEST = {".gif": 50.0}
-_MAX_FPS = 240.0
+# The colours of scenes, which all palettes hold.
+_KEPT = (
+    *(colours.PAGE, colours.CELL_EMPTY, colours.CELL_OBSTACLE, colours.CELL_FOOD),
+    *(colours.CELL_QUEEN, colours.FLOOR_FOOD, colours.FLOOR_QUEEN, colours.ANT),
+    *(colours.INK, colours.FAINT_INK, colours.RULE, colours.CHOSEN, colours.CELL_NEARER),
+    *colours.TRAIL_RAMP[::6].tolist(),
+)
 
 
-def check_animation(path: PathLike, fps: float) -> Path:
+def check_animation(path: files.PathLike, fps: float = DEFAULT_FPS) -> Path:
     """Make sure, before the work begins, that an animation can be written.
 
     Args:
-        path: The file, its ending is the kind; without an ending a folder for numbered pictures.
-        fps: Frames per second.
-
-    Returns:
-        The path.
+        path: The file, .gif or .mp4; without an ending a folder for numbered PNG pictures.
+        fps: Frames per second, 0.1 to 50.
 
     Raises:
-        AntsError: The ending or the speed is not allowed, PyAV is missing for an .mp4, or the place
-            cannot be written to.
+        AntsError: The ending or the speed is not allowed, PyAV is missing for an .mp4, the folder
+            holds something, or the place cannot be written to.
     """
-    target = _named_place(path)
-    kind = target.suffix.lower()
-    if kind and kind not in _ANIMATIONS:
+    target = _writable(path)
+    if target.suffix.lower() not in (".gif", ".mp4", ""):
         raise AntsError(
-            f"{str(path)!r} ends in {target.suffix!r}; an animation ends in "
-            f"{', '.join(_ANIMATIONS)}, or in nothing for a folder of PNG pictures."
+            f"{str(path)!r} ends in {target.suffix!r}; an animation ends in .gif, .mp4, or in "
+            "nothing for a folder of PNG pictures."
         )
-    fastest = _FASTEST.get(kind, _MAX_FPS)
-    if (
-        isinstance(fps, bool)
-        or not isinstance(fps, Real)
-        or not 0.1 <= fps <= fastest
-        or not math.isfinite(fps)
-    ):
-        raise AntsError(
-            f"fps is {shown(fps)}; it must be a number from 0.1 to {fastest:g} for "
-            f"{kind or 'pictures'}."
-        )
-    if kind == ".mp4":
-        animated_files.import_av()
-    if not kind and target.exists() and (not target.is_dir() or any(target.iterdir())):
+    if isinstance(fps, bool) or not isinstance(fps, Real) or not 0.1 <= fps <= 50:
+        # Viewers slow a GIF down that is faster.
+        raise AntsError(f"fps is {shown(fps)}; it must be a number from 0.1 to 50.")
+    if target.suffix.lower() == ".mp4":
+        _import_av()
+    if not target.suffix and target.exists() and (not target.is_dir() or any(target.iterdir())):
         raise AntsError(
             f"{str(path)!r} exists already and is no empty folder; name a new folder, or a file "
-            f"that ends in {', '.join(_ANIMATIONS)}."
+            "that ends in .gif or .mp4."
         )
-    with _folder_of(target, keep=False):
-        pass
+    return target
+
+
+def check_picture(path: files.PathLike) -> Path:
+    """Make sure that a picture can be written; raises as `save_picture` does."""
+    target = _writable(path)
+    if target.suffix.lower() != ".png":
+        raise AntsError(f"{str(path)!r} is to hold one picture; give it a name that ends in .png.")
     return target
 
 
 def save_animation(
-    path: PathLike,
+    path: files.PathLike,
     frames: Iterable[np.ndarray],
     fps: float = DEFAULT_FPS,
     *,
     pause: float = 0.0,
-    n: int = 0,
-    progress: Progress | None = None,
 ) -> None:
     """Write frames as they come; raises as `check_animation` does, which it calls first.
 
@@ -97,21 +87,17 @@ def save_animation(
         fps: Frames per second.
         pause: Seconds for which the last one is shown, so that it can be looked at before all
             begins anew.
-        n: How many frames there are, for `progress`.
-        progress: Called after each frame with the share of the work that is done.
     """
     target = check_animation(path, fps)
-    kind = target.suffix.lower()
-    checked = _checked(frames, kind, round(pause * fps) - 1, n, progress)
-    with _folder_of(target):
-        if kind:
-            write = _ANIMATIONS[kind]
-            files.write_atomically(target, lambda file: write(file, checked, fps))
-        else:
-            _save_pictures(target, checked)
+    checked = _checked(frames, round(pause * fps) - 1)
+    if target.suffix:
+        encoded = _mp4 if target.suffix.lower() == ".mp4" else _gif
+        _write(target, encoded(checked, fps))
+    else:
+        _write_folder(target, checked)
 
 
-def save_picture(path: PathLike, frame: np.ndarray) -> None:
+def save_picture(path: files.PathLike, frame: np.ndarray) -> None:
     """Write a picture, uint8 (height, width, 3), as PNG.
 
     Raises:
@@ -119,80 +105,55 @@ def save_picture(path: PathLike, frame: np.ndarray) -> None:
     """
     target = check_picture(path)
     _check_frame(frame)
-    with _folder_of(target):
-        files.write_atomically(target, lambda file: _write_png(file, frame, optimize=True))
+    _write(target, _png(frame, optimize=True))
 
 
-def check_picture(path: PathLike) -> Path:
-    """Make sure that a picture can be written; raises as `save_picture` does."""
-    target = _named_place(path)
-    if target.suffix.lower() != ".png":
-        raise AntsError(f"{str(path)!r} is to hold one picture; give it a name that ends in .png.")
-    with _folder_of(target, keep=False):
-        pass
-    return target
-
-
-def _named_place(path: PathLike) -> Path:
-    """The path, unless it ends both as a folder and as a file do."""
+def _writable(path: files.PathLike) -> Path:
+    """The path, if files can be written to the folder that holds it, or is to hold it."""
     expect("path", path, str, os.PathLike)
-    target, name = Path(path), os.fspath(path)
-    if target.suffix and name.endswith(("/", os.sep)):
-        raise AntsError(
-            f"{name!r} ends in {target.suffix!r} as a file and in {name[-1]!r} as a folder; leave "
-            "out the one or the other."
-        )
+    target = Path(path)
+    files.check_writable_folder(_existing_folder(target))
     return target
 
 
-def _write_png(file: BinaryIO, frame: np.ndarray, optimize: bool = False) -> None:
-    from PIL import Image
-
-    Image.fromarray(frame).save(file, "PNG", optimize=optimize)
+def _existing_folder(target: Path) -> Path:
+    return next(folder for folder in target.absolute().parents if folder.exists())
 
 
-def _save_pictures(folder: Path, frames: Iterable[np.ndarray]) -> None:
+def _write(target: Path, content: bytes) -> None:
+    files.check_writable_folder(target.parent)
+
+    def write(file: BinaryIO) -> None:
+        file.write(content)
+
+    files.write_atomically(target, write)
+
+
+def _write_folder(folder: Path, frames: Iterable[np.ndarray]) -> None:
     """Write numbered pictures to a folder that appears when all of them exist."""
-    temporary = folder.parent / f".{secrets.token_hex(8)}.tmp"
-    try:
-        temporary.mkdir()
+    with tempfile.TemporaryDirectory(prefix=".", dir=_existing_folder(folder)) as place:
+        whole = Path(place, "frames")
+        whole.mkdir()
         for number, frame in enumerate(frames):
-            with open(temporary / f"frame_{number:06d}.png", "xb") as file:
-                _write_png(file, frame)
+            (whole / f"frame_{number:06d}.png").write_bytes(_png(frame))
+        folder.parent.mkdir(parents=True, exist_ok=True)
         if folder.exists():
             folder.rmdir()  # it was empty
-        os.replace(temporary, folder)
-    except OSError as error:
-        reason = error.strerror or type(error).__name__
-        raise AntsError(f"cannot write {str(folder)!r}: {reason}; choose another place.") from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+        os.replace(whole, folder)
 
 
-def _checked(
-    frames: Iterable[np.ndarray], kind: str, more: int, n: int, progress: Progress | None
-) -> Iterator[np.ndarray]:
-    """The frames, if they are what the kind of file can hold, the last one so many times more."""
-    if not isinstance(frames, Iterable):
-        raise AntsError(f"frames is {shown(frames)}; it must be several pictures.")
+def _checked(frames: Iterable[np.ndarray], more: int) -> Iterator[np.ndarray]:
+    """The frames, if they fit together, the last one so many times more."""
+    expect("frames", frames, Iterable)
     shape = None
-    for done, frame in enumerate(frames, start=1):
+    for frame in frames:
         _check_frame(frame)
-        if shape is None:
-            height, width, _ = shape = frame.shape
-            most = _LARGEST.get(kind, max(width, height))
-            if max(width, height) > most:
-                raise AntsError(
-                    f"the frames are {width} x {height} pixels; a {kind} holds at most {most} in "
-                    "width and height, draw them smaller."
-                )
+        shape = shape or frame.shape
         if frame.shape != shape:
             raise AntsError(
                 f"a frame is {frame.shape}, the first one {shape}; all must be of one size."
             )
         yield frame
-        if progress is not None:
-            progress(done / max(n, done))
     if shape is None:
         raise AntsError("there are no frames; an animation needs at least one.")
     for _ in range(more):
@@ -207,17 +168,84 @@ def _check_frame(frame: np.ndarray) -> None:
         )
 
 
-@contextmanager
-def _folder_of(target: Path, keep: bool = True) -> Iterator[None]:
-    """Make the folder that a file goes to; without `keep`, or on failure, it goes again."""
-    missing = [folder for folder in target.parents if not folder.exists()]
-    done = False
+def _png(frame: np.ndarray, optimize: bool = False) -> bytes:
+    from PIL import Image
+
+    buffer = io.BytesIO()
+    Image.fromarray(frame).save(buffer, "PNG", optimize=optimize)
+    return buffer.getvalue()
+
+
+def _gif(frames: Iterable[np.ndarray], fps: float) -> bytes:
+    """A GIF that repeats for ever; Pillow joins frames that are alike, and stores what changes."""
+    from PIL import Image
+
+    waiting = iter(frames)
+    first = next(waiting)
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(_palette(first).tobytes())
+
+    def pictures() -> Iterator[Image.Image]:
+        shown = 0
+        for number, frame in enumerate(chain([first], waiting), start=1):
+            picture = Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
+            # A GIF counts hundredths of a second; rounded so that their sum is right.
+            until = 10 * round(100 * number / fps)
+            picture.info["duration"], shown = until - shown, until
+            yield picture
+
+    drawn, buffer = pictures(), io.BytesIO()
+    options = {"save_all": True, "append_images": drawn, "loop": 0, "optimize": True}
+    next(drawn).save(buffer, "GIF", **options)
+    return buffer.getvalue()
+
+
+def _palette(first: np.ndarray) -> np.ndarray:
+    """Colours for all frames, uint8 (n, 3): those of scenes, and what else represents the first."""
+    from PIL import Image
+
+    kept = colours.channels(np.array(_KEPT))
+    sample = np.unique(first.reshape(-1, 3), axis=0)
+    free = Image.fromarray(sample[None]).quantize(200).getpalette()
+    others = np.array(free, dtype=np.uint8).reshape(-1, 3)
+    # Pillow looks colours up by their upper bits, so one close by would take a kept one's place.
+    away = np.abs(others[:, None].astype(int) - kept).sum(axis=2).min(axis=1)
+    return np.concatenate([kept, others[away > 20]])
+
+
+def _mp4(frames: Iterable[np.ndarray], fps: float) -> bytes:
+    """An MP4 (H.264); of an odd width or height it leaves out the last column or row."""
+    av = _import_av()
+    from fractions import Fraction
+
+    waiting = iter(frames)
+    first = next(waiting)
+    height, width = first.shape[0] // 2 * 2, first.shape[1] // 2 * 2
+    buffer = io.BytesIO()
+    with av.open(buffer, "w", format="mp4") as container:
+        stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1000))
+        stream.width, stream.height = width, height
+        stream.pix_fmt = "yuv420p"
+        stream.options = {
+            **{"crf": "17", "preset": "superfast", "tune": "animation"},
+            "x264-params": "colorprim=bt709:transfer=bt709:colormatrix=bt709",
+        }
+        for frame in chain([first], waiting):
+            picture = np.ascontiguousarray(frame[:height, :width])
+            video = av.VideoFrame.from_ndarray(picture, format="rgb24")
+            # Players take pictures of this kind for BT.709, PyAV's default is BT.601.
+            video = video.reformat(format="yuv420p", dst_colorspace="ITU709")
+            container.mux(stream.encode(video))
+        container.mux(stream.encode())
+    return buffer.getvalue()
+
+
+def _import_av() -> ModuleType:
     try:
-        files.check_writable_folder(target.parent)
-        yield
-        done = keep
-    finally:
-        if not done:
-            for folder in missing:
-                with suppress(OSError):
-                    folder.rmdir()
+        import av
+    except ImportError as error:
+        raise AntsError(
+            f"MP4 needs PyAV, which cannot be imported ({error}); install it with "
+            "pip install -e '.[video]' in the project's folder, or choose .gif."
+        ) from error
+    return av

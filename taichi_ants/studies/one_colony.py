@@ -46,7 +46,7 @@ class Outputs:
 
     Attributes:
         save: Where to keep it at the end; None keeps nothing.
-        render: A .png of the end, or an animation of all (.gif, .webp, .mp4, or a folder); or None.
+        render: A .png of the end, or an animation of all (.gif, .mp4 or a folder); or None.
         every: Ticks from one picture of an animation to the next.
     """
 

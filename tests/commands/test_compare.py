@@ -324,10 +324,7 @@ def test_pictures_show_the_episode_that_told_the_behaviour(finished, tmp_path):
         assert (path.read_bytes() == shown) == (not evaporation)
 
 
-@pytest.mark.parametrize("limit", [40, MAX_STEPS])
-def test_pictures_name_learner_delivery_and_behaviour(limit, finished, tmp_path, monkeypatch):
-    """What stops before the episode ends has no outcome."""
-    monkeypatch.setattr(commands, "RENDERED_STEPS", limit)
+def test_pictures_name_learner_delivery_and_behaviour(finished, tmp_path, monkeypatch):
     lines = []
     monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
     study = commands.build_study(commands.parse_arguments([str(one) for one in SMALL]))
@@ -335,7 +332,6 @@ def test_pictures_name_learner_delivery_and_behaviour(limit, finished, tmp_path,
     for delivery in ("continuing", "absorbing"):
         assert {f"{name}, {delivery}" for name in ("SARSA", "Dyna-Q (p2)")} <= set(lines)
     assert {"delivers", "circles with food", "delivered"} <= set(lines)
-    assert ("step limit" in lines) == (limit == MAX_STEPS)
     assert not [line for line in lines if line.endswith("...")]
 
 

@@ -17,7 +17,7 @@ from PIL import Image
 from taichi_ants import commands
 from taichi_ants.commands import render
 from taichi_ants.learners.policies import save_policy, trail_follower
-from taichi_ants.rendering import colours, learning_frames, text
+from taichi_ants.rendering import learning_frames, text
 from taichi_ants.studies.command_line import Parser
 from taichi_ants.worlds import paper
 
@@ -87,32 +87,28 @@ def test_training_on_the_spot(tmp_path) -> None:
     assert 5 <= len(files_in(tmp_path / "frames")) <= 17
 
 
-def test_one_step_and_a_sheet(tmp_path, policy) -> None:
+def test_a_still_and_a_sheet(tmp_path, policy) -> None:
     path = tmp_path / "a.png"
-    assert run("episode", "--policy", policy, "--step", 3, "--out", path).stdout.endswith(
-        "step 3 of 34\n"
-    )
+    done = run("episode", "--policy", policy, "--max-steps", 3, "--out", path)
+    assert done.stdout.endswith("3 steps, return 3, not delivered\n")
     assert Image.open(path).size == (1280, 720)
-    late = run("episode", "--policy", policy, "--step", 35, "--out", tmp_path / "b.png")
-    assert late.returncode == 2
-    assert "no step 35" in late.stderr
     done = run("sheet", "--policy", policy, "--out", tmp_path / "sheet.png")
     assert done.returncode == 0, done.stderr
     assert Image.open(tmp_path / "sheet.png").width == 1280
     assert files_in(tmp_path) == ["a.png", "sheet.png"]
     done = run("sheet", "--policy", policy, "--all-states", "--out", tmp_path / "all.png")
     assert done.returncode == 0, done.stderr
-    assert Image.open(tmp_path / "all.png").width == 1920
+    assert Image.open(tmp_path / "all.png").height > 1500
 
 
 def test_learning_and_a_colony(tmp_path) -> None:
     done = run(
         *("learning", "--stages", "0,2", "--max-steps", 9, "--size", "300x200"),
-        *("--out", tmp_path / "a.webp"),
+        *("--out", tmp_path / "a.gif"),
     )
     assert done.returncode == 0, done.stderr
-    assert done.stdout.endswith("a.webp: before learning, after 2 episodes\n")
-    with Image.open(tmp_path / "a.webp") as image:
+    assert done.stdout.endswith("a.gif: before learning, after 2 episodes\n")
+    with Image.open(tmp_path / "a.gif") as image:
         assert image.n_frames >= 5
     done = run(
         *("colony", "--world", "open", "--ants", 7, "--episodes", 2, "--ticks", 9),
@@ -127,15 +123,13 @@ def test_learning_and_a_colony(tmp_path) -> None:
 WRONG = {
     "nothing to show": ([], "episode|colony|learning|sheet"),
     "something else": (["movie"], "'movie'"),
-    "ending": (["episode", "--out", "{}/a.avi"], ".gif, .webp, .mp4"),
+    "ending": (["episode", "--out", "{}/a.avi"], ".gif, .mp4"),
     "ending of a sheet": (["sheet", "--out", "{}/a.gif"], ".png"),
     "ending of learning": (["learning", "--out", "{}/a.png"], ".gif"),
     "place": (["episode", "--out", "/proc/nope/a.gif"], "cannot write"),
-    "size": (["episode", "--size", "63x63", "--out", "{}/a.gif"], "64 to 4096"),
-    "large size": (["colony", "--size", "5000x100", "--out", "{}/a.gif"], "64 to 4096"),
+    "size": (["episode", "--size", "63x63", "--out", "{}/a.gif"], "64 and 4096"),
+    "large size": (["colony", "--size", "5000x100", "--out", "{}/a.gif"], "64 and 4096"),
     "size of a sheet": (["sheet", "--size", "400x300"], "--size"),
-    "file as a folder": (["episode", "--out", "{}/a.gif/"], "as a folder"),
-    "picture as a folder": (["sheet", "--out", "{}/a.png/"], "as a folder"),
     "form of a size": (["episode", "--size", "1280*720"], "1280x720"),
     "speed": (["episode", "--fps", "0", "--out", "{}/a.gif"], "fps"),
     "no number": (["episode", "--fps", "fast"], "not a number"),
@@ -143,24 +137,14 @@ WRONG = {
     "policy": (["episode", "--policy", "nope.npz", "--out", "{}/a.gif"], "nope.npz"),
     "policy and learning": (["learning", "--policy", "a.npz"], "--policy"),
     "episodes of learning": (["learning", "--episodes", "500"], "--episodes"),
-    "step of a GIF": (["episode", "--step", "3"], "let --out end in .png"),
     "states of an episode": (["episode", "--all-states"], "--all-states"),
     "world seed of the paper": (
         ["episode", "--world-seed", "3"],
         "--world-seed is for a world drawn at random",
     ),
-    "step of a sheet": (["sheet", "--step", "3"], "--step"),
     "ants of an episode": (["episode", "--ants", "80"], "--ants"),
-    "every of a still": (["colony", "--every", "4", "--out", "a.png"], "--every is for an anim"),
-    "view of a colony": (["colony", "--no-view"], "--no-view"),
-    "legend of learning": (["learning", "--no-legend"], "--no-legend"),
-    "lines of learning": (["learning", "--no-hud"], "--no-hud"),
-    "speed of a still": (["episode", "--fps", "9", "--out", "a.png"], "--fps is for an animation"),
+    "plain learning": (["learning", "--plain"], "--plain"),
     "stages of an episode": (["episode", "--stages", "1"], "--stages"),
-    "training and policy": (
-        ["sheet", "--policy", "a.npz", "--learner", "sarsa"],
-        "--learner is for training, but --policy is given",
-    ),
     "epsilon": (
         ["episode", "--policy", "{policy}", "--epsilon", "2", "--out", "{}/a.gif"],
         "epsilon",
@@ -210,7 +194,7 @@ def test_without_pyav(tmp_path, policy) -> None:
     [
         ("a.gif", signal.SIGINT, 130),
         ("frames", signal.SIGINT, 130),
-        ("a.webp", signal.SIGTERM, 143),
+        ("a.gif", signal.SIGTERM, 143),
     ],
 )
 def test_stopped_midway_it_leaves_nothing_behind(tmp_path, policy, name, sent, status) -> None:
@@ -224,34 +208,15 @@ def test_stopped_midway_it_leaves_nothing_behind(tmp_path, policy, name, sent, s
         stderr=subprocess.PIPE,
         text=True,
     ) as process:
-        for _ in range(600):
-            if any(path.name.endswith(".tmp") for path in tmp_path.rglob(".*")):
+        for _ in range(50):  # pictures are written to a hidden folder, a GIF to memory
+            if any(tmp_path.rglob("frame_*")):
                 break
             time.sleep(0.1)
-        else:
-            process.kill()
-            pytest.fail("it has not begun to write")
-        time.sleep(0.7)
         process.send_signal(sent)
         _, errors = process.communicate(timeout=30)
     assert process.returncode == status
-    assert errors == ("Stopped; nothing was left behind.\n" if sent == signal.SIGINT else "")
+    assert errors == "Stopped; nothing was left behind.\n"
     assert files_in(tmp_path) == []
-
-
-def test_trails_of_a_colony_stay_without_evaporation(tmp_path, policy) -> None:
-    pictures = []
-    for more in ([], ["--no-evaporation"]):
-        path = tmp_path / f"{len(more)}.png"
-        colony = ["colony", "--policy", policy, "--ants", 60, "--ticks", 150]
-        done = run(*colony, "--no-hud", "--no-legend", "--world", "paper", *more, "--out", path)
-        assert done.returncode == 0, done.stderr
-        pictures.append(np.asarray(Image.open(path)).astype(int))
-    # A trail is as it was at the start, 25, or as an ant laid it, 250, unless it evaporates.
-    between = set(colours.TRAIL_RAMP[40:230].tolist())
-    evaporated = [between & set(colours.pack(picture).ravel().tolist()) for picture in pictures]
-    assert len(evaporated[0]) > 10
-    assert not evaporated[1]
 
 
 @pytest.mark.parametrize(
@@ -268,7 +233,6 @@ def test_default_worlds(arguments, world) -> None:
         (["episode"], (1280, 720)),
         (["learning"], (1280, 520)),
         (["colony"], (960, 540)),
-        (["colony", "--out", "a.png"], (1280, 720)),
         (["colony", "--size", "320x200"], (320, 200)),
     ],
 )
@@ -322,10 +286,10 @@ def test_an_ant_that_circles_earns_more_than_a_delivery_and_the_picture_says_why
     lines = []
     monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
     list(learning_frames(stages, arguments.size))
-    assert "return 57: circles with food" in lines
+    assert "step 100, return 57: circles with food" in lines
     assert "= T 16 + S 38 + F 3" in lines
     assert "= T 16 + S 16 + F 3 + Q 10" in lines
-    assert "S nearer to the queen, with food +1" in lines  # the legend
+    assert "S nearer to the queen +1" in lines  # the legend
 
 
 def test_the_gallery_is_there_and_small() -> None:
@@ -348,7 +312,7 @@ def test_the_gallery_is_there_and_small() -> None:
 
 def test_the_tracked_pictures_are_those_of_the_gallery() -> None:
     listed = subprocess.run(
-        ["git", "ls-files", "renders", "docs", "*.png", "*.gif", "*.webp", "*.mp4"],
+        ["git", "ls-files", "renders", "docs", "*.png", "*.gif", "*.mp4"],
         cwd=ROOT,
         capture_output=True,
         text=True,
@@ -359,7 +323,7 @@ def test_the_tracked_pictures_are_those_of_the_gallery() -> None:
     pictures = {
         path
         for path in listed.stdout.split()
-        if Path(path).suffix in (".png", ".gif", ".webp", ".mp4") and not path.startswith("tests/")
+        if Path(path).suffix in (".png", ".gif", ".mp4") and not path.startswith("tests/")
     }
     figures = {f"docs/figures/{name}" for name in (*gallery.COMPARISON, *gallery.COLONY)}
     assert pictures == figures | {f"renders/{name}" for name in gallery.GALLERY}

@@ -10,7 +10,7 @@ import pytest
 
 from taichi_ants import AntsError, Colony, TrainingConfig, rendering
 from taichi_ants.learners.policies import trail_follower
-from taichi_ants.rendering import Episode, Scene, Status, Viewport, at_start
+from taichi_ants.rendering import Episode, Scene, Status, at_start
 from taichi_ants.worlds import paper
 
 WORLD = paper()
@@ -41,15 +41,12 @@ def of(make: Callable, *others: object, **named: object) -> Callable[[object], o
 
 # Public name -> calls with one wrong argument, which the message names.
 CALLS: dict[str, list[tuple[str, Callable[[object], object]]]] = {
-    "Episode": [
-        ("world", of(Episode.play, TABLE)),
-        ("step", lambda wrong: episode().moment(wrong)),
-    ],
+    "Episode": [("world", of(Episode.play, TABLE))],
     "Scene": [
         ("grid", of(Scene)),
         ("size", lambda wrong: Scene(WORLD.grid, wrong)),
         ("title", lambda wrong: Scene(WORLD.grid, title=wrong)),
-        ("full_level", lambda wrong: Scene(WORLD.grid, full_level=wrong)),
+        ("plain", lambda wrong: Scene(WORLD.grid, plain=wrong)),
         ("snapshot", lambda wrong: Scene(WORLD.grid).draw(wrong)),
         ("status", lambda wrong: Scene(WORLD.grid).draw(at_start(WORLD), wrong)),
     ],
@@ -57,23 +54,18 @@ CALLS: dict[str, list[tuple[str, Callable[[object], object]]]] = {
     "Stage": [("a stage", lambda wrong: next(rendering.learning_frames([wrong])))],
     "Status": [("status", lambda wrong: Scene(WORLD.grid).draw(at_start(WORLD), wrong))],
     "at_start": [("world", of(at_start))],
-    "Viewport": [("grid", lambda wrong: Viewport.fit(wrong, 9, 9))],
-    "best_actions": [("values", of(rendering.best_actions))],
     "check_animation": [
         ("path", of(rendering.check_animation, 8)),
         ("fps", lambda wrong: rendering.check_animation("a.gif", wrong)),
     ],
     "check_picture": [("path", of(rendering.check_picture))],
-    "check_size": [("size", of(rendering.check_size))],
-    "clarity": [("values", of(rendering.clarity, 1.0))],
     "colony_moments": [
         ("colony", of(rendering.colony_moments, 3)),
         ("ticks", lambda wrong: next(rendering.colony_moments(colony(), wrong))),
         ("every", lambda wrong: next(rendering.colony_moments(colony(), 3, every=wrong))),
-        ("world", lambda wrong: next(rendering.colony_moments(colony(), 3, world=wrong))),
     ],
     "frames": [
-        ("snapshot", lambda wrong: next(rendering.frames([(wrong, Status(0))]))),
+        ("snapshot", lambda wrong: next(rendering.frames([(wrong, Status(()))]))),
         ("status", lambda wrong: next(rendering.frames([(at_start(WORLD), wrong)]))),
         ("size", lambda wrong: next(rendering.frames(episode().moments(), wrong))),
     ],
@@ -85,8 +77,8 @@ CALLS: dict[str, list[tuple[str, Callable[[object], object]]]] = {
     "policy_sheet": [
         ("q_values", of(rendering.policy_sheet)),
         ("title", lambda wrong: rendering.policy_sheet(TABLE, wrong)),
-        ("width", lambda wrong: rendering.policy_sheet(TABLE, width=wrong)),
         ("complete", lambda wrong: rendering.policy_sheet(TABLE, complete=wrong)),
+        ("task", lambda wrong: rendering.policy_sheet(TABLE, task=wrong)),
     ],
     "save_animation": [
         ("path", of(rendering.save_animation, [FRAME], 8)),
@@ -97,7 +89,6 @@ CALLS: dict[str, list[tuple[str, Callable[[object], object]]]] = {
         ("path", of(rendering.save_picture, FRAME)),
         ("a frame", lambda wrong: rendering.save_picture("a.png", wrong)),
     ],
-    "usual_spread": [("q_values", of(rendering.usual_spread))],
 }
 
 
@@ -122,7 +113,7 @@ def test_a_wrong_kind_is_named_in_one_sentence(
     called, named, call, wrong, tmp_path, monkeypatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    if named in ("fps", "full_level") and isinstance(wrong, float):
+    if named == "fps" and isinstance(wrong, float):
         wrong = "7.5"
     with pytest.raises(AntsError) as caught:
         call(wrong)
@@ -137,4 +128,4 @@ def test_a_snapshot_of_another_grid_is_refused() -> None:
     from taichi_ants.worlds import open_world
 
     with pytest.raises(AntsError, match="ranges"):
-        Scene(WORLD.grid).draw(at_start(open_world(1)), Status(0))
+        Scene(WORLD.grid).draw(at_start(open_world(1)), Status(()))

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from random_worlds import random_world
 
-from taichi_ants import AntsError, Task, World, reference, rollout
+from taichi_ants import Task, World, reference, rollout
 from taichi_ants.grid.hexgrid import normal_form
 from taichi_ants.grid.randomness import GAMMA
 from taichi_ants.learners.policies import random_policy, trail_follower
-from taichi_ants.rendering import Episode, Scene, frames
-from taichi_ants.worlds import paper
+from taichi_ants.rendering import Episode, at_start
+from taichi_ants.worlds import open_world, paper
 
 
 def pantry() -> World:
@@ -32,18 +30,16 @@ def draws_between(one: int, other: int) -> int:
     return (other - one) * pow(GAMMA, -1, 2**64) % 2**64
 
 
-def check(world: World, seed: int, number: int, evaporation: bool, epsilon: float) -> int:
+def check(world: World, seed: int, evaporation: bool, epsilon: float) -> int:
     """Compare step by step; the number of choices among several foods."""
     table, task = trail_follower(), Task(evaporation_in_evaluation=evaporation)
-    trace = rollout(world, table, seed, number, 120, task, epsilon)
-    episode = Episode.play(
-        world, table, seed=seed, number=number, max_steps=120, task=task, epsilon=epsilon
-    )
+    trace = rollout(world, table, seed, 0, 120, task, epsilon)
+    episode = Episode.play(world, table, seed=seed, max_steps=120, task=task, epsilon=epsilon)
     assert episode.trace == trace
     moments = list(episode.moments())
     assert len(moments) == len(trace) + 1
 
-    colony = reference.follower(world, table, seed, number, task, epsilon)
+    colony = reference.follower(world, table, seed, 0, task, epsilon)
     colony.begin_episode()
     existing = list(colony.world.ground)
     index = world.grid.index(np.array(existing))
@@ -69,52 +65,47 @@ def check(world: World, seed: int, number: int, evaporation: bool, epsilon: floa
 
 @pytest.mark.parametrize("evaporation", [True, False])
 def test_the_paper_world(evaporation) -> None:
-    check(paper(), 0, 0, evaporation, 0.0)
-    check(paper(), 1, 2, evaporation, 0.6)
+    check(paper(), 0, evaporation, 0.0)
+    check(paper(), 1, evaporation, 0.6)
 
 
 def test_several_foods_in_view() -> None:
-    choices = [check(pantry(), seed, seed % 3, True, 0.3) for seed in range(8)]
+    choices = [check(pantry(), seed, True, 0.3) for seed in range(8)]
     assert sum(choices) >= 4
 
 
 @pytest.mark.parametrize("seed", range(12))
 def test_random_worlds(seed) -> None:
-    check(random_world(seed), seed, seed % 4, bool(seed % 2), 0.4)
-
-
-def test_what_the_head_up_lines_say() -> None:
-    episode = Episode.play(paper(), trail_follower())
-    statuses = [status for _, status in episode.moments()]
-    assert len(statuses) == len(episode) == 35
-    assert statuses[0].episode_return == 0
-    assert [status.step for status in statuses] == list(range(35))
-    assert statuses[-1].episode_return == 45
-    assert statuses[-1].outcome == "delivered"
-    assert episode.delivered
-    assert {status.outcome for status in statuses[:-1]} == {""}
-    gained = np.diff([status.episode_return for status in statuses])
-    assert (gained == episode.trace.rewards).all()
-    lost = Episode.play(paper(), random_policy(), max_steps=5)
-    assert not lost.delivered
-    assert [status.outcome for _, status in lost.moments()][-1] == "step limit"
-    begun = replace(lost, whole=False)
-    assert [status.outcome for _, status in begun.moments()][-1] == ""
-
-
-def test_the_moment_of_one_step_is_that_of_all() -> None:
-    episode = Episode.play(pantry(), trail_follower(), max_steps=12)
-    last = len(episode) - 1
-    pictures = list(frames(episode.moments(), (400, 330)))
-    scene = Scene(episode.world.grid, (400, 330))
-    for step in (0, 1, last):
-        assert (scene.draw(*episode.moment(step)) == pictures[step]).all()
-    assert not (pictures[0] == pictures[1]).all()
-    with pytest.raises(AntsError, match="step"):
-        episode.moment(last + 1)
+    check(random_world(seed), seed, bool(seed % 2), 0.4)
 
 
 def test_moments_do_not_share_their_arrays() -> None:
     snapshots = [snapshot for snapshot, _ in Episode.play(paper(), trail_follower()).moments()]
     assert (snapshots[0].ground == paper().ground()).all()
     assert not (snapshots[-1].ground == paper().ground()).all()
+
+
+def test_what_the_lines_say() -> None:
+    episode = Episode.play(paper(), trail_follower())
+    said = [dict(status.lines) for _, status in episode.moments()]
+    assert len(said) == len(episode) == 35
+    assert [one["step"] for one in said] == [str(step) for step in range(35)]
+    assert [said[0]["return"], said[-1]["return"]] == ["0", "45"]
+    assert (np.diff([int(one["return"]) for one in said]) == episode.trace.rewards).all()
+    assert [said[0]["task"], said[0]["sees"]] == ["foraging", "E T E"]
+    assert [said[-2]["action"], said[-1]["outcome"]] == ["give", "delivered"]
+    assert not any("outcome" in one for one in said[:-1])
+    lost = Episode.play(paper(), random_policy(), max_steps=5)
+    assert not lost.delivered
+    *_, (_, last) = lost.moments()
+    assert {"outcome", "action"}.isdisjoint(dict(last.lines))
+
+
+def test_the_start_of_an_episode() -> None:
+    world = open_world(3)
+    snapshot = at_start(world, seed=5, n=30)
+    cells, headings = world.start(5, 30)
+    assert (snapshot.ant_cells == cells).all()
+    assert (snapshot.ant_headings == headings).all()
+    assert not snapshot.ant_carries.any()
+    assert (snapshot.ground == world.ground()).all()

@@ -159,8 +159,7 @@ def test_flags(value):
         says(f"{name} {text}", Task, **{name: value})
     says(f"births {text}", Life, births=value)
     says(f"ends_at_delivery {text}", Colony, paper(), None, CONFIG, ends_at_delivery=value)
-    for name in ("hud", "legend", "view"):
-        says(f"{name} is {value!r}", Scene, paper().grid, **{name: value})
+    says(f"plain is {value!r}", Scene, paper().grid, plain=value)
 
 
 @pytest.mark.parametrize("task", ["paper", 3, Task])
