@@ -300,10 +300,8 @@ def do_comparison(
     comparison = to_comparison(study, arrays, world)
     first = study.points[0]
     baselines = baseline_rows(
-        *(first.world, partial(evaluate, **where), study.seeds, ROLLOUTS, settings.discounts),
-        first.max_steps,
-        first.task.evaporation_in_training,
-        first.task.evaporation_in_evaluation,
+        *(first.world, first.task, partial(evaluate, **where), study.seeds),
+        *(ROLLOUTS, settings.discounts, first.max_steps),
     )
     files.write_csv(ready / BASELINES, baselines, BASELINE_COLUMNS)
     costs = [cost.as_row() for cost in costs_of(study, outcomes)]
