@@ -194,11 +194,8 @@ def test_a_food_behind_another_is_never_reached() -> None:
     # and then the ant carries.
     world = World((4, 1, 1), (0, 0, 0), [(2, 0, 0), (3, 0, 0)], ants=[((1, 0, 0), 0)])
     alone = World((4, 1, 1), (0, 0, 0), [(2, 0, 0)], [(3, 0, 0)], ants=[((1, 0, 0), 0)])
-    (value, outcome), expected = (
-        bounds_of(world).optimal(0.9, 10),
-        bounds_of(alone).optimal(0.9, 10),
-    )
-    assert (pytest.approx(value), outcome) == expected
+    value, outcome = bounds_of(world).optimal(0.9, 10)
+    assert (pytest.approx(value), outcome) == bounds_of(alone).optimal(0.9, 10)
     assert bounds_of(world).shortest() == bounds_of(alone).shortest() == Outcome(13, 2, 1)
 
 
