@@ -136,11 +136,9 @@ def run_values(point: Any, seeds: tuple[int, ...], outcome: Outcome, name: str) 
 
 def colony_values(point: Any, seeds: tuple[int, ...], outcome: Outcome, name: str) -> np.ndarray:
     """A measure of a point's colonies, as the scaling study has it, float64 (seeds,)."""
-    from taichi_ants.analysis.colony.study import Record, compute
+    from taichi_ants.analysis.colony.study import MEASURES
 
-    names = Record.__dataclass_fields__
-    record = Record(**{key: outcome[key].astype(int) for key in names})
-    return compute(record, name, point.ants, point.ticks)
+    return MEASURES[name].compute(outcome, point.ants, point.ticks)
 
 
 def main(arguments: list[str] | None = None) -> None:
