@@ -32,7 +32,7 @@ from taichi_ants.studies.command_line import (
 from taichi_ants.studies.interruption import held
 
 if TYPE_CHECKING:
-    from taichi_ants import Colony, World
+    from taichi_ants import Colony
     from taichi_ants.learners.config import TrainingConfig
     from taichi_ants.studies.colony_study import Plan
     from taichi_ants.studies.runner import ColonyPoint, Study
@@ -49,14 +49,6 @@ QUICK = {
     "episodes": 20,
     "ticks": 500,
     "rollouts": 2,
-}
-DEFAULTS = {
-    "arenas": ARENAS,
-    "sizes": (1, 2, 4, 8, 16, 32, 64),
-    "seeds": 20,
-    "episodes": 50,
-    "ticks": 1000,
-    "rollouts": 4,
 }
 EVALUATION_EPSILON = 0.01
 WIDTH = 100  # of the report, in columns
@@ -78,10 +70,9 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     settings, given = chosen.parse_given(given_words[1:])
     settings.kind = given_words[0]
     if settings.kind == "study":
-        usual: dict[str, Any] = QUICK if settings.quick else DEFAULTS
-        for name, value in usual.items():
-            if getattr(settings, name) is None:
-                setattr(settings, name, value)
+        usual: dict[str, Any] = QUICK if settings.quick else {}
+        for name in usual.keys() - given.keys():
+            setattr(settings, name, usual[name])
         settings.sizes = tuple(sorted({1, *settings.sizes}))
         settings.out = settings.out or default_folder(chosen, "colony", settings, **usual)
     elif settings.resume:
@@ -102,27 +93,20 @@ def _add_learning(parser: argparse.ArgumentParser, epsilon: float) -> None:
 
 def _add_study(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("--arenas", action=ListAction, item=_arena, metavar="NAME", help=f"of {', '.join(ARENAS)}")
-    sizes = "numbers of ants in the paper's and the open worlds (default: 1 2 4 ... 64)"
+    add("--arenas", action=ListAction, default=ARENAS, metavar="NAME", help="kinds of world")
     several: dict[str, Any] = {"action": ListAction, "item": whole_number(1, 100_000)}
-    add("--sizes", **several, metavar="N", help=sizes)
-    add("--seeds", type=whole_number(1, 1000), metavar="N", help="how many (default: 20)")
+    sizes = "numbers of ants in the paper's and the open worlds"
+    add("--sizes", **several, default=(1, 2, 4, 8, 16, 32, 64), metavar="N", help=sizes)
+    add("--seeds", type=whole_number(1, 1000), default=20, metavar="N", help="how many")
     add("--seed", type=whole_number(), default=0, metavar="N", help="the first of them")
     counts: dict[str, Any] = {"type": whole_number(1, 10_000_000), "metavar": "N"}
-    add("--episodes", **counts, help="of training (default: 50)")
-    add("--ticks", **counts, help="of an episode (default: 1000)")
-    add("--rollouts", **counts, help="evaluation episodes (default: 4)")
+    add("--episodes", **counts, default=50, help="of training")
+    add("--ticks", **counts, default=1000, help="of an episode")
+    add("--rollouts", **counts, default=4, help="evaluation episodes")
     add("--quick", action="store_true", help="fewer seeds, sizes and ticks, no large worlds")
     _add_learning(parser, 0.3)
     add_common(parser)
     add_results(parser, BESIDE_DEFAULTS.format("colony", "sizes-1-8-quick"))
-
-
-def _arena(text: str) -> str:
-    if text not in ARENAS:
-        allowed = ", ".join(ARENAS)
-        raise argparse.ArgumentTypeError(f"{text!r} is no arena, choose of {allowed}")
-    return text
 
 
 def _add_live(parser: argparse.ArgumentParser) -> None:
@@ -244,10 +228,14 @@ def draw_figures(results: Path, folder: Path) -> None:
 
 def live(settings: argparse.Namespace) -> None:
     """Let one colony live, then say what it did; a signal ends it at a whole tick."""
+    from taichi_ants import Colony
     from taichi_ants.studies.one_colony import check_places, live, summary
 
     check_places(settings.save, settings.render)
-    colony = resumed_colony(settings) if settings.resume else new_colony(settings)
+    if settings.resume:
+        colony = Colony.load(settings.resume, settings.threads, arch=settings.arch)
+    else:
+        colony = new_colony(settings)
     begun, began = colony.ticks, time.perf_counter()
     with held() as stopped:
         with progress_bar("colony") as progress:
@@ -263,12 +251,14 @@ def live(settings: argparse.Namespace) -> None:
 
 def new_colony(settings: argparse.Namespace) -> Colony:
     """A colony at the start of its episode; deliveries do not end it, so updates look beyond."""
-    from taichi_ants import AntsError, Colony, Life, Pheromone, Task, load_policy
+    from taichi_ants import AntsError, Colony, Life, Pheromone, Task, load_policy, worlds
 
-    if settings.capacity and not settings.births:
-        raise AntsError(
-            "--capacity is for colonies in which ants are born; give --births too, or leave it out."
-        )
+    if settings.ranges and settings.world != "open":
+        raise AntsError(f"--ranges are those of an open world, not of {settings.world!r}.")
+    if settings.ranges:
+        world = worlds.open_world(settings.seed, settings.ranges)
+    else:
+        world = worlds.build(settings.world, settings.seed)
     names = ("evaporation", "half_life", "diffusion", "deposit", "level", "cap")
     given = {name: getattr(settings, name) for name in names if getattr(settings, name) is not None}
     if "half_life" in given:
@@ -280,7 +270,7 @@ def new_colony(settings: argparse.Namespace) -> Colony:
         life=Life(settings.births, settings.lifespan, settings.regrowth, settings.wander),
     )
     colony = Colony(
-        build_world(settings),
+        world,
         task,
         training_config(settings, settings.epsilon),
         range(settings.seed, settings.seed + settings.colonies),
@@ -293,29 +283,6 @@ def new_colony(settings: argparse.Namespace) -> Colony:
         arch=settings.arch,
     )
     colony.begin_episode()
-    return colony
-
-
-def build_world(settings: argparse.Namespace) -> World:
-    """The world of one colony."""
-    from taichi_ants import AntsError, worlds
-
-    if settings.ranges and settings.world != "open":
-        raise AntsError(f"--ranges are those of an open world, not of {settings.world!r}.")
-    if settings.ranges:
-        return worlds.open_world(settings.seed, settings.ranges)
-    return worlds.build(settings.world, settings.seed)
-
-
-def resumed_colony(settings: argparse.Namespace) -> Colony:
-    """A colony that was saved."""
-    from taichi_ants import AntsError, Colony
-
-    colony = Colony.load(settings.resume, settings.threads, arch=settings.arch)
-    if colony.episode < 0:
-        raise AntsError(
-            f"the colony in {settings.resume!r} has not begun an episode; run it first."
-        )
     return colony
 
 

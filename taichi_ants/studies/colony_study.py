@@ -11,11 +11,11 @@ import numpy as np
 from taichi_ants import worlds
 from taichi_ants.analysis.bounds.limits import Limits, limits_of
 from taichi_ants.analysis.colony.study import (
+    ARENAS,
     COPIED,
     COPIED_LONG,
     JOINT,
     LASTING,
-    MEASURES,
     OFF,
     ON,
     OWN,
@@ -23,7 +23,9 @@ from taichi_ants.analysis.colony.study import (
     Condition,
     Design,
     Measured,
+    measures_of,
 )
+from taichi_ants.errors import check_one_of
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.runner import ColonyPoint, Outcome
 from taichi_ants.task import Life, Pheromone, Task
@@ -85,6 +87,7 @@ def plan(
     """
     conditions = {}
     for arena in arenas:
+        check_one_of("the arena", arena, tuple(ARENAS))
         large = arena == "large"
         alone = ColonyPoint(
             _world(arena, seeds),
@@ -96,10 +99,10 @@ def plan(
         )
         for design in LARGE_DESIGNS if large else DESIGNS:
             for ants in LARGE_SIZES if large else sizes:
-                point = _point(
-                    replace(alone, task=TASKS[design.rules]), design.way, ants, sizes[-1]
+                ruled = replace(alone, task=TASKS[design.rules])
+                conditions[Condition(arena, *design, ants)] = _point(
+                    ruled, design.way, ants, sizes[-1]
                 )
-                conditions[Condition(arena, *design, ants)] = point
     return conditions
 
 
@@ -142,10 +145,7 @@ def _exploring(point: ColonyPoint) -> ColonyPoint:
 def measured(conditions: Plan, outcomes: Mapping[Any, Outcome]) -> Measured:
     """All measures of all conditions, from what their points gave."""
     return {
-        condition: {
-            name: one.compute(outcomes[point], point.ants, point.ticks)
-            for name, one in MEASURES.items()
-        }
+        condition: measures_of(outcomes[point], point.ants, point.ticks)
         for condition, point in conditions.items()
     }
 

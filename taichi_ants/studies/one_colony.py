@@ -66,41 +66,33 @@ def live(
     Raises:
         AntsError: A file cannot be written; the message says where the colony is, if it is saved.
     """
-    failure = None
+    animated = render is not None and is_animation(render)
+    passing = _pieces(colony, ticks, progress, stopped, every if animated else 0)
     try:
-        _live_and_draw(colony, ticks, progress, stopped, render, every)
-    except Exception as error:
+        _draw(colony, passing, render)
+    except (AntsError, OSError) as error:
+        if not save:
+            raise
         # Pictures are drawn between ticks, so this one is whole, and may have taken hours.
-        failure = error
-    if save:
         colony.save(save)
-    if save and isinstance(failure, (AntsError, OSError)):
-        reason = str(failure).rstrip(".")
+        reason = str(error).rstrip(".")
         raise AntsError(
             f"{reason}; the colony is saved in {save!r}, at tick {colony.ticks}."
-        ) from failure
-    if failure is not None:
-        raise failure
+        ) from error
+    if save:
+        colony.save(save)
 
 
-def _live_and_draw(
-    colony: Colony,
-    ticks: int,
-    progress: Callable[[float], None],
-    stopped: Callable[[], bool],
-    render: str | None,
-    every: int,
-) -> None:
+def _draw(colony: Colony, passing: Iterator[int], render: str | None) -> None:
+    """Let time pass, and draw it, or what is there at the end."""
     from taichi_ants.rendering import colony_moments, frames, save_animation, save_picture
 
     if render and is_animation(render):
-        passing = _pieces(colony, ticks, progress, stopped, every)
         moments = (moment for _ in chain([0], passing) for moment in colony_moments(colony))
         save_animation(render, frames(moments), FRAMES_PER_SECOND)
-        return
-    for _ in _pieces(colony, ticks, progress, stopped):
+    for _ in passing:
         pass
-    if render:
+    if render and not is_animation(render):
         save_picture(render, next(frames(colony_moments(colony))))
 
 
@@ -109,7 +101,7 @@ def _pieces(
     ticks: int,
     progress: Callable[[float], None],
     stopped: Callable[[], bool],
-    every: int = 0,
+    every: int,
 ) -> Iterator[int]:
     """Move a colony on by pieces of `every` ticks, with 0 by short ones; yields after each."""
     begun, piece = colony.ticks, every or 1

@@ -229,11 +229,10 @@ def test_stopped_and_killed_it_goes_on_to_the_same_results(finished, kernels, tm
         (["live", "--resume", "x", "--seed", 0], "--seed cannot change a colony that is resumed"),
         (["live", "--resume", "x", "--learner", "sarsa"], "--learner cannot change a colony"),
         (["live", "--resume", "x", "--births"], "--births cannot change a colony"),
-        (["live", "--capacity", 5], "--capacity is for colonies in which ants are born"),
         (["live", "--cap", 5], "cap is 5, but deposit is 'set'"),
         (["live", "--resume", "x"], "cannot read 'x'"),
-        (["study", "--arenas", "moon"], "'moon' is no arena, choose of paper, open, large"),
-        (["study", "--sizes", 300, "--arenas", "paper"], "300 ants are asked for"),
+        (["study", "--arenas", "moon"], "the arena is 'moon'"),
+        (["study", "--sizes", "300,8", "--arenas", "paper"], "300 ants are asked for"),
         (["study", "--learner", "none"], "there is no learner 'none'"),
         (["study", "--epsilon", 2], "epsilon is 2.0"),
         (["live", "--ants", 0], "0 is not allowed"),
@@ -346,7 +345,7 @@ def test_stopped_a_colony_is_saved_at_a_whole_tick(sent, status, kernels, tmp_pa
     assert process.returncode == status
     ticks = int(err.removeprefix("Stopped at tick ").split(";")[0])
     assert err == f"Stopped at tick {ticks}; --resume colony.npz goes on from there.\n"
-    assert f"60 ants, {ticks} ticks in " in out
+    assert f"60 ants, {ticks} tick" in out
     monkeypatch.chdir(tmp_path)
     training = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0, 0.1)
     colony = Colony(worlds.paper(), task(), training, 0, 60)

@@ -31,9 +31,6 @@ TRAINING_SETTING = "training, no evaporation"
 GREEDY_SETTING = "greedy, evaporation"
 _CONDITIONS = ("no evaporation", "evaporation")
 
-# One row of baselines.csv; None for an empty field.
-BaselineRow = dict[str, Any]
-
 # Called as evaluate(world, q_values, rollouts=, max_steps=, task=, seeds=), with one table for
 # each seed: q_values (seeds, 128, 5). What it returns has returns, steps and deliveries,
 # (seeds, rollouts) each.
@@ -48,7 +45,7 @@ def baseline_rows(
     rollouts: int = 50,
     discounts: Sequence[float] = (0.9, 0.99),
     max_steps: int = 600,
-) -> list[BaselineRow]:
+) -> list[dict[str, Any]]:
     """All baselines of a world, as rows with the columns BASELINE_COLUMNS.
 
     Args:
@@ -99,7 +96,7 @@ def baseline_rows(
 
 def _bounds(
     world: World, task: Task, discounts: Sequence[float], max_steps: int, setting: str
-) -> list[BaselineRow]:
+) -> list[dict[str, Any]]:
     try:
         bounds = EpisodeBounds(world, task)
     except AntsError as error:
@@ -134,5 +131,5 @@ def _exact(outcome: Outcome | None) -> dict[str, float]:
     }
 
 
-def _row(baseline: str, setting: str, **figures: Any) -> BaselineRow:
+def _row(baseline: str, setting: str, **figures: Any) -> dict[str, Any]:
     return {**dict.fromkeys(BASELINE_COLUMNS), "baseline": baseline, "setting": setting, **figures}

@@ -81,18 +81,14 @@ def food_limit(world: World, regrowth: int = 0) -> float:
     unit = TICKS_A_CELL * TICKS_A_CELL_BESIDE_QUEEN * (regrowth + 1)
     per_cell = np.where(beside_queen, unit // TICKS_A_CELL_BESIDE_QUEEN, unit // TICKS_A_CELL)
     first_cell, sink = 1 + len(foods), 1 + len(foods) + len(cells)
-    source_edges = (np.zeros(len(foods), int), 1 + np.arange(len(foods)))
-    sink_edges = (first_cell + np.arange(len(cells)), np.full(len(cells), sink))
-    rows = np.concatenate([source_edges[0], 1 + food, sink_edges[0]])
-    columns = np.concatenate([source_edges[1], first_cell + cell, sink_edges[1]])
-    most = np.concatenate(
-        [
-            np.full(len(foods), unit // (regrowth + 1)),
-            np.full(len(food), unit // TICKS_A_CELL),
-            per_cell,
-        ]
-    ).astype(np.int32)
-    graph = coo_array((most, (rows, columns)), shape=(sink + 1, sink + 1)).tocsr()
+    edges = (  # from a source to the foods, from these to cells, from these to a sink
+        (0, 1 + np.arange(len(foods)), unit // (regrowth + 1)),
+        (1 + food, first_cell + cell, unit // TICKS_A_CELL),
+        (first_cell + np.arange(len(cells)), sink, per_cell),
+    )
+    broad = (np.broadcast_arrays(*edge) for edge in edges)
+    rows, columns, most = (np.concatenate(part) for part in zip(*broad, strict=True))
+    graph = coo_array((most.astype(np.int32), (rows, columns)), shape=(sink + 1, sink + 1)).tocsr()
     return 1000 * int(maximum_flow(graph, 0, sink).flow_value) / unit
 
 

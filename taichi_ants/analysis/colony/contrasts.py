@@ -56,7 +56,7 @@ class Series:
     def words(self) -> str:
         """What is computed."""
         whom = "a smaller colony" if self.against == "smaller" else self.second.words
-        return f"{MEASURES[self.measure].words}: {self.first.words} minus {whom}"
+        return f"{MEASURES[self.measure]}: {self.first.words} minus {whom}"
 
     def contrasts(self, measured: Measured, arena: str) -> dict[Sizes, Contrast]:
         """The contrasts of an arena; none where conditions are missing."""

@@ -1,8 +1,4 @@
-"""The figures of the study, one column of panels for each arena.
-
-Each function takes the rows of conditions.csv and returns a matplotlib Figure; `save_all` writes
-all of them.
-"""
+"""The figures of the study, from the rows of conditions.csv."""
 
 from __future__ import annotations
 
@@ -64,10 +60,15 @@ _Lines = Mapping[Design, tuple[str, tuple[str, str, str]]]
 _BY_WAY: _Lines = {Design(ON, way): (WAYS[way], look) for way, look in WAY_LOOKS.items()}
 
 
-def scaling(rows: Rows) -> Figure:
-    """Deliveries of the whole colony and of each ant against the number of ants."""
-    return _by_size(
-        rows,
+def _by_rules(way: str) -> tuple[str, str, _Lines]:
+    label = sentence(WAYS[way].replace(", ", ",\n"))
+    lines = {Design(one, way): (RULES[one], look) for one, look in RULES_LOOKS.items()}
+    return f"{label}\n(deliveries per 1000 ticks)", "deliveries", lines
+
+
+# By name: the label, the measure and the lines of each row of panels, a title, a caption.
+FIGURES: dict[str, tuple[Sequence[tuple[str, str, _Lines]], str, str]] = {
+    "scaling": (
         [
             ("Deliveries\nper 1000 ticks", "deliveries", _BY_WAY),
             ("Deliveries per ant\nand 1000 ticks", "per_ant", _BY_WAY),
@@ -75,36 +76,22 @@ def scaling(rows: Rows) -> Figure:
         "More ants: what a colony delivers, and each of its ants",
         "Trails evaporate. Dashed grey: no colony can deliver more (shortest cycles, room at food "
         "and queen).",
-    )
-
-
-def crowding(rows: Rows) -> Figure:
-    """Blocked moves and the time to the first delivery against the number of ants."""
-    return _by_size(
-        rows,
+    ),
+    "crowding": (
         [
             ("Blocked moves\n(share of those tried)", "blocked", _BY_WAY),
             ("Ticks to the\nfirst delivery", "first_delivery", _BY_WAY),
         ],
         "More ants: how often they block each other, how soon one delivers",
         "Trails evaporate. An episode without a delivery counts with all its ticks.",
-    )
-
-
-def trails(rows: Rows) -> Figure:
-    """What the trails that ants lay do to deliveries, for copies and for joint training."""
-    panels = []
-    for way in (COPIED, JOINT):
-        words = sentence(WAYS[way].replace(", ", ",\n"))
-        lines = {Design(one, way): (RULES[one], look) for one, look in RULES_LOOKS.items()}
-        panels.append((f"{words}\n(deliveries per 1000 ticks)", "deliveries", lines))
-    return _by_size(
-        rows,
-        panels,
+    ),
+    "trails": (
+        [_by_rules(COPIED), _by_rules(JOINT)],
         "Do the trails help that ants lay themselves?",
         "Each ant was trained under the condition that it is shown in. Dashed grey: no colony can "
         "deliver more.",
-    )
+    ),
+}
 
 
 def save_all(rows: Rows, folder: str | Path) -> list[Path]:
@@ -118,16 +105,15 @@ def save_all(rows: Rows, folder: str | Path) -> list[Path]:
     """
     folder = check_writable_folder(folder)
     paths = []
-    for make in (scaling, crowding, trails):
-        paths.append(folder / f"{make.__name__}.png")
-        save(make(rows), paths[-1])
+    for name in FIGURES:
+        paths.append(folder / f"{name}.png")
+        save(draw(name, rows), paths[-1])
     return paths
 
 
-def _by_size(
-    rows: Rows, panels: Sequence[tuple[str, str, _Lines]], title: str, caption: str
-) -> Figure:
-    """A row of panels for each (label, measure, lines), a column for each arena."""
+def draw(name: str, rows: Rows) -> Figure:
+    """One of `FIGURES`: measures against the number of ants, a column of panels for each arena."""
+    panels, title, caption = FIGURES[name]
     arenas = list(dict.fromkeys(row["arena"] for row in rows))
     with styled():
         figure = new_figure(5.6)

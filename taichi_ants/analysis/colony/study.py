@@ -7,8 +7,7 @@ arena, since a seed gives all of them the same world.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -58,60 +57,41 @@ class Condition(NamedTuple):
     ants: int
 
 
+# What is measured, with the words of tables.
+MEASURES: dict[str, str] = {
+    "deliveries": "deliveries per 1000 ticks",
+    "per_ant": "deliveries per ant and 1000 ticks",
+    "first_delivery": "ticks to the first delivery",
+    "fruitless": "share of episodes without a delivery",
+    "blocked": "share of blocked moves",
+    "reward": "reward per ant and 1000 ticks",
+}
 # Measures of each seed, float64 (seeds,), by their names in `MEASURES`.
 Measured = Mapping[Condition, Mapping[str, np.ndarray]]
 
 
-@dataclass(frozen=True)
-class Measure:
-    """A number of a seed under a condition.
+def measures_of(outcome: Mapping[str, np.ndarray], ants: int, ticks: int) -> dict[str, np.ndarray]:
+    """All measures of each seed, float64 (seeds,).
 
-    Attributes:
-        words: What it is, for readers.
-        compute: From the outcome of a `ColonyPoint`, integer arrays (seeds, episodes) by name, how
-            many ants there are, and the ticks of an episode: float64 (seeds,).
+    An episode without a delivery counts with all its ticks for `first_delivery`: the mean is that
+    of the time to the first delivery or the end, whichever comes first (the restricted mean of
+    survival analysis), and never too large. `fruitless` tells how often this was so.
+
+    Args:
+        outcome: That of a `ColonyPoint`, integer arrays (seeds, episodes) by name.
+        ants: How many there are.
+        ticks: Ticks of each episode.
     """
-
-    words: str
-    compute: Callable[[Mapping[str, np.ndarray], int, int], np.ndarray]
-
-
-def _per_1000(counts: np.ndarray, ticks: int) -> np.ndarray:
-    return counts.mean(axis=1, dtype=float) * 1000 / ticks
-
-
-def _first_delivery(outcome: Mapping[str, np.ndarray], ants: int, ticks: int) -> np.ndarray:
-    """An episode without a delivery counts with all its ticks.
-
-    So the mean is that of the time to the first delivery or the end, whichever comes first (the
-    restricted mean of survival analysis), and never too large.
-    """
+    deliveries, rewards = (
+        outcome[name].mean(axis=1, dtype=float) * 1000 / ticks for name in ("deliveries", "returns")
+    )
     first = outcome["first_delivery"].astype(int)
-    return np.where(first < 0, ticks, first).mean(axis=1)
-
-
-def _blocked(outcome: Mapping[str, np.ndarray], ants: int, ticks: int) -> np.ndarray:
     moves = outcome["moves"].sum(axis=1, dtype=float)
-    return outcome["blocked"].sum(axis=1) / np.maximum(moves, 1.0)
-
-
-MEASURES: dict[str, Measure] = {
-    "deliveries": Measure(
-        "deliveries per 1000 ticks",
-        lambda outcome, ants, ticks: _per_1000(outcome["deliveries"], ticks),
-    ),
-    "per_ant": Measure(
-        "deliveries per ant and 1000 ticks",
-        lambda outcome, ants, ticks: _per_1000(outcome["deliveries"], ticks) / ants,
-    ),
-    "first_delivery": Measure("ticks to the first delivery", _first_delivery),
-    "fruitless": Measure(
-        "share of episodes without a delivery",
-        lambda outcome, ants, ticks: (outcome["first_delivery"] < 0).mean(axis=1),
-    ),
-    "blocked": Measure("share of blocked moves", _blocked),
-    "reward": Measure(
-        "reward per ant and 1000 ticks",
-        lambda outcome, ants, ticks: _per_1000(outcome["returns"], ticks) / ants,
-    ),
-}
+    return {
+        "deliveries": deliveries,
+        "per_ant": deliveries / ants,
+        "first_delivery": np.where(first < 0, ticks, first).mean(axis=1),
+        "fruitless": (first < 0).mean(axis=1),
+        "blocked": outcome["blocked"].sum(axis=1) / np.maximum(moves, 1.0),
+        "reward": rewards / ants,
+    }

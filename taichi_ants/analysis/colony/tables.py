@@ -9,13 +9,7 @@ import numpy as np
 
 from taichi_ants.analysis.bounds.limits import Limits
 from taichi_ants.analysis.colony.contrasts import FIRST, QUESTIONS, Judged, Series, Sizes
-from taichi_ants.analysis.colony.study import (
-    ARENAS,
-    MEASURES,
-    Condition,
-    Design,
-    Measured,
-)
+from taichi_ants.analysis.colony.study import ARENAS, MEASURES, Condition, Design, Measured
 from taichi_ants.analysis.findings import Finding, Verdict, weakest
 from taichi_ants.analysis.sweeps import seed_rows, summary_rows
 from taichi_ants.analysis.tables import MISSING, Block, Table, figure, number, sentence
@@ -73,15 +67,18 @@ def means(rows: Sequence[Mapping[str, Any]], limits: LimitsByArena) -> list[Bloc
     """
     blocks: list[Block] = []
     for arena, several in limits.items():
-        lines: dict[str, dict[int, str]] = {}
+        lines: dict[str, dict[int, float]] = {}
         possible = {}
         for row in rows:
             if row["arena"] == arena:
                 words, ants = Design(row["rules"], row["way"]).words, row["ants"]
-                lines.setdefault(words, {})[ants] = _short(row["deliveries_mean"])
-                possible[ants] = _short(row["deliveries_limit"])
-        sizes = sorted(possible)
+                lines.setdefault(words, {})[ants] = row["deliveries_mean"]
+                possible[ants] = row["deliveries_limit"]
         lines["limit"] = possible
+        cells = [
+            [who, *(_short(by[n]) if n in by else MISSING for n in sorted(possible))]
+            for who, by in lines.items()
+        ]
         cycle, food, queen = (
             figure(float(np.mean([getattr(one, name) for one in several])))
             for name in ("cycle", "food", "queen")
@@ -90,11 +87,9 @@ def means(rows: Sequence[Mapping[str, Any]], limits: LimitsByArena) -> list[Bloc
             f"Limit: the shortest cycle from the queen to food and back takes {cycle} ticks; per "
             f"1000 ticks, food can give {food} and the queen take {queen}."
         )
-        title = f"{sentence(ARENAS[arena])}, {count(rows[0]['seeds'], 'seed')}: " + (
-            MEASURES["deliveries"].words
-        )
-        cells = [[who, *(by.get(n, MISSING) for n in sizes)] for who, by in lines.items()]
-        blocks.append(Table(title, ("ants", *map(str, sizes)), cells, [note]))
+        seeds = count(rows[0]["seeds"], "seed")
+        title = f"{sentence(ARENAS[arena])}, {seeds}: {MEASURES['deliveries']}"
+        blocks.append(Table(title, ("ants", *map(str, sorted(possible))), cells, [note]))
     return blocks
 
 
@@ -122,7 +117,7 @@ def found(measured: Measured, judged: Judged) -> list[Block]:
                 world = "" if arena == shown else sentence(ARENAS[arena])
                 verdicts = _verdicts(measured, arena, series, findings)
                 lines.append([world, sentence(series.statement), *verdicts])
-                units.append(MEASURES[series.measure].words)
+                units.append(MEASURES[series.measure])
                 shown = arena
         notes = [f"{sentence(' or '.join(dict.fromkeys(units)))}, as the statement says."]
         if question == FIRST:
@@ -149,21 +144,21 @@ def _verdicts(
     shown = (Verdict.SUPPORTED, Verdict.CONTRADICTED, Verdict.UNDECIDED)
     cells = [", ".join(map(str, sorted(by_verdict[one]))) or MISSING for one in shown]
 
-    def both(sizes: Sizes) -> tuple[float, float]:
-        conditions = (
-            Condition(arena, *design, n)
-            for design, n in zip((series.first, series.second), sizes, strict=True)
+    means = {
+        (n, other): tuple(
+            float(measured[Condition(arena, *design, ants)][series.measure].mean())
+            for design, ants in ((series.first, n), (series.second, other))
         )
-        one, other = (float(measured[key][series.measure].mean()) for key in conditions)
-        return one, other
+        for n, other in findings
+    }
 
     def distance(sizes: Sizes) -> float:
-        one, other = both(sizes)
+        one, other = means[sizes]
         return abs(one - other) / (abs(one) + abs(other)) if one or other else 0.0
 
-    clearest = max(findings, key=distance)
-    one, other = both(clearest)
-    example = f"{clearest[0]}: {figure(one)} against {figure(other)}"
-    example += "" if clearest[1] == clearest[0] else f" with {clearest[1]}"
+    n, less = max(means, key=distance)
+    one, other = means[n, less]
+    example = f"{n}: {figure(one)} against {figure(other)}"
+    example += "" if less == n else f" with {less}"
     example += f" ({100 * (one / other - 1):+.0f} %)" if min(one, other) > 0 else ""
     return [*cells, example]

@@ -44,14 +44,14 @@ def points(bar: ErrorbarContainer) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize(
-    ("make", "measures"),
+    ("name", "measures"),
     [
-        (figures.scaling, ("deliveries", "per_ant")),
-        (figures.crowding, ("blocked", "first_delivery")),
+        ("scaling", ("deliveries", "per_ant")),
+        ("crowding", ("blocked", "first_delivery")),
     ],
 )
-def test_ways_against_the_number_of_ants(rows, make, measures) -> None:
-    axes = np.array(make(rows).axes).reshape(2, 2)
+def test_ways_against_the_number_of_ants(rows, name, measures) -> None:
+    axes = np.array(figures.draw(name, rows).axes).reshape(2, 2)
     for row, measure in zip(axes, measures, strict=True):
         for axis, arena in zip(row, ARENAS, strict=True):
             assert list(bars(axis)) == list(WAYS.values())
@@ -71,14 +71,14 @@ def test_ways_against_the_number_of_ants(rows, make, measures) -> None:
 
 
 def test_limits_stand_above_the_data(rows) -> None:
-    total, each = (np.array(figures.scaling(rows).axes).reshape(2, 2))[:, 0]
+    total, each = (np.array(figures.draw("scaling", rows).axes).reshape(2, 2))[:, 0]
     for axis, per in ((total, 1), (each, 8)):
         (line,) = (line for line in axis.lines if line.get_label() == "limit")
         assert (line.get_xdata()[-1], line.get_ydata()[-1]) == (8, 200 / per)
 
 
 def test_trails(rows) -> None:
-    axes = np.array(figures.trails(rows).axes).reshape(2, 2)
+    axes = np.array(figures.draw("trails", rows).axes).reshape(2, 2)
     for row, way in zip(axes, (COPIED, JOINT), strict=True):
         found = bars(row[1])
         assert list(found) == list(RULES.values())

@@ -16,6 +16,7 @@ from taichi_ants.analysis.colony.study import (
     RULES,
     WAYS,
     Condition,
+    measures_of,
 )
 from taichi_ants.analysis.colony.tables import (
     condition_rows,
@@ -51,7 +52,7 @@ OUTCOME = {
     ],
 )
 def test_measures(measure: str, expected: list[float]) -> None:
-    np.testing.assert_allclose(MEASURES[measure].compute(OUTCOME, 4, 500), expected)
+    np.testing.assert_allclose(measures_of(OUTCOME, 4, 500)[measure], expected)
 
 
 def test_every_measure_is_in_the_tables() -> None:
