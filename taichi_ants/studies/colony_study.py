@@ -1,4 +1,8 @@
-"""The scaling study of the colony: its arenas, its designs, and what is done for each condition."""
+"""The scaling study of the colony: its arenas, its designs, and what is done for each condition.
+
+Other rules of the game are an entry in `RULES` (`analysis.colony.study`) and one in `TASKS`, other
+ways to come to a policy one in `WAYS` and a case in `_point`; then they can stand in `DESIGNS`.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +33,6 @@ from taichi_ants.errors import check_one_of
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.runner import ColonyPoint, Outcome
 from taichi_ants.task import Life, Pheromone, Task
-from taichi_ants.worlds.world import World
 
 _PHEROMONES = {
     ON: Pheromone(),
@@ -89,8 +92,9 @@ def plan(
     for arena in arenas:
         check_one_of("the arena", arena, tuple(ARENAS))
         large = arena == "large"
+        ranges = RANGES.get(arena)
         alone = ColonyPoint(
-            _world(arena, seeds),
+            tuple(worlds.open_world(s, ranges) for s in seeds) if ranges else worlds.paper(),
             Task(),
             training,
             episodes=min(LARGE_EPISODES, episodes) if large else episodes,
@@ -104,12 +108,6 @@ def plan(
                     ruled, design.way, ants, sizes[-1]
                 )
     return conditions
-
-
-def _world(arena: str, seeds: Sequence[int]) -> World | tuple[World, ...]:
-    if arena == "paper":
-        return worlds.paper()
-    return tuple(worlds.open_world(seed, RANGES[arena]) for seed in seeds)
 
 
 def _point(alone: ColonyPoint, way: str, ants: int, long: int) -> ColonyPoint:

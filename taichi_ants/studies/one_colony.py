@@ -116,13 +116,7 @@ def _pieces(
 
 
 def summary(colony: Colony, ticks: int, seconds: float) -> str:
-    """What happened, in two lines.
-
-    Args:
-        colony: As it is now.
-        ticks: How many have passed.
-        seconds: How long they took.
-    """
+    """What happened, in two lines, while so many ticks took so many seconds."""
     outcome = {name: int(array.sum()) for name, array in vars(colony.outcome()).items()}
     blocked = 100 * outcome["blocked"] / max(1, outcome["moves"])
     changes = [count(outcome[f"{one}s"], one) for one in ("birth", "death") if outcome[f"{one}s"]]

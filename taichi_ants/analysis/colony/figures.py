@@ -94,21 +94,15 @@ FIGURES: dict[str, tuple[Sequence[tuple[str, str, _Lines]], str, str]] = {
 }
 
 
-def save_all(rows: Rows, folder: str | Path) -> list[Path]:
+def save_all(rows: Rows, folder: str | Path) -> None:
     """Write all figures as PNG files into a folder, which is made if needed.
-
-    Returns:
-        The paths written.
 
     Raises:
         AntsError: The folder or a file in it cannot be written.
     """
     folder = check_writable_folder(folder)
-    paths = []
     for name in FIGURES:
-        paths.append(folder / f"{name}.png")
-        save(draw(name, rows), paths[-1])
-    return paths
+        save(draw(name, rows), folder / f"{name}.png")
 
 
 def draw(name: str, rows: Rows) -> Figure:

@@ -97,14 +97,8 @@ def _short(value: float) -> str:
     return number(value, 0 if value >= 100 else 1)
 
 
-_HEADERS = (
-    "World",
-    "Statement",
-    "Supported\nwith",
-    "Contradicted\nwith",
-    "Undecided\nwith",
-    "Clearest",
-)
+_SHOWN = (Verdict.SUPPORTED, Verdict.CONTRADICTED, Verdict.UNDECIDED)
+_HEADERS = ("World", "Statement", *(f"{sentence(one)}\nwith" for one in _SHOWN), "Clearest")
 
 
 def found(measured: Measured, judged: Judged) -> list[Block]:
@@ -141,9 +135,7 @@ def _verdicts(
         of_all = weakest([one for (ants, _), one in findings.items() if ants == n])
         by_verdict[of_all.verdict].append(n)
     by_verdict[Verdict.UNDECIDED] += by_verdict[Verdict.EQUIVALENT]
-    shown = (Verdict.SUPPORTED, Verdict.CONTRADICTED, Verdict.UNDECIDED)
-    cells = [", ".join(map(str, sorted(by_verdict[one]))) or MISSING for one in shown]
-
+    cells = [", ".join(map(str, sorted(by_verdict[one]))) or MISSING for one in _SHOWN]
     means = {
         (n, other): tuple(
             float(measured[Condition(arena, *design, ants)][series.measure].mean())

@@ -87,11 +87,11 @@ def test_trails(rows) -> None:
 
 
 def test_files_are_wide_enough_to_read_and_little_data_can_be_drawn(rows, tmp_path: Path) -> None:
-    paths = figures.save_all(rows, tmp_path / "new")
-    assert [path.name for path in paths] == ["scaling.png", "crowding.png", "trails.png"]
-    assert {Image.open(path).width for path in paths} == {1620}
+    figures.save_all(rows, tmp_path / "new")
+    for name in ("scaling", "crowding", "trails"):
+        assert Image.open(tmp_path / "new" / f"{name}.png").width == 1620
     lonely = build(seeds=1, sizes=(1,), ways=(COPIED,), rules=(ON,))
     nothing = build(lambda rules, way, ants: 0.0, noise=0, reward=lambda *_: 0.0)
     for number, study in enumerate((lonely, nothing)):
-        drawn = figures.save_all(condition_rows(study, LIMITS), tmp_path / str(number))
-        assert all(path.exists() for path in drawn)
+        figures.save_all(condition_rows(study, LIMITS), tmp_path / str(number))
+        assert len(list((tmp_path / str(number)).iterdir())) == 3
