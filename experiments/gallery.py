@@ -86,7 +86,7 @@ def make_figures(folder: Path) -> None:
         drawn = Path(place)
         compare.draw_figures(compare.build_study(comparison), world, comparison.out, drawn)
         keep(drawn / compare.FIGURES, COMPARISON, folder)
-        colony.draw_figures(colony.build_plan(study), study.out, drawn)
+        colony.draw_figures(study.out, drawn)
         keep(drawn / colony.FIGURES, COLONY, folder)
 
 

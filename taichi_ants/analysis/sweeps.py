@@ -11,10 +11,12 @@ import numpy as np
 
 from taichi_ants.analysis import style
 from taichi_ants.analysis.statistics import bootstrap_interval, centres
+from taichi_ants.analysis.tables import MISSING, Table, plain_text, sentence
 
 Settings = Mapping[str, Any]
 _COLOURS = (style.BLUE, style.ORANGE, style.RED, style.WINE, style.SKY, style.INK, style.GREY)
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+_TERMINAL = 200  # columns, at most
 _WIDE = 20  # a ratio of settings from which their axis is logarithmic
 
 
@@ -65,22 +67,18 @@ def report(settings: Sequence[Settings], values: Mapping[str, np.ndarray]) -> st
     """The means with their intervals as a table for a terminal."""
     names = columns_of(settings)
     ends = {name: bootstrap_interval(array) for name, array in values.items()}
-    lines = [[*(short(name, names) for name in names), *values]]
+    lines = []
     for p, one in enumerate(settings):
-        cells = [_shown(one.get(name, "-")) for name in names]
+        cells = [_shown(one.get(name, MISSING)) for name in names]
         for name, array in values.items():
             low, high = (end[p] for end in ends[name])
             mean = f"{array[p].mean():.4g}"
             cells.append(mean if np.isnan(low) else f"{mean} [{low:.4g}, {high:.4g}]")
         lines.append(cells)
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    padded = (
-        "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
-        for line in lines
-    )
+    headers = [*(short(name, names) for name in names), *values]
     seeds = next(iter(values.values())).shape[1]
-    many = f"Means over {seeds} seeds, with 95 % intervals." if seeds > 1 else "One seed."
-    return "\n".join([many, "", *padded, ""])
+    many = f"Means over {seeds} seeds, with 95 % intervals" if seeds > 1 else "One seed"
+    return plain_text([Table(many, headers, lines, text_columns=len(headers))], _TERMINAL)
 
 
 def draw(
@@ -100,10 +98,9 @@ def draw(
     """
     names = columns_of(settings)
     first, others = names[0], names[1:]
-    marks: list[Any] = list(dict.fromkeys(_hashable(one.get(first)) for one in settings))
+    marks: list[Any] = [one.get(first) for one in settings]
     numbers = all(isinstance(mark, (int, float)) and not isinstance(mark, bool) for mark in marks)
-    places = marks if numbers else range(len(marks))
-    place_of = dict(zip(marks, places, strict=True))
+    places = marks if numbers else list(map(_shown, marks))
     low, high = bootstrap_interval(values)
     lines: dict[str, list[int]] = {}
     for p, one in enumerate(settings):
@@ -114,20 +111,19 @@ def draw(
         axes = figure.subplots()
         looks = itertools.cycle(zip(_COLOURS, _MARKERS, strict=True))
         for (label, points), (colour, marker) in zip(lines.items(), looks, strict=False):
-            points = sorted(points, key=lambda p: place_of[_hashable(settings[p].get(first))])
-            x = [place_of[_hashable(settings[p].get(first))] for p in points]
+            if numbers:
+                points.sort(key=lambda p: marks[p])
+            x: Any = [places[p] for p in points]
             mean = values[points].mean(axis=1)
             axes.plot(x, mean, marker=marker, color=colour, label=label or words)
             axes.fill_between(x, low[points], high[points], color=colour, alpha=0.15, linewidth=0)
         if numbers and min(marks) > 0 and max(marks) / min(marks) >= _WIDE:
             style.logarithmic(axes.xaxis, (1, 2, 5))
-        if not numbers:
-            axes.set_xticks(list(places), [_shown(mark) for mark in marks])
         axes.set(xlabel=first, ylabel=words)
         seeds = values.shape[1]
         spread = f"mean of {seeds} seeds with 95 % bootstrap intervals" if seeds > 1 else "one seed"
         entries = style.legend_entries([axes])
-        style.frame(figure, title, f"{spread[0].upper()}{spread[1:]}.", entries)
+        style.frame(figure, title, f"{sentence(spread)}.", entries)
     style.save(figure, path)
 
 
@@ -135,10 +131,6 @@ def short(name: str, names: Sequence[str]) -> str:
     """The last part of a name, if no other of the names has the same."""
     last = name.rpartition(".")[2]
     return last if sum(one.rpartition(".")[2] == last for one in names) == 1 else name
-
-
-def _hashable(value: Any) -> Any:
-    return str(value) if isinstance(value, list) else value
 
 
 def _shown(value: Any) -> str:

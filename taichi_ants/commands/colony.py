@@ -8,7 +8,9 @@ colony of any size live, or many side by side; it can be saved, resumed and draw
 from __future__ import annotations
 
 import argparse
+import csv
 import sys
+import time
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,18 +32,16 @@ from taichi_ants.studies.command_line import (
 from taichi_ants.studies.interruption import held
 
 if TYPE_CHECKING:
-    from taichi_ants import Colony, World
-    from taichi_ants.analysis.colony.study import ColonyStudy
+    from taichi_ants import Colony
     from taichi_ants.learners.config import TrainingConfig
-    from taichi_ants.studies.colony_study import ArenaPlan, StudyPlan
+    from taichi_ants.studies.colony_study import Plan
+    from taichi_ants.studies.runner import ColonyPoint, Study
 
 KINDS = {
     "study": "The scaling study of the colony",
     "live": "One colony, or many side by side, that live for a while",
 }
 ARENAS = ("paper", "open", "large")
-OPEN_RANGES, LARGE_RANGES = (30, 30, 30), (100, 100, 100)
-LARGE_SIZES, LARGE_EPISODES, LARGE_ROLLOUTS = (1, 10, 100, 1000), 10, 2
 QUICK = {
     "arenas": ("paper", "open"),
     "sizes": (1, 4, 16, 64),
@@ -50,16 +50,9 @@ QUICK = {
     "ticks": 500,
     "rollouts": 2,
 }
-DEFAULTS = {
-    "arenas": ARENAS,
-    "sizes": (1, 2, 4, 8, 16, 32, 64),
-    "seeds": 20,
-    "episodes": 50,
-    "ticks": 1000,
-    "rollouts": 4,
-}
 EVALUATION_EPSILON = 0.01
-EPISODES, FIGURES = "episodes.npz", "figures"
+WIDTH = 100  # of the report, in columns
+CONDITIONS, FIGURES = "conditions.csv", "figures"
 _OF_RESUMED = ("resume", "ticks", "save", "render", "every", "plugin", "threads", "arch")
 
 
@@ -77,10 +70,9 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     settings, given = chosen.parse_given(given_words[1:])
     settings.kind = given_words[0]
     if settings.kind == "study":
-        usual: dict[str, Any] = QUICK if settings.quick else DEFAULTS
-        for name, value in usual.items():
-            if getattr(settings, name) is None:
-                setattr(settings, name, value)
+        usual: dict[str, Any] = QUICK if settings.quick else {}
+        for name in usual.keys() - given.keys():
+            setattr(settings, name, usual[name])
         settings.sizes = tuple(sorted({1, *settings.sizes}))
         settings.out = settings.out or default_folder(chosen, "colony", settings, **usual)
     elif settings.resume:
@@ -101,27 +93,20 @@ def _add_learning(parser: argparse.ArgumentParser, epsilon: float) -> None:
 
 def _add_study(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("--arenas", action=ListAction, item=_arena, metavar="NAME", help=f"of {', '.join(ARENAS)}")
-    sizes = "numbers of ants in the paper's and the open worlds (default: 1 2 4 ... 64)"
+    add("--arenas", action=ListAction, default=ARENAS, metavar="NAME", help="kinds of world")
     several: dict[str, Any] = {"action": ListAction, "item": whole_number(1, 100_000)}
-    add("--sizes", **several, metavar="N", help=sizes)
-    add("--seeds", type=whole_number(1, 1000), metavar="N", help="how many (default: 20)")
+    sizes = "numbers of ants in the paper's and the open worlds"
+    add("--sizes", **several, default=(1, 2, 4, 8, 16, 32, 64), metavar="N", help=sizes)
+    add("--seeds", type=whole_number(1, 1000), default=20, metavar="N", help="how many")
     add("--seed", type=whole_number(), default=0, metavar="N", help="the first of them")
     counts: dict[str, Any] = {"type": whole_number(1, 10_000_000), "metavar": "N"}
-    add("--episodes", **counts, help="of training (default: 50)")
-    add("--ticks", **counts, help="of an episode (default: 1000)")
-    add("--rollouts", **counts, help="evaluation episodes (default: 4)")
+    add("--episodes", **counts, default=50, help="of training")
+    add("--ticks", **counts, default=1000, help="of an episode")
+    add("--rollouts", **counts, default=4, help="evaluation episodes")
     add("--quick", action="store_true", help="fewer seeds, sizes and ticks, no large worlds")
     _add_learning(parser, 0.3)
     add_common(parser)
     add_results(parser, BESIDE_DEFAULTS.format("colony", "sizes-1-8-quick"))
-
-
-def _arena(text: str) -> str:
-    if text not in ARENAS:
-        allowed = ", ".join(ARENAS)
-        raise argparse.ArgumentTypeError(f"{text!r} is no arena, choose of {allowed}")
-    return text
 
 
 def _add_live(parser: argparse.ArgumentParser) -> None:
@@ -169,104 +154,94 @@ def training_config(settings: argparse.Namespace, least: float) -> TrainingConfi
     return TrainingConfig(settings.learner, *numbers, 1.0, least, planning)
 
 
-def build_plan(settings: argparse.Namespace) -> StudyPlan:
-    """The work, checked as a whole before any of it is done."""
-    from taichi_ants.studies.colony_study import StudyPlan
+def study(settings: argparse.Namespace) -> None:
+    """Run the study, or show the finished one."""
+    from taichi_ants.studies.colony_study import plan
+    from taichi_ants.studies.result_folder import work_or_show
+    from taichi_ants.studies.runner import Study
 
     seeds = tuple(range(settings.seed, settings.seed + settings.seeds))
-    return StudyPlan(tuple(plan_arena(name, settings, seeds) for name in settings.arenas), seeds)
-
-
-def plan_arena(name: str, settings: argparse.Namespace, seeds: tuple[int, ...]) -> ArenaPlan:
-    """One kind of world; the large ones get fewer conditions and shorter training."""
-    from taichi_ants import worlds
-    from taichi_ants.analysis.colony import study as names
-    from taichi_ants.studies.colony_study import ArenaPlan
-
-    trained = (names.JOINT, names.THEN_JOINT, names.OWN)
-    ways = {
-        names.ON: (names.COPIED, names.COPIED_LONG, *trained),
-        names.OFF: (names.COPIED, *trained),
-        names.LASTING: (names.COPIED, *trained),
-    }
-    large = name == "large"
-    if large:
-        ways = {names.ON: (names.COPIED, *trained), names.OFF: (names.COPIED, names.JOINT)}
-    ranges = {"open": OPEN_RANGES, "large": LARGE_RANGES}.get(name)
-    words = {"paper": "the paper's world", "large": f"large worlds {LARGE_RANGES}"}
-    return ArenaPlan(
-        name=name,
-        words=words.get(name, f"open worlds {OPEN_RANGES}"),
-        world=tuple(worlds.open_world(s, ranges) for s in seeds) if ranges else worlds.paper(),
-        sizes=LARGE_SIZES if large else settings.sizes,
-        ways=ways,
-        training=training_config(settings, EVALUATION_EPSILON),
-        episodes=min(LARGE_EPISODES, settings.episodes) if large else settings.episodes,
-        ticks=settings.ticks,
-        rollouts=min(LARGE_ROLLOUTS, settings.rollouts) if large else settings.rollouts,
-        long_factor=settings.sizes[-1],
+    conditions = plan(
+        settings.arenas,
+        settings.sizes,
+        seeds,
+        training_config(settings, EVALUATION_EPSILON),
+        settings.episodes,
+        settings.ticks,
+        settings.rollouts,
+    )
+    asked = Study(tuple(conditions.values()), seeds)
+    pictures = {} if settings.no_figures else {FIGURES: draw_figures}
+    work_or_show(
+        settings, asked.settings(), partial(do_study, settings, conditions, asked), pictures
     )
 
 
-def study(settings: argparse.Namespace) -> None:
-    """Run the study, or show the finished one."""
-    from taichi_ants.studies.result_folder import work_or_show
-
-    plan = build_plan(settings)
-    pictures = {} if settings.no_figures else {FIGURES: partial(draw_figures, plan)}
-    work_or_show(settings, plan.study().settings(), partial(do_study, settings, plan), pictures)
-
-
-def do_study(settings: argparse.Namespace, plan: StudyPlan, blocks: Path, ready: Path) -> None:
+def do_study(
+    settings: argparse.Namespace,
+    conditions: Plan,
+    asked: Study[ColonyPoint],
+    blocks: Path,
+    ready: Path,
+) -> None:
     """All but the pictures."""
     from taichi_ants import files, save_policy
-    from taichi_ants.studies.colony_study import to_arrays
+    from taichi_ants.analysis.colony import tables
+    from taichi_ants.analysis.colony.contrasts import judge_all
+    from taichi_ants.analysis.tables import markdown, plain_text
+    from taichi_ants.studies.colony_study import limits_by_arena, measured, median_policies
+    from taichi_ants.studies.result_folder import REPORT
 
     with progress_bar("study") as progress:
-        outcomes = plan.study().run(blocks, settings.threads, settings.arch, progress, notice)
-    found = plan.found(outcomes)
-    write_tables(found, ready)
-    files.write_npz(ready / EPISODES, to_arrays(found))
+        outcomes = asked.run(blocks, settings.threads, settings.arch, progress, notice)
+    values, limits = measured(conditions, outcomes), limits_by_arena(conditions)
+    judged = judge_all(values)
+    rows, findings = tables.condition_rows(values, limits), tables.found(values, judged)
+    for name, table in (
+        ("seeds.csv", tables.rows_of_seeds(values, asked.seeds)),
+        (CONDITIONS, rows),
+        ("differences.csv", tables.difference_rows(judged)),
+    ):
+        files.write_csv(ready / name, table, list(table[0]))
+    files.write_text(ready / "findings.md", markdown(findings))
+    report = plain_text([*tables.means(rows, limits), *findings], WIDTH)
+    files.write_text(ready / REPORT, report)
     policies = files.check_writable_folder(ready / "policies")
-    for name, q_values, metadata in plan.median_policies(found, outcomes):
+    for name, q_values, metadata in median_policies(conditions, asked.seeds, values, outcomes):
         save_policy(policies / f"{name}.npz", q_values, metadata)
 
 
-def write_tables(found: ColonyStudy, folder: Path) -> None:
-    """Write tables, findings and the report."""
-    from taichi_ants import files
-    from taichi_ants.analysis.colony import tables
-    from taichi_ants.analysis.colony.contrasts import judge_all
-    from taichi_ants.studies.result_folder import REPORT
-
-    rows, judged = tables.condition_rows(found), judge_all(found)
-    files.write_csv(folder / "conditions.csv", rows, tables.CONDITION_COLUMNS)
-    differences = tables.difference_rows(judged)
-    files.write_csv(folder / "differences.csv", differences, tables.DIFFERENCE_COLUMNS)
-    files.write_text(folder / "table.md", tables.table_markdown(found, rows))
-    files.write_text(folder / "findings.md", tables.findings_markdown(found, judged))
-    files.write_text(folder / REPORT, tables.report_text(found, rows, judged))
-
-
-def draw_figures(plan: StudyPlan, results: Path, folder: Path) -> None:
-    """Draw the figures of the study in one folder into the folder `figures` of another."""
-    from taichi_ants import files
+def draw_figures(results: Path, folder: Path) -> None:
+    """Draw the figures from the table in one folder into the folder `figures` of another."""
     from taichi_ants.analysis.colony.figures import save_all
 
-    save_all(plan.read(files.read_npz(results / EPISODES)), folder / FIGURES)
+    with open(results / CONDITIONS, newline="", encoding="utf-8") as file:
+        rows = [
+            {
+                name: text if name in ("arena", "rules", "way") else float(text or "nan")
+                for name, text in row.items()
+            }
+            for row in csv.DictReader(file)
+        ]
+    save_all(rows, folder / FIGURES)
 
 
 def live(settings: argparse.Namespace) -> None:
     """Let one colony live, then say what it did; a signal ends it at a whole tick."""
-    from taichi_ants.studies.one_colony import Outputs, live, summary
+    from taichi_ants import Colony
+    from taichi_ants.studies.one_colony import check_places, live, summary
 
-    outputs = Outputs(settings.save, settings.render, settings.every)
-    outputs.check()
-    colony = resumed_colony(settings) if settings.resume else new_colony(settings)
+    check_places(settings.save, settings.render)
+    if settings.resume:
+        colony = Colony.load(settings.resume, settings.threads, arch=settings.arch)
+    else:
+        colony = new_colony(settings)
+    begun, began = colony.ticks, time.perf_counter()
     with held() as stopped:
         with progress_bar("colony") as progress:
-            pace = live(colony, settings.ticks, outputs, progress, stopped)
-        print(summary(colony, pace))
+            files = settings.save, settings.render, settings.every
+            live(colony, settings.ticks, progress, stopped, *files)
+        print(summary(colony, colony.ticks - begun, time.perf_counter() - began))
         for path in filter(None, (settings.save, settings.render)):
             print(f"{path} is written.")
         if stopped():
@@ -276,12 +251,14 @@ def live(settings: argparse.Namespace) -> None:
 
 def new_colony(settings: argparse.Namespace) -> Colony:
     """A colony at the start of its episode; deliveries do not end it, so updates look beyond."""
-    from taichi_ants import AntsError, Colony, Life, Pheromone, Task, load_policy
+    from taichi_ants import AntsError, Colony, Life, Pheromone, Task, load_policy, worlds
 
-    if settings.capacity and not settings.births:
-        raise AntsError(
-            "--capacity is for colonies in which ants are born; give --births too, or leave it out."
-        )
+    if settings.ranges and settings.world != "open":
+        raise AntsError(f"--ranges are those of an open world, not of {settings.world!r}.")
+    if settings.ranges:
+        world = worlds.open_world(settings.seed, settings.ranges)
+    else:
+        world = worlds.build(settings.world, settings.seed)
     names = ("evaporation", "half_life", "diffusion", "deposit", "level", "cap")
     given = {name: getattr(settings, name) for name in names if getattr(settings, name) is not None}
     if "half_life" in given:
@@ -293,7 +270,7 @@ def new_colony(settings: argparse.Namespace) -> Colony:
         life=Life(settings.births, settings.lifespan, settings.regrowth, settings.wander),
     )
     colony = Colony(
-        build_world(settings),
+        world,
         task,
         training_config(settings, settings.epsilon),
         range(settings.seed, settings.seed + settings.colonies),
@@ -306,29 +283,6 @@ def new_colony(settings: argparse.Namespace) -> Colony:
         arch=settings.arch,
     )
     colony.begin_episode()
-    return colony
-
-
-def build_world(settings: argparse.Namespace) -> World:
-    """The world of one colony."""
-    from taichi_ants import AntsError, worlds
-
-    if settings.ranges and settings.world != "open":
-        raise AntsError(f"--ranges are those of an open world, not of {settings.world!r}.")
-    if settings.ranges:
-        return worlds.open_world(settings.seed, settings.ranges)
-    return worlds.build(settings.world, settings.seed)
-
-
-def resumed_colony(settings: argparse.Namespace) -> Colony:
-    """A colony that was saved."""
-    from taichi_ants import AntsError, Colony
-
-    colony = Colony.load(settings.resume, settings.threads, arch=settings.arch)
-    if colony.episode < 0:
-        raise AntsError(
-            f"the colony in {settings.resume!r} has not begun an episode; run it first."
-        )
     return colony
 
 

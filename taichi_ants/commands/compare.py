@@ -306,10 +306,8 @@ def do_comparison(
     comparison = to_comparison(study, arrays, world)
     first = study.points[0]
     baselines = baseline_rows(
-        *(first.world, partial(evaluate, **where), study.seeds, ROLLOUTS, settings.discounts),
-        first.max_steps,
-        first.task.evaporation_in_training,
-        first.task.evaporation_in_evaluation,
+        *(first.world, first.task, partial(evaluate, **where), study.seeds),
+        *(ROLLOUTS, settings.discounts, first.max_steps),
     )
     files.write_csv(ready / BASELINES, baselines, BASELINE_COLUMNS)
     costs = costs_of(study, outcomes)

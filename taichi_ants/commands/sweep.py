@@ -103,7 +103,7 @@ def measures(kind: str) -> dict[str, Any]:
         return dict(MEASURES)
     from taichi_ants.analysis.colony.study import MEASURES as OF_COLONIES
 
-    return dict(OF_COLONIES)
+    return {name: argparse.Namespace(words=words) for name, words in OF_COLONIES.items()}
 
 
 def measured(asked: Sweep, outcomes: dict[Any, Outcome], name: str) -> np.ndarray:
@@ -136,11 +136,9 @@ def run_values(point: Any, seeds: tuple[int, ...], outcome: Outcome, name: str) 
 
 def colony_values(point: Any, seeds: tuple[int, ...], outcome: Outcome, name: str) -> np.ndarray:
     """A measure of a point's colonies, as the scaling study has it, float64 (seeds,)."""
-    from taichi_ants.analysis.colony.study import Record, compute
+    from taichi_ants.analysis.colony.study import measures_of
 
-    names = Record.__dataclass_fields__
-    record = Record(**{key: outcome[key].astype(int) for key in names})
-    return compute(record, name, point.ants, point.ticks)
+    return measures_of(outcome, point.ants, point.ticks)[name]
 
 
 def main(arguments: list[str] | None = None) -> None:

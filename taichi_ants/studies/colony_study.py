@@ -1,16 +1,21 @@
-"""The scaling study of the colony as data: its arenas, and what is done for each condition."""
+"""The scaling study of the colony: its arenas, its designs, and what is done for each condition.
+
+Other rules of the game are an entry in `RULES` (`analysis.colony.study`) and one in `TASKS`, other
+ways to come to a policy one in `WAYS` and a case in `_point`; then they can stand in `DESIGNS`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from taichi_ants import files
+from taichi_ants import worlds
 from taichi_ants.analysis.bounds.limits import Limits, limits_of
 from taichi_ants.analysis.colony.study import (
+    ARENAS,
     COPIED,
     COPIED_LONG,
     JOINT,
@@ -19,15 +24,15 @@ from taichi_ants.analysis.colony.study import (
     ON,
     OWN,
     THEN_JOINT,
-    Arena,
-    ColonyStudy,
     Condition,
-    Record,
+    Design,
+    Measured,
+    measures_of,
 )
+from taichi_ants.errors import check_one_of
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.studies.runner import ColonyPoint, Outcome, Study
+from taichi_ants.studies.runner import ColonyPoint, Outcome
 from taichi_ants.task import Life, Pheromone, Task
-from taichi_ants.worlds.world import World
 
 _PHEROMONES = {
     ON: Pheromone(),
@@ -36,175 +41,145 @@ _PHEROMONES = {
 }
 # Trails fall in training too, food grows back at once, and an ant goes on after a delivery.
 TASKS = {
-    name: Task(
+    rules: Task(
         pheromone=pheromone,
         delivery="continuing",
         evaporation_in_training=True,
         life=Life(regrowth=0),
     )
-    for name, pheromone in _PHEROMONES.items()
+    for rules, pheromone in _PHEROMONES.items()
 }
+_TRAINED = (JOINT, THEN_JOINT, OWN)
+DESIGNS = (
+    *(Design(ON, way) for way in (COPIED, COPIED_LONG, *_TRAINED)),
+    *(Design(rules, way) for rules in (OFF, LASTING) for way in (COPIED, *_TRAINED)),
+)
+# The large worlds get fewer designs, other numbers of ants, and shorter training.
+LARGE_DESIGNS = (
+    *(Design(ON, way) for way in (COPIED, *_TRAINED)),
+    *(Design(OFF, way) for way in (COPIED, JOINT)),
+)
+LARGE_SIZES, LARGE_EPISODES, LARGE_ROLLOUTS = (1, 10, 100, 1000), 10, 2
+RANGES = {"open": (30, 30, 30), "large": (100, 100, 100)}
 _EXPLORING = 0.7  # of the training episodes, until epsilon has fallen to what evaluation uses
-_ARRAYS = tuple(Record.__dataclass_fields__)
+
+# What is done for each condition; some have a point in common.
+Plan = dict[Condition, ColonyPoint]
 
 
-@dataclass(frozen=True)
-class ArenaPlan:
-    """What to do in one kind of world.
+def plan(
+    arenas: Sequence[str],
+    sizes: Sequence[int],
+    seeds: Sequence[int],
+    training: TrainingConfig,
+    episodes: int,
+    ticks: int,
+    rollouts: int,
+) -> Plan:
+    """The conditions of some arenas.
 
-    Attributes:
-        name, words: As in `analysis.colony.study.Arena`.
-        world: The world, or one for each seed, all of the same ranges.
-        sizes: Numbers of ants, ascending, 1 first.
-        ways: The ways of sharing to train, by pheromone.
+    Args:
+        arenas: Names in `ARENAS`.
+        sizes: Numbers of ants, ascending; the large worlds have their own. The way `COPIED_LONG`
+            trains as many times as long as there are ants in the largest colony.
+        seeds: A seed gives its open world to all conditions.
         training: The learner; its epsilon is that of the first episode, its `min_epsilon` that of
             the last 30 % and of the evaluation. The decay follows from these.
-        episodes: Training episodes, all of `ticks` ticks.
-        ticks: Ticks of each episode.
-        rollouts: Evaluation episodes.
-        long_factor: How many times as many episodes the way `COPIED_LONG` trains.
+        episodes, ticks, rollouts: As of a `ColonyPoint`; `episodes` and `rollouts` are at most so
+            many in large worlds.
     """
-
-    name: str
-    words: str
-    world: World | tuple[World, ...]
-    sizes: tuple[int, ...]
-    ways: Mapping[str, tuple[str, ...]]
-    training: TrainingConfig
-    episodes: int
-    ticks: int
-    rollouts: int
-    long_factor: int
-
-    def conditions(self) -> Iterator[tuple[Condition, ColonyPoint]]:
-        """All of them, with what is done for each; some have a point in common."""
-        for pheromone, ways in self.ways.items():
-            for way in ways:
-                for ants in self.sizes:
-                    condition = Condition(self.name, pheromone, way, ants)
-                    yield condition, self._point(condition)
-
-    def _point(self, condition: Condition) -> ColonyPoint:
-        ants, way = condition.ants, condition.way
-        alone = self._trained(condition.pheromone, self.episodes)
-        if way == COPIED_LONG:
-            alone = self._trained(condition.pheromone, self.episodes * self.long_factor)
-        if way == THEN_JOINT:
-            return replace(alone, ants=ants, after=alone)
-        if ants == 1:  # learning jointly, or with a table of its own, is learning alone
-            return alone
-        if way == OWN:
-            return replace(alone, ants=ants, sharing="own")
-        if way == JOINT:
-            return replace(alone, ants=ants)
-        return replace(alone, ants=ants, episodes=0, after=alone)
-
-    def _trained(self, pheromone: str, episodes: int) -> ColonyPoint:
-        """One ant that learns for so many episodes."""
-        exploring, least = max(1, round(_EXPLORING * episodes)), self.training.min_epsilon
-        low = max(least, 1e-6)
-        decay = min(1.0, (low / max(self.training.epsilon, low)) ** (1 / exploring))
-        return ColonyPoint(
-            *(self.world, TASKS[pheromone], replace(self.training, epsilon_decay=decay)),
-            episodes=episodes,
-            ticks=self.ticks,
-            rollouts=self.rollouts,
+    conditions = {}
+    for arena in arenas:
+        check_one_of("the arena", arena, tuple(ARENAS))
+        large = arena == "large"
+        ranges = RANGES.get(arena)
+        alone = ColonyPoint(
+            tuple(worlds.open_world(s, ranges) for s in seeds) if ranges else worlds.paper(),
+            Task(),
+            training,
+            episodes=min(LARGE_EPISODES, episodes) if large else episodes,
+            ticks=ticks,
+            rollouts=min(LARGE_ROLLOUTS, rollouts) if large else rollouts,
         )
+        for design in LARGE_DESIGNS if large else DESIGNS:
+            for ants in LARGE_SIZES if large else sizes:
+                ruled = replace(alone, task=TASKS[design.rules])
+                conditions[Condition(arena, *design, ants)] = _point(
+                    ruled, design.way, ants, sizes[-1]
+                )
+    return conditions
 
 
-@dataclass(frozen=True)
-class StudyPlan:
-    """What to do: the kinds of world, and the seeds of each."""
+def _point(alone: ColonyPoint, way: str, ants: int, long: int) -> ColonyPoint:
+    """What is done for so many ants that come to their policy in a way.
 
-    arenas: tuple[ArenaPlan, ...]
-    seeds: tuple[int, ...]
-
-    def conditions(self) -> Iterator[tuple[Condition, ColonyPoint]]:
-        """Those of all arenas."""
-        for arena in self.arenas:
-            yield from arena.conditions()
-
-    def study(self) -> Study:
-        """The work."""
-        return Study(tuple(point for _, point in self.conditions()), self.seeds)
-
-    def found(self, outcomes: Mapping[Any, Outcome]) -> ColonyStudy:
-        """What the analysis reads, from what the points gave."""
-        return self._joined({one: outcomes[point] for one, point in self.conditions()})
-
-    def read(self, arrays: Mapping[str, np.ndarray]) -> ColonyStudy:
-        """The same from what `to_arrays` gave."""
-        return self._joined(
-            {
-                one: {name: arrays[f"{_name(one)}.{name}"] for name in _ARRAYS}
-                for one, _ in self.conditions()
-            }
-        )
-
-    def _joined(self, outcomes: Mapping[Condition, Outcome]) -> ColonyStudy:
-        records = {
-            condition: Record(**{name: outcome[name].astype(np.int64) for name in _ARRAYS})
-            for condition, outcome in outcomes.items()
-        }
-        return ColonyStudy(tuple(_arena(one, self.seeds) for one in self.arenas), records)
-
-    def median_policies(
-        self, study: ColonyStudy, outcomes: Mapping[Any, Outcome]
-    ) -> Iterator[tuple[str, np.ndarray, dict[str, Any]]]:
-        """Policies worth keeping: those of median seeds, trained alone and jointly, with trails.
-
-        Yields:
-            A name, the action values float32 (n_states, 5), and what made them.
-        """
-        arenas = {arena.name: arena for arena in study.arenas}
-        for condition, point in self.conditions():
-            way, ants = condition.way, condition.ants
-            wanted = (way == COPIED and ants == 1) or (way == JOINT and ants > 1)
-            if condition.pheromone != ON or not wanted:
-                continue
-            values = study.values(arenas[condition.arena], ON, way, ants)
-            run = int(np.argsort(values, kind="stable")[(len(self.seeds) - 1) // 2])
-            metadata = {
-                **vars(condition),
-                "task": point.task.as_dict(),
-                "training": point.training.as_dict(),
-                "seed": self.seeds[run],
-                "episodes": point.episodes,
-                "ticks": point.ticks,
-                "deliveries_per_1000_ticks": values[run],
-            }
-            trained = "alone" if way == COPIED else f"joint_{ants}"
-            yield f"{condition.arena}_{trained}", outcomes[point]["q_values"][run], metadata
+    Args:
+        alone: What is done for one ant; its epsilon need not decay yet.
+        way: A name in `WAYS`.
+        ants: How many.
+        long: How many times as long the way `COPIED_LONG` trains.
+    """
+    alone = _exploring(
+        replace(alone, episodes=alone.episodes * (long if way == COPIED_LONG else 1))
+    )
+    many = replace(alone, ants=ants)
+    if way == THEN_JOINT:
+        return replace(many, after=alone)
+    if ants == 1 or way == JOINT:  # learning jointly, or with a table of its own, is learning alone
+        return many
+    if way == OWN:
+        return replace(many, sharing="own")
+    return replace(many, episodes=0, after=alone)
 
 
-def to_arrays(study: ColonyStudy) -> dict[str, np.ndarray]:
-    """What the conditions gave under names for a file, "arena.pheromone.way.ants.what"."""
+def _exploring(point: ColonyPoint) -> ColonyPoint:
+    """The same with an epsilon that falls while the ants explore."""
+    training, exploring = point.training, max(1, round(_EXPLORING * point.episodes))
+    low = max(training.min_epsilon, 1e-6)
+    decay = min(1.0, (low / max(training.epsilon, low)) ** (1 / exploring))
+    return replace(point, training=replace(training, epsilon_decay=decay))
+
+
+def measured(conditions: Plan, outcomes: Mapping[Any, Outcome]) -> Measured:
+    """All measures of all conditions, from what their points gave."""
     return {
-        f"{_name(condition)}.{name}": files.smallest(array)
-        for condition, record in study.records.items()
-        for name, array in vars(record).items()
+        condition: measures_of(outcomes[point], point.ants, point.ticks)
+        for condition, point in conditions.items()
     }
 
 
-def _name(condition: Condition) -> str:
-    return ".".join(map(str, vars(condition).values()))
+def limits_by_arena(conditions: Plan) -> dict[str, list[Limits]]:
+    """The limits of the world of each arena, or of each of its worlds."""
+    by_arena = {condition.arena: point.world for condition, point in conditions.items()}
+    return {
+        arena: [limits_of(one) for one in (world if isinstance(world, tuple) else (world,))]
+        for arena, world in by_arena.items()
+    }
 
 
-def _arena(plan: ArenaPlan, seeds: tuple[int, ...]) -> Arena:
-    """What the analysis needs to know of an arena, with the limits of its worlds."""
-    worlds = plan.world if isinstance(plan.world, tuple) else (plan.world,) * len(seeds)
-    limits: dict[World, Limits] = {}
-    for world, seed in zip(worlds, seeds, strict=True):
-        if world not in limits:
-            limits[world] = limits_of(world, seed)
-    return Arena(
-        name=plan.name,
-        words=plan.words,
-        sizes=plan.sizes,
-        episodes=plan.episodes,
-        ticks=plan.ticks,
-        rollouts=plan.rollouts,
-        seeds=len(seeds),
-        long_factor=plan.long_factor,
-        limits=tuple(limits[world] for world in worlds),
-    )
+def median_policies(
+    conditions: Plan, seeds: Sequence[int], found: Measured, outcomes: Mapping[Any, Outcome]
+) -> Iterator[tuple[str, np.ndarray, dict[str, Any]]]:
+    """Policies worth keeping: those of median seeds, trained alone and jointly, with trails.
+
+    Yields:
+        A name, the action values float32 (n_states, 5), and what made them.
+    """
+    for condition, point in conditions.items():
+        arena, rules, way, ants = condition
+        wanted = (way == COPIED and ants == 1) or (way == JOINT and ants > 1)
+        if rules != ON or not wanted:
+            continue
+        deliveries = found[condition]["deliveries"]
+        run = int(np.argsort(deliveries, kind="stable")[(len(seeds) - 1) // 2])
+        metadata = {
+            **condition._asdict(),
+            "task": point.task.as_dict(),
+            "training": point.training.as_dict(),
+            "seed": seeds[run],
+            "episodes": point.episodes,
+            "ticks": point.ticks,
+            "deliveries_per_1000_ticks": deliveries[run],
+        }
+        trained = "alone" if way == COPIED else f"joint_{ants}"
+        yield f"{arena}_{trained}", outcomes[point]["q_values"][run], metadata

@@ -132,7 +132,7 @@ def test_a_row_is_a_point_and_a_seed_as_the_library_has_it(sweep):
         assert float(line["return_last50_ci_high"]) == pytest.approx(high[0])
     report = (folder / "report.txt").read_text("utf-8")
     assert out.startswith(report)
-    assert "learning_rate  epsilon  lure" in report
+    assert "learning_rate epsilon lure" in report
     facts = json.loads((folder / "manifest.json").read_text("utf-8"))["settings"]
     assert (facts["task.delivery"], facts["seeds"]) == ("continuing", [7, 2, 5])
 

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from random_worlds import random_world
+from taichi_ants.engines.runs.launches import LaunchPlan
 
 from taichi_ants import Task, TrainingConfig, continue_training, evaluate, train
 from taichi_ants.engines.runs import engine as run_engine
-from taichi_ants.engines.runs.launches import LaunchPlan
 from taichi_ants.worlds import World, paper
 
 # Uneven on purpose: some deliver within 34 steps, some walk in circles for all of an episode, a

@@ -100,8 +100,8 @@ def test_things_stay_apart(deficiency) -> None:
 @pytest.mark.parametrize("deficiency", DEFICIENCIES)
 def test_lines_of_the_figures_stay_apart(deficiency) -> None:
     learners = [colour for colour, _ in looks(VARIANTS).values()]
-    ways = [look[0] for look in figures._WAY_LOOKS.values()]
-    trails = [look[0] for look in figures._PHEROMONE_LOOKS.values()]
+    ways = [look[0] for look in figures.WAY_LOOKS.values()]
+    trails = [look[0] for look in figures.RULES_LOOKS.values()]
     for compared in (learners, ways, trails):
         seen = lab([int(colour[1:], 16) for colour in compared], deficiency)
         for first, second in itertools.combinations(seen, 2):

@@ -7,6 +7,7 @@ from itertools import product
 import numpy as np
 
 from taichi_ants.analysis.bounds.episodes import Outcome
+from taichi_ants.task import Rewards
 from taichi_ants.worlds.world import World
 
 STEPS = [(1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1), (1, 0, 1)]
@@ -16,10 +17,14 @@ STEPS = [(1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1), (1, 0, 1)]
 DELIVERED = None
 
 
+PAPERS = Rewards(empty=0, failed=-1, lure=1, pick_up=3, give=10)
+
+
 class PlainWorld:
     """The rules for one ant without evaporation, with no thought of speed."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, paid: Rewards = PAPERS) -> None:
+        self.paid = paid
         self.ranges, self.queen = world.ranges, world.queen
         self.foods = set(map(tuple, world.foods.tolist()))
         self.obstacles = set(map(tuple, world.obstacles.tolist()))
@@ -35,20 +40,21 @@ class PlainWorld:
         if action == 3:
             in_view = [target for target in seen if target in foods]
             if taken or not in_view:
-                return [(state, -1)]
-            return [((cell, (heading + 3) % 6, target), 3) for target in in_view]
+                return [(state, self.paid.failed)]
+            return [((cell, (heading + 3) % 6, target), self.paid.pick_up) for target in in_view]
         if action == 4:
-            return [(DELIVERED, 10)] if taken and self.queen in seen else [(state, -1)]
+            gives = taken and self.queen in seen
+            return [(DELIVERED, self.paid.give)] if gives else [(state, self.paid.failed)]
         target, heading = seen[action], (heading + action - 1) % 6
         if not self._is_empty(target, foods):
-            return [((cell, heading, taken), -1)]
+            return [((cell, heading, taken), self.paid.failed)]
         if taken:
             lured = self._distance(target) < self._distance(cell)
         else:
             levels = [self.trails.get(c, 0) for c in seen if self._is_empty(c, foods)]
             level = self.trails.get(target, 0)
             lured = level >= 1 and level >= max(levels) / 2
-        return [((target, heading, taken), int(lured))]
+        return [((target, heading, taken), self.paid.lure if lured else self.paid.empty)]
 
     def _is_empty(self, cell: tuple, foods: set) -> bool:
         exists = all(value < size for value, size in zip(cell, self.ranges, strict=True))
@@ -75,39 +81,18 @@ class PlainWorld:
         return found
 
 
-def search_all_sequences(plain: PlainWorld, max_steps: int) -> tuple[tuple, tuple]:
-    """The shortest and the best (return, steps, deliveries) of all sequences of actions."""
-    episodes = []
+def search_all_sequences(plain: PlainWorld, max_steps: int) -> tuple:
+    """The shortest (return, steps, deliveries) of all sequences of actions, then the best."""
+    delivered = []
     for actions in product(range(5), repeat=max_steps):
         state, reward = plain.start, 0
         for steps, action in enumerate(actions, start=1):
             [(state, gained)] = plain.outcomes(state, action)
             reward += gained
-            if state is DELIVERED or steps == max_steps:
-                episodes.append((reward, steps, int(state is DELIVERED)))
+            if state is DELIVERED:
+                delivered.append((reward, steps, 1))
                 break
-    delivered = [episode for episode in episodes if episode[2]]
-    shortest = min(delivered, key=lambda episode: (episode[1], -episode[0]))
-    return shortest, max(episodes, key=lambda episode: (episode[0], -episode[1], episode[2]))
-
-
-def search_largest(plain: PlainWorld, max_steps: int) -> Outcome:
-    """The largest return, then the fewest steps, then a delivery, with luck at the pick-up."""
-    states = plain.all_states()
-    best = dict.fromkeys(states, (0, 0, 0))
-    best[DELIVERED] = (0, 0, 1)
-    for _ in range(max_steps):
-        later = {
-            state: max(
-                (best[after][0] + reward, best[after][1] - 1, best[after][2])
-                for outcomes in actions
-                for after, reward in outcomes
-            )
-            for state, actions in states.items()
-        }
-        best = {**later, DELIVERED: (0, 0, 1)}
-    reward, steps, deliveries = best[plain.start]
-    return Outcome(reward, -steps, deliveries)
+    return min(delivered, key=lambda episode: (episode[1], -episode[0]))
 
 
 def search_shortest(plain: PlainWorld) -> Outcome | None:

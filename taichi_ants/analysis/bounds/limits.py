@@ -22,12 +22,11 @@ All hold in the long run, for ants that neither die nor are born, and food that 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_ants.analysis.bounds.transitions import look_around
+from taichi_ants.analysis.bounds.surroundings import look_around
 from taichi_ants.task.constants import EMPTY, QUEEN
 from taichi_ants.worlds.geometry import walkable
 from taichi_ants.worlds.world import World
@@ -42,14 +41,12 @@ class Limits:
     """The limits of one world; inf or 0 where nothing can be delivered.
 
     Attributes:
-        first: Ticks to the first delivery of one ant alone, from its start.
         cycle: Ticks from one delivery to the next of one ant alone, in the long run.
         crowd_cycle: The same of an ant that can turn on the spot everywhere.
         food: Foods that can be taken, per 1000 ticks.
         queen: Foods that can be given, per 1000 ticks.
     """
 
-    first: float
     cycle: float
     crowd_cycle: float
     food: float
@@ -61,24 +58,10 @@ class Limits:
         return min(ants * 1000 / cycle, self.food, self.queen)
 
 
-def limits_of(world: World, seed: int = 0, regrowth: int = 0) -> Limits:
-    """The limits of a world.
-
-    Args:
-        world: The world.
-        seed: Where and how one ant starts.
-        regrowth: Ticks until a food grows back; of the food's limit alone, the cycles are those
-            of food that grows back at once.
-    """
-    alone, crowd = _Walks(world, can_stay=False), _Walks(world, can_stay=True)
-    cells, headings = world.start(seed, 1)
-    return Limits(
-        first=alone.first_delivery(int(cells[0]), int(headings[0])),
-        cycle=alone.cycle(),
-        crowd_cycle=crowd.cycle(),
-        food=food_limit(world, regrowth),
-        queen=queen_limit(world),
-    )
+def limits_of(world: World) -> Limits:
+    """The limits of a world."""
+    cycles = shortest_cycle(world, can_stay=False), shortest_cycle(world, can_stay=True)
+    return Limits(*cycles, food_limit(world), queen_limit(world))
 
 
 def food_limit(world: World, regrowth: int = 0) -> float:
@@ -98,18 +81,14 @@ def food_limit(world: World, regrowth: int = 0) -> float:
     unit = TICKS_A_CELL * TICKS_A_CELL_BESIDE_QUEEN * (regrowth + 1)
     per_cell = np.where(beside_queen, unit // TICKS_A_CELL_BESIDE_QUEEN, unit // TICKS_A_CELL)
     first_cell, sink = 1 + len(foods), 1 + len(foods) + len(cells)
-    source_edges = (np.zeros(len(foods), int), 1 + np.arange(len(foods)))
-    sink_edges = (first_cell + np.arange(len(cells)), np.full(len(cells), sink))
-    rows = np.concatenate([source_edges[0], 1 + food, sink_edges[0]])
-    columns = np.concatenate([source_edges[1], first_cell + cell, sink_edges[1]])
-    most = np.concatenate(
-        [
-            np.full(len(foods), unit // (regrowth + 1)),
-            np.full(len(food), unit // TICKS_A_CELL),
-            per_cell,
-        ]
-    ).astype(np.int32)
-    graph = coo_array((most, (rows, columns)), shape=(sink + 1, sink + 1)).tocsr()
+    edges = (  # from a source to the foods, from these to cells, from these to a sink
+        (0, 1 + np.arange(len(foods)), unit // (regrowth + 1)),
+        (1 + food, first_cell + cell, unit // TICKS_A_CELL),
+        (first_cell + np.arange(len(cells)), sink, per_cell),
+    )
+    broad = (np.broadcast_arrays(*edge) for edge in edges)
+    rows, columns, most = (np.concatenate(part) for part in zip(*broad, strict=True))
+    graph = coo_array((most.astype(np.int32), (rows, columns)), shape=(sink + 1, sink + 1)).tocsr()
     return 1000 * int(maximum_flow(graph, 0, sink).flow_value) / unit
 
 
@@ -124,72 +103,43 @@ def _reachable(world: World) -> np.ndarray:
     return walkable(world.grid, world.ground(), world.grid.index(world.queen) + world.grid.offsets)
 
 
-class _Walks:
-    """Shortest walks of an ant between deliveries, as paths in a graph.
+def shortest_cycle(world: World, can_stay: bool) -> float:
+    """The least mean number of ticks from one delivery to the next, inf if there is no way.
 
-    A node is (carrying, heading, cell); edges are moves, blocked or not, and pick-ups. A delivery
-    leaves the ant where it is, so it is the end of one walk and the start of the next.
+    A delivery leaves the ant where it is, so it is the end of one walk and the start of the next.
 
     Args:
         world: The world; its ground stays as it is.
         can_stay: Whether a move can also turn the ant on the spot where nothing is in its way.
     """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import dijkstra
 
-    def __init__(self, world: World, can_stay: bool) -> None:
-        from scipy.sparse import coo_array
-
-        around = look_around(world)
-        self._cells, self._half = around.cells, around.n_states
-        moves = [around.moves(around.empty)]
-        if can_stay:
-            moves.append(around.moves(np.zeros_like(around.empty)))
-        states = np.arange(self._half)
-        walks = [np.stack([states, move]) for move in np.concatenate(moves)]
-        picks = around.sees(around.food)
-        pick_ups = np.stack([picks, around.turned_round(picks) + self._half])
-        rows, columns = np.concatenate(
-            [*walks, *[walk + self._half for walk in walks], pick_ups], axis=1
-        )
-        ones, size = np.ones(len(rows), np.int8), 2 * self._half
-        self._graph = coo_array((ones, (rows, columns)), shape=(size, size)).tocsr()
-        # Where a carrying ant can give; no ant comes to a cell that holds food.
-        gives = around.sees(around.queen)
-        self._gives = gives[world.ground()[self._cells[gives % len(self._cells)]] == EMPTY]
-
-    def first_delivery(self, cell: int, heading: int) -> float:
-        """Ticks to a delivery of an ant that starts on a cell (flat index) without food."""
-        start = heading * len(self._cells) + int(np.searchsorted(self._cells, cell))
-        for horizon in self._horizons():
-            ticks = self._to_deliveries([start], horizon).min(initial=np.inf)
-            if np.isfinite(ticks):
-                return float(ticks)
-        return np.inf
-
-    def cycle(self) -> float:
-        """The least mean number of ticks from one delivery to the next, inf if there is no way."""
-        n = len(self._gives)
-        for horizon in self._horizons() if n else ():
-            ticks = self._to_deliveries(self._gives, horizon)
-            mean = least_mean_cycle(ticks)
-            # If so, a cycle of up to n walks with one beyond the horizon has a greater mean.
-            if np.isfinite(mean) and mean + (n - 1) * (mean - ticks.min()) <= horizon:
-                return mean
-        return np.inf
-
-    def _horizons(self) -> Iterator[int]:
-        """Lengths up to which to search for walks: short ones are quick, and mostly enough."""
-        horizon = _FIRST_HORIZON
-        while horizon < 2 * self._half:
-            yield horizon
-            horizon *= 4
-        yield 2 * self._half
-
-    def _to_deliveries(self, starts: np.ndarray | list[int], horizon: int) -> np.ndarray:
-        """Ticks (starts, gives) from states without food to each state after a delivery."""
-        from scipy.sparse.csgraph import dijkstra
-
-        steps = dijkstra(self._graph, indices=starts, unweighted=True, limit=horizon)
-        return steps[:, self._half + self._gives] + 1
+    # A node is (carrying, heading, cell); edges are moves, blocked or not, and pick-ups.
+    around = look_around(world)
+    half = around.n_states
+    moves = [around.moves(around.empty)]
+    if can_stay:
+        moves.append(around.moves(np.zeros_like(around.empty)))
+    walks = [np.stack([np.arange(half), move]) for move in np.concatenate(moves)]
+    picks = around.sees(around.food)
+    pick_ups = np.stack([picks, around.turned_round(picks) + half])
+    edges = np.concatenate([*walks, *[walk + half for walk in walks], pick_ups], axis=1)
+    ones = np.ones(edges.shape[1], np.int8)
+    graph = coo_array((ones, tuple(edges)), shape=(2 * half, 2 * half)).tocsr()
+    # Where a carrying ant can give; no ant comes to a cell that holds food.
+    gives = around.sees(around.queen)
+    gives = gives[world.ground()[around.cells[gives % len(around.cells)]] == EMPTY]
+    mean, horizon = np.inf, _FIRST_HORIZON  # short walks are found quickly, and mostly enough
+    while len(gives) and horizon < 8 * half:  # the longest walk has less than 2 * half steps
+        walked = dijkstra(graph, indices=gives, unweighted=True, limit=horizon)
+        ticks = walked[:, half + gives] + 1
+        mean = least_mean_cycle(ticks)
+        # If so, a cycle of walks with one beyond the horizon has a greater mean.
+        if np.isfinite(mean) and mean + (len(gives) - 1) * (mean - ticks.min()) <= horizon:
+            break
+        horizon *= 4
+    return mean
 
 
 def least_mean_cycle(lengths: np.ndarray) -> float:

@@ -9,18 +9,15 @@ import numpy as np
 import pytest
 from plain_runs import rollout
 
-from taichi_ants.analysis.bounds import episodes as dynamic_programming
+from taichi_ants.analysis.bounds import episodes
 from taichi_ants.analysis.bounds.baselines import (
     BASELINE_COLUMNS,
     GREEDY_SETTING,
     TRAINING_SETTING,
     baseline_rows,
-    bound_rows,
-    policy_rows,
 )
-from taichi_ants.errors import AntsError
 from taichi_ants.learners.policies import random_policy, trail_follower
-from taichi_ants.task import Task
+from taichi_ants.task import Rewards, Task
 from taichi_ants.worlds.paper import paper
 from taichi_ants.worlds.world import World
 
@@ -36,7 +33,6 @@ def evaluate(world: World, q_values: np.ndarray, **options: Any) -> SimpleNamesp
                 number=number,
                 max_steps=options["max_steps"],
                 task=options["task"],
-                epsilon=options["epsilon"],
             )
             for number in range(options["rollouts"])
         ]
@@ -50,7 +46,7 @@ def evaluate(world: World, q_values: np.ndarray, **options: Any) -> SimpleNamesp
 
 
 def test_the_rows_of_the_world_of_the_paper() -> None:
-    rows = baseline_rows(paper(), evaluate, seeds=[3, 4], rollouts=2)
+    rows = baseline_rows(paper(), Task(), evaluate, seeds=[3, 4], rollouts=2)
     assert all(tuple(row) == BASELINE_COLUMNS for row in rows)
     assert all(row["note"] for row in rows)
     figures = [
@@ -67,7 +63,6 @@ def test_the_rows_of_the_world_of_the_paper() -> None:
     ]
     assert figures == [
         ("shortest delivery", TRAINING_SETTING, None, 45, 34, 1),
-        ("largest return", TRAINING_SETTING, None, 491, 600, 1),
         ("optimal policy", TRAINING_SETTING, 0.9, 45, 34, 1),
         ("optimal policy", TRAINING_SETTING, 0.99, 476, 600, 0),
         ("trail follower", TRAINING_SETTING, None, 45, 34, 1),
@@ -79,10 +74,9 @@ def test_the_rows_of_the_world_of_the_paper() -> None:
     ]
 
 
-def test_exact_rows_have_no_interval() -> None:
-    for row in bound_rows(paper(), [0.9], 600):
-        assert row["return_ci_low"] is None
-        assert row["return_ci_high"] is None
+def test_only_rows_of_several_seeds_have_an_interval() -> None:
+    rows = baseline_rows(paper(), Task(), evaluate, [0], rollouts=1, max_steps=40)
+    assert {(row["return_ci_low"], row["return_ci_high"]) for row in rows} == {(None, None)}
 
 
 def test_policies_are_evaluated_in_both_settings_with_one_table_for_each_seed() -> None:
@@ -95,7 +89,8 @@ def test_policies_are_evaluated_in_both_settings_with_one_table_for_each_seed() 
         returns = np.array([[0, 2], [2, 2], [5, 7]])
         return SimpleNamespace(returns=returns, steps=np.full(shape, 9), deliveries=np.eye(3, 2))
 
-    rows = policy_rows(paper(), record, seeds=range(5, 8), rollouts=2, max_steps=77)
+    task = Task("five_cells", rewards=Rewards(give=77))
+    rows = baseline_rows(paper(), task, record, range(5, 8), rollouts=2, max_steps=77)[-4:]
     expected = [random_policy()] * 2 + [trail_follower()] * 2
     for (q_values, options), policy, evaporation in zip(
         calls, expected, [False, True, False, True], strict=True
@@ -103,9 +98,8 @@ def test_policies_are_evaluated_in_both_settings_with_one_table_for_each_seed() 
         np.testing.assert_array_equal(q_values, np.stack([policy] * 3))
         assert options == {
             "rollouts": 2,
-            "epsilon": 0.0,
             "max_steps": 77,
-            "task": Task(evaporation_in_evaluation=evaporation),
+            "task": Task(rewards=task.rewards, evaporation_in_evaluation=evaporation),
             "seeds": [5, 6, 7],
         }
     for row in rows:
@@ -116,6 +110,13 @@ def test_policies_are_evaluated_in_both_settings_with_one_table_for_each_seed() 
         assert 1 <= row["return_ci_low"] < 3 < row["return_ci_high"] <= 6
 
 
+def test_all_baselines_are_paid_what_the_task_pays() -> None:
+    task = Task(rewards=Rewards(empty=0, failed=-1, lure=2, pick_up=30, give=100))
+    rows = baseline_rows(paper(), task, evaluate, [0], 1, (0.9,))
+    returns = {row["return_mean"] for row in rows if row["baseline"] != "random policy"}
+    assert returns == {32 * 2 + 30 + 100}
+
+
 def test_settings_say_where_trails_evaporate() -> None:
     calls = []
 
@@ -123,7 +124,8 @@ def test_settings_say_where_trails_evaporate() -> None:
         calls.append(options["task"].evaporation_in_evaluation)
         return evaluate(*arguments, **options)
 
-    rows = baseline_rows(paper(), record, [0], 1, (0.9,), 40, True, False)
+    task = Task(evaporation_in_training=True, evaporation_in_evaluation=False)
+    rows = baseline_rows(paper(), task, record, [0], 1, (0.9,), 40)
     assert rows[0]["note"] == "exact bounds are known for worlds without evaporation only."
     assert [row["setting"] for row in rows] == [
         "training, evaporation",
@@ -132,22 +134,16 @@ def test_settings_say_where_trails_evaporate() -> None:
     assert calls == [True, False] * 2
 
 
-def test_one_seed_has_no_interval() -> None:
-    rows = policy_rows(paper(), evaluate, seeds=[0], rollouts=1, max_steps=40)
-    assert [(row["return_ci_low"], row["return_ci_high"]) for row in rows] == [(None, None)] * 4
-    assert rows[2]["return_mean"] == 45
-
-
 def test_a_discount_of_one_has_no_figures_but_a_reason() -> None:
-    rows = bound_rows(paper(), [1.0, 0.5, 1], 600)
-    assert [row["discount"] for row in rows] == [None, None, 0.5, 1.0]
-    assert rows[-1]["return_mean"] is None
-    assert "may grow without bound" in rows[-1]["note"]
+    rows = baseline_rows(paper(), Task(), evaluate, [0], 1, [1.0, 0.5, 1], 40)[:-4]
+    assert [row["discount"] for row in rows] == [None, 1.0, 0.5]
+    assert rows[1]["return_mean"] is None
+    assert "may grow without bound" in rows[1]["note"]
 
 
 def test_a_world_without_a_delivery_says_so() -> None:
     world = World((3, 1, 1), (0, 0, 0), ants=[((1, 0, 0), 0)])
-    shortest = bound_rows(world, [], 10)[0]
+    shortest = baseline_rows(world, Task(), evaluate, [0], 1, [], 10)[0]
     assert shortest["return_mean"] is None
     assert shortest["note"] == "no delivery is possible"
 
@@ -155,10 +151,8 @@ def test_a_world_without_a_delivery_says_so() -> None:
 def test_a_world_that_is_too_large_leaves_out_the_bounds_only(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(dynamic_programming, "MAX_STATES", 100)
-    with pytest.raises(AntsError, match="choose a smaller world"):
-        bound_rows(paper(), [], 600)
-    first, *others = baseline_rows(paper(), evaluate, [0], rollouts=1, max_steps=40)
+    monkeypatch.setattr(episodes, "MAX_STATES", 100)
+    first, *others = baseline_rows(paper(), Task(), evaluate, [0], rollouts=1, max_steps=40)
     assert first["baseline"] == "exact bounds"
     assert "choose a smaller world" in first["note"]
     assert first["return_mean"] is None

@@ -7,21 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from plain_runs import rollout
-from plain_search import (
-    PlainWorld,
-    search_all_sequences,
-    search_largest,
-    search_optimal,
-    search_shortest,
-)
+from plain_search import PlainWorld, search_all_sequences, search_optimal, search_shortest
 
-from taichi_ants.analysis.bounds import episodes as dynamic_programming
-from taichi_ants.analysis.bounds.episodes import Outcome, exact_bounds
-from taichi_ants.analysis.bounds.transitions import build_transitions
+from taichi_ants.analysis.bounds import episodes
+from taichi_ants.analysis.bounds.episodes import EpisodeBounds, Outcome
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.policies import random_policy, trail_follower
-from taichi_ants.task import Rewards, Task
+from taichi_ants.task import Pheromone, Rewards, Task
 from taichi_ants.worlds.paper import paper
 from taichi_ants.worlds.world import World
 
@@ -54,27 +47,33 @@ def small_worlds(draw: st.DrawFn) -> World:
     )
 
 
-@settings(max_examples=40, deadline=None)
-@given(world=small_worlds(), max_steps=st.integers(1, 25))
-def test_bounds_agree_with_plain_searches(world: World, max_steps: int) -> None:
-    bounds = exact_bounds(world, [0.5], max_steps)
-    plain = PlainWorld(world)
-    assert bounds.shortest == search_shortest(plain)
-    assert bounds.largest == search_largest(plain, max_steps)
-    [optimal] = bounds.optimal
-    value, outcome = search_optimal(plain, 0.5, max_steps)
-    assert optimal.value == pytest.approx(value, abs=1e-9)
-    assert_outcome(optimal.outcome, outcome)
+def bounds_of(world: World, rewards: Rewards | None = None) -> EpisodeBounds:
+    return EpisodeBounds(world, Task(rewards=rewards or Rewards()))
 
 
-@pytest.mark.parametrize("max_steps", [4, 5, 6])
-def test_bounds_agree_with_all_sequences_of_actions(max_steps: int) -> None:
+@settings(max_examples=60, deadline=None)
+@given(
+    world=small_worlds(),
+    max_steps=st.integers(1, 25),
+    paid=st.none() | st.tuples(*[st.integers(-12, 12)] * 5),
+)
+def test_bounds_agree_with_plain_searches_for_any_rewards(
+    world: World, max_steps: int, paid: tuple | None
+) -> None:
+    rewards = Rewards(*paid) if paid else Rewards()
+    bounds, plain = bounds_of(world, rewards), PlainWorld(world, rewards)
+    assert bounds.shortest() == search_shortest(plain)
+    expected_value, expected = search_optimal(plain, 0.5, max_steps)
+    value, outcome = bounds.optimal(0.5, max_steps)
+    assert value == pytest.approx(expected_value, abs=1e-9)
+    assert_outcome(outcome, expected)
+
+
+def test_the_shortest_delivery_is_that_of_all_sequences_of_actions() -> None:
     # Queen, ant, trail, food in a row; the ant faces away from the queen.
     world = World((4, 1, 1), (0, 0, 0), [(3, 0, 0)], trails=[((2, 0, 0), 1)], ants=[((1, 0, 0), 0)])
-    shortest, largest = search_all_sequences(PlainWorld(world), max_steps)
-    bounds = exact_bounds(world, [], max_steps)
-    assert bounds.shortest == Outcome(*shortest) == Outcome(15, 4, 1)
-    assert bounds.largest == Outcome(*largest)
+    shortest = search_all_sequences(PlainWorld(world), 6)
+    assert bounds_of(world).shortest() == Outcome(*shortest) == Outcome(15, 4, 1)
 
 
 # The world of the paper. On the line of the cells (i, 0, 0) the queen is at i = -9, the ant at
@@ -86,38 +85,28 @@ PAPERS_SHORTEST = Outcome(45, 34, 1)
 
 
 def test_the_shortest_delivery_in_the_world_of_the_paper() -> None:
-    assert exact_bounds(paper(), []).shortest == PAPERS_SHORTEST
+    assert bounds_of(paper()).shortest() == PAPERS_SHORTEST
 
 
 def test_a_small_discount_factor_makes_the_shortest_delivery_optimal() -> None:
-    [optimal] = exact_bounds(paper(), [0.9]).optimal
+    value, outcome = bounds_of(paper()).optimal(0.9, 600)
     ways = (1 - 0.9**16) / (1 - 0.9)
-    assert optimal.value == pytest.approx(ways + 0.9**16 * 3 + 0.9**17 * ways + 0.9**33 * 10)
-    assert optimal.outcome == PAPERS_SHORTEST
+    assert value == pytest.approx(ways + 0.9**16 * 3 + 0.9**17 * ways + 0.9**33 * 10)
+    assert outcome == PAPERS_SHORTEST
 
 
 def test_a_large_discount_factor_makes_the_ant_walk_the_trail_forever() -> None:
     # After the first 16 cells of the trail it turns round: four moves beside the trail earn
     # nothing, the fifth comes back to the trail two cells before the turn, and 14 more lead to the
     # other end. So 19 steps earn 15: 600 = 16 + 30 * 19 + 14 steps earn 16 + 30 * 15 + 10.
-    [optimal] = exact_bounds(paper(), [0.99]).optimal
-    assert optimal.outcome == Outcome(476, 600, 0)
+    value, outcome = bounds_of(paper()).optimal(0.99, 600)
+    assert outcome == Outcome(476, 600, 0)
     turn_and_way = 0.99**4 * (1 - 0.99**15) / (1 - 0.99) / (1 - 0.99**19)
     first_way = (1 - 0.99**16) / (1 - 0.99)
-    assert optimal.value == pytest.approx(first_way + 0.99**16 * turn_and_way)
+    assert value == pytest.approx(first_way + 0.99**16 * turn_and_way)
 
 
-def test_the_largest_return_in_the_world_of_the_paper() -> None:
-    largest = exact_bounds(paper(), [], 600).largest
-    assert largest == Outcome(491, 600, 1)
-    # With exactly the steps of the shortest delivery nothing is better.
-    assert exact_bounds(paper(), [], 34).largest == PAPERS_SHORTEST
-    # One step less: walk on the trail and pick up at the end. 16 + 3, and 15 or 16 moves home.
-    assert exact_bounds(paper(), [], 33).largest == Outcome(35, 33, 0)
-    assert exact_bounds(paper(), [], 1).largest == Outcome(1, 1, 0)
-
-
-def test_no_policy_exceeds_the_bounds() -> None:
+def test_no_policy_delivers_sooner() -> None:
     world = World(
         (4, 3, 2),
         (0, 0, 0),
@@ -126,8 +115,8 @@ def test_no_policy_exceeds_the_bounds() -> None:
         [((1, 1, 0), 3), ((2, 1, 0), 3)],
         [((1, 0, 0), 0)],
     )
-    bounds = exact_bounds(world, [0.9], 60)
-    assert bounds.shortest is not None
+    shortest = bounds_of(world).shortest()
+    assert shortest is not None
     rollouts = [
         rollout(
             world,
@@ -139,13 +128,12 @@ def test_no_policy_exceeds_the_bounds() -> None:
         for policy in (random_policy(), trail_follower())
         for number in range(40)
     ]
-    assert all(run.returns[0] <= bounds.largest.episode_return for run in rollouts)
     delivered = [run for run in rollouts if run.deliveries[0]]
     assert delivered
-    assert all(run.steps[0] >= bounds.shortest.steps for run in delivered)
+    assert all(run.steps[0] >= shortest.steps for run in delivered)
 
 
-def test_a_pick_up_of_one_of_two_foods_is_luck_for_the_bounds_and_chance_for_the_optimum() -> None:
+def test_a_pick_up_of_one_of_two_foods_is_luck_for_the_shortest_chance_for_the_best() -> None:
     # Eight cells, y = 1 above, x to the right. The ant at A looks towards the queen and sees the
     # foods 1 and 2; all else is rock.
     #     # # 2 #
@@ -162,14 +150,13 @@ def test_a_pick_up_of_one_of_two_foods_is_luck_for_the_bounds_and_chance_for_the
         obstacles=[(0, 1, 0), (1, 1, 0), (3, 0, 0), (3, 1, 0)],
         ants=[((2, 0, 0), 3)],
     )
-    bounds = exact_bounds(world, [0.5], 6)
-    assert bounds.shortest == bounds.largest == Outcome(12, 5, 1)
-    [optimal] = bounds.optimal
-    assert optimal.outcome == Outcome((12 + 0) / 2, (5 + 6) / 2, 0.5)
+    assert bounds_of(world).shortest() == Outcome(12, 5, 1)
+    value, outcome = bounds_of(world).optimal(0.5, 6)
+    assert outcome == Outcome((12 + 0) / 2, (5 + 6) / 2, 0.5)
     food_1 = -1 - 0.5 + 0.25 * 1 + 0.125 * 10
     cycle = (-1 - 0.5) / (1 - 0.125)
     food_2 = -1 + 0.25 * cycle
-    assert optimal.value == pytest.approx(3 + 0.5 * (food_1 + food_2) / 2)
+    assert value == pytest.approx(3 + 0.5 * (food_1 + food_2) / 2)
 
 
 @pytest.mark.parametrize(
@@ -195,23 +182,11 @@ def test_moves_onto_trails_earn_what_the_ant_sees(
         trails=list(zip(ahead, levels, strict=True)),
         ants=[((1, 0, 0), 0)],
     )
-    transitions = build_transitions(world)
-    assert transitions.foraging.rewards[:, transitions.start].tolist() == [*rewards, -1, -1]
-
-
-def test_moves_earn_what_the_caller_pays() -> None:
-    world = World((4, 1, 1), (0, 0, 0), [(2, 0, 0)], trails=[((1, 0, 0), 9)], ants=[((1, 0, 0), 0)])
-    paid = Rewards(empty=-2, failed=-7, lure=5, pick_up=11, give=40)
-    transitions = build_transitions(world, paid)
-    usual = build_transitions(world)
-    assert (transitions.foraging.exit_reward, transitions.carrying(0).exit_reward) == (11, 40)
-    by_usual = {0: -2, -1: -7, 1: 5, 3: 11, 10: 40}
-    for phase, other in (
-        (transitions.foraging, usual.foraging),
-        (transitions.carrying(0), usual.carrying(0)),
-    ):
-        assert (phase.rewards == np.vectorize(by_usual.get)(other.rewards)).all()
-        assert phase.failed_reward == -7
+    # With a discount of 0 what the ant earns at once is all that counts.
+    value, _ = bounds_of(world).optimal(0.0, 1)
+    assert value == max(rewards)
+    bounds = bounds_of(world)
+    assert bounds._rewards[:, bounds._start].tolist() == [*rewards, -1, -1]
 
 
 def test_a_food_behind_another_is_never_reached() -> None:
@@ -219,28 +194,25 @@ def test_a_food_behind_another_is_never_reached() -> None:
     # and then the ant carries.
     world = World((4, 1, 1), (0, 0, 0), [(2, 0, 0), (3, 0, 0)], ants=[((1, 0, 0), 0)])
     alone = World((4, 1, 1), (0, 0, 0), [(2, 0, 0)], [(3, 0, 0)], ants=[((1, 0, 0), 0)])
-    bounds = exact_bounds(world, [0.9], 10)
-    assert bounds == exact_bounds(alone, [0.9], 10)
-    assert bounds.shortest == Outcome(13, 2, 1)
+    value, outcome = bounds_of(world).optimal(0.9, 10)
+    assert (pytest.approx(value), outcome) == bounds_of(alone).optimal(0.9, 10)
+    assert bounds_of(world).shortest() == bounds_of(alone).shortest() == Outcome(13, 2, 1)
 
 
 @pytest.mark.parametrize("foods", [[], [(5, 0, 0)]])
 def test_a_world_without_a_delivery_has_no_shortest_one(foods: list) -> None:
     # The only food, if any, lies behind a rock.
     world = World((6, 1, 1), (0, 0, 0), foods, [(3, 0, 0)], ants=[((1, 0, 0), 0)])
-    bounds = exact_bounds(world, [0.9], 10)
-    assert bounds.shortest is None
-    assert bounds.largest.deliveries == 0
-    assert bounds.optimal[0].outcome.deliveries == 0
+    assert bounds_of(world).shortest() is None
+    _, outcome = bounds_of(world).optimal(0.9, 10)
+    assert outcome.deliveries == 0
 
 
 def test_equal_actions_are_decided_by_the_lowest_number() -> None:
     # Three cells in a row: the ant in the middle between queen and rock can only fail, for ever.
     world = World((3, 1, 1), (0, 0, 0), obstacles=[(2, 0, 0)], ants=[((1, 0, 0), 0)])
-    [at_once, later] = exact_bounds(world, [0.0, 0.9], 7).optimal
-    assert at_once.outcome == later.outcome == Outcome(-7, 7, 0)
-    assert at_once.value == -1
-    assert later.value == pytest.approx(-10)
+    assert bounds_of(world).optimal(0.0, 7) == (-1, Outcome(-7, 7, 0))
+    assert bounds_of(world).optimal(0.9, 7) == (pytest.approx(-10), Outcome(-7, 7, 0))
 
 
 def test_an_ant_that_is_not_listed_starts_by_the_seed_zero() -> None:
@@ -249,54 +221,46 @@ def test_an_ant_that_is_not_listed_starts_by_the_seed_zero() -> None:
     listed = World(
         (4, 3, 2), (0, 0, 0), [(3, 0, 0)], ants=[(placed.grid.cells(cell).tolist(), int(heading))]
     )
-    assert exact_bounds(placed, [0.9], 50) == exact_bounds(listed, [0.9], 50)
+    assert bounds_of(placed).optimal(0.9, 50) == bounds_of(listed).optimal(0.9, 50)
 
 
 @pytest.mark.parametrize("discount", [-0.1, 1.0, 1.5, float("nan")])
 def test_a_discount_out_of_range_is_refused(discount: float) -> None:
     with pytest.raises(AntsError, match=str(discount)):
-        exact_bounds(paper(), [0.9, discount])
-
-
-@pytest.mark.parametrize("max_steps", [0, -3, 2.5, 10**9])
-def test_a_step_limit_out_of_range_is_refused(max_steps: float) -> None:
-    with pytest.raises(AntsError, match="max_steps"):
-        exact_bounds(paper(), [], max_steps)
+        bounds_of(paper()).optimal(discount, 600)
 
 
 @pytest.mark.parametrize(
-    ("world", "max_steps"),
-    [
-        # A million cells.
-        (World((1000, 1000, 1), (0, 0, 0)), 1),
-        # Few states, but too many steps.
-        (paper(), 10_000_000),
-    ],
+    "task",
+    [Task(evaporation_in_training=True), Task(pheromone=Pheromone(diffusion=0.1))],
 )
-def test_a_world_that_is_too_large_is_refused(world: World, max_steps: int) -> None:
-    with pytest.raises(AntsError, match=r"choose a smaller world.* fewer foods.* to get them\.$"):
-        exact_bounds(world, [], max_steps)
+def test_trails_that_change_are_refused(task: Task) -> None:
+    with pytest.raises(AntsError, match="without evaporation"):
+        EpisodeBounds(paper(), task)
+
+
+def test_a_world_that_is_too_large_is_refused() -> None:
+    with pytest.raises(AntsError, match=r"choose a smaller world or fewer foods to get them\.$"):
+        bounds_of(World((1000, 1000, 1), (0, 0, 0)))
 
 
 @pytest.mark.parametrize(
     ("foods", "obstacles", "states"),
     [
-        # Six states on each cell but the queen's, in the phase without food and in one for each
-        # food that can come into view.
-        ([], [], 6 * 5),
-        ([(5, 0, 0)], [], 6 * 5 * 2),
-        ([(4, 0, 0), (5, 0, 0)], [], 6 * 5 * 2),
-        ([(5, 0, 0)], [(4, 0, 0)], 6 * 4),
+        # Six states on each cell but the queen's, without food and with each food that can come
+        # into view, and the delivery.
+        ([], [], 6 * 5 + 1),
+        ([(5, 0, 0)], [], 6 * 5 * 2 + 1),
+        ([(4, 0, 0), (5, 0, 0)], [], 6 * 5 * 2 + 1),
+        ([(5, 0, 0)], [(4, 0, 0)], 6 * 4 + 1),
     ],
 )
 def test_every_food_in_reach_counts_for_the_size(
     foods: list, obstacles: list, states: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     world = World((6, 1, 1), (0, 0, 0), foods, obstacles, ants=[((1, 0, 0), 0)])
-    # No world is refused for less than its first phase on all cells, the queen's included: 36.
-    least = max(states, 6 * 6)
-    monkeypatch.setattr(dynamic_programming, "MAX_STATES", least)
-    exact_bounds(world, [], 10)
-    monkeypatch.setattr(dynamic_programming, "MAX_STATES", least - 1)
-    with pytest.raises(AntsError, match=f"need {least} states, more than the {least - 1}"):
-        exact_bounds(world, [], 10)
+    monkeypatch.setattr(episodes, "MAX_STATES", states)
+    bounds_of(world)
+    monkeypatch.setattr(episodes, "MAX_STATES", states - 1)
+    with pytest.raises(AntsError, match=f"need {states} states, more than the {states - 1}"):
+        bounds_of(world)

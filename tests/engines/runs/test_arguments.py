@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from taichi_ants.engines.runs.launches import plan_launches
 
 from taichi_ants import (
     AntsError,
@@ -19,7 +20,6 @@ from taichi_ants import (
     worlds,
 )
 from taichi_ants.checks import checked_count, checked_seeds, checked_seeds_for
-from taichi_ants.engines.runs.launches import plan_launches
 from taichi_ants.errors import shown
 from taichi_ants.rendering import Scene
 from taichi_ants.worlds import World, paper
