@@ -12,13 +12,13 @@ from taichi_ants import checks, learners, runtime
 from taichi_ants.engines.colony import files as colony_files
 from taichi_ants.engines.colony import memory as colony_memory
 from taichi_ants.engines.colony.layout import AntRow, Stage, WorldRow
-from taichi_ants.engines.colony.population import SHARINGS, Population, Start
+from taichi_ants.engines.colony.population import SHARINGS, Population, Start, check_sharing
 from taichi_ants.engines.records import Record
 from taichi_ants.errors import AntsError, check_one_of, shown
 from taichi_ants.files import PathLike
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.learners.registry import Learner, Memory
+from taichi_ants.learners.registry import Memory
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, MAX_STEPS, N_ACTIONS, ROW
 from taichi_ants.worlds.world import World
@@ -155,7 +155,7 @@ class Colony:
         self._cost = 1.0  # of a tick of an ant, in that of Q-learning
         self._plans_together = False
         if self._learner is not None:
-            _check_sharing(self._learner, sharing)
+            check_sharing(self._learner, sharing)
             settings = self._learner.settings(self.training)
             self._cost = self._learner.cost(settings)
             self._plans_together = sharing == "shared" and self._learner.plans
@@ -453,17 +453,3 @@ class Colony:
             "floats_size": self.memory.floats,
             "integers_size": self.memory.integers,
         }
-
-
-def _check_sharing(learner: Learner, sharing: str) -> None:
-    """Refuse a learner that cannot learn in a colony, or not into a table that others share."""
-    if learner.needs_episode_end:
-        raise AntsError(
-            f"learner {learner.name!r} needs to know the last step of an episode, which the ants "
-            "of a colony do not; take another one, or train one ant by train(...)."
-        )
-    if sharing == "shared" and learner.td_error is None:
-        raise AntsError(
-            f"learner {learner.name!r} keeps a memory of its own, so ants cannot share its table; "
-            'take sharing="own".'
-        )

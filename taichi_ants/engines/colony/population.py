@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from taichi_ants.errors import AntsError, check_one_of, check_whole, checked_flag
+from taichi_ants.learners.registry import Learner
 from taichi_ants.task import Task
 from taichi_ants.worlds.starts import STARTS, Start
 
@@ -56,3 +57,17 @@ class Population:
             )
         room = min(2 * ants + 64, MAX_ANTS) if task.life.births else ants
         return cls(int(ants), int(capacity or room), start, bool(ends_at_delivery))
+
+
+def check_sharing(learner: Learner, sharing: str) -> None:
+    """Refuse a learner that cannot learn in a colony, or not into a table that others share."""
+    if learner.needs_episode_end:
+        raise AntsError(
+            f"learner {learner.name!r} needs to know the last step of an episode, which the ants "
+            "of a colony do not; take another one, or train one ant by train(...)."
+        )
+    if sharing == "shared" and learner.td_error is None:
+        raise AntsError(
+            f"learner {learner.name!r} keeps a memory of its own, so ants cannot share its table; "
+            'take sharing="own".'
+        )
