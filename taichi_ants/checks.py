@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from taichi_ants import learners
-from taichi_ants.errors import AntsError, shown, whole
+from taichi_ants.errors import AntsError, check_whole, shown, whole
 from taichi_ants.learners.config import TrainingConfig, share_of_one
 from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS, N_ACTIONS
@@ -112,10 +112,7 @@ def checked_seeds_for(seeds: int | Sequence[int], shape: tuple[int, ...]) -> np.
 
 def checked_count(name: str, value: int, most: int = 2**31 - 1, least: int = 1) -> int:
     """A whole number from `least` to `most`."""
-    value = whole(name, value)
-    if not least <= value <= most:
-        raise AntsError(f"{name} is {shown(value)}; it must lie between {least} and {most}.")
-    return value
+    return check_whole(name, value, least, most)
 
 
 def checked_max_steps(value: int, task: Task) -> int:

@@ -15,7 +15,7 @@ from pathlib import Path
 from types import ModuleType
 
 from taichi_ants.environment import fallback_folder, is_writable_folder
-from taichi_ants.errors import AntsError, check_one_of, shown, whole
+from taichi_ants.errors import AntsError, check_one_of, check_whole
 
 ARCHITECTURES = ("cpu", "cuda")
 MAX_THREADS = 1024
@@ -59,7 +59,8 @@ def start(threads: int | None = None, arch: str | None = None) -> Runtime:
     """
     if arch is not None:
         check_one_of("arch", arch, ARCHITECTURES)
-    threads = None if threads is None else _checked_threads(threads)
+    if threads is not None:
+        check_whole("threads", threads, 1, MAX_THREADS)
     import taichi as ti
 
     running = _running(ti)
@@ -119,13 +120,6 @@ def quiet() -> Iterator[None]:
         yield
     finally:
         core.set_logging_level(before)
-
-
-def _checked_threads(threads: int) -> int:
-    threads = whole("threads", threads)
-    if not 1 <= threads <= MAX_THREADS:
-        raise AntsError(f"threads is {shown(threads)}; it must lie between 1 and {MAX_THREADS}.")
-    return threads
 
 
 def _running(ti: ModuleType) -> Runtime | None:

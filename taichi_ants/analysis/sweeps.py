@@ -61,8 +61,19 @@ def columns_of(rows: Sequence[Settings]) -> list[str]:
     return list(dict.fromkeys(name for row in rows for name in row))
 
 
-def report(settings: Sequence[Settings], values: Mapping[str, np.ndarray]) -> str:
-    """The means with their intervals as a table for a terminal."""
+def report(
+    settings: Sequence[Settings],
+    values: Mapping[str, np.ndarray],
+    against: tuple[str, Any] | None = None,
+    notes: Sequence[str] = (),
+) -> str:
+    """The means with their intervals as a table for a terminal.
+
+    Args:
+        settings, values: As above.
+        against: The setting with whose value the others are compared in the first measure.
+        notes: What came out of it, for each point.
+    """
     names = columns_of(settings)
     ends = {name: bootstrap_interval(array) for name, array in values.items()}
     lines = [[*(short(name, names) for name in names), *values]]
@@ -73,6 +84,9 @@ def report(settings: Sequence[Settings], values: Mapping[str, np.ndarray]) -> st
             mean = f"{array[p].mean():.4g}"
             cells.append(mean if np.isnan(low) else f"{mean} [{low:.4g}, {high:.4g}]")
         lines.append(cells)
+    if against:
+        title = f"{next(iter(values))} against {short(against[0], names)} {_shown(against[1])}"
+        lines = [[*line, note] for line, note in zip(lines, [title, *notes], strict=True)]
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     padded = (
         "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
@@ -99,7 +113,9 @@ def draw(
         AntsError: The file cannot be written.
     """
     names = columns_of(settings)
-    first, others = names[0], names[1:]
+    first = names[0]
+    others = [name for name in names[1:] if len({str(one.get(name)) for one in settings}) > 1]
+    alike = [f"{short(n, names)} {_shown(settings[0][n])}" for n in names[1:] if n not in others]
     marks: list[Any] = list(dict.fromkeys(_hashable(one.get(first)) for one in settings))
     numbers = all(isinstance(mark, (int, float)) and not isinstance(mark, bool) for mark in marks)
     places = marks if numbers else range(len(marks))
@@ -127,7 +143,8 @@ def draw(
         seeds = values.shape[1]
         spread = f"mean of {seeds} seeds with 95 % bootstrap intervals" if seeds > 1 else "one seed"
         entries = style.legend_entries([axes])
-        style.frame(figure, title, f"{spread[0].upper()}{spread[1:]}.", entries)
+        caption = ", ".join([f"{spread[0].upper()}{spread[1:]}", *alike])
+        style.frame(figure, title, f"{caption}.", entries)
     style.save(figure, path)
 
 

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from taichi_ants.studies.runner import Outcome
     from taichi_ants.studies.sweep_file import Sweep
 
-FIGURES, RUNS, SUMMARY = "figures", "runs.csv", "summary.csv"
+FIGURES, RUNS, SUMMARY, FINDINGS = "figures", "runs.csv", "summary.csv", "findings.csv"
+_WORDS = {"supported": "more", "contradicted": "less", "equivalent": "equal"}
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -55,6 +56,8 @@ def sweep(settings: argparse.Namespace) -> None:
         **asked.study.settings(),
         "measures": asked.measures,
         "varies": asked.settings,
+        "against": asked.against,
+        "margin": asked.margin,
         "rows": list(map(asked.study.in_order.index, asked.study.points)),
     }
     work_or_show(settings, facts, partial(do_sweep, settings, asked), pictures)
@@ -74,11 +77,45 @@ def do_sweep(settings: argparse.Namespace, asked: Sweep, blocks: Path, ready: Pa
     typical = [name for name in values if getattr(measures(asked.kind)[name], "typical", False)]
     rows = sweeps.summary_rows(asked.settings, values, typical)
     files.write_csv(ready / SUMMARY, rows, sweeps.columns_of(rows))
-    files.write_text(ready / REPORT, sweeps.report(asked.settings, values))
+    found = findings(asked, values[asked.measures[0]])
+    if asked.against:
+        columns = [*sweeps.columns_of(asked.settings), "finding", "difference", "low", "high"]
+        files.write_csv(ready / FINDINGS, found.values(), columns)
+    notes = [found[p]["finding"] if p in found else "" for p in range(len(asked.settings))]
+    files.write_text(ready / REPORT, sweeps.report(asked.settings, values, asked.against, notes))
+
+
+def findings(asked: Sweep, values: np.ndarray) -> dict[int, dict[str, Any]]:
+    """By point, how it differs from the one that is the same but for the setting of `against`.
+
+    Intervals hold at once, with a probability of 95 %.
+
+    Args:
+        values: The first measure, float64 (points, seeds).
+    """
+    from taichi_ants.analysis.findings import Above, Contrast, judge
+
+    rows, pairs = list(asked.settings), {}
+    for p, row in enumerate(rows):
+        other = {**row, **dict([asked.against] if asked.against else [])}
+        if other != row and other in rows:
+            pairs[p] = rows.index(other)
+    differences = [values[p] - values[other] for p, other in pairs.items()]
+    judged = judge([Contrast("", one, Above(asked.margin)) for one in differences])
+    return {
+        p: {
+            **rows[p],
+            "finding": _WORDS.get(one.verdict.value, "undecided"),
+            "difference": one.effect,
+            "low": one.low,
+            "high": one.high,
+        }
+        for p, one in zip(pairs, judged, strict=True)
+    }
 
 
 def draw_figure(asked: Sweep, results: Path, folder: Path) -> None:
-    """Draw the first measure from the table in one folder into `figures` of another."""
+    """Draw the first measure from the table in one folder, a figure for each [vary]."""
     import csv
 
     import numpy as np
@@ -90,9 +127,15 @@ def draw_figure(asked: Sweep, results: Path, folder: Path) -> None:
     with open(results / RUNS, newline="", encoding="utf-8") as file:
         values = [float(row[name] or "nan") for row in csv.DictReader(file)]
     array = np.array(values).reshape(len(asked.settings), len(asked.study.seeds))
-    place = files.check_writable_folder(folder / FIGURES) / f"{name}.png"
-    words = measures(asked.kind)[name].words
-    sweeps.draw(place, asked.settings, array, words, f"{words[0].upper()}{words[1:]}")
+    place = files.check_writable_folder(folder / FIGURES)
+    words, begin = measures(asked.kind)[name].words, 0
+    for number, size in enumerate(asked.grids, start=1):
+        some = slice(begin, begin + size)
+        path = place / (f"{name}.png" if len(asked.grids) == 1 else f"{name}-{number}.png")
+        sweeps.draw(
+            path, asked.settings[some], array[some], words, f"{words[0].upper()}{words[1:]}"
+        )
+        begin += size
 
 
 def measures(kind: str) -> dict[str, Any]:

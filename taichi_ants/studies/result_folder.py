@@ -134,7 +134,8 @@ class ResultFolder:
                 draw(self.path, ready)
                 for file in drawn:
                     del manifest["files"][file]
-                manifest["files"] |= self._move_up(ready)
+                listed = manifest["files"] | self._move_up(ready)
+                manifest["files"] = dict(sorted(listed.items()))
                 files.write_json(self.path / MANIFEST, manifest)
 
     @contextmanager
