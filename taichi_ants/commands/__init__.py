@@ -12,7 +12,6 @@ from taichi_ants.studies.interruption import stoppable
 COMMANDS = {  # modules beside this one, and what they do
     "compare": "the paper's comparison of learners, over many seeds",
     "colony": "the scaling study of the colony, or one colony of any size",
-    "observations": "what ants gain from seeing more, for all learners",
     "sweep": "any settings against any measure, from a file",
     "render": "pictures of ants: an episode, a colony, learning, a policy",
 }
@@ -34,21 +33,13 @@ def main() -> None:
             Parser.program = f"taichi-ants {name}"
             run(name, arguments)
         elif name in ("-h", "--help"):
-            print(_help())
+            print(f"usage: taichi-ants COMMAND ...\n\n{taichi_ants.__doc__.splitlines()[0]}\n")
+            for command, summary in COMMANDS.items():
+                print(f"  {command:9} {summary}")
+            print("\n`taichi-ants COMMAND --help` tells the rest.")
         elif name == "--version":
             print(f"taichi-ants {taichi_ants.__version__}")
         else:
             known = ", ".join(COMMANDS)
             print(f"error: there is no command {name!r}; choose one of {known}.", file=sys.stderr)
             sys.exit(2)
-
-
-def _help() -> str:
-    lines = "\n".join(f"  {name:13} {summary}" for name, summary in COMMANDS.items())
-    return f"""usage: taichi-ants COMMAND ...
-
-Ants on a hexagonal grid that lay pheromone trails and learn by reinforcement.
-
-{lines}
-
-`taichi-ants COMMAND --help` tells the rest."""

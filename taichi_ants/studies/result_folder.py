@@ -180,7 +180,8 @@ class ResultFolder:
         new = [part for part in (self.path, *self.path.parents) if not part.exists()]
         blocks, ready = self._unfinished / BLOCKS, self._unfinished / READY
         try:
-            files.check_writable_folder(self._unfinished)
+            files.check_writable_folder(self.path)
+            self._unfinished.mkdir(exist_ok=True)
             with _locked(self._unfinished):
                 # Without a manifest nobody knows whose blocks these are.
                 if replace or not (self._unfinished / MANIFEST).exists():
@@ -204,12 +205,11 @@ class ResultFolder:
 
     def _move_up(self, ready: Path) -> dict[str, str]:
         """Move all files into the folder; their hashes by name."""
-        moved = {}
-        for file in sorted(path for path in ready.rglob("*") if path.is_file()):
-            name = file.relative_to(ready)
-            moved[name.as_posix()] = _hash(file)
+        paths = (path.relative_to(ready) for path in ready.rglob("*") if path.is_file())
+        moved = {name: _hash(ready / name) for name in sorted(path.as_posix() for path in paths)}
+        for name in moved:
             (self.path / name).parent.mkdir(parents=True, exist_ok=True)
-            file.replace(self.path / name)
+            (ready / name).replace(self.path / name)
         return moved
 
     def _remove(self, name: str, digest: str) -> None:
