@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from taichi_ants import learners
-from taichi_ants.errors import AntsError, check_whole, shown, whole
+from taichi_ants.errors import AntsError, check_whole, expect, shown, whole
 from taichi_ants.learners.config import TrainingConfig, share_of_one
 from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS, N_ACTIONS
@@ -16,15 +16,13 @@ from taichi_ants.worlds.world import World
 
 def checked_world(world: World) -> World:
     """The world, if it is one."""
-    if not isinstance(world, World):
-        raise AntsError(f"world is {shown(world)}; it must be a World, for example worlds.paper().")
+    expect("world", world, World)
     return world
 
 
 def checked_task(task: Task) -> Task:
     """The task, if it is one."""
-    if not isinstance(task, Task):
-        raise AntsError(f"task is {shown(task)}; it must be a Task, for example task.paper().")
+    expect("task", task, Task)
     return task
 
 
@@ -50,15 +48,6 @@ def checked_food(world: World) -> World:
     return world
 
 
-def checked_progress(progress: Callable[[float], None] | None) -> Callable[[float], None] | None:
-    """What is called with the share of the work that is done, or None."""
-    if progress is not None and not callable(progress):
-        raise AntsError(
-            f"progress is {shown(progress)}; it must be a function of a share, or None."
-        )
-    return progress
-
-
 def checked_configs(configs: TrainingConfig | Sequence[TrainingConfig]) -> tuple:
     """One configuration or several as a tuple, with all hyperparameters of their learners."""
     if isinstance(configs, TrainingConfig):
@@ -69,10 +58,7 @@ def checked_configs(configs: TrainingConfig | Sequence[TrainingConfig]) -> tuple
     if not several:
         raise AntsError("configs is empty; give at least one TrainingConfig.")
     for config in several:
-        if not isinstance(config, TrainingConfig):
-            raise AntsError(
-                f"configs holds {shown(config)}; it must hold TrainingConfig objects only."
-            )
+        expect("a configuration", config, TrainingConfig)
     return tuple(learners.settle(config) for config in several)
 
 

@@ -41,11 +41,7 @@ class Parser(argparse.ArgumentParser):
         )
 
     def parse_given(self, arguments: list[str] | None = None) -> tuple[argparse.Namespace, dict]:
-        """Parse a command line, and tell what it holds from what is left to defaults.
-
-        Returns:
-            The settings; and of those that were given, even as their defaults, the flag by name.
-        """
+        """The settings; and of those that were given, even as their defaults, the flag by name."""
         words = sys.argv[1:] if arguments is None else arguments
         flags = [word.partition("=")[0] for word in words if word.startswith("--")]
         return self.parse_args(words), {flag[2:].replace("-", "_"): flag for flag in flags}
@@ -78,16 +74,9 @@ _NOT_IN_NAMES = ("out", "threads", "force", "no_figures", "no_render")  # they c
 def default_folder(
     parser: Parser, command: str, settings: argparse.Namespace, **usual: Any
 ) -> Path:
-    """Where the results of a command go by default: one folder for each way to call it.
+    """A folder for each way to call a command, as results/compare-world-garden.txt-quick.
 
-    Args:
-        parser: Knows the defaults, and the order of flags.
-        command: The folder of the defaults is results/COMMAND.
-        settings: What counts; behind the name comes what differs from the defaults.
-        usual: Other defaults than the parser's.
-
-    Returns:
-        As results/compare-world-garden.txt-quick or results/compare-seeds-20-discounts-0.8-0.9.
+    Behind the name comes what differs from the defaults: the parser's, or the `usual` ones.
     """
     parts = [command]
     for action in parser._actions:
@@ -143,9 +132,7 @@ class ListAction(argparse.Action):
 def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> NoReturn:
     """Run a command line to its exit: mistakes end in one sentence, never in a traceback.
 
-    Args:
-        command: The work.
-        interrupted: What is said after Ctrl-C or SIGTERM.
+    After Ctrl-C or SIGTERM it says what `interrupted` says.
     """
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="replace")  # a terminal that lacks a character shows "?"

@@ -95,7 +95,7 @@ class RunPoint:
     def do(
         points: Sequence[RunPoint],
         seeds: Sequence[int],
-        learned: None,
+        learned: np.ndarray | None,
         progress: Progress,
         where: Mapping[str, Any],
     ) -> Outcome:

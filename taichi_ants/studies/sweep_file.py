@@ -76,7 +76,7 @@ def read_sweep(path: Path, measures: Mapping[str, Iterable[str]]) -> Sweep:
 
 
 def _sweep(file: Settings, measures: Mapping[str, Iterable[str]]) -> Sweep:
-    kind = file.get("kind")
+    kind: Any = file.get("kind")
     check_one_of("kind", kind, tuple(KINDS))
     wanted = _listed(file.get("measures", []))
     if not wanted:
@@ -94,7 +94,7 @@ def _sweep(file: Settings, measures: Mapping[str, Iterable[str]]) -> Sweep:
     checked = checks.checked_seeds(seeds)
     built: dict[str, Any] = {}
     rows = tuple(itertools.chain(*grids))
-    points = tuple(_point(kind, {**fixed, **row}, checked, built) for row in rows)
+    points: tuple[Any, ...] = tuple(_point(kind, {**fixed, **row}, checked, built) for row in rows)
     margin = file.get("margin", 0)
     if not isinstance(margin, (int, float)) or margin < 0:
         raise AntsError(f"margin is {shown(margin)}; it must be a number of at least 0.")

@@ -241,7 +241,6 @@ class Colony:
         """
         episodes = checks.checked_count("episodes", episodes)
         ticks = checks.checked_count("ticks", ticks, MAX_STEPS)
-        progress = checks.checked_progress(progress)
         outcomes = []
         for episode in range(episodes):
             self.begin_episode()

@@ -15,7 +15,6 @@ from taichi_ants.checks import (
     checked_count,
     checked_food,
     checked_max_steps,
-    checked_progress,
     checked_q_values,
     checked_runs_task,
     checked_seeds,
@@ -114,7 +113,6 @@ def continue_training(
     checked_configs(result.configs)
     result.check_memory()
     episodes = checked_count("episodes", episodes)
-    progress = checked_progress(progress)
     settings = runtime.start(threads, arch)
     state = result.state.take(...)
     shape = (len(result.configs), len(result.seeds))
@@ -186,7 +184,6 @@ def evaluate(
     rollouts = checked_count("rollouts", rollouts)
     epsilon = checked_share("epsilon", epsilon)
     max_steps = checked_max_steps(max_steps, task)
-    progress = checked_progress(progress)
     settings = runtime.start(threads, arch)
     engine = RunEngine(checked_world(world), task, max_steps, settings)
     flat = tables.reshape(-1, *tables.shape[-2:])
