@@ -47,8 +47,7 @@ def assert_refused(arguments, named, place, capsys):
     [
         (["--learners", "td_zero"], ["td_zero", "q_learning", "sarsa", "dyna_q"]),
         (["--learners"], ["--learners", "at least one"]),
-        (["--learners", ","], ["--learners", "empty"]),
-        (["--learners", ""], ["--learners", "empty"]),
+        (["--learners", ""], ["''", "q_learning"]),
         (["--discounts", " "], ["--discounts", "' '"]),
         (["--epsilons", "half"], ["--epsilons", "'half'"]),
         (["--learning-rates", "-0.1"], ["learning_rate", "-0.1", "above 0"]),
