@@ -73,15 +73,13 @@ def checked_seeds(seeds: int | Sequence[int]) -> tuple[int, ...]:
     several = tuple(whole("a seed", seed) for seed in given)
     if not several:
         raise AntsError("seeds is empty; give at least one whole number.")
-    taken: dict[int, int] = {}
+    taken: set[int] = set()
     for seed in several:
         if not -(2**63) <= seed < 2**64:
             raise AntsError(f"seeds holds {shown(seed)}; a seed must fit into 64 bits.")
-        if (word := seed % 2**64) in taken:
-            same = taken[word]
-            reason = "more than once" if same == seed else f"and {same}, which are one in 64 bits"
-            raise AntsError(f"seeds holds {seed} {reason}; each seed must differ.")
-        taken[word] = seed
+        if seed % 2**64 in taken:
+            raise AntsError(f"seeds holds {seed} more than once; in 64 bits each must differ.")
+        taken.add(seed % 2**64)
     return several
 
 

@@ -140,13 +140,10 @@ def draw_figure(asked: Sweep, results: Path, folder: Path) -> None:
 
 def measures(kind: str) -> dict[str, Any]:
     """What can be measured, by name."""
-    if kind == "runs":
-        from taichi_ants.analysis.paper.measures import MEASURES
-
-        return dict(MEASURES)
     from taichi_ants.analysis.colony.study import MEASURES as OF_COLONIES
+    from taichi_ants.analysis.paper.measures import MEASURES as OF_RUNS
 
-    return dict(OF_COLONIES)
+    return dict(OF_RUNS if kind == "runs" else OF_COLONIES)
 
 
 def measured(asked: Sweep, outcomes: dict[Any, Outcome], name: str) -> np.ndarray:

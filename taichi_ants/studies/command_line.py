@@ -93,24 +93,17 @@ def whole_number(least: int | None = None, most: int | None = None) -> Callable[
     """An argument type: a whole number within bounds."""
 
     def parse(text: str) -> int:
-        try:
-            value = int(text)
-        except ValueError:
-            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
+        value = int(text)
         if (least is not None and value < least) or (most is not None and value > most):
             bounds = f"at least {least}" if most is None else f"from {least} to {most}"
             raise argparse.ArgumentTypeError(f"{value} is not allowed, it must be {bounds}")
         return value
 
+    parse.__name__ = "whole number"  # in argparse's message, where the text is none
     return parse
 
 
-def number(text: str) -> float:
-    """An argument type: a number."""
-    try:
-        return float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+number = float  # an argument type, too
 
 
 class ListAction(argparse.Action):

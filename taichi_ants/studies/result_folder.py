@@ -140,15 +140,10 @@ class ResultFolder:
 
     @contextmanager
     def work(self, replace: bool = False) -> Iterator[tuple[Path, Path]]:
-        """Lock the folder and hold the work in progress.
+        """Hold a folder for blocks of work, which survive an interruption, and one for results.
 
-        Args:
-            replace: Start anew, whatever the folder holds. Old results stay until the new ones are
-                complete.
-
-        Yields:
-            The folder for blocks of work, which survive an interruption, and an empty one for
-            results that are ready. Both are gone once `publish` was called.
+        With `replace` the work starts anew, whatever the folder holds; old results stay until the
+        new ones are complete.
 
         Raises:
             AntsError: The folder cannot be written, or another process works in it.

@@ -232,18 +232,12 @@ class Study(Generic[PointKind]):
         object.__setattr__(self, "seeds", checks.checked_seeds(self.seeds))
         if not self.points:
             raise AntsError("there are no points to do; give at least one.")
-        most: dict[World | tuple[World, ...], int] = {}
-        for point in self.points:
-            most[point.world] = max(most.get(point.world, 1), point.ants)
-        for world, ants in most.items():
-            self._check_room(world, ants)
-
-    def _check_room(self, world: World | tuple[World, ...], ants: int) -> None:
-        several = world if isinstance(world, tuple) else (world,)
-        if len(several) not in (1, len(self.seeds)) or not several:
-            raise AntsError(f"there are {len(several)} worlds for {len(self.seeds)} seeds.")
-        for one, seed in zip(several, self.seeds, strict=False):
-            checks.checked_food(one).start(seed, ants)
+        for world, ants in dict.fromkeys((point.world, point.ants) for point in self.points):
+            several = world if isinstance(world, tuple) else (world,)
+            if len(several) not in (1, len(self.seeds)) or not several:
+                raise AntsError(f"there are {len(several)} worlds for {len(self.seeds)} seeds.")
+            for one, seed in zip(several, self.seeds, strict=False):
+                checks.checked_food(one).start(seed, ants)
 
     @property
     def in_order(self) -> tuple[PointKind, ...]:

@@ -70,9 +70,9 @@ def test_what_was_given_is_told_even_where_it_is_the_default(parser):
     [
         (["--size", "0"], "--size: 0 is not allowed, it must be from 1 to 9"),
         (["--size", "10"], "--size: 10 is not allowed, it must be from 1 to 9"),
-        (["--size", "2.5"], "--size: '2.5' is not a whole number"),
+        (["--size", "2.5"], "--size: invalid whole number value: '2.5'"),
         (["--count", "1"], "--count: 1 is not allowed, it must be at least 2"),
-        (["--rates", "1", "x"], "--rates: 'x' is not a number"),
+        (["--rates", "1", "x"], "--rates: invalid float value: 'x'"),
         (["--names"], "--names: expected at least one argument"),
         (["--siz", "3"], "unrecognized arguments: --siz 3"),
         (["a\nb"], "unrecognized arguments: a b"),

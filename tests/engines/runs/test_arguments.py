@@ -79,7 +79,7 @@ BAD_SEEDS = [
     (2**64, f"seeds holds {2**64}; a seed must fit into 64 bits"),
     ([-(2**63) - 1], f"seeds holds {-(2**63) - 1}"),
     ([4, 5, 4], "seeds holds 4 more than once"),
-    ([-1, 2**64 - 1], f"seeds holds {2**64 - 1} and -1, which are one in 64 bits"),
+    ([-1, 2**64 - 1], f"seeds holds {2**64 - 1} more than once; in 64 bits"),
 ]
 
 
