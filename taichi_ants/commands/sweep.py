@@ -88,30 +88,27 @@ def do_sweep(settings: argparse.Namespace, asked: Sweep, blocks: Path, ready: Pa
 def findings(asked: Sweep, values: np.ndarray) -> dict[int, dict[str, Any]]:
     """By point, how it differs from the one that is the same but for the setting of `against`.
 
-    Intervals hold at once, with a probability of 95 %.
+    The intervals of all differences of one [vary] hold at once, with a probability of 95 %.
 
     Args:
         values: The first measure, float64 (points, seeds).
     """
     from taichi_ants.analysis.findings import Above, Contrast, judge
 
-    rows, pairs = list(asked.settings), {}
-    for p, row in enumerate(rows):
-        other = {**row, **dict([asked.against] if asked.against else [])}
-        if other != row and other in rows:
-            pairs[p] = rows.index(other)
-    differences = [values[p] - values[other] for p, other in pairs.items()]
-    judged = judge([Contrast("", one, Above(asked.margin)) for one in differences])
-    return {
-        p: {
-            **rows[p],
-            "finding": _WORDS.get(one.verdict.value, "undecided"),
-            "difference": one.effect,
-            "low": one.low,
-            "high": one.high,
-        }
-        for p, one in zip(pairs, judged, strict=True)
-    }
+    if asked.against is None:
+        return {}
+    (name, value), found = asked.against, {}
+    for some in asked.grids:
+        rows, own = asked.settings[some], values[some]
+        others = [{**row, name: value} for row in rows]
+        pairs = [(p, rows.index(other)) for p, other in enumerate(others) if other in rows]
+        pairs = [(p, other) for p, other in pairs if p != other]
+        contrasts = [Contrast("", own[p] - own[other], Above(asked.margin)) for p, other in pairs]
+        for (p, _), one in zip(pairs, judge(contrasts), strict=True):
+            said = _WORDS.get(one.verdict.value, "undecided")
+            numbers = {"difference": one.effect, "low": one.low, "high": one.high}
+            found[some.start + p] = {**rows[p], "finding": said, **numbers}
+    return found
 
 
 def draw_figure(asked: Sweep, results: Path, folder: Path) -> None:
@@ -128,14 +125,12 @@ def draw_figure(asked: Sweep, results: Path, folder: Path) -> None:
         values = [float(row[name] or "nan") for row in csv.DictReader(file)]
     array = np.array(values).reshape(len(asked.settings), len(asked.study.seeds))
     place = files.check_writable_folder(folder / FIGURES)
-    words, begin = measures(asked.kind)[name].words, 0
-    for number, size in enumerate(asked.grids, start=1):
-        some = slice(begin, begin + size)
+    words = measures(asked.kind)[name].words
+    for number, some in enumerate(asked.grids, start=1):
         path = place / (f"{name}.png" if len(asked.grids) == 1 else f"{name}-{number}.png")
         sweeps.draw(
             path, asked.settings[some], array[some], words, f"{words[0].upper()}{words[1:]}"
         )
-        begin += size
 
 
 def measures(kind: str) -> dict[str, Any]:

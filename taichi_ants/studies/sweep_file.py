@@ -36,7 +36,7 @@ class Sweep:
         kind: "runs" or "colony".
         study: The points over the seeds, in the order of `settings`.
         settings: What varies, for each point of the study.
-        grids: How many of these each [vary] makes.
+        grids: Which of these each [vary] makes.
         measures: Names of measures, the first of which is drawn.
         against: The setting and its value with which all others are compared, if any.
         margin: The difference in the first measure that does not matter.
@@ -45,7 +45,7 @@ class Sweep:
     kind: str
     study: Study[Any]
     settings: tuple[Settings, ...]
-    grids: tuple[int, ...]
+    grids: tuple[slice, ...]
     measures: tuple[str, ...]
     against: tuple[str, Any] | None
     margin: float
@@ -100,7 +100,9 @@ def _sweep(file: Settings, measures: Mapping[str, Iterable[str]]) -> Sweep:
         raise AntsError(f"margin is {shown(margin)}; it must be a number of at least 0.")
     against = _against(flat(file.get("against", {})), rows)
     study = Study(points, checked)
-    return Sweep(kind, study, rows, tuple(map(len, grids)), tuple(wanted), against, margin)
+    ends = list(itertools.accumulate(map(len, grids), initial=0))
+    parts = tuple(map(slice, ends, ends[1:]))
+    return Sweep(kind, study, rows, parts, tuple(wanted), against, margin)
 
 
 def _listed(value: Any) -> list:
