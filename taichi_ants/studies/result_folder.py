@@ -14,7 +14,7 @@ import shutil
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -132,10 +132,11 @@ class ResultFolder:
                 continue
             with self._working() as (_, ready):
                 draw(self.path, ready)
+                hashes = self._ready_beside(manifest["files"])
                 for file in drawn:
                     del manifest["files"][file]
-                listed = manifest["files"] | self._move_up(ready)
-                manifest["files"] = dict(sorted(listed.items()))
+                manifest["files"] = dict(sorted({**manifest["files"], **hashes}.items()))
+                self._move_up(hashes)
                 files.write_json(self.path / MANIFEST, manifest)
 
     @contextmanager
@@ -148,21 +149,28 @@ class ResultFolder:
         Raises:
             AntsError: The folder cannot be written, or another process works in it.
         """
+        self._listed()  # if it is damaged, it is so before the work
         with self._working(replace) as places:
-            files.write_json(self._unfinished / MANIFEST, {"settings": self._settings})
+            if not (self._unfinished / MANIFEST).exists():
+                files.write_json(self._unfinished / MANIFEST, {"settings": self._settings})
             yield places
 
     def publish(self, manifest: Mapping[str, Any]) -> None:
         """Move what is ready into the folder, then the manifest with the settings in it.
 
         What an older manifest lists is replaced or removed; other files stay.
+
+        Raises:
+            AntsError: A file that is not ours is in the way.
         """
-        with suppress(AntsError):  # there is no older one, or it is damaged
-            for name, digest in _manifest_in(self.path)["files"].items():
-                self._remove(name, digest)
-        moved = self._move_up(self._unfinished / READY)
-        contents = {**manifest, "files": moved, "settings": self._settings}
+        half_moved = _manifest_in(self._unfinished)["files"]  # where a kill has left some
+        old = {**half_moved, **self._listed()}
+        hashes = self._ready_beside(old)
+        for name, digest in old.items():
+            self._remove(name, digest)
+        contents = {**manifest, "files": hashes, "settings": self._settings}
         files.write_json(self._unfinished / MANIFEST, contents)
+        self._move_up(hashes)
         os.replace(self._unfinished / MANIFEST, self.path / MANIFEST)  # now it is finished
         self._clear()
 
@@ -198,14 +206,27 @@ class ResultFolder:
         for name in (BLOCKS, READY):
             shutil.rmtree(self._unfinished / name, ignore_errors=True)
 
-    def _move_up(self, ready: Path) -> dict[str, str]:
-        """Move all files into the folder; their hashes by name."""
+    def _listed(self) -> dict[str, str]:
+        """The files of finished results, with their hashes."""
+        return _manifest_in(self.path)["files"] if (self.path / MANIFEST).exists() else {}
+
+    def _ready_beside(self, old: Collection[str]) -> dict[str, str]:
+        """The hashes of all files that are ready; AntsError if another than an old one is there."""
+        ready = self._unfinished / READY
         paths = (path.relative_to(ready) for path in ready.rglob("*") if path.is_file())
-        moved = {name: _hash(ready / name) for name in sorted(path.as_posix() for path in paths)}
-        for name in moved:
+        names = sorted(path.as_posix() for path in paths)
+        for name in names:
+            if (self.path / name).exists() and name not in old:
+                raise AntsError(
+                    f"{str(self.path / name)!r} is in the way of results and none of ours; move it "
+                    "away, and the same command without --force goes on."
+                )
+        return {name: _hash(ready / name) for name in names}
+
+    def _move_up(self, names: Iterable[str]) -> None:
+        for name in names:
             (self.path / name).parent.mkdir(parents=True, exist_ok=True)
-            (ready / name).replace(self.path / name)
-        return moved
+            (self._unfinished / READY / name).replace(self.path / name)
 
     def _remove(self, name: str, digest: str) -> None:
         """Remove a file that an older manifest lists, if it is still that one and lies in here."""
@@ -244,8 +265,8 @@ def _manifest_in(folder: Path) -> dict[str, Any]:
         return {**manifest, **parts}
     except (OSError, ValueError, TypeError, AttributeError) as error:
         raise AntsError(
-            f"{str(folder / MANIFEST)!r} is damaged; choose another --out, or give --force to run "
-            "all again."
+            f"{str(folder / MANIFEST)!r} is damaged, so nobody knows what here is ours; choose "
+            "another --out."
         ) from error
 
 

@@ -166,9 +166,15 @@ def test_a_damaged_manifest_is_named(place, damage, tmp_path):
     else:
         stop_after_a_block(tmp_path)
     (tmp_path / place / "manifest.json").write_text(damage)
-    with pytest.raises(AntsError, match=r"manifest\.json' is damaged; .* --force"):
-        ResultFolder(tmp_path, SETTINGS).is_finished()
-    assert finish(tmp_path, replace=True).is_finished()
+    folder = ResultFolder(tmp_path, SETTINGS)
+    with pytest.raises(AntsError, match=r"manifest\.json' is damaged, .* another --out"):
+        folder.is_finished()
+    if place == "unfinished":
+        assert finish(tmp_path, replace=True).is_finished()
+        return
+    with pytest.raises(AntsError, match=r"manifest\.json' is damaged"):
+        folder.work(replace=True).__enter__()
+    assert names(tmp_path) == ["manifest.json", "report.txt", "table.csv"]
 
 
 def test_foreign_files_are_not_written_among(tmp_path):
@@ -218,12 +224,38 @@ def test_an_unfinished_folder_of_ones_own_stays(tmp_path):
 def test_a_folder_of_ones_own_in_the_way_stays(tmp_path):
     (tmp_path / "table.csv").mkdir()
     (tmp_path / "table.csv" / "mine").write_text("mine")
-    with pytest.raises(OSError, match=r"table\.csv"):
+    with pytest.raises(AntsError, match=r"table\.csv' is in the way"):
         finish(tmp_path, replace=True)
     assert (tmp_path / "table.csv" / "mine").exists()
     assert not ResultFolder(tmp_path, SETTINGS).is_finished()
     (tmp_path / "table.csv").rename(tmp_path / "elsewhere")
     assert finish(tmp_path).is_finished()
+
+
+@pytest.mark.parametrize("name", ["table.csv", "figures/one.png"])
+def test_a_file_of_ones_own_in_the_way_stays(name, tmp_path):
+    """Even with --force; what was edited of ours is replaced."""
+    mine = tmp_path / name
+    mine.parent.mkdir(exist_ok=True)
+    mine.write_text("mine")
+    with pytest.raises(AntsError, match=rf"{mine.name}' is in the way .* move it away"):
+        finish(tmp_path, names=(name,), replace=True)
+    assert mine.read_text() == "mine"
+    mine.unlink()
+    finish(tmp_path, names=(name,))
+    mine.write_text("edited")
+    finish(tmp_path, names=(name,), text="new", replace=True)
+    assert mine.read_text() == "new"
+
+
+def test_a_picture_of_ones_own_in_the_way_stays(tmp_path):
+    folder = finish(tmp_path)
+    (tmp_path / "figures").mkdir()
+    (tmp_path / "figures" / "one.png").write_text("mine")
+    with pytest.raises(AntsError, match=r"one\.png' is in the way"):
+        folder.show(draw("one.png"))
+    assert (tmp_path / "figures" / "one.png").read_text() == "mine"
+    assert names(tmp_path) == ["figures", "manifest.json", "report.txt", "table.csv"]
 
 
 def test_what_lies_behind_a_link_is_not_removed(tmp_path):
