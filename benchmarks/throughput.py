@@ -109,27 +109,24 @@ def measure_c(command: str, delivery: str, seeds: int, episodes: int, max_steps:
 
 
 def measure(seeds: int, episodes: int, max_steps: int, delivery: str, threads: int | None) -> None:
-    """Print a line for each learner, for all of them, and for C."""
+    """Print a line for each learner, and for C."""
     print(
         f"{'':16}{'runs':>6}{'steps':>13}{'wall s':>9}{'CPU s':>9}{'M steps/s':>11}{'ns/step':>9}"
     )
     line = "{:16}{:6}{:13,}{:9.2f}{:9.2f}{:11.1f}{:9.1f}"
-    sums, fastest = [0, 0, 0.0, 0.0], 0.0
+    fastest = 0.0
     for learner, planning_steps in LEARNERS:
         configs = grid(learner, planning_steps)
         task = Task(delivery=delivery)
         train(worlds.paper(), configs, 0, 1, 1, threads=threads)
         began = time.perf_counter()
         result = train(worlds.paper(), configs, range(seeds), episodes, max_steps, task)
-        wall, done = time.perf_counter() - began, int(result.steps.sum(dtype=np.int64))
-        figures = [len(configs) * seeds, done, wall, result.seconds]
-        sums = [one + other for one, other in zip(sums, figures, strict=True)]
-        fastest = fastest or result.seconds * 1e9 / done
+        wall, steps = time.perf_counter() - began, int(result.steps.sum(dtype=np.int64))
+        nanoseconds = result.seconds * 1e9 / steps
+        fastest = fastest or nanoseconds
         label = learner + (f" (p{planning_steps})" if planning_steps else "")
-        _, steps, wall, cpu = figures
-        print(line.format(label, *figures, steps / wall / 1e6, cpu * 1e9 / steps))
-    _, steps, wall, cpu = sums
-    print(line.format("all", *sums, steps / wall / 1e6, cpu * 1e9 / steps))
+        counts = len(configs) * seeds, steps, wall, result.seconds
+        print(line.format(label, *counts, steps / wall / 1e6, nanoseconds))
     if (command := compiler()) is None:
         print("There is no C compiler (cc, gcc, clang or CC), so no comparison with plain C.")
         return

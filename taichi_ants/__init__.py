@@ -24,27 +24,17 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
-    "AntsError": "taichi_ants.errors",
-    "Colony": "taichi_ants.engines.colony.colony",
-    "ColonyEpisodes": "taichi_ants.engines.colony.colony",
-    **dict.fromkeys(("Life", "Observation", "Pheromone", "Rewards", "Task"), "taichi_ants.task"),
-    "Rollouts": "taichi_ants.engines.runs.results",
-    "Trace": "taichi_ants.engines.runs.traces",
-    "TrainingConfig": "taichi_ants.learners.config",
-    "TrainingResult": "taichi_ants.engines.runs.results",
-    "World": "taichi_ants.worlds",
-    "continue_training": "taichi_ants.engines.runs.training",
-    "evaluate": "taichi_ants.engines.runs.training",
-    "load_policy": "taichi_ants.learners.policies",
-    "rollout": "taichi_ants.engines.runs.traces",
-    "save_policy": "taichi_ants.learners.policies",
-    "trace_training": "taichi_ants.engines.runs.traces",
-    "train": "taichi_ants.engines.runs.training",
+    "engines.colony.colony": ("Colony", "ColonyEpisodes"),
+    "engines.runs.results": ("Rollouts", "TrainingResult"),
+    "engines.runs.traces": ("Trace", "rollout", "trace_training"),
+    "engines.runs.training": ("continue_training", "evaluate", "train"),
+    "errors": ("AntsError",),
+    "learners.config": ("TrainingConfig",),
+    "learners.policies": ("load_policy", "save_policy"),
+    "task": ("Life", "Observation", "Pheromone", "Rewards", "Task"),
+    "worlds": ("World",),
 }
-_MODULES = {"states": "taichi_ants.task.states"} | {
-    name: f"taichi_ants.{name}"
-    for name in ("analysis", "learners", "reference", "rendering", "task", "worlds")
-}
+_MODULES = ("analysis", "learners", "reference", "rendering", "task", "task.states", "worlds")
 
 __all__ = [
     "AntsError",
@@ -81,12 +71,13 @@ prepare_for_taichi()
 
 
 def __getattr__(name: str) -> object:
-    if name in _HOMES:
-        value = getattr(import_module(_HOMES[name]), name)
-        globals()[name] = value
-        return value
-    if name in _MODULES:
-        return import_module(_MODULES[name])
+    for home, names in _HOMES.items():
+        if name in names:
+            globals()[name] = getattr(import_module(f"taichi_ants.{home}"), name)
+            return globals()[name]
+    for module in _MODULES:
+        if module.split(".")[-1] == name:
+            return import_module(f"taichi_ants.{module}")
     raise AttributeError(f"module 'taichi_ants' has no attribute {name!r}")
 
 

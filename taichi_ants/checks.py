@@ -2,32 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from taichi_ants import learners
-from taichi_ants.errors import AntsError, check_one_of, check_whole, checked_flag, shown, whole
+from taichi_ants.errors import (
+    AntsError,
+    check_one_of,
+    check_whole,
+    checked_flag,
+    expect,
+    shown,
+    whole,
+)
 from taichi_ants.learners.config import TrainingConfig, share_of_one
 from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS, N_ACTIONS
 from taichi_ants.worlds.starts import STARTS
 from taichi_ants.worlds.world import World
 
+if TYPE_CHECKING:
+    from taichi_ants.learners.registry import Learner
+
 MAX_ANTS = 1 << 24
 
 
 def checked_world(world: World) -> World:
     """The world, if it is one."""
-    if not isinstance(world, World):
-        raise AntsError(f"world is {shown(world)}; it must be a World, for example worlds.paper().")
+    expect("world", world, World)
     return world
 
 
 def checked_task(task: Task) -> Task:
     """The task, if it is one."""
-    if not isinstance(task, Task):
-        raise AntsError(f"task is {shown(task)}; it must be a Task, for example task.paper().")
+    expect("task", task, Task)
     return task
 
 
@@ -69,20 +79,25 @@ def checked_capacity(
     return int(capacity)
 
 
+def check_sharing(learner: Learner, sharing: str) -> None:
+    """Refuse a learner that cannot learn in a colony, or not into a table that others share."""
+    if learner.needs_episode_end:
+        raise AntsError(
+            f"learner {learner.name!r} needs to know the last step of an episode, which the ants "
+            "of a colony do not; take another one, or train one ant by train(...)."
+        )
+    if sharing == "shared" and learner.td_error is None:
+        raise AntsError(
+            f"learner {learner.name!r} keeps a memory of its own, so ants cannot share its table; "
+            'take sharing="own".'
+        )
+
+
 def checked_food(world: World) -> World:
     """The world, if it is one to learn in: it has food, or nothing could ever be delivered."""
     if not len(checked_world(world).foods):
         raise AntsError("the world has no food, so there is nothing to learn; give it some.")
     return world
-
-
-def checked_progress(progress: Callable[[float], None] | None) -> Callable[[float], None] | None:
-    """What is called with the share of the work that is done, or None."""
-    if progress is not None and not callable(progress):
-        raise AntsError(
-            f"progress is {shown(progress)}; it must be a function of a share, or None."
-        )
-    return progress
 
 
 def checked_configs(configs: TrainingConfig | Sequence[TrainingConfig]) -> tuple:
@@ -95,10 +110,7 @@ def checked_configs(configs: TrainingConfig | Sequence[TrainingConfig]) -> tuple
     if not several:
         raise AntsError("configs is empty; give at least one TrainingConfig.")
     for config in several:
-        if not isinstance(config, TrainingConfig):
-            raise AntsError(
-                f"configs holds {shown(config)}; it must hold TrainingConfig objects only."
-            )
+        expect("a configuration", config, TrainingConfig)
     return tuple(learners.settle(config) for config in several)
 
 
@@ -113,15 +125,13 @@ def checked_seeds(seeds: int | Sequence[int]) -> tuple[int, ...]:
     several = tuple(whole("a seed", seed) for seed in given)
     if not several:
         raise AntsError("seeds is empty; give at least one whole number.")
-    taken: dict[int, int] = {}
+    taken: set[int] = set()
     for seed in several:
         if not -(2**63) <= seed < 2**64:
             raise AntsError(f"seeds holds {shown(seed)}; a seed must fit into 64 bits.")
-        if (word := seed % 2**64) in taken:
-            same = taken[word]
-            reason = "more than once" if same == seed else f"and {same}, which are one in 64 bits"
-            raise AntsError(f"seeds holds {seed} {reason}; each seed must differ.")
-        taken[word] = seed
+        if seed % 2**64 in taken:
+            raise AntsError(f"seeds holds {seed} more than once; in 64 bits each must differ.")
+        taken.add(seed % 2**64)
     return several
 
 
@@ -138,10 +148,7 @@ def checked_seeds_for(seeds: int | Sequence[int], shape: tuple[int, ...]) -> np.
 
 def checked_count(name: str, value: int, most: int = 2**31 - 1, least: int = 1) -> int:
     """A whole number from `least` to `most`."""
-    value = whole(name, value)
-    if not least <= value <= most:
-        raise AntsError(f"{name} is {shown(value)}; it must lie between {least} and {most}.")
-    return value
+    return check_whole(name, value, least, most)
 
 
 def checked_max_steps(value: int, task: Task) -> int:

@@ -82,12 +82,14 @@ def whole(name: str, value: object, otherwise: str = "") -> int:
         ) from None
 
 
-def check_whole(name: str, value: object, least: int, most: int, otherwise: str = "") -> None:
-    """Raises AntsError, naming the value `name`, if it is no whole number from least to most."""
-    if not least <= whole(name, value, otherwise) <= most:
+def check_whole(name: str, value: object, least: int, most: int, otherwise: str = "") -> int:
+    """`value` as a Python integer; as `whole`, also if it does not lie between least and most."""
+    number = whole(name, value, otherwise)
+    if not least <= number <= most:
         raise AntsError(
             f"{name} is {shown(value)}; it must lie between {least} and {most}{otherwise}."
         )
+    return number
 
 
 def expect(name: str, value: object, *kinds: type) -> None:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import csv
-import hashlib
 import io
 import json
-import math
 import os
 import secrets
 import tempfile
@@ -18,24 +16,9 @@ from typing import Any, BinaryIO
 import numpy as np
 import numpy.typing as npt
 
-from taichi_ants.errors import AntsError, shown
+from taichi_ants.errors import AntsError, expect, shown
 
 PathLike = str | os.PathLike[str]
-
-_TOKEN = 8  # bytes in the name of a file that is being written
-_SEAL = "sha256"  # the array that holds the hash of the others
-
-
-def checked_path(path: PathLike) -> str:
-    """The name of a file. Numbers are none: they would be taken for files that are open already.
-
-    Raises:
-        AntsError: It is no text and no path.
-    """
-    name = os.fspath(path) if isinstance(path, os.PathLike) else path
-    if not isinstance(name, str):
-        raise AntsError(f"the path is {shown(path)}; it must be the name of a file.")
-    return name
 
 
 def write_atomically(path: PathLike, writer: Callable[[BinaryIO], None]) -> None:
@@ -49,39 +32,28 @@ def write_atomically(path: PathLike, writer: Callable[[BinaryIO], None]) -> None
     Raises:
         AntsError: The file cannot be written. Other exceptions of the writer pass through.
     """
-    name = checked_path(path)
-    if "\0" in name:
-        raise AntsError(f"{_named(name)} contains a null character; name a file to write to.")
+    expect("path", path, str, os.PathLike)
+    if "\0" in os.fspath(path):
+        raise AntsError(f"{_named(path)} contains a null character; name a file to write to.")
     temporary: Path | None = None
     try:
-        target = Path(os.path.realpath(name))
+        target = Path(os.path.realpath(path))
         # Replacing a device, a pipe or a folder would destroy it or fail.
         if target.exists() and not target.is_file():
-            raise AntsError(f"{_named(name)} is not a regular file; name a file to write to.")
+            raise AntsError(f"{_named(path)} is not a regular file; name a file to write to.")
         # Not derived from the file's name: it fits even if that one has the greatest length.
-        temporary = target.parent / f".{secrets.token_hex(_TOKEN)}.tmp"
+        temporary = target.parent / f".{secrets.token_hex(8)}.tmp"
         with open(temporary, "xb") as file:
             writer(file)
         os.replace(temporary, target)
     except (OSError, UnicodeError) as error:
         raise AntsError(
-            f"cannot write {_named(name)}: {_reason(error)}; choose another place."
+            f"cannot write {_named(path)}: {_reason(error)}; choose another place."
         ) from error
     finally:
         if temporary is not None:
             with suppress(OSError):
                 temporary.unlink()
-
-
-def left_overs(folder: Path) -> list[Path]:
-    """Files in a folder that `write_atomically` has not completed, since the process was killed."""
-    digits = "[0-9a-f]" * (2 * _TOKEN)
-    return list(folder.glob(f".{digits}.tmp"))
-
-
-def file_hash(path: PathLike) -> str:
-    """The SHA-256 of a file's bytes, in hexadecimal; OSError if it cannot be read."""
-    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 
 def write_text(path: PathLike, text: str) -> None:
@@ -93,32 +65,14 @@ def write_text(path: PathLike, text: str) -> None:
     write_atomically(path, write_content)
 
 
-def read_text(path: PathLike) -> str:
-    """Read text that `write_text` has written.
-
-    Raises:
-        AntsError: The file cannot be read, or holds no text.
-    """
-    try:
-        return Path(checked_path(path)).read_text("utf-8")
-    except (OSError, UnicodeError) as error:
-        raise AntsError(
-            f"cannot read {os.fspath(path)!r}: {_reason(error)}; give --force to write it again."
-        ) from error
-
-
 def write_json(path: PathLike, value: Any) -> None:
-    """Write a value as indented JSON; raises as `write_atomically` does.
-
-    NumPy scalars and arrays become numbers and lists, tuples lists, paths text. JSON knows no
-    infinite number and no NaN, they become null.
-    """
+    """Write what `to_json` knows, indented; raises as `write_atomically` does."""
     write_text(path, to_json(value, indent=2) + "\n")
 
 
 def to_json(value: Any, indent: int | None = None) -> str:
-    """The JSON text of a value, converted as `write_json` says; TypeError for other types."""
-    return json.dumps(_plain(value), indent=indent, ensure_ascii=False, allow_nan=False)
+    """The JSON text of a value; NumPy's scalars and arrays, tuples and paths are known too."""
+    return json.dumps(value, indent=indent, ensure_ascii=False, default=_plain)
 
 
 def write_csv(path: PathLike, rows: Iterable[Mapping[str, Any]], columns: Sequence[str]) -> None:
@@ -135,8 +89,8 @@ def write_csv(path: PathLike, rows: Iterable[Mapping[str, Any]], columns: Sequen
     table = csv.DictWriter(text, fieldnames=columns, restval="", lineterminator="\n")
     table.writeheader()
     for row in rows:
-        scalars = {key: _plain_scalar(value) for key, value in row.items()}
-        table.writerow({key: None if value != value else value for key, value in scalars.items()})
+        plain = {key: _plain_scalar(value) for key, value in row.items()}
+        table.writerow({key: None if value != value else value for key, value in plain.items()})
     write_text(path, text.getvalue())
 
 
@@ -154,33 +108,6 @@ def write_npz(path: PathLike, arrays: Mapping[str, npt.ArrayLike], compress: boo
     write_atomically(path, lambda file: save(file, **converted))
 
 
-def write_sealed_npz(path: PathLike, arrays: Mapping[str, np.ndarray]) -> None:
-    """Write named arrays, and the hash of them all, as an .npz for `read_sealed_npz`."""
-    write_npz(path, {**arrays, _SEAL: _seal(path, arrays)}, compress=False)
-
-
-def read_sealed_npz(path: PathLike) -> dict[str, np.ndarray]:
-    """Read what `write_sealed_npz` has written.
-
-    Raises:
-        AntsError: As `read_npz`, or these are not the arrays that were written to this file.
-    """
-    arrays = read_npz(path)
-    seal = arrays.pop(_SEAL, None)
-    if seal is None or not np.array_equal(seal, _seal(path, arrays)):
-        raise AntsError(f"{str(path)!r} was altered since it was written; remove it.")
-    return arrays
-
-
-def _seal(path: PathLike, arrays: Mapping[str, np.ndarray]) -> np.ndarray:
-    """The SHA-256 of named arrays and of the name of their file, uint8 (32,)."""
-    digest = hashlib.sha256(Path(path).name.encode())
-    for name, array in sorted(arrays.items()):
-        digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
-        digest.update(np.ascontiguousarray(array).tobytes())
-    return np.frombuffer(digest.digest(), dtype=np.uint8)
-
-
 def smallest(array: np.ndarray) -> np.ndarray:
     """The same integers in the smallest type that holds them."""
     low, high = int(array.min(initial=0)), int(array.max(initial=0))
@@ -193,8 +120,9 @@ def read_npz(path: PathLike) -> dict[str, np.ndarray]:
     Raises:
         AntsError: The file is missing, unreadable, damaged, or no .npz of plain arrays.
     """
+    expect("path", path, str, os.PathLike)
     try:
-        with open(checked_path(path), "rb") as file:
+        with open(path, "rb") as file:
             archive = np.load(file, allow_pickle=False)
             if not isinstance(archive, np.lib.npyio.NpzFile):
                 raise ValueError("it holds a single array")
@@ -202,8 +130,6 @@ def read_npz(path: PathLike) -> dict[str, np.ndarray]:
                 arrays = {name: archive[name] for name in archive.files}
     except OSError as error:
         raise AntsError(f"cannot read {_named(path)}: {_reason(error)}.") from error
-    except AntsError:
-        raise
     # A damaged archive fails in many ways (zipfile, zlib, struct, tokenize, memory ...).
     except Exception as error:
         raise AntsError(
@@ -215,54 +141,24 @@ def read_npz(path: PathLike) -> dict[str, np.ndarray]:
 
 
 def check_writable_folder(path: PathLike) -> Path:
-    """Make sure that a folder exists and that files can be written to it, creating it if needed.
+    """The folder, made if it is missing, if files can be written to it.
 
     It makes a file without a name, of which nothing can be left, since permission bits alone do not
-    tell (root passes them, a read-only mount does not). If the check fails, folders that it created
-    are removed.
-
-    Returns:
-        The folder.
+    tell (root passes them, a read-only mount does not).
 
     Raises:
         AntsError: The folder cannot be created or written to.
     """
-    folder = Path(checked_path(path))
-    created: list[Path] = []
     try:
-        _create_folders(folder, created)
+        folder = Path(path)
+        folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
     except (OSError, ValueError) as error:
-        with suppress(OSError):
-            for made in reversed(created):
-                made.rmdir()
         raise AntsError(
             f"cannot write to the folder {_named(path)}: {_reason(error)}; choose another folder."
         ) from error
     return folder
-
-
-def _create_folders(folder: Path, created: list[Path]) -> None:
-    """Create a folder and its missing parents, noting each one as soon as it is made."""
-    missing = []
-    for part in (folder, *folder.parents):
-        if part.is_dir():
-            break
-        missing.append(part)
-    for part in reversed(missing):
-        _create_folder(part, created)
-
-
-def _create_folder(folder: Path, created: list[Path]) -> None:
-    try:
-        folder.mkdir()
-    except FileExistsError:
-        # Another process may have made it in the meantime; anything else is in the way.
-        if not folder.is_dir():
-            raise
-    else:
-        created.append(folder)
 
 
 def _named(path: PathLike) -> str:
@@ -281,16 +177,9 @@ def _plain_scalar(value: Any) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """Convert to what JSON knows; other types are left to json to refuse."""
-    value = _plain_scalar(value)
-    if isinstance(value, np.ndarray):
-        value = value.tolist()
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
+    """What JSON knows in place of a value that it does not know."""
+    if isinstance(value, (np.generic, np.ndarray)):
+        return value.tolist()
     if isinstance(value, os.PathLike):
         return os.fspath(value)
-    if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    return value
+    raise TypeError(f"{type(value).__name__} has no form in JSON")

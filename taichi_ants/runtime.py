@@ -9,13 +9,13 @@ import contextlib
 import gc
 import io
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
 from taichi_ants.environment import fallback_folder, is_writable_folder
-from taichi_ants.errors import AntsError, check_one_of, shown, whole
+from taichi_ants.errors import AntsError, check_one_of, check_whole
 
 ARCHITECTURES = ("cpu", "cuda")
 MAX_THREADS = 1024
@@ -59,7 +59,8 @@ def start(threads: int | None = None, arch: str | None = None) -> Runtime:
     """
     if arch is not None:
         check_one_of("arch", arch, ARCHITECTURES)
-    threads = None if threads is None else _checked_threads(threads)
+    if threads is not None:
+        check_whole("threads", threads, 1, MAX_THREADS)
     import taichi as ti
 
     running = _running(ti)
@@ -69,7 +70,7 @@ def start(threads: int | None = None, arch: str | None = None) -> Runtime:
         wanted = Runtime(arch or running.arch, threads or running.threads)
     if wanted != running:
         _check_restart(ti, running, wanted)
-        _init(ti, wanted, running)
+        _init(ti, wanted)
     return wanted
 
 
@@ -121,13 +122,6 @@ def quiet() -> Iterator[None]:
         core.set_logging_level(before)
 
 
-def _checked_threads(threads: int) -> int:
-    threads = whole("threads", threads)
-    if not 1 <= threads <= MAX_THREADS:
-        raise AntsError(f"threads is {shown(threads)}; it must lie between 1 and {MAX_THREADS}.")
-    return threads
-
-
 def _running(ti: ModuleType) -> Runtime | None:
     """What runs now, whoever has started it; None if nothing does."""
     runtime = ti.lang.impl.get_runtime()
@@ -165,8 +159,7 @@ def _check_restart(ti: ModuleType, running: Runtime | None, wanted: Runtime) -> 
     )
 
 
-def _init(ti: ModuleType, wanted: Runtime, before: Runtime | None = None, **others: object) -> None:
-    """Start Taichi; if that fails, what ran `before` runs again."""
+def _init(ti: ModuleType, wanted: Runtime, **others: object) -> None:
     settings = {
         "fast_math": False,  # no reordering of floats: the same bits everywhere
         "cpu_max_num_threads": wanted.threads,
@@ -175,26 +168,18 @@ def _init(ti: ModuleType, wanted: Runtime, before: Runtime | None = None, **othe
         **others,
     }
     arch = ti.cuda if wanted.arch == "cuda" else ti.cpu
-    hidden = _without_variables(["arch", "log_level", *settings])
-    with hidden, contextlib.redirect_stdout(io.StringIO()):
-        ti.init(arch=arch, log_level=ti.ERROR, **settings)
+    # With the environment's word on these Taichi would change them, or warn.
+    names = [f"TI_{name.upper()}" for name in ("arch", "log_level", *settings)]
+    hidden = {name: os.environ.pop(name) for name in names if name in os.environ}
+    with contextlib.redirect_stdout(io.StringIO()):
+        try:
+            ti.init(arch=arch, log_level=ti.ERROR, **settings)
+        finally:
+            os.environ.update(hidden)
     ti.lang.impl.get_runtime().is_ours = True
     if wanted.arch == "cuda" and ti.lang.impl.current_cfg().arch != ti.cuda:
         ti.reset()
-        if before is not None:
-            _init(ti, before)
         raise AntsError("arch is 'cuda', but no CUDA device can be used here; choose 'cpu'.")
-
-
-@contextlib.contextmanager
-def _without_variables(settings: Iterable[str]) -> Iterator[None]:
-    """Hide the environment's word on some settings, with which Taichi would change ours or warn."""
-    names = [f"TI_{setting.upper()}" for setting in settings]
-    hidden = {name: os.environ.pop(name) for name in names if name in os.environ}
-    try:
-        yield
-    finally:
-        os.environ.update(hidden)
 
 
 def _cache_folder() -> Path:

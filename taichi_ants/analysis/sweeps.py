@@ -63,8 +63,19 @@ def columns_of(rows: Sequence[Settings]) -> list[str]:
     return list(dict.fromkeys(name for row in rows for name in row))
 
 
-def report(settings: Sequence[Settings], values: Mapping[str, np.ndarray]) -> str:
-    """The means with their intervals as a table for a terminal."""
+def report(
+    settings: Sequence[Settings],
+    values: Mapping[str, np.ndarray],
+    against: tuple[str, Any] | None = None,
+    notes: Sequence[str] = (),
+) -> str:
+    """The means with their intervals as a table for a terminal.
+
+    Args:
+        settings, values: As above.
+        against: The setting with whose value the others are compared in the first measure.
+        notes: What came out of it, for each point.
+    """
     names = columns_of(settings)
     ends = {name: bootstrap_interval(array) for name, array in values.items()}
     lines = []
@@ -76,6 +87,10 @@ def report(settings: Sequence[Settings], values: Mapping[str, np.ndarray]) -> st
             cells.append(mean if np.isnan(low) else f"{mean} [{low:.4g}, {high:.4g}]")
         lines.append(cells)
     headers = [*(short(name, names) for name in names), *values]
+    if against:
+        other = f"{short(against[0], names)} {_shown(against[1])}"
+        headers.append(f"{next(iter(values))} against {other}")
+        lines = [[*line, note] for line, note in zip(lines, notes, strict=True)]
     seeds = next(iter(values.values())).shape[1]
     many = f"Means over {seeds} seeds, with 95 % intervals" if seeds > 1 else "One seed"
     return plain_text([Table(many, headers, lines, text_columns=len(headers))], _TERMINAL)
@@ -97,7 +112,9 @@ def draw(
         AntsError: The file cannot be written.
     """
     names = columns_of(settings)
-    first, others = names[0], names[1:]
+    first = names[0]
+    others = [name for name in names[1:] if len({str(one.get(name)) for one in settings}) > 1]
+    alike = [f"{short(n, names)} {_shown(settings[0][n])}" for n in names[1:] if n not in others]
     marks: list[Any] = [one.get(first) for one in settings]
     numbers = all(isinstance(mark, (int, float)) and not isinstance(mark, bool) for mark in marks)
     places = marks if numbers else list(map(_shown, marks))
@@ -123,7 +140,8 @@ def draw(
         seeds = values.shape[1]
         spread = f"mean of {seeds} seeds with 95 % bootstrap intervals" if seeds > 1 else "one seed"
         entries = style.legend_entries([axes])
-        style.frame(figure, title, f"{sentence(spread)}.", entries)
+        caption = ", ".join([sentence(spread), *alike])
+        style.frame(figure, title, f"{caption}.", entries)
     style.save(figure, path)
 
 

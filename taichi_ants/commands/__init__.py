@@ -12,43 +12,36 @@ from taichi_ants.studies.interruption import stoppable
 COMMANDS = {  # modules beside this one, and what they do
     "compare": "the paper's comparison of learners, over many seeds",
     "colony": "the scaling study of the colony, or one colony of any size",
-    "observations": "what ants gain from seeing more, for all learners",
     "sweep": "any settings against any measure, from a file",
     "render": "pictures of ants: an episode, a colony, learning, a policy",
 }
 
 
-def run(name: str, arguments: Sequence[str] | None = None) -> None:
-    """Run a command to its exit; it can be stopped while it is imported, too."""
+def run(name: str, arguments: Sequence[str] | None = None, program: str | None = None) -> None:
+    """Run a command to its exit; it can be stopped while it is imported, too.
+
+    Its --help calls it `program`, by default the name of the script.
+    """
     with stoppable():
+        from taichi_ants.studies.command_line import Parser
+
+        Parser.program = program
         import_module(f"{__name__}.{name}").main(arguments)
 
 
 def main() -> None:
     """The command line `taichi-ants`."""
     name, *arguments = sys.argv[1:] or ["--help"]
-    with stoppable():
-        if name in COMMANDS:
-            from taichi_ants.studies.command_line import Parser
-
-            Parser.program = f"taichi-ants {name}"
-            run(name, arguments)
-        elif name in ("-h", "--help"):
-            print(_help())
-        elif name == "--version":
-            print(f"taichi-ants {taichi_ants.__version__}")
-        else:
-            known = ", ".join(COMMANDS)
-            print(f"error: there is no command {name!r}; choose one of {known}.", file=sys.stderr)
-            sys.exit(2)
-
-
-def _help() -> str:
-    lines = "\n".join(f"  {name:13} {summary}" for name, summary in COMMANDS.items())
-    return f"""usage: taichi-ants COMMAND ...
-
-Ants on a hexagonal grid that lay pheromone trails and learn by reinforcement.
-
-{lines}
-
-`taichi-ants COMMAND --help` tells the rest."""
+    if name in COMMANDS:
+        run(name, arguments, f"taichi-ants {name}")
+    elif name in ("-h", "--help"):
+        print(f"usage: taichi-ants COMMAND ...\n\n{taichi_ants.__doc__.splitlines()[0]}\n")
+        for command, summary in COMMANDS.items():
+            print(f"  {command:9} {summary}")
+        print("\n`taichi-ants COMMAND --help` tells the rest.")
+    elif name == "--version":
+        print(f"taichi-ants {taichi_ants.__version__}")
+    else:
+        known = ", ".join(COMMANDS)
+        print(f"error: there is no command {name!r}; choose one of {known}.", file=sys.stderr)
+        sys.exit(2)

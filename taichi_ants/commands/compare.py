@@ -80,7 +80,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--world-seed", type=whole_number(), default=0, metavar="N", help="seed of an open world")
     add_common(parser)
     add("--quick", action="store_true", help=f"at most {QUICK_SEEDS} seeds")
-    add_results(parser, BESIDE_DEFAULTS.format("compare", "garden-quick"))
+    add_results(parser, BESIDE_DEFAULTS.format("compare", "seeds-20-quick"))
     add("--no-render", action="store_true", help="show no episodes of the learned policies")
     settings, given = parser.parse_given(arguments)
     settings.given = given

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from taichi_ants.studies.runner import Outcome
     from taichi_ants.studies.sweep_file import Sweep
 
-FIGURES, RUNS, SUMMARY = "figures", "runs.csv", "summary.csv"
+FIGURES, RUNS, SUMMARY, FINDINGS = "figures", "runs.csv", "summary.csv", "findings.csv"
+_WORDS = {"supported": "more", "contradicted": "less", "equivalent": "equal"}
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -55,6 +56,8 @@ def sweep(settings: argparse.Namespace) -> None:
         **asked.study.settings(),
         "measures": asked.measures,
         "varies": asked.settings,
+        "against": asked.against,
+        "margin": asked.margin,
         "rows": list(map(asked.study.in_order.index, asked.study.points)),
     }
     work_or_show(settings, facts, partial(do_sweep, settings, asked), pictures)
@@ -74,11 +77,42 @@ def do_sweep(settings: argparse.Namespace, asked: Sweep, blocks: Path, ready: Pa
     typical = [name for name in values if getattr(measures(asked.kind)[name], "typical", False)]
     rows = sweeps.summary_rows(asked.settings, values, typical)
     files.write_csv(ready / SUMMARY, rows, sweeps.columns_of(rows))
-    files.write_text(ready / REPORT, sweeps.report(asked.settings, values))
+    found = findings(asked, values[asked.measures[0]])
+    if asked.against:
+        columns = [*sweeps.columns_of(asked.settings), "finding", "difference", "low", "high"]
+        files.write_csv(ready / FINDINGS, found.values(), columns)
+    notes = [found[p]["finding"] if p in found else "" for p in range(len(asked.settings))]
+    files.write_text(ready / REPORT, sweeps.report(asked.settings, values, asked.against, notes))
+
+
+def findings(asked: Sweep, values: np.ndarray) -> dict[int, dict[str, Any]]:
+    """By point, how it differs from the one that is the same but for the setting of `against`.
+
+    The intervals of all differences of one [vary] hold at once, with a probability of 95 %.
+
+    Args:
+        values: The first measure, float64 (points, seeds).
+    """
+    from taichi_ants.analysis.findings import Above, Contrast, judge
+
+    if asked.against is None:
+        return {}
+    (name, value), found = asked.against, {}
+    for some in asked.grids:
+        rows, own = asked.settings[some], values[some]
+        others = [{**row, name: value} for row in rows]
+        pairs = [(p, rows.index(other)) for p, other in enumerate(others) if other in rows]
+        pairs = [(p, other) for p, other in pairs if p != other]
+        contrasts = [Contrast("", own[p] - own[other], Above(asked.margin)) for p, other in pairs]
+        for (p, _), one in zip(pairs, judge(contrasts), strict=True):
+            said = _WORDS.get(one.verdict.value, "undecided")
+            numbers = {"difference": one.effect, "low": one.low, "high": one.high}
+            found[some.start + p] = {**rows[p], "finding": said, **numbers}
+    return found
 
 
 def draw_figure(asked: Sweep, results: Path, folder: Path) -> None:
-    """Draw the first measure from the table in one folder into `figures` of another."""
+    """Draw the first measure from the table in one folder, a figure for each [vary]."""
     import csv
 
     import numpy as np
@@ -90,19 +124,22 @@ def draw_figure(asked: Sweep, results: Path, folder: Path) -> None:
     with open(results / RUNS, newline="", encoding="utf-8") as file:
         values = [float(row[name] or "nan") for row in csv.DictReader(file)]
     array = np.array(values).reshape(len(asked.settings), len(asked.study.seeds))
-    place = files.check_writable_folder(folder / FIGURES) / f"{name}.png"
+    place = files.check_writable_folder(folder / FIGURES)
     words = measures(asked.kind)[name].words
-    sweeps.draw(place, asked.settings, array, words, f"{words[0].upper()}{words[1:]}")
+    for number, some in enumerate(asked.grids, start=1):
+        path = place / (f"{name}.png" if len(asked.grids) == 1 else f"{name}-{number}.png")
+        sweeps.draw(
+            path, asked.settings[some], array[some], words, f"{words[0].upper()}{words[1:]}"
+        )
 
 
 def measures(kind: str) -> dict[str, Any]:
     """What can be measured, by name."""
-    if kind == "runs":
-        from taichi_ants.analysis.paper.measures import MEASURES
-
-        return dict(MEASURES)
     from taichi_ants.analysis.colony.study import MEASURES as OF_COLONIES
+    from taichi_ants.analysis.paper.measures import MEASURES as OF_RUNS
 
+    if kind == "runs":
+        return dict(OF_RUNS)
     return {name: argparse.Namespace(words=words) for name, words in OF_COLONIES.items()}
 
 

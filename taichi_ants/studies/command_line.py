@@ -7,8 +7,8 @@ import importlib.util
 import os
 import re
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -16,19 +16,14 @@ from taichi_ants.errors import AntsError
 from taichi_ants.studies.interruption import stop_if_noted, stoppable
 
 EXIT_BAD_INPUT = 2
-_LEFT_OUT = object()
 
 
-class _HelpFormatter(argparse.HelpFormatter):
-    """Shows defaults as they would be typed, and none that says nothing."""
+class _HelpFormatter(argparse.ArgumentDefaultsHelpFormatter):
+    """Shows the defaults that say something."""
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
-        default = action.default
-        silent = default is None or default is False or default is argparse.SUPPRESS
-        if not action.help or silent:
-            return action.help
-        shown = " ".join(map(str, default)) if isinstance(default, tuple) else default
-        return f"{action.help} (default: {shown})"
+        silent = action.default is None or action.default is False
+        return action.help if silent else super()._get_help_string(action)
 
 
 class Parser(argparse.ArgumentParser):
@@ -46,20 +41,10 @@ class Parser(argparse.ArgumentParser):
         )
 
     def parse_given(self, arguments: list[str] | None = None) -> tuple[argparse.Namespace, dict]:
-        """Parse a command line, and tell what it holds from what is left to defaults.
-
-        Returns:
-            The settings; and of those that were given, even as their defaults, the flag by name.
-        """
-        actions = [one for one in self._actions if one.default is not argparse.SUPPRESS]
-        blank = argparse.Namespace(**{action.dest: _LEFT_OUT for action in actions})
-        settings, given = self.parse_args(arguments, blank), {}
-        for action in actions:
-            if getattr(settings, action.dest) is _LEFT_OUT:
-                setattr(settings, action.dest, action.default)
-            else:
-                given[action.dest] = action.option_strings[0]
-        return settings, given
+        """The settings; and of those that were given, even as their defaults, the flag by name."""
+        words = sys.argv[1:] if arguments is None else arguments
+        flags = [word.partition("=")[0] for word in words if word.startswith("--")]
+        return self.parse_args(words), {flag[2:].replace("-", "_"): flag for flag in flags}
 
     def error(self, message: str) -> NoReturn:
         text = _on_one_line(message).removeprefix("argument ").rstrip(".")
@@ -84,36 +69,23 @@ def add_results(parser: argparse.ArgumentParser, place: str) -> None:
 
 BESIDE_DEFAULTS = "results/{0}, and behind it what differs from the defaults, as in results/{0}-{1}"
 _NOT_IN_NAMES = ("out", "threads", "force", "no_figures", "no_render")  # they change no results
-_NAMED_BY_VALUE = ("world", "plugin")  # without the flag
 
 
 def default_folder(
     parser: Parser, command: str, settings: argparse.Namespace, **usual: Any
 ) -> Path:
-    """Where the results of a command go by default: one folder for each way to call it.
+    """A folder for each way to call a command, as results/compare-world-garden.txt-quick.
 
-    Args:
-        parser: Knows the defaults, and the order of flags.
-        command: The folder of the defaults is results/COMMAND.
-        settings: What counts; behind the name comes what differs from the defaults.
-        usual: Other defaults than the parser's.
-
-    Returns:
-        As results/compare-garden-quick or results/compare-seeds-20-discounts-0.8-0.9.
+    Behind the name comes what differs from the defaults: the parser's, or the `usual` ones.
     """
     parts = [command]
     for action in parser._actions:
-        value = getattr(settings, action.dest, argparse.SUPPRESS)
         default = usual.get(action.dest, action.default)
-        if value in (argparse.SUPPRESS, default) or action.dest in _NOT_IN_NAMES:
-            continue
-        flag = [action.option_strings[0].removeprefix("--")]
-        if action.dest in _NAMED_BY_VALUE:
-            parts.append(Path(value).stem)
-        elif value is True:
-            parts += flag
-        else:
-            parts += flag + [str(one) for one in (value if isinstance(value, tuple) else (value,))]
+        value = getattr(settings, action.dest, default)
+        if value != default and action.dest not in _NOT_IN_NAMES:
+            values = value if isinstance(value, tuple) else (value,)
+            shown = [] if value is True else [str(one).rpartition("/")[2] for one in values]
+            parts += [action.option_strings[0].removeprefix("--"), *shown]
     return Path("results", re.sub(r"[^\w.+-]+", "_", "-".join(parts)))
 
 
@@ -121,87 +93,54 @@ def whole_number(least: int | None = None, most: int | None = None) -> Callable[
     """An argument type: a whole number within bounds."""
 
     def parse(text: str) -> int:
-        try:
-            value = int(text)
-        except ValueError:
-            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
+        value = int(text)
         if (least is not None and value < least) or (most is not None and value > most):
             bounds = f"at least {least}" if most is None else f"from {least} to {most}"
             raise argparse.ArgumentTypeError(f"{value} is not allowed, it must be {bounds}")
         return value
 
+    parse.__name__ = "whole number"  # in argparse's message, where the text is none
     return parse
 
 
-def number(text: str) -> float:
-    """An argument type: a number."""
-    try:
-        return float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+number = float  # an argument type, too
 
 
 class ListAction(argparse.Action):
-    """Collects values that are separated by blanks or commas: `--x 1 2` and `--x 1,2` alike.
+    """Collects one value or more as a tuple; of equal ones the first counts."""
 
-    Of equal ones the first counts, unless all are kept with `unique=False`.
-    """
-
-    def __init__(
-        self,
-        *args: Any,
-        item: Callable[[str], object] = str,
-        unique: bool = True,
-        **settings: Any,
-    ):
-        super().__init__(*args, **{**settings, "nargs": "+"})
-        self.item, self.unique = item, unique
+    def __init__(self, *args: Any, item: Callable[[str], object] = str, **settings: Any) -> None:
+        super().__init__(*args, **{**settings, "nargs": "+", "type": item})
 
     def __call__(
         self,
         parser: argparse.ArgumentParser,
         namespace: argparse.Namespace,
-        values: str | Sequence[str] | None,
+        values: Any,
         option_string: str | None = None,
     ) -> None:
-        items = [part for value in values or () for part in value.split(",") if part]
-        try:
-            parsed = tuple(self.item(part) for part in items)
-        except argparse.ArgumentTypeError as error:
-            raise argparse.ArgumentError(self, str(error)) from None
-        if not parsed:
-            raise argparse.ArgumentError(self, "the list is empty, give at least one value")
-        setattr(namespace, self.dest, tuple(dict.fromkeys(parsed)) if self.unique else parsed)
+        setattr(namespace, self.dest, tuple(dict.fromkeys(values)))
 
 
 def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> NoReturn:
     """Run a command line to its exit: mistakes end in one sentence, never in a traceback.
 
-    Args:
-        command: The work.
-        interrupted: What is said after Ctrl-C or SIGTERM.
+    After Ctrl-C or SIGTERM it says what `interrupted` says.
     """
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="replace")  # a terminal that lacks a character shows "?"
+    status = 0
     try:
         with stoppable(interrupted):
             command()
         if sys.stdout is not None:  # it is None if the caller has closed it
             sys.stdout.flush()
-        status = 0
-    except AntsError as error:
-        notice(f"error: {error}")
-        status = EXIT_BAD_INPUT
-    except MemoryError:
-        notice("error: this needs more memory than there is; ask for less at once.")
-        status = EXIT_BAD_INPUT
     except BrokenPipeError:  # the reader of our output has gone, for example `| head`
         _discard_output()
-        status = 0
-    except OSError as error:
+    except (AntsError, OSError, MemoryError) as error:
         _discard_output()
-        place = "the output" if error.filename is None else repr(str(error.filename))
-        notice(f"error: cannot read or write {place}: {error.strerror or error}.")
+        text = str(error) or "this needs more memory than there is"
+        notice(f"error: {text.rstrip('.')}.")
         status = EXIT_BAD_INPUT
     sys.exit(status)
 
@@ -234,19 +173,11 @@ def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
         To be called with the share of the work that is done, 0 to 1. It raises KeyboardInterrupt
         if a signal to stop came, but a library has swallowed it.
     """
-    if sys.stderr is None or not sys.stderr.isatty():
-        yield lambda share: stop_if_noted()
-        return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress
 
-    columns = (
-        TextColumn(title),
-        BarColumn(),
-        TextColumn("{task.percentage:>3.0f} %"),
-        TimeRemainingColumn(compact=True, elapsed_when_finished=True),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(title, total=1.0)
 
         def update(share: float) -> None:
@@ -258,9 +189,7 @@ def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
 
 def notice(text: str) -> None:
     """Say something on one line of standard error."""
-    if sys.stderr is not None:
-        with suppress(OSError):
-            print(_on_one_line(text), file=sys.stderr)
+    print(_on_one_line(text), file=sys.stderr)
 
 
 def _on_one_line(text: str) -> str:

@@ -10,12 +10,12 @@ from __future__ import annotations
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
 _noted: list[int] = []
-_holds = 0
+_holds = False
 
 
 def _note(number: int, frame: FrameType | None) -> None:
@@ -34,8 +34,7 @@ def _forget(unraisable: sys.UnraisableHookArgs) -> None:
 def stoppable(message: str = "Stopped.") -> Iterator[None]:
     """Ctrl-C and SIGTERM end what is done inside, and the process with status 128 + their number.
 
-    What the parent process ignores, as nohup does, stays ignored. Outside the main thread Python
-    lets nobody watch signals.
+    What the parent process ignores, as nohup does, stays ignored.
 
     Args:
         message: What to say on standard error, if the interruption has no message of its own.
@@ -45,27 +44,21 @@ def stoppable(message: str = "Stopped.") -> Iterator[None]:
         signal.SIGTERM: signal.SIG_DFL,
     }
     watched = [number for number, handler in usual.items() if signal.getsignal(number) is handler]
-    hook = sys.unraisablehook
-    with suppress(ValueError):  # not the main thread
-        for number in watched:
-            signal.signal(number, _note)
-        sys.unraisablehook = _forget
+    for number in watched:
+        signal.signal(number, _note)
+    hook, sys.unraisablehook = sys.unraisablehook, _forget
     try:
         yield
     except BaseException as error:
-        stopped = _noted or isinstance(error, KeyboardInterrupt)
-        if isinstance(error, SystemExit) or not stopped:
+        interrupted = isinstance(error, KeyboardInterrupt)
+        if isinstance(error, SystemExit) or not (_noted or interrupted):
             raise
-        if sys.stderr is not None:
-            with suppress(OSError):
-                own = isinstance(error, KeyboardInterrupt) and str(error)
-                print(own or message, file=sys.stderr)
+        print(str(error) if interrupted and str(error) else message, file=sys.stderr)
         sys.exit(128 + (_noted[0] if _noted else signal.SIGINT))
     finally:
         sys.unraisablehook = hook
-        with suppress(ValueError):
-            for number in watched:
-                signal.signal(number, usual[number])
+        for number in watched:
+            signal.signal(number, usual[number])
         if watched:  # this is the outermost
             _noted.clear()
 
@@ -78,14 +71,12 @@ def held() -> Iterator[Callable[[], bool]]:
         Whether a signal has come.
     """
     global _holds
-    before = len(_noted)
-    _holds += 1
+    _holds = True
     try:
-        yield lambda: len(_noted) > before
+        yield lambda: bool(_noted)
     finally:
-        _holds -= 1
-    if len(_noted) > before:
-        stop_if_noted()
+        _holds = False
+    stop_if_noted()
 
 
 def stop_if_noted() -> None:

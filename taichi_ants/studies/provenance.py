@@ -9,7 +9,7 @@ import platform
 import shlex
 import subprocess
 from collections.abc import Sequence
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -43,34 +43,22 @@ def provenance(arguments: Sequence[str]) -> dict[str, Any]:
         "finished": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
         "commit": commit(),
         "python": platform.python_version(),
-        "packages": {"taichi_ants": __version__, **{name: _version(name) for name in _PACKAGES}},
+        "packages": {"taichi_ants": __version__, **{name: version(name) for name in _PACKAGES}},
         "platform": platform.platform(),
         "cpus": os.cpu_count(),
     }
 
 
 def commit() -> str | None:
-    """The commit of the source, "+changes" behind it if files differ; None outside a checkout."""
+    """The commit of the source, "-dirty" behind it if files differ; None outside a checkout."""
     root = Path(__file__).resolve().parents[2]
     if not (root / ".git").exists():
         return None
-    head = _git(root, "rev-parse", "HEAD")
-    changed = _git(root, "status", "--porcelain", "--untracked-files=no")
-    return head and head + ("+changes" if changed else "")
-
-
-def _git(root: Path, *arguments: str) -> str | None:
+    command = ["git", "describe", "--always", "--abbrev=40", "--exclude=*", "--dirty"]
     try:
         done = subprocess.run(
-            ["git", *arguments], cwd=root, capture_output=True, text=True, timeout=10, check=True
+            command, cwd=root, capture_output=True, text=True, timeout=10, check=True
         )
     except (OSError, subprocess.SubprocessError):
         return None
     return done.stdout.strip()
-
-
-def _version(package: str) -> str | None:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None

@@ -1,12 +1,13 @@
 """A folder of results: finished once, never mixed, never lost.
 
-While the work goes on, everything lies in the folder's subfolder `unfinished`, with the settings
-that it belongs to. When all results exist they move up and the manifest is written; the work is
-finished once those settings are gone.
+While the work goes on, everything lies in the subfolder `unfinished`: finished blocks, what is
+ready, and a manifest with the settings. At the end the results move up, the manifest last of all:
+where it lies tells whether the work is finished.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import shutil
@@ -16,11 +17,10 @@ from argparse import Namespace
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from taichi_ants import files
 from taichi_ants.errors import AntsError
-from taichi_ants.studies.interruption import held
 from taichi_ants.studies.provenance import provenance
 
 try:
@@ -29,19 +29,18 @@ except ImportError:  # not on Windows: there nobody checks for a second process
     fcntl = None  # type: ignore[assignment]
 
 MANIFEST = "manifest.json"
-_UNFINISHED = "unfinished"
-_SETTINGS = "settings.json"
-_LOCK = "lock"
-BLOCKS, READY = "blocks", "ready"
+UNFINISHED, BLOCKS, READY = "unfinished", "blocks", "ready"
 REPORT = "report.txt"  # what commands print
 PICTURES = ("figures", "renders")  # can be drawn again from the other results
+
+Draw = Callable[[Path, Path], None]
 
 
 def work_or_show(
     settings: Namespace,
     determines: Mapping[str, Any],
     work: Callable[[Path, Path], Mapping[str, Any] | None],
-    pictures: Mapping[str, Callable[[Path, Path], None]],
+    pictures: Mapping[str, Draw],
 ) -> None:
     """Do the work of a command, or show what its folder holds already; print the report.
 
@@ -56,15 +55,10 @@ def work_or_show(
     Raises:
         AntsError: The folder holds something else, cannot be written, or was altered.
     """
-    plugin = files.file_hash(settings.plugin) if settings.plugin else None
+    plugin = _hash(Path(settings.plugin)) if settings.plugin else None
     folder = ResultFolder(settings.out, {**determines, "arch": settings.arch, "plugin": plugin})
-    if folder.is_finished() and not settings.force:
-        folder.check_whole(apart_from=PICTURES)
-        print(files.read_text(folder.path / REPORT))
-        for name, draw in pictures.items():
-            if folder.lacks(name):
-                with folder.addition() as place:
-                    draw(folder.path, place)
+    if not settings.force and folder.is_finished():
+        folder.show(pictures)
         print(f"{settings.out}/ holds these results already; --force makes them again.")
         return
     began = time.perf_counter()
@@ -72,7 +66,7 @@ def work_or_show(
         manifest = work(blocks, ready) or {}
         for draw in pictures.values():
             draw(ready, ready)
-        report = files.read_text(ready / REPORT)
+        report = (ready / REPORT).read_text("utf-8")
         seconds = time.perf_counter() - began
         folder.publish({**provenance(sys.argv), "seconds": seconds, **manifest})
     print(f"{report}\n{seconds:.1f} s; everything is in {settings.out}/")
@@ -83,274 +77,198 @@ class ResultFolder:
 
     Args:
         path: The folder; it need not exist.
-        settings: All that determines the results, as JSON knows it.
+        settings: All that determines the results, as `files.to_json` knows it.
     """
 
     def __init__(self, path: str | Path, settings: Mapping[str, Any]) -> None:
         self.path = Path(path)
         self._settings = json.loads(files.to_json(settings))
-        self._unfinished = self.path / _UNFINISHED
+        self._unfinished = self.path / UNFINISHED
 
     def is_finished(self) -> bool:
-        """Whether the folder holds finished results of these settings, and nothing unfinished."""
-        same = _settings_in(self.path / MANIFEST) == self._settings
-        return same and not os.path.exists(self._unfinished / _SETTINGS)
-
-    def lacks(self, name: str) -> bool:
-        """Whether a file or a folder was left out of the results, or some of it is gone."""
-        listed = [path for path in self._published() if path.parts[0] == name]
-        return not listed or any(self._is_gone(path) for path in listed)
-
-    def check_whole(self, apart_from: Collection[str] = ()) -> None:
-        """Make sure that finished results are still what they were, and clean up behind a kill.
-
-        Args:
-            apart_from: Files and folders that may be gone.
+        """Whether the folder holds finished results of these settings.
 
         Raises:
-            AntsError: A file is gone or empty, or was altered.
+            AntsError: It holds something else than these, or the work on them.
         """
-        published = self._published()
-        if not published:
-            raise AntsError(
-                f"{str(self.path / MANIFEST)!r} is damaged; give --force to run all again."
-            )
-        for path, facts in published.items():
-            gone = self._is_gone(path)
-            if gone and path.parts[0] in apart_from:
+        for place, what in ((self._unfinished, "unfinished work"), (self.path, "results")):
+            if not (place / MANIFEST).exists():
                 continue
-            if gone or _facts(self.path / path) != facts:
-                what = "is gone or empty" if gone else "was altered since they were finished"
+            other = _manifest_in(place)["settings"]
+            keys = dict.fromkeys([*self._settings, *other])
+            different = [key for key in keys if self._settings.get(key) != other.get(key)]
+            if different:
                 raise AntsError(
-                    f"{str(self.path / path)!r}, a part of the results, {what}; put it back, or "
-                    "give --force to run all again."
+                    f"{str(self.path)!r} holds {what} of other settings ({', '.join(different)} "
+                    "differ); choose another --out, or give --force to replace them."
                 )
-        if os.path.exists(self._unfinished):  # left by a kill; or another process adds something
-            with suppress(AntsError), self._locked():
-                pass
-
-    def _is_gone(self, path: Path) -> bool:
-        file = self.path / path
-        return not file.is_file() or file.stat().st_size == 0
-
-    @contextmanager
-    def work(self, replace: bool = False) -> Iterator[tuple[Path, Path]]:
-        """Lock the folder and hold the work in progress.
-
-        Args:
-            replace: Start anew, even if the folder holds results or work of other settings. Old
-                results stay until the new ones are complete.
-
-        Yields:
-            The folder for blocks of work, which survive an interruption, and an empty one for
-            results that are ready. Both are gone once `publish` was called.
-
-        Raises:
-            AntsError: The folder cannot be written, another process works in it, or it holds
-                something else.
-        """
-        if not replace:
-            self._check_nothing_else()
-        with self._locked():
-            yield self._prepare(replace)
-
-    @contextmanager
-    def _locked(self) -> Iterator[None]:
-        """Make the folders that are missing and keep others away.
-
-        At the end all goes again that is of no use: empty folders, work without blocks, and what a
-        killed process has left.
-        """
-        new = [part for part in (self.path, *self.path.parents) if not os.path.exists(part)]
-        lock = None
-        try:
-            with held():
-                files.check_writable_folder(self.path)
-                files.check_writable_folder(self._unfinished)
-                lock = self._lock()
-            yield
-        finally:
-            with held():
-                if lock is not None:
-                    self._drop_what_is_of_no_use()
-                    lock.close()
-                for folder in (self._unfinished, *new):
-                    with suppress(OSError, ValueError):  # it is not empty, or was never made
-                        folder.rmdir()
-
-    def publish(self, manifest: Mapping[str, Any]) -> None:
-        """Move what is ready into the folder, and write the manifest with the settings in it.
-
-        What an older manifest lists is replaced or removed; other files stay.
-        """
-        hashes = _files_in(self._unfinished / READY)
-        contents = {**manifest, "files": hashes, "settings": self._settings}
-        with held():
-            self._move_up(self._published(), contents)
-            (self._unfinished / _SETTINGS).unlink(missing_ok=True)  # now the work is finished
-        shutil.rmtree(self._unfinished, ignore_errors=True)
-
-    @contextmanager
-    def addition(self) -> Iterator[Path]:
-        """Hold a folder for what is added to finished results; it moves up when it is complete.
-
-        Raises:
-            AntsError: The folder cannot be written, or another process works in it.
-        """
-        with self._locked():
-            shutil.rmtree(self._unfinished / READY, ignore_errors=True)
-            yield files.check_writable_folder(self._unfinished / READY)
-            hashes = _files_in(self._unfinished / READY)
-            added = {Path(file).parts[0] for file in hashes}
-            old = self._published()
-            replaced = [file for file in old if file.parts[0] in added]
-            kept = {file.as_posix(): old[file] for file in old if file not in replaced}
-            manifest = json.loads((self.path / MANIFEST).read_text("utf-8"))
-            with held():
-                self._move_up(
-                    replaced, {**manifest, "files": dict(sorted({**kept, **hashes}.items()))}
-                )
-
-    def _move_up(self, old: Iterable[Path], manifest: Mapping[str, Any]) -> None:
-        """Put what is ready, and the manifest, in the place of old files.
-
-        The manifest comes before the files: what a kill leaves is noticed as gone, never as ours.
-        """
-        ready = self._unfinished / READY
-        try:
-            for file in old:
-                self._remove(file)
-            files.write_json(self.path / MANIFEST, manifest)
-            for name in _files_in(ready):
-                target = self._make_way(Path(name))
-                (ready / name).replace(target)
-        except OSError as error:
-            raise _cannot_write(error.filename or self.path, error) from error
-
-    def _remove(self, file: Path) -> None:
-        """Remove a file of ours, and folders that are empty then; behind a link nothing is ours."""
-        folders = [self.path / folder for folder in file.parents[:-1]]
-        if any(folder.is_symlink() for folder in folders):
-            return
-        with suppress(FileNotFoundError, NotADirectoryError, IsADirectoryError):
-            (self.path / file).unlink()
-        for folder in folders:
-            with suppress(OSError):  # it holds something else
-                folder.rmdir()
-
-    def _make_way(self, file: Path) -> Path:
-        """The place of a file, in folders of its own; OSError if a folder that is full is there."""
-        for folder in reversed([self.path / folder for folder in file.parents[:-1]]):
-            if folder.is_symlink() or not folder.is_dir():
-                folder.unlink(missing_ok=True)
-                folder.mkdir()
-        target = self.path / file
-        if target.is_dir() and not target.is_symlink():
-            target.rmdir()
-        return target
-
-    def _prepare(self, replace: bool) -> tuple[Path, Path]:
-        """Folders for blocks and for what is ready; blocks of other settings are removed."""
-        if replace or _settings_in(self._unfinished / _SETTINGS) != self._settings:
-            shutil.rmtree(self._unfinished / BLOCKS, ignore_errors=True)
-        shutil.rmtree(self._unfinished / READY, ignore_errors=True)
-        blocks = files.check_writable_folder(self._unfinished / BLOCKS)
-        ready = files.check_writable_folder(self._unfinished / READY)
-        files.write_json(self._unfinished / _SETTINGS, {"settings": self._settings})
-        return blocks, ready
-
-    def _published(self) -> dict[Path, Any]:
-        """The files that the manifest lists, relative to the folder, with their facts."""
-        with suppress(OSError, ValueError, TypeError, KeyError, AttributeError):
-            files = json.loads((self.path / MANIFEST).read_text("utf-8"))["files"].items()
-            return {Path(file): facts for file, facts in files if _lies_below(Path(file))}
-        return {}
-
-    def _check_nothing_else(self) -> None:
-        begun = _settings_in(self._unfinished / _SETTINGS)
-        if begun is not None:
-            if begun != self._settings:
-                raise AntsError(self._holds("unfinished work", begun))
-            return
-        done = _settings_in(self.path / MANIFEST)
-        if done is not None and done != self._settings:
-            raise AntsError(self._holds("results", done))
-        if done is None and self._has_foreign_files():
+            return place == self.path
+        if self.path.is_dir() and any(item.name != UNFINISHED for item in self.path.iterdir()):
             raise AntsError(
                 f"{str(self.path)!r} holds files that no finished results go with; "
                 "choose another --out, or give --force to write among them."
             )
+        return False
 
-    def _has_foreign_files(self) -> bool:
-        if not os.path.isdir(self.path):
-            return False
-        left = (_UNFINISHED, *(item.name for item in files.left_overs(self.path)))
-        return any(item.name not in left for item in self.path.iterdir())
+    def show(self, pictures: Mapping[str, Draw]) -> None:
+        """Print the report of finished results, and draw the pictures that are not there.
 
-    def _holds(self, what: str, other: Mapping[str, Any]) -> str:
-        if not other:
-            return (
-                f"{str(self.path)!r} holds {what} whose settings are damaged; "
-                "choose another --out, or give --force to replace them."
-            )
-        keys = dict.fromkeys([*self._settings, *other])
-        different = [key for key in keys if self._settings.get(key) != other.get(key)]
-        return (
-            f"{str(self.path)!r} holds {what} of other settings ({', '.join(different)} differ); "
-            "choose another --out, or give --force to replace them."
-        )
+        Raises:
+            AntsError: A file of the results, apart from pictures, is gone or was altered.
+        """
+        manifest = _manifest_in(self.path)
+        for name, digest in manifest["files"].items():
+            path = self.path / name
+            whole = path.is_file() and _hash(path) == digest
+            if not whole and name.partition("/")[0] not in PICTURES:
+                raise AntsError(
+                    f"{str(path)!r}, a part of the results, is gone or was altered since they were "
+                    "finished; put it back, or give --force to run all again."
+                )
+        print((self.path / REPORT).read_text("utf-8"))
+        for name, draw in pictures.items():
+            drawn = [file for file in manifest["files"] if file.startswith(f"{name}/")]
+            if drawn and all((self.path / file).is_file() for file in drawn):
+                continue
+            with self._working() as (_, ready):
+                draw(self.path, ready)
+                hashes = self._ready_beside(manifest["files"])
+                for file in drawn:
+                    del manifest["files"][file]
+                manifest["files"] = dict(sorted({**manifest["files"], **hashes}.items()))
+                self._move_up(hashes)
+                files.write_json(self.path / MANIFEST, manifest)
 
-    def _lock(self) -> IO[str]:
-        """The file whose lock keeps other processes away."""
+    @contextmanager
+    def work(self, replace: bool = False) -> Iterator[tuple[Path, Path]]:
+        """Hold a folder for blocks of work, which survive an interruption, and one for results.
+
+        With `replace` the work starts anew, whatever the folder holds; old results stay until the
+        new ones are complete.
+
+        Raises:
+            AntsError: The folder cannot be written, or another process works in it.
+        """
+        self._listed()  # if it is damaged, it is so before the work
+        with self._working(replace) as places:
+            if not (self._unfinished / MANIFEST).exists():
+                files.write_json(self._unfinished / MANIFEST, {"settings": self._settings})
+            yield places
+
+    def publish(self, manifest: Mapping[str, Any]) -> None:
+        """Move what is ready into the folder, then the manifest with the settings in it.
+
+        What an older manifest lists is replaced or removed; other files stay.
+
+        Raises:
+            AntsError: A file that is not ours is in the way.
+        """
+        half_moved = _manifest_in(self._unfinished)["files"]  # where a kill has left some
+        old = {**half_moved, **self._listed()}
+        hashes = self._ready_beside(old)
+        for name, digest in old.items():
+            self._remove(name, digest)
+        contents = {**manifest, "files": hashes, "settings": self._settings}
+        files.write_json(self._unfinished / MANIFEST, contents)
+        self._move_up(hashes)
+        os.replace(self._unfinished / MANIFEST, self.path / MANIFEST)  # now it is finished
+        self._clear()
+
+    @contextmanager
+    def _working(self, replace: bool = False) -> Iterator[tuple[Path, Path]]:
+        """Make the folders for blocks and for what is ready, and keep other processes away.
+
+        At the end all goes again that is of no use, that is if there is no block.
+        """
+        new = [part for part in (self.path, *self.path.parents) if not part.exists()]
+        blocks, ready = self._unfinished / BLOCKS, self._unfinished / READY
         try:
-            lock = open(self._unfinished / _LOCK, "w")  # noqa: SIM115 - closed by `_locked`
-        except OSError as error:
-            raise _cannot_write(self.path, error) from error
+            files.check_writable_folder(self.path)
+            self._unfinished.mkdir(exist_ok=True)
+            with _locked(self._unfinished):
+                # Without a manifest nobody knows whose blocks these are.
+                if replace or not (self._unfinished / MANIFEST).exists():
+                    self._clear()
+                shutil.rmtree(ready, ignore_errors=True)
+                try:
+                    yield files.check_writable_folder(blocks), files.check_writable_folder(ready)
+                finally:
+                    if not any(blocks.rglob("*.npz")):
+                        self._clear()
+        finally:
+            for folder in (self._unfinished, *new):
+                with suppress(OSError, ValueError):  # it is not empty, or was never made
+                    folder.rmdir()
+
+    def _clear(self) -> None:
+        """Remove what is ours in `unfinished`."""
+        (self._unfinished / MANIFEST).unlink(missing_ok=True)
+        for name in (BLOCKS, READY):
+            shutil.rmtree(self._unfinished / name, ignore_errors=True)
+
+    def _listed(self) -> dict[str, str]:
+        """The files of finished results, with their hashes."""
+        return _manifest_in(self.path)["files"] if (self.path / MANIFEST).exists() else {}
+
+    def _ready_beside(self, old: Collection[str]) -> dict[str, str]:
+        """The hashes of all files that are ready; AntsError if another than an old one is there."""
+        ready = self._unfinished / READY
+        paths = (path.relative_to(ready) for path in ready.rglob("*") if path.is_file())
+        names = sorted(path.as_posix() for path in paths)
+        for name in names:
+            if (self.path / name).exists() and name not in old:
+                raise AntsError(
+                    f"{str(self.path / name)!r} is in the way of results and none of ours; move it "
+                    "away, and the same command without --force goes on."
+                )
+        return {name: _hash(ready / name) for name in names}
+
+    def _move_up(self, names: Iterable[str]) -> None:
+        for name in names:
+            (self.path / name).parent.mkdir(parents=True, exist_ok=True)
+            (self._unfinished / READY / name).replace(self.path / name)
+
+    def _remove(self, name: str, digest: str) -> None:
+        """Remove a file that an older manifest lists, if it is still that one and lies in here."""
+        file, own = self.path / name, self.path.resolve()
+        if file.is_file() and file.resolve().is_relative_to(own) and _hash(file) == digest:
+            file.unlink()
+            with suppress(OSError):  # it holds something else
+                file.parent.rmdir()
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Keep other processes out of a folder."""
+    if fcntl is None:
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
         try:
-            if fcntl is not None:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            lock.close()
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
             raise AntsError(
-                f"another process is writing to {str(self.path)!r}; wait for it, or choose "
-                "another --out."
+                f"another process is writing to {str(folder)!r}; wait for it, or choose another "
+                "--out."
             ) from None
-        return lock
-
-    def _drop_what_is_of_no_use(self) -> None:
-        for left in files.left_overs(self.path):
-            left.unlink(missing_ok=True)
-        blocks = self._unfinished / BLOCKS
-        done = blocks.is_dir() and len(list(blocks.iterdir())) > len(files.left_overs(blocks))
-        if not done or not os.path.exists(self._unfinished / _SETTINGS):
-            shutil.rmtree(self._unfinished, ignore_errors=True)
+        yield
+    finally:
+        os.close(handle)
 
 
-def _settings_in(path: Path) -> dict[str, Any] | None:
-    """The settings that a file names; None if there is no such file."""
-    if not os.path.exists(path):
-        return None
-    with suppress(OSError, ValueError, TypeError, KeyError):
-        return dict(json.loads(path.read_text("utf-8"))["settings"])
-    return {}  # damaged: of other settings than any
+def _manifest_in(folder: Path) -> dict[str, Any]:
+    """What the manifest in a folder says; AntsError if it is damaged."""
+    try:
+        manifest = json.loads((folder / MANIFEST).read_text("utf-8"))
+        parts = {name: dict(manifest.get(name, {})) for name in ("settings", "files")}
+        return {**manifest, **parts}
+    except (OSError, ValueError, TypeError, AttributeError) as error:
+        raise AntsError(
+            f"{str(folder / MANIFEST)!r} is damaged, so nobody knows what here is ours; choose "
+            "another --out."
+        ) from error
 
 
-def _files_in(folder: Path) -> dict[str, dict[str, Any]]:
-    """All files below a folder, relative to it, with their facts."""
-    paths = sorted(path for path in folder.rglob("*") if not path.is_dir())
-    return {path.relative_to(folder).as_posix(): _facts(path) for path in paths}
-
-
-def _facts(path: Path) -> dict[str, Any]:
-    return {"bytes": path.stat().st_size, "sha256": files.file_hash(path)}
-
-
-def _lies_below(path: Path) -> bool:
-    return bool(path.parts) and not path.is_absolute() and ".." not in path.parts
-
-
-def _cannot_write(path: str | Path, error: OSError) -> AntsError:
-    reason = (error.strerror or str(error)).lower()
-    return AntsError(
-        f"cannot write to {str(path)!r}: {reason}; make room for it or choose another."
-    )
+def _hash(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()

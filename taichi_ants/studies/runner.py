@@ -9,22 +9,19 @@ any order without changing anything.
 from __future__ import annotations
 
 import itertools
-import math
-import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from taichi_ants import __version__, checks, files
-from taichi_ants.errors import AntsError, check_one_of, count
+from taichi_ants import __version__, checks, files, learners
+from taichi_ants.errors import AntsError, check_one_of
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.provenance import world_facts
 from taichi_ants.task import Task
-from taichi_ants.task.constants import MAX_STEPS, N_ACTIONS
+from taichi_ants.task.constants import MAX_STEPS
 from taichi_ants.worlds.world import World
 
 # Seeds of a colony's evaluation are those of the training plus this, so that no random number
@@ -32,16 +29,12 @@ from taichi_ants.worlds.world import World
 EVALUATION_SEEDS = 1 << 32
 _STEPS_OF_A_BLOCK = 100_000_000  # of runs, at most, if every episode used all its steps
 _RUNS_OF_A_BLOCK = 5000  # at most, each needs about 20 KB while it is trained
-_COPIES = 3  # of the results in memory while they are analysed
 _RUN_ARRAYS = ("returns", "steps", "deliveries")
 _COLONY_ARRAYS = ("deliveries", "first_delivery", "moves", "blocked", "returns")
 
 Progress = Callable[[float], None]
 Outcome = dict[str, np.ndarray]  # by name, first axis the seeds
-
-
-def _done(share: float) -> None:
-    """Nobody wants to know."""
+Piece = TypeVar("Piece")
 
 
 @dataclass(frozen=True)
@@ -88,20 +81,37 @@ class RunPoint:
         return (self.world, self.task, which, self.episodes, self.max_steps, self.rollouts)
 
     @property
-    def size(self) -> int:
-        """Bytes of the outcome of one seed."""
-        counts = len(_RUN_ARRAYS) * (self.episodes + self.rollouts)
-        return 4 * (counts + self.task.n_states * N_ACTIONS)
-
-    @property
-    def seeds_of_a_block(self) -> int:
+    def runs_of_a_block(self) -> int:
         """How many runs make launches that do not count, and let a stop come soon."""
         return min(max(1, _STEPS_OF_A_BLOCK // (self.episodes * self.max_steps)), _RUNS_OF_A_BLOCK)
 
     @property
     def weight(self) -> float:
         """About how much work a seed is."""
-        return self.episodes * self.max_steps * (4 + self.training.planning_steps) / 5
+        return self.episodes * self.max_steps
+
+    @staticmethod
+    def do(
+        points: Sequence[RunPoint],
+        seeds: Sequence[int],
+        learned: np.ndarray | None,
+        progress: Progress,
+        where: Mapping[str, Any],
+    ) -> Outcome:
+        """The outcomes of points that are alike: arrays (points, seeds, ...)."""
+        from taichi_ants.engines.runs.training import evaluate, train
+
+        first, configs = points[0], [point.training for point in points]
+        world, lengths, task = first.world, (first.episodes, first.max_steps), first.task
+        trained = train(world, configs, seeds, *lengths, task, **where, progress=progress)
+        q_values, steps = trained.q_values, trained.steps.sum(axis=2, dtype=float)
+        greedy = evaluate(world, q_values, first.rollouts, seeds, first.max_steps, task, **where)
+        return {
+            **{name: files.smallest(getattr(trained, name)) for name in _RUN_ARRAYS},
+            **{f"greedy_{name}": files.smallest(getattr(greedy, name)) for name in _RUN_ARRAYS},
+            "q_values": q_values,
+            "seconds": trained.seconds * steps / steps.sum(),
+        }
 
 
 @dataclass(frozen=True)
@@ -145,6 +155,7 @@ class ColonyPoint:
         checks.checked_task(self.task)
         checks.checked_capacity(self.task, self.ants, self.capacity, self.start, False)
         check_one_of("sharing", self.sharing, ("shared", "own"))
+        checks.check_sharing(learners.get(config.learner), self.sharing)
         checks.checked_count("episodes", self.episodes, least=0 if self.after else 1)
         checks.checked_count("ticks", self.ticks, MAX_STEPS)
         checks.checked_count("rollouts", self.rollouts)
@@ -152,16 +163,48 @@ class ColonyPoint:
             raise AntsError("a colony can only go on from one that has learned into one table.")
 
     alike = property(lambda self: self)
-    seeds_of_a_block = property(lambda self: 1 << 32)  # all
-
-    @property
-    def size(self) -> int:
-        return 4 * (len(_COLONY_ARRAYS) * self.rollouts + self.task.n_states * N_ACTIONS)
+    runs_of_a_block = property(lambda self: 1 << 32)  # all
 
     @property
     def weight(self) -> float:
-        learning = self.episodes * (1 + self.training.planning_steps)
-        return self.ants * self.ticks * (learning + self.rollouts)
+        """About how much work a seed is."""
+        return self.ants * self.ticks * (self.episodes + self.rollouts)
+
+    @staticmethod
+    def do(
+        points: Sequence[ColonyPoint],
+        seeds: Sequence[int],
+        learned: np.ndarray | None,
+        progress: Progress,
+        where: Mapping[str, Any],
+    ) -> Outcome:
+        """The outcome of a point: arrays (1, seeds, ...); `learned` are the tables of `after`."""
+        from taichi_ants.engines.colony.colony import Colony
+
+        (point,) = points
+        options = {"ants": point.ants, "capacity": point.capacity, "start": point.start, **where}
+        share = point.episodes / (point.episodes + point.rollouts)
+        tables: Any = learned
+        if point.episodes:
+            learning = Colony(
+                *(point.world, point.task, point.training, seeds),
+                **options,
+                sharing=point.sharing,
+                q_values=learned,
+            )
+            learning.run(point.episodes, point.ticks, _part(progress, 0.0, share))
+            tables = learning.q_values
+        least = point.training.min_epsilon
+        calm = replace(point.training, epsilon=least, epsilon_decay=1.0)
+        others = [seed + EVALUATION_SEEDS for seed in seeds]
+        colony = Colony(
+            *(point.world, point.task, calm, others), **options, sharing="fixed", q_values=tables
+        )
+        episodes = colony.run(point.rollouts, point.ticks, _part(progress, share, 1 - share))
+        outcome = {name: files.smallest(getattr(episodes, name).T) for name in _COLONY_ARRAYS}
+        if point.episodes and point.sharing == "shared":
+            outcome["q_values"] = tables
+        return {name: array[None] for name, array in outcome.items()}
 
 
 Point = RunPoint | ColonyPoint
@@ -177,8 +220,7 @@ class Study(Generic[PointKind]):
         seeds: The seeds of each; they pair the points.
 
     Raises:
-        AntsError: A world has no room for the ants, or not as many worlds as seeds are given, or
-            the outcomes would not fit into the memory of this machine.
+        AntsError: A world has no room for the ants, or not as many worlds as seeds are given.
     """
 
     points: tuple[PointKind, ...]
@@ -188,26 +230,12 @@ class Study(Generic[PointKind]):
         object.__setattr__(self, "seeds", checks.checked_seeds(self.seeds))
         if not self.points:
             raise AntsError("there are no points to do; give at least one.")
-        most: dict[World | tuple[World, ...], int] = {}
-        for point in self.points:
-            most[point.world] = max(most.get(point.world, 1), point.ants)
-        for world, ants in most.items():
-            self._check_room(world, ants)
-        needed = sum(point.size for point in self.points) * len(self.seeds) * _COPIES
-        if needed > available_memory():
-            longest = max(point.episodes for point in self.points)
-            raise AntsError(
-                f"{count(len(self.points), 'point')} of up to {longest} episodes with "
-                f"{count(len(self.seeds), 'seed')} need about {needed / 1e9:.0f} GB, this machine "
-                f"has {available_memory() / 1e9:.0f} GB of memory; take less of something at once."
-            )
-
-    def _check_room(self, world: World | tuple[World, ...], ants: int) -> None:
-        several = world if isinstance(world, tuple) else (world,)
-        if len(several) not in (1, len(self.seeds)) or not several:
-            raise AntsError(f"there are {len(several)} worlds for {len(self.seeds)} seeds.")
-        for one, seed in zip(several, self.seeds, strict=False):
-            checks.checked_food(one).start(seed, ants)
+        for world, ants in dict.fromkeys((point.world, point.ants) for point in self.points):
+            several = world if isinstance(world, tuple) else (world,)
+            if len(several) not in (1, len(self.seeds)) or not several:
+                raise AntsError(f"there are {len(several)} worlds for {len(self.seeds)} seeds.")
+            for one, seed in zip(several, self.seeds, strict=False):
+                checks.checked_food(one).start(seed, ants)
 
     @property
     def in_order(self) -> tuple[PointKind, ...]:
@@ -215,15 +243,13 @@ class Study(Generic[PointKind]):
         pairs = ((getattr(point, "after", None), point) for point in self.points)
         return tuple(dict.fromkeys(point for pair in pairs for point in pair if point))
 
-    def blocks(self) -> Iterator[tuple[slice, slice]]:
-        """The ranges of points (of `in_order`) and seeds of each block; block by block in order."""
-        numbered = enumerate(self.in_order)
-        for _, group in itertools.groupby(numbered, lambda pair: pair[1].alike):
-            numbers, points = zip(*group, strict=True)
-            size = points[0].seeds_of_a_block
-            together = slice(numbers[0], numbers[-1] + 1)
-            for some in _pieces(together, max(1, size // len(self.seeds))):
-                for seeds in _pieces(slice(0, len(self.seeds)), size):
+    def blocks(self) -> Iterator[tuple[Sequence[PointKind], Sequence[int]]]:
+        """The points and seeds of each block."""
+        for _, group in itertools.groupby(self.in_order, lambda point: point.alike):
+            points = tuple(group)
+            size = points[0].runs_of_a_block
+            for some in _pieces(points, max(1, size // len(self.seeds))):
+                for seeds in _pieces(self.seeds, size):
                     yield some, seeds
 
     def settings(self) -> dict[str, Any]:
@@ -255,7 +281,7 @@ class Study(Generic[PointKind]):
         folder: Path,
         threads: int | None = None,
         arch: str | None = None,
-        progress: Progress = _done,
+        progress: Progress = lambda share: None,
         notice: Callable[[str], None] = lambda text: None,
     ) -> dict[PointKind, Outcome]:
         """Do the blocks that the folder does not hold yet; the outcome of each point.
@@ -269,118 +295,29 @@ class Study(Generic[PointKind]):
         Raises:
             AntsError: A block cannot be written, or an argument is not allowed.
         """
-        points, blocks = self.in_order, list(self.blocks())
-        weights = [
-            sum(point.weight for point in points[some]) * (seeds.stop - seeds.start)
-            for some, seeds in blocks
-        ]
-        total, begun = sum(weights), 0.0
-        pieces: dict[PointKind, list[Outcome]] = {point: [] for point in points}
-        outcomes: dict[PointKind, Outcome] = {}
+        blocks = list(self.blocks())
+        weights = [sum(point.weight for point in points) * len(seeds) for points, seeds in blocks]
+        begun, total = 0.0, sum(weights)
+        pieces: dict[PointKind, list[Outcome]] = {point: [] for point in self.in_order}
         progress(0.0)
-        for (some, seeds), weight in zip(blocks, weights, strict=True):
-            path = folder / f"block-{some.start:04d}-{seeds.start:06d}.npz"
+        for number, ((points, seeds), weight) in enumerate(zip(blocks, weights, strict=True)):
+            path = folder / f"{number:06d}.npz"
             block = _read(path, notice)
             if block is None:
+                after = getattr(points[0], "after", None)
+                learned = pieces[after][0]["q_values"] if after else None
                 part = _part(progress, begun / total, weight / total)
-                block = self._do(points[some], seeds, outcomes, part, threads, arch)
-                files.write_sealed_npz(path, block)
-            for number, point in enumerate(points[some]):
-                pieces[point].append({name: array[number] for name, array in block.items()})
-                if seeds.stop == len(self.seeds):
-                    outcomes[point] = _joined(pieces.pop(point))
+                where = {"threads": threads, "arch": arch}
+                block = points[0].do(points, seeds, learned, part, where)
+                files.write_npz(path, block, compress=False)
+            for place, point in enumerate(points):
+                pieces[point].append({name: array[place] for name, array in block.items()})
             begun += weight
             progress(begun / total)
-        return outcomes
-
-    def _do(
-        self,
-        points: Sequence[Any],
-        seeds: slice,
-        outcomes: Mapping[Any, Outcome],
-        progress: Progress,
-        threads: int | None,
-        arch: str | None,
-    ) -> Outcome:
-        """The outcomes of a block: arrays (points, seeds, ...)."""
-        where = {"threads": threads, "arch": arch}
-        chosen = self.seeds[seeds]
-        if isinstance(points[0], RunPoint):
-            return _run(points, chosen, progress, where)
-        (point,) = points
-        learned = outcomes[point.after]["q_values"] if point.after else None
-        outcome = _live(point, chosen, learned, progress, where)
-        return {name: array[None] for name, array in outcome.items()}
-
-
-def _run(
-    points: Sequence[RunPoint],
-    seeds: tuple[int, ...],
-    progress: Progress,
-    where: dict[str, Any],
-) -> Outcome:
-    from taichi_ants.engines.runs.training import evaluate, train
-
-    first = points[0]
-    configs = [point.training for point in points]
-    trained = train(
-        first.world,
-        configs,
-        seeds,
-        first.episodes,
-        first.max_steps,
-        first.task,
-        **where,
-        progress=progress,
-    )
-    greedy = evaluate(
-        *(first.world, trained.q_values, first.rollouts, seeds, first.max_steps, first.task),
-        **where,
-    )
-    steps = trained.steps.sum(axis=2, dtype=float)
-    return {
-        **{name: files.smallest(getattr(trained, name)) for name in _RUN_ARRAYS},
-        **{f"greedy_{name}": files.smallest(getattr(greedy, name)) for name in _RUN_ARRAYS},
-        "q_values": trained.q_values,
-        "seconds": trained.seconds * steps / steps.sum(),
-    }
-
-
-def _live(
-    point: ColonyPoint,
-    seeds: tuple[int, ...],
-    learned: np.ndarray | None,
-    progress: Progress,
-    where: dict[str, Any],
-) -> Outcome:
-    from taichi_ants.engines.colony.colony import Colony
-
-    options = {"ants": point.ants, "capacity": point.capacity, "start": point.start, **where}
-    share = point.episodes / (point.episodes + point.rollouts)
-    tables: Any = learned
-    if point.episodes:
-        colony = Colony(
-            *(point.world, point.task, point.training, seeds),
-            **options,
-            sharing=point.sharing,
-            q_values=learned,
-        )
-        colony.run(point.episodes, point.ticks, _part(progress, 0.0, share))
-        tables = colony.q_values
-    least = point.training.min_epsilon
-    training = replace(point.training, epsilon=least, epsilon_decay=1.0)
-    others = [seed + EVALUATION_SEEDS for seed in seeds]
-    colony = Colony(
-        *(point.world, point.task, training, others),
-        **options,
-        sharing="fixed",
-        q_values=tables,
-    )
-    episodes = colony.run(point.rollouts, point.ticks, _part(progress, share, 1 - share))
-    outcome = {name: files.smallest(getattr(episodes, name).T) for name in _COLONY_ARRAYS}
-    if point.episodes and point.sharing == "shared":
-        outcome["q_values"] = tables
-    return outcome
+        return {
+            point: {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+            for point, parts in pieces.items()
+        }
 
 
 def _part(progress: Progress, begin: float, share: float) -> Progress:
@@ -388,15 +325,9 @@ def _part(progress: Progress, begin: float, share: float) -> Progress:
     return lambda done: progress(begin + share * done)
 
 
-def _pieces(whole: slice, size: int) -> Iterator[slice]:
-    for first in range(whole.start, whole.stop, size):
-        yield slice(first, min(first + size, whole.stop))
-
-
-def _joined(pieces: list[Outcome]) -> Outcome:
-    if len(pieces) == 1:
-        return pieces[0]
-    return {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
+def _pieces(whole: Sequence[Piece], size: int) -> Iterator[Sequence[Piece]]:
+    for first in range(0, len(whole), size):
+        yield whole[first : first + size]
 
 
 def _read(path: Path, notice: Callable[[str], None]) -> Outcome | None:
@@ -404,7 +335,7 @@ def _read(path: Path, notice: Callable[[str], None]) -> Outcome | None:
     if not path.exists():
         return None
     try:
-        return files.read_sealed_npz(path)
+        return files.read_npz(path)
     except AntsError:
         notice(f"{str(path)!r} is damaged, so this part is done again.")
         return None
@@ -426,10 +357,3 @@ def flat(facts: Mapping[str, Any], before: str = "") -> dict[str, Any]:
         inner = isinstance(value, Mapping)
         pairs |= flat(value, f"{before}{name}.") if inner else {f"{before}{name}": value}
     return pairs
-
-
-def available_memory() -> float:
-    """Bytes of memory that this machine has; infinite where the system does not tell."""
-    with suppress(AttributeError, ValueError, OSError):
-        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    return math.inf

@@ -301,4 +301,4 @@ def test_progress_on_a_terminal(kernels, tmp_path):
         timeout=60,
     )
     assert done.returncode == 0
-    assert re.search(r"training.*0 %", done.stdout)
+    assert re.search(r"training.*0%", done.stdout)

@@ -47,7 +47,7 @@ discount = 0.9
 epsilon_decay = 0.99
 
 [vary]
-learning_rate = [0.01, 0.1]
+training.learning_rate = [0.01, 0.1]
 training.epsilon = [0.1, 0.5, 1.0]
 task.rewards.lure = [1, 0]
 """
@@ -79,7 +79,7 @@ epsilon = 0.3
 epsilon_decay = 0.9
 
 [vary]
-half_life = { from = 5, to = 20, times = 2 }
+task.pheromone.half_life = [5, 10, 20]
 """
 
 
@@ -169,7 +169,8 @@ def test_a_finished_sweep_is_shown_and_its_figure_drawn_later(sweep):
 
 
 def test_stopped_and_killed_it_goes_on_to_the_same_results(kernels, tmp_path):
-    long = COLONY.replace("episodes = 2", "episodes = 60").replace("to = 20", "to = 320")
+    long = COLONY.replace("episodes = 2", "episodes = 60")
+    long = long.replace("[5, 10, 20]", "[5, 10, 20, 40, 80, 160, 320]")
     (tmp_path / "long.toml").write_text(long)
     blocks = tmp_path / "out" / "unfinished" / "blocks"
 
@@ -196,31 +197,32 @@ def test_stopped_and_killed_it_goes_on_to_the_same_results(kernels, tmp_path):
 
 
 WRONG = {
-    "kind": ('kind = "runs"', 'kind = "run"', ["kind is 'run'", "runs, colony", "'runs'"]),
+    "kind": ('kind = "runs"', 'kind = "run"', ["kind is 'run'", "runs, colony"]),
     "no kind": ('kind = "runs"', "", ["kind is None", "runs, colony"]),
     "measure": ('"return_last50"', '"return_last"', ["'return_last'", "return_last50"]),
     "no measure": (RUNS[RUNS.index("measures") : RUNS.index("seeds")], "", ["measures is missing"]),
     "unknown": ("lure =", "lures =", ["'task.rewards.lures' is no setting", "task.rewards.lure"]),
     "unknown above": ("episodes =", "episode =", ["'episode' is no setting", "episodes"]),
+    "not in full": ("task.rewards.lure =", "lure =", ["'lure' is no setting", "task.rewards.lure"]),
     "of the other kind": ("rollouts = 3", "ants = 3", ["'ants' is no setting", "known are"]),
     "hyperparameter": ("discount = 0.9", "discount = 0.9\nplanning_steps = 3", ["planning_steps"]),
     "missing": ("discount = 0.9", "", ["training.discount is missing"]),
     "value": ("discount = 0.9", "discount = 1.9", ["discount is 1.9"]),
     "text": ("episodes = 12", 'episodes = "12"', ["episodes is '12'"]),
-    "list": ("discount = 0.9", "discount = [0.9, 1]", ["training.discount is a list", "[vary]"]),
+    "list": ("discount = 0.9", "discount = [0.9, 1]", ["discount is [0.9, 1]"]),
     "twice": ("discount = 0.9", "discount = 0.9\nepsilon = 0.1", ["training.epsilon stands among"]),
     "empty": ("[1, 0]", "[]", ["task.rewards.lure is an empty list"]),
-    "range": ("[1, 0]", "{ from = 1, to = 5 }", ["the range of task.rewards.lure", "by = 10"]),
-    "endless": ("[1, 0]", "{ from = 1, to = 5, by = 0 }", ["does not come to an end"]),
-    "large": ("[1, 0]", "{ from = 1, to = 9000, by = 1 }", ["points; make it 10000 or fewer"]),
-    "seeds": ("seeds = [7, 2, 5]", "seeds = 0", ["seeds is 0", "number"]),
+    "seeds": ("seeds = [7, 2, 5]", "seeds = 0", ["seeds is 0", "or a list of seeds"]),
     "seed twice": ("[7, 2, 5]", "[7, 7]", ["seeds holds 7 more than once"]),
     "world": ("[task]", '[world]\npreset = "mars"\n[task]', ["'mars'", "open, paper"]),
-    "world's": ("[task]", "[world]\nranges = [9, 9, 9]\n[task]", ["'world.ranges' is no setting"]),
+    "world's": ("[task]", "[world]\nranges = [9, 9, 9]\n[task]", ["ranges is no setting of the"]),
     "per seed": ("[task]", "[world]\nper_seed = true\n[task]", ["per_seed", "colonies only"]),
+    "per seed?": ("[task]", "[world]\nper_seed = 1\n[task]", ["per_seed is 1", "True or False"]),
     "observation": ("[task]", '[task]\nobservation = "all"', ["'all'", "paper"]),
     "learner": ('"sarsa"', '"salsa"', ["'salsa'", "sarsa"]),
-    "for colonies": ("[vary]", "[vary]\nregrowth = [1]", ["use a Colony"]),
+    "for colonies": ("[vary]", "[vary]\ntask.life.regrowth = [1]", ["use a Colony"]),
+    "against": ("[task]", "[against]\ntask.rewards.lure = 7\n[task]", ["against is", "in [vary]"]),
+    "margin": ("seeds =", "margin = -1\nseeds =", ["margin is -1"]),
     "no toml": ("[vary]", "[vary", ["is no TOML", "mend the file"]),
     "nothing varies": (RUNS[RUNS.index("[vary]") :], "", ["[vary] is missing"]),
 }
@@ -255,12 +257,12 @@ def test_several_grids_are_joined(tmp_path):
     """Learners with hyperparameters of their own, and what belongs together."""
     grids = """
 [[vary]]
-learner = "q_learning"
-learning_rate = [0.1, 0.2]
+training.learner = "q_learning"
+training.learning_rate = [0.1, 0.2]
 [[vary]]
-learner = "dyna_q"
-learning_rate = 0.1
-planning_steps = { from = 2, to = 6, by = 2 }
+training.learner = "dyna_q"
+training.learning_rate = 0.1
+training.planning_steps = [2, 4, 6]
 """
     head = RUNS[: RUNS.index("[vary]")].replace('learner = "sarsa"', "epsilon = 0.3")
     settings = settings_of(head + grids, tmp_path)
@@ -271,14 +273,61 @@ planning_steps = { from = 2, to = 6, by = 2 }
     ]
 
 
-def test_ranges_end_where_they_say(tmp_path):
-    def drawn(text):
-        found = settings_of(RUNS.replace("[0.1, 0.5, 1.0]", text), tmp_path)
-        return list(dict.fromkeys(one["training.epsilon"] for one in found))
+def test_each_grid_has_a_figure(sweep):
+    grids = "[[vary]]\ntask.rewards.lure = [1, 0]\n[[vary]]\ntask.rewards.failed = [-1, 0]\n"
+    text = RUNS[: RUNS.index("[vary]")] + "learning_rate = 0.1\nepsilon = 0.3\n" + grids
+    assert sweep(text)[0] == 0
+    figures = Path("results/sweep-my/figures").iterdir()
+    assert {path.name for path in figures} == {"return_last50-1.png", "return_last50-2.png"}
 
-    assert drawn("{ from = 0.1, to = 0.7, by = 0.2 }") == [0.1, 0.3, 0.5, 0.7]
-    assert drawn("{ from = 0.01, to = 1, times = 10 }") == [0.01, 0.1, 1.0]
-    assert drawn("{ from = 0, to = 1, by = 1 }") == [0, 1]
+
+def test_findings_compare_with_the_value_against_which_all_are_held(sweep):
+    against = "margin = 1000\nagainst.training.epsilon = 0.5\n[task]"
+    status, out, _ = sweep(RUNS.replace("[task]", against), "--no-figures")
+    assert status == 0
+    assert "return_last50 against epsilon 0.5" in out
+    names = ["training.learning_rate", "training.epsilon", "task.rewards.lure"]
+    rows = read_csv("results/sweep-my/runs.csv")
+
+    def mean(*values):
+        alike = [row for row in rows if tuple(float(row[name]) for name in names) == values]
+        return np.mean([float(row["return_last50"]) for row in alike])
+
+    found = read_csv("results/sweep-my/findings.csv")
+    assert len(found) == 2 * 2 * 2  # two rates, two other epsilons, two lures
+    for line in found:
+        rate, epsilon, lure = (float(line[name]) for name in names)
+        assert epsilon != 0.5
+        expected = mean(rate, epsilon, lure) - mean(rate, 0.5, lure)
+        assert float(line["difference"]) == pytest.approx(expected)
+        assert float(line["low"]) <= expected + 1e-9 <= float(line["high"]) + 2e-9
+        assert line["finding"] == "equal"  # all within the margin
+
+
+@pytest.mark.parametrize(
+    ("shift", "margin", "word"),
+    [(5.0, 1.0, "more"), (-5.0, 1.0, "less"), (0.0, 9.0, "equal"), (0.0, 0.0, "undecided")],
+)
+def test_what_findings_say(shift, margin, word, tmp_path):
+    (tmp_path / "a.toml").write_text(
+        RUNS.replace("[task]", f"margin = {margin}\nagainst.task.rewards.lure = 0\n[task]")
+        .replace("[0.01, 0.1]", "0.1")
+        .replace("[0.1, 0.5, 1.0]", "0.1")
+        .replace("[7, 2, 5]", "20")
+    )
+    asked = read_sweep(tmp_path / "a.toml", NAMES)
+    noise = np.random.default_rng(0).normal(size=(2, 20))
+    noise -= noise.mean(axis=1, keepdims=True)
+    found = load("sweep").findings(asked, noise + [[shift], [0.0]])
+    assert [(p, one["finding"]) for p, one in found.items()] == [(0, word)]
+
+
+def test_a_learner_that_cannot_share_is_refused_before_the_work(sweep):
+    status, _, err = sweep(COLONY.replace('"sarsa"', '"sarsa_lambda"'))
+    assert status == 2
+    assert_one_sentence(err)
+    assert "'sarsa_lambda' keeps a memory of its own" in err
+    assert not Path("results").exists()
 
 
 def test_a_preset_of_ones_own_and_its_settings_can_be_named(tmp_path, monkeypatch):
@@ -294,7 +343,7 @@ def test_a_preset_of_ones_own_and_its_settings_can_be_named(tmp_path, monkeypatc
     assert {point.world for point in points} == {line(0, 4), line(0, 6)}
 
 
-@pytest.mark.parametrize("name", ["crowds", "learning_rates", "trails"])
+@pytest.mark.parametrize("name", ["crowds", "learning_rates", "observations", "trails"])
 def test_the_examples_can_be_read(name):
     assert len(read_sweep(EXPERIMENTS / "sweeps" / f"{name}.toml", NAMES).settings) > 4
 

@@ -228,9 +228,9 @@ def test_metadata_nested_beyond_reason_is_damaged(tmp_path: Path, deep: str) -> 
 @pytest.mark.parametrize(
     ("path", "q_values", "metadata", "message"),
     [
-        (1, random_policy(), {}, "the path is 1; it must be the name of a file"),
-        (None, random_policy(), {}, "the path is None"),
-        (b"p.npz", random_policy(), {}, "the path is b'p.npz'"),
+        (1, random_policy(), {}, "path is 1; it must be text or a path"),
+        (None, random_policy(), {}, "path is None"),
+        (b"p.npz", random_policy(), {}, "path is b'p.npz'"),
         ("p.npz", [[1, 2], [3]], {}, "q_values is no array"),
         ("p.npz", None, {}, "q_values has the type object"),
         ("p.npz", random_policy(), None, "metadata is None; it must be a mapping"),
@@ -248,7 +248,7 @@ def test_what_cannot_be_a_policy_file(
 
 def test_a_number_is_no_file_and_nothing_is_closed(capfd: pytest.CaptureFixture) -> None:
     for number in (0, 1, 2):
-        with pytest.raises(AntsError, match=f"the path is {number}"):
+        with pytest.raises(AntsError, match=f"path is {number}"):
             load_policy(number)
     print("still open", flush=True)
     assert capfd.readouterr().out == "still open\n"

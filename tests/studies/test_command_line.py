@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import signal
 import sys
-import threading
 
 import pytest
 
@@ -43,7 +42,7 @@ def refused(parser, arguments, capsys):
 
 
 def test_values_and_defaults(parser):
-    arguments = ["--size", "9", "--seed", "-4", "--count", "2", "--rates", "1", "2,3", "--loud"]
+    arguments = ["--size", "9", "--seed", "-4", "--count", "2", "--rates", "1", "2", "3", "--loud"]
     parsed = vars(parser.parse_args(arguments))
     assert parsed == {
         **{"size": 9, "seed": -4, "count": 2, "rates": (1.0, 2.0, 3.0), "names": ("a",)},
@@ -56,18 +55,14 @@ def test_values_and_defaults(parser):
     }
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        (["a,b"], ("a", "b")),
-        (["a", "b"], ("a", "b")),
-        (["b,", ",a"], ("b", "a")),
-        (["b", "a", "b"], ("b", "a")),
-        (["a b"], ("a b",)),
-    ],
-)
-def test_lists(text, expected, parser):
-    assert parser.parse_args(["--names", *text]).names == expected
+def test_of_equal_values_the_first_counts(parser):
+    assert parser.parse_args(["--names", "b", "a", "b"]).names == ("b", "a")
+
+
+def test_what_was_given_is_told_even_where_it_is_the_default(parser):
+    settings, given = parser.parse_given(["--size=3", "--rates", "1", "-2", "--loud"])
+    assert given == {"size": "--size", "rates": "--rates", "loud": "--loud"}
+    assert (settings.size, settings.rates, settings.seed) == (3, (1.0, -2.0), 0)
 
 
 @pytest.mark.parametrize(
@@ -75,10 +70,9 @@ def test_lists(text, expected, parser):
     [
         (["--size", "0"], "--size: 0 is not allowed, it must be from 1 to 9"),
         (["--size", "10"], "--size: 10 is not allowed, it must be from 1 to 9"),
-        (["--size", "2.5"], "--size: '2.5' is not a whole number"),
+        (["--size", "2.5"], "--size: invalid whole number value: '2.5'"),
         (["--count", "1"], "--count: 1 is not allowed, it must be at least 2"),
-        (["--rates", "1", "x"], "--rates: 'x' is not a number"),
-        (["--rates", ","], "--rates: the list is empty, give at least one value"),
+        (["--rates", "1", "x"], "--rates: invalid float value: 'x'"),
         (["--names"], "--names: expected at least one argument"),
         (["--siz", "3"], "unrecognized arguments: --siz 3"),
         (["a\nb"], "unrecognized arguments: a b"),
@@ -94,7 +88,7 @@ def test_help_shows_the_defaults_that_say_something(parser, monkeypatch):
     assert "--size SIZE how large (default: 3)" in lines
     assert "--seed SEED the first (default: 0)" in lines
     assert "--count COUNT how many" in lines
-    assert "--rates X [X ...] how fast (default: 0.1 2.0)" in lines
+    assert "--rates X [X ...] how fast (default: (0.1, 2.0))" in lines
     assert "--loud whether" in lines
 
 
@@ -111,22 +105,13 @@ def fail_with(error):
     [
         (AntsError("the world is flat."), 2, "error: the world is flat.\n"),
         (AntsError("one\ntwo."), 2, "error: one two.\n"),
-        (
-            MemoryError(),
-            2,
-            "error: this needs more memory than there is; ask for less at once.\n",
-        ),
+        (MemoryError(), 2, "error: this needs more memory than there is.\n"),
         (KeyboardInterrupt(), 130, "Halted.\n"),
         (BrokenPipeError(32, "Broken pipe"), 0, ""),
         (
             FileNotFoundError(2, "No such file or directory", "x.txt"),
             2,
-            "error: cannot read or write 'x.txt': No such file or directory.\n",
-        ),
-        (
-            OSError(28, "No space left"),
-            2,
-            "error: cannot read or write the output: No space left.\n",
+            "error: [Errno 2] No such file or directory: 'x.txt'.\n",
         ),
     ],
 )
@@ -195,22 +180,6 @@ def test_an_interruption_that_a_library_swallows_is_found_later(capsys):
     assert end.value.code == 0
 
 
-def test_commands_run_in_other_threads_too():
-    """Where Python lets nobody watch signals."""
-    statuses = []
-
-    def work():
-        try:
-            run_command(lambda: None)
-        except SystemExit as end:
-            statuses.append(end.code)
-
-    thread = threading.Thread(target=work)
-    thread.start()
-    thread.join()
-    assert statuses == [0]
-
-
 class Terminal(io.StringIO):
     def isatty(self):
         return True
@@ -227,7 +196,7 @@ def test_progress_is_drawn_on_terminals_only(monkeypatch, capsys):
     with progress_bar("training") as progress:
         progress(0.25)
     assert "training" in terminal.getvalue()
-    assert "25 %" in terminal.getvalue()
+    assert "25%" in terminal.getvalue()
 
 
 def test_plugins_are_executed(tmp_path, monkeypatch):

@@ -5,14 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import signal
 
 import numpy as np
 import pytest
 
-from taichi_ants import files
 from taichi_ants.errors import AntsError
-from taichi_ants.studies.interruption import stoppable
 from taichi_ants.studies.result_folder import ResultFolder
 
 SETTINGS = {"seeds": (0, 1), "rate": np.float32(0.5), "world": {"ranges": [3, 3, 3]}}
@@ -22,9 +19,11 @@ OTHER = {**SETTINGS, "rate": 0.25}
 def finish(path, settings=SETTINGS, names=("table.csv",), text="result", replace=False):
     """Do a whole piece of work."""
     folder = ResultFolder(path, settings)
+    assert replace or not folder.is_finished()
     with folder.work(replace) as (blocks, ready):
-        (blocks / "block").write_text(text)
-        for name in names:
+        (blocks / "0.npz").write_text(text)
+        for name in ("report.txt", *names):
+            (ready / name).parent.mkdir(exist_ok=True)
             (ready / name).write_text(text)
         folder.publish({"made": text})
     return folder
@@ -34,7 +33,7 @@ def interrupted_work(path, settings=SETTINGS, replace=False, block="done"):
     """The work stops after one block, or before it."""
     with ResultFolder(path, settings).work(replace) as (blocks, ready):
         if block:
-            (blocks / "block").write_text(block)
+            (blocks / "0.npz").write_text(block)
         (ready / "half").write_text("half")
         raise KeyboardInterrupt
 
@@ -50,29 +49,29 @@ def names(path):
 
 def test_finished_work(tmp_path):
     path = tmp_path / "a" / "b"
-    assert not ResultFolder(path, SETTINGS).is_finished()
-    finish(path)
-    assert names(path) == ["manifest.json", "table.csv"]
+    folder = finish(path)
+    assert names(path) == ["manifest.json", "report.txt", "table.csv"]
     assert (path / "table.csv").read_text() == "result"
     manifest = json.loads((path / "manifest.json").read_text())
     assert manifest == {
         "made": "result",
-        "files": {"table.csv": {"bytes": 6, "sha256": hashlib.sha256(b"result").hexdigest()}},
+        "files": dict.fromkeys(["report.txt", "table.csv"], hashlib.sha256(b"result").hexdigest()),
         "settings": {"seeds": [0, 1], "rate": 0.5, "world": {"ranges": [3, 3, 3]}},
     }
-    assert ResultFolder(path, SETTINGS).is_finished()
-    assert not ResultFolder(path, OTHER).is_finished()
+    assert folder.is_finished()
 
 
 def test_blocks_survive_what_is_ready_does_not(tmp_path):
     stop_after_a_block(tmp_path / "out")
     assert names(tmp_path / "out") == ["unfinished"]
-    with ResultFolder(tmp_path / "out", SETTINGS).work() as (blocks, ready):
-        assert (blocks / "block").read_text() == "done"
+    folder = ResultFolder(tmp_path / "out", SETTINGS)
+    assert not folder.is_finished()
+    with folder.work() as (blocks, ready):
+        assert (blocks / "0.npz").read_text() == "done"
         assert names(ready) == []
-    assert not ResultFolder(tmp_path / "out", SETTINGS).is_finished()
+    assert not folder.is_finished()
     finish(tmp_path / "out")
-    assert names(tmp_path / "out") == ["manifest.json", "table.csv"]
+    assert names(tmp_path / "out") == ["manifest.json", "report.txt", "table.csv"]
 
 
 @pytest.mark.parametrize("existed", [False, True])
@@ -87,31 +86,19 @@ def test_work_without_a_block_leaves_nothing(existed, tmp_path):
     assert not existed or names(path) == []
 
 
-def test_an_interruption_while_folders_are_made_leaves_nothing(tmp_path, monkeypatch):
-    def interrupt(folder, lock):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(ResultFolder, "_prepare", interrupt)
-    with pytest.raises(KeyboardInterrupt), ResultFolder(tmp_path / "a" / "b", SETTINGS).work():
-        pass
-    assert names(tmp_path) == []
-
-
 def test_results_of_other_settings_are_kept_apart(tmp_path):
     finish(tmp_path)
     with pytest.raises(AntsError, match=r"results of other settings \(rate differ\)"):
-        ResultFolder(tmp_path, OTHER).work().__enter__()
+        ResultFolder(tmp_path, OTHER).is_finished()
     with pytest.raises(AntsError, match=r"\(more, rate, world differ\)"):
-        ResultFolder(tmp_path, {"seeds": [0, 1], "more": 1}).work().__enter__()
-    assert names(tmp_path) == ["manifest.json", "table.csv"]
-    assert ResultFolder(tmp_path, SETTINGS).is_finished()
+        ResultFolder(tmp_path, {"seeds": [0, 1], "more": 1}).is_finished()
 
 
 def test_unfinished_work_of_other_settings_is_kept_apart(tmp_path):
     stop_after_a_block(tmp_path)
     with pytest.raises(AntsError, match=r"unfinished work of other settings \(rate differ\)"):
-        ResultFolder(tmp_path, OTHER).work().__enter__()
-    assert (tmp_path / "unfinished" / "blocks" / "block").exists()
+        ResultFolder(tmp_path, OTHER).is_finished()
+    assert (tmp_path / "unfinished" / "blocks" / "0.npz").exists()
 
 
 def test_replacing_starts_anew_and_keeps_old_results_until_the_end(tmp_path):
@@ -119,9 +106,9 @@ def test_replacing_starts_anew_and_keeps_old_results_until_the_end(tmp_path):
     (tmp_path / "notes.txt").write_text("mine")
     stop_after_a_block(tmp_path, OTHER, replace=True)
     assert (tmp_path / "table.csv").read_text() == "old"
-    assert not ResultFolder(tmp_path, SETTINGS).is_finished()  # the work on the others is not done
+    assert not ResultFolder(tmp_path, OTHER).is_finished()
     finish(tmp_path, OTHER, text="new")
-    assert names(tmp_path) == ["manifest.json", "notes.txt", "table.csv"]
+    assert names(tmp_path) == ["manifest.json", "notes.txt", "report.txt", "table.csv"]
     assert (tmp_path / "table.csv").read_text() == "new"
     assert ResultFolder(tmp_path, OTHER).is_finished()
 
@@ -133,306 +120,228 @@ def test_replacing_does_not_use_old_blocks(settings, tmp_path):
         assert names(blocks) == []
 
 
-def test_blocks_without_settings_are_not_trusted(tmp_path):
+def test_blocks_without_a_manifest_are_not_trusted(tmp_path):
     """Where a process was killed while it cleaned up, nobody knows whose blocks are left."""
     stop_after_a_block(tmp_path)
-    (tmp_path / "unfinished" / "settings.json").unlink()
+    (tmp_path / "unfinished" / "manifest.json").unlink()
     with ResultFolder(tmp_path, OTHER).work() as (blocks, _):
         assert names(blocks) == []
 
 
-def test_left_overs_of_a_killed_clean_up_do_not_matter(tmp_path):
-    finish(tmp_path)
+def test_what_a_killed_clean_up_has_left_does_not_matter(tmp_path):
+    folder = finish(tmp_path)
     (tmp_path / "unfinished" / "blocks").mkdir(parents=True)
-    assert ResultFolder(tmp_path, SETTINGS).is_finished()
-
-
-def test_an_interrupted_clean_up_does_not_undo_the_work(tmp_path, monkeypatch):
-    def interrupt(folder, **options):
-        raise KeyboardInterrupt
-
-    folder = ResultFolder(tmp_path, SETTINGS)
-    with folder.work() as (blocks, ready):
-        (blocks / "block").write_text("done")
-        (ready / "table.csv").write_text("result")
-        monkeypatch.setattr("shutil.rmtree", interrupt)
-        with pytest.raises(KeyboardInterrupt):
-            folder.publish({})
-        monkeypatch.undo()
     assert folder.is_finished()
 
 
+@pytest.mark.parametrize("moment", ["pathlib.Path.replace", "os.replace", "shutil.rmtree"])
+def test_a_kill_while_results_move_up_loses_nothing(moment, tmp_path, monkeypatch):
+    finish(tmp_path, names=("table.csv", "old.csv"), text="old")
+
+    def interrupt(*arguments, **options):
+        raise KeyboardInterrupt
+
+    folder = ResultFolder(tmp_path, OTHER)
+    with folder.work(replace=True) as (blocks, ready):
+        (blocks / "0.npz").write_text("done")
+        for name in ("report.txt", "table.csv"):
+            (ready / name).write_text("new")
+        monkeypatch.setattr(moment, interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            folder.publish({})
+        monkeypatch.undo()
+    assert folder.is_finished() == (moment == "shutil.rmtree")
+    if not folder.is_finished():
+        assert (tmp_path / "unfinished" / "blocks" / "0.npz").exists()
+        finish(tmp_path, OTHER, text="new")
+    assert "old.csv" not in names(tmp_path)
+    assert (tmp_path / "table.csv").read_text() == "new"
+
+
 @pytest.mark.parametrize("damage", ["", "{", "[]", '{"settings": 3}', "\0"])
-def test_damaged_settings_are_of_no_settings(damage, tmp_path):
-    stop_after_a_block(tmp_path)
-    (tmp_path / "unfinished" / "settings.json").write_text(damage)
-    with pytest.raises(AntsError, match="unfinished work whose settings are damaged"):
-        ResultFolder(tmp_path, SETTINGS).work().__enter__()
-
-
-def test_a_damaged_manifest_is_of_no_settings(tmp_path):
-    finish(tmp_path)
-    (tmp_path / "manifest.json").write_text("{}")
-    assert not ResultFolder(tmp_path, SETTINGS).is_finished()
-    with pytest.raises(AntsError, match="results whose settings are damaged"):
-        ResultFolder(tmp_path, SETTINGS).work().__enter__()
-    finish(tmp_path, replace=True)
-    assert ResultFolder(tmp_path, SETTINGS).is_finished()
+@pytest.mark.parametrize("place", [".", "unfinished"])
+def test_a_damaged_manifest_is_named(place, damage, tmp_path):
+    if place == ".":
+        finish(tmp_path)
+    else:
+        stop_after_a_block(tmp_path)
+    (tmp_path / place / "manifest.json").write_text(damage)
+    folder = ResultFolder(tmp_path, SETTINGS)
+    with pytest.raises(AntsError, match=r"manifest\.json' is damaged, .* another --out"):
+        folder.is_finished()
+    if place == "unfinished":
+        assert finish(tmp_path, replace=True).is_finished()
+        return
+    with pytest.raises(AntsError, match=r"manifest\.json' is damaged"):
+        folder.work(replace=True).__enter__()
+    assert names(tmp_path) == ["manifest.json", "report.txt", "table.csv"]
 
 
 def test_foreign_files_are_not_written_among(tmp_path):
     (tmp_path / "diary.txt").write_text("mine")
     with pytest.raises(AntsError, match=r"no finished results .*--force"):
-        ResultFolder(tmp_path, SETTINGS).work().__enter__()
+        ResultFolder(tmp_path, SETTINGS).is_finished()
     assert names(tmp_path) == ["diary.txt"]
     finish(tmp_path, replace=True)
-    assert names(tmp_path) == ["diary.txt", "manifest.json", "table.csv"]
-
-
-def test_an_empty_folder_can_be_used(tmp_path):
-    finish(tmp_path)
-    assert ResultFolder(tmp_path, SETTINGS).is_finished()
+    assert names(tmp_path) == ["diary.txt", "manifest.json", "report.txt", "table.csv"]
 
 
 def test_one_process_at_a_time(tmp_path):
     with ResultFolder(tmp_path, SETTINGS).work() as (blocks, _):
+        (blocks / "0.npz").write_text("done")
         for replace in (False, True):
             with pytest.raises(AntsError, match="another process"):
                 ResultFolder(tmp_path, SETTINGS).work(replace).__enter__()
-        assert blocks.is_dir()
-        (blocks / "block").write_text("done")
-    assert (tmp_path / "unfinished" / "blocks" / "block").exists()
+    assert (tmp_path / "unfinished" / "blocks" / "0.npz").exists()
     finish(tmp_path)
 
 
-def test_what_is_in_the_way_is_replaced(tmp_path):
-    """A file where a folder goes, a folder where a file goes, links: their targets stay."""
-    target = tmp_path / "target"
-    target.mkdir()
-    (target / "precious").write_text("mine")
-    path = tmp_path / "out"
-    path.mkdir()
-    (path / "figures").write_text("a file")
-    (path / "table.csv").mkdir()
-    (path / "policies").symlink_to(target)
-    folder = ResultFolder(path, SETTINGS)
-    with folder.work(replace=True) as (_, ready):
-        for name in ("figures", "policies"):
-            (ready / name).mkdir()
-            (ready / name / "x").write_text("new")
-        (ready / "table.csv").write_text("new")
-        folder.publish({})
-    assert (path / "figures" / "x").read_text() == (path / "policies" / "x").read_text() == "new"
-    assert (path / "table.csv").read_text() == "new"
-    assert names(target) == ["precious"]
-
-
-def test_only_files_of_the_folder_itself_are_replaced(tmp_path):
-    """A manifest from elsewhere cannot make us remove what lies outside."""
-    finish(tmp_path / "out")
-    (tmp_path / "precious").write_text("mine")
-    manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
-    listed = dict.fromkeys(["../precious", str(tmp_path / "precious"), "..", ".", "table.csv"])
-    (tmp_path / "out" / "manifest.json").write_text(json.dumps({**manifest, "files": listed}))
-    finish(tmp_path / "out", replace=True, names=("new.csv",))
+@pytest.mark.parametrize("text", ["result", "mine"])
+def test_only_files_of_the_folder_itself_are_removed(text, tmp_path):
+    """Whatever a manifest lists, and even if a file outside is the same."""
+    finish(tmp_path / "out", names=("table.csv", "old.csv"))
+    (tmp_path / "precious").write_text("result")
+    (tmp_path / "out" / "old.csv").write_text(text)
+    path = tmp_path / "out" / "manifest.json"
+    manifest = json.loads(path.read_text())
+    digest = manifest["files"]["old.csv"]
+    for name in ("../precious", str(tmp_path / "precious"), "..", "."):
+        manifest["files"][name] = digest
+    path.write_text(json.dumps(manifest))
+    finish(tmp_path / "out", replace=True)
     assert names(tmp_path) == ["out", "precious"]
-    assert names(tmp_path / "out") == ["manifest.json", "new.csv"]
+    kept = ["old.csv"] if text == "mine" else []  # altered, so it is the user's now
+    assert names(tmp_path / "out") == ["manifest.json", *kept, "report.txt", "table.csv"]
 
 
-def test_additions(tmp_path):
-    folder = finish(tmp_path)
-    with folder.addition() as place:
-        (place / "figures").mkdir()
-        (place / "figures" / "one.png").write_text("drawn")
-        assert "figures" not in names(tmp_path)
-    assert names(tmp_path) == ["figures", "manifest.json", "table.csv"]
-    assert folder.is_finished()
-    manifest = json.loads((tmp_path / "manifest.json").read_text())
-    assert set(manifest["files"]) == {"figures/one.png", "table.csv"}
-    assert manifest["made"] == "result"
-    finish(tmp_path, replace=True)  # what was added goes with the results
-    assert names(tmp_path) == ["manifest.json", "table.csv"]
-
-
-def test_what_is_gone_is_noticed(tmp_path):
-    folder = finish(tmp_path, names=("table.csv", "policy.npz"))
-    with folder.addition() as place:
-        (place / "figures").mkdir()
-        for name in ("one.png", "two.png"):
-            (place / "figures" / name).write_text("drawn")
-    folder.check_whole()
-    assert [folder.lacks(name) for name in ("figures", "table.csv", "renders")] == [
-        False,
-        False,
-        True,
-    ]
-    (tmp_path / "figures" / "two.png").unlink()
-    assert folder.lacks("figures")
-    folder.check_whole(apart_from={"figures"})
-    with pytest.raises(
-        AntsError, match=r"figures/two\.png', a part of the results, is gone or empty"
-    ):
-        folder.check_whole()
-    (tmp_path / "policy.npz").write_text("")
-    with pytest.raises(AntsError, match=r"policy\.npz', .* give --force"):
-        folder.check_whole(apart_from={"figures"})
-
-
-ALTERED = {
-    "longer": lambda path: path.write_text("result, improved"),
-    "as long": lambda path: path.write_text("resuLt"),
-    "a folder": lambda path: (path.unlink(), path.mkdir()),
-}
-
-
-@pytest.mark.parametrize("change", ALTERED)
-def test_what_was_altered_is_noticed(change, tmp_path):
-    folder = finish(tmp_path, names=("policy.npz", "table.csv"))
-    folder.check_whole()
-    ALTERED[change](tmp_path / "table.csv")
-    before = names(tmp_path)
-    with pytest.raises(
-        AntsError, match=r"table\.csv', a part of the results, (was altered|is gone)"
-    ):
-        folder.check_whole()
-    assert names(tmp_path) == before
-
-
-def test_a_manifest_that_lists_nothing_is_damaged(tmp_path):
-    folder = finish(tmp_path)
-    manifest = json.loads((tmp_path / "manifest.json").read_text())
-    (tmp_path / "manifest.json").write_text(json.dumps({**manifest, "files": ["table.csv"]}))
-    with pytest.raises(AntsError, match=r"manifest\.json' is damaged; give --force"):
-        folder.check_whole()
-
-
-def add_a_picture(folder, name="one.png"):
-    with folder.addition() as place:
-        (place / "figures").mkdir()
-        (place / "figures" / name).write_text("drawn")
-
-
-def test_files_of_ones_own_among_ours_stay(tmp_path):
-    """In folders of ours, too, and whether pictures are drawn again or all is replaced."""
-    folder = finish(tmp_path)
-    add_a_picture(folder)
-    (tmp_path / "figures" / "mine.png").write_text("mine")
-    add_a_picture(folder, "two.png")
-    assert names(tmp_path / "figures") == ["mine.png", "two.png"]
-    folder.check_whole()
-    finish(tmp_path, replace=True)
-    assert names(tmp_path) == ["figures", "manifest.json", "table.csv"]
-    assert names(tmp_path / "figures") == ["mine.png"]
+def test_an_unfinished_folder_of_ones_own_stays(tmp_path):
+    (tmp_path / "unfinished").mkdir()
+    (tmp_path / "unfinished" / "novel.txt").write_text("mine")
+    finish(tmp_path)
+    assert (tmp_path / "unfinished" / "novel.txt").read_text() == "mine"
 
 
 def test_a_folder_of_ones_own_in_the_way_stays(tmp_path):
     (tmp_path / "table.csv").mkdir()
     (tmp_path / "table.csv" / "mine").write_text("mine")
-    with pytest.raises(AntsError, match=r"cannot write to .*table\.csv': directory not empty"):
+    with pytest.raises(AntsError, match=r"table\.csv' is in the way"):
         finish(tmp_path, replace=True)
     assert (tmp_path / "table.csv" / "mine").exists()
     assert not ResultFolder(tmp_path, SETTINGS).is_finished()
     (tmp_path / "table.csv").rename(tmp_path / "elsewhere")
-    finish(tmp_path)
-    assert ResultFolder(tmp_path, SETTINGS).is_finished()
+    assert finish(tmp_path).is_finished()
 
 
-def test_what_lies_behind_a_link_is_not_ours(tmp_path):
-    folder = finish(tmp_path / "out")
-    add_a_picture(folder)
+@pytest.mark.parametrize("name", ["table.csv", "figures/one.png"])
+def test_a_file_of_ones_own_in_the_way_stays(name, tmp_path):
+    """Even with --force; what was edited of ours is replaced."""
+    mine = tmp_path / name
+    mine.parent.mkdir(exist_ok=True)
+    mine.write_text("mine")
+    with pytest.raises(AntsError, match=rf"{mine.name}' is in the way .* move it away"):
+        finish(tmp_path, names=(name,), replace=True)
+    assert mine.read_text() == "mine"
+    mine.unlink()
+    finish(tmp_path, names=(name,))
+    mine.write_text("edited")
+    finish(tmp_path, names=(name,), text="new", replace=True)
+    assert mine.read_text() == "new"
+
+
+def test_a_picture_of_ones_own_in_the_way_stays(tmp_path):
+    folder = finish(tmp_path)
+    (tmp_path / "figures").mkdir()
+    (tmp_path / "figures" / "one.png").write_text("mine")
+    with pytest.raises(AntsError, match=r"one\.png' is in the way"):
+        folder.show(draw("one.png"))
+    assert (tmp_path / "figures" / "one.png").read_text() == "mine"
+    assert names(tmp_path) == ["figures", "manifest.json", "report.txt", "table.csv"]
+
+
+def test_what_lies_behind_a_link_is_not_removed(tmp_path):
+    finish(tmp_path / "out", names=("figures/one.png",))
     (tmp_path / "out" / "figures").rename(tmp_path / "figures")
     (tmp_path / "out" / "figures").symlink_to(tmp_path / "figures")
     finish(tmp_path / "out", replace=True)
     assert names(tmp_path / "figures") == ["one.png"]
 
 
-def test_what_a_kill_has_left_of_a_clean_up_goes(tmp_path):
+def draw(name, text="drawn"):
+    def one(results, folder):
+        assert (results / "report.txt").exists()
+        (folder / "figures").mkdir()
+        (folder / "figures" / name).write_text(text)
+
+    return {"figures": one}
+
+
+def test_pictures_are_drawn_where_they_are_missing_and_go_with_the_results(tmp_path, capsys):
     folder = finish(tmp_path)
-    (tmp_path / "unfinished" / "blocks").mkdir(parents=True)
-    (tmp_path / "unfinished" / "blocks" / "block").write_text("done")
-    folder.check_whole()
-    assert names(tmp_path) == ["manifest.json", "table.csv"]
+    folder.show({})
+    assert capsys.readouterr().out == "result\n"
+    assert names(tmp_path) == ["manifest.json", "report.txt", "table.csv"]
+    folder.show(draw("one.png"))
+    assert names(tmp_path) == ["figures", "manifest.json", "report.txt", "table.csv"]
+    folder.show(draw("one.png", "drawn again"))  # it is there
+    assert (tmp_path / "figures" / "one.png").read_text() == "drawn"
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    assert set(manifest["files"]) == {"figures/one.png", "report.txt", "table.csv"}
+    assert manifest["made"] == "result"
+    (tmp_path / "figures" / "one.png").unlink()
+    folder.show(draw("one.png", "drawn again"))
+    assert (tmp_path / "figures" / "one.png").read_text() == "drawn again"
+    finish(tmp_path, replace=True)
+    assert names(tmp_path) == ["manifest.json", "report.txt", "table.csv"]
 
 
-def test_what_another_process_adds_is_no_left_over(tmp_path):
-    folder = finish(tmp_path)
-    with folder.addition() as place:
-        folder.check_whole()
-        assert place.is_dir()
-
-
-def test_files_that_a_kill_or_a_full_disk_has_left_half_written_do_not_matter(tmp_path):
-    (tmp_path / ".0123456789abcdef.tmp").write_text("half")
-    finish(tmp_path)
-    assert names(tmp_path) == ["manifest.json", "table.csv"]
-    for theirs in (".0123456789abcdeg.tmp", ".vimrc.tmp"):
-        (tmp_path / "other" / theirs).mkdir(parents=True)
-        with pytest.raises(AntsError, match="no finished results"):
-            ResultFolder(tmp_path / "other", SETTINGS).work().__enter__()
-        (tmp_path / "other" / theirs).rmdir()
-
-
-@pytest.mark.parametrize(
-    ("owner", "name"),
-    [
-        *((files, "check_writable_folder"), (ResultFolder, "_lock")),
-        *((ResultFolder, "_prepare"), (files, "write_json")),
-    ],
-)
-def test_ctrl_c_while_folders_are_made_leaves_nothing(owner, name, tmp_path, monkeypatch):
-    real = getattr(owner, name)
-
-    def interrupted(*arguments):
-        value = real(*arguments)
-        signal.raise_signal(signal.SIGINT)
-        return value
-
-    monkeypatch.setattr(owner, name, interrupted)
-    with (
-        pytest.raises(SystemExit),
-        stoppable(),
-        ResultFolder(tmp_path / "a" / "b", SETTINGS).work(),
-    ):
-        pytest.fail("the work has begun")
-    assert names(tmp_path) == []
-
-
-def test_an_addition_that_was_killed_leaves_nothing_for_ever(tmp_path):
-    folder = finish(tmp_path)
-    left = tmp_path / "unfinished" / "ready" / "figures"
-    left.mkdir(parents=True)
-    (left / "half.png").write_text("half")
-    assert folder.is_finished()
-    with folder.addition() as place:
-        assert list(place.iterdir()) == []
-    assert names(tmp_path) == ["manifest.json", "table.csv"]
-
-
-def test_additions_wait_for_nobody(tmp_path):
-    folder = finish(tmp_path)
-    with folder.addition(), pytest.raises(AntsError, match="another process"):
-        folder.addition().__enter__()
-    assert folder.is_finished()
-
-
-def test_what_fails_beside_an_addition_is_not_taken_for_its_place(tmp_path):
-    with pytest.raises(FileNotFoundError), finish(tmp_path).addition():
-        (tmp_path / "gone.csv").read_text()
-    assert names(tmp_path) == ["manifest.json", "table.csv"]
-
-
-def test_additions_that_fail_leave_nothing(tmp_path):
-    def add_half(folder):
-        with folder.addition() as place:
-            (place / "half").write_text("half")
-            raise KeyboardInterrupt
+def test_pictures_that_are_stopped_leave_nothing(tmp_path):
+    def stopped(results, folder):
+        (folder / "half.png").write_text("half")
+        raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        add_half(finish(tmp_path))
-    assert names(tmp_path) == ["manifest.json", "table.csv"]
+        finish(tmp_path).show({"figures": stopped})
+    assert names(tmp_path) == ["manifest.json", "report.txt", "table.csv"]
 
 
-@pytest.mark.parametrize("place", ["file", "file/below", "/proc/nothing", "a\0b", "x" * 300])
+def test_files_of_ones_own_among_ours_stay(tmp_path):
+    """In folders of ours, too, and whether pictures are drawn again or all is replaced."""
+    folder = finish(tmp_path)
+    folder.show(draw("one.png"))
+    (tmp_path / "figures" / "mine.png").write_text("mine")
+    (tmp_path / "figures" / "one.png").unlink()
+    folder.show(draw("one.png"))
+    assert names(tmp_path / "figures") == ["mine.png", "one.png"]
+    finish(tmp_path, replace=True)
+    assert names(tmp_path / "figures") == ["mine.png"]
+
+
+ALTERED = {
+    "gone": lambda path: path.unlink(),
+    "empty": lambda path: path.write_text(""),
+    "as long": lambda path: path.write_text("resuLt"),
+    "a folder": lambda path: (path.unlink(), path.mkdir()),
+}
+
+
+@pytest.mark.parametrize("change", ALTERED)
+def test_what_was_altered_is_noticed(change, tmp_path, capsys):
+    folder = finish(tmp_path, names=("policy.npz", "figures/one.png"))
+    ALTERED[change](tmp_path / "policy.npz")
+    said = r"policy\.npz', a part of the results, is gone or was altered .* give --force"
+    with pytest.raises(AntsError, match=said):
+        folder.show({})
+    assert capsys.readouterr().out == ""
+
+
+def test_an_altered_picture_is_the_users_business(tmp_path):
+    folder = finish(tmp_path, names=("figures/one.png",))
+    (tmp_path / "figures" / "one.png").write_text("cropped")
+    folder.show(draw("one.png"))
+    assert (tmp_path / "figures" / "one.png").read_text() == "cropped"
+
+
+@pytest.mark.parametrize("place", ["file", "file/below", "/proc/nothing", "a\0b"])
 def test_folders_that_cannot_be_written(place, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").write_text("in the way")
@@ -443,18 +352,17 @@ def test_folders_that_cannot_be_written(place, tmp_path, monkeypatch):
     assert names(tmp_path) == ["file"]
 
 
-def test_errors_of_the_system_while_publishing(tmp_path, monkeypatch):
+def test_a_full_disk_while_publishing_loses_nothing(tmp_path, monkeypatch):
     folder = ResultFolder(tmp_path / "out", SETTINGS)
+
+    def fail(*arguments):
+        raise OSError(28, os.strerror(28))
+
     with folder.work() as (blocks, ready):
-        (blocks / "block").write_text("done")
+        (blocks / "0.npz").write_text("done")
         (ready / "table.csv").write_text("new")
-
-        def fail(*arguments):
-            raise OSError(28, os.strerror(28))
-
         monkeypatch.setattr("pathlib.Path.replace", fail)
-        with pytest.raises(AntsError, match="no space left"):
+        with pytest.raises(OSError, match="No space left"):
             folder.publish({})
-    assert not folder.is_finished()
     monkeypatch.undo()
     finish(tmp_path / "out")

@@ -17,6 +17,7 @@ from taichi_ants.worlds import World, open_world, paper
 
 ABSORBING, CONTINUING = Task(), Task(delivery="continuing")
 SARSA = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.99)
+LAMBDA, N_STEP = (replace(SARSA, learner=name) for name in ("sarsa_lambda", "n_step_sarsa"))
 DYNA = TrainingConfig("dyna_q", 0.1, 0.9, 0.3, 0.99, planning_steps=2)
 KINDS = (
     (ABSORBING, SARSA),
@@ -51,22 +52,22 @@ def same(one, other):
 
 
 def test_blocks_cover_all_runs_once_with_one_task_and_learner_each(study):
-    done = np.zeros((5, 5), int)
+    done = []
     limit = runner._STEPS_OF_A_BLOCK // (6 * 80)
     for points, seeds in study.blocks():
-        assert done[points, seeds].size <= limit
-        assert len({(p.task, p.training.learner) for p in study.in_order[points]}) == 1
-        done[points, seeds] += 1
-    assert (done == 1).all()
+        assert len(points) * len(seeds) <= limit
+        assert len({(p.task, p.training.learner) for p in points}) == 1
+        done += itertools.product(points, seeds)
+    assert sorted(done, key=str) == sorted(itertools.product(POINTS, SEEDS), key=str)
     assert len(list(study.blocks())) == {2: 5 * 3, 11: 4}[limit]
 
 
 def test_blocks_are_limited_in_runs_too():
     short = replace(POINTS[0], episodes=1, max_steps=1, rollouts=1)
     study = Study((short,), tuple(range(9000)))
-    assert max(seeds.stop - seeds.start for _, seeds in study.blocks()) <= 5000
+    assert max(len(seeds) for _, seeds in study.blocks()) <= 5000
     long = replace(POINTS[0], episodes=10**6, max_steps=10**7)
-    assert {seeds.stop - seeds.start for _, seeds in Study((long,), (0, 1)).blocks()} == {1}
+    assert {len(seeds) for _, seeds in Study((long,), (0, 1)).blocks()} == {1}
 
 
 def test_a_study_of_runs_is_training_and_evaluation(study, tmp_path):
@@ -153,8 +154,10 @@ def test_a_study_goes_on_from_any_blocks(kind, study, tmp_path, monkeypatch):
     blocks = sorted(tmp_path.iterdir())
     stamps = {file: file.stat().st_mtime_ns for file in blocks}
     calls = []
-    real = Study._do
-    monkeypatch.setattr(Study, "_do", lambda *given: calls.append(given) or real(*given))
+    owner = type(study.points[0])
+    real = owner.do
+    do = staticmethod(lambda *given: calls.append(given) or real(*given))
+    monkeypatch.setattr(owner, "do", do)
     assert same(study.run(tmp_path), first)
     assert calls == []
     for file in blocks[::2]:
@@ -165,21 +168,18 @@ def test_a_study_goes_on_from_any_blocks(kind, study, tmp_path, monkeypatch):
         assert file.stat().st_mtime_ns == stamps[file]
 
 
+def flip_a_bit(path):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
 DAMAGES = {
     "empty": lambda path: path.write_bytes(b""),
     "cut off": lambda path: path.write_bytes(path.read_bytes()[:-40]),
     "no archive": lambda path: path.write_text("block"),
-    "without a table": lambda path: rewrite(path, "q_values", None),
-    "fewer seeds": lambda path: rewrite(path, "returns", np.zeros((1, 0, 6), int)),
-    "smaller tables": lambda path: rewrite(path, "q_values", np.zeros((1, 2, 64, 5))),
-    "other actions": lambda path: rewrite(path, "q_values", 1 + files.read_npz(path)["q_values"]),
-    "of other seeds": lambda path: path.write_bytes(sorted(path.parent.iterdir())[1].read_bytes()),
+    "one bit": flip_a_bit,
 }
-
-
-def rewrite(path, name, array):
-    arrays = {**files.read_npz(path), name: array}
-    files.write_npz(path, {key: value for key, value in arrays.items() if value is not None})
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
@@ -188,7 +188,7 @@ def test_damaged_blocks_are_done_again(damage, study, tmp_path):
     path, said = sorted(tmp_path.iterdir())[2], []
     DAMAGES[damage](path)
     assert same(study.run(tmp_path, notice=said.append), first)
-    assert files.read_sealed_npz(path)["returns"].size
+    assert files.read_npz(path)["returns"].size
     assert said == [f"{str(path)!r} is damaged, so this part is done again."]
 
 
@@ -235,6 +235,8 @@ def test_bad_points_of_runs_are_named(change, says):
         ({"ticks": 0}, "ticks is 0"),
         ({"rollouts": 0}, "rollouts is 0"),
         ({"after": replace(ALONE, sharing="own")}, "learned into one table"),
+        ({"training": LAMBDA}, "'sarsa_lambda' keeps a memory of its own"),
+        ({"training": N_STEP, "sharing": "own"}, "needs to know the last step of an episode"),
     ],
 )
 def test_bad_points_of_colonies_are_named(change, says):
@@ -254,27 +256,12 @@ def test_bad_points_of_colonies_are_named(change, says):
         ((replace(POINTS[0], world=World((3, 3, 3), (0, 0, 0))),), (0,), "the world has no food"),
         ((ALONE,), (1, 2, 3), "2 worlds for 3 seeds"),
         ((replace(ALONE, ants=4000),), (3, 5), "4000 ants are asked for"),
-        (
-            (replace(POINTS[0], episodes=2 * 10**9),),
-            range(1000),
-            "1 point of up to 2000000000 episodes with 1000 seeds need",
-        ),
     ],
 )
 def test_bad_studies_are_refused_before_any_work(points, seeds, says):
     with pytest.raises(AntsError) as caught:
         Study(tuple(points), tuple(seeds))
     assert says in str(caught.value)
-
-
-def test_memory_bounds_a_study(monkeypatch):
-    monkeypatch.setattr(runner, "available_memory", lambda: 1e6)
-    points = tuple(replace(point, episodes=500) for point in POINTS)
-    Study(points, (0,))
-    with pytest.raises(
-        AntsError, match=r"5 points of up to 500 episodes with 20 seeds need about 0 GB"
-    ):
-        Study(points, tuple(range(20)))
 
 
 def test_settings_tell_all_that_determines_results():
@@ -325,10 +312,8 @@ def test_any_difference_of_worlds_is_told():
     assert world_facts(World(**swapped)) != facts[-1]
 
 
-def test_provenance(tmp_path):
+def test_provenance():
     facts = provenance(["compare.py", "--out", "a b"])
     assert facts["command"] == "compare.py --out 'a b'"
     assert facts["packages"]["taichi"] == "1.7.4"
     assert facts["commit"] == commit()
-    (tmp_path / "x").write_bytes(b"abc")
-    assert files.file_hash(tmp_path / "x").startswith("ba7816bf8f01cfea414140de5dae2223")

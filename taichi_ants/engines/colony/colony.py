@@ -19,7 +19,7 @@ from taichi_ants.errors import AntsError, check_one_of, shown
 from taichi_ants.files import PathLike
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.learners.registry import Learner, Memory
+from taichi_ants.learners.registry import Memory
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, MAX_STEPS, N_ACTIONS, ROW
 from taichi_ants.worlds.starts import Start
@@ -159,7 +159,7 @@ class Colony:
         self._plans_together = False
         self.memory = Memory()
         if self._learner is not None:
-            _check_sharing(self._learner, sharing)
+            checks.check_sharing(self._learner, sharing)
             self._plans_together = sharing == "shared" and self._learner.plans
             if sharing == "own" or self._plans_together:
                 self.memory = padded(self._learner.memory_for(self.training, self.task.n_states))
@@ -266,7 +266,6 @@ class Colony:
         """
         episodes = checks.checked_count("episodes", episodes)
         ticks = checks.checked_count("ticks", ticks, MAX_STEPS)
-        progress = checks.checked_progress(progress)
         outcomes = []
         for episode in range(episodes):
             self.begin_episode()
@@ -470,17 +469,3 @@ class Colony:
             "floats_by_8": memory.floats // 8,  # see the runs' `engine`
             "integers_by_8": memory.integers // 8,
         }
-
-
-def _check_sharing(learner: Learner, sharing: str) -> None:
-    """Refuse a learner that cannot learn in a colony, or not into a table that others share."""
-    if learner.needs_episode_end:
-        raise AntsError(
-            f"learner {learner.name!r} needs to know the last step of an episode, which the ants "
-            "of a colony do not; take another one, or train one ant by train(...)."
-        )
-    if sharing == "shared" and learner.td_error is None:
-        raise AntsError(
-            f"learner {learner.name!r} keeps a memory of its own, so ants cannot share its table; "
-            'take sharing="own".'
-        )

@@ -16,7 +16,6 @@ from taichi_ants.checks import (
     checked_count,
     checked_food,
     checked_max_steps,
-    checked_progress,
     checked_q_values,
     checked_runs_task,
     checked_seeds,
@@ -112,7 +111,6 @@ def continue_training(
     checked_configs(result.configs)
     _check_memory(result)
     episodes = checked_count("episodes", episodes)
-    progress = checked_progress(progress)
     runtime.start(threads, arch)
     state = copy.deepcopy(result.state)
     shape = (len(result.configs), len(result.seeds))
@@ -192,7 +190,6 @@ def evaluate(
     rollouts = checked_count("rollouts", rollouts)
     epsilon = checked_share("epsilon", epsilon)
     max_steps = checked_max_steps(max_steps, task)
-    progress = checked_progress(progress)
     runtime.start(threads, arch)
     flat = tables.reshape(-1, *tables.shape[-2:])
     runs = Runs.following(flat, run_seeds, np.arange(rollouts), epsilon)

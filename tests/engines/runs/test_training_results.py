@@ -128,7 +128,7 @@ def test_foreign_files(tmp_path):
     (tmp_path / "text.npz").write_text("text")
     with pytest.raises(AntsError, match=r"text\.npz' is damaged or not an \.npz file"):
         TrainingResult.load(tmp_path / "text.npz")
-    with pytest.raises(AntsError, match="the path is 1; it must be the name of a file"):
+    with pytest.raises(AntsError, match="path is 1; it must be text or a path"):
         TrainingResult.load(1)
 
 
