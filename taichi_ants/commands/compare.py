@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
     from taichi_ants import World
     from taichi_ants.analysis.paper.comparison import Comparison
-    from taichi_ants.engines.runs.results import LearnerCost
     from taichi_ants.studies.runner import Outcome, RunPoint, Study
     from taichi_ants.task import Task
 
@@ -127,7 +126,6 @@ def points(settings: argparse.Namespace, world: World) -> tuple[RunPoint, ...]:
 def build_study(settings: argparse.Namespace) -> Study[RunPoint]:
     """The work, checked as a whole before any of it is done."""
     from taichi_ants import AntsError, worlds
-    from taichi_ants.analysis.paper.comparison import Row
     from taichi_ants.studies.runner import Study
 
     if settings.plugin:
@@ -136,10 +134,6 @@ def build_study(settings: argparse.Namespace) -> Study[RunPoint]:
         worlds.check_seed_counts(settings.world)
     world = worlds.build(settings.world, settings.world_seed)
     grid = points(settings, world)
-    # The tables find configurations by six digits of their numbers.
-    rows = [Row.of(point.task, point.training) for point in grid]
-    if len({(row.delivery, row.variant, row.hyperparameters.key()) for row in rows}) < len(rows):
-        raise AntsError("two values of a list agree in six digits; leave one of them out.")
     if not world.reachable_foods().any():
         raise AntsError(
             f"no food of the world {settings.world!r} can be reached from the queen; "
@@ -164,29 +158,29 @@ def to_comparison(study: Study[RunPoint], arrays: dict[str, np.ndarray], world: 
     """What the analysis reads: the arrays of `EPISODES`, and the world's name."""
     from taichi_ants.analysis.paper.comparison import Comparison, Row
 
-    task = study.points[0].task
     return Comparison(
         rows=tuple(Row.of(point.task, point.training) for point in study.points),
         seeds=study.seeds,
         **arrays,
         max_steps=study.points[0].max_steps,
-        train_evaporation=task.evaporation_in_training,
-        greedy_evaporation=task.evaporation_in_evaluation,
+        task=study.points[0].task,
         world=world,
     )
 
 
-def costs_of(study: Study[RunPoint], outcomes: dict[RunPoint, Outcome]) -> list[LearnerCost]:
+def costs_of(study: Study[RunPoint], outcomes: dict[RunPoint, Outcome]) -> list[dict[str, Any]]:
     """What each learner's training took."""
-    from taichi_ants.engines.runs.results import LearnerCost
+    from taichi_ants.analysis.paper.comparison import Row
 
-    costs: dict[tuple[str, int], LearnerCost] = {}
+    spent: dict[str, list[float]] = {}
     for point in study.points:
-        key = point.training.learner, point.training.planning_steps
-        known = costs.get(key, LearnerCost(*key, steps=0, seconds=0.0))
-        steps, seconds = (outcomes[point][name].sum(dtype=float) for name in ("steps", "seconds"))
-        costs[key] = LearnerCost(*key, known.steps + int(steps), known.seconds + float(seconds))
-    return list(costs.values())
+        of_learner = spent.setdefault(Row.of(point.task, point.training).variant.label, [0, 0.0])
+        for place, name in enumerate(("steps", "seconds")):
+            of_learner[place] += outcomes[point][name].sum().item()
+    return [
+        {"learner": label, "steps": steps, "nanoseconds_per_step": 1e9 * seconds / steps}
+        for label, (steps, seconds) in spent.items()
+    ]
 
 
 def as_in_training(task: Task) -> Task:
@@ -218,22 +212,20 @@ def write_tables(
 ) -> None:
     """Write all tables and the report."""
     from taichi_ants import files
-    from taichi_ants.analysis.paper import report, summary, table2
     from taichi_ants.analysis.paper.audit import assess, claims_markdown, claims_rows
+    from taichi_ants.analysis.paper.report import report, table2_markdown
+    from taichi_ants.analysis.paper.summary import summarise, summarise_behaviours
+    from taichi_ants.analysis.paper.table2 import table2
     from taichi_ants.studies.result_folder import REPORT
 
-    lines = summary.summarise(comparison)
-    files.write_csv(folder / "summary.csv", lines, summary.SUMMARY_COLUMNS)
-    lines = summary.summarise_behaviours(comparison)
-    files.write_csv(folder / "behaviours.csv", lines, summary.BEHAVIOUR_COLUMNS)
-    table = table2.table2(comparison)
-    files.write_csv(folder / "table2.csv", table, list(table[0]))
-    files.write_text(folder / "table2.md", table2.table2_markdown(table, comparison))
-    findings = assess(comparison)
-    rows = claims_rows(findings)
-    files.write_csv(folder / "claims.csv", rows, list(rows[0]))
-    files.write_text(folder / "claims.md", claims_markdown(findings, comparison.world))
-    text = report.render(comparison, table, findings, baselines, costs)
+    summary, behaviours = summarise(comparison), summarise_behaviours(comparison)
+    lines, audit = table2(comparison, summary), assess(comparison)
+    tables = {"summary": summary, "behaviours": behaviours, "table2": lines}
+    for name, rows in {**tables, "claims": claims_rows(audit)}.items():
+        files.write_csv(folder / f"{name}.csv", rows, list(rows[0]))
+    files.write_text(folder / "table2.md", table2_markdown(comparison, lines))
+    files.write_text(folder / "claims.md", claims_markdown(audit, comparison.world))
+    text = report(comparison, lines, behaviours, audit, baselines, costs)
     files.write_text(folder / REPORT, text)
 
 
@@ -247,20 +239,19 @@ def write_policies(
 
     files.check_writable_folder(folder)
     for row, run in examples(comparison):
-        point = study.points[row]
-        task, config = point.task, point.training
+        point, variant = study.points[row], comparison.rows[row].variant
         behaviour = comparison.behaviours[row, run]
-        depth = f"_p{config.planning_steps}" if config.planning_steps else ""
-        name = f"{task.delivery}_{config.learner}{depth}_{NAMES[behaviour]}"
+        own = "".join(f"_{part}" for part in variant.short)
         metadata = {
-            "task": task.as_dict(),
-            "config": config.as_dict(),
+            "task": point.task.as_dict(),
+            "config": point.training.as_dict(),
             "seed": study.seeds[run],
             "episodes": point.episodes,
             "max_steps": point.max_steps,
             "return_last50": comparison.measure("return_last50")[row, run],
             "behaviour": BEHAVIOURS[behaviour],
         }
+        name = f"{point.task.delivery}_{variant.learner}{own}_{NAMES[behaviour]}"
         save_policy(folder / f"{name}.npz", tables[row, run], metadata)
 
 
@@ -306,7 +297,7 @@ def do_comparison(
         first.task.evaporation_in_evaluation,
     )
     files.write_csv(ready / BASELINES, baselines, BASELINE_COLUMNS)
-    costs = [cost.as_row() for cost in costs_of(study, outcomes)]
+    costs = costs_of(study, outcomes)
     write_tables(ready, comparison, baselines, costs)
     write_policies(ready / POLICIES, study, comparison, q_values)
     return {"cost_per_step": costs}
@@ -348,8 +339,8 @@ def render_policies(study: Study[RunPoint], results: Path, folder: Path) -> None
     """
     from dataclasses import replace
 
-    from taichi_ants import files, load_policy
-    from taichi_ants.analysis.paper.comparison import Variant
+    from taichi_ants import Task, TrainingConfig, files, load_policy
+    from taichi_ants.analysis.paper.comparison import Row
     from taichi_ants.rendering import PAUSE, Episode, frames, save_animation
 
     first, place = study.points[0], files.check_writable_folder(folder / RENDERS)
@@ -357,18 +348,18 @@ def render_policies(study: Study[RunPoint], results: Path, folder: Path) -> None
         paths = sorted((results / POLICIES).glob("*.npz"))
         for done, path in enumerate(paths):
             q_values, metadata = load_policy(path)
-            config = metadata["config"]
-            depth = config["hyperparameters"].get("planning_steps", 0)
+            task = Task.from_dict(metadata["task"])
+            row = Row.of(task, TrainingConfig(**metadata["config"]))
             episode = Episode.play(
                 first.world,
                 q_values,
                 seed=metadata["seed"],
                 max_steps=min(first.max_steps, RENDERED_STEPS),
-                task=as_in_training(first.task),
+                task=as_in_training(task),
             )
             whole = episode.delivered or len(episode.trace) == first.max_steps
             episode = replace(episode, name=metadata["behaviour"], whole=whole)
-            title = f"{Variant(config['learner'], depth).label}, {metadata['task']['delivery']}"
+            title = f"{row.variant.label}, {row.delivery}"
             pictures = frames(episode.moments(), (720, 480), title=title)
             save_animation(place / f"{path.stem}.gif", pictures, pause=PAUSE)
             report_progress((done + 1) / len(paths))

@@ -195,7 +195,6 @@ def do_study(
         {
             "contrast": one.contrast.label,
             "verdict": one.verdict.value,
-            "note": one.note,
             "difference": one.effect,
             "low": one.low,
             "high": one.high,

@@ -29,6 +29,7 @@ from taichi_ants.analysis.paper.quantities import (
     MEAN_OF_ALL,
     Quantity,
     effect_of,
+    effects_of,
     growth,
     minus,
     moderate_exploration,
@@ -40,7 +41,7 @@ from taichi_ants.analysis.paper.quantities import (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Claim:
     """An empirical claim of the paper, made precise.
 
@@ -64,6 +65,11 @@ class Claim:
     def tested_on(self) -> str:
         """What is computed, and why so."""
         return f"{self.quantity.text}; {self.why}" if self.why else self.quantity.text
+
+    @property
+    def centre(self) -> str:
+        """What of the seeds must fulfil the criterion."""
+        return "interquartile mean" if self.quantity.typical else "mean"
 
 
 # What is too small to matter. An episode along the shortest path returns 45 reward in 34 steps:
@@ -230,7 +236,7 @@ CLAIMS: tuple[Claim, ...] = (
           Above(STEPS), of(effect_of("epsilon"), ALL_STEPS, *DYNAS)),
     Claim("epsilon-sarsa-robust", "3.3.1", "SARSA is robust to the exploration schedule.",
           Within(-2.5, 2.5),
-          of(effect_of("epsilon"), RETURN, SARSA) + of(effect_of("epsilon_decay"), RETURN, SARSA),
+          effects_of(RETURN, SARSA, "epsilon", "epsilon_decay"),
           "'robust' is within 2.5 reward, about a twentieth"),
     Claim("discount-q", "3.3.1", "Discount 0.99 raises Q-learning's return.",
           Above(REWARD), of(effect_of("discount"), RETURN, Q_LEARNING)),

@@ -306,7 +306,7 @@ def verdicts(*signs: tuple[int, int, int]) -> dict[tuple[int, int], Finding]:
     contrast = Contrast("", np.zeros(2), Above())
 
     def finding(effect: float, low: float, high: float) -> Finding:
-        return Finding(contrast, *Above().judge(low, high), effect, low, high, 0.95)
+        return Finding(contrast, Above().judge(low, high), effect, low, high, 0.95)
 
     every = {(n, less): finding(0.0, -1.0, 1.0) for n in SIZES for less in SIZES if less < n}
     return every | {(n, less): finding(s, s - 0.5, s + 0.5) for n, less, s in signs}
