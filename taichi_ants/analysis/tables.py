@@ -49,12 +49,6 @@ def sentence(words: str) -> str:
     return words[:1].upper() + words[1:]
 
 
-def table(headers: Sequence[str], lines: Sequence[Sequence[str]], text_columns: int = 1) -> str:
-    """A Markdown table; the first `text_columns` columns to the left, the others to the right."""
-    rule = ["---" if column < text_columns else "---:" for column in range(len(headers))]
-    return "\n".join(f"| {' | '.join(cells)} |" for cells in (headers, rule, *lines)) + "\n"
-
-
 @dataclass(frozen=True)
 class Table:
     """A table of text.
@@ -75,9 +69,15 @@ class Table:
 
     def markdown(self) -> str:
         """Title, table and notes as Markdown, each cell in one line."""
-        lines = [[" ".join(cell.split("\n")) for cell in row] for row in (self.columns, *self.rows)]
+        rule = [
+            "---" if place < self.text_columns else "---:" for place in range(len(self.columns))
+        ]
+        lines = [
+            f"| {' | '.join(' '.join(cell.split()) for cell in cells)} |"
+            for cells in (self.columns, rule, *self.rows)
+        ]
         parts = [f"**{self.title}**\n"] if self.title else []
-        parts += [table(lines[0], lines[1:], self.text_columns)] if self.rows else []
+        parts += ["\n".join(lines) + "\n"] if self.rows else []
         parts += ["  \n".join(self.notes) + "\n"] if self.notes else []  # two blanks break a line
         return "\n".join(parts)
 

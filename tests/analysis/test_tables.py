@@ -12,7 +12,6 @@ from taichi_ants.analysis.tables import (
     number,
     percent,
     plain_text,
-    table,
 )
 from taichi_ants.errors import count
 
@@ -26,7 +25,6 @@ def test_numbers_as_text() -> None:
     assert interval(1.0, math.nan) == "-"
     assert (count(1, "seed"), count(0, "seed")) == ("1 seed", "0 seeds")
     assert (count(1, "delivery"), count(2, "delivery")) == ("1 delivery", "2 deliveries")
-    assert table(["a", "b"], [["x", "1"]]) == "| a | b |\n| --- | ---: |\n| x | 1 |\n"
     assert [figure(x) for x in (0, 7, 7.2, 12.34, 123.4, math.inf)] == [
         *("0", "7", "7.20", "12.3", "123", "-"),
     ]

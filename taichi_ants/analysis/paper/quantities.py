@@ -203,13 +203,11 @@ def share_above(measure: str, first: Variant, second: Variant, below: bool = Fal
 def growth(later: str, earlier: str, *variants: Variant) -> Quantity:
     """One measure minus another of each learner, mean over all configurations."""
 
-    def difference(variant: Variant) -> Effect:
-        values = MEAN_OF_ALL.values
-        return lambda part: values(part, later, variant) - values(part, earlier, variant)
+    def values(part: Slice, _: str, variant: Variant) -> np.ndarray:
+        return MEAN_OF_ALL.values(part, later, variant) - MEAN_OF_ALL.values(part, earlier, variant)
 
-    words = f"{MEASURES[later].words} minus {MEASURES[earlier].words}"
-    effects = {variant.label: difference(variant) for variant in variants}
-    return Quantity(words, MEAN_OF_ALL.words, MEASURES[later].unit, effects)
+    words = f"minus {MEASURES[earlier].words}, {MEAN_OF_ALL.words}"
+    return of(Read(words, values), later, *variants)
 
 
 def rank_correlation(first: str, second: str, variant: Variant) -> Quantity:
