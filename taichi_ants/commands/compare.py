@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from taichi_ants import World
     from taichi_ants.analysis.paper.comparison import Comparison
-    from taichi_ants.studies.runner import Outcome, RunPoint, Study
+    from taichi_ants.studies.runner import RunPoint, Study
     from taichi_ants.task import Task
 
 DELIVERIES = ("continuing", "absorbing")
@@ -167,21 +167,6 @@ def to_comparison(study: Study[RunPoint], arrays: dict[str, np.ndarray], world: 
     )
 
 
-def costs_of(study: Study[RunPoint], outcomes: dict[RunPoint, Outcome]) -> list[dict[str, Any]]:
-    """What each learner's training took."""
-    from taichi_ants.analysis.paper.comparison import Row
-
-    spent: dict[str, list[float]] = {}
-    for point in study.points:
-        of_learner = spent.setdefault(Row.of(point.task, point.training).variant.label, [0, 0.0])
-        for place, name in enumerate(("steps", "seconds")):
-            of_learner[place] += outcomes[point][name].sum().item()
-    return [
-        {"learner": label, "steps": steps, "nanoseconds_per_step": 1e9 * seconds / steps}
-        for label, (steps, seconds) in spent.items()
-    ]
-
-
 def as_in_training(task: Task) -> Task:
     """The task with the evaporation of training in rollouts too."""
     from dataclasses import replace
@@ -206,9 +191,7 @@ def what_policies_do(study: Study[RunPoint], q_values: np.ndarray) -> dict[str, 
     return {name: np.concatenate(parts).reshape(n, seeds) for name, parts in arrays.items()}
 
 
-def write_tables(
-    folder: Path, comparison: Comparison, baselines: list[dict[str, Any]], costs: list[dict]
-) -> None:
+def write_tables(folder: Path, comparison: Comparison, baselines: list[dict[str, Any]]) -> None:
     """Write all tables and the report."""
     from taichi_ants import files
     from taichi_ants.analysis.paper.audit import assess, claims_markdown, claims_rows
@@ -224,7 +207,7 @@ def write_tables(
         files.write_csv(folder / f"{name}.csv", rows, list(rows[0]))
     files.write_text(folder / "table2.md", table2_markdown(comparison, lines))
     files.write_text(folder / "claims.md", claims_markdown(audit, comparison.world))
-    text = report(comparison, lines, behaviours, audit, baselines, costs)
+    text = report(comparison, lines, behaviours, audit, baselines)
     files.write_text(folder / REPORT, text)
 
 
@@ -271,8 +254,8 @@ def compare(settings: argparse.Namespace) -> None:
 
 def do_comparison(
     settings: argparse.Namespace, study: Study[RunPoint], world: str, blocks: Path, ready: Path
-) -> dict[str, Any]:
-    """All but the pictures; what the manifest says of it."""
+) -> None:
+    """All but the pictures."""
     import numpy as np
 
     from taichi_ants import files
@@ -297,10 +280,8 @@ def do_comparison(
         first.task.evaporation_in_evaluation,
     )
     files.write_csv(ready / BASELINES, baselines, BASELINE_COLUMNS)
-    costs = costs_of(study, outcomes)
-    write_tables(ready, comparison, baselines, costs)
+    write_tables(ready, comparison, baselines)
     write_policies(ready / POLICIES, study, comparison, q_values)
-    return {"cost_per_step": costs}
 
 
 def draw_figures(study: Study[RunPoint], world: str, results: Path, folder: Path) -> None:

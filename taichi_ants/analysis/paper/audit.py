@@ -139,20 +139,13 @@ def claims_markdown(audit: Audit, world: str) -> str:
 
 
 _EXPLANATION = """\
-Effects are paired by seed. Claims in reward or steps rest on the typical run: the interquartile \
-mean over seeds (the mean of the middle half), as one run in hundreds that does something else \
-moves the mean. Where the mean gives another verdict, it stands behind. Shares, deliveries and \
-correlations rest on the mean: they are bounded, and the middle half would hide that a quarter \
-fails. Intervals are at {:.3f} % each, those of both readings counted, so that all hold at once \
-with 95 %, as far as an interval of a mean with heavy tails can.
-
-Of claims with several contrasts the weakest is shown. A claim 'above 0' is equivalent if its \
-interval lies within the margin on either side of 0, so that what shall differ differs by less \
-than matters; else supported if it lies above 0, contradicted if it lies below. A claim of a range \
-is supported if the interval lies inside it, contradicted if it lies outside. All others are \
-undecided. Margins are what is too small to matter: one reward is one step on a trail, two steps \
-are what the paper itself calls alike. Not tested is what lacks something: the paper's world, one \
-of the configurations, or 50 episodes (100 where early ones are compared with late ones)."""
+Effects are paired by seed, claims in reward or steps by the typical run: the interquartile mean \
+over seeds. Where the mean gives another verdict, it stands behind. Of claims with several \
+contrasts the weakest is shown. Intervals are at {:.3f} % each: all hold at once with 95 %, as far \
+as an interval of a mean with heavy tails can. docs/statistics.md says what verdicts mean. \
+Margins are what is too small to matter: one reward is one step on a trail, two steps are what the \
+paper itself calls alike. Not tested is what lacks something: the paper's world, a configuration, \
+or 50 episodes (100 where early ones are compared with late ones)."""
 
 
 def _effect(finding: Finding) -> str:

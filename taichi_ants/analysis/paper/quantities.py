@@ -282,15 +282,10 @@ def moderate_exploration(measure: str, variant: Variant) -> Quantity:
 
         return values
 
-    names = {
-        (k, m): f"{epsilon:g} / {decay:g}"
-        for k, epsilon in enumerate(FACTORS["epsilon"])
-        for m, decay in enumerate(FACTORS["epsilon_decay"])
-    }
-    first, *others = names
+    others = {"0.3 / 0.995": (0, 1), "0.5 / 0.99": (1, 0), "0.5 / 0.995": (1, 1)}
     return Quantity(
         f"{MEASURES[measure].words} of {variant.label} by epsilon / decay",
         "mean of 4 matched configurations",
         MEASURES[measure].unit,
-        {f"{names[first]} minus {names[other]}": difference(*other) for other in others},
+        {f"0.3 / 0.99 minus {label}": difference(*place) for label, place in others.items()},
     )

@@ -38,7 +38,6 @@ def report(
     behaviours: Sequence[Mapping],
     audit: Audit,
     baselines: Sequence[Mapping] = (),
-    costs: Sequence[Mapping] = (),
 ) -> str:
     """The report as plain text of at most `WIDTH` columns.
 
@@ -48,7 +47,6 @@ def report(
         behaviours: From `summary.summarise_behaviours`.
         audit: Its claims, from `audit.assess`.
         baselines: Rows of baselines.csv, see `baselines.baseline_rows`.
-        costs: Time per step of learners, each with "learner" and "nanoseconds_per_step".
     """
     blocks = [
         *_heading(comparison),
@@ -56,7 +54,6 @@ def report(
         _greedy(lines),
         _behaviours(lines, behaviours),
         claims_table(audit),
-        _costs(costs),
         _baselines(baselines),
     ]
     return plain_text(blocks, WIDTH)
@@ -118,11 +115,6 @@ def _behaviours(lines: Sequence[Mapping], behaviours: Sequence[Mapping]) -> Tabl
 
 def _same(one: Mapping, other: Mapping, *names: str) -> bool:
     return all(one[name] == other[name] for name in names)
-
-
-def _costs(costs: Sequence[Mapping]) -> Table:
-    rows = [[cost["learner"], number(cost["nanoseconds_per_step"])] for cost in costs]
-    return Table("Cost per step", ("Learner", "Nanoseconds"), rows)
 
 
 def _baselines(baselines: Sequence[Mapping]) -> Table:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import pytest
@@ -39,16 +38,12 @@ BASELINES = [
         "note": "the world is too large",
     },
 ]
-COSTS = [
-    {"learner": "Q-learning", "nanoseconds_per_step": 12.0},
-    {"learner": "SARSA", "nanoseconds_per_step": math.nan},
-]
 
 
 def render(comparison: Comparison) -> str:
     lines = table2(comparison, summarise(comparison), 50)
     behaviours, audit = summarise_behaviours(comparison), assess(comparison, CLAIMS[:3])
-    return report(comparison, lines, behaviours, audit, BASELINES, COSTS)
+    return report(comparison, lines, behaviours, audit, BASELINES)
 
 
 @pytest.fixture(scope="module")
@@ -115,11 +110,9 @@ def test_means_that_far_runs_have_moved_are_marked() -> None:
     assert "Few seeds (10): where one run in a hundred" in render(few)
 
 
-def test_greedy_costs_and_baselines(text: str) -> None:
+def test_greedy_evaluation_and_baselines(text: str) -> None:
     greedy = ["45.0", "45.0", "35.0", "35.0", "1.00"]
     assert row(text, "SARSA", after="Greedy evaluation") == ["SARSA", "continuing", *greedy]
-    assert row(text, "Q-learning", after="Cost per step")[-1] == "12.0"
-    assert row(text, "SARSA", after="Cost per step")[-1] == "-"
     assert row(text, "optimal policy, discount 0.99")[-3:] == ["476.0", "600.0", "-"]
     assert "exact bounds: the world is too large" in text
 
