@@ -191,18 +191,15 @@ def judge(contrasts: Sequence[Contrast]) -> list[Finding]:
         numbers.update(zip(batch, lines, strict=True))
 
     def finding(place: int, typical: bool) -> Finding:
-        contrast = contrasts[place]
+        contrast, by_mean = contrasts[place], finding(place, False) if typical else None
         if contrast.missing:
-            return Finding(contrast, Verdict.NOT_TESTED, np.nan, np.nan, np.nan, level)
+            return Finding(contrast, Verdict.NOT_TESTED, np.nan, np.nan, np.nan, level, by_mean)
         effect, *ends = numbers[place, typical]
         low, high = np.clip(ends, *contrast.possible).tolist()
-        return Finding(contrast, contrast.criterion.judge(low, high), effect, low, high, level)
+        verdict = contrast.criterion.judge(low, high)
+        return Finding(contrast, verdict, effect, low, high, level, by_mean)
 
-    found = [finding(place, contrast.typical) for place, contrast in enumerate(contrasts)]
-    return [
-        replace(one, by_mean=finding(place, False)) if one.contrast.typical else one
-        for place, one in enumerate(found)
-    ]
+    return [finding(place, contrast.typical) for place, contrast in enumerate(contrasts)]
 
 
 def weakest(findings: Sequence[Finding]) -> Finding:

@@ -56,15 +56,10 @@ def resampling_counts(n: int, resamples: int = RESAMPLES, iqm: bool = False) -> 
 
 
 def interquartile_mean(values: np.ndarray) -> np.ndarray:
-    """Mean over seeds without the lowest and the highest quarter of a row.
+    """Mean of (rows, seeds) over seeds without the lowest and the highest quarter, float64 (rows,).
 
     A quarter of n seeds is rounded down, as in rliable; so of fewer than four seeds it is the mean.
-
-    Args:
-        values: Float (rows, seeds).
-
-    Returns:
-        Float64 (rows,); nan for rows with a nan.
+    Rows with a nan give nan.
     """
     ordered = np.sort(np.asarray(values, float), axis=1)
     cut = ordered.shape[1] // 4
@@ -76,13 +71,7 @@ def interquartile_values(values: np.ndarray) -> np.ndarray:
     """Values whose mean over seeds is the interquartile mean, and whose spread is the spread of it.
 
     They are the winsorised values (what lies beyond the middle half is moved to its ends) around
-    the IQM, stretched by what the trimming takes away.
-
-    Args:
-        values: Float (rows, seeds).
-
-    Returns:
-        Float64 (rows, seeds), seeds in their order.
+    the IQM, stretched by what the trimming takes away; float64 (rows, seeds), as the values.
     """
     values = np.asarray(values, float)
     ordered, cut = np.sort(values, axis=1), values.shape[1] // 4
@@ -95,15 +84,10 @@ def interquartile_values(values: np.ndarray) -> np.ndarray:
 
 
 def centres(values: np.ndarray, typical: bool = True) -> dict[str, np.ndarray]:
-    """Columns of a table: the mean with its 95 % interval, and the IQM with its own if `typical`.
+    """Columns of a table, float64 (rows,) each: centres of values (rows, seeds) with intervals.
 
-    Args:
-        values: Float (rows, seeds).
-        typical: Whether the IQM makes sense; of shares and counts it does not.
-
-    Returns:
-        "mean", "ci_low" and "ci_high", then "iqm", "iqm_ci_low" and "iqm_ci_high", float64
-        (rows,) each.
+    "mean", "ci_low" and "ci_high", then "iqm", "iqm_ci_low" and "iqm_ci_high" if there is a typical
+    run; of shares and counts there is none.
     """
     values = np.asarray(values, float)
     columns = {"mean": values.mean(axis=1)}
@@ -159,9 +143,9 @@ def student_interval(
     rows, n = values.shape
     if n < 2:
         return np.full(rows, np.nan), np.full(rows, np.nan)
-    kept = n - 2 * (n // 4) if iqm else n
+    kept = n
     if iqm:
-        values = interquartile_values(values)
+        kept, values = n - 2 * (n // 4), interquartile_values(values)
     half = stdtrit(kept - 1, (1 + level) / 2) * values.std(axis=1, ddof=1) / np.sqrt(n)
     half[all_equal(values)] = 0.0
     mean = values.mean(axis=1)
@@ -203,10 +187,7 @@ def jackknife_values(
 
     Args:
         statistic: Smooth function of means, float (..., k) -> float (k,).
-        values: Float (..., seeds).
-
-    Returns:
-        Float64 (seeds,); nan for one seed.
+        values: Float (..., seeds); of one seed the pseudo-value is nan.
     """
     n = values.shape[-1]
     if n < 2:

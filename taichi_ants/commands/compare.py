@@ -60,21 +60,22 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--delivery", choices=(*DELIVERIES, "both"), default="both", help="what delivery means")
     names = ("q_learning", "sarsa", "dyna_q")
     add("--learners", action=ListAction, default=names, metavar="NAME", help="one or more")
-    lists = {
-        "--learning-rates": (0.001, 0.01),
-        "--discounts": (0.9, 0.99),
-        "--epsilons": (0.3, 0.5),
-        "--epsilon-decays": (0.99, 0.995),
-    }
-    for flag, values in lists.items():
-        add(flag, action=ListAction, item=number, default=values, metavar="X", help="one or more")
+    few: dict[str, Any] = {"action": ListAction, "item": number, "metavar": "X"}
+    few["help"] = "one or more"
+    add("--learning-rates", **few, default=(0.001, 0.01))
+    add("--discounts", **few, default=(0.9, 0.99))
+    add("--epsilons", **few, default=(0.3, 0.5))
+    add("--epsilon-decays", **few, default=(0.99, 0.995))
     several: dict[str, Any] = {"action": ListAction, "item": whole_number(1), "metavar": "N"}
     add("--planning-steps", **several, default=(3, 5), help="one or more, for learners that plan")
     switch: dict[str, Any] = {"choices": ("on", "off"), "metavar": "on|off"}
-    words = "evaporation of trails in training; off in the paper"
-    add("--train-evaporation", default="off", help=words, **switch)
-    words = "evaporation in the greedy evaluation; on in the paper"
-    add("--greedy-evaporation", default="on", help=words, **switch)
+    add("--train-evaporation", **switch, default="off", help="of trails; off in the paper")
+    add(
+        "--greedy-evaporation",
+        **switch,
+        default="on",
+        help="in the greedy evaluation; so the paper",
+    )
     add("--world", default="paper", help="paper, open, or the path of a map file")
     add("--world-seed", type=whole_number(), default=0, metavar="N", help="seed of an open world")
     add_common(parser)

@@ -29,16 +29,10 @@ _PAPER_TASK = Task()
 
 
 class Variant(NamedTuple):
-    """A learner with hyperparameters of its own: what the paper calls an algorithm.
-
-    Attributes:
-        learner: Its registered name.
-        hyperparameters: What it has besides the grid, for example "planning_steps=3"; several are
-            separated by blanks.
-    """
+    """A learner with hyperparameters of its own: what the paper calls an algorithm."""
 
     learner: str
-    hyperparameters: str = ""
+    hyperparameters: str = ""  # as "planning_steps=3"; several are separated by blanks
 
     @property
     def short(self) -> list[str]:

@@ -172,28 +172,16 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Mappin
     return figure
 
 
-def save_all(
-    comparison: Comparison, baselines: Sequence[Mapping], folder: str | Path
-) -> list[Path]:
+def save_all(comparison: Comparison, baselines: Sequence[Mapping], folder: str | Path) -> None:
     """Writes all figures as PNG files into a folder, which is made if needed.
-
-    Returns:
-        The paths written.
 
     Raises:
         AntsError: The folder or a file in it cannot be written.
     """
     folder = check_writable_folder(folder)
-    figures = {
-        "learning_curves": learning_curves(comparison, baselines),
-        "best_runs": best_runs(comparison),
-        "return_against_deliveries": return_against_deliveries(comparison, baselines),
-    }
-    paths = []
-    for name, figure in figures.items():
-        paths.append(folder / f"{name}.png")
-        save(figure, paths[-1])
-    return paths
+    save(learning_curves(comparison, baselines), folder / "learning_curves.png")
+    save(best_runs(comparison), folder / "best_runs.png")
+    save(return_against_deliveries(comparison, baselines), folder / "return_against_deliveries.png")
 
 
 def _colours(comparison: Comparison) -> dict[Variant, str]:

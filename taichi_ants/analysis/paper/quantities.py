@@ -22,6 +22,7 @@ from taichi_ants.analysis.paper.measures import MEASURES, WINDOW
 from taichi_ants.analysis.paper.published import FACTORS, FIGURE_1, GRID, TABLE_2, VARIANTS
 
 SHARE, DIFFERENCE = (0.0, 1.0), (-1.0, 1.0)
+ALL = f"all {len(GRID)}"
 EVERY_CONFIGURATION = (0, 1, 2, 3)  # the axes of `Slice.grid` without that of the seeds
 
 
@@ -81,10 +82,10 @@ AT_FIGURE_1 = Read(
     lambda part, measure, variant: part.at(measure, variant, FIGURE_1),
 )
 MEAN_OF_ALL = Read(
-    f"mean of all {len(GRID)}", lambda part, *what: part.grid(*what).mean(axis=EVERY_CONFIGURATION)
+    f"mean of {ALL}", lambda part, *what: part.grid(*what).mean(axis=EVERY_CONFIGURATION)
 )
 LEAST_OF_ALL = Read(
-    f"least of all {len(GRID)}", lambda part, *what: part.grid(*what).min(axis=EVERY_CONFIGURATION)
+    f"least of {ALL}", lambda part, *what: part.grid(*what).min(axis=EVERY_CONFIGURATION)
 )
 BEST = Read("best on half of the seeds, measured on the others", Slice.held_out)
 
@@ -99,10 +100,8 @@ def effect_of(factor: str, sign: int = 1) -> Read:
 
 
 def _epsilon_at_table_2(part: Slice, measure: str, variant: Variant) -> np.ndarray:
-    point = TABLE_2[variant].point
-    low, high = (
-        part.at(measure, variant, point._replace(epsilon=epsilon)) for epsilon in FACTORS["epsilon"]
-    )
+    points = (TABLE_2[variant].point._replace(epsilon=epsilon) for epsilon in FACTORS["epsilon"])
+    low, high = (part.at(measure, variant, point) for point in points)
     return high - low
 
 
@@ -170,7 +169,7 @@ def effects_of(measure: str, variant: Variant, *factors: str) -> Quantity:
     """The effect of each hyperparameter on the measure of a learner."""
     reads = map(effect_of, factors)
     effects = {f"{variant.label}, {one.words}": _reader(one, measure, variant) for one in reads}
-    return _quantity(f"all {len(GRID)}", measure, effects)
+    return _quantity(ALL, measure, effects)
 
 
 def _reader(read: Read, measure: str, variant: Variant) -> Effect:
@@ -197,7 +196,7 @@ def share_above(measure: str, first: Variant, second: Variant, below: bool = Fal
 
     label = f"{first.label} {'below' if below else 'above'} {second.label}"
     words = f"{MEASURES[measure].words}, in which share of 16 matched configurations of a seed"
-    return Quantity(words, f"all {len(GRID)}", "share of 16 pairs", {label: share}, SHARE)
+    return Quantity(words, ALL, "share of 16 pairs", {label: share}, SHARE)
 
 
 def growth(later: str, earlier: str, *variants: Variant) -> Quantity:
@@ -226,7 +225,7 @@ def rank_correlation(first: str, second: str, variant: Variant) -> Quantity:
 
     words = f"rank correlation of {MEASURES[first].words} and {MEASURES[second].words} of a seed"
     effects: dict[str, Effect] = {variant.label: correlation}
-    return Quantity(words, f"all {len(GRID)}", "correlation", effects, DIFFERENCE)
+    return Quantity(words, ALL, "correlation", effects, DIFFERENCE)
 
 
 def stronger(measure: str, factor: str) -> Quantity:
@@ -241,7 +240,7 @@ def stronger(measure: str, factor: str) -> Quantity:
     others = [other for other in FACTORS if other != factor]
     return Quantity(
         f"{MEASURES[measure].words}, absolute effect of a hyperparameter, mean of the learners",
-        f"all {len(GRID)}",
+        ALL,
         MEASURES[measure].unit,
         {f"{factor} minus {other}".replace("_", " "): effects(other) for other in others},
         of_centres=lambda centres: _first_minus_second(np.abs(centres), np.mean),
@@ -259,7 +258,7 @@ def more_dependent(measure: str, factor: str, *pairs: tuple[Variant, Variant]) -
     return Quantity(
         f"{MEASURES[measure].words}, standard deviation of the effect of {factor} over 8 pairs of "
         "configurations (jackknife over seeds)",
-        f"all {len(GRID)}",
+        ALL,
         MEASURES[measure].unit,
         {f"{one.label} minus {other.label}": effects(one, other) for one, other in pairs},
         of_centres=lambda centres: _first_minus_second(centres, partial(np.std, ddof=1)),
