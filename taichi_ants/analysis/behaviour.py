@@ -8,19 +8,17 @@ mean that means anything, so that runs are counted by what they do.
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from taichi_ants.task.constants import N_STATES, RIGHT, SEES_LURE
 
+if TYPE_CHECKING:
+    from taichi_ants.engines.runs.traces import Trace
+
 # What an ant does is a number, its place in this list.
-BEHAVIOURS: tuple[str, ...] = (
-    "delivers",
-    "walks the trail",
-    "circles with food",
-    "other",
-)
+BEHAVIOURS: tuple[str, ...] = ("delivers", "walks the trail", "circles with food", "other")
 DELIVERS, WALKS, CIRCLES, OTHER = range(len(BEHAVIOURS))
 
 NAMES: tuple[str, ...] = tuple(name.replace(" ", "_") for name in BEHAVIOURS)  # of columns, files
@@ -34,32 +32,8 @@ DEFINITIONS: tuple[str, ...] = (
 )
 _PAID_SHARE = 0.25
 
-# What to say of means over runs that are not alike.
-MIXED = "the runs do different things, and no run has their mean"
 
-
-class Steps(Protocol):
-    """Steps of one or more episodes in order, as `taichi_ants.rollout` and `trace_policies` give.
-
-    Arrays (n,): the number of the episode, the step in it, the percept before the action, the
-    action, the reward, whether the step delivered.
-    """
-
-    @property
-    def episodes(self) -> np.ndarray: ...
-    @property
-    def steps(self) -> np.ndarray: ...
-    @property
-    def percepts(self) -> np.ndarray: ...
-    @property
-    def actions(self) -> np.ndarray: ...
-    @property
-    def rewards(self) -> np.ndarray: ...
-    @property
-    def delivered(self) -> np.ndarray: ...
-
-
-def classify(trace: Steps, max_steps: int) -> tuple[np.ndarray, np.ndarray]:
+def classify(trace: Trace, max_steps: int) -> tuple[np.ndarray, np.ndarray]:
     """What the ant does in each episode of a trace, see `DEFINITIONS`, and what it earns.
 
     Rewards play no part in it, so it holds whatever the steps are paid.
@@ -92,14 +66,6 @@ def counts(behaviours: np.ndarray) -> dict[int, int]:
     """How many runs do what, without what nobody does, in the order of `BEHAVIOURS`."""
     number_of = np.bincount(np.ravel(behaviours), minlength=len(BEHAVIOURS)).tolist()
     return {code: number for code, number in enumerate(number_of) if number}
-
-
-def mixture(behaviours: np.ndarray) -> str:
-    """The counts in words where runs do different things, "" where all do the same."""
-    found = counts(behaviours)
-    if len(found) < 2:
-        return ""
-    return ", ".join(f"{BEHAVIOURS[code]} {number}" for code, number in found.items())
 
 
 def _enters_lure(states: np.ndarray, actions: np.ndarray) -> np.ndarray:

@@ -25,7 +25,6 @@ from taichi_ants.analysis.statistics import (
 )
 
 SIMULTANEOUS_LEVEL = 0.95
-WITHIN_MARGIN = "may be within the margin"
 UNBOUNDED = (-np.inf, np.inf)
 
 
@@ -37,11 +36,11 @@ class Verdict(str, Enum):
     is one.
     """
 
+    NOT_TESTED = "not tested"
     CONTRADICTED = "contradicted"
     EQUIVALENT = "equivalent"
     UNDECIDED = "undecided"
     SUPPORTED = "supported"
-    NOT_TESTED = "not tested"
 
 
 @dataclass(frozen=True)
@@ -55,15 +54,13 @@ class Above:
     margin: float = 0.0
     most: float = np.inf
 
-    def judge(self, low: float, high: float) -> tuple[Verdict, str]:
-        """The verdict on an interval, and a note."""
+    def judge(self, low: float, high: float) -> Verdict:
+        """The verdict on an interval."""
         if -self.margin <= low and high <= self.margin:
-            return Verdict.EQUIVALENT, ""
+            return Verdict.EQUIVALENT
         if low > 0 and high <= self.most:
-            return Verdict.SUPPORTED, "" if low > self.margin else WITHIN_MARGIN
-        if high < 0 or low > self.most:
-            return Verdict.CONTRADICTED, "" if high < -self.margin or low > 0 else WITHIN_MARGIN
-        return Verdict.UNDECIDED, ""
+            return Verdict.SUPPORTED
+        return Verdict.CONTRADICTED if high < 0 or low > self.most else Verdict.UNDECIDED
 
     def slack(self, effect: float) -> float:
         """How far an effect is on the criterion's side; the smallest is the weakest."""
@@ -85,13 +82,11 @@ class Within:
     low: float
     high: float
 
-    def judge(self, low: float, high: float) -> tuple[Verdict, str]:
-        """The verdict on an interval, and a note."""
+    def judge(self, low: float, high: float) -> Verdict:
+        """The verdict on an interval."""
         if self.low <= low and high <= self.high:
-            return Verdict.SUPPORTED, ""
-        if high < self.low or low > self.high:
-            return Verdict.CONTRADICTED, ""
-        return Verdict.UNDECIDED, ""
+            return Verdict.SUPPORTED
+        return Verdict.CONTRADICTED if high < self.low or low > self.high else Verdict.UNDECIDED
 
     def slack(self, effect: float) -> float:
         """Distance to the nearer end of the range, negative outside of it."""
@@ -115,7 +110,7 @@ class Contrast:
 
     Attributes:
         label: What is compared, for example "Q-learning minus SARSA".
-        values: Float64 (seeds,); (k, seeds) with `of_centres`.
+        values: Float64 (seeds,); (k, seeds) with `of_centres`. nan where there are none.
         criterion: What the centre over seeds shall fulfil.
         typical: Whether it rests on the typical run, that is on the interquartile mean over seeds.
         possible: The range that the centre cannot leave; its interval is cut off there.
@@ -136,6 +131,11 @@ class Contrast:
         """How many seeds it rests on."""
         return self.values.shape[-1]
 
+    @property
+    def missing(self) -> bool:
+        """Whether there are no values, or some are nan."""
+        return not self.seeds or bool(np.isnan(self.values).any())
+
     def reading(self, typical: bool) -> tuple[np.ndarray, bool]:
         """What is averaged over seeds, float64 (seeds,), and whether by interquartile mean."""
         if self.of_centres is None:
@@ -150,17 +150,15 @@ class Finding:
 
     Attributes:
         contrast: The contrast.
-        verdict: The verdict.
-        note: A word on it, or "".
-        effect: The centre over seeds.
-        low, high: Its interval at the corrected level.
+        verdict: The verdict; not tested if values of the contrast are missing.
+        effect: The centre over seeds; nan if it was not tested.
+        low, high: Its interval at the corrected level; nan for one seed.
         level: Confidence level of that one interval.
         by_mean: What the mean says of a contrast that rests on the typical run, else None.
     """
 
     contrast: Contrast
     verdict: Verdict
-    note: str
     effect: float
     low: float
     high: float
@@ -179,6 +177,7 @@ def judge(contrasts: Sequence[Contrast]) -> list[Finding]:
         (place, typical): contrast.reading(typical)
         for place, contrast in enumerate(contrasts)
         for typical in ((True, False) if contrast.typical else (False,))
+        if not contrast.missing
     }
     level = 1 - (1 - SIMULTANEOUS_LEVEL) / max(1, len(readings))
     numbers: dict[tuple[int, bool], tuple[float, ...]] = {}
@@ -192,15 +191,15 @@ def judge(contrasts: Sequence[Contrast]) -> list[Finding]:
         numbers.update(zip(batch, lines, strict=True))
 
     def finding(place: int, typical: bool) -> Finding:
-        contrast, (effect, *ends) = contrasts[place], numbers[place, typical]
+        contrast, by_mean = contrasts[place], finding(place, False) if typical else None
+        if contrast.missing:
+            return Finding(contrast, Verdict.NOT_TESTED, np.nan, np.nan, np.nan, level, by_mean)
+        effect, *ends = numbers[place, typical]
         low, high = np.clip(ends, *contrast.possible).tolist()
-        return Finding(contrast, *contrast.criterion.judge(low, high), effect, low, high, level)
+        verdict = contrast.criterion.judge(low, high)
+        return Finding(contrast, verdict, effect, low, high, level, by_mean)
 
-    found = [finding(place, contrast.typical) for place, contrast in enumerate(contrasts)]
-    return [
-        replace(one, by_mean=finding(place, False)) if one.contrast.typical else one
-        for place, one in enumerate(found)
-    ]
+    return [finding(place, contrast.typical) for place, contrast in enumerate(contrasts)]
 
 
 def weakest(findings: Sequence[Finding]) -> Finding:
@@ -216,7 +215,5 @@ def _strength(finding: Finding) -> tuple[int, float]:
 
 
 def tally(verdicts: Iterable[Verdict]) -> str:
-    """How many verdicts of each kind there are, as a phrase."""
-    counts = Counter(verdicts)
-    order = sorted(Verdict, key=lambda verdict: verdict is not Verdict.SUPPORTED)
-    return ", ".join(f"{counts[verdict]} {verdict.value}" for verdict in order if counts[verdict])
+    """How many verdicts of each kind there are, as a phrase; the most frequent first."""
+    return ", ".join(f"{n} {verdict.value}" for verdict, n in Counter(verdicts).most_common())

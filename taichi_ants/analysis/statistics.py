@@ -1,31 +1,18 @@
-"""Centres over seeds and their intervals.
+"""Centres over seeds and their intervals: what they are for and cover is in docs/statistics.md.
 
-Two centres, for two questions. The mean answers "what do runs bring on average?", and for shares
-and counts it is the only one that makes sense. Returns and lengths have heavy tails: one run in
-many finds another behaviour and returns ten times as much, so that the mean of 20 seeds says
-whether such a run is among them. The interquartile mean (IQM) answers "what does a typical run
-bring?" (Agarwal et al. 2021, "Deep reinforcement learning at the edge of the statistical
-precipice").
+Two centres: the mean says what runs bring on average, the interquartile mean (IQM) what a typical
+run brings (Agarwal et al. 2021). Each has two intervals:
 
-Each centre has two intervals:
-
-- The bootstrap's. For the mean it is BCa (bias-corrected and accelerated) with the expansion of
-  Hesterberg (2015, "What teachers should know about the bootstrap"): the normal quantile z in the
-  percentile levels is replaced by sqrt(n / (n - 1)) times the t quantile with n - 1 degrees of
-  freedom. For the IQM it is the percentile interval, as in rliable.
-- Student's t. For the IQM it is that of Tukey and McLaughlin (1963, Sankhya A 25): the deviation
-  is that of the winsorised values, the degrees of freedom those of the values that remain (see
-  Yuen 1974, Biometrika 61, and Wilcox, "Introduction to robust estimation").
+- The bootstrap's. For the mean it is BCa with the expansion of Hesterberg (2015): the normal
+  quantile z in the percentile levels is replaced by sqrt(n / (n - 1)) times the t quantile with
+  n - 1 degrees of freedom. For the IQM it is the percentile interval, as in rliable.
+- Student's t. For the IQM it is that of Tukey and McLaughlin (1963): the deviation is that of the
+  winsorised values, the degrees of freedom those of the values that remain.
 
 Tables and figures show the first. Verdicts on claims use the hull of both, at a level corrected
 for their number: far in the tails a bootstrap of few seeds ends at its most extreme resample,
 where the t interval goes on; where ties fill the middle half, the t interval is a point, while
 the bootstrap knows how near the tails are.
-
-What they cover is measured on thousands of training runs, see `docs/statistics.md`. The IQM's
-cover what they say from 10 seeds on. The mean's do where no run is far off; where one in a hundred
-is, a 95 % interval of the mean holds it in as few as two of five cases with 10 to 50 seeds, and in
-seven of ten with 100. No interval knows of events so rare that no seed has met them.
 
 The resampling weights are drawn once per number of seeds from a fixed generator and serve all
 rows, so that results are reproducible.
@@ -69,16 +56,10 @@ def resampling_counts(n: int, resamples: int = RESAMPLES, iqm: bool = False) -> 
 
 
 def interquartile_mean(values: np.ndarray) -> np.ndarray:
-    """Mean over seeds of what remains without the lowest and the highest quarter of a row.
+    """Mean of (rows, seeds) over seeds without the lowest and the highest quarter, float64 (rows,).
 
-    The centre of the typical runs: a few runs far away do not move it. A quarter of n seeds is
-    rounded down, as in rliable; so of fewer than four seeds it is the mean.
-
-    Args:
-        values: Float (rows, seeds).
-
-    Returns:
-        Float64 (rows,); nan for rows with a nan.
+    A quarter of n seeds is rounded down, as in rliable; so of fewer than four seeds it is the mean.
+    Rows with a nan give nan.
     """
     ordered = np.sort(np.asarray(values, float), axis=1)
     cut = ordered.shape[1] // 4
@@ -90,14 +71,7 @@ def interquartile_values(values: np.ndarray) -> np.ndarray:
     """Values whose mean over seeds is the interquartile mean, and whose spread is the spread of it.
 
     They are the winsorised values (what lies beyond the middle half is moved to its ends) around
-    the IQM, stretched by what the trimming takes away. A smooth statistic of several IQMs has the
-    interval that it has as a statistic of the means of these (see `jackknife_values`).
-
-    Args:
-        values: Float (rows, seeds).
-
-    Returns:
-        Float64 (rows, seeds), seeds in their order.
+    the IQM, stretched by what the trimming takes away; float64 (rows, seeds), as the values.
     """
     values = np.asarray(values, float)
     ordered, cut = np.sort(values, axis=1), values.shape[1] // 4
@@ -110,15 +84,10 @@ def interquartile_values(values: np.ndarray) -> np.ndarray:
 
 
 def centres(values: np.ndarray, typical: bool = True) -> dict[str, np.ndarray]:
-    """Columns of a table: the mean with its 95 % interval, and the IQM with its own if `typical`.
+    """Columns of a table, float64 (rows,) each: centres of values (rows, seeds) with intervals.
 
-    Args:
-        values: Float (rows, seeds).
-        typical: Whether the IQM makes sense; of shares and counts it does not.
-
-    Returns:
-        "mean", "ci_low" and "ci_high", then "iqm", "iqm_ci_low" and "iqm_ci_high", float64
-        (rows,) each.
+    "mean", "ci_low" and "ci_high", then "iqm", "iqm_ci_low" and "iqm_ci_high" if there is a typical
+    run; of shares and counts there is none.
     """
     values = np.asarray(values, float)
     columns = {"mean": values.mean(axis=1)}
@@ -152,14 +121,13 @@ def bootstrap_interval(
     """
     values = np.asarray(values, float)
     rows, n = values.shape
-    low, high = np.full(rows, np.nan), np.full(rows, np.nan)
-    if n < 2:
-        return low, high
-    counts = resampling_counts(n, resamples, iqm)
-    for start in range(0, rows, _BLOCK_ROWS):  # bounds the memory of the resampled means
-        block = slice(start, start + _BLOCK_ROWS)
-        low[block], high[block] = (_percentile if iqm else _bca)(values[block], level, counts)
-    return low, high
+    ends = np.full((rows, 2), np.nan)
+    if n > 1:
+        counts = resampling_counts(n, resamples, iqm)
+        for start in range(0, rows, _BLOCK_ROWS):  # bounds the memory of the resampled means
+            block = slice(start, start + _BLOCK_ROWS)
+            ends[block] = (_percentile if iqm else _bca)(values[block], level, counts)
+    return ends[:, 0], ends[:, 1]
 
 
 def student_interval(
@@ -175,9 +143,9 @@ def student_interval(
     rows, n = values.shape
     if n < 2:
         return np.full(rows, np.nan), np.full(rows, np.nan)
-    kept = n - 2 * (n // 4) if iqm else n
+    kept = n
     if iqm:
-        values = interquartile_values(values)
+        kept, values = n - 2 * (n // 4), interquartile_values(values)
     half = stdtrit(kept - 1, (1 + level) / 2) * values.std(axis=1, ddof=1) / np.sqrt(n)
     half[all_equal(values)] = 0.0
     mean = values.mean(axis=1)
@@ -215,16 +183,11 @@ def jackknife_values(
     """Pseudo-values of a statistic of means over seeds, one for each seed.
 
     Their mean is the statistic with its bias of order 1/n removed, and their spread is that of
-    the statistic; so they can be averaged over seeds like any other effect. Needed where the
-    question is about the means themselves (how unequal are the effects of 8 configurations?), as
-    the noise of single seeds would be taken for the answer.
+    the statistic; so they can be averaged over seeds like any other effect.
 
     Args:
         statistic: Smooth function of means, float (..., k) -> float (k,).
-        values: Float (..., seeds).
-
-    Returns:
-        Float64 (seeds,); nan for one seed.
+        values: Float (..., seeds); of one seed the pseudo-value is nan.
     """
     n = values.shape[-1]
     if n < 2:
@@ -233,7 +196,8 @@ def jackknife_values(
     return n * statistic(total / n) - (n - 1) * statistic((total - values) / (n - 1))
 
 
-def _bca(values: np.ndarray, level: float, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _bca(values: np.ndarray, level: float, counts: np.ndarray) -> np.ndarray:
+    """Expanded BCa interval of the mean, float64 (rows, 2)."""
     from scipy.special import ndtr, ndtri, stdtrit
 
     n = values.shape[1]
@@ -256,24 +220,18 @@ def _bca(values: np.ndarray, level: float, counts: np.ndarray) -> tuple[np.ndarr
     # Past its pole the transformation has run through infinity: the end of the distribution.
     stretched = np.copysign(np.inf, quantile)
     np.divide(quantile, stretch, out=stretched, where=stretch > 0)
-    draws.sort(axis=1)
-    low, high = (mean + _at_level(draws, ndtr(shift + stretched))).T
-    return low, high
+    return mean + _at_level(draws, ndtr(shift + stretched))
 
 
-def _percentile(
-    values: np.ndarray, level: float, counts: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Percentile interval of the IQM; the counts are those of ascending values."""
+def _percentile(values: np.ndarray, level: float, counts: np.ndarray) -> np.ndarray:
+    """Percentile interval of the IQM, float64 (rows, 2); counts are those of ascending values."""
     middle = interquartile_mean(values)[:, None]
     n = values.shape[1]
     draws = _resampled_means(np.sort(values, axis=1) - middle, counts)
     draws *= n / (n - 2 * (n // 4))  # from a sum of the middle half to its mean
     draws[all_equal(values)] = 0.0
-    draws.sort(axis=1)
     levels = np.broadcast_to([(1 - level) / 2, (1 + level) / 2], (len(values), 2))
-    low, high = (middle + _at_level(draws, levels)).T
-    return low, high
+    return middle + _at_level(draws, levels)
 
 
 def _resampled_means(deviations: np.ndarray, counts: np.ndarray) -> np.ndarray:
@@ -287,11 +245,12 @@ def _resampled_means(deviations: np.ndarray, counts: np.ndarray) -> np.ndarray:
     return draws
 
 
-def _at_level(ordered: np.ndarray, levels: np.ndarray) -> np.ndarray:
-    """Quantiles of sorted rows (rows, resamples) at the levels (rows, k), interpolated."""
-    last = ordered.shape[1] - 1
+def _at_level(draws: np.ndarray, levels: np.ndarray) -> np.ndarray:
+    """Quantiles of rows (rows, resamples) at the levels (rows, k), interpolated (Weibull)."""
+    draws.sort(axis=1)
+    last = draws.shape[1] - 1
     place = np.clip(levels * (last + 2) - 1, 0, last)
     left = np.nan_to_num(np.floor(place)).astype(int)
     right = np.minimum(left + 1, last)
-    rows = np.arange(len(ordered))[:, None]
-    return ordered[rows, left] + (place - left) * (ordered[rows, right] - ordered[rows, left])
+    rows = np.arange(len(draws))[:, None]
+    return draws[rows, left] + (place - left) * (draws[rows, right] - draws[rows, left])

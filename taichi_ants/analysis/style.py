@@ -7,11 +7,6 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from taichi_ants.analysis.paper.comparison import Variant
-from taichi_ants.analysis.paper.published import DYNA_P3, DYNA_P5, Q_LEARNING, SARSA
-from taichi_ants.analysis.tables import baseline_name
 from taichi_ants.files import write_atomically
 
 if TYPE_CHECKING:
@@ -28,16 +23,8 @@ DPI = 180
 # deficiency, in this order: two, four or five of them.
 BLUE, ORANGE, RED, WINE, SKY = "#0072B2", "#E69F00", "#CC3311", "#882255", "#56B4E9"
 INK, GREY, PALE = "#222222", "#767676", "#E4E4E4"
-
-_COLOURS = {Q_LEARNING: BLUE, SARSA: ORANGE, DYNA_P3: RED, DYNA_P5: WINE}
-_MARKERS = {Q_LEARNING: "o", SARSA: "s", DYNA_P3: "^", DYNA_P5: "D"}
-# Then those of the paper's learners that are not compared, a green and an olive.
-_MORE_COLOURS = (SKY, "#CC79A7", INK, GREY)
-_LAST_COLOURS = ("#009E73", "#999933")
-_MORE_MARKERS = ("v", "P", "X", "h")
-
-# By their places in `behaviour.BEHAVIOURS`.
-BEHAVIOUR_LOOKS = ((BLUE, "o"), (ORANGE, "^"), (WINE, "s"), (INK, "x"))
+# Of lines, in this order.
+COLOURS = (BLUE, ORANGE, RED, WINE, SKY, "#CC79A7", INK, "#009E73", "#999933", GREY)
 
 _SETTINGS: dict[Any, Any] = {
     "font.size": 9,
@@ -69,23 +56,6 @@ _SETTINGS: dict[Any, Any] = {
 }
 
 
-def looks(variants: Sequence[Variant]) -> dict[Variant, tuple[str, str]]:
-    """Colour and marker of each learner; the paper's have their own, others take turns."""
-    others = [variant for variant in variants if variant not in _COLOURS]
-    free = [colour for variant, colour in _COLOURS.items() if variant not in variants]
-    colours = [*_MORE_COLOURS, *free, *_LAST_COLOURS]
-    chosen = {}
-    for variant in variants:
-        if variant in _COLOURS:
-            chosen[variant] = _COLOURS[variant], _MARKERS[variant]
-        else:
-            turn = others.index(variant)
-            again, place = divmod(turn, len(colours))
-            marker = _MORE_MARKERS[(place + again) % len(_MORE_MARKERS)]
-            chosen[variant] = colours[place], marker
-    return chosen
-
-
 def styled() -> AbstractContextManager:
     """The context in which figures are made and saved."""
     from matplotlib import rc_context
@@ -111,12 +81,14 @@ def frame(figure: Figure, title: str, caption: str, entries: Mapping[str, Artist
         caption: Lines of at most about 120 characters.
         entries: The legend, label -> what to show beside it.
     """
+    widest = max(map(len, entries), default=0)
+    columns = int(WIDTH / (0.6 + 0.068 * widest))  # inches at 9 points
     # The title is the legend's: the layout engine would put a title of the figure on top of it.
     figure.legend(
         entries.values(),
         entries.keys(),
         loc="outside upper left",
-        ncols=_columns(list(entries)),
+        ncols=max(1, min(columns, len(entries))),
         columnspacing=1.6,
         borderpad=0.2,
         title=title,
@@ -124,17 +96,6 @@ def frame(figure: Figure, title: str, caption: str, entries: Mapping[str, Artist
         alignment="left",
     )
     figure.supxlabel(caption, x=0.008, ha="left", fontsize=8, color=GREY)
-
-
-def _columns(labels: Sequence[str]) -> int:
-    """The most columns of a legend that fit into the width of a figure, at least one."""
-    lengths = [len(label) for label in labels]
-    for columns in range(len(labels), 1, -1):
-        # As matplotlib fills them: one after the other, the first ones longer if they must be.
-        longest = [max(column) for column in np.array_split(lengths, columns)]
-        if sum(0.6 + 0.068 * length for length in longest) <= WIDTH:  # inches at 9 points
-            return columns
-    return 1
 
 
 def logarithmic(axis: XAxis | YAxis, steps: Sequence[float]) -> None:
@@ -154,36 +115,6 @@ def legend_entries(axes: Iterable[Axes]) -> dict[str, Artist]:
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
     return entries
-
-
-def in_training(
-    baselines: Iterable[Mapping], columns: Sequence[str]
-) -> dict[str, tuple[float, ...]]:
-    """Where to draw the baselines that were measured as training is.
-
-    Args:
-        baselines: Rows of baselines.csv.
-        columns: Columns that make up a place.
-
-    Returns:
-        Name -> place, rounded to two digits. Baselines at one place share a name.
-    """
-    names: dict[tuple[float, ...], list[str]] = {}
-    for row in baselines:
-        if row["setting"].startswith("training") and None not in (row[name] for name in columns):
-            place = tuple(round(float(row[name]), 2) for name in columns)
-            names.setdefault(place, []).append(baseline_name(row))
-    return {"; ".join(alike): place for place, alike in names.items()}
-
-
-def for_setting(baselines: Iterable[Mapping], setting: str) -> list[Mapping]:
-    """The baselines without the optimal policies where delivery is not the end.
-
-    They are optimal for absorbing delivery only.
-    """
-    return [
-        row for row in baselines if setting == "absorbing" or row["baseline"] != "optimal policy"
-    ]
 
 
 def save(figure: Figure, path: Path) -> None:

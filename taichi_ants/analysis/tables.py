@@ -5,21 +5,13 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from rich.console import Console
+    from rich.table import Table as RichTable
 
 MISSING = "-"
-# Colours of a terminal, of cells that begin with these words.
-_STYLES = {
-    "supported": "green",
-    "contradicted": "red",
-    "equivalent": "cyan",
-    "undecided": "yellow",
-    "not tested": "dim",
-}
 
 
 def number(value: float, digits: int = 1) -> str:
@@ -57,12 +49,6 @@ def sentence(words: str) -> str:
     return words[:1].upper() + words[1:]
 
 
-def table(headers: Sequence[str], lines: Sequence[Sequence[str]], text_columns: int = 1) -> str:
-    """A Markdown table; the first `text_columns` columns to the left, the others to the right."""
-    rule = ["---" if column < text_columns else "---:" for column in range(len(headers))]
-    return "\n".join(f"| {' | '.join(cells)} |" for cells in (headers, rule, *lines)) + "\n"
-
-
 @dataclass(frozen=True)
 class Table:
     """A table of text.
@@ -83,43 +69,28 @@ class Table:
 
     def markdown(self) -> str:
         """Title, table and notes as Markdown, each cell in one line."""
-        lines = [[" ".join(cell.split("\n")) for cell in row] for row in (self.columns, *self.rows)]
+        rule = [
+            "---" if place < self.text_columns else "---:" for place in range(len(self.columns))
+        ]
+        lines = [
+            f"| {' | '.join(' '.join(cell.split()) for cell in cells)} |"
+            for cells in (self.columns, rule, *self.rows)
+        ]
         parts = [f"**{self.title}**\n"] if self.title else []
-        parts += [table(lines[0], lines[1:], self.text_columns)]
+        parts += ["\n".join(lines) + "\n"] if self.rows else []
         parts += ["  \n".join(self.notes) + "\n"] if self.notes else []  # two blanks break a line
         return "\n".join(parts)
 
-    def print(self, console: Console) -> None:
-        """Title, table and notes in a terminal; without rows the notes alone."""
-        from rich.box import SIMPLE_HEAD
-        from rich.table import Table as RichTable
-        from rich.text import Text
-
-        drawn = RichTable(
-            title=self.title,
-            title_justify="left",
-            title_style="bold",
-            box=SIMPLE_HEAD,
-            show_edge=False,
-            padding=0,
-        )
-        for position, header in enumerate(self.columns):
-            left = position < self.text_columns
-            # No name breaks within a word.
-            least = len("Q-learning") if header == "Learner" else None
-            drawn.add_column(
-                header, justify="left" if left else "right", overflow="fold", min_width=least
-            )
-        for row in self.rows:
-            styles = (
-                next((look for word, look in _STYLES.items() if cell.startswith(word)), "")
-                for cell in row
-            )
-            drawn.add_row(*map(Text, row, styles))
-        if self.rows:
-            console.print(drawn)
-        if self.notes:
-            console.print("\n".join(self.notes))
+    def without_empty_columns(self) -> Table:
+        """The table without columns in which no row has anything."""
+        kept = [
+            place
+            for place in range(len(self.columns))
+            if any(row[place] != MISSING for row in self.rows)
+        ]
+        columns = [self.columns[place] for place in kept]
+        rows = [[row[place] for place in kept] for row in self.rows]
+        return replace(self, columns=columns, rows=rows)
 
 
 # A paragraph or a table.
@@ -131,26 +102,47 @@ def markdown(blocks: Sequence[Block]) -> str:
     return "\n".join(one.markdown() if isinstance(one, Table) else f"{one}\n" for one in blocks)
 
 
-def print_blocks(blocks: Sequence[Block], console: Console) -> None:
-    """Print blocks with empty lines between them; a table without rows and notes is left out."""
-    shown = [one for one in blocks if isinstance(one, str) or one.rows or one.notes]
-    for place, block in enumerate(shown):
-        if place:
-            console.print()
-        if isinstance(block, Table):
-            block.print(console)
-        else:
-            console.print(block)
-
-
 def plain_text(blocks: Sequence[Block], width: int) -> str:
-    """Blocks as plain text of at most so many columns."""
+    """Blocks as plain text of at most so many columns, empty lines between them.
+
+    A table without rows shows its notes alone, and nothing without these.
+    """
     from rich.console import Console
 
     text = io.StringIO()
-    options: dict[str, Any] = {"highlight": False, "markup": False, "color_system": None}
-    print_blocks(blocks, Console(file=text, width=width, **options))
-    return "".join(f"{line.rstrip()}\n" for line in text.getvalue().splitlines())
+    console = Console(file=text, width=width, highlight=False, markup=False, color_system=None)
+    for block in blocks:
+        if isinstance(block, str):
+            console.print(block)
+        elif block.rows:
+            console.print(_drawn(block))
+        if isinstance(block, Table) and block.notes:
+            console.print("\n".join(block.notes))
+        if isinstance(block, str) or block.rows or block.notes:
+            console.print()
+    return "".join(f"{line.rstrip()}\n" for line in text.getvalue().rstrip().splitlines())
+
+
+def _drawn(table: Table) -> RichTable:
+    """A table for a terminal."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table as RichTable
+
+    drawn = RichTable(
+        title=table.title,
+        title_justify="left",
+        box=SIMPLE_HEAD,
+        show_edge=False,
+        padding=0,
+    )
+    for position, header in enumerate(table.columns):
+        justify: Literal["left", "right"] = "left" if position < table.text_columns else "right"
+        # No name breaks within a word.
+        least = len("Q-learning") if header == "Learner" else None
+        drawn.add_column(header, justify=justify, overflow="fold", min_width=least)
+    for row in table.rows:
+        drawn.add_row(*row)
+    return drawn
 
 
 def baseline_name(row: Mapping) -> str:

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from taichi_ants import World
     from taichi_ants.analysis.paper.comparison import Comparison
-    from taichi_ants.studies.runner import Outcome, RunPoint, Study
+    from taichi_ants.studies.runner import RunPoint, Study
     from taichi_ants.task import Task
 
 DELIVERIES = ("continuing", "absorbing")
@@ -60,22 +60,22 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--delivery", choices=(*DELIVERIES, "both"), default="both", help="what delivery means")
     names = ("q_learning", "sarsa", "dyna_q")
     add("--learners", action=ListAction, default=names, metavar="NAME", help="one or more")
-    lists = {
-        "--learning-rates": (0.001, 0.01),
-        "--discounts": (0.9, 0.99),
-        "--epsilons": (0.3, 0.5),
-        "--epsilon-decays": (0.99, 0.995),
-    }
-    for flag, values in lists.items():
-        add(flag, action=ListAction, item=number, default=values, metavar="X", help="one or more")
+    few: dict[str, Any] = {"action": ListAction, "item": number, "metavar": "X"}
+    few["help"] = "one or more"
+    add("--learning-rates", **few, default=(0.001, 0.01))
+    add("--discounts", **few, default=(0.9, 0.99))
+    add("--epsilons", **few, default=(0.3, 0.5))
+    add("--epsilon-decays", **few, default=(0.99, 0.995))
     several: dict[str, Any] = {"action": ListAction, "item": whole_number(1), "metavar": "N"}
-    words = "one or more, for learners that plan"
-    add("--planning-steps", **several, default=(3, 5), help=words)
+    add("--planning-steps", **several, default=(3, 5), help="one or more, for learners that plan")
     switch: dict[str, Any] = {"choices": ("on", "off"), "metavar": "on|off"}
-    words = "evaporation of trails in training; off in the paper"
-    add("--train-evaporation", default="off", help=words, **switch)
-    words = "evaporation in the greedy evaluation; on in the paper"
-    add("--greedy-evaporation", default="on", help=words, **switch)
+    add("--train-evaporation", **switch, default="off", help="of trails; off in the paper")
+    add(
+        "--greedy-evaporation",
+        **switch,
+        default="on",
+        help="in the greedy evaluation; so the paper",
+    )
     add("--world", default="paper", help="paper, open, or the path of a map file")
     add("--world-seed", type=whole_number(), default=0, metavar="N", help="seed of an open world")
     add_common(parser)
@@ -126,7 +126,6 @@ def points(settings: argparse.Namespace, world: World) -> tuple[RunPoint, ...]:
 def build_study(settings: argparse.Namespace) -> Study[RunPoint]:
     """The work, checked as a whole before any of it is done."""
     from taichi_ants import AntsError, worlds
-    from taichi_ants.analysis.paper.comparison import Row
     from taichi_ants.studies.runner import Study
 
     if settings.plugin:
@@ -135,10 +134,6 @@ def build_study(settings: argparse.Namespace) -> Study[RunPoint]:
         worlds.check_seed_counts(settings.world)
     world = worlds.build(settings.world, settings.world_seed)
     grid = points(settings, world)
-    # The tables find configurations by six digits of their numbers.
-    rows = [Row.of(point.task, point.training) for point in grid]
-    if len({(row.delivery, row.variant, row.hyperparameters.key()) for row in rows}) < len(rows):
-        raise AntsError("two values of a list agree in six digits; leave one of them out.")
     if not world.reachable_foods().any():
         raise AntsError(
             f"no food of the world {settings.world!r} can be reached from the queen; "
@@ -147,12 +142,12 @@ def build_study(settings: argparse.Namespace) -> Study[RunPoint]:
     return Study(grid, tuple(range(settings.seed, settings.seed + settings.seeds)))
 
 
-def world_name(settings: argparse.Namespace) -> str:
+def world_name(settings: argparse.Namespace, study: Study[RunPoint]) -> str:
     """The world for readers: a registered name with its seed, or the name of a map file."""
     from taichi_ants import worlds
     from taichi_ants.analysis.paper.comparison import PAPER_WORLD
 
-    if worlds.build(settings.world, settings.world_seed) == worlds.paper():
+    if study.points[0].world == worlds.paper():
         return PAPER_WORLD
     if settings.world in worlds.names():
         return f"{settings.world}, world seed {settings.world_seed}"
@@ -163,36 +158,14 @@ def to_comparison(study: Study[RunPoint], arrays: dict[str, np.ndarray], world: 
     """What the analysis reads: the arrays of `EPISODES`, and the world's name."""
     from taichi_ants.analysis.paper.comparison import Comparison, Row
 
-    task = study.points[0].task
     return Comparison(
         rows=tuple(Row.of(point.task, point.training) for point in study.points),
         seeds=study.seeds,
         **arrays,
         max_steps=study.points[0].max_steps,
-        train_evaporation=task.evaporation_in_training,
-        greedy_evaporation=task.evaporation_in_evaluation,
+        task=study.points[0].task,
         world=world,
     )
-
-
-def costs_of(study: Study[RunPoint], outcomes: dict[RunPoint, Outcome]) -> list[dict[str, Any]]:
-    """What each learner's training took."""
-    sums: dict[tuple[str, int], tuple[float, float]] = {}
-    for point in study.points:
-        key = point.training.learner, point.training.planning_steps
-        steps, seconds = sums.get(key, (0.0, 0.0))
-        outcome = outcomes[point]
-        sums[key] = (steps + outcome["steps"].sum(), seconds + outcome["seconds"].sum())
-    return [
-        {
-            "learner": learner,
-            "planning_steps": planning_steps,
-            "steps": int(steps),
-            "seconds": float(seconds),
-            "nanoseconds_per_step": float(seconds * 1e9 / steps) if steps else float("nan"),
-        }
-        for (learner, planning_steps), (steps, seconds) in sums.items()
-    ]
 
 
 def as_in_training(task: Task) -> Task:
@@ -219,27 +192,23 @@ def what_policies_do(study: Study[RunPoint], q_values: np.ndarray) -> dict[str, 
     return {name: np.concatenate(parts).reshape(n, seeds) for name, parts in arrays.items()}
 
 
-def write_tables(
-    folder: Path, comparison: Comparison, baselines: list[dict[str, Any]], costs: list[dict]
-) -> None:
+def write_tables(folder: Path, comparison: Comparison, baselines: list[dict[str, Any]]) -> None:
     """Write all tables and the report."""
     from taichi_ants import files
-    from taichi_ants.analysis.paper import report, summary, table2
     from taichi_ants.analysis.paper.audit import assess, claims_markdown, claims_rows
+    from taichi_ants.analysis.paper.report import report, table2_markdown
+    from taichi_ants.analysis.paper.summary import summarise, summarise_behaviours
+    from taichi_ants.analysis.paper.table2 import table2
     from taichi_ants.studies.result_folder import REPORT
 
-    lines = summary.summarise(comparison)
-    files.write_csv(folder / "summary.csv", lines, summary.SUMMARY_COLUMNS)
-    lines = summary.summarise_behaviours(comparison)
-    files.write_csv(folder / "behaviours.csv", lines, summary.BEHAVIOUR_COLUMNS)
-    table = table2.table2(comparison)
-    files.write_csv(folder / "table2.csv", table, list(table[0]))
-    files.write_text(folder / "table2.md", table2.table2_markdown(table, comparison))
-    findings = assess(comparison)
-    rows = claims_rows(findings)
-    files.write_csv(folder / "claims.csv", rows, list(rows[0]))
-    files.write_text(folder / "claims.md", claims_markdown(findings, comparison.world))
-    text = report.render(comparison, table, findings, baselines, costs)
+    summary, behaviours = summarise(comparison), summarise_behaviours(comparison)
+    lines, audit = table2(comparison, summary), assess(comparison)
+    tables = {"summary": summary, "behaviours": behaviours, "table2": lines}
+    for name, rows in {**tables, "claims": claims_rows(audit)}.items():
+        files.write_csv(folder / f"{name}.csv", rows, list(rows[0]))
+    files.write_text(folder / "table2.md", table2_markdown(comparison, lines))
+    files.write_text(folder / "claims.md", claims_markdown(audit, comparison.world))
+    text = report(comparison, lines, behaviours, audit, baselines)
     files.write_text(folder / REPORT, text)
 
 
@@ -253,20 +222,19 @@ def write_policies(
 
     files.check_writable_folder(folder)
     for row, run in examples(comparison):
-        point = study.points[row]
-        task, config = point.task, point.training
+        point, variant = study.points[row], comparison.rows[row].variant
         behaviour = comparison.behaviours[row, run]
-        depth = f"_p{config.planning_steps}" if config.planning_steps else ""
-        name = f"{task.delivery}_{config.learner}{depth}_{NAMES[behaviour]}"
+        own = "".join(f"_{part}" for part in variant.short)
         metadata = {
-            "task": task.as_dict(),
-            "config": config.as_dict(),
+            "task": point.task.as_dict(),
+            "config": point.training.as_dict(),
             "seed": study.seeds[run],
             "episodes": point.episodes,
             "max_steps": point.max_steps,
             "return_last50": comparison.measure("return_last50")[row, run],
             "behaviour": BEHAVIOURS[behaviour],
         }
+        name = f"{point.task.delivery}_{variant.learner}{own}_{NAMES[behaviour]}"
         save_policy(folder / f"{name}.npz", tables[row, run], metadata)
 
 
@@ -274,7 +242,8 @@ def compare(settings: argparse.Namespace) -> None:
     """Run the comparison, or show the finished one."""
     from taichi_ants.studies.result_folder import work_or_show
 
-    study, world = build_study(settings), world_name(settings)
+    study = build_study(settings)
+    world = world_name(settings, study)
     pictures: dict[str, Any] = {}
     if not settings.no_render:
         pictures[RENDERS] = partial(render_policies, study)
@@ -286,8 +255,8 @@ def compare(settings: argparse.Namespace) -> None:
 
 def do_comparison(
     settings: argparse.Namespace, study: Study[RunPoint], world: str, blocks: Path, ready: Path
-) -> dict[str, Any]:
-    """All but the pictures; what the manifest says of it."""
+) -> None:
+    """All but the pictures."""
     import numpy as np
 
     from taichi_ants import files
@@ -310,29 +279,19 @@ def do_comparison(
         *(ROLLOUTS, settings.discounts, first.max_steps),
     )
     files.write_csv(ready / BASELINES, baselines, BASELINE_COLUMNS)
-    costs = costs_of(study, outcomes)
-    write_tables(ready, comparison, baselines, costs)
+    write_tables(ready, comparison, baselines)
     write_policies(ready / POLICIES, study, comparison, q_values)
-    return {"cost_per_step": costs}
 
 
 def draw_figures(study: Study[RunPoint], world: str, results: Path, folder: Path) -> None:
     """Draw the figures of the comparison in one folder into the folder `figures` of another."""
-    from taichi_ants import AntsError, files
-    from taichi_ants.analysis.bounds.baselines import BASELINE_COLUMNS
+    from taichi_ants import files
     from taichi_ants.analysis.paper.figures import save_all
 
-    try:
-        arrays = {name: one.astype(int) for name, one in files.read_npz(results / EPISODES).items()}
-        comparison = to_comparison(study, arrays, world)
-        with open(results / BASELINES, newline="", encoding="utf-8") as file:
-            lines = csv.DictReader(file)
-            baselines = [read_baseline(line) for line in lines]
-        if lines.fieldnames != list(BASELINE_COLUMNS):
-            raise ValueError("other columns")
-    except (AntsError, OSError, TypeError, ValueError, KeyError) as error:
-        raise AntsError(f"the results in {str(results)!r} are damaged; give --force.") from error
-    save_all(comparison, baselines, folder / FIGURES)
+    arrays = {name: one.astype(int) for name, one in files.read_npz(results / EPISODES).items()}
+    with open(results / BASELINES, newline="", encoding="utf-8") as file:
+        baselines = [read_baseline(row) for row in csv.DictReader(file)]
+    save_all(to_comparison(study, arrays, world), baselines, folder / FIGURES)
 
 
 def read_baseline(row: dict[str, str]) -> dict[str, Any]:
@@ -352,8 +311,8 @@ def render_policies(study: Study[RunPoint], results: Path, folder: Path) -> None
     """
     from dataclasses import replace
 
-    from taichi_ants import files, load_policy
-    from taichi_ants.analysis.paper.comparison import Variant
+    from taichi_ants import Task, TrainingConfig, files, load_policy
+    from taichi_ants.analysis.paper.comparison import Row
     from taichi_ants.rendering import PAUSE, Episode, frames, save_animation
 
     first, place = study.points[0], files.check_writable_folder(folder / RENDERS)
@@ -361,17 +320,17 @@ def render_policies(study: Study[RunPoint], results: Path, folder: Path) -> None
         paths = sorted((results / POLICIES).glob("*.npz"))
         for done, path in enumerate(paths):
             q_values, _, metadata = load_policy(path)
-            config = metadata["config"]
-            depth = config["hyperparameters"].get("planning_steps", 0)
+            task = Task.from_dict(metadata["task"])
+            row = Row.of(task, TrainingConfig(**metadata["config"]))
             episode = Episode.play(
                 first.world,
                 q_values,
                 seed=metadata["seed"],
                 max_steps=min(first.max_steps, RENDERED_STEPS),
-                task=as_in_training(first.task),
+                task=as_in_training(task),
             )
             episode = replace(episode, name=metadata["behaviour"])
-            title = f"{Variant(config['learner'], depth).label}, {metadata['task']['delivery']}"
+            title = f"{row.variant.label}, {row.delivery}"
             pictures = frames(episode.moments(), (720, 480), title=title)
             save_animation(place / f"{path.stem}.gif", pictures, pause=PAUSE)
             report_progress((done + 1) / len(paths))

@@ -154,21 +154,10 @@ def measured(asked: Sweep, outcomes: dict[Any, Outcome], name: str) -> np.ndarra
 
 def run_values(point: Any, seeds: tuple[int, ...], outcome: Outcome, name: str) -> np.ndarray:
     """A measure of a point's runs, as the comparison has it, float64 (seeds,)."""
-    import numpy as np
+    from taichi_ants.analysis.paper.measures import RunOutcomes
 
-    from taichi_ants.analysis.paper.comparison import Comparison, Row
-
-    arrays: Any = {k: array[None].astype(int) for k, array in outcome.items() if array.ndim == 2}
-    unknown = np.zeros((1, len(seeds)), int)
-    alone = Comparison(
-        rows=(Row.of(point.task, point.training),),
-        seeds=seeds,
-        **arrays,
-        max_steps=point.max_steps,
-        behaviours=unknown,
-        policy_returns=unknown,
-    )
-    return alone.measure(name)[0]
+    arrays = {key: array[None] for key, array in outcome.items() if array.ndim == 2}
+    return RunOutcomes(**arrays).measure(name)[0]
 
 
 def colony_values(point: Any, seeds: tuple[int, ...], outcome: Outcome, name: str) -> np.ndarray:

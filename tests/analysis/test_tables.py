@@ -12,7 +12,6 @@ from taichi_ants.analysis.tables import (
     number,
     percent,
     plain_text,
-    table,
 )
 from taichi_ants.errors import count
 
@@ -26,7 +25,6 @@ def test_numbers_as_text() -> None:
     assert interval(1.0, math.nan) == "-"
     assert (count(1, "seed"), count(0, "seed")) == ("1 seed", "0 seeds")
     assert (count(1, "delivery"), count(2, "delivery")) == ("1 delivery", "2 deliveries")
-    assert table(["a", "b"], [["x", "1"]]) == "| a | b |\n| --- | ---: |\n| x | 1 |\n"
     assert [figure(x) for x in (0, 7, 7.2, 12.34, 123.4, math.inf)] == [
         *("0", "7", "7.20", "12.3", "123", "-"),
     ]
@@ -58,3 +56,9 @@ def test_a_table_without_rows_shows_its_notes_alone() -> None:
     empty = Table("Bees", ["Who"], [], ["None was seen."])
     assert plain_text(["Insects.", empty], 40) == "Insects.\n\nNone was seen.\n"
     assert plain_text(["Insects.", Table("Bees", ["Who"], [])], 40) == "Insects.\n"
+
+
+def test_columns_without_anything_are_left_out() -> None:
+    table = Table("Bees", ["Who", "Age", "Number"], [["queen", "-", "1"], ["drone", "-", "-"]])
+    less = table.without_empty_columns()
+    assert (less.columns, less.rows) == (["Who", "Number"], [["queen", "1"], ["drone", "-"]])

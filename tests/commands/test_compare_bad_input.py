@@ -60,7 +60,6 @@ def assert_refused(arguments, named, place, capsys):
         (["--epsilon-decays", "0"], ["epsilon_decay", "0.0"]),
         (["--learners", "dyna_q", "--planning-steps", "0"], ["--planning-steps", "0"]),
         (["--learners", "dyna_q", "--planning-steps", "1001"], ["planning_steps", "1001"]),
-        (["--discounts", "0.9", "0.90000001"], ["six digits"]),
     ],
 )
 def test_learners_and_their_settings(arguments, named, place, capsys):

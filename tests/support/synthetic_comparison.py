@@ -6,17 +6,18 @@ each claim clearly.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from taichi_ants.analysis.behaviour import DELIVERS, WALKS
-from taichi_ants.analysis.paper.comparison import Comparison, Hyperparameters, Row, Variant
+from taichi_ants.analysis.paper.comparison import Comparison, GridPoint, Row, Variant
 from taichi_ants.analysis.paper.published import DYNA_P3, GRID, Q_LEARNING, SARSA, VARIANTS
 
 EARLY = 50  # episodes before the late level is reached
+EPISODES = ("returns", "steps", "deliveries")
+ROLLOUTS = tuple(f"greedy_{name}" for name in EPISODES)
 
 
 @dataclass(frozen=True)
@@ -47,10 +48,10 @@ class Truth:
     greedy_varies: bool = False
 
 
-Edit = Callable[[Variant, Hyperparameters, Truth], Truth]
+Edit = Callable[[Variant, GridPoint, Truth], Truth]
 
 
-def paper_truth(variant: Variant, point: Hyperparameters) -> Truth:
+def paper_truth(variant: Variant, point: GridPoint) -> Truth:
     """A world in which every claim of the paper holds."""
     fast = point.learning_rate == 0.01
     # Effects of the discount that differ between configurations, and cancel over all.
@@ -70,24 +71,24 @@ def paper_truth(variant: Variant, point: Hyperparameters) -> Truth:
     return Truth(20, late + (0.6 if special else -1), 6 + 6 * fast, 130, 72 + 10 * high, 12)
 
 
-def level_truth(variant: Variant, point: Hyperparameters) -> Truth:
+def level_truth(variant: Variant, point: GridPoint) -> Truth:
     """A world in which nothing makes a difference."""
     return Truth(45, 45, 0, 100, 100, 0)
 
 
-def unchanged(variant: Variant, point: Hyperparameters, truth: Truth) -> Truth:
+def unchanged(variant: Variant, point: GridPoint, truth: Truth) -> Truth:
     return truth
 
 
 def change(
     variants: Variant | Sequence[Variant] = VARIANTS,
-    where: Callable[[Hyperparameters], bool] = lambda point: True,
+    where: Callable[[GridPoint], bool] = lambda point: True,
     **amounts: float,
 ) -> Edit:
     """An edit that adds amounts to fields of the truth of some configurations."""
     chosen = [variants] if isinstance(variants, Variant) else variants
 
-    def edit(variant: Variant, point: Hyperparameters, truth: Truth) -> Truth:
+    def edit(variant: Variant, point: GridPoint, truth: Truth) -> Truth:
         if variant not in chosen or not where(point):
             return truth
         return replace(
@@ -103,10 +104,10 @@ def build(
     episodes: int = 120,
     rollouts: int = 3,
     variants: Sequence[Variant] = VARIANTS,
-    grid: Sequence[Hyperparameters] = GRID,
+    grid: Sequence[GridPoint] = GRID,
     noise: float = 0.5,
     shared: float = 3.0,
-    truth: Callable[[Variant, Hyperparameters], Truth] = paper_truth,
+    truth: Callable[[Variant, GridPoint], Truth] = paper_truth,
     random_seed: int = 7,
 ) -> Comparison:
     """A comparison drawn from the truth.
@@ -126,23 +127,20 @@ def build(
     for delivery, edit in edits.items():
         for variant in variants:
             for point in grid:
-                rows.append(Row(*variant, *point, delivery))
+                rows.append(Row(delivery, variant, point))
                 row = edit(variant, point, truth(variant, point))
                 runs.append(_runs(random, row, seed_effects, episodes, noise))
                 greedy.append(_rollouts(row, seeds, rollouts))
-    returns, steps, deliveries = np.moveaxis(np.array(runs), 1, 0)
-    greedy_returns, greedy_steps, greedy_deliveries = np.moveaxis(np.array(greedy), 1, 0)
+    arrays = dict(zip(EPISODES, np.moveaxis(np.array(runs), 1, 0), strict=True))
+    arrays |= dict(zip(ROLLOUTS, np.moveaxis(np.array(greedy), 1, 0), strict=True))
+    delivers = arrays["greedy_deliveries"][..., 0] > 0
     return Comparison(
-        tuple(rows),
-        tuple(range(seeds)),
-        returns,
-        steps,
-        deliveries,
-        greedy_returns,
-        greedy_steps,
-        greedy_deliveries,
-        600,
-        *_policies(greedy_returns, greedy_deliveries),
+        rows=tuple(rows),
+        seeds=tuple(range(seeds)),
+        **arrays,
+        behaviours=np.where(delivers, DELIVERS, WALKS),
+        policy_returns=arrays["greedy_returns"][..., 0].copy(),
+        max_steps=600,
     )
 
 
@@ -174,27 +172,11 @@ def _rollouts(row: Truth, seeds: int, rollouts: int) -> np.ndarray:
     return values.astype(np.int32)
 
 
-def _policies(returns: np.ndarray, deliveries: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Behaviours and their returns (rows, seeds): of the first rollout, delivering without any."""
-    if not returns.shape[2]:
-        return np.full(returns.shape[:2], DELIVERS), np.full(returns.shape[:2], 45)
-    return np.where(deliveries[..., 0] > 0, DELIVERS, WALKS), returns[..., 0].copy()
-
-
 def subset(comparison: Comparison, rows: Sequence[int], seeds: int, episodes: int) -> Comparison:
     """Some rows, the first seeds and the first episodes of a comparison."""
     rows = list(rows)
-
-    def cut(name: str, length: float = math.inf) -> np.ndarray:
-        values = getattr(comparison, name)
-        return values[rows, :seeds, : int(min(length, values.shape[2]))]
-
-    return Comparison(
-        tuple(comparison.rows[row] for row in rows),
-        comparison.seeds[:seeds],
-        *(cut(name, episodes) for name in ("returns", "steps", "deliveries")),
-        *(cut(name) for name in ("greedy_returns", "greedy_steps", "greedy_deliveries")),
-        comparison.max_steps,
-        comparison.behaviours[rows, :seeds],
-        comparison.policy_returns[rows, :seeds],
-    )
+    arrays = {name: getattr(comparison, name)[rows, :seeds, :episodes] for name in EPISODES}
+    for name in (*ROLLOUTS, "behaviours", "policy_returns"):
+        arrays[name] = getattr(comparison, name)[rows, :seeds]
+    names = tuple(comparison.rows[row] for row in rows)
+    return replace(comparison, rows=names, seeds=comparison.seeds[:seeds], **arrays)

@@ -1,7 +1,8 @@
 """All empirical claims of the paper, in its order, as one table.
 
-One is left out: that all methods have a similar cost per step, Dyna-Q's planning apart (3.3.2). A
-comparison records no run times; the report shows measured ones.
+One is left out: that all methods have a similar cost per step, Dyna-Q's planning apart (3.3.2), as
+a comparison records no run times; benchmarks/throughput.py measures them. How far a word such as
+"about", "close" or "consistently" goes is the criterion.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from taichi_ants.analysis.paper.quantities import (
     MEAN_OF_ALL,
     Quantity,
     effect_of,
+    effects_of,
     growth,
     minus,
     moderate_exploration,
@@ -40,7 +42,7 @@ from taichi_ants.analysis.paper.quantities import (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Claim:
     """An empirical claim of the paper, made precise.
 
@@ -64,6 +66,11 @@ class Claim:
     def tested_on(self) -> str:
         """What is computed, and why so."""
         return f"{self.quantity.text}; {self.why}" if self.why else self.quantity.text
+
+    @property
+    def centre(self) -> str:
+        """What of the seeds must fulfil the criterion."""
+        return "interquartile mean" if self.quantity.typical else "mean"
 
 
 # What is too small to matter. An episode along the shortest path returns 45 reward in 34 steps:
@@ -114,15 +121,12 @@ CLAIMS: tuple[Claim, ...] = (
           _TABLE_2),
     Claim("sarsa-consistently-direct", "3.2",
           "SARSA's routes are consistently more direct than Q-learning's.",
-          Within(0.75, np.inf), share_above(LATE_STEPS, SARSA, Q_LEARNING, below=True),
-          "'consistently' is three quarters or more"),
+          Within(0.75, np.inf), share_above(LATE_STEPS, SARSA, Q_LEARNING, below=True)),
     Claim("sarsa-shortest-episode", "3.2", "The shortest SARSA episode takes about 55 steps.",
-          Within(50.0, 60.0), of(LEAST_OF_ALL, "shortest_episode", SARSA),
-          "'about' is 5 steps either way"),
+          Within(50.0, 60.0), of(LEAST_OF_ALL, "shortest_episode", SARSA)),
     Claim("sarsa-shortest-mean", "3.2",
           "The shortest SARSA episodes take about 55 steps, read as a mean over training.",
-          Within(50.0, 60.0), of(LEAST_OF_ALL, ALL_STEPS, SARSA),
-          "'about' is 5 steps either way"),
+          Within(50.0, 60.0), of(LEAST_OF_ALL, ALL_STEPS, SARSA)),
     Claim("sarsa-more-stable", "3.2", "SARSA is more stable than Q-learning.",
           Above(FLUCTUATION), minus(MEAN_OF_ALL, LATE_FLUCTUATION, (Q_LEARNING, SARSA))),
     Claim("dyna-depth-return-best", "3.2",
@@ -144,11 +148,9 @@ CLAIMS: tuple[Claim, ...] = (
           Above(STEPS), minus(MEAN_OF_ALL, ALL_STEPS, (DYNA_P5, DYNA_P3))),
     Claim("dyna-depth-length-often", "3.2, 3.3.1",
           "Deeper planning lengthens Dyna-Q's episodes in most configurations.",
-          Within(0.5, np.inf), share_above(ALL_STEPS, DYNA_P5, DYNA_P3),
-          "'most' is more than half"),
+          Within(0.5, np.inf), share_above(ALL_STEPS, DYNA_P5, DYNA_P3)),
     Claim("dyna-below-q-peak", "3.2", "Dyna-Q does not surpass Q-learning's peak return.",
-          Within(-REWARD, np.inf), minus(BEST, RETURN, *Q_MINUS_DYNAS),
-          "a lead of up to 1 does not count as surpassing"),
+          Within(-REWARD, np.inf), minus(BEST, RETURN, *Q_MINUS_DYNAS)),
     Claim("dyna-between-return", "3.2", "Dyna-Q's return lies between SARSA's and Q-learning's.",
           Above(REWARD), minus(AT_TABLE_2, RETURN, *Q_OVER_DYNA_OVER_SARSA)),
     Claim("dyna-between-length", "3.2",
@@ -160,8 +162,7 @@ CLAIMS: tuple[Claim, ...] = (
           "'nearly every' is 98 % or more, as the paper reports 0.99 to 1.0"),
     Claim("curves-close-returns", "3.2, figure 1",
           "All learners converge to returns close to each other.",
-          Within(-5.0, 5.0), minus(AT_FIGURE_1, RETURN, *ALGORITHMS),
-          "'close' is 5 reward, about a tenth"),
+          Within(-5.0, 5.0), minus(AT_FIGURE_1, RETURN, *ALGORITHMS)),
     Claim("curves-early-variance", "3.2, figure 1",
           "Q-learning and Dyna-Q vary more than SARSA early in training.",
           Above(FLUCTUATION),
@@ -183,28 +184,22 @@ CLAIMS: tuple[Claim, ...] = (
           Within(0.95, np.inf), of(AT_FIGURE_1, "deliveries_second50", *VARIANTS),
           "'every' is 95 % or more, as exploration is still at a fifth of all actions"),
     Claim("curves-equal-success", "3.2, figure 1", "The learners do not differ in final success.",
-          Within(-0.02, 0.02), minus(AT_FIGURE_1, "deliveries_last50", *ALGORITHMS),
-          "up to 0.02 counts as equal"),
+          Within(-0.02, 0.02), minus(AT_FIGURE_1, "deliveries_last50", *ALGORITHMS)),
     Claim("greedy-return", _GREEDY, "Greedy policies of all learners return about 45.",
           Within(GREEDY_RETURN - REWARD, GREEDY_RETURN + REWARD),
-          of(AT_TABLE_2, "greedy_return", *VARIANTS),
-          "'about' is 1 either way"),
+          of(AT_TABLE_2, "greedy_return", *VARIANTS)),
     Claim("greedy-steps", _GREEDY, "Greedy policies of all learners need 34 to 36 steps.",
           Within(GREEDY_STEPS[0] - 0.5, GREEDY_STEPS[1] + 0.5),
           of(AT_TABLE_2, "greedy_steps", *VARIANTS),
           "rounded to whole steps"),
     Claim("greedy-success", _GREEDY, "Greedy policies of all learners deliver consistently.",
-          Within(0.98, np.inf), of(AT_TABLE_2, "greedy_deliveries", *VARIANTS),
-          "'consistently' is 98 % or more"),
+          Within(0.98, np.inf), of(AT_TABLE_2, "greedy_deliveries", *VARIANTS)),
     Claim("greedy-deterministic", _GREEDY, "Greedy policies are deterministic.",
-          Within(0.95, np.inf), of(AT_TABLE_2, "greedy_repeats", *VARIANTS),
-          "95 % or more"),
+          Within(0.95, np.inf), of(AT_TABLE_2, "greedy_repeats", *VARIANTS)),
     Claim("greedy-alike-return", _GREEDY, "Greedy policies of all learners are alike in return.",
-          Within(-REWARD, REWARD), minus(AT_TABLE_2, "greedy_return", *ALGORITHMS),
-          "up to 1 counts as alike"),
+          Within(-REWARD, REWARD), minus(AT_TABLE_2, "greedy_return", *ALGORITHMS)),
     Claim("greedy-alike-length", _GREEDY, "Greedy policies of all learners are alike in length.",
-          Within(-STEPS, STEPS), minus(AT_TABLE_2, "greedy_steps", *ALGORITHMS),
-          "up to 2 counts as alike"),
+          Within(-STEPS, STEPS), minus(AT_TABLE_2, "greedy_steps", *ALGORITHMS)),
     Claim("rate-strongest", "3.3.1",
           "The learning rate has the strongest impact of all hyperparameters.",
           Above(REWARD), stronger(RETURN, "learning_rate")),
@@ -230,8 +225,7 @@ CLAIMS: tuple[Claim, ...] = (
           Above(STEPS), of(effect_of("epsilon"), ALL_STEPS, *DYNAS)),
     Claim("epsilon-sarsa-robust", "3.3.1", "SARSA is robust to the exploration schedule.",
           Within(-2.5, 2.5),
-          of(effect_of("epsilon"), RETURN, SARSA) + of(effect_of("epsilon_decay"), RETURN, SARSA),
-          "'robust' is within 2.5 reward, about a twentieth"),
+          effects_of(RETURN, SARSA, "epsilon", "epsilon_decay")),
     Claim("discount-q", "3.3.1", "Discount 0.99 raises Q-learning's return.",
           Above(REWARD), of(effect_of("discount"), RETURN, Q_LEARNING)),
     Claim("discount-depends", "3.3.1",
@@ -242,12 +236,10 @@ CLAIMS: tuple[Claim, ...] = (
           Above(FLUCTUATION), minus(MEAN_OF_ALL, LATE_FLUCTUATION, (DYNA_P5, DYNA_P3))),
     Claim("planning-no-gain-return", "3.3.2",
           "Planning brings no clear gain in sample efficiency: early returns.",
-          Within(-np.inf, REWARD), minus(MEAN_OF_ALL, EARLY_RETURN, *DYNAS_MINUS_Q),
-          "more than 1 would be a clear gain"),
+          Within(-np.inf, REWARD), minus(MEAN_OF_ALL, EARLY_RETURN, *DYNAS_MINUS_Q)),
     Claim("planning-no-gain-length", "3.3.2",
           "Planning brings no clear gain in sample efficiency: early episode lengths.",
-          Within(-np.inf, STEPS), minus(MEAN_OF_ALL, EARLY_STEPS, *Q_MINUS_DYNAS),
-          "more than 2 would be a clear gain"),
+          Within(-np.inf, STEPS), minus(MEAN_OF_ALL, EARLY_STEPS, *Q_MINUS_DYNAS)),
     Claim("overall-q-return", "3.4", "Q-learning excels in return.",
           Above(REWARD), minus(MEAN_OF_ALL, RETURN, *Q_MINUS_OTHERS)),
     Claim("overall-sarsa-length", "3.4", "SARSA is the most step-efficient.",
@@ -261,7 +253,6 @@ CLAIMS: tuple[Claim, ...] = (
     Claim("overall-improvement", "4", "All learners improve over the 500 episodes.",
           Above(REWARD), growth(RETURN, EARLY_RETURN, *VARIANTS)),
     Claim("overall-improvement-reliable", "4", "The improvement is reliable.",
-          Within(0.95, np.inf), of(MEAN_OF_ALL, "improved", *VARIANTS),
-          "'reliable' is 95 % or more"),
+          Within(0.95, np.inf), of(MEAN_OF_ALL, "improved", *VARIANTS)),
 )
 # fmt: on

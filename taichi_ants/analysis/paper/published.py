@@ -5,47 +5,50 @@ from __future__ import annotations
 from itertools import product
 from typing import NamedTuple
 
-from taichi_ants.analysis.paper.comparison import Hyperparameters, Variant
+from taichi_ants.analysis.paper.comparison import GridPoint, Variant
 
 Q_LEARNING = Variant("q_learning")
 SARSA = Variant("sarsa")
-DYNA_P3 = Variant("dyna_q", 3)
-DYNA_P5 = Variant("dyna_q", 5)
+DYNA_P3 = Variant("dyna_q", "planning_steps=3")
+DYNA_P5 = Variant("dyna_q", "planning_steps=5")
 VARIANTS: tuple[Variant, ...] = (Q_LEARNING, SARSA, DYNA_P3, DYNA_P5)
 
 
 class PaperRow(NamedTuple):
-    """One row of the paper's table 2."""
+    """One row of the paper's table 2, of one run."""
 
-    hyperparameters: Hyperparameters
-    return_last50: float  # reward, mean of the last 50 episodes of one run
-    # Steps. The column is headed "train avg steps", section 3.1 says "the last 50 episodes"; ours
-    # come near them as a mean of all episodes, and do not as one of the last 50.
-    steps_all: float
-    deliveries_last50: float  # per episode
+    point: GridPoint
+    reward: float  # mean of the last 50 episodes
+    # The column is headed "train avg steps", section 3.1 says "the last 50 episodes"; ours come
+    # near them as a mean of all episodes, and do not as one of the last 50.
+    steps: float
+    deliveries: float  # per episode
+
+    def figure(self, measure: str) -> float:
+        """What is to be held against a measure of ours."""
+        by_word = {"return": self.reward, "steps": self.steps, "deliveries": self.deliveries}
+        return by_word[measure.partition("_")[0]]
 
 
 TABLE_2: dict[Variant, PaperRow] = {
-    Q_LEARNING: PaperRow(Hyperparameters(0.001, 0.99, 0.3, 0.99), 56.9, 100.9, 1.0),
-    DYNA_P5: PaperRow(Hyperparameters(0.01, 0.99, 0.5, 0.995), 49.0, 137.9, 0.99),
-    DYNA_P3: PaperRow(Hyperparameters(0.01, 0.9, 0.3, 0.995), 47.6, 81.0, 1.0),
-    SARSA: PaperRow(Hyperparameters(0.01, 0.9, 0.3, 0.995), 47.3, 73.0, 1.0),
+    Q_LEARNING: PaperRow(GridPoint(0.001, 0.99, 0.3, 0.99), 56.9, 100.9, 1.0),
+    DYNA_P5: PaperRow(GridPoint(0.01, 0.99, 0.5, 0.995), 49.0, 137.9, 0.99),
+    DYNA_P3: PaperRow(GridPoint(0.01, 0.9, 0.3, 0.995), 47.6, 81.0, 1.0),
+    SARSA: PaperRow(GridPoint(0.01, 0.9, 0.3, 0.995), 47.3, 73.0, 1.0),
 }
 
 # Its figure 1 shows all learners with "shared hyperparameters" that it does not name; these are
 # the only ones that occur twice in its table 2.
-FIGURE_1 = Hyperparameters(0.01, 0.9, 0.3, 0.995)
+FIGURE_1 = GridPoint(0.01, 0.9, 0.3, 0.995)
 
 GREEDY_RETURN = 45.0
 GREEDY_STEPS = (34.0, 36.0)
 
-# The paper's grid: each factor with its two values, in the order of `Hyperparameters`.
+# The paper's grid: each factor with its two values, in the order of `GridPoint`.
 FACTORS: dict[str, tuple[float, float]] = {
     "learning_rate": (0.001, 0.01),
     "discount": (0.9, 0.99),
     "epsilon": (0.3, 0.5),
     "epsilon_decay": (0.99, 0.995),
 }
-GRID: tuple[Hyperparameters, ...] = tuple(
-    Hyperparameters(*values) for values in product(*FACTORS.values())
-)
+GRID: tuple[GridPoint, ...] = tuple(GridPoint(*values) for values in product(*FACTORS.values()))

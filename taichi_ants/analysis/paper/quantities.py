@@ -10,57 +10,44 @@ the mean difference over the 8 pairs of configurations that differ in it alone.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from taichi_ants.analysis.findings import UNBOUNDED
-from taichi_ants.analysis.paper.best_of import held_out
-from taichi_ants.analysis.paper.comparison import Comparison, Hyperparameters, Variant
-from taichi_ants.analysis.paper.measures import MEASURES
-from taichi_ants.analysis.paper.published import (
-    FACTORS,
-    FIGURE_1,
-    GRID,
-    TABLE_2,
-    VARIANTS,
-)
+from taichi_ants.analysis.paper.comparison import Comparison, GridPoint, Variant
+from taichi_ants.analysis.paper.measures import MEASURES, WINDOW
+from taichi_ants.analysis.paper.published import FACTORS, FIGURE_1, GRID, TABLE_2, VARIANTS
 
 SHARE, DIFFERENCE = (0.0, 1.0), (-1.0, 1.0)
+ALL = f"all {len(GRID)}"
 EVERY_CONFIGURATION = (0, 1, 2, 3)  # the axes of `Slice.grid` without that of the seeds
 
 
-class NotTestedError(Exception):
-    """The comparison lacks what a claim needs; the message says what."""
+class Slice(NamedTuple):
+    """Reads the values of one delivery setting, by the name of a measure and a learner.
 
-
-class Slice:
-    """Reads the values of one delivery setting, and notes which rows were read.
-
-    Every method takes the name of a measure (see `measures.MEASURES`) and a learner, and raises
-    `NotTestedError` where a configuration, episodes or rollouts are missing.
-
-    Attributes:
-        used: The rows read so far.
+    What is not there is nan: a configuration that is missing, a measure that needs more episodes,
+    and all of another world than the paper's or of runs with fewer than 50 episodes.
     """
 
-    def __init__(self, comparison: Comparison, delivery: str) -> None:
-        self._comparison = comparison
-        self._delivery = delivery
-        self.used: set[int] = set()
+    comparison: Comparison
+    delivery: str
 
-    def at(self, measure: str, variant: Variant, hyperparameters: Hyperparameters) -> np.ndarray:
+    def at(self, measure: str, variant: Variant, point: GridPoint) -> np.ndarray:
         """The values of one configuration, float64 (seeds,)."""
-        position = self._comparison.position(self._delivery, variant, hyperparameters)
-        if position is None:
-            raise NotTestedError(f"no {variant.label} at {hyperparameters.label}")
-        return self._read(measure, [position])[0]
+        runs = self.comparison
+        row = runs.position(self.delivery, variant, point)
+        if row is None or not runs.in_paper_world or runs.episodes < WINDOW:
+            return np.full(len(runs.seeds), np.nan)
+        return runs.measure(measure)[row]
 
     def grid(self, measure: str, variant: Variant) -> np.ndarray:
         """All 16 configurations, float64 (2, 2, 2, 2, seeds), axes in the order of `FACTORS`."""
-        return self._read(measure, self._grid(variant)).reshape(*[2] * len(FACTORS), -1)
+        values = np.stack([self.at(measure, variant, point) for point in GRID])
+        return values.reshape(*[2] * len(FACTORS), -1)
 
     def pairs(self, measure: str, variant: Variant, factor: str) -> np.ndarray:
         """Upper minus lower value of a hyperparameter, all else equal, float64 (8, seeds)."""
@@ -68,103 +55,57 @@ class Slice:
         return (upper - lower).reshape(-1, lower.shape[-1])
 
     def held_out(self, measure: str, variant: Variant) -> np.ndarray:
-        """The best configuration on the seeds that did not choose it, float64 (seeds / 2,)."""
-        best = held_out(self._comparison, self._grid(variant))
-        if best is None:
-            raise NotTestedError("needs a second seed")
-        return self._read(measure, [best.position])[0][best.seeds]
-
-    def _grid(self, variant: Variant) -> list[int]:
-        positions = [self._comparison.position(self._delivery, variant, one) for one in GRID]
-        found = [position for position in positions if position is not None]
-        if missing := len(positions) - len(found):
-            raise NotTestedError(
-                f"{missing} of the paper's {len(GRID)} configurations of {variant.label} missing"
-            )
-        self.used.update(found)
-        return found
-
-    def _read(self, measure: str, positions: list[int]) -> np.ndarray:
-        lacks = MEASURES[measure].lacks(self._comparison)
-        if lacks:
-            raise NotTestedError(f"{MEASURES[measure].words} {lacks}")
-        self.used.update(positions)
-        return self._comparison.measure(measure)[positions]
+        """The best by mean return of even seeds, on odd ones, float64 (seeds / 2,)."""
+        choosing = self.grid("return_last50", variant)[..., ::2].mean(axis=-1)
+        best = np.unravel_index(choosing.argmax(), choosing.shape)  # of a missing one, if there is
+        return self.grid(measure, variant)[best][1::2]
 
 
-@dataclass(frozen=True)
-class Read:
+class Read(NamedTuple):
     """How a learner's number is read.
 
     Attributes:
-        words: From which configurations, for sentences.
-        scope: The same in a few words.
+        words: From which configurations.
         values: (slice, measure, learner) -> float64 (seeds,).
-        change: What is subtracted from what, where it is the effect of a hyperparameter.
     """
 
     words: str
-    scope: str
     values: Callable[[Slice, str, Variant], np.ndarray]
-    change: str = ""
 
 
 AT_TABLE_2 = Read(
-    "at the learner's configuration in the paper's table 2",
-    "table 2 configurations",
-    lambda part, measure, variant: part.at(measure, variant, TABLE_2[variant].hyperparameters),
+    "at the configuration of table 2",
+    lambda part, measure, variant: part.at(measure, variant, TABLE_2[variant].point),
 )
 AT_FIGURE_1 = Read(
-    f"at {FIGURE_1.label}, shared by all learners (our choice, the paper names none)",
-    "figure 1 configuration",
+    f"at {FIGURE_1.label}, our choice for figure 1",
     lambda part, measure, variant: part.at(measure, variant, FIGURE_1),
 )
-ALL = f"all {len(GRID)}"
 MEAN_OF_ALL = Read(
-    "mean over 16 configurations",
-    ALL,
-    lambda part, *what: part.grid(*what).mean(axis=EVERY_CONFIGURATION),
+    f"mean of {ALL}", lambda part, *what: part.grid(*what).mean(axis=EVERY_CONFIGURATION)
 )
 LEAST_OF_ALL = Read(
-    "smallest of 16 configurations within each seed",
-    ALL,
-    lambda part, *what: part.grid(*what).min(axis=EVERY_CONFIGURATION),
+    f"least of {ALL}", lambda part, *what: part.grid(*what).min(axis=EVERY_CONFIGURATION)
 )
-BEST = Read(
-    "at the best of the learner's 16 configurations, chosen on half of the seeds and measured on "
-    "the others",
-    "best, on other seeds",
-    Slice.held_out,
-)
+BEST = Read("best on half of the seeds, measured on the others", Slice.held_out)
 
 
 def effect_of(factor: str, sign: int = 1) -> Read:
     """The effect of a hyperparameter: its upper minus its lower value, or the reverse."""
     lower, upper = FACTORS[factor][::sign]
-    change = f"{upper:g} minus {lower:g}"
     return Read(
-        f"{factor.replace('_', ' ')} {change}, mean over 8 pairs of configurations",
-        ALL,
+        f"{factor.replace('_', ' ')} {upper:g} minus {lower:g}, mean of 8 pairs",
         lambda part, measure, variant: sign * part.pairs(measure, variant, factor).mean(axis=0),
-        change,
     )
 
 
 def _epsilon_at_table_2(part: Slice, measure: str, variant: Variant) -> np.ndarray:
-    point = TABLE_2[variant].hyperparameters
-    low, high = (
-        part.at(measure, variant, point._replace(epsilon=epsilon)) for epsilon in FACTORS["epsilon"]
-    )
+    points = (TABLE_2[variant].point._replace(epsilon=epsilon) for epsilon in FACTORS["epsilon"])
+    low, high = (part.at(measure, variant, point) for point in points)
     return high - low
 
 
-EPSILON_AT_TABLE_2 = Read(
-    "epsilon 0.5 minus 0.3, all else as in the paper's table 2",
-    "single configurations",
-    _epsilon_at_table_2,
-    "0.5 minus 0.3",
-)
-
+EPSILON_AT_TABLE_2 = Read("epsilon 0.5 minus 0.3, all else as in table 2", _epsilon_at_table_2)
 
 # What reads a number of each seed, float64 (seeds,).
 Effect = Callable[[Slice], np.ndarray]
@@ -176,16 +117,16 @@ class Quantity:
 
     Attributes:
         words: What is computed, without what is subtracted from what.
+        scope: From which configurations.
         unit: The unit.
-        scope: Which configurations are used, in a few words.
         effects: What reads them, by label, such as "Q-learning minus SARSA".
         possible: The range that the numbers cannot leave.
         of_centres: As of a `Contrast`; then `effects` read float64 (k, seeds).
     """
 
     words: str
-    unit: str
     scope: str
+    unit: str
     effects: dict[str, Effect]
     possible: tuple[float, float] = UNBOUNDED
     of_centres: Callable[[np.ndarray], np.ndarray] | None = None
@@ -193,7 +134,7 @@ class Quantity:
     @property
     def text(self) -> str:
         """What is computed, for readers."""
-        return f"{self.words}: {'; '.join(self.effects)}"
+        return f"{self.words}, {self.scope}: {'; '.join(self.effects)}"
 
     @property
     def typical(self) -> bool:
@@ -206,18 +147,11 @@ class Quantity:
         """
         return self.possible == UNBOUNDED
 
-    def __add__(self, other: Quantity) -> Quantity:
-        """The numbers of both, which differ in where they are read."""
-        words = f"{self.words}, and {other.words}"
-        return replace(self, words=words, effects=self.effects | other.effects)
-
 
 def of(read: Read, measure: str, *variants: Variant) -> Quantity:
     """The measure of each learner."""
-    change = f", {read.change}" if read.change else ""
-    effects = {f"{one.label}{change}": _reader(read, measure, one) for one in variants}
-    possible = UNBOUNDED if MEASURES[measure].typical else SHARE
-    return Quantity(*_what(read, measure), effects, possible)
+    effects = {variant.label: _reader(read, measure, variant) for variant in variants}
+    return _quantity(read.words, measure, effects, SHARE)
 
 
 def minus(read: Read, measure: str, *pairs: tuple[Variant, Variant]) -> Quantity:
@@ -228,41 +162,51 @@ def minus(read: Read, measure: str, *pairs: tuple[Variant, Variant]) -> Quantity
         return lambda part: one(part) - other(part)
 
     effects = {f"{one.label} minus {other.label}": difference(one, other) for one, other in pairs}
-    possible = UNBOUNDED if MEASURES[measure].typical else DIFFERENCE
-    return Quantity(*_what(read, measure), effects, possible)
+    return _quantity(read.words, measure, effects, DIFFERENCE)
+
+
+def effects_of(measure: str, variant: Variant, *factors: str) -> Quantity:
+    """The effect of each hyperparameter on the measure of a learner."""
+    reads = map(effect_of, factors)
+    effects = {f"{variant.label}, {one.words}": _reader(one, measure, variant) for one in reads}
+    return _quantity(ALL, measure, effects)
 
 
 def _reader(read: Read, measure: str, variant: Variant) -> Effect:
     return lambda part: read.values(part, measure, variant)
 
 
-def _what(read: Read, measure: str) -> tuple[str, str, str]:
-    return f"{MEASURES[measure].words}, {read.words}", MEASURES[measure].unit, read.scope
+def _quantity(
+    scope: str,
+    measure: str,
+    effects: dict[str, Effect],
+    bounds: tuple[float, float] = UNBOUNDED,
+) -> Quantity:
+    """A quantity in the unit of a measure; the bounds are those of a share or a count."""
+    one = MEASURES[measure]
+    return Quantity(one.words, scope, one.unit, effects, UNBOUNDED if one.typical else bounds)
 
 
 def share_above(measure: str, first: Variant, second: Variant, below: bool = False) -> Quantity:
     """In which share of matched configurations the first is above (or below); ties by half."""
 
     def share(part: Slice) -> np.ndarray:
-        one, other = part.grid(measure, first), part.grid(measure, second)
-        above = (other > one if below else one > other) + 0.5 * (one == other)
-        return above.mean(axis=EVERY_CONFIGURATION)
+        signs = np.sign(part.grid(measure, first) - part.grid(measure, second))
+        return (0.5 + (-0.5 if below else 0.5) * signs).mean(axis=EVERY_CONFIGURATION)
 
     label = f"{first.label} {'below' if below else 'above'} {second.label}"
     words = f"{MEASURES[measure].words}, in which share of 16 matched configurations of a seed"
-    return Quantity(words, "share of 16 pairs", ALL, {label: share}, SHARE)
+    return Quantity(words, ALL, "share of 16 pairs", {label: share}, SHARE)
 
 
 def growth(later: str, earlier: str, *variants: Variant) -> Quantity:
     """One measure minus another of each learner, mean over all configurations."""
 
-    def difference(variant: Variant) -> Effect:
-        values = MEAN_OF_ALL.values
-        return lambda part: values(part, later, variant) - values(part, earlier, variant)
+    def values(part: Slice, _: str, variant: Variant) -> np.ndarray:
+        return MEAN_OF_ALL.values(part, later, variant) - MEAN_OF_ALL.values(part, earlier, variant)
 
-    _, unit, scope = _what(MEAN_OF_ALL, later)
-    words = f"{MEASURES[later].words} minus {MEASURES[earlier].words}, {MEAN_OF_ALL.words}"
-    return Quantity(words, unit, scope, {one.label: difference(one) for one in variants})
+    words = f"minus {MEASURES[earlier].words}, {MEAN_OF_ALL.words}"
+    return of(Read(words, values), later, *variants)
 
 
 def rank_correlation(first: str, second: str, variant: Variant) -> Quantity:
@@ -279,9 +223,9 @@ def rank_correlation(first: str, second: str, variant: Variant) -> Quantity:
         scale = np.sqrt((one**2).sum(axis=0) * (other**2).sum(axis=0))
         return (one * other).sum(axis=0) / np.where(scale > 0, scale, 1.0)
 
-    words = f"rank correlation of {MEASURES[first].words} and {MEASURES[second].words}"
-    words += " over 16 configurations of a seed"
-    return Quantity(words, "correlation", ALL, {variant.label: correlation}, DIFFERENCE)
+    words = f"rank correlation of {MEASURES[first].words} and {MEASURES[second].words} of a seed"
+    effects: dict[str, Effect] = {variant.label: correlation}
+    return Quantity(words, ALL, "correlation", effects, DIFFERENCE)
 
 
 def stronger(measure: str, factor: str) -> Quantity:
@@ -294,12 +238,11 @@ def stronger(measure: str, factor: str) -> Quantity:
         )
 
     others = [other for other in FACTORS if other != factor]
-    labels = (f"{factor} minus {other}".replace("_", " ") for other in others)
     return Quantity(
-        f"{MEASURES[measure].words}, absolute effect of a hyperparameter, mean over the learners",
-        MEASURES[measure].unit,
+        f"{MEASURES[measure].words}, absolute effect of a hyperparameter, mean of the learners",
         ALL,
-        dict(zip(labels, map(effects, others), strict=True)),
+        MEASURES[measure].unit,
+        {f"{factor} minus {other}".replace("_", " "): effects(other) for other in others},
         of_centres=lambda centres: _first_minus_second(np.abs(centres), np.mean),
     )
 
@@ -313,10 +256,10 @@ def more_dependent(measure: str, factor: str, *pairs: tuple[Variant, Variant]) -
         )
 
     return Quantity(
-        f"{MEASURES[measure].words}, standard deviation over 8 pairs of configurations of the "
-        f"mean effect of {factor} (jackknife over seeds)",
-        MEASURES[measure].unit,
+        f"{MEASURES[measure].words}, standard deviation of the effect of {factor} over 8 pairs of "
+        "configurations (jackknife over seeds)",
         ALL,
+        MEASURES[measure].unit,
         {f"{one.label} minus {other.label}": effects(one, other) for one, other in pairs},
         of_centres=lambda centres: _first_minus_second(centres, partial(np.std, ddof=1)),
     )
@@ -338,16 +281,10 @@ def moderate_exploration(measure: str, variant: Variant) -> Quantity:
 
         return values
 
-    names = {
-        (k, m): f"{epsilon:g} / {decay:g}"
-        for k, epsilon in enumerate(FACTORS["epsilon"])
-        for m, decay in enumerate(FACTORS["epsilon_decay"])
-    }
-    first, *others = names
+    others = {"0.3 / 0.995": (0, 1), "0.5 / 0.99": (1, 0), "0.5 / 0.995": (1, 1)}
     return Quantity(
-        f"{MEASURES[measure].words} of {variant.label} by epsilon / decay, mean over 4 matched "
-        "configurations",
+        f"{MEASURES[measure].words} of {variant.label} by epsilon / decay",
+        "mean of 4 matched configurations",
         MEASURES[measure].unit,
-        ALL,
-        {f"{names[first]} minus {names[other]}": difference(*other) for other in others},
+        {f"0.3 / 0.99 minus {label}": difference(*place) for label, place in others.items()},
     )

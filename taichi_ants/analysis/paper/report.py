@@ -1,172 +1,130 @@
-"""The comparison in a terminal: the paper's table 2 beside ours, and what became of its claims.
+"""The comparison as text: the paper's table 2 beside ours, and what became of its claims.
 
-A learner without the paper's configuration, or in another world, is shown at its best one.
+It shows what the other tables hold, and computes nothing.
 """
 
 from __future__ import annotations
 
-import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import IO, Any
 
-import numpy as np
-
-from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS, counts
-from taichi_ants.analysis.paper.audit import OTHER_WORLD, Audited, claims_table
-from taichi_ants.analysis.paper.best_of import choices
-from taichi_ants.analysis.paper.comparison import Comparison, Variant
-from taichi_ants.analysis.paper.measures import MEASURES
+from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS
+from taichi_ants.analysis.paper.audit import Audit, claims_table
+from taichi_ants.analysis.paper.comparison import Comparison, GridPoint
 from taichi_ants.analysis.paper.published import GREEDY_RETURN, GREEDY_STEPS
-from taichi_ants.analysis.paper.summary import mean_returns
 from taichi_ants.analysis.paper.table2 import APART, apart, figure_tables, label
-from taichi_ants.analysis.statistics import centres
 from taichi_ants.analysis.tables import (
     MISSING,
     Block,
     Table,
     baseline_name,
+    markdown,
     number,
     plain_text,
-    print_blocks,
 )
 from taichi_ants.errors import count
 
-# Columns where the output is no terminal: what the narrowest common terminal shows.
-WIDTH = 79
+WIDTH = 79  # columns: what the narrowest common terminal shows
 
 
-def print_report(*data: Any, file: IO[str] | None = None) -> None:
-    """Prints the report: in colours and as wide as the terminal, or as `render` has it elsewhere.
-
-    Args:
-        data: The arguments of `report`.
-        file: Where to; standard output by default.
-    """
-    from rich.console import Console
-
-    console = Console(file=file, highlight=False, markup=False)
-    if console.is_terminal:
-        console.width = max(console.width, WIDTH)  # a narrower one breaks lines, but no number
-        print_blocks(report(*data), console)
-    else:
-        print(render(*data), end="", file=file)
-
-
-def render(*data: Any) -> str:
-    """The report as plain text of at most `WIDTH` columns; arguments as for `report`."""
-    return plain_text(report(*data), WIDTH)
+def table2_markdown(comparison: Comparison, lines: Sequence[Mapping]) -> str:
+    """The paper's table 2 beside ours, as Markdown."""
+    return markdown([*_heading(comparison), *figure_tables(lines, comparison), _greedy(lines)])
 
 
 def report(
     comparison: Comparison,
     lines: Sequence[Mapping],
-    audit: Sequence[Audited],
+    behaviours: Sequence[Mapping],
+    audit: Audit,
     baselines: Sequence[Mapping] = (),
-    costs: Sequence[Mapping] = (),
-) -> list[Block]:
-    """The report as data.
+) -> str:
+    """The report as plain text of at most `WIDTH` columns.
 
     Args:
         comparison: The comparison.
         lines: Its table 2, from `table2.table2`.
+        behaviours: From `summary.summarise_behaviours`.
         audit: Its claims, from `audit.assess`.
         baselines: Rows of baselines.csv, see `baselines.baseline_rows`.
-        costs: Time per step of learners, each with "learner", "planning_steps" and
-            "nanoseconds_per_step".
     """
+    blocks = [
+        *_heading(comparison),
+        *figure_tables(lines, comparison),
+        _greedy(lines),
+        _behaviours(lines, behaviours),
+        claims_table(audit),
+        _baselines(baselines),
+    ]
+    return plain_text(blocks, WIDTH)
+
+
+def _heading(comparison: Comparison) -> list[Block]:
     sizes = (
         f"{count(len(comparison.rows), 'configuration')}, {count(len(comparison.seeds), 'seed')}, "
         f"{count(comparison.episodes, 'episode')} of at most {comparison.max_steps} steps, "
-        f"{count(comparison.rollouts, 'greedy rollout')} a run."
+        f"{count(comparison.greedy_returns.shape[2], 'greedy rollout')} a run."
     )
-    claims: Block = claims_table(audit)
-    if not comparison.in_paper_world:
-        claims = f"The paper's claims: not tested, {OTHER_WORLD}."
-    return [
-        f"World: {comparison.world}.\n{sizes}\n{comparison.conditions}",
-        *figure_tables(lines, comparison),
-        _greedy(comparison),
-        _behaviours(comparison),
-        claims,
-        _costs(costs),
-        _baselines(baselines),
-    ]
+    return [f"World: {comparison.world}.\n{sizes}\n{comparison.conditions}"]
 
 
-def _greedy(comparison: Comparison) -> Table:
-    """Greedy rollouts, of what the tables above show."""
+def _greedy(lines: Sequence[Mapping]) -> Table:
+    """Greedy rollouts of the final policies."""
     headers = ("Learner", "Delivery", "Return\nmean", "IQM", "Steps\nmean", "IQM", "Food\nmean")
     rows = []
-    for (setting, variant), chosen in choices(comparison).items() if comparison.rollouts else ():
-        rows.append([label(comparison, variant, chosen), setting])
-        for measure, digits in (
-            ("greedy_return", 1),
-            ("greedy_steps", 1),
-            ("greedy_deliveries", 2),
-        ):
-            values = comparison.measure(measure)[[chosen.position], chosen.seeds]
-            typical = MEASURES[measure].typical
-            line = {name: float(column[0]) for name, column in centres(values, typical).items()}
-            off = typical and apart(line)
-            rows[-1].append(number(line["mean"], digits) + (f" {APART}" if off else ""))
-            rows[-1] += [number(line["iqm"], digits)] if typical else []
-    notes = ["Configurations and seeds as in the tables above."] if rows else []
-    if rows and comparison.in_paper_world:
-        low, high = GREEDY_STEPS
-        notes.append(f"The paper: about {GREEDY_RETURN:g} reward in {low:g} to {high:g} steps.")
-    return Table("Greedy evaluation", headers, rows, notes, text_columns=2)
+    for line in lines:
+        cells = [label(line), line["delivery"]]
+        for name in ("greedy_return", "greedy_steps"):
+            mark = f" {APART}" if apart(line, name) else ""
+            cells += [number(line[f"{name}_mean"]) + mark, number(line[f"{name}_iqm"])]
+        rows.append([*cells, number(line["greedy_deliveries_mean"], 2)])
+    low, high = GREEDY_STEPS
+    note = f"The paper, in its world: about {GREEDY_RETURN:g} reward in {low:g} to {high:g} steps."
+    return Table("Greedy evaluation, configurations as above", headers, rows, [note], 2)
 
 
-def _behaviours(comparison: Comparison) -> Table:
-    """What the final policies do: of the runs that the tables above show, and of all."""
+def _behaviours(lines: Sequence[Mapping], behaviours: Sequence[Mapping]) -> Table:
+    """What the final policies do: in the configurations that the tables above show, and in all."""
     headers = ("Learner", "Delivery", "Behaviour", "Runs", "Return\ntraining", "followed", "greedy")
     rows = []
-    for (setting, variant), chosen in choices(comparison).items():
-        names = [label(comparison, variant, chosen), setting]
-        shown = np.arange(len(comparison.seeds))[chosen.seeds]
-        positions = comparison.positions(setting, variant)
-        for code, number_of in counts(comparison.behaviours[positions]).items():
-            alike = shown[comparison.behaviours[chosen.position, shown] == code]
-            cells = [MISSING] * 3
-            if alike.size:
-                means = mean_returns(comparison, chosen.position, alike)
-                which = ("return_last50_mean", "policy_return_mean", "greedy_return_mean")
-                cells = [number(means[name]) for name in which]
-            rows.append([*names, BEHAVIOURS[code], str(alike.size), *cells, str(number_of)])
+    for line in lines:
+        names = [label(line), line["delivery"]]
+        learner = ("learner", "hyperparameters", "delivery")
+        of_learner = [one for one in behaviours if _same(one, line, *learner)]
+        here = {one["behaviour"]: one for one in of_learner if _same(one, line, *GridPoint._fields)}
+        all_runs: Counter[str] = Counter()
+        for one in of_learner:
+            all_runs[one["behaviour"]] += one["runs"]
+        for behaviour in filter(all_runs.__contains__, BEHAVIOURS):
+            cells = ["0", *[MISSING] * 3]
+            if found := here.get(behaviour):
+                means = ("return_last50_mean", "policy_return_mean", "greedy_return_mean")
+                cells = [str(found["runs"]), *(number(found[name]) for name in means)]
+            rows.append([*names, behaviour, *cells, str(all_runs[behaviour])])
             names = ["", ""]
     notes = (
-        f"Each policy is followed greedily once, {comparison.as_trained}.",
-        *(f"{BEHAVIOURS[code]}: {DEFINITIONS[code]}" for code in counts(comparison.behaviours)),
+        "Each policy is followed greedily once, with evaporation as in training.",
+        *(f"{one}: {means}" for one, means in zip(BEHAVIOURS, DEFINITIONS, strict=True)),
         "An episode without delivery is told by its second half.",
-        "runs and their mean returns: configurations and seeds as in the tables above",
-        f"training: {comparison.late} episodes; followed: the episode that tells the behaviour",
-        "greedy: the greedy evaluation above; all: runs in all configurations",
+        "Runs: of the configurations above. Return: mean of the last 50 training episodes,",
+        "of the episode that tells the behaviour, of the greedy evaluation.",
+        "All: runs in all configurations.",
     )
     return Table("What the ants do", (*headers, "All"), rows, notes, text_columns=3)
 
 
-def _costs(costs: Sequence[Mapping]) -> Table:
-    times = [cost["nanoseconds_per_step"] for cost in costs]
-    fastest = min((time for time in times if time > 0), default=math.nan)
-    rows = [
-        [
-            Variant(cost["learner"], cost["planning_steps"]).label,
-            number(time),
-            number(time / fastest, 2),
-        ]
-        for cost, time in zip(costs, times, strict=True)
-    ]
-    return Table("Cost per step", ("Learner", "Nanoseconds", "Relative"), rows)
+def _same(one: Mapping, other: Mapping, *names: str) -> bool:
+    return all(one[name] == other[name] for name in names)
 
 
 def _baselines(baselines: Sequence[Mapping]) -> Table:
     headers = ("Behaviour", "Setting", "Return", "Steps", "Deliveries")
+    digits = {"return_mean": 1, "steps_mean": 1, "deliveries_mean": 2}
     rows, notes = [], []
     for row in baselines:
-        figures = {"return_mean": 1, "steps_mean": 1, "deliveries_mean": 2}
         cells = [
-            MISSING if row[name] is None else number(row[name], digits)
-            for name, digits in figures.items()
+            MISSING if row[name] is None else number(row[name], places)
+            for name, places in digits.items()
         ]
         rows.append([baseline_name(row), row["setting"], *cells])
         if row["return_mean"] is None and row.get("note"):
