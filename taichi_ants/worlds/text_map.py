@@ -46,10 +46,12 @@ def load_map(path: str | os.PathLike[str]) -> World:
     """
     try:
         text = Path(path).read_text("utf-8")
+    except UnicodeError:
+        raise AntsError(f"{path} is no text file; give the path of a map file.") from None
     except (OSError, TypeError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise AntsError(
-            f"the map file {shown(path)} cannot be read: {reason}; give the path of a text file."
+            f"the map file {shown(path)} cannot be read: {reason}; give the path of a map file."
         ) from None
     return from_text(text, str(path))
 
