@@ -27,7 +27,7 @@ def checked_world(world: World) -> World:
 def checked_task(task: Task) -> Task:
     """The task, if it is one."""
     if not isinstance(task, Task):
-        raise AntsError(f"task is {shown(task)}; it must be a Task, for example task.paper().")
+        raise AntsError(f"task is {shown(task)}; it must be a Task, for example Task().")
     return task
 
 

@@ -151,7 +151,7 @@ def of_a_dictionary(look):
 
 def test_what_taichi_cannot_compile_is_refused_and_taichi_goes_on(capfd):
     task = Task(observations.register(Observation("mine", 128, of_a_dictionary)).name)
-    with pytest.raises(AntsError, match="^observation 'mine' cannot be used: "):
+    with pytest.raises(AntsError, match=r"^observation 'mine' cannot be used: "):
         train(paper(), CONFIG, 0, 2, 50, task)
     assert capfd.readouterr() == ("", "")
     assert train(paper(), CONFIG, 0, 2, 50).q_values.any()

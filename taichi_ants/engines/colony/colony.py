@@ -169,7 +169,8 @@ class Colony:
         self.seed_words = np.array([seed % 2**64 for seed in self.seeds], dtype=np.uint64)
         runtime.start(threads, arch)
         one = isinstance(world, (str, World)) or not isinstance(world, Iterable)
-        several: Any = (world,) * len(self.seeds) if one else tuple(world)
+        given: Any = (world,) * len(self.seeds) if one else world
+        several = tuple(given)
         if len(several) != len(self.seeds):
             raise AntsError(f"there are {len(several)} worlds for {len(self.seeds)} seeds.")
         check_world = checks.checked_food if learns else checks.checked_world
