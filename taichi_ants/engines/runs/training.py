@@ -100,13 +100,10 @@ def continue_training(
     Args:
         result: What `train` or this function returned.
         episodes: Further episodes of each run, at least 1.
-        threads, arch, progress: As in `train`.
+        threads, arch, progress: As in `train`, which tells the errors, too.
 
     Returns:
         All episodes, old and new; `seconds` is what the new ones took.
-
-    Raises:
-        AntsError: An argument is not allowed; the message names it.
     """
     if not isinstance(result, TrainingResult):
         raise AntsError(f"result is {shown(result)}; give what train has returned.")
