@@ -15,12 +15,7 @@ from taichi_ants.task.rules.vision import see_carrying, see_foraging, state_inde
 
 @cache
 def look_type(observation: Observation, dense: bool) -> Any:
-    """The struct that `row` of an observation reads; vectors have an entry for each cell in view.
-
-    Args:
-        observation: The observation.
-        dense: Whether trail levels are f32, not i32.
-    """
+    """The struct that `row` reads, levels as f32 if dense; vectors go by the cells in view."""
     n = len(observation.cells)
     level = ti.f32 if dense else ti.i32
     of_cells = ti.types.vector(n, ti.i32)

@@ -8,29 +8,20 @@ example "foraging E T O" or "carrying S E O".
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from itertools import product
+from collections.abc import Callable
 from numbers import Integral
+from typing import NamedTuple
 
 from taichi_ants.errors import AntsError, shown
-from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
-from taichi_ants.task.constants import N_STATES, SEES_EMPTY, SEES_GOAL, SEES_LURE, SEES_OBSTACLE
+from taichi_ants.task.constants import N_STATES, SEES_GOAL, SEES_LURE
 
 # Indexed by `carries`, then by code.
 TASK_NAMES: tuple[str, str] = ("foraging", "carrying")
 CELL_LETTERS: tuple[str, str] = ("EOTF", "EOSQ")
 
 
-@dataclass(frozen=True)
-class State:
-    """What an ant knows.
-
-    Attributes:
-        carries: Whether it carries food.
-        left: Code 0..3 of the cell at heading - 1.
-        forward: Code 0..3 of the cell at its heading.
-        right: Code 0..3 of the cell at heading + 1.
-    """
+class State(NamedTuple):
+    """What an ant knows: whether it carries food, and the codes 0 to 3 of the cells in view."""
 
     carries: bool
     left: int
@@ -44,17 +35,8 @@ class State:
 
 
 def state_index(carries: bool, left: int, forward: int, right: int) -> int:
-    """The index 64 * carries + 16 * left + 4 * forward + right, in 0..127.
-
-    Raises:
-        AntsError: A code is not 0, 1, 2 or 3.
-    """
-    for name, code in (("left", left), ("forward", forward), ("right", right)):
-        if not isinstance(code, Integral) or not 0 <= code <= 3:
-            raise AntsError(
-                f"the code of the cell {name} is {shown(code)}; it must be 0, 1, 2 or 3."
-            )
-    return 64 * bool(carries) + 16 * int(left) + 4 * int(forward) + int(right)
+    """The index 64 * carries + 16 * left + 4 * forward + right, in 0..127."""
+    return 64 * bool(carries) + 16 * left + 4 * forward + right
 
 
 def state_from_index(index: int) -> State:
@@ -72,11 +54,27 @@ def state_from_index(index: int) -> State:
     return State(bool(index >> 6), (index >> 4) & 3, (index >> 2) & 3, index & 3)
 
 
-def state_name(index: int) -> str:
-    """The name of a state, for example "foraging E T O"; raises as `state_from_index` does."""
-    state = state_from_index(index)
-    letters = CELL_LETTERS[state.carries]
-    return " ".join((TASK_NAMES[state.carries], *(letters[code] for code in state.view)))
+def name_of_codes(n_cells: int, foraging: str, carrying: str) -> Callable[[int], str]:
+    """A function that names rows of a table, such as "foraging E T O".
+
+    Args:
+        n_cells: How many cells are in view; the row is the load, then their codes as digits.
+        foraging, carrying: The letter of each code for an ant without and with food.
+    """
+
+    def name_of(row: int) -> str:
+        codes = []
+        for _ in range(n_cells):
+            row, code = divmod(row, len(foraging))
+            codes.append(code)
+        letters = (foraging, carrying)[row]
+        return " ".join((TASK_NAMES[row], *(letters[code] for code in reversed(codes))))
+
+    return name_of
+
+
+# The name of a state by its index.
+state_name = name_of_codes(3, *CELL_LETTERS)
 
 
 def parse_state(name: str) -> int:
@@ -98,40 +96,17 @@ def parse_state(name: str) -> int:
     )
 
 
-def _foraging_indices() -> set[int]:
-    """Any cell in view can be empty, blocked, food or (equally strong, so all seen) a trail."""
-    codes = (SEES_EMPTY, SEES_OBSTACLE, SEES_LURE, SEES_GOAL)
-    return {state_index(False, *view) for view in product(codes, repeat=3)}
-
-
-def _carrying_indices() -> set[int]:
-    """What an ant with food can see, from where it can stand and turn.
-
-    The pattern of nearer neighbours depends only on the direction of the queen, so the cells
-    within distance 2 of her show every pattern. Each cell but hers may be empty or blocked.
-    """
-    indices = set()
-    for x, y in product(range(-2, 3), repeat=2):
-        own = _distance((x, y, 0))
-        if not 1 <= own <= 2:
-            continue
-        around = [_distance((x + dx, y + dy, dz)) for dx, dy, dz in HEADING_STEPS]
-        for heading in range(N_HEADINGS):
-            seen = [around[(heading + turn) % N_HEADINGS] for turn in (-1, 0, 1)]
-            choices = [
-                (SEES_GOAL,)
-                if distance == 0
-                else (SEES_OBSTACLE, SEES_LURE if distance < own else SEES_EMPTY)
-                for distance in seen
-            ]
-            indices |= {state_index(True, *view) for view in product(*choices)}
-    return indices
-
-
-def _distance(cell: tuple[int, int, int]) -> int:
-    """Distance to the origin: the largest coordinate of the normal form."""
-    return max(cell) - min(cell)
+def _can_occur(state: State) -> bool:
+    """Whether the rules can produce a state, see section 1.5 of the paper."""
+    queens, nearer = state.view.count(SEES_GOAL), state.view.count(SEES_LURE)
+    if not state.carries:
+        return True
+    if queens:  # there is one, and nothing is nearer to her than the cells beside hers
+        return queens == 1 and nearer == 0
+    return not state.left == state.right == SEES_LURE
 
 
 # The 100 indices that the rules can produce, ascending.
-REACHABLE_STATES: tuple[int, ...] = tuple(sorted(_foraging_indices() | _carrying_indices()))
+REACHABLE_STATES: tuple[int, ...] = tuple(
+    index for index in range(N_STATES) if _can_occur(state_from_index(index))
+)

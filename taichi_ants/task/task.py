@@ -94,8 +94,3 @@ class Task:
                 )
         parts = {name: kind(**facts[name]) for name, kind in _PARTS.items() if name in facts}
         return cls(**{**facts, **parts})
-
-
-def paper() -> Task:
-    """The paper's task, which is the default everywhere."""
-    return Task()

@@ -25,6 +25,7 @@ from command_lines import (
 )
 
 from taichi_ants import Colony, Life, Pheromone, Task, TrainingConfig, load_policy, worlds
+from taichi_ants.engines.colony.layout import AntRow
 from taichi_ants.learners import registry
 
 SEEDS, EPISODES, TICKS, ROLLOUTS = (3, 4), 4, 80, 2
@@ -370,7 +371,7 @@ def test_colonies_live_side_by_side_and_can_start_spread(capsys, tmp_path, monke
         assert (status, err) == (0, "")
         assert out.startswith("45 ants in 5 colonies, 60 ticks in ")
         colony = Colony.load("x.npz")
-        assert (colony.task, colony.population.start) == (task(), place)
+        assert (colony.task, colony.start) == (task(), place)
         assert colony.seeds == (3, 4, 5, 6, 7)
         world = worlds.open_world(3, (20, 20, 20))
         assert set(colony.worlds) == {world}
@@ -381,7 +382,7 @@ def test_colonies_live_side_by_side_and_can_start_spread(capsys, tmp_path, monke
         assert alone.outcome().deliveries[0, 0] == colony.outcome().deliveries[0, 2]
         assert np.array_equal(alone.q_values[0], colony.q_values[2])
         cells, _ = world.start(5, 9, place)
-        assert np.array_equal(colony.layout.start_cells[2], cells)
+        assert np.array_equal(colony.at_start["ants"][AntRow.CELL, 18:27], cells)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from random_worlds import random_world
-from taichi_ants.engines.runs.launches import LaunchPlan
 
 from taichi_ants import Task, TrainingConfig, continue_training, evaluate, train
 from taichi_ants.engines.runs import engine as run_engine
@@ -84,10 +83,10 @@ def test_a_configuration_that_is_listed_twice_runs_twice(expected):
         assert np.array_equal(array[0], getattr(expected, name)[1, :2])
 
 
-@pytest.mark.parametrize("size", [LaunchPlan(1, EPISODES), LaunchPlan(3, 7), LaunchPlan(1000, 1)])
+@pytest.mark.parametrize("size", [(1, EPISODES), (3, 7), (1000, 1)])
 def test_whatever_the_size_of_launches(size, expected, monkeypatch):
     used = []
-    monkeypatch.setattr(run_engine, "plan_launches", lambda *sizes: used.append(sizes) or size)
+    monkeypatch.setattr(run_engine, "size_of_launch", lambda *sizes: used.append(sizes) or size)
     again = train(paper(), CONFIGS, SEEDS, EPISODES, MAX_STEPS, CONTINUING, threads=2)
     assert used
     assert_same(again, expected)

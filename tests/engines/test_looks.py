@@ -112,21 +112,46 @@ def of_a_division_by_zero(look):
     return 100 // look.strongest
 
 
+def of_a_vector(look):
+    return look.codes
+
+
+def of_what_overflows(look):
+    return (look.percept * 1_000_000_000) % 128
+
+
+def of_the_end(look):
+    return look.codes[-1]
+
+
 @pytest.mark.parametrize(
     ("row", "says"),
     [
         (beyond_the_table, "row gives 128, but it must lie between 0 and 127"),
         (below_the_table, "row gives -1, but it must lie between 0 and 127"),
         (of_what_there_is_not, "has no attribute 'smell'"),
-        (of_a_cell_too_far, "it ends the process"),
-        (of_a_division_by_zero, "it ends the process"),
+        (of_a_cell_too_far, "index out of range"),
+        (of_the_end, "there is no entry -1"),
+        (of_a_division_by_zero, "divide by zero"),
+        (of_a_vector, "row fails"),
+        (of_what_overflows, "overflow"),
     ],
 )
-def test_what_cannot_work_is_refused_and_the_process_lives(row, says, capfd):
-    task = Task(observations.register(Observation("mine", 128, row)).name)
+def test_what_gives_wrong_rows_is_refused_at_once(row, says):
     with pytest.raises(AntsError) as caught:
-        train(paper(), CONFIG, 0, 2, 50, task)
+        observations.register(Observation("mine", 128, row))
     assert str(caught.value).startswith("observation 'mine' cannot be used: ")
     assert says in str(caught.value)
+    assert "mine" not in observations.names()
+
+
+def of_a_dictionary(look):
+    return {0: 1, 1: 0}[int(look.carries)]
+
+
+def test_what_taichi_cannot_compile_is_refused_and_taichi_goes_on(capfd):
+    task = Task(observations.register(Observation("mine", 128, of_a_dictionary)).name)
+    with pytest.raises(AntsError, match=r"^observation 'mine' cannot be used: "):
+        train(paper(), CONFIG, 0, 2, 50, task)
     assert capfd.readouterr() == ("", "")
-    assert train(paper(), CONFIG, 0, 2, 50).q_values.any()  # Taichi goes on
+    assert train(paper(), CONFIG, 0, 2, 50).q_values.any()

@@ -80,12 +80,6 @@ def test_an_index_out_of_range_is_refused(index: float) -> None:
         state_from_index(index)
 
 
-@pytest.mark.parametrize("codes", [(4, 0, 0), (0, -1, 0), (0, 0, 7)])
-def test_a_code_out_of_range_is_refused(codes: tuple[int, int, int]) -> None:
-    with pytest.raises(AntsError, match="must be 0, 1, 2 or 3"):
-        state_index(False, *codes)
-
-
 def test_the_reachable_states_are_those_that_the_paper_counts() -> None:
     views = {state_name(index) for index in REACHABLE_STATES}
     foraging = {name for name in views if name.startswith("foraging")}

@@ -11,12 +11,12 @@ import pytest
 from random_rewards import random_rewards
 
 from taichi_ants.errors import AntsError
-from taichi_ants.task import Life, Pheromone, Rewards, Task, observations, paper
+from taichi_ants.task import Life, Pheromone, Rewards, Task, observations
 from taichi_ants.task.observations import Observation, registry
 
 
 def test_the_defaults_are_the_rules_of_the_world():
-    task = paper()
+    task = Task()
     assert task == Task()
     assert hash(task) == hash(Task())
     assert dataclasses.astuple(task.pheromone) == ("linear", None, 0.0, "set", 250, None)

@@ -168,15 +168,7 @@ class Colony:
         self.seeds = checks.checked_seeds(seeds)
         self.seed_words = np.array([seed % 2**64 for seed in self.seeds], dtype=np.uint64)
         runtime.start(threads, arch)
-        one = isinstance(world, (str, World)) or not isinstance(world, Iterable)
-        several: Any = (world,) * len(self.seeds) if one else tuple(world)
-        if len(several) != len(self.seeds):
-            raise AntsError(f"there are {len(several)} worlds for {len(self.seeds)} seeds.")
-        check_world = checks.checked_food if learns else checks.checked_world
-        self.worlds: tuple[World, ...] = tuple(check_world(one) for one in several)
-        ranges = {world.ranges for world in self.worlds}
-        if len(ranges) > 1:
-            raise AntsError(f"the worlds have the ranges {sorted(ranges)}; all must have the same.")
+        self.worlds = _checked_worlds(world, len(self.seeds), learns)
         self.grid = self.worlds[0].grid
         life = self.task.life
         self._ants_change = life.births or life.lifespan is not None
@@ -226,7 +218,7 @@ class Colony:
 
     def _advance(self, n: int) -> None:
         if self.schedule == "by_world":
-            self._launch("", n)
+            self._launch(None, n)
             self.ticks += n
             return
         rounds = self.training.planning_steps if self._plans_together else 0
@@ -407,8 +399,8 @@ class Colony:
             row[:] = row[order]
         self.arrays["streams"][:] = self.arrays["streams"][order]
 
-    def _launch(self, phases: str, n_ticks: int = 0) -> None:
-        """Do some phases by chunk, or whole ticks by world."""
+    def _launch(self, phases: str | None, n_ticks: int = 1) -> None:
+        """Do some phases of `kernels` by chunk; whole ticks by world if none are named."""
         from taichi_ants.engines.arguments import Arguments
         from taichi_ants.engines.colony import kernels
 
@@ -469,3 +461,19 @@ class Colony:
             "floats_by_8": memory.floats // 8,  # see the runs' `engine`
             "integers_by_8": memory.integers // 8,
         }
+
+
+def _checked_worlds(
+    world: World | Sequence[World], n_seeds: int, learns: bool
+) -> tuple[World, ...]:
+    """A world for each seed, all of the same ranges."""
+    one = isinstance(world, (str, World)) or not isinstance(world, Iterable)
+    given: Any = (world,) * n_seeds if one else world
+    check_world = checks.checked_food if learns else checks.checked_world
+    worlds = tuple(check_world(one) for one in given)
+    if len(worlds) != n_seeds:
+        raise AntsError(f"there are {len(worlds)} worlds for {n_seeds} seeds.")
+    ranges = {world.ranges for world in worlds}
+    if len(ranges) > 1:
+        raise AntsError(f"the worlds have the ranges {sorted(ranges)}; all must have the same.")
+    return worlds

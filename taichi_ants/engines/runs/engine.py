@@ -121,11 +121,7 @@ class Runs:
     ) -> Runs:
         """Runs that follow tables (n, n_states, 5) with a constant epsilon.
 
-        Args:
-            tables: The action values.
-            seeds: Python integers (n,).
-            numbers: Which rollouts of a seed, (episodes,); each has a stream of its own.
-            epsilon: Probability of a random action.
+        They do the rollouts of these `numbers` (episodes,), each with a stream of its own.
         """
         state = RunState.empty((len(tables),), tables.shape[-2])
         state.q[:, 0, :, :N_ACTIONS] = tables

@@ -82,19 +82,9 @@ def rollout(
     task: Task | None = None,
     epsilon: float = 0.0,
 ) -> Trace:
-    """One episode with a fixed policy: rollout `number` of the seed, as `evaluate` does it.
+    """One episode with one table (n_states, 5): rollout `number` of the seed, from 0.
 
-    Args:
-        world: The world.
-        q_values: float (n_states, 5), action values; the best action is taken, ties at random.
-        seed: The seed.
-        number: Which of the seed's rollouts, from 0.
-        max_steps: Steps after which the episode is truncated.
-        task: The rules of the game; None is the paper's.
-        epsilon: Probability of a random action.
-
-    Raises:
-        AntsError: An argument is not allowed; the message names it.
+    Other arguments and errors are those of `evaluate`.
     """
     task = checks.checked_runs_task(task)
     tables = checks.checked_q_values(q_values, task)
@@ -116,16 +106,12 @@ def trace_policies(
     """Rollout 0 of each of many policies, some policies at a time.
 
     Args:
-        world: The world.
+        world, max_steps, task: As in `evaluate`, which tells the errors, too.
         q_values: float (n, n_states, 5), action values of each policy.
         seeds: Their seeds (n,); a seed may come several times.
-        max_steps, task: As in `rollout`.
 
     Yields:
         The steps of the first policies, of the next ones, and so on, in order.
-
-    Raises:
-        AntsError: An argument is not allowed; the message names it.
     """
     task = checks.checked_runs_task(task)
     tables = checks.checked_q_values(q_values, task)

@@ -6,6 +6,7 @@ import copy
 import operator
 from collections.abc import Sequence
 from dataclasses import astuple, replace
+from functools import partial
 
 import numpy as np
 
@@ -98,13 +99,10 @@ def continue_training(
     Args:
         result: What `train` or this function returned.
         episodes: Further episodes of each run, at least 1.
-        threads, arch, progress: As in `train`.
+        threads, arch, progress: As in `train`, which tells the errors, too.
 
     Returns:
         All episodes, old and new; `seconds` is what the new ones took.
-
-    Raises:
-        AntsError: An argument is not allowed; the message names it.
     """
     if not isinstance(result, TrainingResult):
         raise AntsError(f"result is {shown(result)}; give what train has returned.")
@@ -126,10 +124,8 @@ def continue_training(
     work, done, seconds = sum(runs.cost * len(runs) for runs in several), 0.0, 0.0
     for group, runs in zip(groups.values(), several, strict=True):
         share = runs.cost * len(runs) / work
-        given, took = do_episodes(
-            *(result.world, result.task, result.max_steps, runs, episodes),
-            progress and (lambda part, done=done, share=share: progress(done + share * part)),
-        )
+        part = progress and partial(_report, progress, done, share)
+        given, took = do_episodes(result.world, result.task, result.max_steps, runs, episodes, part)
         outcomes[:, group] = given.reshape(3, len(group), shape[1], episodes)
         check_finite(runs.state.q, [result.configs[c] for c in group], result.seeds)
         state.put(group, runs.state)
@@ -142,6 +138,11 @@ def continue_training(
     return replace(
         result, returns=returns, steps=steps, deliveries=deliveries, seconds=seconds, state=state
     )
+
+
+def _report(progress: Progress, done: float, share: float, part: float) -> None:
+    """Report the progress of one part of the work as that of all."""
+    progress(done + share * part)
 
 
 def _check_memory(result: TrainingResult) -> None:

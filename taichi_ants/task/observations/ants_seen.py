@@ -1,7 +1,7 @@
 """The three cells ahead; another ant is told from a rock."""
 
-from taichi_ants.task.observations.names import name_of_codes
 from taichi_ants.task.observations.registry import Observation
+from taichi_ants.task.states import name_of_codes
 
 
 def row(look):

@@ -140,30 +140,32 @@ def _refuse_wrong_rows(observation: Observation) -> None:
 def _drawn_looks(observation: Observation) -> Iterator[SimpleNamespace]:
     """What ants could look at, in numbers of the types that kernels have."""
     rng, shape = np.random.default_rng(0), (_LOOKS, len(observation.cells))
-    ants = rng.integers(0, 3, shape) * (rng.random(shape) < 0.3)
+    ahead = list(observation.ahead)
+    ants = rng.integers(0, 3, shape, np.int32) * (rng.random(shape) < 0.3)
     drawn = rng.choice([EMPTY, EMPTY, OBSTACLE, FOOD, QUEEN], shape)
-    ground = np.where(ants > 0, OBSTACLE, drawn)
-    nearer, carries = rng.integers(0, 2, shape), rng.integers(0, 2, _LOOKS)
+    ground = np.where(ants > 0, OBSTACLE, drawn).astype(np.int32)
+    nearer = rng.integers(0, 2, shape, np.int32)
+    carries = rng.integers(0, 2, _LOOKS, np.int32)
     trails = rng.integers(0, 2, shape) * 10.0 ** rng.uniform(-1, 6, shape)
     for n in range(_LOOKS):
-        number = (np.int32, np.float32)[n % 2]  # of levels
-        levels = np.where(ground[n] == EMPTY, trails[n], 0).astype(number)
-        strongest = levels[list(observation.ahead)].max()
+        trail = trails[n].astype(np.int32 if n % 2 else np.float32)
+        levels = trail * (ground[n] == EMPTY)
+        strongest = levels[ahead].max()
         if carries[n]:
             lure, codes = (ground[n] == EMPTY) & (nearer[n] == 1), ground[n] >> 2
         else:
             lure, codes = 2 * levels >= max(strongest, 2), ground[n] & 3
-        codes = np.where(lure, SEES_LURE, codes)
-        left, forward, right = codes[list(observation.ahead)]
+        codes[lure] = SEES_LURE
+        left, forward, right = codes[ahead]
         yield SimpleNamespace(
-            carries=np.int32(carries[n]),
-            percept=np.int32(carries[n] << 6 | left << 4 | forward << 2 | right),
-            codes=_Vector(np.int32(codes)),
+            carries=carries[n],
+            percept=carries[n] << 6 | left << 4 | forward << 2 | right,
+            codes=_Vector(codes),
             levels=_Vector(levels),
             strongest=strongest,
-            ants=_Vector(np.int32(ants[n])),
-            nearer=_Vector(np.int32(nearer[n])),
-            own_level=number(trails[n, 0]),
+            ants=_Vector(ants[n]),
+            nearer=_Vector(nearer[n]),
+            own_level=trail[0],
         )
 
 

@@ -1,7 +1,7 @@
 """The paper's codes, in all six cells around."""
 
-from taichi_ants.task.observations.names import name_of_codes
 from taichi_ants.task.observations.registry import Observation
+from taichi_ants.task.states import name_of_codes
 
 CELLS = (-2, -1, 0, 1, 2, 3)
 

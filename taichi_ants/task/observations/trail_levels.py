@@ -1,7 +1,7 @@
 """The three cells ahead; a trail is weak, middling or strong, relative to the strongest ahead."""
 
-from taichi_ants.task.observations.names import name_of_codes
 from taichi_ants.task.observations.registry import Observation
+from taichi_ants.task.states import name_of_codes
 
 
 def row(look):

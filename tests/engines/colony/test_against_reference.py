@@ -12,7 +12,8 @@ from random_rewards import random_rewards
 from taichi_ants import AntsError, Colony, TrainingConfig, learners, worlds
 from taichi_ants.engines.colony.layout import AntRow, HomeRow, Stage, WorldRow
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.task import Task, observations
+from taichi_ants.task import Observation, Task, observations
+from taichi_ants.task.observations import registry
 
 # Each entry is a kernel of its own, so that there are few: learner, sharing, observation, dense.
 KERNELS = [
@@ -123,7 +124,7 @@ def test_each_learner_and_observation_is_compared():
         name for name in learners.registry.BUILT_IN if not learners.get(name).needs_episode_end
     }
     assert {kernel[0] for kernel in KERNELS} == possible
-    assert {kernel[2] for kernel in KERNELS} == set(observations.names()) - {"crowd"}
+    assert {kernel[2] for kernel in KERNELS} == set(observations.names())
 
 
 def crowd(look):
@@ -134,17 +135,21 @@ def crowd(look):
     return index
 
 
-CROWD = observations.register(observations.Observation("crowd", 3**6, crowd, (-1, 0, 1, 2, 3, -2)))
+@pytest.fixture
+def seen_crowd(monkeypatch):
+    """The observation, registered for one test."""
+    monkeypatch.setattr(registry, "_OBSERVATIONS", dict(registry._OBSERVATIONS))
+    return observations.register(Observation("crowd", 3**6, crowd, (-1, 0, 1, 2, 3, -2)))
 
 
-def test_ants_see_which_ants_stand_around_them_and_what_these_carry():
+def test_ants_see_which_ants_stand_around_them_and_what_these_carry(seen_crowd):
     """By a registered observation, after moves, pick-ups, gives, births and deaths."""
     loads = np.zeros(3, dtype=int)
     for seed in range(40):
         drawn = random_colony(seed, sharing="fixed", dense=False)
         task = replace(drawn.task, observation="crowd")
         given = (drawn.world, task, drawn.training, drawn.seed)
-        table = np.zeros((CROWD.n_states, 5), np.float32)  # any action, at random
+        table = np.zeros((seen_crowd.n_states, 5), np.float32)  # any action, at random
         colony = Colony(*given, **drawn.population, sharing="fixed", q_values=table)
         colony.begin_episode()
         for _ in range(15):
@@ -153,7 +158,7 @@ def test_ants_see_which_ants_stand_around_them_and_what_these_carry():
             ants = ants[:, ants[AntRow.STAGE] == Stage.LIVING]
             load = dict(zip(ants[AntRow.CELL].tolist(), ants[AntRow.CARRIES].tolist(), strict=True))
             for cell, heading, row in ants[[AntRow.CELL, AntRow.HEADING, AntRow.STATE]].T.tolist():
-                steps = [colony.layout.grid.offsets[(heading + k) % 6] for k in CROWD.cells]
+                steps = [colony.grid.offsets[(heading + k) % 6] for k in seen_crowd.cells]
                 seen = [1 + load[cell + step] if cell + step in load else 0 for step in steps]
                 assert row == int("".join(map(str, seen)), 3)
                 loads += np.bincount(seen, minlength=3)

@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from taichi_ants import AntsError, Colony, TrainingConfig, World, worlds
+from taichi_ants.checks import MAX_ANTS
 from taichi_ants.engines.colony.layout import WorldRow
-from taichi_ants.learners.policies import random_policy
+from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.rendering import colony_moments
 from taichi_ants.task import Life, Pheromone, Task
 from taichi_ants.task.constants import FOOD
@@ -111,7 +112,15 @@ def test_births_fill_the_slots_and_no_more():
     ("arguments", "said"),
     [
         ({"ants": 5000}, "5000"),
+        ({"ants": 0}, "ants is 0; it must lie between 1"),
+        ({"ants": 1.0}, "ants is 1.0; it must be a whole number"),
+        ({"ants": MAX_ANTS + 1}, "ants is"),
         ({"ants": 8, "capacity": 7}, "capacity is 7, but 8 ants start"),
+        ({"capacity": 1.5}, "capacity is 1.5"),
+        ({"start": "queen"}, "start is 'queen'; it must be one of nest, spread"),
+        ({"ends_at_delivery": None}, "ends_at_delivery is None"),
+        ({"ends_at_delivery": True, "ants": 2}, "ends_at_delivery is set with 2 ants"),
+        ({"ends_at_delivery": True, "task": Task(life=Life(births=True))}, "births True"),
         ({"task": 3}, "task is 3"),
         (
             {
@@ -148,6 +157,43 @@ def test_wrong_arguments_are_named(arguments, said):
     with pytest.raises(AntsError, match=r"[.]$") as caught:
         Colony(**{**usual, **arguments})
     assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("settings", "capacity"),
+    [
+        ({}, 1),
+        ({"ants": 7}, 7),
+        ({"ants": np.int64(7), "capacity": np.int32(9)}, 9),
+        ({"ants": 7, "task": Task(life=Life(births=True))}, 78),
+        ({"ants": 7, "capacity": 7, "task": Task(life=Life(births=True))}, 7),
+    ],
+)
+def test_the_capacity_leaves_room_for_ants_that_are_born(settings, capacity):
+    usual = {"world": worlds.paper(), "task": None, "training": TRAINING}
+    assert Colony(**{**usual, **settings}).capacity == capacity
+
+
+@pytest.mark.parametrize("schedule", ["by_world", "by_chunk"])
+@pytest.mark.parametrize("pheromone", [Pheromone(), Pheromone(diffusion=0.5)])
+def test_a_world_whose_episode_has_ended_stays_as_it_is(schedule, pheromone):
+    """Trails too stand still, whatever the other worlds do."""
+    task = Task(pheromone=pheromone, evaporation_in_evaluation=True)
+    colony = Colony(
+        *(worlds.paper(), task, TRAINING, (1, 2)),
+        sharing="fixed",
+        q_values=trail_follower(),
+        ends_at_delivery=True,
+        schedule=schedule,
+    )
+    colony.begin_episode()
+    while not (ticks := colony.outcome().first_delivery[0, 0]) > 0:
+        colony.tick()
+    ended = colony.snapshot(0)
+    assert ended.trail.any()
+    assert colony.outcome().ticks[0, 0] == ticks
+    colony.tick(7)
+    assert colony.snapshot(0) == ended
 
 
 def test_both_schedules_agree_where_places_stay_vacant():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from taichi_ants.engines.runs.launches import plan_launches
 
 from taichi_ants import (
     AntsError,
@@ -20,6 +19,7 @@ from taichi_ants import (
     worlds,
 )
 from taichi_ants.checks import checked_count, checked_seeds, checked_seeds_for
+from taichi_ants.engines.runs.engine import pieces, size_of_launch
 from taichi_ants.errors import shown
 from taichi_ants.rendering import Scene
 from taichi_ants.worlds import World, paper
@@ -273,9 +273,7 @@ def test_results_have_the_documented_forms():
     assert (result.configs, result.seeds) == ((CONFIG, PLANS), (3, 1, 2))
     result.q_values[:] = 1  # a copy
     assert not (result.q_values == 1).all()
-    costs = [(cost.learner, cost.planning_steps, cost.steps) for cost in result.costs]
-    steps = result.steps.sum(axis=(1, 2)).tolist()
-    assert costs == [("q_learning", 0, steps[0]), ("dyna_q", 2, steps[1])]
+    assert result.seconds > 0
 
     for shape in ((), (3,), (2, 3)):
         outcome = evaluate(paper(), np.zeros((*shape, 128, 5)), 6, max_steps=20)
@@ -327,24 +325,21 @@ def test_messages_stay_short_whatever_they_name(value):
 @pytest.mark.parametrize("cells", [11, 500, 10**8])
 def test_launches_are_short_and_can_be_indexed(workers, episodes, max_steps, cells):
     for cost, widest in ((1, 1024), (250, 10**7)):
-        plan = plan_launches(workers, episodes, max_steps, cost, cells, widest)
-        assert plan.runs >= 1
-        assert 1 <= plan.episodes <= episodes
-        assert plan.runs == 1 or plan.runs * cells * 4 <= 2**28
-        assert plan.runs * widest < 2**31
-        assert plan.runs * plan.episodes < 2**31
+        runs, each = size_of_launch(workers, episodes, max_steps, cost, cells, widest)
+        assert runs >= 1
+        assert 1 <= each <= episodes
+        assert runs == 1 or runs * cells * 4 <= 2**28
+        assert runs * widest < 2**31
+        assert runs * each < 2**31
         # A second of a thread, if every episode has its greatest length, or one episode.
-        steps = -(-plan.runs // workers) * plan.episodes * max_steps
-        assert plan.episodes == 1 or steps * 25 * cost <= 1.1e9
+        steps = -(-runs // workers) * each * max_steps
+        assert each == 1 or steps * 25 * cost <= 1.1e9
 
 
 @pytest.mark.parametrize(("n_runs", "n_episodes"), [(1, 1), (7, 500), (8, 3), (20, 10)])
 def test_launches_cover_all_work_once_and_episodes_in_order(n_runs, n_episodes):
-    plan = plan_launches(2, 4, 3_000_000, 1, 500, 1024)
     done = np.zeros((n_runs, n_episodes), int)
-    for launch in plan.launches(n_runs, n_episodes):
-        rows = slice(launch.first, launch.first + launch.count)
-        assert launch.end <= n_episodes
-        assert (done[rows, : launch.begin] == 1).all()
-        done[rows, launch.begin : launch.end] += 1
+    for runs, episodes in pieces(n_runs, n_episodes, 3, 4):
+        assert (done[runs, : episodes.start] == 1).all()
+        done[runs, episodes] += 1
     assert (done == 1).all()
