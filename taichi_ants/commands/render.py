@@ -27,7 +27,7 @@ from taichi_ants.studies.command_line import (
 if TYPE_CHECKING:
     import numpy as np
 
-    from taichi_ants import World
+    from taichi_ants import Task, World
     from taichi_ants.learners.config import TrainingConfig
     from taichi_ants.rendering import Stage
     from taichi_ants.rendering.moments import Moment
@@ -133,9 +133,9 @@ def show_episode(settings: argparse.Namespace, world: World) -> None:
     """Write an episode as an animation, or its end as a picture."""
     from taichi_ants.rendering import Episode
 
-    q_values, title = find_policy(settings, world)
+    q_values, task, title = find_policy(settings, world)
     rules = {"seed": settings.seed, "max_steps": settings.max_steps, "epsilon": settings.epsilon}
-    episode = Episode.play(world, q_values, **rules)
+    episode = Episode.play(world, q_values, task=task, **rules)
     _save_moments(settings, episode.moments(), len(episode), title)
     outcome = "delivered" if episode.delivered else "not delivered"
     rewards = int(episode.trace.rewards.sum())
@@ -151,10 +151,10 @@ def show_colony(settings: argparse.Namespace, world: World) -> None:
     from taichi_ants.errors import count
     from taichi_ants.rendering import colony_moments
 
-    q_values, title = find_policy(settings, world)
+    q_values, task, title = find_policy(settings, world)
     config = replace(training_config(settings), epsilon=settings.epsilon, min_epsilon=0.0)
     who = (config, settings.seed, settings.ants)
-    colony = Colony(world, None, *who, sharing="fixed", q_values=q_values)
+    colony = Colony(world, task, *who, sharing="fixed", q_values=q_values)
     colony.begin_episode()
     moments = colony_moments(colony, settings.ticks, settings.every)
     _save_moments(settings, moments, 1 + -(-settings.ticks // settings.every), title)
@@ -178,28 +178,30 @@ def show_sheet(settings: argparse.Namespace, world: World) -> None:
     """Write what a policy does in each state."""
     from taichi_ants.rendering import policy_sheet, save_picture
 
-    q_values, title = find_policy(settings, world)
-    save_picture(settings.out, policy_sheet(q_values, title, complete=settings.all_states))
+    q_values, task, title = find_policy(settings, world)
+    sheet = policy_sheet(q_values, title, complete=settings.all_states, task=task)
+    save_picture(settings.out, sheet)
     print(f"{settings.out}: the best action in each state")
 
 
-def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray, str]:
-    """The action values (128, 5) to follow, and a title that says where they come from."""
+def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray, Task, str]:
+    """The action values (n_states, 5) to follow, their task, and a title that says whence."""
     from taichi_ants import Colony, Task, load_policy, train
 
     if settings.policy:
-        q_values = load_policy(settings.policy).q_values
-        return q_values, settings.title or f"policy {Path(settings.policy).stem}"
+        policy = load_policy(settings.policy)
+        title = settings.title or f"policy {Path(settings.policy).stem}"
+        return policy.q_values, Task(policy.observation), title
     config, seed, episodes = training_config(settings), settings.seed, settings.episodes
     title = settings.title or f"{settings.learner} after {episodes} episodes"
     with progress_bar("Training") as progress:
         if settings.kind != "colony":
             result = train(world, config, seed, episodes, progress=progress)
-            return result.q_values[0, 0], title
+            return result.q_values[0, 0], Task(), title
         task = Task(evaporation_in_training=True)  # trails fall while it learns too
         colony = Colony(world, task, config, seed, settings.ants)
         colony.run(episodes, settings.ticks, progress)
-    return colony.q_values[0], title
+    return colony.q_values[0], task, title
 
 
 def training_config(settings: argparse.Namespace) -> TrainingConfig:

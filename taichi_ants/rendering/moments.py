@@ -119,14 +119,8 @@ class Episode:
         elif self.delivered:
             lines.append(("outcome", "delivered"))
         low, high = float(trace.q_values.min(initial=0)), float(trace.q_values.max(initial=0))
-        return Status(
-            tuple(lines),
-            state,
-            self.q_values[state],
-            action,
-            (low, high) if low < high else (0.0, 1.0),
-            observation,
-        )
+        q_range = (low, high) if low < high else (0.0, 1.0)
+        return Status(tuple(lines), state, self.q_values[state], action, q_range, observation)
 
 
 def colony_moments(colony: Colony, ticks: int = 0, every: int = 1) -> Iterator[Moment]:

@@ -101,6 +101,16 @@ def test_a_still_and_a_sheet(tmp_path, policy) -> None:
     assert Image.open(tmp_path / "all.png").height > 1500
 
 
+@pytest.mark.parametrize("shown", ["episode", "colony", "sheet"])
+def test_a_policy_of_another_observation_is_shown_as_such(tmp_path, shown) -> None:
+    path = tmp_path / "five.npz"
+    save_policy(path, np.eye(2048, 5), {}, "five_cells")
+    length = {"episode": ["--max-steps", "2"], "colony": ["--ticks", "2"], "sheet": []}[shown]
+    done = run(shown, "--policy", path, *length, "--out", tmp_path / "a.png")
+    assert done.returncode == 0, done.stderr
+    assert files_in(tmp_path) == ["a.png", "five.npz"]
+
+
 def test_learning_and_a_colony(tmp_path) -> None:
     done = run(
         *("learning", "--stages", "0,2", "--max-steps", 9, "--size", "300x200"),
