@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from taichi_ants import Colony
     from taichi_ants.learners.config import TrainingConfig
     from taichi_ants.studies.colony_study import Plan
-    from taichi_ants.studies.runner import ColonyPoint, Study
+    from taichi_ants.studies.runner import Study
 
 KINDS = {
     "study": "The scaling study of the colony",
@@ -178,11 +178,7 @@ def study(settings: argparse.Namespace) -> None:
 
 
 def do_study(
-    settings: argparse.Namespace,
-    conditions: Plan,
-    asked: Study[ColonyPoint],
-    blocks: Path,
-    ready: Path,
+    settings: argparse.Namespace, conditions: Plan, asked: Study, blocks: Path, ready: Path
 ) -> None:
     """All but the pictures."""
     from taichi_ants import files, save_policy

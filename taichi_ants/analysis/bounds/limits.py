@@ -33,7 +33,6 @@ from taichi_ants.worlds.world import World
 
 TICKS_A_CELL = 3
 TICKS_A_CELL_BESIDE_QUEEN = 2
-_FIRST_HORIZON = 64
 
 
 @dataclass(frozen=True)
@@ -130,13 +129,14 @@ def shortest_cycle(world: World, can_stay: bool) -> float:
     # Where a carrying ant can give; no ant comes to a cell that holds food.
     gives = around.sees(around.queen)
     gives = gives[world.ground()[around.cells[gives % len(around.cells)]] == EMPTY]
-    mean, horizon = np.inf, _FIRST_HORIZON  # short walks are found quickly, and mostly enough
-    while len(gives) and horizon < 8 * half:  # the longest walk has less than 2 * half steps
+    mean, horizon = np.inf, 64  # short walks are found quickly, and mostly enough
+    while len(gives):
         walked = dijkstra(graph, indices=gives, unweighted=True, limit=horizon)
         ticks = walked[:, half + gives] + 1
         mean = least_mean_cycle(ticks)
         # If so, a cycle of walks with one beyond the horizon has a greater mean.
-        if np.isfinite(mean) and mean + (len(gives) - 1) * (mean - ticks.min()) <= horizon:
+        enough = np.isfinite(mean) and mean + (len(gives) - 1) * (mean - ticks.min()) <= horizon
+        if enough or horizon >= 2 * half:  # no walk is longer
             break
         horizon *= 4
     return mean

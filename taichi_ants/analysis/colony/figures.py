@@ -154,10 +154,10 @@ def _draw_panel(axis: Axes, rows: Rows, measure: str, lines: _Lines) -> None:
             elinewidth=1.2,
         )
     limits = {row["ants"]: row["deliveries_limit"] for row in rows}
+    sizes = sorted(limits)
     if measure in ("deliveries", "per_ant"):
-        each = {n: most / (n if measure == "per_ant" else 1) for n, most in limits.items()}
-        sizes = sorted(each)
-        axis.plot(sizes, [each[n] for n in sizes], "--", color=GREY, linewidth=1.2, label="limit")
+        most = [limits[n] / (n if measure == "per_ant" else 1) for n in sizes]
+        axis.plot(sizes, most, "--", color=GREY, linewidth=1.2, label="limit")
     if measure != "blocked" and np.isfinite(axis.dataLim.minposy):  # something is above 0
         axis.set_yscale("log")
         bottom, top = axis.get_ylim()
@@ -165,4 +165,4 @@ def _draw_panel(axis: Axes, rows: Rows, measure: str, lines: _Lines) -> None:
     else:
         axis.margins(y=0.08)
     logarithmic(axis.xaxis, (1,))
-    axis.xaxis.set_major_locator(FixedLocator(sorted(limits)))
+    axis.xaxis.set_major_locator(FixedLocator(sizes))

@@ -69,11 +69,10 @@ def means(rows: Sequence[Mapping[str, Any]], limits: LimitsByArena) -> list[Bloc
     for arena, several in limits.items():
         lines: dict[str, dict[int, float]] = {}
         possible = {}
-        for row in rows:
-            if row["arena"] == arena:
-                words, ants = Design(row["rules"], row["way"]).words, row["ants"]
-                lines.setdefault(words, {})[ants] = row["deliveries_mean"]
-                possible[ants] = row["deliveries_limit"]
+        for row in (one for one in rows if one["arena"] == arena):
+            words, ants = Design(row["rules"], row["way"]).words, row["ants"]
+            lines.setdefault(words, {})[ants] = row["deliveries_mean"]
+            possible[ants] = row["deliveries_limit"]
         lines["limit"] = possible
         cells = [
             [who, *(_short(by[n]) if n in by else MISSING for n in sorted(possible))]
