@@ -131,9 +131,9 @@ def _notes(lines: Sequence[Mapping], comparison: Comparison) -> list[str]:
         f"{APART} the mean lies outside of the IQM's interval: a few far runs have moved it.",
         "Best run: best by return of all configurations, one run each: median [95 %].",
     ]
-    if comparison.in_paper_world:
+    if not all(math.isnan(line["paper_return"]) for line in lines):
         notes += [
-            "Paper: its table 2, which leaves open whether it means all episodes or the last 50.",
+            "Paper: its table 2. Its steps may be of all episodes or of the last 50.",
             "Below: percentage of the best runs below the paper's figure.",
         ]
     if 1 < seeds < FEW_SEEDS:
