@@ -35,7 +35,8 @@ def main() -> None:
     if name in COMMANDS:
         run(name, arguments, f"taichi-ants {name}")
     elif name in ("-h", "--help"):
-        print(f"usage: taichi-ants COMMAND ...\n\n{taichi_ants.__doc__.splitlines()[0]}\n")
+        print("usage: taichi-ants COMMAND ...\n")
+        print("Ants on a hexagonal grid that lay pheromone trails and learn by reinforcement.\n")
         for command, summary in COMMANDS.items():
             print(f"  {command:9} {summary}")
         print("\n`taichi-ants COMMAND --help` tells the rest.")
