@@ -80,12 +80,7 @@ def checked_capacity(
 
 
 def check_sharing(learner: Learner, sharing: str) -> None:
-    """Refuse a learner that cannot learn in a colony, or not into a table that others share."""
-    if learner.needs_episode_end:
-        raise AntsError(
-            f"learner {learner.name!r} needs to know the last step of an episode, which the ants "
-            "of a colony do not; take another one, or train one ant by train(...)."
-        )
+    """Refuse a learner that cannot learn into a table that others share."""
     if sharing == "shared" and learner.td_error is None:
         raise AntsError(
             f"learner {learner.name!r} keeps a memory of its own, so ants cannot share its table; "

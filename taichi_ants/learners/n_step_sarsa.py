@@ -60,7 +60,6 @@ N_STEP_SARSA = Learner(
     learn,
     begin,
     draws_next_action=True,
-    needs_episode_end=True,
     hyperparameters=Steps,
     memory=lambda settings, n_states: Memory(
         floats=settings.n_steps, integers=2 + settings.n_steps

@@ -55,8 +55,6 @@ class Learner:
         plans: The learner keeps `taichi_ants.learners.model` and has the hyperparameter
             `planning_steps`; ants that share a table share the model. Its updates from the model
             have no next action, so td_error may not look at it.
-        needs_episode_end: It looks at whether a step is the last of an episode; colonies, where no
-            ant knows that, refuse it.
         hyperparameters: What it has besides the settings of all learners: a dataclass whose fields
             `number` of `taichi_ants.learners` makes, all with usual values.
         memory: A function (hyperparameters, n_states) -> Memory, where a table has n_states rows.
@@ -71,7 +69,6 @@ class Learner:
     td_error: Any = None
     draws_next_action: bool = False
     plans: bool = False
-    needs_episode_end: bool = False
     hyperparameters: type[Hyperparameters] = Hyperparameters
     memory: Callable[[Any, int], Memory] = lambda settings, n_states: Memory()
     cost: Callable[[Any], float] = lambda settings: 1.0

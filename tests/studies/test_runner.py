@@ -236,7 +236,6 @@ def test_bad_points_of_runs_are_named(change, says):
         ({"rollouts": 0}, "rollouts is 0"),
         ({"after": replace(ALONE, sharing="own")}, "learned into one table"),
         ({"training": LAMBDA}, "'sarsa_lambda' keeps a memory of its own"),
-        ({"training": N_STEP, "sharing": "own"}, "needs to know the last step of an episode"),
     ],
 )
 def test_bad_points_of_colonies_are_named(change, says):

@@ -189,10 +189,16 @@ class Colony:
         self._piece = 1  # ticks that take less than _PIECE_SECONDS
         self.epsilon = float(self.training.epsilon)
         self.episode = -1
+        self.length = 0  # of the episode in ticks, 0 if nobody has said
         self.ticks = 0
 
-    def begin_episode(self) -> None:
-        """Set worlds and ants to their start; the ants look around."""
+    def begin_episode(self, length: int | None = None) -> None:
+        """Set worlds and ants to their start; the ants look around.
+
+        Learners that need to know are told which tick is the last, if `length` says how many ticks
+        there will be.
+        """
+        self.length = 0 if length is None else checks.checked_count("length", length, MAX_STEPS)
         self.episode += 1
         self.ticks = 0
         memory.begin_episode(self)
@@ -260,7 +266,7 @@ class Colony:
         ticks = checks.checked_count("ticks", ticks, MAX_STEPS)
         outcomes = []
         for episode in range(episodes):
-            self.begin_episode()
+            self.begin_episode(ticks)
             for _ in self._pass(ticks):
                 if progress is not None:
                     progress((episode + self.ticks / ticks) / episodes)
@@ -436,6 +442,7 @@ class Colony:
             "n_homes": self.n_homes,  # room for homes in each world
             "size": self.grid.size,
             "episode": self.episode,
+            "length": self.length,
             "evaporates": int(pheromone.evaporation == "linear"),  # of integer trails: the clock
             "deposits": int(pheromone.deposit != "none"),
             "adds": int(pheromone.deposit == "add"),

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 _KIND = FileKind("taichi-ants colony 5", "colony", "Colony.save")
 _OPTIONS = ("seeds", "ants", "capacity", "start", "ends_at_delivery", "sharing", "schedule")
-_MOMENT = ("epsilon", "episode", "ticks")
+_MOMENT = ("epsilon", "episode", "length", "ticks")
 
 
 def save_colony(colony: Colony, path: files.PathLike) -> None:
@@ -79,6 +79,7 @@ def load_colony(
         colony = cls([worlds[number] for number in facts["world_of"]], task, training, **options)
         colony.epsilon = checks.checked_share("epsilon", facts["epsilon"])
         colony.episode = checks.checked_count("episode", facts["episode"], least=-1)
+        colony.length = checks.checked_count("length", facts["length"], least=0)
         colony.ticks = checks.checked_count("ticks", facts["ticks"], least=0)
         for name in colony.stored:
             array, kept = colony.arrays[name], stored[f"array_{name}"]

@@ -43,7 +43,7 @@ def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
             if terminates(c, c.ants[AntRow.EVENT, ant]) == 0:
                 next_action = draw_action(c, v, w, ant, row)
         if ti.static(v.alone):
-            learn_alone(c, v, ant, row, next_action)
+            learn_alone(c, v, ant, row, next_action, tick)
         elif ti.static(v.together):
             share_error(c, v, w, chunk, ant, row, next_action)
     c.ants[AntRow.PERCEPT, ant] = percept
@@ -86,18 +86,21 @@ def forget(c: ti.template(), v: ti.template(), ant):
 
 
 @ti.func
-def learn_alone(c: ti.template(), v: ti.template(), ant, seen, next_action):
+def learn_alone(c: ti.template(), v: ti.template(), ant, seen, next_action, tick):
     """Update the ant's own table, as an ant that is alone does."""
     memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
     event = c.ants[AntRow.EVENT, ant]
+    terminated = terminates(c, event)
+    last = c.ants[AntRow.STAGE, ant] == Stage.DYING or tick + 1 == c.length
+    last = last or (c.ends_at_delivery == 1 and event == DELIVERED)
     step = Transition(
         state=c.ants[v.row_at, ant],
         action=c.ants[AntRow.ACTION, ant],
         reward=ti.cast(c.rewards[event], ti.f32),
         next_state=seen,
         next_action=next_action,
-        terminated=terminates(c, event),
-        truncated=ti.cast(c.ants[AntRow.STAGE, ant] == Stage.DYING, ti.i32),
+        terminated=terminated,
+        truncated=ti.cast(last, ti.i32) & (1 - terminated),
     )
     _, c.streams[ant] = v.learner.learn(
         memory, memory_of(c, v, ant), step, rates_of(c, v), c.streams[ant]

@@ -25,6 +25,7 @@ KERNELS = [
     ("dyna_q", "own", "ants_seen", False),
     ("double_q", "own", "paper", True),
     ("sarsa_lambda", "own", "paper", False),
+    ("n_step_sarsa", "own", "paper", False),
     ("prioritized_sweeping", "own", "trail_levels", False),
     ("q_learning", "fixed", "six_cells", False),
 ]
@@ -98,13 +99,13 @@ def test_every_tick_in_crowded_micro_worlds(learner, sharing, observation, dense
         )
         colony, plain = both(drawn)
         for ticks in (11, 8):
-            colony.begin_episode()
+            colony.begin_episode(ticks)
             plain.begin_episode()
             assert_equal(colony, plain)
-            for _ in range(ticks):
+            for tick in range(ticks):
                 if not plain.over:
                     colony.tick()
-                    plain.tick()
+                    plain.tick(last=tick == ticks - 1)
                     assert_equal(colony, plain)
             colony.end_episode()
             plain.end_episode()
@@ -120,10 +121,7 @@ def test_every_tick_in_crowded_micro_worlds(learner, sharing, observation, dense
 
 
 def test_each_learner_and_observation_is_compared():
-    possible = {
-        name for name in learners.registry.BUILT_IN if not learners.get(name).needs_episode_end
-    }
-    assert {kernel[0] for kernel in KERNELS} == possible
+    assert {kernel[0] for kernel in KERNELS} == set(learners.registry.BUILT_IN)
     assert {kernel[2] for kernel in KERNELS} == set(observations.names())
 
 
@@ -165,14 +163,11 @@ def test_ants_see_which_ants_stand_around_them_and_what_these_carry(seen_crowd):
     assert (loads > 100).all()
 
 
-def test_learners_that_cannot_live_in_a_colony_are_refused():
+def test_learners_whose_tables_cannot_be_shared_are_refused():
     for name in learners.registry.BUILT_IN:
         learner = learners.get(name)
         training = TrainingConfig(name, 0.1, 0.9, 0.1, 1.0)
-        if learner.needs_episode_end:
-            with pytest.raises(AntsError, match=rf"^learner '{name}' needs to know the last step"):
-                Colony(worlds.paper(), Task(), training, sharing="own")
-        elif learner.td_error is None:
+        if learner.td_error is None:
             with pytest.raises(AntsError, match=rf"^learner '{name}' .* take sharing=\"own\"\.$"):
                 Colony(worlds.paper(), Task(), training)
 
