@@ -17,7 +17,7 @@ from taichi_ants.worlds import World, open_world, paper
 
 ABSORBING, CONTINUING = Task(), Task(delivery="continuing")
 SARSA = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.99)
-LAMBDA, N_STEP = (replace(SARSA, learner=name) for name in ("sarsa_lambda", "n_step_sarsa"))
+LAMBDA = replace(SARSA, learner="sarsa_lambda")
 DYNA = TrainingConfig("dyna_q", 0.1, 0.9, 0.3, 0.99, planning_steps=2)
 KINDS = (
     (ABSORBING, SARSA),
