@@ -235,8 +235,8 @@ def live(settings: argparse.Namespace) -> None:
     begun, began = colony.ticks, time.perf_counter()
     with held() as stopped:
         with progress_bar("colony") as progress:
-            files = settings.save, settings.render, settings.every
-            live(colony, settings.ticks, progress, stopped, *files)
+            more = settings.save, settings.render, settings.every
+            live(colony, settings.ticks, progress, stopped, *more)
         print(summary(colony, colony.ticks - begun, time.perf_counter() - began))
         for path in filter(None, (settings.save, settings.render)):
             print(f"{path} is written.")

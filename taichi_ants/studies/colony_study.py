@@ -104,9 +104,8 @@ def plan(
         for design in LARGE_DESIGNS if large else DESIGNS:
             for ants in LARGE_SIZES if large else sizes:
                 ruled = replace(alone, task=TASKS[design.rules])
-                conditions[Condition(arena, *design, ants)] = _point(
-                    ruled, design.way, ants, sizes[-1]
-                )
+                condition = Condition(arena, *design, ants)
+                conditions[condition] = _point(ruled, design.way, ants, sizes[-1])
     return conditions
 
 

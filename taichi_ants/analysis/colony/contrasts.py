@@ -91,11 +91,10 @@ CURED = 0.9
 
 _COPIES, _COPIES_OFF, _COPIES_LASTING = (Design(one, COPIED) for one in (ON, OFF, LASTING))
 _JOINT, _JOINT_OFF, _JOINT_LASTING = (Design(one, JOINT) for one in (ON, OFF, LASTING))
-_COPIED_WORDS = "copies of an ant trained alone"
 
 # fmt: off
 SERIES: tuple[Series, ...] = (
-    Series(COPIES, f"{_COPIED_WORDS} deliver more than fewer of them do",
+    Series(COPIES, "copies of an ant trained alone deliver more than fewer of them do",
            _COPIES, _COPIES, against="smaller"),
     Series(COPIES, "jointly trained ants deliver more than fewer of them do",
            _JOINT, _JOINT, against="smaller"),
@@ -105,7 +104,8 @@ SERIES: tuple[Series, ...] = (
            _COPIES_OFF, _COPIES_OFF, "per_ant", "smaller"),
     Series(CROWDING, "each of many jointly trained ants delivers more than each of fewer",
            _JOINT, _JOINT, "per_ant", "smaller"),
-    Series(CURE, f"jointly trained ants deliver more than {_COPIED_WORDS}", _JOINT, _COPIES),
+    Series(CURE, "jointly trained ants deliver more than copies of an ant trained alone",
+           _JOINT, _COPIES),
     Series(CURE, "jointly trained ants deliver more than copies of one trained alone for long",
            _JOINT, Design(ON, COPIED_LONG)),
     Series(CURE, "ants with a table each deliver more than ants that share one",
