@@ -92,7 +92,7 @@ def _fault_of(observation: Observation, row: Callable[..., Any], dense: bool) ->
                 look.codes[k] = ti.select(
                     look.carries == 1,
                     see_carrying(grounds[i, k], nearer[i, k]),
-                    see_foraging(grounds[i, k], look.levels[k], look.strongest),
+                    see_foraging(True, grounds[i, k], look.levels[k], look.strongest),
                 )
             look.percept = state_index(
                 look.carries, look.codes[left], look.codes[forward], look.codes[right]

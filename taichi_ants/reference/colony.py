@@ -118,7 +118,7 @@ class ReferenceColony:
 
     def _add(self, ant: Ant) -> None:
         self.ants[ant.slot] = ant
-        self.world.occupied.add(ant.cell)
+        self.world.ants[ant.cell] = ant
 
     def look(self, ant: Ant) -> None:
         """Let an ant see what is around it now."""
@@ -169,8 +169,8 @@ class ReferenceColony:
         tick = self.record.ticks
         acting = [self.ants[slot] for slot in sorted(self.ants)]
         before = [copy.copy(ant) for ant in acting]
-        intents = [intend(ant, self._choose(ant)) for ant in acting]
-        events = carry_out(self.world, intents, tick, self._task.rewards)
+        intents = [intend(self.world, ant, self._choose(ant), self._task.traffic) for ant in acting]
+        events = carry_out(self.world, intents, tick, self._task)
         for intent, event in zip(intents, events, strict=True):
             if event is Event.PICKED_UP and intent.target is not None:
                 self.homes.taken(intent.target, tick)
@@ -199,7 +199,10 @@ class ReferenceColony:
         gives = events.count(Event.DELIVERED)
         record.episode_return += sum(ant.reward for ant in acting)
         record.moves += sum(ant.action < PICK_UP for ant in acting)
-        record.blocked += events.count(Event.BLOCKED)
+        record.blocked += sum(
+            ant.action < PICK_UP and event in (Event.BLOCKED, Event.PUSHED)
+            for ant, event in zip(acting, events, strict=True)
+        )
         record.deliveries += gives
         record.deliveries_per_tick.append(gives)
         if gives and record.first_delivery < 0:

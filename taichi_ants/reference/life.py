@@ -61,7 +61,7 @@ def grow_old(world: WorldState, ants: Sequence[Ant], lifespan: int) -> list[Ant]
         ant.age += 1
     dying = [ant for ant in ants if ant.age >= lifespan]
     for ant in dying:
-        world.occupied.remove(ant.cell)
+        del world.ants[ant.cell]
         if ant.carries:
             world.ground[ant.cell] = FOOD
     return dying

@@ -40,11 +40,14 @@ class IntegerTrail:
         """Return the level of a cell now, 0 where there never was a trail."""
         return max(0, self._until.get(cell, 0) - self._clock)
 
-    def deposit(self, cell: Cell) -> None:
-        """Lay the trail of one ant on a cell."""
+    def deposit(self, cell: Cell, carried: int) -> None:
+        """Lay the trail of an ant that has carried its food for so many ticks."""
         level = self._pheromone.level
         if self._pheromone.deposit == "set":
             self._until[cell] = self._clock + level
+        elif self._pheromone.slope is not None:  # of "fading" only
+            fresh = level - self._pheromone.slope * carried
+            self._until[cell] = self._clock + max(self.level(cell), fresh)
         elif self._pheromone.cap is not None:  # of "add" only
             added = min(self.level(cell) + level, self._pheromone.cap)
             self._until[cell] = self._clock + added
@@ -81,12 +84,15 @@ class DenseTrail:
         place = self._place.get(cell)
         return np.float32(0) if place is None else self._levels[place]
 
-    def deposit(self, cell: Cell) -> None:
-        """Lay the trail of one ant on a cell."""
+    def deposit(self, cell: Cell, carried: int) -> None:
+        """Lay the trail of an ant that has carried its food for so many ticks."""
         level = np.float32(self._pheromone.level)
         place = self._place[cell]
         if self._pheromone.deposit == "set":
             self._levels[place] = level
+        elif self._pheromone.slope is not None:  # of "fading" only
+            fresh = np.float32(self._pheromone.level - self._pheromone.slope * carried)
+            self._levels[place] = max(self._levels[place], fresh)
         elif self._pheromone.deposit == "add":
             cap = np.float32(self._pheromone.cap)
             self._levels[place] = min(self._levels[place] + level, cap)

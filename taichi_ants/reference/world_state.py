@@ -11,6 +11,7 @@ from taichi_ants.reference.trail import make_trail
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
 if TYPE_CHECKING:
+    from taichi_ants.reference.records import Ant
     from taichi_ants.task import Pheromone
     from taichi_ants.worlds.world import World
 
@@ -24,8 +25,9 @@ class WorldState:
     Attributes:
         queen: The queen's cell.
         ground: What each existing cell holds, ants aside: EMPTY, OBSTACLE, FOOD or QUEEN.
-        occupied: The cells on which ants stand; they are EMPTY in `ground`.
+        ants: The ants by the cell that they stand on; these cells are EMPTY in `ground`.
         trail: The trail of every cell.
+        pheromone: How trails are laid, fall and spread.
     """
 
     def __init__(self, world: World, pheromone: Pheromone) -> None:
@@ -35,12 +37,13 @@ class WorldState:
         self.ground[self.queen] = QUEEN
         self.ground.update(dict.fromkeys(listed_cells(world.foods), FOOD))
         self.ground.update(dict.fromkeys(listed_cells(world.obstacles), OBSTACLE))
-        self.occupied: set[Cell] = set()
+        self.ants: dict[Cell, Ant] = {}
+        self.pheromone = pheromone
         self.trail = make_trail(world, pheromone)
 
     def content(self, cell: Cell) -> int:
         """Return what a cell looks like: the ground, or an OBSTACLE where an ant stands."""
-        if cell in self.occupied:
+        if cell in self.ants:
             return OBSTACLE
         return self.ground.get(cell, OBSTACLE)
 

@@ -410,6 +410,8 @@ class Colony:
             self.memory.tables,
             self.task.sees,
             self.pheromone.dense,
+            self.pheromone.view,
+            self.task.traffic,
             self.task.life.changes,
         )
         with runtime.quiet():
@@ -431,9 +433,12 @@ class Colony:
             "size": self.layout.size,
             "episode": self.episode,
             "evaporates": int(pheromone.evaporation == "linear"),  # of integer trails: the clock
-            "adds": {"add": 1, "set": 0, "none": off}[pheromone.deposit],
+            "adds": {"fading": 2, "add": 1, "set": 0, "none": off}[pheromone.deposit],
             "deposit_level": int(pheromone.level),
             "cap": int(pheromone.cap or 0),
+            "slope": int(pheromone.slope or 0),
+            "fades_after": pheromone.fades_after,
+            "turns_at_queen": int(self.task.turns_at_queen),
             # The factor of exponential evaporation, 1 for none, -1 for linear.
             "decay": -1.0 if pheromone.evaporation == "linear" else float(pheromone.decay),
             "share": float(pheromone.share),  # what a cell gives to each neighbour

@@ -13,7 +13,7 @@ from typing import Any
 import taichi as ti
 
 from taichi_ants.engines import looks
-from taichi_ants.engines.colony.layout import AntRow, WorldRow
+from taichi_ants.engines.colony.layout import STANDS, AntRow, WorldRow
 from taichi_ants.engines.colony.phases import (
     after_deaths,
     before_deaths,
@@ -27,6 +27,7 @@ from taichi_ants.engines.colony.phases import (
     plan_together,
     resolve_all,
     retire_all,
+    settle_all,
     stop_at_delivery,
 )
 from taichi_ants.engines.colony.trail import diffused, evaporate
@@ -36,6 +37,7 @@ from taichi_ants.learners.registry import Learner
 from taichi_ants.learners.td_errors import guarded
 from taichi_ants.task.constants import N_ACTIONS, ROW
 from taichi_ants.task.observations import Observation
+from taichi_ants.task.traffic import Traffic
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,8 @@ class Variant:
         further_tables: How many the learner keeps behind each.
         observation: The observation.
         dense: Whether levels are f32, see `trail`.
+        view: Which trails look like one, see `Pheromone`.
+        traffic: Who may enter a cell on which another ant stands.
         lively: Whether ants or food come and go; leaving that out halves the time to compile.
     """
 
@@ -56,6 +60,8 @@ class Variant:
     further_tables: int
     observation: Observation
     dense: bool
+    view: str
+    traffic: Traffic
     lively: bool
 
     @property
@@ -116,7 +122,17 @@ class Variant:
     @property
     def sees_ants(self) -> bool:
         """Whether the cell of an ant has to tell what the ant carries."""
-        return not self.sees_percept
+        return not self.sees_percept or self.view == "strongest_under_carriers"
+
+    @property
+    def half(self) -> bool:
+        """Whether trails of half the strongest look like one."""
+        return self.view == "half"
+
+    @property
+    def idle(self) -> int:
+        """The mark of an ant that wants nothing."""
+        return STANDS if self.traffic.shared else 0
 
     @property
     def row_at(self) -> AntRow:
@@ -160,7 +176,9 @@ def by_world(c: ti.template(), v: ti.template(), first_tick, n_ticks):
 @ti.func
 def tick_of_world(c: ti.template(), v: ti.template(), w, tick):
     choose_all(c, v, w)
-    resolve_all(c, w, tick)
+    resolve_all(c, v, w, tick)
+    if ti.static(v.traffic.shared):
+        settle_all(c, v, w, tick)
     commit_all(c, v, w, tick)
     if ti.static(v.dense):
         for place in range(w * c.size, (w + 1) * c.size):
@@ -195,7 +213,11 @@ def by_chunk(c: ti.template(), v: ti.template(), tick, n_ticks):
         choose_all(c, v, chunk)
     ti.loop_config(block_dim=1)
     for chunk in range(c.n_worlds * c.n_chunks):
-        resolve_all(c, chunk, tick)
+        resolve_all(c, v, chunk, tick)
+    if ti.static(v.traffic.shared):
+        ti.loop_config(block_dim=1)
+        for chunk in range(c.n_worlds * c.n_chunks):
+            settle_all(c, v, chunk, tick)
     ti.loop_config(block_dim=1)
     for chunk in range(c.n_worlds * c.n_chunks):
         commit_all(c, v, chunk, tick)

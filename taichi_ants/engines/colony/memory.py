@@ -163,6 +163,7 @@ def constants(colony: Colony) -> dict[str, np.ndarray]:
     layout, chunks = colony.layout, len(colony.seeds) * colony.chunks
     shared = colony.sharing == "shared"
     pairs = colony.task.n_states * N_ACTIONS
+    cells = len(colony.seeds) * layout.size
     sums = chunks * pairs if shared else 1
     most_updates = colony.population.slots if shared else 1
     return {
@@ -176,6 +177,8 @@ def constants(colony: Colony) -> dict[str, np.ndarray]:
         "hyperparameters": np.array([*dict(colony.training.hyperparameters).values(), 0.0]),
         # How far the mean of n errors moves a value, by n.
         "weights": update_weights(colony.training.learning_rate, most_updates),
+        # What other ants need to know of the ant on a cell, see `layout`.
+        "crowd": np.zeros(cells if colony.task.traffic.shared else 1, np.uint8),
         "spare": np.zeros_like(colony.arrays["level"]),  # the next levels, with diffusion
         "tallies": np.zeros((len(TallyRow), chunks), np.int32),
         # By chunk and pair: fixed-point sums of TD errors, the last error, and see SumRow.

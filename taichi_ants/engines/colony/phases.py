@@ -26,7 +26,7 @@ from taichi_ants.engines.colony.life import (
     regrow,
     wander,
 )
-from taichi_ants.engines.colony.steps import commit, grow_old, observe, resolve, want
+from taichi_ants.engines.colony.steps import commit, grow_old, observe, resolve, settle, want
 
 
 @ti.func
@@ -58,16 +58,25 @@ def choose_all(c: ti.template(), v: ti.template(), chunk):
             action = c.ants[AntRow.ACTION, ant]
             if action < 0:
                 action = draw_action(c, v, w, ant, c.ants[v.row_at, ant])
-            want(c, base, ant, action)
+            want(c, v, base, ant, action)
 
 
 @ti.func
-def resolve_all(c: ti.template(), chunk, tick):
+def resolve_all(c: ti.template(), v: ti.template(), chunk, tick):
     w, first, last = ants_of(c, chunk)
     base = w * c.size
     for ant in range(first, last):
         if c.ants[AntRow.STAGE, ant] == Stage.LIVING:
-            resolve(c, base, ant, tick)
+            resolve(c, v, base, ant, tick)
+
+
+@ti.func
+def settle_all(c: ti.template(), v: ti.template(), chunk, tick):
+    w, first, last = ants_of(c, chunk)
+    base = w * c.size
+    for ant in range(first, last):
+        if c.ants[AntRow.STAGE, ant] == Stage.LIVING:
+            settle(c, v, base, ant, chunk, tick)
 
 
 @ti.func

@@ -6,6 +6,7 @@ Dense mode (exponential evaporation, diffusion) stores levels as f32 and walks o
 
 import taichi as ti
 
+from taichi_ants.engines.colony.layout import STANDS_WITH_FOOD
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task.constants import EMPTY
 
@@ -31,18 +32,34 @@ def level_in_view(c: ti.template(), v: ti.template(), place, clock):
 
 
 @ti.func
-def deposit(c: ti.template(), v: ti.template(), place, clock):
-    """Lay a trail on a cell, as the configuration says."""
+def level_that_counts(c: ti.template(), v: ti.template(), place, clock):
+    """The trail of a cell in view for the strongest one: 0 where it does not count."""
+    level = level_in_view(c, v, place, clock)
+    if ti.static(v.view == "strongest_under_carriers"):
+        carrier = c.ground[place] >> 4 == STANDS_WITH_FOOD
+        level = ti.select(carrier, level_of(c, v, place, clock), level)
+    return level
+
+
+@ti.func
+def deposit(c: ti.template(), v: ti.template(), place, clock, carried):
+    """Lay the trail of an ant that has carried its food for so many ticks on a cell."""
     if ti.static(v.dense):
         if c.adds == 1:
             laid = c.level[place] + ti.cast(c.deposit_level, ti.f32)
             c.level[place] = ti.min(laid, ti.cast(c.cap, ti.f32))
         elif c.adds == 0:
             c.level[place] = ti.cast(c.deposit_level, ti.f32)
+        elif c.adds == 2:
+            fresh = ti.cast(c.deposit_level - c.slope * ti.min(carried, c.fades_after), ti.f32)
+            c.level[place] = ti.max(c.level[place], fresh)
     elif c.adds == 1:
         c.trail[place] = clock + ti.min(ti.max(c.trail[place] - clock, 0) + c.deposit_level, c.cap)
     elif c.adds == 0:
         c.trail[place] = clock + c.deposit_level
+    elif c.adds == 2:
+        fresh = c.deposit_level - c.slope * ti.min(carried, c.fades_after)
+        c.trail[place] = ti.max(c.trail[place], clock + fresh)
 
 
 @ti.func

@@ -34,6 +34,9 @@ _NO_WORK: dict[str, Any] = {
     # The task.
     "falls": 0,  # by how much a trail falls per tick: 1, or 0 without evaporation
     "level": 0,  # of a deposit
+    "slope": 0,
+    "fades_after": 0,
+    "turns_at_queen": 0,
     "cap": 0,  # of deposits that add
     "continuing": 0,  # 1 if a delivery is no terminal state
     "rewards": np.zeros(1, np.int32),  # (5,) by event
@@ -161,6 +164,7 @@ class RunEngine:
             runs.learner,
             self._task.sees,
             self._task.pheromone.deposit,
+            self._task.pheromone.view == "half",
             traced,
             arguments.type_of(_NO_WORK),
         )
@@ -184,6 +188,9 @@ class RunEngine:
             "falls": int(falls and task.pheromone.evaporation == "linear"),
             "level": task.pheromone.level,
             "cap": task.pheromone.cap or 0,
+            "slope": task.pheromone.slope or 0,
+            "fades_after": task.pheromone.fades_after,
+            "turns_at_queen": int(task.turns_at_queen),
             "continuing": int(task.delivery == "continuing"),
             "rewards": task.rewards.by_event(),
             "world": pack_cells(world),

@@ -13,7 +13,7 @@ ANOTHER_ANT = 4
 def row(world: WorldState, ant: Ant) -> int:
     """Return the load, then the code of each cell."""
     codes = [
-        ANOTHER_ANT if cell in world.occupied else code
+        ANOTHER_ANT if cell in world.ants else code
         for cell, code in zip(cells_in_view(ant), codes_in_view(world, ant), strict=True)
     ]
     return number([ant.carries, *codes], 5)

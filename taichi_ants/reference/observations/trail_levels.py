@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from taichi_ants.reference.observations.observation import Observation, number
 from taichi_ants.reference.records import Ant
-from taichi_ants.reference.vision import codes_in_view, levels_in_view
+from taichi_ants.reference.vision import codes_in_view, levels_in_view, strongest_in_view
 from taichi_ants.reference.world_state import Level, WorldState
 from taichi_ants.task.constants import SEES_GOAL, SEES_LURE, SEES_OBSTACLE
 
@@ -14,7 +14,7 @@ NOTHING, OBSTACLE, WEAK, MIDDLE, STRONG, GOAL = range(6)
 def row(world: WorldState, ant: Ant) -> int:
     """Return the load, then the code of each cell."""
     levels = levels_in_view(world, ant)
-    strongest = max(levels)
+    strongest = strongest_in_view(world, ant)
     codes = []
     for code, level in zip(codes_in_view(world, ant), levels, strict=True):
         if code == SEES_GOAL:
