@@ -9,6 +9,7 @@ import taichi as ti
 from taichi_ants import runtime
 from taichi_ants.engines.trial import last_line
 from taichi_ants.errors import AntsError
+from taichi_ants.task.constants import EMPTY
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.rules.vision import see_carrying, see_foraging, state_index
 
@@ -32,16 +33,20 @@ def look_type(observation: Observation, dense: bool) -> Any:
 
 
 @ti.func
-def judge(look: ti.template(), observation: ti.template()):
+def judge(half: ti.template(), look: ti.template(), observation: ti.template()):
     """Complete a look, whose codes say what the cells hold so far."""
     left, forward, right = ti.static(observation.ahead)
-    look.strongest = ti.max(look.levels[left], look.levels[forward], look.levels[right])
     for k in ti.static(range(len(observation.cells))):
         # No branch: Taichi cannot compile one that is of no use, where a row reads no codes.
         look.codes[k] = ti.select(
             look.carries == 1,
             see_carrying(look.codes[k], look.nearer[k]),
-            see_foraging(look.codes[k], look.levels[k], look.strongest),
+            see_foraging(
+                half,
+                look.codes[k],
+                ti.select(look.codes[k] == EMPTY, look.levels[k], 0),
+                look.strongest,
+            ),
         )
     look.percept = state_index(
         look.carries, look.codes[left], look.codes[forward], look.codes[right]

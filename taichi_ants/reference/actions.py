@@ -12,6 +12,7 @@ from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.ants import Ant, Event
 from taichi_ants.reference.geometry import Cell, neighbour
 from taichi_ants.reference.random_stream import RandomStream, hash_of, pick
+from taichi_ants.reference.vision import is_better
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task.constants import (
     EMPTY,
@@ -24,7 +25,7 @@ from taichi_ants.task.constants import (
 )
 
 if TYPE_CHECKING:
-    from taichi_ants.task import Rewards
+    from taichi_ants.task import Task, Traffic
 
 
 def choose_action(values: Sequence[np.float32], epsilon: float, stream: RandomStream) -> int:
@@ -49,8 +50,8 @@ class Intent:
         action: 0..4.
         heading: Of a move or a pick-up: towards its cell.
         target: The cell that it wants to enter or whose food it wants to take. None where there is
-            nothing to want: the way is blocked, no food is in view, or the action is to give.
-        lured: Whether the cell looks T or S.
+            nothing to want: the way is closed, no food is in view, or the action is to give.
+        lured: Whether the cell looks T or S, or is better than the ant's own if an ant is there.
         gives: Whether it can give.
     """
 
@@ -61,8 +62,13 @@ class Intent:
     lured: bool = False
     gives: bool = False
 
+    @property
+    def enters(self) -> bool:
+        """Whether it wants to enter a cell."""
+        return self.action < PICK_UP and self.target is not None
 
-def intend(ant: Ant, action: int) -> Intent:
+
+def intend(world: WorldState, ant: Ant, action: int, traffic: Traffic) -> Intent:
     """What the ant wants by an action, from its percept.
 
     It draws from its stream where a pick-up has several foods to choose from.
@@ -81,13 +87,21 @@ def intend(ant: Ant, action: int) -> Intent:
         heading = (ant.heading + side - 1) % N_HEADINGS
         return Intent(ant, action, heading, neighbour(ant.cell, heading))
     heading = (ant.heading + action - 1) % N_HEADINGS
-    is_open = codes[action] in (SEES_EMPTY, SEES_LURE)
-    target = neighbour(ant.cell, heading) if is_open else None
+    target = neighbour(ant.cell, heading)
+    if traffic.shared and target in world.ants:
+        return Intent(ant, action, heading, target, lured=is_better(world, ant, target))
+    if codes[action] not in (SEES_EMPTY, SEES_LURE):
+        return Intent(ant, action, heading)
     return Intent(ant, action, heading, target, lured=codes[action] == SEES_LURE)
 
 
-def winners(intents: Sequence[Intent], tick: int, index: Callable[[Cell], int]) -> set[int]:
-    """The slots of the ants that get the cell, or the food, that they want.
+def winners(
+    intents: Sequence[Intent],
+    tick: int,
+    index: Callable[[Cell], int],
+    carriers_first: bool = False,
+) -> set[int]:
+    """The slots of the ants that win the cell, or the food, that they want.
 
     Of those that want one cell, it is the one whose own cell has the smallest hash with the tick;
     were two equal, the one with the smaller heading towards the cell. So neither numbers of ants
@@ -97,48 +111,122 @@ def winners(intents: Sequence[Intent], tick: int, index: Callable[[Cell], int]) 
         intents: All wishes of a tick.
         tick: Its number in the episode, from 0.
         index: The number of a cell that is hashed.
+        carriers_first: Whether an ant with food wins against all without.
     """
-    best: dict[Cell, tuple[int, int, int]] = {}
+    best: dict[Cell, tuple[bool, int, int, int]] = {}
     for intent in intents:
         if intent.target is None:
             continue
-        key = (hash_of(index(intent.ant.cell), tick), intent.heading, intent.ant.slot)
+        ant = intent.ant
+        last = carriers_first and not ant.carries
+        key = (last, hash_of(index(ant.cell), tick), intent.heading, ant.slot)
         best[intent.target] = min(key, best.get(intent.target, key))
-    return {slot for _, _, slot in best.values()}
+    return {slot for *_, slot in best.values()}
 
 
-def carry_out(world: WorldState, intent: Intent, wins: bool, rewards: Rewards) -> Event:
-    """Let one ant act, and lay its trail: change it and the world.
+def settle(
+    intents: Sequence[Intent], winning: set[int], traffic: Traffic
+) -> tuple[dict[int, Cell], dict[int, Cell]]:
+    """By slot the cells that ants enter, and those onto which others are pushed.
+
+    Args:
+        intents: All wishes of a tick.
+        winning: The slots of those that win what they want.
+        traffic: Who may enter a cell on which another ant stands.
+    """
+    standing = {intent.ant.cell: intent for intent in intents}
+
+    def moves(intent: Intent) -> bool:
+        """Whether an ant enters its cell, which is empty or which another one leaves."""
+        one = intent
+        while one.enters and one.ant.slot in winning:
+            ahead = standing.get(one.target)
+            if ahead is None:
+                return True
+            if not traffic.follow or ahead is intent:
+                return False
+            one = ahead
+        return False
+
+    entered = {intent.ant.slot: intent.target for intent in intents if moves(intent)}
+    pushed = {}
+    for intent in intents:
+        ant = intent.ant
+        claims = intent.enters and ant.slot in winning and ant.slot not in entered
+        if not (traffic.swap and claims and ant.carries):
+            continue
+        other = standing[intent.target]
+        picks_up = other.action == PICK_UP and other.target is not None
+        if other.ant.carries or other.ant.slot in entered or picks_up:
+            continue
+        entered[ant.slot] = intent.target
+        granted = traffic.grant and other.enters and other.target == ant.cell
+        (entered if granted else pushed)[other.ant.slot] = ant.cell
+    return entered, pushed
+
+
+def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Task) -> list[Event]:
+    """Resolve the conflicts, let all ants act at once, and lay their trails: change them all.
 
     All wishes are from the start of the tick, so no ant's deed can change another's; and no cell is
     entered, emptied or marked by two.
     """
-    ant, target = intent.ant, intent.target
+    winning = winners(intents, tick, world.index, task.traffic.carriers_first)
+    entered, pushed = settle(intents, winning, task.traffic)
+    events = []
+    for intent in intents:
+        slot = intent.ant.slot
+        if slot in pushed:
+            events.append(_pushed(intent, pushed[slot], task))
+        elif intent.action < PICK_UP:
+            events.append(_moved(world, intent, entered.get(slot), task))
+        else:
+            events.append(_handled(world, intent, slot in winning, task))
+    for intent in intents:
+        intent.ant.carried += intent.ant.carries
+    world.ants = {intent.ant.cell: intent.ant for intent in intents}
+    return events
+
+
+def _moved(world: WorldState, intent: Intent, destination: Cell | None, task: Task) -> Event:
+    """Do a move, onto a cell or none."""
+    ant, rewards = intent.ant, task.rewards
+    # The turn is made even if the way is blocked: so an ant gets out of a dead end.
+    ant.action, ant.heading, ant.reward = intent.action, intent.heading, rewards.failed
+    if destination is None:
+        return Event.BLOCKED
+    ant.cell = destination
+    if ant.carries:
+        world.trail.deposit(destination, ant.carried)
+    ant.reward = rewards.lure if intent.lured else rewards.empty
+    return Event.MOVED
+
+
+def _pushed(intent: Intent, destination: Cell, task: Task) -> Event:
+    """Give way; of its own action only the turn of a move is left."""
+    ant = intent.ant
+    ant.action, ant.cell, ant.reward = intent.action, destination, task.rewards.empty
+    if intent.action < PICK_UP:
+        ant.heading = intent.heading
+    return Event.PUSHED
+
+
+def _handled(world: WorldState, intent: Intent, wins: bool, task: Task) -> Event:
+    """Do a pick-up or a give, if it can be done."""
+    ant, rewards = intent.ant, task.rewards
     ant.action, ant.reward = intent.action, rewards.failed
-    if intent.action == GIVE:
-        if not intent.gives:
-            return Event.FAILED
-        ant.carries = False
+    if intent.gives:
+        ant.carries, ant.carried = False, 0
+        if task.turns_at_queen:
+            ant.heading = (ant.heading + 3) % N_HEADINGS
         ant.reward = rewards.give
         return Event.DELIVERED
-    if intent.action == PICK_UP:
-        if not wins or target is None:
-            return Event.FAILED
-        world.ground[target] = EMPTY
-        world.trail.deposit(target)
-        world.trail.deposit(ant.cell)
+    if intent.action == PICK_UP and wins and intent.target is not None:
+        world.ground[intent.target] = EMPTY
+        world.trail.deposit(intent.target, 0)
+        world.trail.deposit(ant.cell, 0)
         ant.carries = True
         ant.heading = (ant.heading + 3) % N_HEADINGS
         ant.reward = rewards.pick_up
         return Event.PICKED_UP
-    # The turn is made even if the way is blocked: so an ant gets out of a dead end.
-    ant.heading = intent.heading
-    if not wins or target is None:
-        return Event.BLOCKED
-    world.occupied.remove(ant.cell)
-    world.occupied.add(target)
-    ant.cell = target
-    if ant.carries:
-        world.trail.deposit(target)
-    ant.reward = rewards.lure if intent.lured else rewards.empty
-    return Event.MOVED
+    return Event.FAILED

@@ -30,6 +30,7 @@ class Ant:
         number: The initial ants are 0 .. n - 1, those born in an episode n, n + 1, ...
         stream: Its random stream.
         age: Ticks that it has lived, where there is a lifespan, else 0.
+        carried: Ticks that it has carried its food, 0 without food.
         percept: What lies in the three cells ahead, 0..127; what it does goes by this.
         state: The row of its table that it looks at; what it chooses and learns goes by this.
         action: What it did last, 0..4; -1 before its first tick.
@@ -44,6 +45,7 @@ class Ant:
     number: int = 0
     stream: RandomStream = field(default_factory=lambda: RandomStream(0))
     age: int = 0
+    carried: int = 0
     percept: int = 0
     state: int = 0
     action: int = -1
@@ -56,6 +58,7 @@ class Event(Enum):
 
     MOVED = "moved"
     BLOCKED = "blocked"  # a move that only turned the ant
+    PUSHED = "pushed"  # another ant changed places with it
     PICKED_UP = "picked up"
     DELIVERED = "delivered"
     FAILED = "failed"  # a pick-up or give that could not be done

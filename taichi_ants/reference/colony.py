@@ -18,7 +18,7 @@ from taichi_ants.grid.constants import (
     STREAM_ROLLOUT,
 )
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.reference.actions import carry_out, choose_action, intend, winners
+from taichi_ants.reference.actions import carry_out, choose_action, intend
 from taichi_ants.reference.ants import Ant, Event, Transition, starts
 from taichi_ants.reference.geometry import neighbour
 from taichi_ants.reference.homes import Homes
@@ -148,7 +148,7 @@ class ReferenceColony:
 
     def _add(self, ant: Ant) -> None:
         self.ants[ant.slot] = ant
-        self.world.occupied.add(ant.cell)
+        self.world.ants[ant.cell] = ant
 
     @property
     def q_values(self) -> np.ndarray:
@@ -198,12 +198,9 @@ class ReferenceColony:
         tick = self.record.ticks
         acting = [self.ants[slot] for slot in sorted(self.ants)]
         before = [copy.copy(ant) for ant in acting]
-        intents = [intend(ant, self._choose(ant)) for ant in acting]
-        winning = winners(intents, tick, self.world.index)
-        events = [
-            carry_out(self.world, intent, intent.ant.slot in winning, self._task.rewards)
-            for intent in intents
-        ]
+        traffic = self._task.traffic
+        intents = [intend(self.world, ant, self._choose(ant), traffic) for ant in acting]
+        events = carry_out(self.world, intents, tick, self._task)
         for intent, event in zip(intents, events, strict=True):
             if event is Event.PICKED_UP and intent.target is not None:
                 self.homes.taken(intent.target, tick)
@@ -232,7 +229,10 @@ class ReferenceColony:
         record = self.record
         record.episode_return += sum(ant.reward for ant in acting)
         record.moves += sum(ant.action < PICK_UP for ant in acting)
-        record.blocked += events.count(Event.BLOCKED)
+        record.blocked += sum(
+            ant.action < PICK_UP and event in (Event.BLOCKED, Event.PUSHED)
+            for ant, event in zip(acting, events, strict=True)
+        )
         record.deliveries += events.count(Event.DELIVERED)
         if record.deliveries and record.first_delivery < 0:
             record.first_delivery = record.ticks + 1
@@ -268,7 +268,7 @@ class ReferenceColony:
             ant.age += 1
         dying = [ant for ant in acting if ant.age >= lifespan]
         for ant in dying:
-            self.world.occupied.remove(ant.cell)
+            del self.world.ants[ant.cell]
             if ant.carries:
                 self.world.ground[ant.cell] = FOOD
             del self.ants[ant.slot]

@@ -47,13 +47,15 @@ class Trail:
         place = self._place.get(cell)
         return 0 if place is None else self._levels[place]
 
-    def deposit(self, cell: Cell) -> None:
-        """Lay the trail of one ant on a cell."""
+    def deposit(self, cell: Cell, carried: int) -> None:
+        """Lay the trail of an ant that has carried its food for so many ticks."""
         place, rule = self._place[cell], self._pheromone
         if rule.deposit == "set":
             self._levels[place] = rule.level
         elif rule.deposit == "add":
             self._levels[place] = min(self._levels[place] + rule.level, rule.cap)
+        elif rule.deposit == "fading":
+            self._levels[place] = max(self._levels[place], rule.level - rule.slope * carried)
 
     def tick(self) -> None:
         """Let one tick pass: the trails evaporate, then spread."""

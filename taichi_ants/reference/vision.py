@@ -33,9 +33,28 @@ def levels_in_view(world: WorldState, ant: Ant, turns: tuple[int, ...] = AHEAD) 
     ]
 
 
+def strongest_in_view(world: WorldState, ant: Ant) -> Level:
+    """The largest trail level of the three cells ahead that count, 0 where none does."""
+    counting = [cell for cell in cells_in_view(ant) if world.content(cell) == EMPTY]
+    if world.pheromone.view == "strongest_under_carriers":
+        others = [world.ants.get(cell) for cell in cells_in_view(ant)]
+        counting += [other.cell for other in others if other is not None and other.carries]
+    return max((world.level(cell) for cell in counting), default=0)
+
+
+def is_better(world: WorldState, ant: Ant, cell: Cell) -> bool:
+    """Whether a cell is better than the ant's own for what the ant is about.
+
+    With food that is nearer to the queen, without food a stronger trail.
+    """
+    if ant.carries:
+        return distance(cell, world.queen) < distance(ant.cell, world.queen)
+    return bool(world.level(cell) > world.level(ant.cell))
+
+
 def codes_in_view(world: WorldState, ant: Ant, turns: tuple[int, ...] = AHEAD) -> list[int]:
     """What each cell looks like, SEES_EMPTY, SEES_OBSTACLE, SEES_LURE or SEES_GOAL."""
-    strongest = 0 if ant.carries else max(levels_in_view(world, ant))  # of the cells ahead, always
+    strongest = 0 if ant.carries else strongest_in_view(world, ant)
     return [_code(world, ant, cell, strongest) for cell in cells_in_view(ant, turns)]
 
 
@@ -46,10 +65,11 @@ def _code(world: WorldState, ant: Ant, cell: Cell, strongest: Level) -> int:
     if content != EMPTY:  # without food the queen too, with food other food
         return SEES_OBSTACLE
     if ant.carries:
-        lures = distance(cell, world.queen) < distance(ant.cell, world.queen)
+        lures = is_better(world, ant, cell)
     else:
         level = world.level(cell)
-        lures = bool(level >= 1 and 2 * level >= strongest)
+        enough = 2 * level if world.pheromone.view == "half" else level
+        lures = bool(level >= 1 and enough >= strongest)
     return SEES_LURE if lures else SEES_EMPTY
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.geometry import Cell, existing_cells, listed_cells
 from taichi_ants.reference.trail import Level, Trail
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
@@ -19,8 +20,9 @@ class WorldState:
     Attributes:
         queen: The queen's cell.
         ground: What each existing cell holds, ants aside: EMPTY, OBSTACLE, FOOD or QUEEN.
-        occupied: The cells on which ants stand; they are EMPTY in `ground`.
+        ants: The ants by the cells on which they stand; these are EMPTY in `ground`.
         trail: The trail of every cell.
+        pheromone: How trails are laid, fall and spread, and which are seen.
     """
 
     def __init__(self, world: World, pheromone: Pheromone) -> None:
@@ -30,12 +32,13 @@ class WorldState:
         self.ground[self.queen] = QUEEN
         self.ground.update(dict.fromkeys(listed_cells(world.foods), FOOD))
         self.ground.update(dict.fromkeys(listed_cells(world.obstacles), OBSTACLE))
-        self.occupied: set[Cell] = set()
+        self.ants: dict[Cell, Ant] = {}
+        self.pheromone = pheromone
         self.trail = Trail(world, pheromone)
 
     def content(self, cell: Cell) -> int:
         """What a cell looks like: the ground, or an OBSTACLE where an ant stands."""
-        if cell in self.occupied:
+        if cell in self.ants:
             return OBSTACLE
         return self.ground.get(cell, OBSTACLE)
 

@@ -4,6 +4,17 @@ from taichi_ants.task.life import Life
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rewards import Rewards
-from taichi_ants.task.task import Task
+from taichi_ants.task.task import Task, foraging, paper, queueing
+from taichi_ants.task.traffic import Traffic
 
-__all__ = ["Life", "Observation", "Pheromone", "Rewards", "Task"]
+__all__ = [
+    "Life",
+    "Observation",
+    "Pheromone",
+    "Rewards",
+    "Task",
+    "Traffic",
+    "foraging",
+    "paper",
+    "queueing",
+]

@@ -12,9 +12,11 @@ from taichi_ants.errors import AntsError, check_one_of, check_whole, shown
 from taichi_ants.task.constants import DEPOSIT_LEVEL
 
 Evaporation = Literal["linear", "exponential", "none"]
-Deposit = Literal["set", "add", "none"]
+Deposit = Literal["set", "add", "fading", "none"]
+View = Literal["half", "strongest", "strongest_under_carriers"]
 EVAPORATIONS: tuple[str, ...] = get_args(Evaporation)
 DEPOSITS: tuple[str, ...] = get_args(Deposit)
+VIEWS: tuple[str, ...] = get_args(View)
 MAX_DEPOSIT = 1_000_000
 
 
@@ -29,10 +31,17 @@ class Pheromone:
         diffusion: Share of a cell's trail that it gives to its six neighbours per tick, a sixth
             of it to each, in [0, 1]. The share aimed at an obstacle or out of the world stays.
         deposit: "set": a carrying ant sets the trail of a cell to `level`. "add": it adds `level`,
-            up to `cap`. "none": it lays nothing.
+            up to `cap`. "fading": it raises the trail to `level` less `slope` for each tick that it
+            has carried its food, so that trails rise towards food. "none": it lays nothing.
         level: What a deposit sets or adds, in ticks of linear evaporation, 1 .. 1 000 000.
+        slope: How much less an ant lays after each tick with food, 1 .. 1 000 000; of "fading"
+            only, there 10 if None. Trails rise towards food if it is above what evaporates.
         cap: No deposit that adds leaves a trail above this, 1 .. 1 000 000; of "add" only, there
             1000 if None.
+        view: Which trails an ant without food sees as T, of those of at least 1 on the empty cells
+            in view. "half": those of at least half the strongest. "strongest": the strongest, all
+            of them if several are. "strongest_under_carriers": the same, but a trail on the cell of
+            an ant with food counts for the strongest too.
 
     Raises:
         AntsError: A value is outside its range, or would change nothing.
@@ -44,6 +53,8 @@ class Pheromone:
     deposit: Deposit = "set"
     level: int = DEPOSIT_LEVEL
     cap: int | None = None
+    slope: int | None = None
+    view: View = "half"
 
     def __post_init__(self) -> None:
         check_one_of("evaporation", self.evaporation, EVAPORATIONS)
@@ -59,8 +70,12 @@ class Pheromone:
         check_whole("level", self.level, 1, MAX_DEPOSIT)
         if self.cap is not None:
             check_whole("cap", self.cap, 1, MAX_DEPOSIT)
+        if self.slope is not None:
+            check_whole("slope", self.slope, 1, MAX_DEPOSIT)
+        check_one_of("view", self.view, VIEWS)
         self._settle("half_life", 50.0, "evaporation", "exponential")
         self._settle("cap", 1000, "deposit", "add")
+        self._settle("slope", 10, "deposit", "fading")
 
     def _settle(self, name: str, usual: float, other: str, needed: str) -> None:
         """Refuse an option where another one makes it mean nothing; fill it in where it is not."""
@@ -77,6 +92,11 @@ class Pheromone:
     def dense(self) -> bool:
         """Whether levels are float32 and change in every cell each tick; else they are integers."""
         return self.evaporation == "exponential" or self.diffusion > 0
+
+    @property
+    def fades_after(self) -> int:
+        """Ticks with food after which an ant lays nothing, if deposits fade, else 0."""
+        return -(-int(self.level) // self.slope) if self.slope else 0
 
     @property
     def lasting(self) -> Pheromone:

@@ -12,12 +12,11 @@ from taichi_ants.task.life import Life
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rewards import Rewards
+from taichi_ants.task.traffic import Traffic
 
 Delivery = Literal["absorbing", "continuing"]
-Traffic = Literal["blocking"]
 DELIVERIES: tuple[str, ...] = get_args(Delivery)
-TRAFFIC: tuple[str, ...] = get_args(Traffic)
-_PARTS = {"rewards": Rewards, "pheromone": Pheromone, "life": Life}
+_PARTS = {"rewards": Rewards, "pheromone": Pheromone, "traffic": Traffic, "life": Life}
 
 
 @dataclass(frozen=True)
@@ -32,7 +31,11 @@ class Task:
             looks at, see `taichi_ants.task.observations`.
         rewards: What each event pays.
         pheromone: How trails are laid, fall and spread.
-        traffic: "blocking": no ant enters a cell on which another one stands.
+        traffic: Who may enter a cell on which another ant stands: a `Traffic`, or the name of one.
+            "blocking": nobody. "right_of_way": an ant with food changes places with one without.
+            "following": besides, queues move as one.
+        turns_at_queen: Whether an ant turns round when it has given its food, as it does when it
+            has picked one up.
         delivery: "absorbing": the delivery is a terminal state, its target is the reward alone.
             "continuing": the update at delivery bootstraps from what the ant then sees. An episode
             of one ant ends in both.
@@ -47,7 +50,8 @@ class Task:
     observation: str = "paper"
     rewards: Rewards = field(default_factory=Rewards)
     pheromone: Pheromone = field(default_factory=Pheromone)
-    traffic: Traffic = "blocking"
+    traffic: Traffic | str = field(default_factory=Traffic)
+    turns_at_queen: bool = False
     delivery: Delivery = "absorbing"
     evaporation_in_training: bool = False
     evaporation_in_evaluation: bool = True
@@ -55,14 +59,15 @@ class Task:
 
     def __post_init__(self) -> None:
         observations.get(self.observation)
+        if isinstance(self.traffic, str):
+            object.__setattr__(self, "traffic", Traffic.named(self.traffic))
         for name, kind in _PARTS.items():
             if not isinstance(getattr(self, name), kind):
                 raise AntsError(
                     f"{name} is {shown(getattr(self, name))}; it must be {kind.__name__}(...)."
                 )
-        check_one_of("traffic", self.traffic, TRAFFIC)
         check_one_of("delivery", self.delivery, DELIVERIES)
-        for name in ("evaporation_in_training", "evaporation_in_evaluation"):
+        for name in ("turns_at_queen", "evaporation_in_training", "evaporation_in_evaluation"):
             object.__setattr__(self, name, checked_flag(name, getattr(self, name)))
 
     @property
@@ -94,3 +99,36 @@ class Task:
                 )
         parts = {name: kind(**facts[name]) for name, kind in _PARTS.items() if name in facts}
         return cls(**{**facts, **parts})
+
+
+def foraging() -> Task:
+    """A task in which the trails of a colony help.
+
+    Trails rise towards food, ants with food have right of way, and ants see each other.
+    """
+    return Task(
+        observation="ants",
+        pheromone=Pheromone(deposit="fading", level=500, view="strongest"),
+        traffic="right_of_way",
+        evaporation_in_training=True,
+    )
+
+
+def queueing() -> Task:
+    """As `foraging`; besides, queues move as one, and ants see which ones are worth following.
+
+    Where the trail that leads to food lies under an ant with food, no weaker one looks like it.
+    Ants turn round at the queen, back towards where they came from.
+    """
+    return Task(
+        observation="queues",
+        pheromone=Pheromone(deposit="fading", level=500, view="strongest_under_carriers"),
+        traffic="following",
+        turns_at_queen=True,
+        evaporation_in_training=True,
+    )
+
+
+def paper() -> Task:
+    """The paper's task, which is the default everywhere."""
+    return Task()

@@ -26,7 +26,7 @@ OUTSIDE = {
     "numpy",
     "typing",
 }
-RULES = {"Life", "Pheromone", "Rewards", "Task"}
+RULES = {"Life", "Pheromone", "Rewards", "Task", "Traffic"}
 
 
 FILES = sorted(FOLDER.rglob("*.py"))

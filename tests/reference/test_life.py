@@ -184,7 +184,7 @@ def test_an_ant_dies_at_its_lifespan():
     assert [step.truncated for step in colony.transitions] == [True, False]
     act(colony, FORWARD)
     assert cells_of(colony) == []  # it has got there, and died of age 2
-    assert front not in colony.world.occupied
+    assert front not in colony.world.ants
     assert not colony.ants
     colony.tick()  # an empty world goes on
     assert colony.record.ticks == 4

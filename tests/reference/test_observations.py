@@ -59,6 +59,8 @@ def test_the_papers_row_is_the_percept():
         ("six_cells", digits(4, 0, 1, 2, 3, 0, 2, 1)),  # without food the queen looks O
         ("trail_levels", digits(6, 0, 4, 5, 0)),
         ("ants_seen", digits(5, 0, 2, 3, 0)),
+        ("ants", digits(6, 0, 2, 3, 0)),
+        ("queues", digits(7, 0, 2, 3, 0)),
     ],
 )
 def test_without_food(observation, row):
@@ -74,6 +76,8 @@ def test_without_food(observation, row):
         ("six_cells", digits(4, 1, 1, 0, 1, 0, 0, 3)),
         ("trail_levels", digits(6, 1, 0, 1, 0)),
         ("ants_seen", digits(5, 1, 0, 1, 0)),
+        ("ants", digits(6, 1, 0, 1, 0)),
+        ("queues", digits(7, 1, 0, 1, 0)),
     ],
 )
 def test_with_food(observation, row):
@@ -178,6 +182,44 @@ def test_another_ant_is_told_from_a_rock_whatever_it_carries(carries, other_carr
     looking = colony.ants[1]
     assert looking.state == digits(5, int(carries), 1, 4, 1)
     assert looking.percept == 64 * carries + 16 + 4 + 1
+
+
+P, OTHER, AHEAD = 4, 5, 6  # ants: other load on a better cell, on any other; same load on a better
+
+
+@pytest.mark.parametrize(
+    ("loads", "of_upper", "of_lower"),
+    [
+        # (upper, lower). With food a cell is better if it is nearer to the queen: the lower one is.
+        ((True, False), P, OTHER),
+        ((False, True), OTHER, OTHER),  # no trail is stronger than none
+        ((True, True), AHEAD, 1),
+        ((False, False), 1, 1),
+    ],
+)
+def test_ants_look_like_what_they_carry_and_where_they_stand(loads, of_upper, of_lower):
+    for name, base in (("ants", 6), ("queues", 7)):
+        colony = begun(CROWD, observation=name)
+        load(colony, *(slot for slot in range(2) if loads[slot]))
+        for slot in range(2):
+            colony.look(colony.ants[slot])
+        seen = [1 if code == AHEAD and name == "ants" else code for code in (of_upper, of_lower)]
+        upper, lower = (colony.ants[slot].state for slot in range(2))
+        assert upper // base % base == seen[0]
+        assert lower == digits(base, int(loads[1]), 1, seen[1], 1)
+
+
+@pytest.mark.parametrize(("levels", "code"), [((7, 6), P), ((6, 6), OTHER), ((0, 6), OTHER)])
+def test_without_food_a_better_cell_has_a_stronger_trail_than_the_ants_own(levels, code):
+    ahead = neighbour(A, 0)
+    trails = list(zip((ahead, A), levels, strict=True))
+    world = World((5, 5, 5), FAR, trails=trails, ants=[(A, 0), (ahead, 0)])
+    colony = begun(world, observation="queues")
+    assert colony.ants[0].state == digits(7, 0, 0, AHEAD if code == P else 1, 0)
+    load(colony, 1)
+    colony.look(colony.ants[0])
+    assert colony.ants[0].state == digits(7, 0, 0, code, 0)
+    assert colony.ants[0].percept == 4  # what it can do goes by the paper's state
 
 
 def test_an_ant_that_has_just_died_is_not_seen():

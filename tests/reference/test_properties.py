@@ -68,7 +68,7 @@ def test_ants_stand_alone_on_empty_cells(seed):
     for drawn, colony, _ in colonies_of(seed):
         cells = [ant.cell for ant in colony.ants.values()]
         assert len(set(cells)) == len(cells)
-        assert set(cells) == colony.world.occupied
+        assert set(cells) == set(colony.world.ants)
         assert all(colony.world.ground[cell] == EMPTY for cell in cells)
         record = colony.record
         assert len(cells) == drawn.population["ants"] + record.births - record.deaths

@@ -263,3 +263,50 @@ def test_dense_levels_are_seen_from_one_on_and_from_half_of_the_strongest():
             trail._levels[trail._place[neighbour(MIDDLE, heading)]] = level
         act(colony, GIVE)
         assert colony.ants[0].state == state
+
+
+@pytest.mark.parametrize(
+    ("pheromone", "levels"),
+    [
+        # The ant takes the food of the lane's end, turns round and walks back over two cells: 500
+        # on the food's cell and its own, then 10 less for each tick that it has carried.
+        (Pheromone("none", deposit="fading", level=500), (500, 500, 490, 480)),
+        (Pheromone("none", deposit="fading", level=500, slope=100), (500, 500, 400, 300)),
+        (Pheromone("none", deposit="fading", level=15), (15, 15, 5, 0)),
+        (Pheromone("linear", deposit="fading", level=500), (497, 497, 488, 479)),
+        (Pheromone("exponential", 1, deposit="fading", level=512, slope=64), (64, 64, 112, 192)),
+    ],
+)
+def test_trails_that_fade_rise_towards_the_food(pheromone, levels):
+    colony = begun(FADING, pheromone=pheromone)
+    cells = [neighbour(colony.ants[0].cell, 0)]
+    for _ in range(3):
+        cells.append(neighbour(cells[-1], 3))
+    act(colony, PICK_UP)
+    act(colony, FORWARD)
+    act(colony, FORWARD)
+    assert [float(colony.world.level(cell)) for cell in cells] == list(levels)
+
+
+def test_a_fading_deposit_lowers_no_trail():
+    colony = begun(
+        "trail = 900\n" + FADING.replace(".", "t"),
+        pheromone=Pheromone("none", deposit="fading", level=500),
+    )
+    first = colony.ants[0].cell
+    act(colony, PICK_UP)
+    act(colony, FORWARD)
+    assert [colony.world.level(first), colony.world.level(neighbour(first, 3))] == [500, 900]
+
+
+# An ant below food; below it two free cells, and the queen beside them.
+FADING = """
+F
+  .
+0
+  .
+.
+  .
+.
+  Q
+"""

@@ -118,3 +118,27 @@ def test_with_food_other_food_looks_o():
 
 def test_with_food_trails_are_not_seen():
     assert sees(carries=True, trails=[(M, 250)]) == 64
+
+
+@pytest.mark.parametrize(
+    ("view", "levels", "loads", "state"),
+    [
+        # Left, forward, right; "-" is no ant, 0 an ant without food, 1 one with food.
+        ("half", (10, 5, 4), "---", 40),
+        ("strongest", (10, 5, 4), "---", 32),
+        ("strongest", (10, 9, 10), "---", 34),  # all that are equally strong
+        ("strongest", (0, 0, 0), "---", 0),
+        ("strongest", (5, 10, 4), "-1-", 16 * 2 + 4),  # a trail under an ant does not count
+        ("strongest_under_carriers", (5, 10, 4), "-1-", 4),  # under one with food it does,
+        ("strongest_under_carriers", (5, 10, 4), "-0-", 16 * 2 + 4),  # without it does not
+        ("strongest_under_carriers", (10, 10, 4), "-1-", 16 * 2 + 4),
+    ],
+)
+@pytest.mark.parametrize("diffusion", [0.0, 1e-9])
+def test_which_trails_look_like_one(view, levels, loads, state, diffusion):
+    world = World((5, 5, 5), FAR, trails=list(zip((L, M, R), levels, strict=True)))
+    moving = WorldState(world, Pheromone(view=view, diffusion=diffusion))
+    for cell, load in zip((L, M, R), loads, strict=True):
+        if load != "-":
+            moving.ants[cell] = Ant(cell, 0, load == "1")
+    assert observe(moving, Ant(A, 1)) == state

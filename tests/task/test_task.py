@@ -19,9 +19,20 @@ def test_the_defaults_are_the_rules_of_the_world():
     task = Task()
     assert task == Task()
     assert hash(task) == hash(Task())
-    assert dataclasses.astuple(task.pheromone) == ("linear", None, 0.0, "set", 250, None)
+    assert dataclasses.astuple(task.pheromone) == (
+        "linear",
+        None,
+        0.0,
+        "set",
+        250,
+        None,
+        None,
+        "half",
+    )
     assert dataclasses.astuple(task.rewards) == (0, -1, 1, 3, 10)
     assert task.life == Life(births=False, lifespan=None, regrowth=None, wander=None)
+    assert dataclasses.astuple(task.traffic) == (False, False, False, False)
+    assert not task.turns_at_queen
     assert (task.observation, task.n_states, task.delivery) == ("paper", 128, "absorbing")
     assert (task.evaporation_in_training, task.evaporation_in_evaluation) == (False, True)
 
@@ -46,7 +57,7 @@ def test_a_task_can_be_written_as_json():
         ({"rewards": 3}, r"rewards is 3; it must be Rewards\(...\)"),
         ({"pheromone": "linear"}, r"pheromone is 'linear'; it must be Pheromone\(...\)"),
         ({"life": None}, r"life is None; it must be Life\(...\)"),
-        ({"traffic": "left"}, "traffic is 'left'; it must be one of blocking"),
+        ({"traffic": "left"}, "traffic is 'left'; it must be one of blocking, right_of_way"),
         ({"delivery": "never"}, "delivery is 'never'; it must be one of absorbing, continuing"),
         ({"evaporation_in_training": 1}, "evaporation_in_training is 1; it must be True or False"),
     ],
@@ -129,7 +140,7 @@ def test_each_row_has_a_name_of_its_own(name):
         ({"diffusion": 1.01}, "diffusion is 1.01; it must be a number from 0 to 1"),
         ({"diffusion": -0.1}, "diffusion is -0.1"),
         ({"diffusion": None}, "diffusion is None"),
-        ({"deposit": "drop"}, "deposit is 'drop'; .* set, add, none"),
+        ({"deposit": "drop"}, "deposit is 'drop'; .* set, add, fading, none"),
         ({"level": 0}, "level is 0; it must lie between 1 and 1000000"),
         ({"level": 2.5}, "level is 2.5"),
         ({"cap": 1_000_001}, "cap is 1000001"),

@@ -12,7 +12,7 @@ import numpy as np
 from taichi_ants import checks, learners, runtime
 from taichi_ants.engines.colony import files as colony_files
 from taichi_ants.engines.colony import memory
-from taichi_ants.engines.colony.layout import AntRow, Stage, WorldRow
+from taichi_ants.engines.colony.layout import ADDS, FADES, LINEAR, SETS, AntRow, Stage, WorldRow
 from taichi_ants.engines.packing import padded
 from taichi_ants.engines.records import Record
 from taichi_ants.errors import AntsError, check_one_of, shown
@@ -34,6 +34,8 @@ _ANTS_PER_CHUNK = 2048
 _MOST_CHUNKS = 256
 _TICKS_BETWEEN_SORTS = 32
 _PIECE_SECONDS = 0.4
+
+_DEPOSITS = {"none": 0, "set": SETS, "add": ADDS, "fading": FADES}  # as kernels read them
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -418,6 +420,8 @@ class Colony:
             self.one_a_slot,
             self.task.sees,
             self.pheromone.dense,
+            self.pheromone.view,
+            self.task.traffic,
             self._ants_change,
             self._food_changes,
         )
@@ -444,12 +448,14 @@ class Colony:
             "episode": self.episode,
             "length": self.length,
             "evaporates": int(pheromone.evaporation == "linear"),  # of integer trails: the clock
-            "deposits": int(pheromone.deposit != "none"),
-            "adds": int(pheromone.deposit == "add"),
+            "deposits": _DEPOSITS[pheromone.deposit],
             "deposit_level": level(pheromone.level),
             "cap": level(pheromone.cap or 0),
+            "slope": level(pheromone.slope or 0),
+            "fades_after": pheromone.fades_after,
+            "turns_at_queen": int(self.task.turns_at_queen),
             # The factor of exponential evaporation, 1 for none, -1 for linear.
-            "decay": -1.0 if pheromone.evaporation == "linear" else float(pheromone.decay),
+            "decay": LINEAR if pheromone.evaporation == "linear" else float(pheromone.decay),
             "share": float(pheromone.share),  # what a cell gives to each neighbour
             "births": int(life.births),
             "lifespan": life.lifespan or off,

@@ -14,13 +14,14 @@ import taichi as ti
 
 from taichi_ants.engines import looks
 from taichi_ants.engines.colony import learning, life, steps, trail
-from taichi_ants.engines.colony.layout import AntRow, Stage, WorldRow
+from taichi_ants.engines.colony.layout import STANDS, AntRow, Stage, WorldRow
 from taichi_ants.engines.trial import tried
 from taichi_ants.learners.memory import read_rates
 from taichi_ants.learners.registry import Learner
 from taichi_ants.learners.td_errors import guarded
 from taichi_ants.task.constants import ROW
 from taichi_ants.task.observations import Observation
+from taichi_ants.task.traffic import Traffic
 
 ANTS, CELLS, WORLD = "ants", "cells", "world"
 
@@ -48,6 +49,8 @@ class Variant:
         own_tables: Whether there is a table for each slot, not one for each world.
         observation: The observation.
         dense: Whether levels are f32, see `trail`.
+        view: Which trails look like one, see `Pheromone`.
+        traffic: Who may enter a cell on which another ant stands.
         ants_change, food_changes: Whether ants, or foods, come and go; leaving that out saves time,
             more so while this compiles.
     """
@@ -58,10 +61,15 @@ class Variant:
         own_tables: bool,
         observation: Observation,
         dense: bool,
+        view: str,
+        traffic: Traffic,
         ants_change: bool,
         food_changes: bool,
     ) -> None:
         self.own_tables, self.dense = own_tables, dense
+        self.view, self.half, self.traffic = view, view == "half", traffic
+        # The mark of an ant that wants nothing.
+        self.idle = STANDS if traffic.shared else 0
         self.ants_change, self.food_changes = ants_change, food_changes
         self.learner = None if learner is None else tried(learner)
         self.draws_next_action = learner is not None and learner.draws_next_action
@@ -77,6 +85,8 @@ class Variant:
         self.observation = observation
         self.n_pairs = observation.n_states * ROW  # of a row and an action, and some of no meaning
         self.sees_percept = looks.is_percept(observation)
+        # Whether the cell of an ant has to tell what the ant carries.
+        self.sees_ants = not self.sees_percept or view == "strongest_under_carriers"
         # Where an ant keeps the row of its table.
         self.row_at = AntRow.PERCEPT if self.sees_percept else AntRow.STATE
         if not self.sees_percept:
@@ -96,6 +106,8 @@ def tick_phases(v: Variant) -> Iterator[Phase]:
     """A tick; rounds of `planning_phases` and the `last_phases` follow."""
     yield Phase(ANTS, steps.want)
     yield Phase(ANTS, steps.resolve)
+    if v.traffic.shared:
+        yield Phase(ANTS, steps.settle)
     yield Phase(ANTS, steps.commit)
     if v.dense:
         yield Phase(CELLS, trail.evaporate)

@@ -15,12 +15,15 @@ class AntRow(IntEnum):
     CARRIES = auto()
     STAGE = auto()  # a `Stage`
     AGE = auto()
+    CARRIED = auto()  # ticks with the food that it carries
     NUMBER = auto()  # -1 in a slot that was never used in this episode
     PERCEPT = auto()  # the paper's state: what acting and rewards go by
     STATE = auto()  # the row of the table; unused where the percept is the row
     ACTION = auto()  # the one that is drawn already, -1
     WANT = auto()  # the cell to enter, or of the food to take, -1
     EVENT = auto()  # what came of the last action
+    GOES = auto()  # where it is after the tick, and whether another ant enters the cell that it
+    FILLED = auto()  # leaves; only where cells with ants can be entered
 
 
 class Stage(IntEnum):
@@ -87,6 +90,14 @@ class SumRow(IntEnum):
 # a cell on which an ant stands, are a mark of that ant. Between two phases of acting it says what
 # the ant wants: nothing (0), to enter the cell at a heading, or to take the food there.
 ENTER, TAKE = 1, 9  # plus the heading
-# Otherwise whether it carries food.
+# Otherwise whether it carries food. Where cells with ants can be entered, an ant that wants nothing
+# has STANDS for its mark, so that every ant has one.
 STANDS, STANDS_WITH_FOOD = 7, 15
+# What else the others need to know of an ant then, in `crowd` at its cell.
+HAS_FOOD, TAKES_FOOD, WINS = 1, 2, 4
 ANT_GROUND = OBSTACLE | STANDS << 4  # the cell of an ant without food
+
+# What kernels read of the pheromone: how deposits are laid, 0 for none, and the value of `decay`
+# that stands for linear evaporation.
+SETS, ADDS, FADES = 1, 2, 3
+LINEAR = -1.0

@@ -165,7 +165,7 @@ def constants(colony: Colony) -> dict[str, np.ndarray]:
     """What worlds and settings determine, and what is used within a tick alone."""
     chunks, shared = len(colony.seeds) * colony.chunks, colony.sharing == "shared"
     pairs = colony.task.n_states * ROW if shared else 0
-    sums = max(1, chunks * pairs)
+    sums, cells = max(1, chunks * pairs), len(colony.seeds) * colony.grid.size
     return {
         # 1 for rocks and outside.
         "walls": _of_each(colony, _walls).reshape(-1),
@@ -177,6 +177,8 @@ def constants(colony: Colony) -> dict[str, np.ndarray]:
         "hyperparameters": np.array([*dict(colony.training.hyperparameters).values(), 0.0]),
         # How far the mean of n errors moves a value, by n.
         "weights": update_weights(colony.training.learning_rate, colony.capacity if shared else 1),
+        # What other ants need to know of the ant on a cell, see `layout`.
+        "crowd": np.zeros(cells if colony.task.traffic.shared else 1, np.uint8),
         "spare": np.zeros_like(colony.arrays["level"]),  # the next levels, with diffusion
         "tallies": np.zeros((len(TallyRow), chunks), np.int64),
         # By chunk and pair: fixed-point sums of TD errors, the last error, and see SumRow.

@@ -4,6 +4,10 @@ The conflict rule: a cell to enter must be empty at the start of the tick. Of se
 one cell (to enter it, or to take the food in it) the one with the smallest key wins, a hash of the
 cell it stands on and the tick. So neither ant numbers nor threads matter, and nothing is atomic:
 each ant writes what it wants into its own cell, and looks at the six cells around what it wants.
+
+Where cells with ants can be entered, see `Traffic`, the winners settle in a phase of their own who
+of them moves: each ant finds its own way out of what all have written, and changes nothing that
+another one reads.
 """
 
 import taichi as ti
@@ -12,19 +16,24 @@ from taichi.math import popcnt
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
     ENTER,
+    HAS_FOOD,
     STANDS,
     TAKE,
+    TAKES_FOOD,
+    WINS,
     AntRow,
     HomeRow,
     TallyRow,
 )
-from taichi_ants.engines.colony.trail import deposit, level_in_view, level_of
+from taichi_ants.engines.colony.trail import deposit, level_in_view, level_of, level_that_counts
 from taichi_ants.engines.looks import judge
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.learners.memory import values_of
 from taichi_ants.task.constants import (
     DELIVERED,
     EMPTY,
+    ENTERED_EMPTY,
+    ENTERED_LURE,
     FAILED,
     FORWARD,
     GIVE,
@@ -82,14 +91,23 @@ def see(c: ti.template(), v: ti.template(), w, ant, clock):
         percept = percept_carrying(ground_left, ground_forward, ground_right, nearer)
     else:
         percept = percept_foraging(
+            v.half,
             ground_left,
             ground_forward,
             ground_right,
             level_in_view(c, v, left, clock),
             level_in_view(c, v, forward, clock),
             level_in_view(c, v, right, clock),
+            strongest_of(c, v, left, forward, right, clock),
         )
     return percept
+
+
+@ti.func
+def strongest_of(c: ti.template(), v: ti.template(), left, forward, right, clock):
+    """The largest level of the three cells ahead that counts."""
+    others = ti.max(level_that_counts(c, v, forward, clock), level_that_counts(c, v, right, clock))
+    return ti.max(level_that_counts(c, v, left, clock), others)
 
 
 @ti.func
@@ -102,11 +120,18 @@ def look_around(c: ti.template(), v: ti.template(), w, ant, clock):
     for k in ti.static(range(len(cells))):
         towards = (heading + cells[k] + N_HEADINGS) % N_HEADINGS
         place = here + step_towards(c.compass, towards, FORWARD)
-        look.levels[k] = level_in_view(c, v, place, clock)
+        standable = (looks_of(c.ground[place]) == EMPTY) | (c.ground[place] >= ANT_GROUND)
+        look.levels[k] = ti.select(standable, level_of(c, v, place, clock), 0)
         look.ants[k] = ant_on(c.ground[place])
         look.nearer[k] = nearer >> (cells[k] % N_HEADINGS) & 1
         look.codes[k] = looks_of(c.ground[place])
-    judge(look, v.observation)
+    look.strongest = strongest_of(
+        *(c, v, here + step_towards(c.compass, heading, LEFT)),
+        here + step_towards(c.compass, heading, FORWARD),
+        here + step_towards(c.compass, heading, RIGHT),
+        clock,
+    )
+    judge(v.half, look, v.observation)
     return look
 
 
@@ -153,9 +178,12 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         action = draw_action(c, v, w, ant, c.ants[v.row_at, ant])
     percept, cell = c.ants[AntRow.PERCEPT, ant], c.ants[AntRow.CELL, ant]
     heading = turned_by(c.compass, c.ants[AntRow.HEADING, ant], action)
+    ahead = cell + step_towards(c.compass, heading, FORWARD)
     enters = is_open(code_in_view(percept, ti.min(action, RIGHT))) and action <= RIGHT
-    wanted = ti.select(enters, cell + step_towards(c.compass, heading, FORWARD), -1)
-    mark = ti.select(enters, ENTER + heading, 0)
+    if ti.static(v.traffic.shared):
+        enters = enters or (action <= RIGHT and has_ant(c, w * c.size + ahead))
+    wanted = ti.select(enters, ahead, -1)
+    mark = ti.select(enters, ENTER + heading, v.idle)
     if action == PICK_UP and c.ants[AntRow.CARRIES, ant] == 0:
         foods = goals_in_view(percept)
         if foods != 0:
@@ -169,6 +197,9 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     c.ants[AntRow.ACTION, ant] = action
     c.ants[AntRow.WANT, ant] = wanted
     c.ground[w * c.size + cell] = ti.cast(OBSTACLE | mark << 4, ti.u8)
+    if ti.static(v.traffic.shared):
+        takes = ti.select(mark >= TAKE, TAKES_FOOD, 0)
+        c.crowd[w * c.size + cell] = ti.cast(c.ants[AntRow.CARRIES, ant] | takes, ti.u8)
 
 
 @ti.func
@@ -182,8 +213,11 @@ def resolve(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         for heading in ti.static(range(N_HEADINGS)):
             other = c.ground[base + wanted + c.compass[heading + 1]] >> 4
             rivals += ti.cast(other == wanting(kind, heading), ti.i32)
-        if rivals > 0 and not wins(c, base, c.ants[AntRow.CELL, ant], wanted, kind, tick):
+        cell = c.ants[AntRow.CELL, ant]
+        if rivals > 0 and not wins(c, v, base, cell, wanted, kind, tick):
             c.ants[AntRow.WANT, ant] = -1
+        elif ti.static(v.traffic.shared):
+            c.crowd[base + cell] |= ti.cast(WINS, ti.u8)
 
 
 @ti.func
@@ -193,13 +227,18 @@ def wanting(kind, heading):
 
 
 @ti.func
-def wins(c: ti.template(), base, cell, wanted, kind, tick):
-    """Whether no other ant that wants the same has a smaller key than the one on `cell`."""
+def wins(c: ti.template(), v: ti.template(), base, cell, wanted, kind, tick):
+    """Whether no other ant that wants the same comes before the one on `cell`."""
     own, won = conflict_key(cell, tick), True
     for heading in range(N_HEADINGS):
         other = wanted + c.compass[heading + 1]
         if c.ground[base + other] >> 4 == wanting(kind, heading) and other != cell:
-            won = won and conflict_key(other, tick) > own
+            after = conflict_key(other, tick) > own
+            if ti.static(v.traffic.carriers_first):
+                loaded = c.crowd[base + cell] & HAS_FOOD
+                other_loaded = c.crowd[base + other] & HAS_FOOD
+                after = loaded > other_loaded or (loaded == other_loaded and after)
+            won = won and after
     return won
 
 
@@ -208,6 +247,112 @@ def conflict_key(cell, tick):
     """The smallest key wins."""
     inner = bits_of(advance(ti.cast(cell, ti.u64)))
     return bits_of(advance(inner ^ ti.cast(tick, ti.u64)))
+
+
+@ti.func
+def has_ant(c: ti.template(), place):
+    """Whether an ant stands on a cell; where cells with ants can be entered, all have a mark."""
+    return c.ground[place] >> 4 != 0
+
+
+@ti.func
+def way_is_free(c: ti.template(), v: ti.template(), base, cell, wanted):
+    """Whether the winner on `cell` enters a cell that is empty, or whose ant moves on as it does.
+
+    The winners of cells with ants form queues; one moves if its head enters an empty cell. A queue
+    that bites its own tail is a ring, which stays.
+    """
+    ahead = wanted
+    if ti.static(v.traffic.follow):
+        moving = True
+        while moving:
+            moving = has_ant(c, base + ahead) and ahead != cell
+            moving = moving and c.crowd[base + ahead] & (WINS | TAKES_FOOD) == WINS
+            if moving:
+                heading = ti.cast(c.ground[base + ahead] >> 4, ti.i32) - ENTER
+                ahead += c.compass[heading + 1]
+    return not has_ant(c, base + ahead)
+
+
+@ti.func
+def entering(c: ti.template(), base, cell):
+    """The cell of the ant that wins the cell of another one, -1 if nobody does."""
+    found = -1
+    for heading in ti.static(range(N_HEADINGS)):
+        other = cell + c.compass[heading + 1]
+        mark = c.ground[base + other] >> 4
+        if mark == wanting(0, heading) and c.crowd[base + other] & WINS != 0:
+            found = other
+    return found
+
+
+@ti.func
+def gives_way(c: ti.template(), v: ti.template(), base, cell):
+    """Whether the ant on a cell gives way to one with food that wins its cell.
+
+    Where ants follow, one that moves is never asked: then the other one moves as well.
+    """
+    crowd = c.crowd[base + cell]
+    stays = crowd & (HAS_FOOD | TAKES_FOOD) == 0
+    if ti.static(not v.traffic.follow):
+        if stays and crowd & WINS != 0:
+            heading = ti.cast(c.ground[base + cell] >> 4, ti.i32) - ENTER
+            stays = has_ant(c, base + cell + c.compass[heading + 1])
+    return stays
+
+
+@ti.func
+def step_ahead(c: ti.template(), ant):
+    """The index step to the cell before an ant."""
+    return step_towards(c.compass, c.ants[AntRow.HEADING, ant], FORWARD)
+
+
+@ti.func
+def event_of(c: ti.template(), v: ti.template(), base, ant, clock):
+    """The event of a move that succeeds; a cell with an ant is a lure if it is the better one."""
+    action, percept = c.ants[AntRow.ACTION, ant], c.ants[AntRow.PERCEPT, ant]
+    here = base + c.ants[AntRow.CELL, ant]
+    ahead = here + step_ahead(c, ant)
+    event = move_event(code_in_view(percept, action))
+    if has_ant(c, ahead):
+        better = level_of(c, v, ahead, clock) > level_of(c, v, here, clock)
+        if c.ants[AntRow.CARRIES, ant] == 1:
+            better = ti.cast(c.closer[here], ti.i32) >> c.ants[AntRow.HEADING, ant] & 1 == 1
+        event = ti.select(better, ENTERED_LURE, ENTERED_EMPTY)
+    return event
+
+
+@ti.func
+def settle(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
+    """Find out where the ant is after the tick, and what comes of its move.
+
+    It moves on an empty way; or, with food, it changes places with the ant in its way; or it gives
+    way to an ant with food that wins its cell; or it stays.
+    """
+    base, clock = w * c.size, tick * c.evaporates
+    cell, wanted = c.ants[AntRow.CELL, ant], c.ants[AntRow.WANT, ant]
+    carries, moves = c.ants[AntRow.CARRIES, ant], c.ants[AntRow.ACTION, ant] <= RIGHT
+    enters, follower = False, entering(c, base, cell)
+    event, goes, filled = FAILED, cell, 0
+    if moves and wanted >= 0:
+        enters = way_is_free(c, v, base, cell, wanted)
+        if ti.static(v.traffic.follow):
+            filled = ti.cast(enters and follower >= 0, ti.i32)
+        if ti.static(v.traffic.swap):
+            if not enters and carries == 1 and gives_way(c, v, base, wanted):
+                enters, filled = True, 1
+        if enters:
+            goes, event = wanted, event_of(c, v, base, ant, clock)
+    if ti.static(v.traffic.swap):
+        if not enters and follower >= 0:
+            if c.crowd[base + follower] & HAS_FOOD != 0 and gives_way(c, v, base, cell):
+                goes, filled, event = follower, 1, ENTERED_EMPTY
+                if ti.static(v.traffic.grant):
+                    if moves and cell + step_ahead(c, ant) == follower:
+                        enters, event = True, event_of(c, v, base, ant, clock)
+    c.ants[AntRow.GOES, ant], c.ants[AntRow.FILLED, ant] = goes, filled
+    c.ants[AntRow.EVENT, ant] = event
+    tally(c, TallyRow.BLOCKED, chunk, ti.cast(moves and not enters, ti.i32))
 
 
 @ti.func
@@ -220,28 +365,38 @@ def commit(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     enters = moves and wanted >= 0
     destination = ti.select(enters, wanted, cell)
     event = ti.select(enters, move_event(code_in_view(percept, ti.min(action, RIGHT))), FAILED)
-    c.ground[base + cell] = EMPTY
+    if ti.static(v.traffic.shared):
+        destination, event = c.ants[AntRow.GOES, ant], c.ants[AntRow.EVENT, ant]
+        enters = destination != cell
+        if c.ants[AntRow.FILLED, ant] == 0:
+            c.ground[base + cell] = EMPTY
+    else:
+        c.ground[base + cell] = EMPTY
+        tally(c, TallyRow.BLOCKED, chunk, ti.cast(moves and not enters, ti.i32))
     c.ground[base + destination] = ANT_GROUND
     c.ants[AntRow.CELL, ant] = destination
     tally(c, TallyRow.MOVES, chunk, ti.cast(moves, ti.i32))
-    tally(c, TallyRow.BLOCKED, chunk, ti.cast(moves and not enters, ti.i32))
     if c.ants[AntRow.CARRIES, ant] == 1:
         if enters:
-            deposit(c, v, base + destination, clock)
+            deposit(c, v, base + destination, clock, c.ants[AntRow.CARRIED, ant])
         elif action == GIVE and goals_in_view(percept) != 0:
             event = DELIVERED
             c.ants[AntRow.CARRIES, ant] = 0
+            c.ants[AntRow.CARRIED, ant] = 0
+            if c.turns_at_queen == 1:
+                c.ants[AntRow.HEADING, ant] = turn_round(c.ants[AntRow.HEADING, ant])
             tally(c, TallyRow.DELIVERIES, chunk, 1)
     elif action == PICK_UP and wanted >= 0:
         event = PICKED_UP
         c.ants[AntRow.CARRIES, ant] = 1
         c.ground[base + wanted] = EMPTY
         take_from_home(c, base + wanted, tick)
-        deposit(c, v, base + wanted, clock)
-        deposit(c, v, base + cell, clock)
+        deposit(c, v, base + wanted, clock, 0)
+        deposit(c, v, base + cell, clock, 0)
         c.ants[AntRow.HEADING, ant] = turn_round(c.ants[AntRow.HEADING, ant])
-    if ti.static(not v.sees_percept):
+    if ti.static(v.sees_ants):
         c.ground[base + destination] = ground_under(c.ants[AntRow.CARRIES, ant])
+    c.ants[AntRow.CARRIED, ant] += c.ants[AntRow.CARRIES, ant]
     c.ants[AntRow.EVENT, ant] = event
     tally(c, TallyRow.RETURNS, chunk, c.rewards[event])
 

@@ -6,10 +6,9 @@ Dense mode (exponential evaporation, diffusion) stores levels as f32 and walks o
 
 import taichi as ti
 
+from taichi_ants.engines.colony.layout import ADDS, FADES, LINEAR, STANDS_WITH_FOOD
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task.constants import EMPTY
-
-LINEAR = -1.0  # the value of `decay` that stands for linear evaporation in dense mode
 
 
 @ti.func
@@ -26,12 +25,25 @@ def level_in_view(c: ti.template(), v: ti.template(), place, clock):
 
 
 @ti.func
-def deposit(c: ti.template(), v: ti.template(), place, clock):
-    """Lay a trail on a cell, as the task says."""
-    if c.deposits == 1:
+def level_that_counts(c: ti.template(), v: ti.template(), place, clock):
+    """The trail of a cell in view for the strongest one, 0 where it does not count."""
+    level = level_in_view(c, v, place, clock)
+    if ti.static(v.view == "strongest_under_carriers"):
+        carrier = c.ground[place] >> 4 == STANDS_WITH_FOOD
+        level = ti.select(carrier, level_of(c, v, place, clock), level)
+    return level
+
+
+@ti.func
+def deposit(c: ti.template(), v: ti.template(), place, clock, carried):
+    """Lay the trail of an ant that has carried its food for so many ticks, as the task says."""
+    if c.deposits != 0:
         laid = c.deposit_level
-        if c.adds == 1:
+        if c.deposits == ADDS:
             laid = ti.min(level_of(c, v, place, clock) + laid, c.cap)
+        elif c.deposits == FADES:
+            laid -= c.slope * ti.min(carried, c.fades_after)
+            laid = ti.max(level_of(c, v, place, clock), laid)
         if ti.static(v.dense):
             c.level[place] = laid
         else:

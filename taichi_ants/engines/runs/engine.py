@@ -46,6 +46,9 @@ _NO_WORK: dict[str, Any] = {
     # The task.
     "falls": 0,  # by how much a trail falls per tick: 1, or 0 without evaporation
     "level": 0,  # of a deposit
+    "slope": 0,  # of deposits that fade
+    "fades_after": 0,
+    "turns_at_queen": 0,
     "cap": 0,  # of deposits that add
     "continuing": 0,  # 1 if a delivery is no terminal state
     "rewards": np.zeros(1, np.int32),  # (5,) by event
@@ -149,8 +152,10 @@ class Launcher:
         self._runs, self._start, self._arguments = runs, cache(world.start), Arguments()
         self.cells_of_a_run = world.grid.size + EXTRA_CELLS
         learns, pheromone = runs.learner is not None, task.pheromone
-        kind = self._arguments.type_of(_NO_WORK)
-        self._kernel = run_kernel(runs.learner, task.sees, pheromone.deposit, traced, kind)
+        self._kernel = run_kernel(
+            *(runs.learner, task.sees, pheromone.deposit, pheromone.view == "half", traced),
+            self._arguments.type_of(_NO_WORK),
+        )
         compile_once(self._kernel, lambda: Arguments().pack(_NO_WORK))
         falls = task.evaporation_in_training if learns else task.evaporation_in_evaluation
         self._values = _NO_WORK | {
@@ -159,6 +164,9 @@ class Launcher:
             "falls": int(falls and pheromone.evaporation == "linear"),
             "level": pheromone.level,
             "cap": pheromone.cap or 0,
+            "slope": pheromone.slope or 0,
+            "fades_after": pheromone.fades_after,
+            "turns_at_queen": int(task.turns_at_queen),
             "continuing": int(task.delivery == "continuing"),
             "rewards": task.rewards.by_event(),
             "world": pack_cells(world),

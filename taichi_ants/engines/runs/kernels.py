@@ -34,7 +34,12 @@ from taichi_ants.task.rules.random_bits import advance, bits_of
 
 @cache
 def run_kernel(
-    learner: Learner | None, observation: Observation, deposit: str, traced: bool, arguments: Any
+    learner: Learner | None,
+    observation: Observation,
+    deposit: str,
+    half: bool,
+    traced: bool,
+    arguments: Any,
 ) -> Callable[..., None]:
     """The kernel for runs that learn, or follow a fixed policy; it is compiled on first use.
 
@@ -42,6 +47,7 @@ def run_kernel(
         learner: The learner; None for a fixed policy.
         observation: What row of its table an ant looks at.
         deposit: How trails are laid, see `Pheromone`.
+        half: Whether trails of half the strongest look like one, see `Pheromone.view`.
         traced: Record each step too, in `n_episodes * max_steps` rows for each run.
         arguments: The type of the argument pack, which `engine` lists.
     """
@@ -52,7 +58,7 @@ def run_kernel(
     hyperparameters = learner.hyperparameters if learns else Hyperparameters
     read = read_rates(hyperparameters)
     columns = N_SETTINGS + len(fields(hyperparameters))
-    state_of = state_seen(observation)
+    state_of = state_seen(observation, half)
     n_states = observation.n_states
     table = n_states * ROW
 
@@ -99,7 +105,7 @@ def run_kernel(
                 )
                 explore_below = ti.cast(exploration * 4294967296.0, ti.u64)
                 step, clock, total, next_action = 0, 0, 0, -1
-                percept = percept_of(a, base, ant, clock)
+                percept = percept_of(half, a, base, ant, clock)
                 state = state_of(a, base, ant, clock, percept)
                 if ti.static(on_policy):
                     next_action, ant.random_state = decide(a, at.table, ant, state, explore_below)
@@ -112,7 +118,7 @@ def run_kernel(
                     clock += a.falls
                     reward = a.rewards[ant.event]
                     total += reward
-                    seen = percept_of(a, base, ant, clock)
+                    seen = percept_of(half, a, base, ant, clock)
                     next_state = state_of(a, base, ant, clock, seen)
                     delivered = ti.cast(ant.event == DELIVERED, ti.i32)
                     terminated = delivered & (1 - a.continuing)

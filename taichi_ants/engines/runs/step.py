@@ -42,6 +42,7 @@ Ant = ti.types.struct(
     cell=ti.i32,
     heading=ti.i32,
     carries=ti.i32,
+    carried=ti.i32,  # ticks with the food that it carries, where trails fade
     event=ti.i32,
     random_state=ti.u64,
 )
@@ -60,15 +61,19 @@ def restore(a: ti.template(), base, first, last):
 
 
 @ti.func
-def lay(kind: ti.template(), a: ti.template(), base, cell, clock, trail):
+def lay(kind: ti.template(), a: ti.template(), base, cell, clock, trail, carried):
     """Lay a trail on an empty cell, stored as the clock at which it will have evaporated.
 
-    `kind` is the deposit of the task's pheromone, `trail` what is stored there so far.
+    `kind` is the deposit of the task's pheromone, `trail` what is stored there so far, `carried`
+    for how many ticks the ant has carried its food.
     """
     if ti.static(kind == "set"):
         a.cells[base + cell] = clock + a.level
     elif ti.static(kind == "add"):
         a.cells[base + cell] = clock + ti.min(ti.max(trail - clock, 0) + a.level, a.cap)
+    elif ti.static(kind == "fading"):
+        fresh = a.level - a.slope * ti.min(carried, a.fades_after)
+        a.cells[base + cell] = ti.max(trail, clock + fresh)
     else:
         a.cells[base + cell] = trail
     a.cells[base + a.size] = ti.min(a.cells[base + a.size], cell)
@@ -82,7 +87,7 @@ def ground_of(packed):
 
 
 @ti.func
-def percept_of(a: ti.template(), base, ant, clock):
+def percept_of(half: ti.template(), a: ti.template(), base, ant, clock):
     """The percept of the ant at `clock`; the cells of its run begin at `base`."""
     here = base + ant.cell
     left = a.cells[here + step_towards(a.compass, ant.heading, LEFT)]
@@ -93,23 +98,28 @@ def percept_of(a: ti.template(), base, ant, clock):
         nearer = nearer_from(a.closer[ant.cell], ant.heading)
         percept = percept_carrying(ground_of(left), ground_of(forward), ground_of(right), nearer)
     else:
+        trail_left, trail_forward = ti.max(left - clock, 0), ti.max(forward - clock, 0)
+        trail_right = ti.max(right - clock, 0)
         percept = percept_foraging(
+            half,
             ground_of(left),
             ground_of(forward),
             ground_of(right),
-            ti.max(left - clock, 0),
-            ti.max(forward - clock, 0),
-            ti.max(right - clock, 0),
+            trail_left,
+            trail_forward,
+            trail_right,
+            ti.max(trail_left, ti.max(trail_forward, trail_right)),
         )
     return percept
 
 
 @cache
-def state_seen(observation: Observation) -> Callable[..., Any]:
+def state_seen(observation: Observation, half: bool) -> Callable[..., Any]:
     """A `ti.func` (a, base, ant, clock, percept) -> the row of the table that the ant looks at."""
     if is_percept(observation):
         return _percept_itself
     view = observation.cells
+    left, forward, right = observation.ahead
     look_of, row = look_type(observation, False), row_function(observation)
 
     @ti.func
@@ -122,7 +132,9 @@ def state_seen(observation: Observation) -> Callable[..., Any]:
             look.levels[k] = ti.max(cell - clock, 0)
             look.nearer[k] = nearer >> (view[k] % N_HEADINGS) & 1
             look.codes[k] = ground_of(cell)
-        judge(look, observation)
+        ahead = ti.max(look.levels[left], look.levels[forward])
+        look.strongest = ti.max(ahead, look.levels[right])
+        judge(half, look, observation)
         return row(look)
 
     return see
@@ -146,7 +158,8 @@ def act(deposit: ti.template(), a: ti.template(), base, ant, percept, action, cl
             after.cell += step_towards(a.compass, after.heading, FORWARD)
             if ant.carries == 1:
                 if ti.static(deposit != "none"):
-                    lay(deposit, a, base, after.cell, clock, a.cells[base + after.cell])
+                    before = a.cells[base + after.cell]
+                    lay(deposit, a, base, after.cell, clock, before, ant.carried)
     else:
         goals = goals_in_view(percept)
         if goals != 0 and action == PICK_UP and ant.carries == 0:
@@ -155,12 +168,16 @@ def act(deposit: ti.template(), a: ti.template(), base, ant, percept, action, cl
                 k, after.random_state = draw_below(ant.random_state, popcnt(goals))
                 position = bit_number(goals, k)
             food = ant.cell + step_towards(a.compass, ant.heading, position)
-            lay(deposit, a, base, food, clock, a.trails[food])
-            lay(deposit, a, base, ant.cell, clock, a.cells[base + ant.cell])
+            lay(deposit, a, base, food, clock, a.trails[food], 0)
+            lay(deposit, a, base, ant.cell, clock, a.cells[base + ant.cell], 0)
             after.heading = turn_round(ant.heading)
             after.carries = 1
             after.event = PICKED_UP
         elif goals != 0 and action == GIVE and ant.carries == 1:
             after.carries = 0
+            if a.turns_at_queen == 1:
+                after.heading = turn_round(ant.heading)
             after.event = DELIVERED
+    if ti.static(deposit == "fading"):
+        after.carried = (ant.carried + 1) * after.carries
     return after

@@ -40,9 +40,10 @@ class Observation:
             `carries`, 1 with food, else 0; `percept`, the paper's state, 0 to 127; `codes`, what
             each cell in `cells` looks like (0 E, 1 O, 2 T or S, 3 F or Q; T is measured against
             the strongest trail of the three cells ahead); `levels`, the trail of each if it is
-            empty, else 0; `strongest`, the largest level of the three cells ahead; `ants`, 0 for
-            no ant there, 1 for one without food, 2 for one with food; `nearer`, 1 if the cell is
-            nearer to the queen than the ant's own; and `own_level`, the trail on its own cell.
+            empty or an ant stands there, else 0; `strongest`, the largest level of the three cells
+            ahead that counts; `ants`, 0 for no ant there, 1 for one without food, 2 for one with
+            food; `nearer`, 1 if the cell is nearer to the queen than the ant's own; and
+            `own_level`, the trail on its own cell.
         cells: The cells in view: their headings relative to the ant's, each from -2 to 3; -1, 0
             and 1, the cells ahead, are among them.
         name_of: The name of a row for people.
@@ -149,12 +150,13 @@ def _drawn_looks(observation: Observation) -> Iterator[SimpleNamespace]:
     trails = rng.integers(0, 2, shape) * 10.0 ** rng.uniform(-1, 6, shape)
     for n in range(_LOOKS):
         trail = trails[n].astype(np.int32 if n % 2 else np.float32)
-        levels = trail * (ground[n] == EMPTY)
-        strongest = levels[ahead].max()
+        levels = trail * ((ground[n] == EMPTY) | (ants[n] > 0))
+        visible = trail * (ground[n] == EMPTY)
+        strongest = visible[ahead].max()
         if carries[n]:
             lure, codes = (ground[n] == EMPTY) & (nearer[n] == 1), ground[n] >> 2
         else:
-            lure, codes = 2 * levels >= max(strongest, 2), ground[n] & 3
+            lure, codes = 2 * visible >= max(strongest, 2), ground[n] & 3
         codes[lure] = SEES_LURE
         left, forward, right = codes[ahead]
         yield SimpleNamespace(

@@ -7,15 +7,18 @@ from taichi_ants.task.constants import EMPTY, SEES_LURE
 
 
 @ti.func
-def see_foraging(ground, level, strongest):
+def see_foraging(half: ti.template(), ground, level, strongest):
     """The code of a cell for an ant without food.
 
     `ground` is what the cell holds, `level` its trail if it is empty, else 0, and `strongest` the
-    largest level in view. An empty cell is a trail if its level is at least 1 and at least half of
-    the strongest.
+    largest level in view that counts. An empty cell is a trail if its level is at least 1 and, if
+    `half`, at least half of the strongest, else as much.
     """
     code = ground & 3
-    if 2 * level >= ti.max(strongest, 2):
+    if ti.static(half):
+        if 2 * level >= ti.max(strongest, 2):
+            code = SEES_LURE
+    elif level >= ti.max(strongest, 1):
         code = SEES_LURE
     return code
 
@@ -30,14 +33,15 @@ def see_carrying(ground, nearer):
 
 
 @ti.func
-def percept_foraging(left, forward, right, trail_left, trail_forward, trail_right):
+def percept_foraging(
+    half: ti.template(), left, forward, right, trail_left, trail_forward, trail_right, strongest
+):
     """The percept of an ant without food, from what the three cells hold and their levels."""
-    strongest = ti.max(trail_left, ti.max(trail_forward, trail_right))
     return state_index(
         0,
-        see_foraging(left, trail_left, strongest),
-        see_foraging(forward, trail_forward, strongest),
-        see_foraging(right, trail_right, strongest),
+        see_foraging(half, left, trail_left, strongest),
+        see_foraging(half, forward, trail_forward, strongest),
+        see_foraging(half, right, trail_right, strongest),
     )
 
 

@@ -1,0 +1,33 @@
+"""The three cells ahead; an ant with the other load is told from a rock."""
+
+from taichi_ants.task.observations.registry import Observation
+from taichi_ants.task.states import name_of_codes
+
+
+def row(look):
+    """The load, then a code of each cell as a digit of base 6.
+
+    The paper's codes; 4 for an ant with the other load on a better cell, 5 for one on any other. A
+    better cell is nearer to the queen, or without food has a stronger trail, than the ant's own.
+    """
+    index = look.carries
+    for k in range(3):
+        code = look.codes[k]
+        if look.ants[k] == 2 - look.carries:
+            better = look.nearer[k] == 1
+            if look.carries == 0:
+                better = look.levels[k] > look.own_level
+            code = 5
+            if better:
+                code = 4
+        index = 6 * index + code
+    return index
+
+
+ANTS = Observation(
+    "ants",
+    2 * 6**3,
+    row,
+    name_of=name_of_codes(3, "EOTFPA", "EOSQPA"),
+    summary="the three cells ahead, ants with the other load told from rocks",
+)
