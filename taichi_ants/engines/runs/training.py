@@ -147,13 +147,15 @@ def _report(progress: Progress, done: float, share: float, part: float) -> None:
 
 def _check_memory(result: TrainingResult) -> None:
     """Refuse learners for whose memory there is no room; kernels would write outside of it."""
-    state, needed = result.state, memory_for(result.configs, result.task.n_states)
+    state = result.state
     given = (state.q.shape[2] - 1, state.floats.shape[2], state.integers.shape[2])
-    if not all(map(operator.ge, given, astuple(needed))):
-        raise AntsError(
-            "a learner of this result has come to need more memory than when its training began; "
-            "train anew."
-        )
+    for config in result.configs:
+        needed = astuple(memory_for([config], result.task.n_states))
+        if not all(map(operator.ge, given, needed)):
+            raise AntsError(
+                f"learner {config.learner!r} has come to need more memory than when this training "
+                "began; train anew."
+            )
 
 
 def evaluate(
