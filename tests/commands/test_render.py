@@ -296,7 +296,7 @@ def test_an_ant_that_circles_earns_more_than_a_delivery_and_the_picture_says_why
     lines = []
     monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
     list(learning_frames(stages, arguments.size))
-    assert "step 100, return 57: circles with food" in lines
+    assert "return 57: circles with food" in lines
     assert "= T 16 + S 38 + F 3" in lines
     assert "= T 16 + S 16 + F 3 + Q 10" in lines
     assert "S nearer to the queen +1" in lines  # the legend
