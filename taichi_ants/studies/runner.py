@@ -82,7 +82,7 @@ class RunPoint:
 
     @property
     def runs_of_a_block(self) -> int:
-        """How many runs make launches that do not count, and let a stop come soon."""
+        """How many runs: enough that starting a block costs little, few enough to stop soon."""
         return min(max(1, _STEPS_OF_A_BLOCK // (self.episodes * self.max_steps)), _RUNS_OF_A_BLOCK)
 
     @property
@@ -162,8 +162,8 @@ class ColonyPoint:
         if self.after and (self.after.sharing != "shared" or not self.after.episodes):
             raise AntsError("a colony can only go on from one that has learned into one table.")
 
-    alike = property(lambda self: self)
-    runs_of_a_block = property(lambda self: 1 << 32)  # all
+    alike = property(lambda self: self)  # each point is a block of its own
+    runs_of_a_block = property(lambda self: 1 << 32)  # all seeds of a point are one block
 
     @property
     def weight(self) -> float:

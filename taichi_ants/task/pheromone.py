@@ -1,4 +1,4 @@
-"""How trails are laid, fall and spread."""
+"""How trails are laid, fall and spread: the numbers, which kernels in `engines` read."""
 
 from __future__ import annotations
 

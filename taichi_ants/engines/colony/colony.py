@@ -301,11 +301,6 @@ class Colony:
         tables = tables[:, :, 0, :, :N_ACTIONS]
         return (tables if self.one_a_slot else tables[:, 0]).copy()
 
-    @property
-    def waiting_foods(self) -> int:
-        """Foods that the queens have been given, but could not turn into ants yet."""
-        return int(self.arrays["worlds"][WorldRow.STORE].sum())
-
     def snapshot(self, world: int = 0) -> ColonySnapshot:
         """World number `world` as it is now; arrays are copies.
 
