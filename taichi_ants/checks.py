@@ -11,8 +11,8 @@ from taichi_ants import learners
 from taichi_ants.errors import (
     AntsError,
     check_one_of,
-    check_whole,
     checked_flag,
+    checked_whole,
     expect,
     shown,
     whole,
@@ -60,7 +60,7 @@ def checked_capacity(
     task: Task, ants: int, capacity: int | None, start: str, ends_at_delivery: bool
 ) -> int:
     """How many ants a colony can have at once; the arguments are those of `Colony`."""
-    check_whole("ants", ants, 1, MAX_ANTS)
+    checked_whole("ants", ants, 1, MAX_ANTS)
     check_one_of("start", start, STARTS)
     births = task.life.births
     if checked_flag("ends_at_delivery", ends_at_delivery) and (ants != 1 or births):
@@ -70,7 +70,7 @@ def checked_capacity(
         )
     if capacity is None:
         return min(2 * ants + 64, MAX_ANTS) if births else int(ants)
-    check_whole("capacity", capacity, 1, MAX_ANTS)
+    checked_whole("capacity", capacity, 1, MAX_ANTS)
     if capacity < ants:
         raise AntsError(
             f"capacity is {capacity}, but {ants} ants start; give a capacity of at least {ants}, "
@@ -141,15 +141,10 @@ def checked_seeds_for(seeds: int | Sequence[int], shape: tuple[int, ...]) -> np.
     return np.broadcast_to(np.array(several, dtype=object), shape or (1,)).ravel()
 
 
-def checked_count(name: str, value: int, most: int = 2**31 - 1, least: int = 1) -> int:
-    """A whole number from `least` to `most`."""
-    return check_whole(name, value, least, most)
-
-
 def checked_max_steps(value: int, task: Task) -> int:
     """The step limit of an episode, whose return must fit into 32 bits."""
     most = (2**31 - 1) // max(1, task.rewards.largest)
-    return checked_count("max_steps", value, min(MAX_STEPS, most))
+    return checked_whole("max_steps", value, most=min(MAX_STEPS, most))
 
 
 def checked_share(name: str, value: float) -> float:

@@ -82,7 +82,9 @@ def whole(name: str, value: object, otherwise: str = "") -> int:
         ) from None
 
 
-def check_whole(name: str, value: object, least: int, most: int, otherwise: str = "") -> int:
+def checked_whole(
+    name: str, value: object, least: int = 1, most: int = 2**31 - 1, otherwise: str = ""
+) -> int:
     """`value` as a Python integer; as `whole`, also if it does not lie between least and most."""
     number = whole(name, value, otherwise)
     if not least <= number <= most:

@@ -15,7 +15,7 @@ from pathlib import Path
 from types import ModuleType
 
 from taichi_ants.environment import fallback_folder, is_writable_folder
-from taichi_ants.errors import AntsError, check_one_of, check_whole
+from taichi_ants.errors import AntsError, check_one_of, checked_whole
 
 ARCHITECTURES = ("cpu", "cuda")
 MAX_THREADS = 1024
@@ -60,7 +60,7 @@ def start(threads: int | None = None, arch: str | None = None) -> Runtime:
     if arch is not None:
         check_one_of("arch", arch, ARCHITECTURES)
     if threads is not None:
-        check_whole("threads", threads, 1, MAX_THREADS)
+        checked_whole("threads", threads, 1, MAX_THREADS)
     import taichi as ti
 
     running = _running(ti)

@@ -37,31 +37,6 @@ def test_python_objects_are_not_written(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_sealed_arrays_read_back_and_are_known_to_be_the_same(tmp_path: Path) -> None:
-    path, arrays = tmp_path / "a.npz", {"x": np.arange(6.0), "y": np.zeros((2, 3), np.int16)}
-    files.write_sealed_npz(path, arrays)
-    read = files.read_sealed_npz(path)
-    assert set(read) == {"x", "y"}
-    np.testing.assert_array_equal(read["x"], arrays["x"])
-
-    sealed = files.read_npz(path)
-    changes = {
-        "value": {**sealed, "x": np.array([0, 1, 2, 3, 4, 6.0])},
-        "type": {**sealed, "y": np.zeros((2, 3), np.uint16)},
-        "shape": {**sealed, "y": np.zeros((3, 2), np.int16)},
-        "name": {"z" if name == "x" else name: array for name, array in sealed.items()},
-        "more": {**sealed, "z": np.zeros(0)},
-        "no seal": arrays,
-    }
-    for change in changes.values():
-        files.write_npz(path, change)
-        with pytest.raises(AntsError, match="altered since"):
-            files.read_sealed_npz(path)
-    files.write_npz(tmp_path / "b.npz", sealed)
-    with pytest.raises(AntsError, match=r"b\.npz' was altered"):  # of another block
-        files.read_sealed_npz(tmp_path / "b.npz")
-
-
 class Trap:
     """Unpickling it creates a file."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from taichi_ants.errors import AntsError, check_whole, shown
+from taichi_ants.errors import AntsError, checked_whole, shown
 
 
 def number(usual: float, least: float, most: float) -> Any:
@@ -28,7 +28,7 @@ class Hyperparameters:
             name, value = one.name, getattr(self, one.name)
             kind, least, most = one.metadata["kind"], one.metadata["least"], one.metadata["most"]
             if kind is int:
-                check_whole(name, value, least, most)
+                checked_whole(name, value, least, most)
             elif not least <= value <= most:
                 raise AntsError(
                     f"{name} is {shown(value)}; it must lie between {least} and {most}."

@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass, fields, replace
 from importlib import import_module
 from typing import Any
 
-from taichi_ants.errors import AntsError, check_whole, shown
+from taichi_ants.errors import AntsError, checked_whole, shown
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.hyperparameters import Hyperparameters
 
@@ -35,7 +35,7 @@ class Memory:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            check_whole(f"{name} of a memory", value, 0, 2**30)
+            checked_whole(f"{name} of a memory", value, 0, 2**30)
 
 
 @dataclass(frozen=True)

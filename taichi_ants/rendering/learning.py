@@ -173,8 +173,9 @@ def _tile_pictures(
     for step, (snapshot, _) in enumerate(stage.episode.moments()):
         tile[:] = colours.channels(colours.PAGE)
         tile[above : above + rasteriser.height] = rasteriser.draw(snapshot)
-        note = f": {stage.note}" if stage.note and step == len(stage.episode.trace) else ""
-        result = f"step {step}, return {account[step].sum()}{note}"
+        result = f"step {step}, return {account[step].sum()}"
+        if stage.note and step == len(stage.episode.trace):
+            result = f"return {account[step].sum()}: {stage.note}"
         parts = [
             f"{'+' if earned > 0 else '-'} {letter} {abs(earned)}"
             for (letter, *_), earned in zip(_SOURCES, account[step].tolist(), strict=True)

@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants.checks import checked_count
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.traces import Trace, rollout
-from taichi_ants.errors import expect
+from taichi_ants.errors import checked_whole, expect
 from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.learners.config import TrainingConfig
@@ -22,7 +21,7 @@ from taichi_ants.rendering.panel import Status
 from taichi_ants.rendering.scene import DEFAULT_SIZE, Scene
 from taichi_ants.rendering.snapshot import Snapshot
 from taichi_ants.task import Task
-from taichi_ants.task.constants import ACTION_NAMES
+from taichi_ants.task.constants import ACTION_NAMES, EPISODE_STEPS
 from taichi_ants.worlds.world import World
 
 Moment = tuple[Snapshot, Status]
@@ -72,7 +71,7 @@ class Episode:
         q_values: np.ndarray,
         *,
         seed: int = 0,
-        max_steps: int = 600,
+        max_steps: int = EPISODE_STEPS,
         task: Task | None = None,
         epsilon: float = 0.0,
     ) -> Episode:
@@ -135,8 +134,8 @@ def colony_moments(colony: Colony, ticks: int = 0, every: int = 1) -> Iterator[M
         AntsError: A number is not allowed, or no episode has begun.
     """
     expect("colony", colony, Colony)
-    ticks = checked_count("ticks", ticks, least=0)
-    every = checked_count("every", every)
+    ticks = checked_whole("ticks", ticks, least=0)
+    every = checked_whole("every", every)
     yield _moment(colony)
     for done in range(0, ticks, every):
         colony.tick(min(every, ticks - done))

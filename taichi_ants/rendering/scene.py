@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, check_whole, checked_flag, expect, shown
+from taichi_ants.errors import AntsError, checked_flag, checked_whole, expect, shown
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import colours, panel, text
@@ -27,7 +27,7 @@ def check_size(size: tuple[int, int]) -> tuple[int, int]:
     if not isinstance(size, (tuple, list)) or len(size) != 2:
         raise AntsError(f"the size is {shown(size)}; it must be a width and a height in pixels.")
     for side in size:
-        check_whole("a side of the size", side, SMALLEST_SIDE, LARGEST_SIDE, " pixels")
+        checked_whole("a side of the size", side, SMALLEST_SIDE, LARGEST_SIDE, " pixels")
     return size[0], size[1]
 
 

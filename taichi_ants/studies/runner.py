@@ -17,11 +17,11 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from taichi_ants import __version__, checks, files, learners
-from taichi_ants.errors import AntsError, check_one_of
+from taichi_ants.errors import AntsError, check_one_of, checked_whole
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.provenance import world_facts
 from taichi_ants.task import Task
-from taichi_ants.task.constants import MAX_STEPS
+from taichi_ants.task.constants import EPISODE_STEPS, EPISODES, MAX_STEPS
 from taichi_ants.worlds.world import World
 
 # Seeds of a colony's evaluation are those of the training plus this, so that no random number
@@ -58,17 +58,17 @@ class RunPoint:
     world: World
     task: Task
     training: TrainingConfig
-    episodes: int = 500
-    max_steps: int = 600
+    episodes: int = EPISODES
+    max_steps: int = EPISODE_STEPS
     rollouts: int = 50
 
     def __post_init__(self) -> None:
         (config,) = checks.checked_configs(self.training)
         object.__setattr__(self, "training", config)
         checks.checked_runs_task(checks.checked_task(self.task))
-        checks.checked_count("episodes", self.episodes)
+        checked_whole("episodes", self.episodes)
         checks.checked_max_steps(self.max_steps, self.task)
-        checks.checked_count("rollouts", self.rollouts)
+        checked_whole("rollouts", self.rollouts)
 
     @property
     def ants(self) -> int:
@@ -82,7 +82,7 @@ class RunPoint:
 
     @property
     def runs_of_a_block(self) -> int:
-        """How many runs make launches that do not count, and let a stop come soon."""
+        """How many runs: enough that starting a block costs little, few enough to stop soon."""
         return min(max(1, _STEPS_OF_A_BLOCK // (self.episodes * self.max_steps)), _RUNS_OF_A_BLOCK)
 
     @property
@@ -156,14 +156,14 @@ class ColonyPoint:
         checks.checked_capacity(self.task, self.ants, self.capacity, self.start, False)
         check_one_of("sharing", self.sharing, ("shared", "own"))
         checks.check_sharing(learners.get(config.learner), self.sharing)
-        checks.checked_count("episodes", self.episodes, least=0 if self.after else 1)
-        checks.checked_count("ticks", self.ticks, MAX_STEPS)
-        checks.checked_count("rollouts", self.rollouts)
+        checked_whole("episodes", self.episodes, least=0 if self.after else 1)
+        checked_whole("ticks", self.ticks, most=MAX_STEPS)
+        checked_whole("rollouts", self.rollouts)
         if self.after and (self.after.sharing != "shared" or not self.after.episodes):
             raise AntsError("a colony can only go on from one that has learned into one table.")
 
-    alike = property(lambda self: self)
-    runs_of_a_block = property(lambda self: 1 << 32)  # all
+    alike = property(lambda self: self)  # each point is a block of its own
+    runs_of_a_block = property(lambda self: 1 << 32)  # all seeds of a point are one block
 
     @property
     def weight(self) -> float:

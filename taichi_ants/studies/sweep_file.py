@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from taichi_ants import checks, worlds
-from taichi_ants.errors import AntsError, check_one_of, check_whole, checked_flag, shown
+from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, shown
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.runner import ColonyPoint, Point, RunPoint, Study, flat
 from taichi_ants.task import Task
@@ -89,7 +89,7 @@ def _sweep(file: Settings, measures: Mapping[str, Iterable[str]]) -> Sweep:
         raise AntsError("[vary] is missing; name in it what varies, with lists of values.")
     seeds = file.get("seeds", 10)
     if not isinstance(seeds, list):
-        check_whole("seeds", seeds, 1, 100_000, ", or a list of seeds")
+        checked_whole("seeds", seeds, 1, 100_000, ", or a list of seeds")
         seeds = range(seeds)
     checked = checks.checked_seeds(seeds)
     built: dict[str, Any] = {}
@@ -165,5 +165,5 @@ def _world(kind: str, given: Settings, seeds: tuple[int, ...]) -> Any:
         return worlds.build(preset, first, **given)
     if kind == "runs":
         raise AntsError("world.per_seed is for colonies only; leave it out.")
-    check_whole("world.seed", first, -(2**62), 2**62)
+    checked_whole("world.seed", first, -(2**62), 2**62)
     return tuple(worlds.build(preset, first + seed, **given) for seed in seeds)

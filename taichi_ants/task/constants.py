@@ -41,3 +41,7 @@ DEPOSIT_LEVEL = 250
 # Levels and steps share 32-bit integers (a trail stores the tick at which it has evaporated).
 MAX_TRAIL_LEVEL = 1_000_000_000
 MAX_STEPS = 10_000_000
+
+# The usual length of training, as in the paper: how many episodes of one ant, and their step limit.
+EPISODES = 500
+EPISODE_STEPS = 600

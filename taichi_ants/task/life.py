@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from taichi_ants.errors import check_whole, checked_flag
+from taichi_ants.errors import checked_flag, checked_whole
 from taichi_ants.task.constants import MAX_STEPS
 
 
@@ -34,7 +34,7 @@ class Life:
         for name, least in (("lifespan", 1), ("regrowth", 0), ("wander", 1)):
             ticks = getattr(self, name)
             if ticks is not None:
-                check_whole(name, ticks, least, MAX_STEPS, ", or None")
+                checked_whole(name, ticks, least, MAX_STEPS, ", or None")
 
     @property
     def changes(self) -> bool:

@@ -1,4 +1,4 @@
-"""How trails are laid, fall and spread."""
+"""How trails are laid, fall and spread: the numbers, which kernels in `engines` read."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, check_one_of, check_whole, shown
+from taichi_ants.errors import AntsError, check_one_of, checked_whole, shown
 from taichi_ants.task.constants import DEPOSIT_LEVEL
 
 Evaporation = Literal["linear", "exponential", "none"]
@@ -67,11 +67,11 @@ class Pheromone:
                 f"diffusion is {shown(self.diffusion)}; it must be a number from 0 to 1."
             )
         check_one_of("deposit", self.deposit, DEPOSITS)
-        check_whole("level", self.level, 1, MAX_DEPOSIT)
+        checked_whole("level", self.level, 1, MAX_DEPOSIT)
         if self.cap is not None:
-            check_whole("cap", self.cap, 1, MAX_DEPOSIT)
+            checked_whole("cap", self.cap, 1, MAX_DEPOSIT)
         if self.slope is not None:
-            check_whole("slope", self.slope, 1, MAX_DEPOSIT)
+            checked_whole("slope", self.slope, 1, MAX_DEPOSIT)
         check_one_of("view", self.view, VIEWS)
         self._settle("half_life", 50.0, "evaporation", "exponential")
         self._settle("cap", 1000, "deposit", "add")

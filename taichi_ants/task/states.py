@@ -34,13 +34,8 @@ class State(NamedTuple):
         return self.left, self.forward, self.right
 
 
-def state_index(carries: bool, left: int, forward: int, right: int) -> int:
-    """The index 64 * carries + 16 * left + 4 * forward + right, in 0..127."""
-    return 64 * bool(carries) + 16 * left + 4 * forward + right
-
-
 def state_from_index(index: int) -> State:
-    """The state of an index in 0..127, the inverse of `state_index`.
+    """The state of an index 64 * carries + 16 * left + 4 * forward + right, in 0..127.
 
     Raises:
         AntsError: The index lies outside 0..127.
@@ -75,6 +70,7 @@ def name_of_codes(n_cells: int, foraging: str, carrying: str) -> Callable[[int],
 
 # The name of a state by its index.
 state_name = name_of_codes(3, *CELL_LETTERS)
+_INDICES: dict[object, int] = {state_name(index).lower(): index for index in range(N_STATES)}
 
 
 def parse_state(name: str) -> int:
@@ -83,12 +79,9 @@ def parse_state(name: str) -> int:
     Raises:
         AntsError: The text is not the name of a state.
     """
-    words = name.split() if isinstance(name, str) else []
-    if len(words) == 4 and words[0].lower() in TASK_NAMES:
-        carries = TASK_NAMES.index(words[0].lower())
-        codes = [CELL_LETTERS[carries].find(word.upper()) for word in words[1:]]
-        if all(len(word) == 1 for word in words[1:]) and -1 not in codes:
-            return state_index(bool(carries), *codes)
+    known = isinstance(name, str) and " ".join(name.lower().split())
+    if known in _INDICES:
+        return _INDICES[known]
     raise AntsError(
         f"{shown(name)} is not a state; write the ant's task and the three cells it sees, left, "
         "forward, right, as in 'foraging E T O' (letters E, O, T, F) or 'carrying S E O' "

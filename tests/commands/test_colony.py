@@ -233,7 +233,7 @@ def test_stopped_and_killed_it_goes_on_to_the_same_results(finished, kernels, tm
         (["live", "--cap", 5], "cap is 5, but deposit is 'set'"),
         (["live", "--resume", "x"], "cannot read 'x'"),
         (["study", "--arenas", "moon"], "the arena is 'moon'"),
-        (["study", "--sizes", "300,8", "--arenas", "paper"], "300 ants are asked for"),
+        (["study", "--sizes", "300", "8", "--arenas", "paper"], "300 ants are asked for"),
         (["study", "--learner", "none"], "there is no learner 'none'"),
         (["study", "--epsilon", 2], "epsilon is 2.0"),
         (["live", "--ants", 0], "0 is not allowed"),

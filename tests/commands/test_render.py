@@ -113,7 +113,7 @@ def test_a_policy_of_another_observation_is_shown_as_such(tmp_path, shown) -> No
 
 def test_learning_and_a_colony(tmp_path) -> None:
     done = run(
-        *("learning", "--stages", "0,2", "--max-steps", 9, "--size", "300x200"),
+        *("learning", "--stages", 0, 2, "--max-steps", 9, "--size", "300x200"),
         *("--out", tmp_path / "a.gif"),
     )
     assert done.returncode == 0, done.stderr
@@ -142,7 +142,7 @@ WRONG = {
     "size of a sheet": (["sheet", "--size", "400x300"], "--size"),
     "form of a size": (["episode", "--size", "1280*720"], "1280x720"),
     "speed": (["episode", "--fps", "0", "--out", "{}/a.gif"], "fps"),
-    "no number": (["episode", "--fps", "fast"], "not a number"),
+    "no number": (["episode", "--fps", "fast"], "invalid float value: 'fast'"),
     "world": (["episode", "--world", "mars", "--out", "{}/a.gif"], "mars"),
     "policy": (["episode", "--policy", "nope.npz", "--out", "{}/a.gif"], "nope.npz"),
     "policy and learning": (["learning", "--policy", "a.npz"], "--policy"),
@@ -160,10 +160,10 @@ WRONG = {
         "epsilon",
     ),
     "learner": (["episode", "--learner", "magic", "--out", "{}/a.gif"], "magic"),
-    "stages": (["learning", "--stages", "5,1", "--out", "{}/a.gif"], "ascend"),
+    "stages": (["learning", "--stages", "5", "1", "--out", "{}/a.gif"], "ascend"),
     "order of stages": (
-        ["learning", "--stages", "5", "5", "2", "--out", "{}/a.gif"],
-        "stages are (5, 5, 2); they must ascend",
+        ["learning", "--stages", "5", "2", "--out", "{}/a.gif"],
+        "stages are (5, 2); they must ascend",
     ),
     "steps": (["episode", "--max-steps", "0"], "from 1 to"),
     "unknown option": (["episode", "--colour", "red"], "--colour"),
@@ -296,7 +296,7 @@ def test_an_ant_that_circles_earns_more_than_a_delivery_and_the_picture_says_why
     lines = []
     monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
     list(learning_frames(stages, arguments.size))
-    assert "step 100, return 57: circles with food" in lines
+    assert "return 57: circles with food" in lines
     assert "= T 16 + S 38 + F 3" in lines
     assert "= T 16 + S 16 + F 3 + Q 10" in lines
     assert "S nearer to the queen +1" in lines  # the legend

@@ -9,7 +9,7 @@ import pytest
 
 from taichi_ants.analysis.colony import figures
 from taichi_ants.analysis.paper.published import VARIANTS
-from taichi_ants.analysis.style import looks
+from taichi_ants.analysis.style import COLOURS
 from taichi_ants.rendering import colours
 
 # Full strength, linear light: Machado, Oliveira and Fernandes (2009).
@@ -99,7 +99,7 @@ def test_things_stay_apart(deficiency) -> None:
 
 @pytest.mark.parametrize("deficiency", DEFICIENCIES)
 def test_lines_of_the_figures_stay_apart(deficiency) -> None:
-    learners = [colour for colour, _ in looks(VARIANTS).values()]
+    learners = COLOURS[: len(VARIANTS)]
     ways = [look[0] for look in figures.WAY_LOOKS.values()]
     trails = [look[0] for look in figures.RULES_LOOKS.values()]
     for compared in (learners, ways, trails):

@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hexagons import neighbours
+from hexagons import cell_at, exist, neighbours
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
 from taichi_ants import runtime
-from taichi_ants.grid import hexgrid
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import Scene, Snapshot, at_start, colours
 from taichi_ants.rendering.rasteriser import Rasteriser
@@ -25,8 +24,8 @@ GOLDEN = Path(__file__).parent / "golden" / "world.png"
 def index_at(rasteriser: Rasteriser, pixels: np.ndarray) -> np.ndarray:
     """Flat indices (...) of the cells at pixel coordinates (..., 2), -1 where there is none."""
     grid, origin = rasteriser.grid, rasteriser.centres((0, 0, 0))
-    cells = hexgrid.cell_at(pixels - origin, rasteriser.hexagon)
-    inside = grid.contains(cells)
+    cells = cell_at(pixels - origin, rasteriser.hexagon)
+    inside = exist(grid, cells)
     return np.where(inside, grid.index(np.where(inside[..., None], cells, 0)), -1)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from taichi_ants.grid.constants import HEADING_STEPS
-from taichi_ants.grid.hexgrid import normal_form
+from taichi_ants.grid.hexgrid import AxialGrid, cube, normal_form
 
 
 def neighbours(cells: object) -> np.ndarray:
@@ -16,3 +16,28 @@ def neighbours(cells: object) -> np.ndarray:
 def distance(cells: object, others: object) -> np.ndarray:
     """The number of steps between cells (..., 3), obstacles ignored."""
     return normal_form(np.asarray(cells) - np.asarray(others)).max(axis=-1)
+
+
+def cell_at(pixels: object, size: float) -> np.ndarray:
+    """The cells (normal form, (..., 3), int64) whose hexagons hold pixel coordinates (..., 2).
+
+    The inverse of `centre_of`; on a border of two hexagons, one of the two.
+    """
+    points = np.asarray(pixels, dtype=np.float64)
+    r = points[..., 0] / (1.5 * size)
+    q = 0.5 * r - points[..., 1] / (np.sqrt(3.0) * size)
+    # Cube rounding: q, -r and r - q sum to zero; after rounding, the coordinate that moved most is
+    # the one that gives way to restore the sum.
+    exact = np.stack([q, -r, r - q], axis=-1)
+    near = np.rint(exact)
+    moved = np.abs(near - exact)
+    fixes_q = (moved[..., 0] > moved[..., 1]) & (moved[..., 0] > moved[..., 2])
+    fixes_r = ~fixes_q & (moved[..., 1] > moved[..., 2])
+    whole_q = np.where(fixes_q, -near[..., 1] - near[..., 2], near[..., 0])
+    whole_r = np.where(fixes_r, near[..., 0] + near[..., 2], -near[..., 1])
+    return cube(np.stack([whole_q, whole_r], axis=-1).astype(np.int64))
+
+
+def exist(grid: AxialGrid, cells: object) -> np.ndarray:
+    """bool (...): whether cells (..., 3) lie in the world."""
+    return np.all(normal_form(cells) < np.array(grid.ranges), axis=-1)

@@ -13,6 +13,7 @@ from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.task import Task
+from taichi_ants.task.constants import EPISODE_STEPS
 from taichi_ants.worlds.world import World
 
 BASELINE_COLUMNS: tuple[str, ...] = (
@@ -26,13 +27,10 @@ BASELINE_COLUMNS: tuple[str, ...] = (
     "deliveries_mean",
     "note",
 )
-# In the paper's protocol; the first word tells what the rows are held against.
-TRAINING_SETTING = "training, no evaporation"
-GREEDY_SETTING = "greedy, evaporation"
 _CONDITIONS = ("no evaporation", "evaporation")
 
 # Called as evaluate(world, q_values, rollouts=, max_steps=, task=, seeds=), with one table for
-# each seed: q_values (seeds, 128, 5). What it returns has returns, steps and deliveries,
+# each seed: q_values (seeds, n_states, 5). What it returns has returns, steps and deliveries,
 # (seeds, rollouts) each.
 Evaluate = Callable[..., Any]
 
@@ -44,7 +42,7 @@ def baseline_rows(
     seeds: Sequence[int],
     rollouts: int = 50,
     discounts: Sequence[float] = (0.9, 0.99),
-    max_steps: int = 600,
+    max_steps: int = EPISODE_STEPS,
 ) -> list[dict[str, Any]]:
     """All baselines of a world, as rows with the columns BASELINE_COLUMNS.
 
@@ -52,7 +50,7 @@ def baseline_rows(
         world: The world.
         task: What is paid, and whether trails evaporate in training and in the greedy evaluation
             of what is compared.
-        evaluate: What rolls out policies, such as `taichi_ants.engines.evaluate`.
+        evaluate: What rolls out policies, such as `taichi_ants.evaluate`.
         seeds: The seeds of the rollouts; figures are means over them, with 95 % intervals.
         rollouts: Rollouts for each seed.
         discounts: Discount factors whose optimal policies are wanted.

@@ -22,7 +22,7 @@ from taichi_ants.analysis.colony.study import (
 )
 from taichi_ants.analysis.findings import Above, Contrast, Finding, Within, judge
 
-# Numbers of ants: of the condition from which is subtracted, and of the one that is.
+# Numbers of ants, of the first and of the second condition of a difference.
 Sizes = tuple[int, int]
 
 
@@ -33,7 +33,7 @@ class Series:
     Attributes:
         question: What it helps to answer.
         statement: What is so where the differences are above 0.
-        first, second: From which is subtracted, and which is.
+        first, second: The difference is first minus second.
         measure: A name in `MEASURES`.
         against: With how many ants of the second each number of ants of the first is compared:
             with the same number, with each smaller one, or the largest with one ant.

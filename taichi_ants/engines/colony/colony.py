@@ -15,7 +15,7 @@ from taichi_ants.engines.colony import memory
 from taichi_ants.engines.colony.layout import ADDS, FADES, LINEAR, SETS, AntRow, Stage, WorldRow
 from taichi_ants.engines.packing import padded
 from taichi_ants.engines.records import Record
-from taichi_ants.errors import AntsError, check_one_of, shown
+from taichi_ants.errors import AntsError, check_one_of, checked_whole, shown
 from taichi_ants.files import PathLike
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.config import TrainingConfig
@@ -200,7 +200,7 @@ class Colony:
         Learners that need to know are told which tick is the last, if `length` says how many ticks
         there will be.
         """
-        self.length = 0 if length is None else checks.checked_count("length", length, MAX_STEPS)
+        self.length = 0 if length is None else checked_whole("length", length, most=MAX_STEPS)
         self.episode += 1
         self.ticks = 0
         memory.begin_episode(self)
@@ -209,7 +209,7 @@ class Colony:
     def tick(self, n: int = 1) -> None:
         """Let n ticks pass; worlds whose episode has ended stand still."""
         self._check_begun()
-        for _ in self._pass(checks.checked_count("n", n)):
+        for _ in self._pass(checked_whole("n", n)):
             pass
 
     def _pass(self, n: int) -> Iterator[None]:
@@ -264,8 +264,8 @@ class Colony:
             ticks: Ticks of each.
             progress: Called now and then with the share of the work that is done.
         """
-        episodes = checks.checked_count("episodes", episodes)
-        ticks = checks.checked_count("ticks", ticks, MAX_STEPS)
+        episodes = checked_whole("episodes", episodes)
+        ticks = checked_whole("ticks", ticks, most=MAX_STEPS)
         outcomes = []
         for episode in range(episodes):
             self.begin_episode(ticks)
@@ -303,11 +303,6 @@ class Colony:
         tables = tables[:, :, 0, :, :N_ACTIONS]
         return (tables if self.one_a_slot else tables[:, 0]).copy()
 
-    @property
-    def waiting_foods(self) -> int:
-        """Foods that the queens have been given, but could not turn into ants yet."""
-        return int(self.arrays["worlds"][WorldRow.STORE].sum())
-
     def snapshot(self, world: int = 0) -> ColonySnapshot:
         """World number `world` as it is now; arrays are copies.
 
@@ -315,7 +310,7 @@ class Colony:
             AntsError: There is no such world, or no episode has begun.
         """
         self._check_begun()
-        world = checks.checked_count("world", world, len(self.seeds) - 1, least=0)
+        world = checked_whole("world", world, most=len(self.seeds) - 1, least=0)
         cells = slice(world * self.grid.size, (world + 1) * self.grid.size)
         ants = self.arrays["ants"][:, world * self.capacity : (world + 1) * self.capacity]
         ants = ants[:, ants[AntRow.STAGE] == Stage.LIVING]

@@ -9,6 +9,7 @@ import numpy as np
 from taichi_ants import checks, files, learners, runtime
 from taichi_ants.engines.records import same
 from taichi_ants.engines.stored import FileKind, world_arrays, world_facts, world_from
+from taichi_ants.errors import checked_whole
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS
@@ -78,9 +79,9 @@ def load_colony(
             options["q_values"] = np.zeros((*leading, task.n_states, N_ACTIONS), np.float32)
         colony = cls([worlds[number] for number in facts["world_of"]], task, training, **options)
         colony.epsilon = checks.checked_share("epsilon", facts["epsilon"])
-        colony.episode = checks.checked_count("episode", facts["episode"], least=-1)
-        colony.length = checks.checked_count("length", facts["length"], least=0)
-        colony.ticks = checks.checked_count("ticks", facts["ticks"], least=0)
+        colony.episode = checked_whole("episode", facts["episode"], least=-1)
+        colony.length = checked_whole("length", facts["length"], least=0)
+        colony.ticks = checked_whole("ticks", facts["ticks"], least=0)
         for name in colony.stored:
             array, kept = colony.arrays[name], stored[f"array_{name}"]
             if kept.shape != array.shape or kept.dtype != array.dtype:

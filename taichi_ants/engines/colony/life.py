@@ -1,6 +1,7 @@
-"""What comes and goes in a colony: births, food that grows back, food that wanders.
+"""What comes and goes in a colony: births, deaths, food that grows back, food that wanders.
 
-Each function handles one whole world, serially; there is little to do in a tick.
+`grow_old` and `retire` are phases of single ants, in parallel. All others handle one whole world,
+serially; there is little to do in a tick.
 """
 
 import taichi as ti
@@ -132,7 +133,10 @@ def wander(c: ti.template(), v: ti.template(), w, tick):
 
 @ti.func
 def move_pile(c: ti.template(), w, pile):
-    """A pile takes a step: its foods one after the other, the front ones first."""
+    """A pile takes a step: its foods that can move leave their cells, then all enter the next ones.
+
+    So the front of a pile makes way for what is behind it, whatever the order of the homes.
+    """
     heading, c.queen_streams[w] = draw_below(c.queen_streams[w], N_HEADINGS)
     step = c.compass[heading + 1]
     begins = w * (c.n_homes + 1) + pile

@@ -15,10 +15,10 @@ from taichi_ants.engines.layout import OUTCOMES, STEPS, TRACE
 from taichi_ants.engines.records import Record
 from taichi_ants.engines.runs.engine import Launcher, Runs
 from taichi_ants.engines.runs.results import RunState
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
-from taichi_ants.task.constants import DELIVERED, N_ACTIONS
+from taichi_ants.task.constants import DELIVERED, EPISODE_STEPS, N_ACTIONS
 from taichi_ants.worlds.world import World
 
 MAX_ROLLOUT_STEPS = 1_000_000
@@ -78,7 +78,7 @@ def rollout(
     q_values: np.ndarray,
     seed: int = 0,
     number: int = 0,
-    max_steps: int = 600,
+    max_steps: int = EPISODE_STEPS,
     task: Task | None = None,
     epsilon: float = 0.0,
 ) -> Trace:
@@ -91,7 +91,7 @@ def rollout(
     if tables.ndim != 2:
         raise AntsError(f"q_values has shape {tables.shape}; a rollout follows one table.")
     seeds = checks.checked_seeds_for(seed, ())
-    numbers = np.array([checks.checked_count("number", number, least=0)])
+    numbers = np.array([checked_whole("number", number, least=0)])
     epsilon = checks.checked_share("epsilon", epsilon)
     return _trace(world, task, Runs.following(tables[None], seeds, numbers, epsilon), max_steps)
 
@@ -100,7 +100,7 @@ def trace_policies(
     world: World,
     q_values: np.ndarray,
     seeds: Sequence[int],
-    max_steps: int = 600,
+    max_steps: int = EPISODE_STEPS,
     task: Task | None = None,
 ) -> Iterator[Trace]:
     """Rollout 0 of each of many policies, some policies at a time.
@@ -131,7 +131,7 @@ def trace_training(
     config: TrainingConfig,
     seed: int = 0,
     episodes: int = 1,
-    max_steps: int = 600,
+    max_steps: int = EPISODE_STEPS,
     task: Task | None = None,
 ) -> Trace:
     """The first episodes of one training run, step by step, with the Q-table after each step.
@@ -146,7 +146,7 @@ def trace_training(
     seeds = checks.checked_seeds_for(seed, ())
     state = RunState.fresh(several, seeds.tolist(), task.n_states).take([0])
     runs = Runs.learning(several, seeds.tolist(), state)
-    return _trace(world, task, runs, max_steps, checks.checked_count("episodes", episodes))
+    return _trace(world, task, runs, max_steps, checked_whole("episodes", episodes))
 
 
 def _trace(world: World, task: Task, runs: Runs, max_steps: int, episodes: int = 1) -> Trace:

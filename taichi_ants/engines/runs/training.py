@@ -14,7 +14,6 @@ from taichi_ants import runtime
 from taichi_ants.checks import (
     check_finite,
     checked_configs,
-    checked_count,
     checked_food,
     checked_max_steps,
     checked_q_values,
@@ -26,9 +25,10 @@ from taichi_ants.checks import (
 )
 from taichi_ants.engines.runs.engine import Progress, Runs, do_episodes
 from taichi_ants.engines.runs.results import Rollouts, RunState, TrainingResult, memory_for
-from taichi_ants.errors import AntsError, shown
+from taichi_ants.errors import AntsError, checked_whole, shown
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
+from taichi_ants.task.constants import EPISODE_STEPS, EPISODES
 from taichi_ants.worlds.world import World
 
 
@@ -36,8 +36,8 @@ def train(
     world: World,
     configs: TrainingConfig | Sequence[TrainingConfig],
     seeds: int | Sequence[int],
-    episodes: int = 500,
-    max_steps: int = 600,
+    episodes: int = EPISODES,
+    max_steps: int = EPISODE_STEPS,
     task: Task | None = None,
     threads: int | None = None,
     *,
@@ -108,7 +108,7 @@ def continue_training(
         raise AntsError(f"result is {shown(result)}; give what train has returned.")
     checked_configs(result.configs)
     _check_memory(result)
-    episodes = checked_count("episodes", episodes)
+    episodes = checked_whole("episodes", episodes)
     runtime.start(threads, arch)
     state = copy.deepcopy(result.state)
     shape = (len(result.configs), len(result.seeds))
@@ -147,13 +147,15 @@ def _report(progress: Progress, done: float, share: float, part: float) -> None:
 
 def _check_memory(result: TrainingResult) -> None:
     """Refuse learners for whose memory there is no room; kernels would write outside of it."""
-    state, needed = result.state, memory_for(result.configs, result.task.n_states)
+    state = result.state
     given = (state.q.shape[2] - 1, state.floats.shape[2], state.integers.shape[2])
-    if not all(map(operator.ge, given, astuple(needed))):
-        raise AntsError(
-            "a learner of this result has come to need more memory than when its training began; "
-            "train anew."
-        )
+    for config in result.configs:
+        needed = astuple(memory_for([config], result.task.n_states))
+        if not all(map(operator.ge, given, needed)):
+            raise AntsError(
+                f"learner {config.learner!r} has come to need more memory than when this training "
+                "began; train anew."
+            )
 
 
 def evaluate(
@@ -161,7 +163,7 @@ def evaluate(
     q_values: np.ndarray,
     rollouts: int = 50,
     seeds: int | Sequence[int] = 0,
-    max_steps: int = 600,
+    max_steps: int = EPISODE_STEPS,
     task: Task | None = None,
     epsilon: float = 0.0,
     threads: int | None = None,
@@ -188,7 +190,7 @@ def evaluate(
     tables = checked_q_values(q_values, task)
     shape = tables.shape[:-2]
     run_seeds = checked_seeds_for(seeds, shape)
-    rollouts = checked_count("rollouts", rollouts)
+    rollouts = checked_whole("rollouts", rollouts)
     epsilon = checked_share("epsilon", epsilon)
     max_steps = checked_max_steps(max_steps, task)
     runtime.start(threads, arch)

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, check_whole, shown
+from taichi_ants.errors import AntsError, checked_whole, shown
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN, SEES_LURE
 
 # Tables of this many rows hold 5 * 2**20 values; kernels index many of them by 32 bits.
@@ -82,7 +82,7 @@ def register(observation: Observation) -> Observation:
         )
     if name in _OBSERVATIONS:
         raise AntsError(f"an observation named {name!r} exists already; choose another name.")
-    check_whole(f"n_states of {name!r}", observation.n_states, 1, MAX_STATES)
+    checked_whole(f"n_states of {name!r}", observation.n_states, 1, MAX_STATES)
     row = observation.row
     named = inspect.isfunction(row) and row.__name__ != "<lambda>"  # kernels cannot take lambdas
     if not named or len(inspect.signature(row).parameters) != 1:

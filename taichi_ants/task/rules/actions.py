@@ -1,4 +1,4 @@
-"""What the five actions do and what they are worth."""
+"""Where the five actions lead: steps, turns, and the event of a move."""
 
 import taichi as ti
 

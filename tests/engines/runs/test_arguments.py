@@ -18,9 +18,9 @@ from taichi_ants import (
     train,
     worlds,
 )
-from taichi_ants.checks import checked_count, checked_seeds, checked_seeds_for
+from taichi_ants.checks import checked_seeds, checked_seeds_for
 from taichi_ants.engines.runs.engine import pieces, size_of_launch
-from taichi_ants.errors import shown
+from taichi_ants.errors import checked_whole, shown
 from taichi_ants.rendering import Scene
 from taichi_ants.worlds import World, paper
 
@@ -146,9 +146,9 @@ def test_numbers_of_rollouts(value, shown):
 
 
 def test_counts_of_any_kind_of_integer():
-    assert checked_count("n", np.int64(3)) == 3
-    assert type(checked_count("n", np.uint8(3))) is int
-    assert checked_count("n", 0, least=0) == 0
+    assert checked_whole("n", np.int64(3)) == 3
+    assert type(checked_whole("n", np.uint8(3))) is int
+    assert checked_whole("n", 0, least=0) == 0
 
 
 @pytest.mark.parametrize("value", ["none", "off", 0, 1, None, 0.5, [True]])
