@@ -1,9 +1,12 @@
 """Names of the columns and rows of arrays that engines and kernels share; no Taichi here."""
 
 # The settings of a run, columns in front of the hyperparameters of its learner.
-SETTINGS = ("learning_rate", "discount", "epsilon_decay", "min_epsilon")
+SETTINGS = (
+    *("discount", "epsilon_decay", "min_epsilon"),
+    *("learning_rate_decay", "min_learning_rate"),
+)
 N_SETTINGS = len(SETTINGS)
-LEARNING_RATE, DISCOUNT, EPSILON_DECAY, MIN_EPSILON = range(N_SETTINGS)
+DISCOUNT, EPSILON_DECAY, MIN_EPSILON, LEARNING_RATE_DECAY, MIN_LEARNING_RATE = range(N_SETTINGS)
 
 # What the episodes of a run give.
 OUTCOMES = ("returns", "steps", "deliveries")

@@ -11,6 +11,8 @@ import numpy as np
 
 from taichi_ants.errors import AntsError, shown
 
+MOST_VALUE = 1_000_000  # of an action before learning
+
 
 @dataclass(frozen=True, init=False)
 class TrainingConfig:
@@ -18,11 +20,15 @@ class TrainingConfig:
 
     Attributes:
         learner: Name of a registered learner, for example "q_learning".
-        learning_rate: Step size alpha of the tabular update, in (0, 1].
+        learning_rate: Step size alpha of the tabular update in the first episode, in (0, 1].
         discount: Discount factor gamma, in [0, 1].
         epsilon: Probability of a random action in the first episode, in [0, 1].
         epsilon_decay: Factor on epsilon after each episode, in (0, 1].
         min_epsilon: Epsilon does not decay below this, in [0, 1].
+        learning_rate_decay: Factor on the learning rate after each episode, in (0, 1].
+        min_learning_rate: The learning rate does not decay below this, in [0, 1].
+        initial_value: Of each action in each state before learning, from -1e6 to 1e6. Values above
+            what can be reached ("optimistic") make ants try all actions.
         hyperparameters: What this learner has besides, (name, number) pairs by name; given as a
             mapping, or as keywords: `TrainingConfig("dyna_q", ..., planning_steps=5)`. Those that
             are left out have their usual values, see `taichi_ants.learners.get(name)`.
@@ -39,6 +45,9 @@ class TrainingConfig:
     epsilon: float
     epsilon_decay: float
     min_epsilon: float
+    learning_rate_decay: float
+    min_learning_rate: float
+    initial_value: float
     hyperparameters: tuple[tuple[str, float], ...]
 
     def __init__(
@@ -50,6 +59,10 @@ class TrainingConfig:
         epsilon_decay: float,
         min_epsilon: float = 0.01,
         hyperparameters: Mapping[str, float] | Iterable[tuple[str, float]] = (),
+        *,
+        learning_rate_decay: float = 1.0,
+        min_learning_rate: float = 0.0,
+        initial_value: float = 0.0,
         **more: float,
     ) -> None:
         if not isinstance(learner, str):
@@ -60,6 +73,15 @@ class TrainingConfig:
         self._set("epsilon", epsilon, "between 0 and 1")
         self._set("epsilon_decay", epsilon_decay, "above 0 and at most 1")
         self._set("min_epsilon", min_epsilon, "between 0 and 1")
+        self._set("learning_rate_decay", learning_rate_decay, "above 0 and at most 1")
+        self._set("min_learning_rate", min_learning_rate, "between 0 and 1")
+        real = isinstance(initial_value, Real) and not isinstance(initial_value, bool)
+        if not (real and abs(initial_value) <= MOST_VALUE):
+            raise AntsError(
+                f"initial_value is {shown(initial_value)}; it must be a number from "
+                f"-{MOST_VALUE} to {MOST_VALUE}."
+            )
+        object.__setattr__(self, "initial_value", float(initial_value))
         try:
             pairs = {**dict(hyperparameters), **more}
         except (TypeError, ValueError):
@@ -78,6 +100,14 @@ class TrainingConfig:
         if not share_of_one(value) or (allowed.startswith("above") and value == 0):
             raise AntsError(f"{name} is {shown(value)}; it must be a number {allowed}.")
         object.__setattr__(self, name, float(value))
+
+    def next_learning_rate(self, rate: float) -> float:
+        """That of the episode after one with this learning rate."""
+        return max(self.min_learning_rate, rate * self.learning_rate_decay)
+
+    def next_epsilon(self, epsilon: float) -> float:
+        """That of the episode after one with this epsilon."""
+        return max(self.min_epsilon, epsilon * self.epsilon_decay)
 
     @property
     def planning_steps(self) -> int:

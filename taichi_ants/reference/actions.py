@@ -134,7 +134,7 @@ def settle(
         winning: The slots of those that win what they want.
         traffic: Who may enter a cell on which another ant stands.
     """
-    standing = {intent.ant.cell: intent for intent in intents}
+    standing: dict[Cell | None, Intent] = {intent.ant.cell: intent for intent in intents}
 
     def moves(intent: Intent) -> bool:
         """Whether an ant enters its cell, which is empty or which another one leaves."""
@@ -148,12 +148,12 @@ def settle(
             one = ahead
         return False
 
-    entered = {intent.ant.slot: intent.target for intent in intents if moves(intent)}
-    pushed = {}
+    entered = {one.ant.slot: one.target for one in intents if one.target and moves(one)}
+    pushed: dict[int, Cell] = {}
     for intent in intents:
         ant = intent.ant
         claims = intent.enters and ant.slot in winning and ant.slot not in entered
-        if not (traffic.swap and claims and ant.carries):
+        if not (traffic.swap and claims and ant.carries) or intent.target is None:
             continue
         other = standing[intent.target]
         picks_up = other.action == PICK_UP and other.target is not None

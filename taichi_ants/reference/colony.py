@@ -70,7 +70,7 @@ class ReferenceColony:
         store: Foods that wait with the queen to become ants.
         queen_stream: Her random stream, which runs on; food that wanders draws from it as well.
         minds: The tables; see `sharing`.
-        epsilon: Of the present episode, float64.
+        epsilon, learning_rate: Of the present episode, float64.
         episode: Its number in the run, from 0; -1 before the first.
         record: What happened in the present episode, or in the last one between two.
         records: Of each finished episode.
@@ -127,7 +127,7 @@ class ReferenceColony:
         self.queen_stream = RandomStream(stream_state(seed, STREAM_QUEEN, 0))
         make = partial(LEARNERS[training.learner], training, task.n_states)
         self.minds = SHARING[sharing](make, self._slots, q_values)
-        self.epsilon = float(training.epsilon)
+        self.epsilon, self.learning_rate = training.epsilon, training.learning_rate
         self.episode = -1
         self.records: list[EpisodeRecord] = []
         self._set_up()
@@ -169,9 +169,13 @@ class ReferenceColony:
             learner.begin()
 
     def end_episode(self) -> None:
-        """End the episode: epsilon decays."""
-        decayed = self.epsilon * float(self._training.epsilon_decay)
-        self.epsilon = max(float(self._training.min_epsilon), decayed)
+        """End the episode: epsilon and the learning rate decay."""
+        training = self._training
+        self.epsilon = max(training.min_epsilon, self.epsilon * training.epsilon_decay)
+        self.learning_rate = max(
+            training.min_learning_rate, self.learning_rate * training.learning_rate_decay
+        )
+        self.minds.pace(self.learning_rate)
         self.records.append(self.record)
 
     def run_episode(self, ticks: int) -> Iterator[list[Transition]]:

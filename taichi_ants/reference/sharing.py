@@ -39,6 +39,11 @@ class FixedTable:
     def born(self, slot: int) -> None:
         """Note that an ant was born into a slot."""
 
+    def pace(self, learning_rate: float) -> None:
+        """Learn at this rate from now on."""
+        for table in self.tables:
+            table.learning_rate = np.float32(learning_rate)
+
     def learn(
         self, steps: Sequence[Transition], streams: Sequence[RandomStream], epsilon: float
     ) -> None:
@@ -66,7 +71,12 @@ class SharedTable(FixedTable):
                 'share its table; take sharing="own".'
             )
         self.draws_next_action = self._common.draws_next_action
-        self._weights = update_weights(float(self._common.learning_rate), slots)
+        self._slots = slots
+        self.pace(float(self._common.learning_rate))
+
+    def pace(self, learning_rate: float) -> None:
+        super().pace(learning_rate)
+        self._weights = update_weights(learning_rate, self._slots)
 
     def learn(
         self, steps: Sequence[Transition], streams: Sequence[RandomStream], epsilon: float
@@ -117,7 +127,9 @@ class OwnTables(FixedTable):
         return self.tables[slot]
 
     def born(self, slot: int) -> None:
-        self.tables[slot] = self._make(None)  # zeros, and no memories
+        learning_rate = self.tables[slot].learning_rate
+        self.tables[slot] = self._make(None)  # initial values, and no memories
+        self.tables[slot].learning_rate = learning_rate
 
     def learn(
         self, steps: Sequence[Transition], streams: Sequence[RandomStream], epsilon: float

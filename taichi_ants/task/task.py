@@ -19,7 +19,7 @@ DELIVERIES: tuple[str, ...] = get_args(Delivery)
 _PARTS = {"rewards": Rewards, "pheromone": Pheromone, "traffic": Traffic, "life": Life}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Task:
     """What an ant perceives, may do and is paid for; the paper's by default.
 
@@ -50,7 +50,7 @@ class Task:
     observation: str = "paper"
     rewards: Rewards = field(default_factory=Rewards)
     pheromone: Pheromone = field(default_factory=Pheromone)
-    traffic: Traffic | str = field(default_factory=Traffic)
+    traffic: Traffic = field(default_factory=Traffic)
     turns_at_queen: bool = False
     delivery: Delivery = "absorbing"
     evaporation_in_training: bool = False
@@ -69,6 +69,12 @@ class Task:
         check_one_of("delivery", self.delivery, DELIVERIES)
         for name in ("turns_at_queen", "evaporation_in_training", "evaporation_in_evaluation"):
             object.__setattr__(self, name, checked_flag(name, getattr(self, name)))
+
+    def __repr__(self) -> str:
+        """What is not as in the paper."""
+        usual, own = vars(Task()), vars(self)
+        given = [f"{name}={own[name]!r}" for name in own if own[name] != usual[name]]
+        return f"Task({', '.join(given)})"
 
     @property
     def sees(self) -> Observation:
@@ -109,7 +115,7 @@ def foraging() -> Task:
     return Task(
         observation="ants",
         pheromone=Pheromone(deposit="fading", level=500, view="strongest"),
-        traffic="right_of_way",
+        traffic=Traffic.named("right_of_way"),
         evaporation_in_training=True,
     )
 
@@ -123,7 +129,7 @@ def queueing() -> Task:
     return Task(
         observation="queues",
         pheromone=Pheromone(deposit="fading", level=500, view="strongest_under_carriers"),
-        traffic="following",
+        traffic=Traffic.named("following"),
         turns_at_queen=True,
         evaporation_in_training=True,
     )

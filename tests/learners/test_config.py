@@ -114,7 +114,7 @@ def test_numbers_of_any_kind_are_stored_as_plain_ones():
     assert plain == other
     assert hash(plain) == hash(other)
     assert asdict(plain) == asdict(other)
-    assert [type(value) for value in asdict(other).values()] == [str, *[float] * 5, tuple]
+    assert [type(value) for value in asdict(other).values()] == [str, *[float] * 8, tuple]
     assert type(dict(other.hyperparameters)["planning_steps"]) is int
     assert TrainingConfig(**json.loads(json.dumps(other.as_dict()))) == plain
     assert pickle.loads(pickle.dumps(other)) == plain

@@ -40,6 +40,8 @@ def random_colony(
     learner: str | None = None,
     observation: str = "paper",
     dense: bool | None = None,
+    traffic: str = "blocking",
+    view: str = "half",
 ) -> RandomColony:
     """The same seed gives the same colony.
 
@@ -55,7 +57,13 @@ def random_colony(
     return RandomColony(
         world=world,
         task=replace(
-            task, delivery=delivery, rewards=rewards or Rewards(), observation=observation
+            task,
+            delivery=delivery,
+            rewards=rewards or Rewards(),
+            observation=observation,
+            pheromone=replace(task.pheromone, view=view),
+            traffic=traffic,
+            turns_at_queen=bool(rng.random() < 0.5),
         ),
         population=population,
         training=training,
@@ -105,7 +113,7 @@ def _pheromone(rng: np.random.Generator, dense: bool | None) -> Pheromone:
     evaporation = str(rng.choice(["linear", "exponential", "none"]))
     half_life = float(rng.choice([0.5, 3.0, 50.0]))
     diffusion = float(rng.choice([0.0, 0.0, 0.05, 0.6, 1.0]))
-    deposit = str(rng.choice(["set", "add", "none"]))
+    deposit = str(rng.choice(["set", "add", "fading", "none"]))
     if dense is True and evaporation != "exponential":
         diffusion = max(diffusion, 0.05)
     elif dense is False:
@@ -117,6 +125,7 @@ def _pheromone(rng: np.random.Generator, dense: bool | None) -> Pheromone:
         deposit=deposit,
         level=int(rng.choice([1, 7, 250])),
         cap=int(rng.choice([1, 10, 1000])) if deposit == "add" else None,
+        slope=int(rng.choice([1, 10, 100])) if deposit == "fading" else None,
     )
 
 
@@ -132,5 +141,8 @@ def _training(rng: np.random.Generator, learner: str | None) -> tuple[TrainingCo
         epsilon_decay=float(rng.choice([0.3, 0.99, 1.0])),
         min_epsilon=float(rng.choice([0.0, 0.01, 0.2])),
         hyperparameters={"planning_steps": 2} if learner == "dyna_q" else {},
+        learning_rate_decay=float(rng.choice([0.5, 0.9, 1.0])),
+        min_learning_rate=float(rng.choice([0.0, 0.1])),
+        initial_value=float(rng.choice([0.0, 0.0, 1.7, -3.0])),
     )
     return config, str(rng.choice(["absorbing", "continuing"]))

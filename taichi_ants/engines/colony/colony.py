@@ -189,7 +189,7 @@ class Colony:
         self.arrays |= memory.constants(self)
         self._arguments: Any = None
         self._piece = 1  # ticks that take less than _PIECE_SECONDS
-        self.epsilon = float(self.training.epsilon)
+        self.epsilon, self.learning_rate = self.training.epsilon, self.training.learning_rate
         self.episode = -1
         self.length = 0  # of the episode in ticks, 0 if nobody has said
         self.ticks = 0
@@ -241,7 +241,7 @@ class Colony:
             self.ticks += 1
 
     def end_episode(self) -> None:
-        """Keep the streams of the ants that start an episode, and let epsilon decay.
+        """Keep the streams of the ants that start an episode; epsilon and learning rate decay.
 
         Raises:
             AntsError: The learner has made action values that are not finite.
@@ -253,8 +253,8 @@ class Colony:
         places = columns // slots * slots + number[columns]
         self.arrays["first_streams"][places] = self.arrays["streams"][columns]
         self._check_finite()
-        decayed = self.epsilon * float(self.training.epsilon_decay)
-        self.epsilon = max(float(self.training.min_epsilon), decayed)
+        self.epsilon = self.training.next_epsilon(self.epsilon)
+        self.learning_rate = self.training.next_learning_rate(self.learning_rate)
 
     def run(self, episodes: int, ticks: int, progress: Progress | None = None) -> ColonyEpisodes:
         """Whole episodes of a fixed number of ticks.
@@ -458,7 +458,7 @@ class Colony:
             "wander": life.wander or off,
             "ends_at_delivery": int(self.ends_at_delivery),
             "continuing": int(self.task.delivery == "continuing"),
-            "learning_rate": self.training.learning_rate,
+            "initial_value": self.training.initial_value,
             "discount": self.training.discount,
             "epsilon": self.epsilon,
             "explore_below": np.uint64(self.epsilon * 4294967296.0),

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from taichi_ants import checks, files, learners, runtime
+from taichi_ants.engines.colony.memory import set_learning_rate
 from taichi_ants.engines.records import same
 from taichi_ants.engines.stored import FileKind, world_arrays, world_facts, world_from
 from taichi_ants.errors import checked_whole
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 _KIND = FileKind("taichi-ants colony 5", "colony", "Colony.save")
 _OPTIONS = ("seeds", "ants", "capacity", "start", "ends_at_delivery", "sharing", "schedule")
-_MOMENT = ("epsilon", "episode", "length", "ticks")
+_MOMENT = ("epsilon", "learning_rate", "episode", "length", "ticks")
 
 
 def save_colony(colony: Colony, path: files.PathLike) -> None:
@@ -78,7 +79,9 @@ def load_colony(
             leading = (len(facts["seeds"]), facts["capacity"]) if facts["one_a_slot"] else ()
             options["q_values"] = np.zeros((*leading, task.n_states, N_ACTIONS), np.float32)
         colony = cls([worlds[number] for number in facts["world_of"]], task, training, **options)
-        colony.epsilon = checks.checked_share("epsilon", facts["epsilon"])
+        for name in ("epsilon", "learning_rate"):
+            setattr(colony, name, checks.checked_share(name, facts[name]))
+        set_learning_rate(colony)
         colony.episode = checked_whole("episode", facts["episode"], least=-1)
         colony.length = checked_whole("length", facts["length"], least=0)
         colony.ticks = checked_whole("ticks", facts["ticks"], least=0)

@@ -20,7 +20,7 @@ from taichi_ants.learners.model import (
     terminated_of,
     visited,
 )
-from taichi_ants.task.constants import DELIVERED, ROW
+from taichi_ants.task.constants import DELIVERED, N_ACTIONS, ROW
 from taichi_ants.task.rules.random_bits import draw_below
 
 _ONE = 4294967296.0  # fixed-point numbers have 32 binary places
@@ -61,7 +61,7 @@ def memory_of(c: ti.template(), v: ti.template(), owner):
 @ti.func
 def rates_of(c: ti.template(), v: ti.template()):
     """Learning rate, discount, epsilon and the learner's own hyperparameters."""
-    return v.read_rates(c.learning_rate, c.discount, c.epsilon, c.hyperparameters, 0)
+    return v.read_rates(c.weights[1], c.discount, c.epsilon, c.hyperparameters, 0)
 
 
 @ti.func
@@ -74,10 +74,10 @@ def begin_to_learn(c: ti.template(), v: ti.template(), ant):
 
 @ti.func
 def forget(c: ti.template(), v: ti.template(), ant):
-    """Empty the tables and the memory of a slot for the ant that was born into it."""
+    """Begin anew the tables and the memory of a slot for the ant that was born into it."""
     at = memory_of(c, v, ant)
     for i in range(at.table, table_of(c, v, ant + 1)):
-        c.q[i] = 0.0
+        c.q[i] = ti.select(i % ROW < N_ACTIONS, c.initial_value, 0.0)
     for i in range(at.floats, at.floats + c.floats_by_8 * 8):
         c.floats[i] = 0.0
     for i in range(at.integers, at.integers + c.integers_by_8 * 8):
@@ -236,11 +236,10 @@ def apply_sums(c: ti.template(), v: ti.template(), w):
         place = v.n_pairs * chunk + pair
         count = c.sums_of[SumRow.COUNT, place]
         error = c.errors[place]
-        rate = c.learning_rate
+        rate = c.weights[count]
         if count > 1:
             mean = ti.cast(c.sums[place], ti.f64) / (ti.cast(count, ti.f64) * _ONE)
             error = ti.cast(mean, ti.f32)
-            rate = c.weights[count]
         c.q[table + pair] += rate * error
         c.sums_of[SumRow.COUNT, place] = 0
     c.touched[listed] = 0

@@ -144,10 +144,11 @@ def lasting(colony: Colony, q_values: np.ndarray | None) -> dict[str, np.ndarray
 
 
 def _tables(colony: Colony, q_values: np.ndarray | None) -> np.ndarray:
-    """The tables of all worlds or slots; zeros without values."""
+    """The tables of all worlds or slots; the initial value everywhere without values."""
     n_worlds, own = len(colony.seeds), colony.one_a_slot
     slots, n_states = colony.capacity if own else 1, colony.task.n_states
     q = np.zeros((n_worlds, slots, 1 + colony.memory.tables, n_states, ROW), np.float32)
+    q[..., :N_ACTIONS] = colony.training.initial_value
     if q_values is not None:
         leading, form = q_values.shape[:-2], f"{n_states}, {N_ACTIONS}"
         if leading not in ((), (n_worlds,)) and not (own and leading == (n_worlds, slots)):
@@ -176,7 +177,7 @@ def constants(colony: Colony) -> dict[str, np.ndarray]:
         "rewards": colony.task.rewards.by_event(),
         "hyperparameters": np.array([*dict(colony.training.hyperparameters).values(), 0.0]),
         # How far the mean of n errors moves a value, by n.
-        "weights": update_weights(colony.training.learning_rate, colony.capacity if shared else 1),
+        "weights": np.zeros(1 + (colony.capacity if shared else 1), np.float32),
         # What other ants need to know of the ant on a cell, see `layout`.
         "crowd": np.zeros(cells if colony.task.traffic.shared else 1, np.uint8),
         "spare": np.zeros_like(colony.arrays["level"]),  # the next levels, with diffusion
@@ -202,9 +203,16 @@ def _of_each(colony: Colony, make: Callable[[World], np.ndarray]) -> np.ndarray:
     return np.stack([made[world] for world in colony.worlds])
 
 
+def set_learning_rate(colony: Colony) -> None:
+    """Set what follows from the learning rate of the episode."""
+    weights = colony.arrays["weights"]
+    weights[:] = update_weights(colony.learning_rate, len(weights) - 1)
+
+
 def begin_episode(colony: Colony) -> None:
     """Set everything that an episode starts with; tables, memories and streams go on."""
     arrays, n = colony.arrays, colony.n_homes
+    set_learning_rate(colony)
     for name, start in colony.at_start.items():
         arrays[name][:] = start
     arrays["streams"][:] = arrays["first_streams"]

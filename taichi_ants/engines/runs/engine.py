@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import learners, runtime
-from taichi_ants.engines.layout import OUTCOMES
+from taichi_ants.engines.layout import EPSILON_DECAY, N_SETTINGS, OUTCOMES, SETTINGS
 from taichi_ants.engines.packing import compass_of, pack_cells
 from taichi_ants.engines.runs.results import RunState
 from taichi_ants.grid.constants import STREAM_ROLLOUT
@@ -62,6 +62,7 @@ _NO_WORK: dict[str, Any] = {
     "start_headings": np.zeros(1, np.int32),  # (n,)
     "settings": np.zeros(1, np.float64),  # `layout.SETTINGS`, then the hyperparameters
     "epsilon": np.zeros(1, np.float64),  # (n,) of the next episode
+    "learning_rate": np.zeros(1, np.float64),  # (n,) of the next episode
     "random_states": np.zeros(1, np.uint64),  # (n,)
     "streams": np.zeros(1, np.uint64),  # (n * n_episodes,): of each episode without learning
     "tables": 0,
@@ -106,10 +107,7 @@ class Runs:
         """Configurations that differ in the settings of all learners alone, times seeds."""
         learner = learners.get(configs[0].learner)
         more = learner.settings(configs[0])
-        settings = [
-            (one.learning_rate, one.discount, one.epsilon_decay, one.min_epsilon, *astuple(more))
-            for one in configs
-        ]
+        settings = [(*(getattr(one, name) for name in SETTINGS), *astuple(more)) for one in configs]
         return cls(
             learner,
             np.tile(np.array(seeds, dtype=object), len(configs)),
@@ -131,7 +129,8 @@ class Runs:
         state.epsilon[:] = epsilon
         words = np.array([seed % 2**64 for seed in seeds.tolist()], dtype=np.uint64)
         streams = stream_state(words[:, None], STREAM_ROLLOUT, numbers[None, :])
-        settings = np.tile([0.0, 0.0, 1.0, 0.0], (len(tables), 1))  # epsilon does not decay
+        settings = np.zeros((len(tables), N_SETTINGS))
+        settings[:, EPSILON_DECAY] = 1.0
         return cls(None, seeds, settings, state, streams)
 
     def __len__(self) -> int:

@@ -15,8 +15,9 @@ from taichi_ants.engines.layout import (
     DELIVERIES,
     DISCOUNT,
     EPSILON_DECAY,
-    LEARNING_RATE,
+    LEARNING_RATE_DECAY,
     MIN_EPSILON,
+    MIN_LEARNING_RATE,
     N_SETTINGS,
     RETURNS,
     STEPS,
@@ -85,10 +86,9 @@ def run_kernel(
         for i in range(a.n_runs):
             base, first = i * (a.size + EXTRA_CELLS), i * columns
             at = At(i * a.tables * table, i * a.floats_by_8 * 8, i * a.integers_by_8 * 8)
-            learning_rate = ti.cast(a.settings[first + LEARNING_RATE], ti.f32)
             discount = ti.cast(a.settings[first + DISCOUNT], ti.f32)
             restore(a, base, 0, a.size - 1)
-            rng, exploration = a.random_states[i], a.epsilon[i]
+            rng, exploration, rate = a.random_states[i], a.epsilon[i], a.learning_rate[i]
             n_recorded = i * a.n_episodes * a.max_steps
             for episode in range(a.n_episodes):
                 if ti.static(not learns):
@@ -97,7 +97,7 @@ def run_kernel(
                     learner.begin(memory, at)
                 ant = Ant(cell=a.start_cells[i], heading=a.start_headings[i], random_state=rng)
                 rates = read(
-                    learning_rate,
+                    ti.cast(rate, ti.f32),
                     discount,
                     ti.cast(exploration, ti.f32),
                     a.settings,
@@ -159,6 +159,10 @@ def run_kernel(
                     a.settings[first + MIN_EPSILON],
                     exploration * a.settings[first + EPSILON_DECAY],
                 )
-            a.random_states[i], a.epsilon[i] = rng, exploration
+                rate = ti.max(
+                    a.settings[first + MIN_LEARNING_RATE],
+                    rate * a.settings[first + LEARNING_RATE_DECAY],
+                )
+            a.random_states[i], a.epsilon[i], a.learning_rate[i] = rng, exploration, rate
 
     return run

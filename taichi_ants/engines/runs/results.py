@@ -38,7 +38,7 @@ class RunState(Record):
             see `taichi_ants.learners.Memory`.
         integers: int32 (..., k), likewise.
         random_states: uint64 (...,), the ants' random streams.
-        epsilon: float64 (...,), of the next episode.
+        epsilon, learning_rate: float64 (...,), of the next episode.
     """
 
     q: np.ndarray
@@ -46,6 +46,7 @@ class RunState(Record):
     integers: np.ndarray
     random_states: np.ndarray
     epsilon: np.ndarray
+    learning_rate: np.ndarray
 
     @classmethod
     def empty(
@@ -61,6 +62,7 @@ class RunState(Record):
             integers=np.zeros((*shape, memory.integers), dtype=np.int32),
             random_states=np.zeros(shape, dtype=np.uint64),
             epsilon=np.zeros(shape, dtype=np.float64),
+            learning_rate=np.zeros(shape, dtype=np.float64),
         )
 
     @classmethod
@@ -71,7 +73,11 @@ class RunState(Record):
         state = cls.empty((len(configs), len(seeds)), n_states, memory_for(configs, n_states))
         words = np.array([seed % 2**64 for seed in seeds], dtype=np.uint64)
         state.random_states[:] = stream_state(words, STREAM_ANT, 0)
-        state.epsilon[:] = np.array([config.epsilon for config in configs])[:, None]
+        for config, q, epsilon, rate in zip(
+            configs, state.q, state.epsilon, state.learning_rate, strict=True
+        ):
+            q[..., :N_ACTIONS] = config.initial_value
+            epsilon[:], rate[:] = config.epsilon, config.learning_rate
         return state
 
     def take(self, configs: Sequence[int]) -> RunState:
@@ -143,6 +149,7 @@ class TrainingResult(Record):
             "integers": ("int32", (*runs, *(n // 8 * 8 for n in np.shape(state.integers)[2:3]))),
             "random_states": ("uint64", runs),
             "epsilon": ("float64", runs),
+            "learning_rate": ("float64", runs),
         }
         arrays = {**vars(self), **vars(state)}
         for name, (kind, shape) in forms.items():

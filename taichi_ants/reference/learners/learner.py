@@ -29,7 +29,7 @@ class Learner:
         shares: Whether all ants of a world can learn into one table: the update is `error` alone.
         hyperparameters: What it has besides the settings of all learners, with the usual values.
         settings: The values of these.
-        learning_rate, discount: Of the configuration.
+        learning_rate, discount: Of the present episode, and of the configuration.
         rows: The table, n_states lists of 5 np.float32: plain lists are several times faster here
             than an array.
         model: Of each visited pair, in the order of first visit, the last seen transition; filled
@@ -43,7 +43,7 @@ class Learner:
     def __init__(
         self, config: TrainingConfig, n_states: int, q_values: np.ndarray | None = None
     ) -> None:
-        """Begin with a copy of a table (n_states, 5), zeros if not given, and without memories."""
+        """Begin with a copy of a table (n_states, 5), or the initial value; without memories."""
         self.name = config.learner
         given = dict(config.hyperparameters)
         for name in given.keys() - self.hyperparameters.keys():
@@ -52,7 +52,7 @@ class Learner:
         self.learning_rate = np.float32(config.learning_rate)
         self.discount = np.float32(config.discount)
         if q_values is None:
-            q_values = np.zeros((n_states, N_ACTIONS))
+            q_values = np.full((n_states, N_ACTIONS), config.initial_value)
         self.rows = [list(row) for row in np.asarray(q_values, np.float32)]
         self.model: dict[Pair, Transition] = {}
         self.begin_run()

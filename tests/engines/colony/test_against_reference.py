@@ -15,7 +15,8 @@ from taichi_ants.reference import ReferenceColony
 from taichi_ants.task import Observation, Task, observations
 from taichi_ants.task.observations import registry
 
-# Each entry is a kernel of its own, so that there are few: learner, sharing, observation, dense.
+# Each entry is a kernel of its own, so that there are few: learner, sharing, observation, dense,
+# and where these are not the paper's the traffic and which trails are seen.
 KERNELS = [
     ("q_learning", "shared", "paper", False),
     ("sarsa", "shared", "ants_seen", True),
@@ -28,6 +29,9 @@ KERNELS = [
     ("n_step_sarsa", "own", "paper", False),
     ("prioritized_sweeping", "own", "trail_levels", False),
     ("q_learning", "fixed", "six_cells", False),
+    ("sarsa", "shared", "ants", False, "right_of_way", "strongest"),
+    ("q_learning", "shared", "queues", False, "following", "strongest_under_carriers"),
+    ("q_learning", "fixed", "paper", True, "following", "strongest_under_carriers"),
 ]
 
 
@@ -84,9 +88,10 @@ def assert_equal_records(colony: Colony, plain: ReferenceColony) -> None:
         assert colony.arrays["integers"][0] == len(plain.minds.tables[0].model)
 
 
-@pytest.mark.parametrize(("learner", "sharing", "observation", "dense"), KERNELS)
-def test_every_tick_in_crowded_micro_worlds(learner, sharing, observation, dense):
+@pytest.mark.parametrize("kernel", KERNELS, ids=str)
+def test_every_tick_in_crowded_micro_worlds(kernel):
     """Two episodes each: something goes on between them."""
+    learner, sharing, observation, dense, *rules = kernel
     happened = np.zeros(5, dtype=int)
     for seed in range(12 if observation in ("five_cells", "six_cells") else 40):  # large tables
         drawn = random_colony(
@@ -96,6 +101,7 @@ def test_every_tick_in_crowded_micro_worlds(learner, sharing, observation, dense
             learner=learner,
             observation=observation,
             dense=dense,
+            **dict(zip(("traffic", "view"), rules, strict=False)),
         )
         colony, plain = both(drawn)
         for ticks in (11, 8):
