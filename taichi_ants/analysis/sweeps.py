@@ -134,11 +134,11 @@ def draw(
             points.sort(key=lambda p: marks[p] if numbers else p)
             x = [marks[p] if numbers else ticks.index(_shown(marks[p])) + shift for p in points]
             mean, ends = values[points].mean(axis=1), (low[points], high[points])
-            line = "-" if numbers else ""
-            axes.plot(x, mean, line, marker=marker, color=colour, label=label or words)
+            (line,) = axes.plot(x, mean, marker=marker, color=colour, label=label or words)
             if numbers:
                 axes.fill_between(x, *ends, color=colour, alpha=0.15, linewidth=0)
             else:
+                line.set_linestyle("none")
                 axes.vlines(x, *ends, color=colour)
         if not numbers:
             axes.set_xticks(range(len(ticks)), ticks)

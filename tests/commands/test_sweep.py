@@ -165,7 +165,7 @@ def test_a_finished_sweep_is_shown_and_its_figure_drawn_later(sweep):
     assert set(after) - set(before) == {"figures/return_last50.png"}
     status, out, err = sweep(RUNS.replace("lure = [1, 0]", "lure = [1, 2]"))
     assert status == 2
-    assert "task.rewards.lure" in err
+    assert "(task.rewards.lure, vary differ)" in err
 
 
 def test_stopped_and_killed_it_goes_on_to_the_same_results(kernels, tmp_path):
@@ -401,4 +401,11 @@ def test_help_is_quick_and_needs_no_taichi(tmp_path):
         [sys.executable, "-c", script], env=environment(tmp_path), capture_output=True, text=True
     )
     assert done.stdout.endswith("heavy: []\n")
-    assert "FILE" in done.stdout
+    assert "\n  FILE " in done.stdout
+
+
+def test_the_script_of_observations_asks_for_no_file(tmp_path):
+    script = [sys.executable, EXPERIMENTS / "observations.py", "--help"]
+    done = subprocess.run(script, env=environment(tmp_path), capture_output=True, text=True)
+    assert done.returncode == 0
+    assert "\n  FILE " not in done.stdout
