@@ -85,7 +85,7 @@ def do_sweep(settings: argparse.Namespace, asked: Sweep, blocks: Path, ready: Pa
     if asked.against:
         columns = [*sweeps.columns_of(asked.settings), "finding", "difference", "low", "high"]
         files.write_csv(ready / FINDINGS, found.values(), columns)
-    notes = [found[p]["finding"] if p in found else "" for p in range(len(asked.settings))]
+    notes = [found.get(p, {}).get("finding", "") for p in range(len(asked.settings))]
     files.write_text(ready / REPORT, sweeps.report(asked.settings, values, asked.against, notes))
 
 
@@ -152,27 +152,19 @@ def measures(kind: str) -> dict[str, Any]:
 
 
 def measured(asked: Sweep, outcomes: dict[Any, Outcome], name: str) -> np.ndarray:
-    """A measure of each point and seed, float64 (points, seeds)."""
+    """A measure of each point and seed, as compare and colony have it, float64 (points, seeds)."""
     import numpy as np
 
-    of = run_values if asked.kind == "runs" else colony_values
-    seeds = asked.study.seeds
-    return np.stack([of(point, seeds, outcomes[point], name) for point in asked.study.points])
-
-
-def run_values(point: Any, seeds: tuple[int, ...], outcome: Outcome, name: str) -> np.ndarray:
-    """A measure of a point's runs, as the comparison has it, float64 (seeds,)."""
+    from taichi_ants.analysis.colony.study import measures_of
     from taichi_ants.analysis.paper.measures import RunOutcomes
 
-    arrays = {key: array[None] for key, array in outcome.items() if array.ndim == 2}
-    return RunOutcomes(**arrays).measure(name)[0]
+    def of(point: Any, outcome: Outcome) -> np.ndarray:
+        if asked.kind == "colony":
+            return measures_of(outcome, point.ants, point.ticks)[name]
+        arrays = {key: array[None] for key, array in outcome.items() if array.ndim == 2}
+        return RunOutcomes(**arrays).measure(name)[0]
 
-
-def colony_values(point: Any, seeds: tuple[int, ...], outcome: Outcome, name: str) -> np.ndarray:
-    """A measure of a point's colonies, as the scaling study has it, float64 (seeds,)."""
-    from taichi_ants.analysis.colony.study import measures_of
-
-    return measures_of(outcome, point.ants, point.ticks)[name]
+    return np.stack([of(point, outcomes[point]) for point in asked.study.points])
 
 
 def main(arguments: list[str] | None = None, file: Path | None = None) -> None:

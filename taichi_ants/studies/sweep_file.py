@@ -108,9 +108,9 @@ def _sweep(file: Settings, measures: Mapping[str, Mapping[str, Any]]) -> Sweep:
     margin = file.get("margin", 0)
     if type(margin) not in (int, float) or not 0 <= margin < math.inf:
         raise AntsError(f"margin is {shown(margin)}; it must be a number of at least 0.")
-    if "margin" in file and "against" not in file:
-        raise AntsError("margin is given without against; give both, or none.")
     against = _against(file["against"], rows) if "against" in file else None
+    if "margin" in file and not against:
+        raise AntsError("margin is given without against; give both, or none.")
     study = Study(points, checked)
     ends = list(itertools.accumulate(map(len, grids), initial=0))
     parts = tuple(map(slice, ends, ends[1:]))
