@@ -50,6 +50,7 @@ class Rasteriser:
         width, height: Of the pictures, in pixels.
         margin: Pixels to leave free at each side.
         full_level: The trail level that has the last colour of the ramp, as stronger ones have.
+        beyond: Whether to leave room for the cells just beyond the border of the world.
 
     Attributes:
         hexagon: Pixels from the centre of a cell to its corners.
@@ -62,6 +63,7 @@ class Rasteriser:
         height: int,
         margin: float = 0.0,
         full_level: float = DEPOSIT_LEVEL,
+        beyond: bool = False,
     ) -> None:
         self.grid = grid
         self.width, self.height = width, height
@@ -71,6 +73,8 @@ class Rasteriser:
         # `hexgrid.centre_of`, x grows with y and falls with z, y falls with x.
         low = np.array([-1.5 * (z_range - 1) - 1, -_SQRT_3 * (x_range - 0.5)])
         high = np.array([1.5 * (y_range - 1) + 1, _SQRT_3 * (y_range + z_range - 1) / 2])
+        ring = beyond * np.array([1.5, _SQRT_3])
+        low, high = low - ring, high + ring
         size = np.array([width, height])
         self.hexagon = float((np.maximum(size - 2 * margin, 1) / (high - low)).min())
         self._origin = size / 2 - self.hexagon * (low + high) / 2

@@ -8,7 +8,7 @@ from taichi_ants.errors import AntsError, checked_flag, checked_whole, expect, s
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import colours, panel, text
-from taichi_ants.rendering.observed import task_and_letters
+from taichi_ants.rendering.observed import name_parts
 from taichi_ants.rendering.panel import Status
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.rendering.snapshot import Snapshot
@@ -43,6 +43,7 @@ class Scene:
         size: Width and height of the pictures, 64 to 4096 pixels each.
         title: A line above the panel.
         plain: Whether to draw the world alone, without panel and marks.
+        view: Whether to leave room for the cells in view beyond the border of the world.
         full_level: The trail level that has the last colour of the ramp, as stronger ones have.
 
     Raises:
@@ -56,6 +57,7 @@ class Scene:
         *,
         title: str = "",
         plain: bool = False,
+        view: bool = False,
         full_level: float = DEPOSIT_LEVEL,
     ) -> None:
         expect("grid", grid, AxialGrid)
@@ -69,7 +71,9 @@ class Scene:
         room = width  # of the world, on the left
         if self._has_panel:
             room -= _PANEL_WIDTH * letters + margin
-        self._rasteriser = Rasteriser(grid, room, height, margin, full_level)
+        self._rasteriser = Rasteriser(
+            grid, room, height, margin, full_level, beyond=checked_flag("view", view) and not plain
+        )
         if self._has_panel:
             column = width - margin - room
             bottom = height - margin - round(panel.LEGEND_HEIGHT * letters)
@@ -109,7 +113,7 @@ class Scene:
         cells = snapshot.ant_cells[0] + snapshot.grid.offsets[turned]
         world = rasteriser.draw(snapshot, in_view=cells)
         if hexagon >= _SMALLEST_LETTERS:
-            _, letters = task_and_letters(status.observation, state)
+            *_, letters = name_parts(status.observation, state)
             floors = rasteriser.cell_colours(snapshot)[cells].tolist()
             centres = rasteriser.centres(snapshot.grid.cells(cells)).tolist()
             taken = np.isin(snapshot.ground[cells], (FOOD, QUEEN))  # by their drawings
