@@ -58,7 +58,7 @@ def draw_status(
         text.write(frame, value, left + width, y, size, align="right", room=room)
         y += round(1.45 * size)
     if status.q_values is not None:
-        y += round(0.8 * size)
+        y += round(0.3 * size)
         text.write(frame, "action values Q", left, y, size, colours.FAINT_INK)
         _draw_bars(frame, status, left, y + round(0.5 * size), width, size)
 

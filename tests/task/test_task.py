@@ -133,7 +133,7 @@ def test_each_row_has_a_name_of_its_own(name):
         ({"level": 0}, "level is 0; it must lie between 1 and 1000000"),
         ({"level": 2.5}, "level is 2.5"),
         ({"cap": 1_000_001}, "cap is 1000001"),
-        ({"half_life": 10}, "half_life is 10, but evaporation is 'linear'; give evaporation='expo"),
+        ({"half_life": 10}, "half_life is 10, but evaporation is 'linear'; make evaporation 'expo"),
         ({"half_life": 10, "evaporation": "none"}, "half_life is 10, but evaporation is 'none'"),
         ({"cap": 10}, "cap is 10, but deposit is 'set'; make deposit 'add', or leave"),
     ],
