@@ -49,7 +49,6 @@ class Rasteriser:
         grid: The grid of all worlds to draw.
         width, height: Of the pictures, in pixels.
         margin: Pixels to leave free at each side.
-        full_level: The trail level that has the last colour of the ramp, as stronger ones have.
         beyond: Whether to leave room for the cells just beyond the border of the world.
 
     Attributes:
@@ -62,12 +61,10 @@ class Rasteriser:
         width: int,
         height: int,
         margin: float = 0.0,
-        full_level: float = DEPOSIT_LEVEL,
         beyond: bool = False,
     ) -> None:
         self.grid = grid
         self.width, self.height = width, height
-        self._full_level = np.float32(full_level)
         x_range, y_range, z_range = grid.ranges
         # The lowest and the highest (x, y), in sizes of a hexagon from the cell (0, 0, 0). By
         # `hexgrid.centre_of`, x grows with y and falls with z, y falls with x.
@@ -139,7 +136,7 @@ class Rasteriser:
         of_ground[QUEEN] = colours.CELL_QUEEN if small else colours.FLOOR_QUEEN
         of_cells = of_ground[snapshot.ground & 15]
         marked = np.flatnonzero((snapshot.ground == EMPTY) & (snapshot.trail >= 1))
-        share = np.minimum(snapshot.trail[marked].astype(np.float32) / self._full_level, 1)
+        share = np.minimum(snapshot.trail[marked].astype(np.float32) / np.float32(DEPOSIT_LEVEL), 1)
         of_cells[marked] = colours.TRAIL_RAMP[(share * 255 + 0.5).astype(np.int32)]
         of_cells[~self.grid.exists] = colours.PAGE
         return of_cells
