@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import csv
-import sys
 import time
 from functools import partial
 from pathlib import Path
@@ -64,18 +63,18 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     kinds = parser.add_subparsers(metavar="|".join(KINDS), required=True)
     options = {"study": _add_study, "live": _add_live}
     for kind, words in KINDS.items():
-        options[kind](kinds.add_parser(kind, help=words, description=f"{words}."))
-    given_words = sys.argv[1:] if arguments is None else arguments
-    parser.parse_args(given_words)
-    chosen: Any = kinds.choices[given_words[0]]
-    settings, given = chosen.parse_given(given_words[1:])
-    settings.kind = given_words[0]
+        one = kinds.add_parser(kind, help=words, description=f"{words}.")
+        one.set_defaults(kind=kind)
+        options[kind](one)
+    settings, given = parser.parse_given(arguments)
     if settings.kind == "study":
         usual: dict[str, Any] = QUICK if settings.quick else {}
         for name in usual.keys() - given.keys():
             setattr(settings, name, usual[name])
         settings.sizes = tuple(sorted({1, *settings.sizes}))
-        settings.out = settings.out or default_folder(chosen, "colony", settings, **usual)
+        settings.out = settings.out or default_folder(
+            kinds.choices["study"], "colony", settings, **usual
+        )
     elif settings.resume:
         for name, flag in given.items():
             if name not in _OF_RESUMED:

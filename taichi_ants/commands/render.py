@@ -57,18 +57,7 @@ _STAGES = {"action": ListAction, "item": whole_number(0), "metavar": "N"}
 
 # Each option: the kinds of pictures that it is for, by their first letters, what it does, and how
 # it is read.
-_OPTIONS: dict[str, tuple[str, str, dict[str, Any]]] = {
-    "--out": ("ecls", "file or folder", {"metavar": "PATH"}),
-    "--title": ("ecls", "a line above all", {"metavar": "TEXT"}),
-    "--world": ("ecls", "paper, open, or the path of a map file", {"default": "paper"}),
-    "--world-seed": ("ecls", "seed of a world drawn at random", {**_SEED, "default": None}),
-    "--seed": ("ecls", "seed of training and of what is shown", _SEED),
-    "--plugin": ("ecls", "a Python file that registers learners or worlds", {"metavar": "FILE"}),
-    "--ants": ("c", "how many", {**_COUNT, "default": 80}),
-    "--max-steps": ("el", "step limit of the episode shown", _LENGTH),
-    "--ticks": ("c", "length of an episode", _LENGTH),
-    "--epsilon": ("ecl", "probability of a random action", {**_NUMBER, "default": 0.0}),
-    "--policy": ("ecs", "a policy file (.npz); without one, it is trained", {"metavar": "FILE"}),
+_TRAINING: dict[str, tuple[str, str, dict[str, Any]]] = {  # of no use beside --policy
     "--learner": ("ecls", "name of the learner to train", {"default": "sarsa", "metavar": "NAME"}),
     "--episodes": ("ecs", "of training", {**_COUNT, "default": 500}),
     "--stages": ("l", "looks at the ant after so many episodes of training", _STAGES),
@@ -78,17 +67,26 @@ _OPTIONS: dict[str, tuple[str, str, dict[str, Any]]] = {
     "--epsilon-decay": ("ecls", "a factor after each episode", {**_NUMBER, "default": 0.99}),
     "--hyperparameter": ("ecls", HYPERPARAMETER["help"], HYPERPARAMETER),
     "--observation": ("ecls", "what ants see", {"default": "paper", "metavar": "NAME"}),
+}
+_OPTIONS = {
+    "--out": ("ecls", "file or folder", {"metavar": "PATH"}),
+    "--title": ("ecls", "a line above all", {"metavar": "TEXT"}),
+    "--world": ("ecls", "paper, open, or the path of a map file", {"default": "paper"}),
+    "--world-seed": ("ecls", "seed of a world drawn at random", {**_SEED, "default": None}),
+    "--seed": ("ecls", "seed of training and of what is shown", _SEED),
+    "--plugin": ("ecls", "a Python file that registers what is your own", {"metavar": "FILE"}),
+    "--ants": ("c", "how many", {**_COUNT, "default": 80}),
+    "--max-steps": ("el", "step limit of the episode shown", _LENGTH),
+    "--ticks": ("c", "length of an episode", _LENGTH),
+    "--epsilon": ("ecl", "probability of a random action", {**_NUMBER, "default": 0.0}),
+    "--policy": ("ecs", "a policy file (.npz); without one, it is trained", {"metavar": "FILE"}),
+    **_TRAINING,
     "--size": ("ecl", "in pixels", {"type": _size, "metavar": "WxH"}),
     "--fps": ("ecl", "pictures a second", {**_NUMBER, "default": 8.0}),
     "--every": ("c", "ticks from one picture to the next", {**_COUNT, "default": 4}),
     "--plain": ("ec", "the world alone, without text and marks", _FLAG),
     "--all-states": ("s", "also those that were not visited", _FLAG),
 }
-# Those of training alone, which a policy from a file has behind it.
-_OF_TRAINING = (
-    *("learner", "episodes", "learning_rate", "discount", "train_epsilon", "epsilon_decay"),
-    *("hyperparameter", "observation"),
-)
 # Where a kind has defaults of its own.
 _DEFAULTS: dict[str, dict[str, Any]] = {
     "episode": {"out": "results/renders/episode.gif", "size": "1280x720"},
@@ -117,8 +115,8 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
                 one.add_argument(flag, **{"help": words, **reading})
         one.set_defaults(kind=kind, **_DEFAULTS[kind])
     settings, given = parser.parse_given(arguments)
-    for name, flag in given.items():
-        if name in _OF_TRAINING and getattr(settings, "policy", None):
+    for flag in given.values():
+        if flag in _TRAINING and getattr(settings, "policy", None):
             parser.error(f"{flag} is of training, but --policy is trained already, leave one out")
     return settings
 
@@ -226,14 +224,9 @@ def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray,
 def training_config(settings: argparse.Namespace) -> TrainingConfig:
     from taichi_ants import TrainingConfig
 
-    return TrainingConfig(
-        learner=settings.learner,
-        learning_rate=settings.learning_rate,
-        discount=settings.discount,
-        epsilon=settings.train_epsilon,
-        epsilon_decay=settings.epsilon_decay,
-        hyperparameters=settings.hyperparameter,
-    )
+    numbers = settings.learning_rate, settings.discount, settings.train_epsilon
+    more = {"hyperparameters": settings.hyperparameter}
+    return TrainingConfig(settings.learner, *numbers, settings.epsilon_decay, **more)
 
 
 def noted_stages(settings: argparse.Namespace, world: World) -> list[Stage]:
