@@ -74,7 +74,7 @@ _OPTIONS = {
     "--world": ("ecls", "paper, open, or the path of a map file", {"default": "paper"}),
     "--world-seed": ("ecls", "seed of a world drawn at random", {**_SEED, "default": None}),
     "--seed": ("ecls", "seed of training and of what is shown", _SEED),
-    "--plugin": ("ecls", "a Python file that registers what is your own", {"metavar": "FILE"}),
+    "--plugin": ("ecls", "a Python file with learners, worlds, observations", {"metavar": "FILE"}),
     "--ants": ("c", "how many", {**_COUNT, "default": 80}),
     "--max-steps": ("el", "step limit of the episode shown", _LENGTH),
     "--ticks": ("c", "length of an episode", _LENGTH),

@@ -50,10 +50,9 @@ _ARROW_COLOURS = {PICK_UP: colours.CELL_FOOD, GIVE: colours.CELL_QUEEN}
 
 
 def usual_spread(q_values: np.ndarray, observation: Observation) -> float:
-    """By how much the action values (n_states, 5) of a state usually differ.
+    """The mean gap from best to worst action value (n_states, 5) of possible states, or 0.
 
-    The mean of the gaps from the best to the worst, over the possible states with values that
-    differ; 0 where there are none.
+    States whose values are all equal do not count.
     """
     rows = q_values.astype(np.float64)[list(possible_states(observation))]
     spreads = np.ptp(rows, axis=1)
