@@ -74,7 +74,7 @@ def checked_capacity(
     if capacity < ants:
         raise AntsError(
             f"capacity is {capacity}, but {ants} ants start; give a capacity of at least {ants}, "
-            "or None."
+            "or leave it out."
         )
     return int(capacity)
 
@@ -84,7 +84,7 @@ def check_sharing(learner: Learner, sharing: str) -> None:
     if sharing == "shared" and learner.td_error is None:
         raise AntsError(
             f"learner {learner.name!r} has no TD error that can be summed over ants, so they "
-            'cannot share its table; take sharing="own".'
+            'cannot share its table; make sharing "own".'
         )
 
 

@@ -60,8 +60,8 @@ def test_a_task_that_cannot_be(settings, message):
     ("settings", "message"),
     [
         ({"births": 1}, "births is 1; it must be True or False"),
-        ({"lifespan": 0}, "lifespan is 0; it must lie between 1 and .*, or None"),
-        ({"lifespan": 2.0}, "lifespan is 2.0; it must be a whole number, or None"),
+        ({"lifespan": 0}, "lifespan is 0; it must lie between 1 and .*, or be left out"),
+        ({"lifespan": 2.0}, "lifespan is 2.0; it must be a whole number, or be left out"),
         ({"regrowth": -1}, "regrowth is -1; it must lie between 0"),
         ({"wander": 0}, "wander is 0"),
         ({"wander": "daily"}, "wander is 'daily'"),
@@ -133,9 +133,9 @@ def test_each_row_has_a_name_of_its_own(name):
         ({"level": 0}, "level is 0; it must lie between 1 and 1000000"),
         ({"level": 2.5}, "level is 2.5"),
         ({"cap": 1_000_001}, "cap is 1000001"),
-        ({"half_life": 10}, "half_life is 10, but evaporation is 'linear'; give evaporation='expo"),
+        ({"half_life": 10}, "half_life is 10, but evaporation is 'linear'; make evaporation 'expo"),
         ({"half_life": 10, "evaporation": "none"}, "half_life is 10, but evaporation is 'none'"),
-        ({"cap": 10}, "cap is 10, but deposit is 'set'; give deposit='add' with it, or leave"),
+        ({"cap": 10}, "cap is 10, but deposit is 'set'; make deposit 'add', or leave"),
     ],
 )
 def test_a_pheromone_that_cannot_be(settings, message):

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, checked_whole, shown
+from taichi_ants.errors import AntsError, checked_whole, expect, shown
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN, SEES_LURE
 
 # Tables of this many rows hold 5 * 2**20 values; kernels index many of them by 32 bits.
@@ -47,6 +47,7 @@ class Observation:
             and 1, the cells ahead, are among them.
         name_of: The name of a row for people.
         summary: One line for listings.
+        letters: What those letters in names mean that are none of the paper's E, O, T, S, F and Q.
     """
 
     name: str
@@ -55,6 +56,7 @@ class Observation:
     cells: tuple[int, ...] = AHEAD
     name_of: Callable[[int], str] = str
     summary: str = ""
+    letters: str = ""
 
     @property
     def ahead(self) -> tuple[int, ...]:
@@ -81,6 +83,7 @@ def register(observation: Observation) -> Observation:
         )
     if name in _OBSERVATIONS:
         raise AntsError(f"an observation named {name!r} exists already; choose another name.")
+    expect(f"letters of {name!r}", observation.letters, str)
     checked_whole(f"n_states of {name!r}", observation.n_states, 1, MAX_STATES)
     row = observation.row
     named = inspect.isfunction(row) and row.__name__ != "<lambda>"  # kernels cannot take lambdas
