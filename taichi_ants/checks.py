@@ -83,8 +83,8 @@ def check_sharing(learner: Learner, sharing: str) -> None:
     """Refuse a learner that cannot learn into a table that others share."""
     if sharing == "shared" and learner.td_error is None:
         raise AntsError(
-            f"learner {learner.name!r} keeps a memory of its own, so ants cannot share its table; "
-            'take sharing="own".'
+            f"learner {learner.name!r} has no TD error to sum up over ants, so they cannot share a "
+            'table; take sharing="own".'
         )
 
 

@@ -62,7 +62,7 @@ _OPTIONS: dict[str, tuple[str, str, dict[str, Any]]] = {
     "--world": ("ecls", "paper, open, or the path of a map file", {"default": "paper"}),
     "--world-seed": ("ecls", "seed of a world drawn at random", {**_SEED, "default": None}),
     "--seed": ("ecls", "seed of training and of what is shown", _SEED),
-    "--plugin": ("ecls", "a Python file that registers learners or worlds", {"metavar": "FILE"}),
+    "--plugin": ("ecls", "your learners, observations or worlds (.py)", {"metavar": "FILE"}),
     "--ants": ("c", "how many", {**_COUNT, "default": 80}),
     "--max-steps": ("el", "step limit of the episode shown", _LENGTH),
     "--ticks": ("c", "length of an episode", _LENGTH),

@@ -35,7 +35,9 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """The settings of the command line."""
     summary, more = __doc__.split("\n", 1)
     parser = Parser(summary, epilog=more)
-    parser.add_argument("file", type=Path, metavar="FILE", help="what to do (.toml)")
+    parser.add_argument(
+        "file", type=Path, metavar="FILE", help="what to do (.toml); observations.py has its own"
+    )
     add_common(parser)
     add_results(parser, "results/sweep-NAME, by the name of FILE")
     settings = parser.parse_args(arguments)

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import dis
 import inspect
+import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields, replace
 from importlib import import_module
 from typing import Any
 
-from taichi_ants.errors import AntsError, checked_whole, shown
+from taichi_ants.errors import AntsError, checked_whole, expect, shown
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.hyperparameters import Hyperparameters
 
@@ -134,9 +135,9 @@ def register(learner: Learner) -> Learner:
 
     Raises:
         AntsError: The name is taken or no identifier; a function is no `ti.func`, has the wrong
-            arguments, or looks at a next action that is not drawn; or a hyperparameter is called
-            as a setting of all learners. What the functions compute is tried when the learner is
-            first used.
+            arguments, or looks at a next action that is not drawn; hyperparameters, memory or cost
+            fail; or a hyperparameter is called as a setting of all learners. What the functions
+            compute is tried when the learner is first used.
     """
     if not isinstance(learner, Learner):
         raise AntsError(f"{shown(learner)} is not a Learner; make one by td_learner(name, ...).")
@@ -154,6 +155,7 @@ def register(learner: Learner) -> Learner:
     if learner.td_error is not None:
         drawn = learner.draws_next_action and not learner.plans
         _check_td_error(name, learner.td_error, drawn)
+    _try_sizes(learner)
     taken = {one.name for one in fields(TrainingConfig)}
     for clash in taken & {one.name for one in fields(learner.hyperparameters)}:
         raise AntsError(
@@ -162,6 +164,24 @@ def register(learner: Learner) -> Learner:
         )
     _LEARNERS[name] = learner
     return learner
+
+
+def _try_sizes(learner: Learner) -> None:
+    """Compute, with the usual hyperparameters, what engines need before the first step."""
+    part = "hyperparameters"
+    try:
+        settings = learner.hyperparameters()
+        expect(part, settings, Hyperparameters)
+        part = "memory"
+        expect("what it gives", learner.memory(settings, 128), Memory)
+        part = "cost"
+        if not 0 < learner.cost(settings) < math.inf:
+            raise ValueError(f"it gives {learner.cost(settings)}, but it must be above 0")
+    except Exception as error:
+        raise AntsError(
+            f"learner {learner.name!r} cannot be used: {part} fails ({str(error).rstrip('.')}); "
+            "see taichi_ants.learners.Learner."
+        ) from error
 
 
 def _check_arguments(what: str, function: Any, wanted: list[str]) -> list[str]:
@@ -199,7 +219,10 @@ def get(name: str) -> Learner:
     if name in BUILT_IN:
         return getattr(import_module(f"taichi_ants.learners.{name}"), name.upper())
     if name not in _LEARNERS:
-        raise AntsError(f"there is no learner {name!r}; choose one of {', '.join(names())}.")
+        raise AntsError(
+            f"there is no learner {name!r}; choose one of {', '.join(names())}, or name the file "
+            "that registers it with --plugin, or import it."
+        )
     return _LEARNERS[name]
 
 

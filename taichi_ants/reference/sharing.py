@@ -62,8 +62,8 @@ class SharedTable(FixedTable):
         [self._common] = self.tables
         if not self._common.shares:
             raise AntsError(
-                f"the learner {self._common.name!r} keeps a memory of its own, so ants cannot "
-                'share its table; take sharing="own".'
+                f"the learner {self._common.name!r} has no TD error to sum up over ants, so they "
+                'cannot share its table; take sharing="own".'
             )
         self.draws_next_action = self._common.draws_next_action
         self._weights = update_weights(float(self._common.learning_rate), slots)

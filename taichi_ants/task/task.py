@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Literal, get_args
 
-from taichi_ants.errors import AntsError, check_one_of, checked_flag, shown
+from taichi_ants.errors import AntsError, check_one_of, checked_flag, expect, shown
 from taichi_ants.task import observations
 from taichi_ants.task.life import Life
 from taichi_ants.task.observations import Observation
@@ -86,11 +86,18 @@ class Task:
         Raises:
             AntsError: A value is not allowed, or there is no such field.
         """
-        known = {one.name for one in fields(cls)}
-        for name in facts:
-            if name not in known:
-                raise AntsError(
-                    f"a task has no {shown(name)}; choose among {', '.join(sorted(known))}."
-                )
-        parts = {name: kind(**facts[name]) for name, kind in _PARTS.items() if name in facts}
+        kinds = {
+            name: kind for name, kind in _PARTS.items() if name in _known("a task", cls, facts)
+        }
+        parts = {name: kind(**_known(name, kind, facts[name])) for name, kind in kinds.items()}
         return cls(**{**facts, **parts})
+
+
+def _known(what: str, kind: type, facts: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The facts, if each is a field of that kind."""
+    expect(what, facts, Mapping)
+    known = sorted(one.name for one in fields(kind))
+    for name in facts:
+        if name not in known:
+            raise AntsError(f"{what} has no {shown(name)}; choose among {', '.join(known)}.")
+    return facts

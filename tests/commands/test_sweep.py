@@ -326,7 +326,7 @@ def test_a_learner_that_cannot_share_is_refused_before_the_work(sweep):
     status, _, err = sweep(COLONY.replace('"sarsa"', '"sarsa_lambda"'))
     assert status == 2
     assert_one_sentence(err)
-    assert "'sarsa_lambda' keeps a memory of its own" in err
+    assert "'sarsa_lambda' has no TD error to sum up" in err
     assert not Path("results").exists()
 
 
@@ -364,3 +364,5 @@ def test_help_is_quick_and_needs_no_taichi(tmp_path):
     )
     assert done.stdout.endswith("heavy: []\n")
     assert "FILE" in done.stdout
+    assert "observations.py has its own" in done.stdout
+    assert "learners, observations or worlds" in " ".join(done.stdout.split())

@@ -80,6 +80,20 @@ def test_wrong_facts(kept, tmp_path, changes, said) -> None:
     assert said in refused({**kept, "facts": np.array(json.dumps(facts))}, tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"rows": {"own": 128}}, "a colony of the observation 'own' with 128 rows, which is not"),
+        ({"training": {**PLANNING.as_dict(), "learner": "mine"}}, "there is no learner 'mine'; "),
+    ],
+)
+def test_a_plugin_that_is_missing_is_asked_for(kept, tmp_path, changes, said) -> None:
+    facts = {**json.loads(str(kept["facts"][()])), **changes}
+    np.savez(tmp_path / "x.npz", **{**kept, "facts": np.array(json.dumps(facts))})
+    with pytest.raises(AntsError, match=f"{said}.* with --plugin, or import it"):
+        Colony.load(tmp_path / "x.npz")
+
+
 def test_other_shapes_and_missing_arrays(kept, tmp_path) -> None:
     for name in ("array_ants", "array_q", "array_ground", "world0_foods"):
         for other in (kept[name][:-1], kept[name].astype(float), np.zeros(())):
