@@ -36,7 +36,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     summary, more = __doc__.split("\n", 1)
     parser = Parser(summary, epilog=more)
     parser.add_argument(
-        "file", type=Path, metavar="FILE", help="what to do (.toml); observations.py has its own"
+        "file", type=Path, help=".toml; observations.py has its own", metavar="FILE"
     )
     add_common(parser)
     add_results(parser, "results/sweep-NAME, by the name of FILE")

@@ -50,8 +50,7 @@ class FileKind:
         """The arrays and the facts of a file.
 
         Raises:
-            AntsError: The file is missing, damaged, of another kind, or of an observation that is
-                not registered.
+            AntsError: The file is missing, damaged, of another kind, or its observation is unknown.
         """
         stored = files.read_npz(path)
         try:
@@ -69,9 +68,8 @@ class FileKind:
             ((name, rows),) = facts["rows"].items()
         if name not in observations.names() or observations.get(name).n_states != rows:
             raise AntsError(
-                f"{str(path)!r} holds a {self.what} of the observation {shown(name)} with {rows} "
-                "rows, which is not registered; name the file that registers it with --plugin, or "
-                "import it."
+                f"{str(path)!r} is of the observation {shown(name)} with {rows} rows, which is not "
+                "registered; name the file that registers it with --plugin, or import it."
             )
         return stored, facts
 

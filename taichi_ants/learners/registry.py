@@ -134,20 +134,16 @@ def register(learner: Learner) -> Learner:
     """Make a learner known by its name.
 
     Raises:
-        AntsError: The name is taken or no identifier; a function is no `ti.func`, has the wrong
-            arguments, or looks at a next action that is not drawn; hyperparameters, memory or cost
-            fail; or a hyperparameter is called as a setting of all learners. What the functions
-            compute is tried when the learner is first used.
+        AntsError: The name is taken or no identifier, or a field is not as `Learner` says. What the
+            functions compute is tried when the learner is first used.
     """
-    if not isinstance(learner, Learner):
-        raise AntsError(f"{shown(learner)} is not a Learner; make one by td_learner(name, ...).")
+    expect("what is registered", learner, Learner)
     name = learner.name
-    if not isinstance(name, str) or not name.isidentifier():
+    if not isinstance(name, str) or not name.isidentifier() or name in names():
         raise AntsError(
-            f"{shown(name)} cannot name a learner; use letters, digits and underscores."
+            f"{shown(name)} cannot name a learner; use letters, digits and underscores, and a name "
+            "that is not taken."
         )
-    if name in names():
-        raise AntsError(f"a learner named {name!r} exists already; choose another name.")
     parts = ["memory", "at", "step", "rates", "random_state"]
     _check_arguments(f"the function learn of {name!r}", learner.learn, parts)
     if learner.begin is not None:
@@ -220,8 +216,7 @@ def get(name: str) -> Learner:
         return getattr(import_module(f"taichi_ants.learners.{name}"), name.upper())
     if name not in _LEARNERS:
         raise AntsError(
-            f"there is no learner {name!r}; choose one of {', '.join(names())}, or name the file "
-            "that registers it with --plugin, or import it."
+            f"there is no learner {name!r}; choose one of {', '.join(names())}, or add a --plugin."
         )
     return _LEARNERS[name]
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from named_states import parse_state
 
 from taichi_ants import AntsError
 from taichi_ants.rendering import Scene, Status, at_start, panel, text
 from taichi_ants.rendering.colours import CHOSEN
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.task import Observation
-from taichi_ants.task.states import parse_state
 from taichi_ants.worlds import World, paper
 
 WORLD = paper()

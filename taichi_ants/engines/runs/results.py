@@ -186,8 +186,7 @@ class TrainingResult(Record):
         """Read a result that `save` wrote; its learners need not be registered.
 
         Raises:
-            AntsError: The file is missing, damaged, or holds no training result; or its observation
-                is not registered.
+            AntsError: The file is missing, damaged, of another kind, or its observation is unknown.
         """
         stored, facts = _KIND.read(path)
         with _KIND.rebuilding(path):

@@ -75,24 +75,21 @@ def register(observation: Observation) -> Observation:
         AntsError: The name is taken or not usable in files and on command lines, a field has not
             the form that it must have, or a row lies outside of the table.
     """
-    if not isinstance(observation, Observation):
-        raise AntsError(f"{shown(observation)} is not an Observation; wrap it in Observation(...).")
+    expect("what is registered", observation, Observation)
     name = observation.name
-    if not isinstance(name, str) or not name.isidentifier():
+    if not isinstance(name, str) or not name.isidentifier() or name in _OBSERVATIONS:
         raise AntsError(
-            f"{shown(name)} cannot name an observation; use letters, digits and underscores."
+            f"{shown(name)} cannot name an observation; use letters, digits and underscores, and a "
+            "name that is not taken."
         )
-    if name in _OBSERVATIONS:
-        raise AntsError(f"an observation named {name!r} exists already; choose another name.")
     checked_whole(f"n_states of {name!r}", observation.n_states, 1, MAX_STATES)
-    row = observation.row
+    row, cells = observation.row, observation.cells
     named = inspect.isfunction(row) and row.__name__ != "<lambda>"  # kernels cannot take lambdas
     if not named or len(inspect.signature(row).parameters) != 1:
         raise AntsError(
             f"row of {name!r} is {shown(row)}; it must be a function of one argument that is "
             "written with def, see taichi_ants.task.Observation."
         )
-    cells = observation.cells
     known = isinstance(cells, tuple) and all(cell in range(-2, 4) for cell in cells)
     if not known or len(set(cells)) < len(cells) or not set(AHEAD) <= set(cells):
         raise AntsError(
@@ -114,8 +111,7 @@ def get(name: str) -> Observation:
     """
     if not isinstance(name, str) or name not in _OBSERVATIONS:
         raise AntsError(
-            f"there is no observation {shown(name)}; choose one of {', '.join(names())}, or "
-            "name the file that registers it with --plugin, or import it."
+            f"there is no observation {shown(name)}; choose one of {', '.join(names())}."
         )
     return _OBSERVATIONS[name]
 
@@ -130,7 +126,8 @@ def _try_functions(observation: Observation) -> None:
     function, last = "row", observation.n_states - 1
     try:
         (source,) = ast.parse(dedent(inspect.getsource(observation.row))).body
-        if [one for one in ast.walk(source) if isinstance(one, ast.Return)] != source.body[-1:]:
+        returns = [one for one in ast.walk(source) if isinstance(one, ast.Return)]
+        if not isinstance(source, ast.FunctionDef) or returns != source.body[-1:]:
             raise ValueError("it needs one return, as its last line")
         with np.errstate(all="raise"):
             for look in _drawn_looks(observation):
