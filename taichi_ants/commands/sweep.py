@@ -35,9 +35,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """The settings of the command line."""
     summary, more = __doc__.split("\n", 1)
     parser = Parser(summary, epilog=more)
-    parser.add_argument(
-        "file", type=Path, help=".toml; observations.py has its own", metavar="FILE"
-    )
+    parser.add_argument("file", type=Path, metavar="FILE", help="a .toml; observations.py has one")
     add_common(parser)
     add_results(parser, "results/sweep-NAME, by the name of FILE")
     settings = parser.parse_args(arguments)

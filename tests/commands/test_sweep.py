@@ -364,5 +364,5 @@ def test_help_is_quick_and_needs_no_taichi(tmp_path):
     )
     assert done.stdout.endswith("heavy: []\n")
     assert "FILE" in done.stdout
-    assert "observations.py has its own" in done.stdout
+    assert "observations.py has one" in done.stdout
     assert "learners, observations or worlds" in " ".join(done.stdout.split())

@@ -97,7 +97,7 @@ def test_an_observation_of_ones_own_is_known_by_its_name():
     mine = observations.register(Observation("mine", 1, always_zero))
     assert observations.get("mine") is mine
     assert Task("mine").n_states == 1
-    with pytest.raises(AntsError, match="'mine' cannot name an observation; .* not taken"):
+    with pytest.raises(AntsError, match=r"'mine' cannot name an observation; .* not taken"):
         observations.register(mine)
 
 
