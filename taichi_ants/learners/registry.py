@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass, fields, replace
 from importlib import import_module
 from typing import Any
 
-from taichi_ants.errors import AntsError, checked_whole, expect, shown
+from taichi_ants.errors import AntsError, checked_whole, expect, shown, unusable
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.hyperparameters import Hyperparameters
 
@@ -141,8 +141,7 @@ def register(learner: Learner) -> Learner:
     name = learner.name
     if not isinstance(name, str) or not name.isidentifier() or name in names():
         raise AntsError(
-            f"{shown(name)} cannot name a learner; use letters, digits and underscores, and a name "
-            "that is not taken."
+            f"{shown(name)} cannot name a learner; use a new one of letters, digits and _."
         )
     parts = ["memory", "at", "step", "rates", "random_state"]
     _check_arguments(f"the function learn of {name!r}", learner.learn, parts)
@@ -174,10 +173,7 @@ def _try_sizes(learner: Learner) -> None:
         if not 0 < learner.cost(settings) < math.inf:
             raise ValueError(f"it gives {learner.cost(settings)}, but it must be above 0")
     except Exception as error:
-        raise AntsError(
-            f"learner {learner.name!r} cannot be used: {part} fails ({str(error).rstrip('.')}); "
-            "see taichi_ants.learners.Learner."
-        ) from error
+        raise unusable(learner, f"{part} fails ({error})") from error
 
 
 def _check_arguments(what: str, function: Any, wanted: list[str]) -> list[str]:

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, checked_whole, expect, shown
+from taichi_ants.errors import AntsError, checked_whole, expect, shown, unusable
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN, SEES_LURE
 
 # Tables of this many rows hold 5 * 2**20 values; kernels index many of them by 32 bits.
@@ -79,8 +79,7 @@ def register(observation: Observation) -> Observation:
     name = observation.name
     if not isinstance(name, str) or not name.isidentifier() or name in _OBSERVATIONS:
         raise AntsError(
-            f"{shown(name)} cannot name an observation; use letters, digits and underscores, and a "
-            "name that is not taken."
+            f"{shown(name)} cannot name an observation; use a new one of letters, digits and _."
         )
     checked_whole(f"n_states of {name!r}", observation.n_states, 1, MAX_STATES)
     row, cells = observation.row, observation.cells
@@ -138,10 +137,7 @@ def _try_functions(observation: Observation) -> None:
         for row in np.linspace(0, last, min(last + 1, _LOOKS), dtype=int).tolist():
             expect(f"the name of row {row}", observation.name_of(row), str)
     except Exception as error:
-        raise AntsError(
-            f"observation {observation.name!r} cannot be used: {function} fails "
-            f"({str(error).rstrip('.')}); see taichi_ants.task.Observation."
-        ) from error
+        raise unusable(observation, f"{function} fails ({error})") from error
 
 
 def _drawn_looks(observation: Observation) -> Iterator[SimpleNamespace]:
