@@ -63,7 +63,7 @@ class SharedTable(FixedTable):
         if not self._common.shares:
             raise AntsError(
                 f"the learner {self._common.name!r} has no TD error that can be summed over ants, "
-                'so they cannot share its table; take sharing="own".'
+                'so they cannot share its table; make sharing "own".'
             )
         self.draws_next_action = self._common.draws_next_action
         self._weights = update_weights(float(self._common.learning_rate), slots)

@@ -54,7 +54,7 @@ class Parser(argparse.ArgumentParser):
 def add_common(parser: argparse.ArgumentParser) -> None:
     """The options of all commands that compute something."""
     add = parser.add_argument
-    add("--plugin", metavar="FILE", help="a Python file that registers learners or worlds")
+    add("--plugin", metavar="FILE", help="a file with learners, observations or worlds (.py)")
     add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
     add("--arch", choices=("cpu", "cuda"), default="cpu", help="where kernels run")
 
@@ -163,7 +163,7 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
 
 
 def load_plugin(path: str) -> None:
-    """Execute a Python file of the user's, which registers learners or worlds.
+    """Execute a Python file of the user's, which registers learners, observations or worlds.
 
     Raises:
         AntsError: The file cannot be read, raises or exits.

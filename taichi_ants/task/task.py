@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Literal, get_args
 
-from taichi_ants.errors import AntsError, check_one_of, checked_flag, shown
+from taichi_ants.errors import AntsError, check_one_of, checked_flag, expect, shown
 from taichi_ants.task import observations
 from taichi_ants.task.life import Life
 from taichi_ants.task.observations import Observation
@@ -14,9 +14,7 @@ from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rewards import Rewards
 
 Delivery = Literal["absorbing", "continuing"]
-Traffic = Literal["blocking"]
 DELIVERIES: tuple[str, ...] = get_args(Delivery)
-TRAFFIC: tuple[str, ...] = get_args(Traffic)
 _PARTS = {"rewards": Rewards, "pheromone": Pheromone, "life": Life}
 
 
@@ -24,15 +22,14 @@ _PARTS = {"rewards": Rewards, "pheromone": Pheromone, "life": Life}
 class Task:
     """What an ant perceives, may do and is paid for; the paper's by default.
 
-    `observation`, `traffic` and what kind of pheromone there is are compiled into the kernels;
-    all else is numbers that kernels read.
+    `observation` and what kind of pheromone there is are compiled into the kernels; all else is
+    numbers that kernels read.
 
     Attributes:
         observation: Name of a registered observation, which tells what row of its table an ant
             looks at, see `taichi_ants.task.observations`.
         rewards: What each event pays.
         pheromone: How trails are laid, fall and spread.
-        traffic: "blocking": no ant enters a cell on which another one stands.
         delivery: "absorbing": the delivery is a terminal state, its target is the reward alone.
             "continuing": the update at delivery bootstraps from what the ant then sees. An episode
             of one ant ends in both.
@@ -47,7 +44,6 @@ class Task:
     observation: str = "paper"
     rewards: Rewards = field(default_factory=Rewards)
     pheromone: Pheromone = field(default_factory=Pheromone)
-    traffic: Traffic = "blocking"
     delivery: Delivery = "absorbing"
     evaporation_in_training: bool = False
     evaporation_in_evaluation: bool = True
@@ -56,11 +52,7 @@ class Task:
     def __post_init__(self) -> None:
         observations.get(self.observation)
         for name, kind in _PARTS.items():
-            if not isinstance(getattr(self, name), kind):
-                raise AntsError(
-                    f"{name} is {shown(getattr(self, name))}; it must be {kind.__name__}(...)."
-                )
-        check_one_of("traffic", self.traffic, TRAFFIC)
+            expect(name, getattr(self, name), kind)
         check_one_of("delivery", self.delivery, DELIVERIES)
         for name in ("evaporation_in_training", "evaporation_in_evaluation"):
             object.__setattr__(self, name, checked_flag(name, getattr(self, name)))
@@ -86,11 +78,18 @@ class Task:
         Raises:
             AntsError: A value is not allowed, or there is no such field.
         """
-        known = {one.name for one in fields(cls)}
-        for name in facts:
-            if name not in known:
-                raise AntsError(
-                    f"a task has no {shown(name)}; choose among {', '.join(sorted(known))}."
-                )
-        parts = {name: kind(**facts[name]) for name, kind in _PARTS.items() if name in facts}
-        return cls(**{**facts, **parts})
+        given = dict(_known("a task", cls, facts))
+        for name, kind in _PARTS.items():
+            if name in given:
+                given[name] = kind(**_known(name, kind, given[name]))
+        return cls(**given)
+
+
+def _known(what: str, kind: type, facts: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The facts, if each is a field of that kind."""
+    expect(what, facts, Mapping)
+    known = sorted(one.name for one in fields(kind))
+    for name in facts:
+        if name not in known:
+            raise AntsError(f"{what} has no {shown(name)}; choose among {', '.join(known)}.")
+    return facts

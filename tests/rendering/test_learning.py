@@ -6,6 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
+from named_states import parse_state
 from PIL import Image
 
 from taichi_ants import AntsError, Colony, TrainingConfig, train
@@ -26,7 +27,7 @@ from taichi_ants.rendering.observed import PAPER
 from taichi_ants.rendering.sheet import clarity, learned, usual_spread
 from taichi_ants.task import Observation, Rewards, Task, observations
 from taichi_ants.task.constants import ACTION_NAMES, GIVE, PICK_UP, RIGHT
-from taichi_ants.task.states import REACHABLE_STATES, parse_state
+from taichi_ants.task.states import REACHABLE_STATES
 from taichi_ants.worlds import open_world, paper
 
 CONFIG = TrainingConfig("sarsa", 0.01, 0.9, 0.5, 0.995)

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from named_states import parse_state
 
 from taichi_ants import AntsError
 from taichi_ants.rendering import Scene, Status, at_start, frames, panel, text
 from taichi_ants.rendering.colours import CHOSEN
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.task import Observation, observations
-from taichi_ants.task.states import parse_state
 from taichi_ants.worlds import World, paper
 
 WORLD = paper()
