@@ -3,7 +3,6 @@
 python experiments/observations.py
 """
 
-import sys
 from pathlib import Path
 
 from taichi_ants.commands import run
@@ -11,4 +10,4 @@ from taichi_ants.commands import run
 SWEEP = Path(__file__).parent / "sweeps" / "observations.toml"
 
 if __name__ == "__main__":
-    run("sweep", [str(SWEEP), *sys.argv[1:]])
+    run("sweep", file=SWEEP)

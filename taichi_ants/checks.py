@@ -29,9 +29,11 @@ if TYPE_CHECKING:
 MAX_ANTS = 1 << 24
 
 
-def checked_world(world: World) -> World:
-    """The world, if it is one."""
+def checked_world(world: World, learns: bool = False) -> World:
+    """The world, if it is one; to learn in, it has food, or nothing could ever be delivered."""
     expect("world", world, World)
+    if learns and not len(world.foods):
+        raise AntsError("the world has no food, so there is nothing to learn; give it some.")
     return world
 
 
@@ -74,7 +76,7 @@ def checked_capacity(
     if capacity < ants:
         raise AntsError(
             f"capacity is {capacity}, but {ants} ants start; give a capacity of at least {ants}, "
-            "or None."
+            "or leave it out."
         )
     return int(capacity)
 
@@ -83,16 +85,9 @@ def check_sharing(learner: Learner, sharing: str) -> None:
     """Refuse a learner that cannot learn into a table that others share."""
     if sharing == "shared" and learner.td_error is None:
         raise AntsError(
-            f"learner {learner.name!r} keeps a memory of its own, so ants cannot share its table; "
-            'take sharing="own".'
+            f"learner {learner.name!r} has no TD error that can be summed over ants, so they "
+            'cannot share its table; make sharing "own".'
         )
-
-
-def checked_food(world: World) -> World:
-    """The world, if it is one to learn in: it has food, or nothing could ever be delivered."""
-    if not len(checked_world(world).foods):
-        raise AntsError("the world has no food, so there is nothing to learn; give it some.")
-    return world
 
 
 def checked_configs(configs: TrainingConfig | Sequence[TrainingConfig]) -> tuple:

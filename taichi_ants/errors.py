@@ -5,6 +5,7 @@ from __future__ import annotations
 import operator
 import reprlib
 from collections.abc import Sequence
+from typing import Any
 
 
 class AntsError(ValueError):
@@ -14,6 +15,12 @@ class AntsError(ValueError):
     lines print it on standard error and exit with status 2; library users catch it as a
     `ValueError`.
     """
+
+
+def unusable(thing: Any, fault: object) -> AntsError:
+    """What says that a learner or an observation cannot be used."""
+    kind, said = type(thing).__name__, str(fault).replace(".)", ")")
+    return AntsError(f"{kind.lower()} {thing.name!r} cannot be used: {said}; see help({kind}).")
 
 
 class _Short(reprlib.Repr):

@@ -14,8 +14,8 @@ from taichi_ants.analysis.statistics import bootstrap_interval, centres
 from taichi_ants.analysis.tables import MISSING, Table, plain_text, sentence
 
 Settings = Mapping[str, Any]
-_COLOURS = (style.BLUE, style.ORANGE, style.RED, style.WINE, style.SKY, style.INK, style.GREY)
-_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X")  # 7 with 10 colours: 70 lines look different
+_FEW_SEEDS = 10  # with fewer, intervals miss more often than they say, see docs/statistics.md
 _TERMINAL = 200  # columns, at most
 _WIDE = 20  # a ratio of settings from which their axis is logarithmic
 
@@ -91,15 +91,16 @@ def report(
         other = f"{short(against[0], names)} {_shown(against[1])}"
         headers.append(f"{next(iter(values))} against {other}")
         lines = [[*line, note] for line, note in zip(lines, notes, strict=True)]
-    seeds = next(iter(values.values())).shape[1]
-    many = f"Means over {seeds} seeds, with 95 % intervals" if seeds > 1 else "One seed"
-    return plain_text([Table(many, headers, lines, text_columns=len(headers))], _TERMINAL)
+    title = sentence(_spread(next(iter(values.values())).shape[1]))
+    return plain_text([Table(title, headers, lines, text_columns=len(headers))], _TERMINAL)
 
 
 def draw(
     path: Path, settings: Sequence[Settings], values: np.ndarray, words: str, title: str
 ) -> None:
     """Draw a measure against the first setting that varies, a line for each value of the others.
+
+    Where that setting is no number there are no lines, but points beside each other.
 
     Args:
         path: Where to write the .png.
@@ -117,7 +118,7 @@ def draw(
     alike = [f"{short(n, names)} {_shown(settings[0][n])}" for n in names[1:] if n not in others]
     marks: list[Any] = [one.get(first) for one in settings]
     numbers = all(isinstance(mark, (int, float)) and not isinstance(mark, bool) for mark in marks)
-    places = marks if numbers else list(map(_shown, marks))
+    ticks = list(dict.fromkeys(map(_shown, marks)))
     low, high = bootstrap_interval(values)
     lines: dict[str, list[int]] = {}
     for p, one in enumerate(settings):
@@ -126,23 +127,33 @@ def draw(
     with style.styled():
         figure = style.new_figure(4.5)
         axes = figure.subplots()
-        looks = itertools.cycle(zip(_COLOURS, _MARKERS, strict=True))
-        for (label, points), (colour, marker) in zip(lines.items(), looks, strict=False):
+        looks = zip(itertools.cycle(style.COLOURS), itertools.cycle(_MARKERS), strict=False)
+        aside = np.linspace(-0.3, 0.3, len(lines)) if len(lines) > 1 else [0.0]
+        for shift, (label, points), look in zip(aside, lines.items(), looks, strict=False):
+            colour, marker = look
+            points.sort(key=lambda p: marks[p] if numbers else p)
+            x = [marks[p] if numbers else ticks.index(_shown(marks[p])) + shift for p in points]
+            mean, ends = values[points].mean(axis=1), (low[points], high[points])
+            (line,) = axes.plot(x, mean, marker=marker, color=colour, label=label or words)
             if numbers:
-                points.sort(key=lambda p: marks[p])
-            x: Any = [places[p] for p in points]
-            mean = values[points].mean(axis=1)
-            axes.plot(x, mean, marker=marker, color=colour, label=label or words)
-            axes.fill_between(x, low[points], high[points], color=colour, alpha=0.15, linewidth=0)
-        if numbers and min(marks) > 0 and max(marks) / min(marks) >= _WIDE:
+                axes.fill_between(x, *ends, color=colour, alpha=0.15, linewidth=0)
+            else:
+                line.set_linestyle("none")
+                axes.vlines(x, *ends, color=colour)
+        if not numbers:
+            axes.set_xticks(range(len(ticks)), ticks)
+        elif min(marks) > 0 and max(marks) / min(marks) >= _WIDE:
             style.logarithmic(axes.xaxis, (1, 2, 5))
         axes.set(xlabel=first, ylabel=words)
-        seeds = values.shape[1]
-        spread = f"mean of {seeds} seeds with 95 % bootstrap intervals" if seeds > 1 else "one seed"
         entries = style.legend_entries([axes])
-        caption = ", ".join([sentence(spread), *alike])
+        caption = ", ".join([sentence(_spread(values.shape[1])), *alike])
         style.frame(figure, title, f"{caption}.", entries)
     style.save(figure, path)
+
+
+def _spread(seeds: int) -> str:
+    few = f" (too few for these: take {_FEW_SEEDS} or more)" if seeds < _FEW_SEEDS else ""
+    return f"means over {seeds} seeds with 95 % intervals{few}" if seeds > 1 else "one seed"
 
 
 def short(name: str, names: Sequence[str]) -> str:

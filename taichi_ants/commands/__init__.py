@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from typing import Any
 
 import taichi_ants
 from taichi_ants.studies.interruption import stoppable
@@ -17,16 +18,18 @@ COMMANDS = {  # modules beside this one, and what they do
 }
 
 
-def run(name: str, arguments: Sequence[str] | None = None, program: str | None = None) -> None:
+def run(
+    name: str, arguments: Sequence[str] | None = None, program: str | None = None, **given: Any
+) -> None:
     """Run a command to its exit; it can be stopped while it is imported, too.
 
-    Its --help calls it `program`, by default the name of the script.
+    Its --help calls it `program`, by default the name of the script; its `main` is `given` more.
     """
     with stoppable():
         from taichi_ants.studies.command_line import Parser
 
         Parser.program = program
-        import_module(f"{__name__}.{name}").main(arguments)
+        import_module(f"{__name__}.{name}").main(arguments, **given)
 
 
 def main() -> None:

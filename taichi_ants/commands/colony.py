@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import csv
-import sys
 import time
 from functools import partial
 from pathlib import Path
@@ -17,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from taichi_ants.studies.command_line import (
     BESIDE_DEFAULTS,
+    HYPERPARAMETER,
     ListAction,
     Parser,
     add_common,
@@ -63,22 +63,24 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     kinds = parser.add_subparsers(metavar="|".join(KINDS), required=True)
     options = {"study": _add_study, "live": _add_live}
     for kind, words in KINDS.items():
-        options[kind](kinds.add_parser(kind, help=words, description=f"{words}."))
-    given_words = sys.argv[1:] if arguments is None else arguments
-    parser.parse_args(given_words)
-    chosen: Any = kinds.choices[given_words[0]]
-    settings, given = chosen.parse_given(given_words[1:])
-    settings.kind = given_words[0]
+        one = kinds.add_parser(kind, help=words, description=f"{words}.")
+        one.set_defaults(kind=kind)
+        options[kind](one)
+    settings, given = parser.parse_given(arguments)
     if settings.kind == "study":
         usual: dict[str, Any] = QUICK if settings.quick else {}
         for name in usual.keys() - given.keys():
             setattr(settings, name, usual[name])
         settings.sizes = tuple(sorted({1, *settings.sizes}))
-        settings.out = settings.out or default_folder(chosen, "colony", settings, **usual)
+        settings.out = settings.out or default_folder(
+            kinds.choices["study"], "colony", settings, **usual
+        )
     elif settings.resume:
         for name, flag in given.items():
             if name not in _OF_RESUMED:
                 parser.error(f"{flag} cannot change a colony that is resumed, leave it out")
+    elif settings.policy and settings.observation:
+        parser.error("--observation is that of the policy, leave it out")
     return settings
 
 
@@ -88,7 +90,7 @@ def _add_learning(parser: argparse.ArgumentParser, epsilon: float) -> None:
     add("--learning-rate", type=number, default=0.1, metavar="X", help="in (0, 1]")
     add("--discount", type=number, default=0.9, metavar="X", help="in [0, 1]")
     add("--epsilon", type=number, default=epsilon, metavar="X", help="in the first episode")
-    add("--planning-steps", type=whole_number(1), metavar="N", help="of learners that plan, 5")
+    add("--hyperparameter", **HYPERPARAMETER)
 
 
 def _add_study(parser: argparse.ArgumentParser) -> None:
@@ -122,6 +124,7 @@ def _add_live(parser: argparse.ArgumentParser) -> None:
     add("--ranges", type=whole_number(1), nargs=3, metavar=("X", "Y", "Z"), help="of an open world")
     add("--sharing", choices=("shared", "own", "fixed"), default="shared", help="of tables")
     add("--policy", metavar="FILE", help="a policy file to start from (.npz)")
+    add("--observation", metavar="NAME", help="what ants see (default: the policy's, or paper)")
     _add_learning(parser, 0.1)
     add = parser.add_argument_group("what comes and goes").add_argument
     add("--births", action="store_true", help="the queen turns food into ants")
@@ -150,8 +153,7 @@ def training_config(settings: argparse.Namespace, least: float) -> TrainingConfi
     from taichi_ants import TrainingConfig
 
     numbers = settings.learning_rate, settings.discount, settings.epsilon
-    planning = {"planning_steps": settings.planning_steps} if settings.planning_steps else {}
-    return TrainingConfig(settings.learner, *numbers, 1.0, least, planning)
+    return TrainingConfig(settings.learner, *numbers, 1.0, least, settings.hyperparameter)
 
 
 def study(settings: argparse.Namespace) -> None:
@@ -259,7 +261,9 @@ def new_colony(settings: argparse.Namespace) -> Colony:
     given = {name: getattr(settings, name) for name in names if getattr(settings, name) is not None}
     if "half_life" in given:
         given.setdefault("evaporation", "exponential")
+    policy = load_policy(settings.policy) if settings.policy else None
     task = Task(
+        policy.observation if policy else settings.observation or "paper",
         pheromone=Pheromone(**given),
         delivery="continuing",
         evaporation_in_training=True,
@@ -274,7 +278,7 @@ def new_colony(settings: argparse.Namespace) -> Colony:
         capacity=settings.capacity,
         start=settings.start,
         sharing=settings.sharing,
-        q_values=load_policy(settings.policy)[0] if settings.policy else None,
+        q_values=policy.q_values if policy else None,
         threads=settings.threads,
         arch=settings.arch,
     )

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from taichi_ants.studies.command_line import (
+    HYPERPARAMETER,
     ListAction,
     Parser,
     load_plugin,
@@ -56,18 +57,7 @@ _STAGES = {"action": ListAction, "item": whole_number(0), "metavar": "N"}
 
 # Each option: the kinds of pictures that it is for, by their first letters, what it does, and how
 # it is read.
-_OPTIONS: dict[str, tuple[str, str, dict[str, Any]]] = {
-    "--out": ("ecls", "file or folder", {"metavar": "PATH"}),
-    "--title": ("ecls", "a line above all", {"metavar": "TEXT"}),
-    "--world": ("ecls", "paper, open, or the path of a map file", {"default": "paper"}),
-    "--world-seed": ("ecls", "seed of a world drawn at random", {**_SEED, "default": None}),
-    "--seed": ("ecls", "seed of training and of what is shown", _SEED),
-    "--plugin": ("ecls", "a Python file that registers learners or worlds", {"metavar": "FILE"}),
-    "--ants": ("c", "how many", {**_COUNT, "default": 80}),
-    "--max-steps": ("el", "step limit of the episode shown", _LENGTH),
-    "--ticks": ("c", "length of an episode", _LENGTH),
-    "--epsilon": ("ecl", "probability of a random action", {**_NUMBER, "default": 0.0}),
-    "--policy": ("ecs", "a policy file (.npz); without one, it is trained", {"metavar": "FILE"}),
+_TRAINING: dict[str, tuple[str, str, dict[str, Any]]] = {  # of no use beside --policy
     "--learner": ("ecls", "name of the learner to train", {"default": "sarsa", "metavar": "NAME"}),
     "--episodes": ("ecs", "of training", {**_COUNT, "default": 500}),
     "--stages": ("l", "looks at the ant after so many episodes of training", _STAGES),
@@ -75,6 +65,22 @@ _OPTIONS: dict[str, tuple[str, str, dict[str, Any]]] = {
     "--discount": ("ecls", "in [0, 1]", {**_NUMBER, "default": 0.9}),
     "--train-epsilon": ("ecls", "epsilon in the first episode", {**_NUMBER, "default": 0.3}),
     "--epsilon-decay": ("ecls", "a factor after each episode", {**_NUMBER, "default": 0.99}),
+    "--hyperparameter": ("ecls", HYPERPARAMETER["help"], HYPERPARAMETER),
+    "--observation": ("ecls", "what ants see", {"default": "paper", "metavar": "NAME"}),
+}
+_OPTIONS = {
+    "--out": ("ecls", "file or folder", {"metavar": "PATH"}),
+    "--title": ("ecls", "a line above all", {"metavar": "TEXT"}),
+    "--world": ("ecls", "paper, open, or the path of a map file", {"default": "paper"}),
+    "--world-seed": ("ecls", "seed of a world drawn at random", {**_SEED, "default": None}),
+    "--seed": ("ecls", "seed of training and of what is shown", _SEED),
+    "--plugin": ("ecls", "a Python file with learners, worlds, observations", {"metavar": "FILE"}),
+    "--ants": ("c", "how many", {**_COUNT, "default": 80}),
+    "--max-steps": ("el", "step limit of the episode shown", _LENGTH),
+    "--ticks": ("c", "length of an episode", _LENGTH),
+    "--epsilon": ("ecl", "probability of a random action", {**_NUMBER, "default": 0.0}),
+    "--policy": ("ecs", "a policy file (.npz); without one, it is trained", {"metavar": "FILE"}),
+    **_TRAINING,
     "--size": ("ecl", "in pixels", {"type": _size, "metavar": "WxH"}),
     "--fps": ("ecl", "pictures a second", {**_NUMBER, "default": 8.0}),
     "--every": ("c", "ticks from one picture to the next", {**_COUNT, "default": 4}),
@@ -106,20 +112,27 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
         one = kinds.add_parser(kind, help=shows, description=f"{shows}.", epilog=example)
         for flag, (where, words, reading) in _OPTIONS.items():
             if kind[0] in where:
-                one.add_argument(flag, help=words, **reading)
+                one.add_argument(flag, **{"help": words, **reading})
         one.set_defaults(kind=kind, **_DEFAULTS[kind])
-    return parser.parse_args(arguments)
+    settings, given = parser.parse_given(arguments)
+    for flag in given.values():
+        if flag in _TRAINING and getattr(settings, "policy", None):
+            parser.error(f"{flag} is of training, but --policy is trained already, leave one out")
+    return settings
 
 
 def show(settings: argparse.Namespace) -> None:
     """Make what was asked for, and say what it is."""
     from taichi_ants import worlds
     from taichi_ants.rendering import check_animation, check_picture
+    from taichi_ants.rendering.scene import check_size
 
     if settings.kind == "sheet" or (settings.kind != "learning" and _is_still(settings)):
         check_picture(settings.out)
     else:
         check_animation(settings.out, settings.fps)
+    if settings.kind != "sheet":
+        check_size(settings.size)
     if settings.plugin:
         load_plugin(settings.plugin)
     if settings.world_seed is not None:
@@ -131,6 +144,7 @@ def show(settings: argparse.Namespace) -> None:
 
 def show_episode(settings: argparse.Namespace, world: World) -> None:
     """Write an episode as an animation, or its end as a picture."""
+    from taichi_ants.errors import count
     from taichi_ants.rendering import Episode
 
     q_values, task, title = find_policy(settings, world)
@@ -139,7 +153,7 @@ def show_episode(settings: argparse.Namespace, world: World) -> None:
     _save_moments(settings, episode.moments(), len(episode), title)
     outcome = "delivered" if episode.delivered else "not delivered"
     rewards = int(episode.trace.rewards.sum())
-    print(f"{settings.out}: {len(episode.trace)} steps, return {rewards}, {outcome}")
+    print(f"{settings.out}: {count(len(episode.trace), 'step')}, return {rewards}, {outcome}")
 
 
 def show_colony(settings: argparse.Namespace, world: World) -> None:
@@ -187,18 +201,21 @@ def show_sheet(settings: argparse.Namespace, world: World) -> None:
 def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray, Task, str]:
     """The action values (n_states, 5) to follow, their task, and a title that says whence."""
     from taichi_ants import Colony, Task, load_policy, train
+    from taichi_ants.errors import count
 
     if settings.policy:
         policy = load_policy(settings.policy)
         title = settings.title or f"policy {Path(settings.policy).stem}"
         return policy.q_values, Task(policy.observation), title
     config, seed, episodes = training_config(settings), settings.seed, settings.episodes
-    title = settings.title or f"{settings.learner} after {episodes} episodes"
+    title = settings.title or f"{settings.learner} after {count(episodes, 'episode')}"
     with progress_bar("Training") as progress:
         if settings.kind != "colony":
-            result = train(world, config, seed, episodes, progress=progress)
-            return result.q_values[0, 0], Task(), title
-        task = Task(evaporation_in_training=True)  # trails fall while it learns too
+            task = Task(settings.observation)
+            result = train(world, config, seed, episodes, task=task, progress=progress)
+            return result.q_values[0, 0], task, title
+        # Trails fall while it learns, too.
+        task = Task(settings.observation, evaporation_in_training=True)
         colony = Colony(world, task, config, seed, settings.ants)
         colony.run(episodes, settings.ticks, progress)
     return colony.q_values[0], task, title
@@ -207,17 +224,14 @@ def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray,
 def training_config(settings: argparse.Namespace) -> TrainingConfig:
     from taichi_ants import TrainingConfig
 
-    return TrainingConfig(
-        learner=settings.learner,
-        learning_rate=settings.learning_rate,
-        discount=settings.discount,
-        epsilon=settings.train_epsilon,
-        epsilon_decay=settings.epsilon_decay,
-    )
+    numbers = settings.learning_rate, settings.discount, settings.train_epsilon
+    more = {"hyperparameters": settings.hyperparameter}
+    return TrainingConfig(settings.learner, *numbers, settings.epsilon_decay, **more)
 
 
 def noted_stages(settings: argparse.Namespace, world: World) -> list[Stage]:
     """The stages of an ant that learns, each with what it does then in words."""
+    from taichi_ants import Task
     from taichi_ants.analysis.behaviour import BEHAVIOURS, DELIVERS, OTHER, classify
     from taichi_ants.rendering import learning_stages
 
@@ -228,6 +242,7 @@ def noted_stages(settings: argparse.Namespace, world: World) -> list[Stage]:
             seed=settings.seed,
             stages=settings.stages,
             max_steps=settings.max_steps,
+            task=Task(settings.observation),
             epsilon=settings.epsilon,
             progress=progress,
         )

@@ -7,6 +7,7 @@ combination is done with every seed; tables and a figure go to a folder. See doc
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,11 +32,15 @@ FIGURES, RUNS, SUMMARY, FINDINGS = "figures", "runs.csv", "summary.csv", "findin
 _WORDS = {"supported": "more", "contradicted": "less", "equivalent": "equal"}
 
 
-def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
-    """The settings of the command line."""
+def parse_arguments(
+    arguments: list[str] | None = None, file: Path | None = None
+) -> argparse.Namespace:
+    """The settings of the command line, which names a file if none is given."""
     summary, more = __doc__.split("\n", 1)
     parser = Parser(summary, epilog=more)
-    parser.add_argument("file", type=Path, metavar="FILE", help="what to do (.toml)")
+    parser.set_defaults(file=file)
+    if file is None:
+        parser.add_argument("file", type=Path, metavar="FILE", help="what to do (.toml)")
     add_common(parser)
     add_results(parser, "results/sweep-NAME, by the name of FILE")
     settings = parser.parse_args(arguments)
@@ -55,10 +60,9 @@ def sweep(settings: argparse.Namespace) -> None:
     facts = {
         **asked.study.settings(),
         "measures": asked.measures,
-        "varies": asked.settings,
+        "vary": asked.settings,
         "against": asked.against,
         "margin": asked.margin,
-        "rows": list(map(asked.study.in_order.index, asked.study.points)),
     }
     work_or_show(settings, facts, partial(do_sweep, settings, asked), pictures)
 
@@ -74,14 +78,14 @@ def do_sweep(settings: argparse.Namespace, asked: Sweep, blocks: Path, ready: Pa
     values = {name: measured(asked, outcomes, name) for name in asked.measures}
     rows = sweeps.seed_rows(asked.settings, asked.study.seeds, values)
     files.write_csv(ready / RUNS, rows, [*sweeps.columns_of(asked.settings), "seed", *values])
-    typical = [name for name in values if getattr(measures(asked.kind)[name], "typical", False)]
+    typical = [name for name in values if measures(asked.kind)[name].typical]
     rows = sweeps.summary_rows(asked.settings, values, typical)
     files.write_csv(ready / SUMMARY, rows, sweeps.columns_of(rows))
     found = findings(asked, values[asked.measures[0]])
     if asked.against:
         columns = [*sweeps.columns_of(asked.settings), "finding", "difference", "low", "high"]
         files.write_csv(ready / FINDINGS, found.values(), columns)
-    notes = [found[p]["finding"] if p in found else "" for p in range(len(asked.settings))]
+    notes = [found.get(p, {}).get("finding", "") for p in range(len(asked.settings))]
     files.write_text(ready / REPORT, sweeps.report(asked.settings, values, asked.against, notes))
 
 
@@ -137,37 +141,33 @@ def measures(kind: str) -> dict[str, Any]:
     """What can be measured, by name."""
     from taichi_ants.analysis.colony.study import MEASURES as OF_COLONIES
     from taichi_ants.analysis.paper.measures import MEASURES as OF_RUNS
+    from taichi_ants.analysis.paper.measures import WINDOW
 
-    if kind == "runs":
-        return dict(OF_RUNS)
-    return {name: argparse.Namespace(words=words) for name, words in OF_COLONIES.items()}
+    if kind == "colony":
+        usual = {"episodes": 0, "typical": False}
+        return {n: argparse.Namespace(words=words, **usual) for n, words in OF_COLONIES.items()}
+    # Where the comparison takes all episodes if there are fewer than the last 50, a sweep takes 50.
+    least = {name: WINDOW if name.endswith("_last50") else 1 for name in OF_RUNS}
+    return {n: replace(one, episodes=max(one.episodes, least[n])) for n, one in OF_RUNS.items()}
 
 
 def measured(asked: Sweep, outcomes: dict[Any, Outcome], name: str) -> np.ndarray:
-    """A measure of each point and seed, float64 (points, seeds)."""
+    """A measure of each point and seed, as compare and colony have it, float64 (points, seeds)."""
     import numpy as np
 
-    of = run_values if asked.kind == "runs" else colony_values
-    seeds = asked.study.seeds
-    return np.stack([of(point, seeds, outcomes[point], name) for point in asked.study.points])
-
-
-def run_values(point: Any, seeds: tuple[int, ...], outcome: Outcome, name: str) -> np.ndarray:
-    """A measure of a point's runs, as the comparison has it, float64 (seeds,)."""
+    from taichi_ants.analysis.colony.study import measures_of
     from taichi_ants.analysis.paper.measures import RunOutcomes
 
-    arrays = {key: array[None] for key, array in outcome.items() if array.ndim == 2}
-    return RunOutcomes(**arrays).measure(name)[0]
+    def of(point: Any, outcome: Outcome) -> np.ndarray:
+        if asked.kind == "colony":
+            return measures_of(outcome, point.ants, point.ticks)[name]
+        arrays = {key: array[None] for key, array in outcome.items() if array.ndim == 2}
+        return RunOutcomes(**arrays).measure(name)[0]
+
+    return np.stack([of(point, outcomes[point]) for point in asked.study.points])
 
 
-def colony_values(point: Any, seeds: tuple[int, ...], outcome: Outcome, name: str) -> np.ndarray:
-    """A measure of a point's colonies, as the scaling study has it, float64 (seeds,)."""
-    from taichi_ants.analysis.colony.study import measures_of
-
-    return measures_of(outcome, point.ants, point.ticks)[name]
-
-
-def main(arguments: list[str] | None = None) -> None:
+def main(arguments: list[str] | None = None, file: Path | None = None) -> None:
     """The command line."""
     again = "Stopped; finished parts are kept, and the same command goes on from there."
-    run_command(lambda: sweep(parse_arguments(arguments)), again)
+    run_command(lambda: sweep(parse_arguments(arguments, file)), again)

@@ -8,7 +8,7 @@ import taichi as ti
 
 from taichi_ants import runtime
 from taichi_ants.engines.trial import last_line
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import unusable
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.rules.vision import see_carrying, see_foraging, state_index
@@ -76,8 +76,5 @@ def row_function(observation: Observation) -> Callable[..., Any]:
             with runtime.quiet():
                 row_of_nothing()
         except Exception as error:
-            raise AntsError(
-                f"observation {observation.name!r} cannot be used: {last_line(error)}; see "
-                "taichi_ants.task.Observation."
-            ) from None
+            raise unusable(observation, last_line(error)) from None
     return row

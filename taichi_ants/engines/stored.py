@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import files
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, shown
+from taichi_ants.task import observations
 from taichi_ants.worlds.world import World
 
 _WORLD_PARTS = ("foods", "obstacles", "trails", "ants")
@@ -40,14 +41,16 @@ class FileKind:
         compress: bool,
     ) -> None:
         """Write a file; raises as `files.write_npz` does."""
-        text = files.to_json({"format": self.mark, "digest": _digest(arrays), **facts})
+        sees = observations.get(facts["task"]["observation"])
+        known = {"format": self.mark, "digest": _digest(arrays), "rows": {sees.name: sees.n_states}}
+        text = files.to_json({**known, **facts})
         files.write_npz(path, {**arrays, "facts": np.array(text)}, compress=compress)
 
     def read(self, path: files.PathLike) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         """The arrays and the facts of a file.
 
         Raises:
-            AntsError: The file is missing, damaged, or of another kind.
+            AntsError: The file is missing, damaged, of another kind, or its observation is unknown.
         """
         stored = files.read_npz(path)
         try:
@@ -62,6 +65,12 @@ class FileKind:
         with self.rebuilding(path):
             if _digest(stored) != facts["digest"]:
                 raise ValueError("its arrays are not those that were written")
+            ((name, rows),) = facts["rows"].items()
+        if name not in observations.names() or observations.get(name).n_states != rows:
+            raise AntsError(
+                f"{str(path)!r} is of the observation {shown(name)} with {rows} rows, which is not "
+                "registered; name the file that registers it with --plugin, or import it."
+            )
         return stored, facts
 
     @contextmanager

@@ -16,7 +16,7 @@ from functools import cache
 import numpy as np
 
 from taichi_ants import runtime
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import unusable
 from taichi_ants.learners import registry
 from taichi_ants.learners.registry import Learner
 from taichi_ants.task.constants import N_ACTIONS, ROW
@@ -41,9 +41,7 @@ def tried(learner: Learner) -> Learner:
     apart = sys.platform == "linux" and arch == "cpu" and not runtime.holds_data()
     fault = _fault_apart(learner) if apart else _fault_of(learner, False)
     if fault:
-        raise AntsError(
-            f"learner {learner.name!r} cannot be used: {fault}; see taichi_ants.learners.Learner."
-        )
+        raise unusable(learner, fault)
     return learner
 
 

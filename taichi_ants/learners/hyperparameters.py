@@ -26,6 +26,8 @@ class Hyperparameters:
     def __post_init__(self) -> None:
         for one in fields(self):
             name, value = one.name, getattr(self, one.name)
+            if "kind" not in one.metadata:
+                raise AntsError(f"{name} is no number; make the field by number(...).")
             kind, least, most = one.metadata["kind"], one.metadata["least"], one.metadata["most"]
             if kind is int:
                 checked_whole(name, value, least, most)

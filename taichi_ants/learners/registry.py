@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import dis
 import inspect
+import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields, replace
 from importlib import import_module
 from typing import Any
 
-from taichi_ants.errors import AntsError, checked_whole, shown
+from taichi_ants.errors import AntsError, checked_whole, expect, shown, unusable
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.hyperparameters import Hyperparameters
 
@@ -133,20 +134,15 @@ def register(learner: Learner) -> Learner:
     """Make a learner known by its name.
 
     Raises:
-        AntsError: The name is taken or no identifier; a function is no `ti.func`, has the wrong
-            arguments, or looks at a next action that is not drawn; or a hyperparameter is called
-            as a setting of all learners. What the functions compute is tried when the learner is
-            first used.
+        AntsError: The name is taken or no identifier, or a field is not as `Learner` says. What the
+            functions compute is tried when the learner is first used.
     """
-    if not isinstance(learner, Learner):
-        raise AntsError(f"{shown(learner)} is not a Learner; make one by td_learner(name, ...).")
+    expect("what is registered", learner, Learner)
     name = learner.name
-    if not isinstance(name, str) or not name.isidentifier():
+    if not isinstance(name, str) or not name.isidentifier() or name in names():
         raise AntsError(
-            f"{shown(name)} cannot name a learner; use letters, digits and underscores."
+            f"{shown(name)} cannot name a learner; use a new one of letters, digits and _."
         )
-    if name in names():
-        raise AntsError(f"a learner named {name!r} exists already; choose another name.")
     parts = ["memory", "at", "step", "rates", "random_state"]
     _check_arguments(f"the function learn of {name!r}", learner.learn, parts)
     if learner.begin is not None:
@@ -154,6 +150,7 @@ def register(learner: Learner) -> Learner:
     if learner.td_error is not None:
         drawn = learner.draws_next_action and not learner.plans
         _check_td_error(name, learner.td_error, drawn)
+    _try_sizes(learner)
     taken = {one.name for one in fields(TrainingConfig)}
     for clash in taken & {one.name for one in fields(learner.hyperparameters)}:
         raise AntsError(
@@ -162,6 +159,21 @@ def register(learner: Learner) -> Learner:
         )
     _LEARNERS[name] = learner
     return learner
+
+
+def _try_sizes(learner: Learner) -> None:
+    """Compute, with the usual hyperparameters, what engines need before the first step."""
+    part = "hyperparameters"
+    try:
+        settings = learner.hyperparameters()
+        expect(part, settings, Hyperparameters)
+        part = "memory"
+        expect("what it gives", learner.memory(settings, 128), Memory)
+        part = "cost"
+        if not 0 < learner.cost(settings) < math.inf:
+            raise ValueError(f"it gives {learner.cost(settings)}, but it must be above 0")
+    except Exception as error:
+        raise unusable(learner, f"{part} fails ({error})") from error
 
 
 def _check_arguments(what: str, function: Any, wanted: list[str]) -> list[str]:
@@ -199,7 +211,9 @@ def get(name: str) -> Learner:
     if name in BUILT_IN:
         return getattr(import_module(f"taichi_ants.learners.{name}"), name.upper())
     if name not in _LEARNERS:
-        raise AntsError(f"there is no learner {name!r}; choose one of {', '.join(names())}.")
+        raise AntsError(
+            f"there is no learner {name!r}; choose one of {', '.join(names())}, or add a --plugin."
+        )
     return _LEARNERS[name]
 
 

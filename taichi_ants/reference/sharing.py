@@ -67,8 +67,8 @@ class SharedTable(FixedTable):
         [self._common] = self.tables
         if not self._common.shares:
             raise AntsError(
-                f"the learner {self._common.name!r} keeps a memory of its own, so ants cannot "
-                'share its table; take sharing="own".'
+                f"the learner {self._common.name!r} has no TD error that can be summed over ants, "
+                'so they cannot share its table; make sharing "own".'
             )
         self.draws_next_action = self._common.draws_next_action
         self._slots = slots

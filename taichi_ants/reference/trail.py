@@ -55,7 +55,9 @@ class Trail:
         elif rule.deposit == "add":
             self._levels[place] = min(self._levels[place] + rule.level, rule.cap)
         elif rule.deposit == "fading":
-            self._levels[place] = max(self._levels[place], rule.level - int(rule.slope or 0) * carried)
+            self._levels[place] = max(
+                self._levels[place], rule.level - int(rule.slope or 0) * carried
+            )
 
     def tick(self) -> None:
         """Let one tick pass: the trails evaporate, then spread."""

@@ -10,7 +10,7 @@ from itertools import islice
 import numpy as np
 
 from taichi_ants.engines.runs.training import train
-from taichi_ants.errors import AntsError, expect, whole
+from taichi_ants.errors import AntsError, count, expect, whole
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.rendering import colours, text
 from taichi_ants.rendering.marks import cell
@@ -51,9 +51,7 @@ class Stage:
 
     @property
     def title(self) -> str:
-        if self.episodes == 0:
-            return "before learning"
-        return f"after {self.episodes} episode{'s' if self.episodes > 1 else ''}"
+        return f"after {count(self.episodes, 'episode')}" if self.episodes else "before learning"
 
     def account(self) -> np.ndarray:
         """What was earned until each moment, int (len(episode), 5); the sum is the return.

@@ -17,6 +17,7 @@ from taichi_ants.errors import checked_whole, expect
 from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.rendering.observed import name_parts
 from taichi_ants.rendering.panel import Status
 from taichi_ants.rendering.scene import DEFAULT_SIZE, Scene
 from taichi_ants.rendering.snapshot import Snapshot
@@ -40,7 +41,8 @@ def frames(
     scene = None
     for snapshot, status in moments:
         expect("the snapshot", snapshot, Snapshot)
-        scene = scene or Scene(snapshot.grid, size, **look)
+        view = getattr(status, "state", None) is not None
+        scene = scene or Scene(snapshot.grid, size, view=view, **look)
         yield scene.draw(snapshot, status)
 
 
@@ -110,9 +112,10 @@ class Episode:
         going_on = step < len(trace)
         state = int(trace.states[step] if going_on else trace.next_states[-1])
         action = int(trace.actions[step]) if going_on else None
-        task, _, seen = observation.name_of(state).partition(" ")
+        task, seen, _ = name_parts(observation, state)
         lines = [("episode", self.name), ("step", str(step)), ("return", str(gained))]
-        lines += [("task", task), ("sees", seen)]
+        lines += [("task", task), ("sees", seen)] if task else [("state", seen)]
+        lines += [("", observation.letters)] if observation.letters else []
         if action is not None:
             lines.append(("action", ACTION_NAMES[action]))
         elif self.delivered:

@@ -10,7 +10,7 @@ from taichi_ants.rendering import colours, text
 from taichi_ants.rendering.marks import ants, cell
 from taichi_ants.rendering.observed import PAPER, Observation
 from taichi_ants.rendering.rasteriser import draw_marks
-from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS
+from taichi_ants.task.constants import ACTION_NAMES, DEPOSIT_LEVEL, N_ACTIONS
 
 # A cell by its letter, whether an ant on it carries food, a letter on it, and what it is called.
 _LEGEND = (
@@ -58,7 +58,7 @@ def draw_status(
         text.write(frame, value, left + width, y, size, align="right", room=room)
         y += round(1.45 * size)
     if status.q_values is not None:
-        y += round(0.8 * size)
+        y += round(0.3 * size)
         text.write(frame, "action values Q", left, y, size, colours.FAINT_INK)
         _draw_bars(frame, status, left, y + round(0.5 * size), width, size)
 
@@ -87,19 +87,12 @@ def _draw_bars(
 
 
 def draw_legend(
-    frame: np.ndarray,
-    left: int,
-    top: int,
-    width: int,
-    size: int,
-    full_level: float,
-    hexagon: float,
+    frame: np.ndarray, left: int, top: int, width: int, size: int, hexagon: float
 ) -> None:
     """Draw what colours, shapes and letters mean, `LEGEND_HEIGHT` sizes of the text high.
 
-    `full_level` is the trail level of the last colour of the ramp; `hexagon` the size of the
-    world's hexagons in pixels, on which the look of its ants depends. The rest is as in
-    `draw_status`.
+    `hexagon` is the size of the world's hexagons in pixels, on which the look of its ants depends.
+    The rest is as in `draw_status`.
     """
     pitch, radius = round(1.55 * size), 0.82 * size
     for row, (kind, carries, letter, label) in enumerate(_LEGEND):
@@ -119,7 +112,7 @@ def draw_legend(
     frame[y : y + round(0.7 * size), left : left + width] = ramp
     y += round(1.75 * size)
     text.write(frame, "1", left, y, size, colours.FAINT_INK)
-    strongest = f"{full_level:g} and more"
+    strongest = f"{DEPOSIT_LEVEL} and more"
     text.write(frame, strongest, left + width, y, size, colours.FAINT_INK, align="right")
 
 

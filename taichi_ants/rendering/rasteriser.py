@@ -49,7 +49,7 @@ class Rasteriser:
         grid: The grid of all worlds to draw.
         width, height: Of the pictures, in pixels.
         margin: Pixels to leave free at each side.
-        full_level: The trail level that has the last colour of the ramp, as stronger ones have.
+        beyond: Whether to leave room for the cells just beyond the border of the world.
 
     Attributes:
         hexagon: Pixels from the centre of a cell to its corners.
@@ -61,16 +61,17 @@ class Rasteriser:
         width: int,
         height: int,
         margin: float = 0.0,
-        full_level: float = DEPOSIT_LEVEL,
+        beyond: bool = False,
     ) -> None:
         self.grid = grid
         self.width, self.height = width, height
-        self._full_level = np.float32(full_level)
         x_range, y_range, z_range = grid.ranges
         # The lowest and the highest (x, y), in sizes of a hexagon from the cell (0, 0, 0). By
         # `hexgrid.centre_of`, x grows with y and falls with z, y falls with x.
         low = np.array([-1.5 * (z_range - 1) - 1, -_SQRT_3 * (x_range - 0.5)])
         high = np.array([1.5 * (y_range - 1) + 1, _SQRT_3 * (y_range + z_range - 1) / 2])
+        ring = beyond * np.array([1.5, _SQRT_3])
+        low, high = low - ring, high + ring
         size = np.array([width, height])
         self.hexagon = float((np.maximum(size - 2 * margin, 1) / (high - low)).min())
         self._origin = size / 2 - self.hexagon * (low + high) / 2
@@ -135,7 +136,7 @@ class Rasteriser:
         of_ground[QUEEN] = colours.CELL_QUEEN if small else colours.FLOOR_QUEEN
         of_cells = of_ground[snapshot.ground & 15]
         marked = np.flatnonzero((snapshot.ground == EMPTY) & (snapshot.trail >= 1))
-        share = np.minimum(snapshot.trail[marked].astype(np.float32) / self._full_level, 1)
+        share = np.minimum(snapshot.trail[marked].astype(np.float32) / np.float32(DEPOSIT_LEVEL), 1)
         of_cells[marked] = colours.TRAIL_RAMP[(share * 255 + 0.5).astype(np.int32)]
         of_cells[~self.grid.exists] = colours.PAGE
         return of_cells

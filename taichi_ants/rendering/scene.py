@@ -8,11 +8,11 @@ from taichi_ants.errors import AntsError, checked_flag, checked_whole, expect, s
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import colours, panel, text
-from taichi_ants.rendering.observed import task_and_letters
+from taichi_ants.rendering.observed import name_parts
 from taichi_ants.rendering.panel import Status
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.rendering.snapshot import Snapshot
-from taichi_ants.task.constants import DEPOSIT_LEVEL, FOOD, QUEEN
+from taichi_ants.task.constants import FOOD, QUEEN
 
 SMALLEST_SIDE, LARGEST_SIDE = 64, 4096
 DEFAULT_SIZE = (1280, 720)
@@ -43,7 +43,7 @@ class Scene:
         size: Width and height of the pictures, 64 to 4096 pixels each.
         title: A line above the panel.
         plain: Whether to draw the world alone, without panel and marks.
-        full_level: The trail level that has the last colour of the ramp, as stronger ones have.
+        view: Whether to leave room for the cells in view beyond the border of the world.
 
     Raises:
         AntsError: An argument is of the wrong kind, or the size is not allowed.
@@ -56,11 +56,12 @@ class Scene:
         *,
         title: str = "",
         plain: bool = False,
-        full_level: float = DEPOSIT_LEVEL,
+        view: bool = False,
     ) -> None:
         expect("grid", grid, AxialGrid)
         width, height = check_size(size)
         expect("title", title, str)
+        view = checked_flag("view", view)
         self._plain = checked_flag("plain", plain)
         letters = round(min(width, height) / 38)
         self._background = np.full((height, width, 3), colours.channels(colours.PAGE))
@@ -69,15 +70,15 @@ class Scene:
         room = width  # of the world, on the left
         if self._has_panel:
             room -= _PANEL_WIDTH * letters + margin
-        self._rasteriser = Rasteriser(grid, room, height, margin, full_level)
+        self._rasteriser = Rasteriser(grid, room, height, margin, view and not plain)
         if self._has_panel:
             column = width - margin - room
             bottom = height - margin - round(panel.LEGEND_HEIGHT * letters)
             text.write(self._background, title, room, margin + letters, letters, room=column)
             top = margin + round(_TITLE_HEIGHT * letters) * bool(title)
             self._status_place = room, top, column, letters
-            looks = (letters, full_level, self._rasteriser.hexagon)
-            panel.draw_legend(self._background, room, bottom, column, *looks)
+            hexagon = self._rasteriser.hexagon
+            panel.draw_legend(self._background, room, bottom, column, letters, hexagon)
 
     def draw(self, snapshot: Snapshot, status: Status | None = None) -> np.ndarray:
         """A picture, uint8 (height, width, 3), of a world and of what is said of it.
@@ -109,7 +110,7 @@ class Scene:
         cells = snapshot.ant_cells[0] + snapshot.grid.offsets[turned]
         world = rasteriser.draw(snapshot, in_view=cells)
         if hexagon >= _SMALLEST_LETTERS:
-            _, letters = task_and_letters(status.observation, state)
+            *_, letters = name_parts(status.observation, state)
             floors = rasteriser.cell_colours(snapshot)[cells].tolist()
             centres = rasteriser.centres(snapshot.grid.cells(cells)).tolist()
             taken = np.isin(snapshot.ground[cells], (FOOD, QUEEN))  # by their drawings

@@ -1,8 +1,8 @@
 """A policy on one sheet: what the ant does in each state.
 
-The states stand in two halves, foraging and carrying, ordered by the cell ahead, then by the other
-cells in view. A sheet shows the states in which something was learned, or all that an ant can come
-into; of very many the first.
+The states stand in two parts, foraging and carrying, or in one if their names tell no task, ordered
+by the cell ahead, then by the other cells in view. A sheet shows the states in which something was
+learned, or all that an ant can come into; of very many the first.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
 from taichi_ants.grid.hexgrid import centre_of
 from taichi_ants.rendering import colours, text
 from taichi_ants.rendering.marks import CELL_LETTERS, Mark, ants, cell, cell_colour, marks
-from taichi_ants.rendering.observed import Observation, possible_states, task_and_letters
+from taichi_ants.rendering.observed import Observation, name_parts, possible_states
 from taichi_ants.rendering.panel import fill
 from taichi_ants.rendering.rasteriser import draw_marks
 from taichi_ants.task import Task
 from taichi_ants.task.constants import ACTION_NAMES, GIVE, PICK_UP, RIGHT
 from taichi_ants.task.states import TASK_NAMES
 
-MOST = 128  # states of a half that are drawn
+MOST = 128  # states of a part that are drawn
 _HARDLY = 0.01  # of the usual spread: below, nothing was learned
 
 # Lengths in pixels.
@@ -33,13 +33,16 @@ WIDTH, _MARGIN, _COLUMNS = 1280, 20, 8
 _TILE = (WIDTH - 2 * _MARGIN) // _COLUMNS
 _HEXAGON = _TILE / 5.7
 _SMALL, _LARGE = 18, 27  # sizes of text
-_TOP, _HEADING, _BELOW = 145, 70, 47  # heights of what stands above all, a half; below a state
+_TOP, _HEADING, _BELOW = 145, 70, 47  # heights of what stands above all, a part; below a state
 
-_HALVES = ("Foraging (without food)", "Carrying (with food)")
+_PARTS = {
+    **dict(zip(TASK_NAMES, ("Foraging (without food)", "Carrying (with food)"), strict=True)),
+    "": "States",
+}
 _EXPLANATION = (
     "A drawing is a state: what the ant sees. The arrow and the word are its best action.",
     "The longer the bar, the worse the second best action; where the bar is empty, it is as good.",
-    "E empty, O obstacle (or the outside), T trail, S nearer to the queen.",
+    "E empty, O obstacle (or the outside), T trail, S nearer to the queen",
 )
 _PALE = 0.4  # how much of its colours a state keeps in which nothing was learned
 _GOALS = "FQ"
@@ -47,10 +50,9 @@ _ARROW_COLOURS = {PICK_UP: colours.CELL_FOOD, GIVE: colours.CELL_QUEEN}
 
 
 def usual_spread(q_values: np.ndarray, observation: Observation) -> float:
-    """By how much the action values (n_states, 5) of a state usually differ.
+    """The mean gap from best to worst action value (n_states, 5) of possible states, or 0.
 
-    The mean of the gaps from the best to the worst, over the possible states with values that
-    differ; 0 where there are none.
+    States whose values are all equal do not count.
     """
     rows = q_values.astype(np.float64)[list(possible_states(observation))]
     spreads = np.ptp(rows, axis=1)
@@ -101,26 +103,26 @@ def policy_sheet(
     complete = checked_flag("complete", complete)
     observation, spread = task.sees, usual_spread(table, task.sees)
     picture = _Picture(observation)
-    halves: tuple[list[int], list[int]] = ([], [])
+    parts: dict[str, list[int]] = {}
     for state in possible_states(observation):
-        halves[observation.name_of(state).startswith(TASK_NAMES[1])].append(state)
-    known = {state for half in halves for state in half if learned(table[state], spread)}
+        parts.setdefault(name_parts(observation, state)[0], []).append(state)
+    known = {state for part in parts.values() for state in part if learned(table[state], spread)}
     drawn = [
-        sorted((state for state in half if complete or state in known), key=picture.order)[:MOST]
-        for half in halves
+        sorted((state for state in part if complete or state in known), key=picture.order)[:MOST]
+        for part in parts.values()
     ]
     tile = picture.height + _BELOW
     heights = [_HEADING + max(1, math.ceil(len(states) / _COLUMNS)) * tile for states in drawn]
     sheet = np.full((_TOP + sum(heights) + _MARGIN, WIDTH, 3), colours.channels(colours.PAGE))
-    _write_head(sheet, title)
+    _write_head(sheet, title, observation)
     top = _TOP
-    for half, states, name, height in zip(halves, drawn, _HALVES, heights, strict=True):
-        n = len(known.intersection(half))
-        words = f"{n} of {len(half)} states learned" if n else "nothing was learned here"
+    for (task_name, every), states, height in zip(parts.items(), drawn, heights, strict=True):
+        n = len(known.intersection(every))
+        words = f"{n} of {len(every)} states learned" if n else "nothing was learned here"
         if len(states) == MOST:
             words += f"; {MOST} are shown"
         y = top + round(1.7 * _LARGE)
-        text.write(sheet, name, _MARGIN, y, _LARGE)
+        text.write(sheet, _PARTS[task_name], _MARGIN, y, _LARGE)
         text.write(sheet, words, WIDTH - _MARGIN, y, _SMALL, colours.FAINT_INK, align="right")
         for place, state in enumerate(states):
             row, column = divmod(place, _COLUMNS)
@@ -133,24 +135,32 @@ def policy_sheet(
     return sheet
 
 
-def _write_head(sheet: np.ndarray, title: str) -> None:
+def _write_head(sheet: np.ndarray, title: str, observation: Observation) -> None:
     room = WIDTH - 2 * _MARGIN
     text.write(sheet, title, _MARGIN, _MARGIN + _LARGE, _LARGE, room=room)
-    for number, line in enumerate(_EXPLANATION):
+    *lines, letters = _EXPLANATION
+    letters = ", ".join(filter(None, [letters, observation.letters])) + "."
+    if not name_parts(observation, 0)[2]:
+        letters = (
+            "The text in a drawing is the name or the number of the state; cells have no letters."
+        )
+    for number, line in enumerate([*lines, letters]):
         y = _MARGIN + 2 * _LARGE + number * 1.5 * _SMALL
-        text.write(sheet, line, _MARGIN, y + 7, _SMALL, colours.FAINT_INK)
+        text.write(sheet, line, _MARGIN, y + 7, _SMALL, colours.FAINT_INK, room=room)
 
 
 def _write_action(tile: np.ndarray, top: int, best: list[int], clear: float) -> None:
     """Write the best actions below a state, with a bar of how clear they are."""
-    words, ink = "not learned", colours.FAINT_INK
+    words, ink, size = "not learned", colours.FAINT_INK, _SMALL
     if best:
         words = " / ".join(ACTION_NAMES[action] for action in best)
+        while text.width(words, size) > _TILE:
+            size -= 1
         ink = _ARROW_COLOURS.get(best[0], colours.CHOSEN)
         length = 0.72 * _TILE
         fill(tile, (_TILE - length) / 2, top + 23, length, 6, colours.CELL_EMPTY)
         fill(tile, (_TILE - length) / 2, top + 23, length * clear, 6, ink)
-    text.write(tile, words, _TILE / 2, top + 15, _SMALL, ink, align="middle", room=_TILE)
+    text.write(tile, words, _TILE / 2, top + 15, size, ink, align="middle")
 
 
 class _Picture:
@@ -168,7 +178,7 @@ class _Picture:
 
     def order(self, state: int) -> list[int]:
         """Sorts by the cell ahead, then by the others."""
-        _, letters = task_and_letters(self._observation, state)
+        *_, letters = name_parts(self._observation, state)
         if letters:
             letters.insert(0, letters.pop(self._observation.cells.index(0)))
         return [*(CELL_LETTERS.find(letter[0]) for letter in letters), state]
@@ -176,15 +186,14 @@ class _Picture:
     def draw(self, state: int, actions: list[int]) -> np.ndarray:
         """The picture, uint8 (height, width, 3); pale without actions."""
         frame = np.full((self.height, _TILE, 3), colours.channels(colours.PAGE))
-        task, letters = task_and_letters(self._observation, state)
+        task, rest, letters = name_parts(self._observation, state)
         carries, radius = np.array([task == TASK_NAMES[1]]), 0.96 * _HEXAGON
         seen = list(zip(letters or ["E"] * len(self._seen), self._seen, strict=True))
         cells = [cell(letter, centre, radius) for letter, centre in [("E", self._own), *seen]]
         ant = ants(self._own + (0, 0.2 * _HEXAGON), 0, carries, _HEXAGON, 0.62 * _HEXAGON)
         draw_marks(frame, *cells, ant, *self._arrows(letters, actions))
         if not letters:  # a name of another form
-            name = self._observation.name_of(state).partition(" ")[2]
-            text.write(frame, name, _TILE / 2, _SMALL, _SMALL, align="middle", room=_TILE)
+            text.write(frame, rest, _TILE / 2, _SMALL, _SMALL, align="middle", room=_TILE)
         for letter, (x, y) in seen if letters else ():
             if letter not in _GOALS:
                 place = x, y - 0.12 * _HEXAGON

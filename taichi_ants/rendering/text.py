@@ -31,11 +31,10 @@ def write(
     Args:
         frame: uint8 (height, width, 3).
         text: The text; the font has little but ASCII, so accents and other letters are left out.
-        x: The left edge, the middle or the right edge of the text, in pixels.
+        x, align: Pixels to the "left" edge, the "middle" or the "right" edge of the text.
         baseline: Where its letters stand, in pixels from the top.
         size: Of the font, in pixels; what is smaller than 9 cannot be read and is left out.
         colour: 0xRRGGBB.
-        align: "left", "middle" or "right", what `x` is.
         room: Pixels for the text, which is shortened; None is without bounds.
     """
     if size < SMALLEST:

@@ -22,7 +22,7 @@ class _HelpFormatter(argparse.ArgumentDefaultsHelpFormatter):
     """Shows the defaults that say something."""
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
-        silent = action.default is None or action.default is False
+        silent = action.default in (None, []) or action.default is False
         return action.help if silent else super()._get_help_string(action)
 
 
@@ -54,7 +54,7 @@ class Parser(argparse.ArgumentParser):
 def add_common(parser: argparse.ArgumentParser) -> None:
     """The options of all commands that compute something."""
     add = parser.add_argument
-    add("--plugin", metavar="FILE", help="a Python file that registers learners or worlds")
+    add("--plugin", metavar="FILE", help="a file with learners, observations or worlds (.py)")
     add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
     add("--arch", choices=("cpu", "cuda"), default="cpu", help="where kernels run")
 
@@ -86,7 +86,8 @@ def default_folder(
             values = value if isinstance(value, tuple) else (value,)
             shown = [] if value is True else [str(one).rpartition("/")[2] for one in values]
             parts += [action.option_strings[0].removeprefix("--"), *shown]
-    return Path("results", re.sub(r"[^\w.+-]+", "_", "-".join(parts)))
+    parts = [re.sub(r"[^\w.+-]+", "_", part).strip("_") for part in parts]
+    return Path("results", "-".join(parts))
 
 
 def whole_number(least: int | None = None, most: int | None = None) -> Callable[[str], int]:
@@ -104,6 +105,22 @@ def whole_number(least: int | None = None, most: int | None = None) -> Callable[
 
 
 number = float  # an argument type, too
+
+
+def _named_number(text: str) -> tuple[str, float]:
+    name, _, value = text.partition("=")
+    try:
+        return name, int(value) if value.lstrip("+-").isdecimal() else float(value)
+    except ValueError:
+        words = f"{text!r} is no name and number, write it as planning_steps=3"
+        raise argparse.ArgumentTypeError(words) from None
+
+
+# The option of commands that train one learner; `dict(settings.hyperparameter)` has its numbers.
+HYPERPARAMETER: dict[str, Any] = {
+    **{"type": _named_number, "action": "extend", "nargs": 1, "default": []},
+    **{"metavar": "NAME=VALUE", "help": "of the learner; may be given several times"},
+}
 
 
 class ListAction(argparse.Action):
@@ -146,7 +163,7 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
 
 
 def load_plugin(path: str) -> None:
-    """Execute a Python file of the user's, which registers learners or worlds.
+    """Execute a Python file of the user's, which registers learners, observations or worlds.
 
     Raises:
         AntsError: The file cannot be read, raises or exits.

@@ -24,11 +24,7 @@ def is_animation(render: str) -> bool:
 
 
 def check_places(save: str | None, render: str | None) -> None:
-    """Make sure, before the work begins, that what `live` shall write can be written.
-
-    Raises:
-        AntsError: Something cannot.
-    """
+    """Make sure, before the work begins, that what `live` shall write can be written."""
     from taichi_ants.rendering import check_animation, check_picture
 
     if render and is_animation(render):
@@ -50,21 +46,10 @@ def live(
     render: str | None = None,
     every: int = 2,
 ) -> None:
-    """Let time pass in a colony, then write its files.
+    """Let time pass in a colony, then write its files; it ends early once `stopped()` is true.
 
-    The colony is saved even if its picture or animation cannot be written.
-
-    Args:
-        colony: In an episode.
-        ticks: How many.
-        progress: Called now and then with the share of the work that is done.
-        stopped: Asked between ticks whether to end.
-        save: Where to keep the colony at the end; None keeps nothing.
-        render: A .png of the end, or an animation of all (.gif, .mp4, or a folder); or None.
-        every: Ticks from one picture of an animation to the next.
-
-    Raises:
-        AntsError: A file cannot be written; the message says where the colony is, if it is saved.
+    It is saved even if its picture (.png) or animation (.gif, .mp4, a folder) cannot be written;
+    the AntsError says where. An animation has a picture for `every` so many ticks.
     """
     animated = render is not None and is_animation(render)
     passing = _pieces(colony, ticks, progress, stopped, every if animated else 0)

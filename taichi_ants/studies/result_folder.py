@@ -105,7 +105,7 @@ class ResultFolder:
             return place == self.path
         if self.path.is_dir() and any(item.name != UNFINISHED for item in self.path.iterdir()):
             raise AntsError(
-                f"{str(self.path)!r} holds files that no finished results go with; "
+                f"{str(self.path)!r} holds files, but no finished results; "
                 "choose another --out, or give --force to write among them."
             )
         return False

@@ -235,7 +235,7 @@ class Study(Generic[PointKind]):
             if len(several) not in (1, len(self.seeds)) or not several:
                 raise AntsError(f"there are {len(several)} worlds for {len(self.seeds)} seeds.")
             for one, seed in zip(several, self.seeds, strict=False):
-                checks.checked_food(one).start(seed, ants)
+                checks.checked_world(one, learns=True).start(seed, ants)
 
     @property
     def in_order(self) -> tuple[PointKind, ...]:

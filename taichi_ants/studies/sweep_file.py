@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import difflib
 import itertools
+import math
+import re
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from taichi_ants import checks, worlds
+from taichi_ants import checks, learners, worlds
 from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, shown
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.runner import ColonyPoint, Point, RunPoint, Study, flat
@@ -24,6 +26,7 @@ else:
 KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
 _OF_FILE = ("kind", "seeds", "measures", "margin", "against", "vary")
 _PARTS = ("world", "task", "training", "after")  # of a point; they have settings of their own
+_OF_LEARNERS = [field.name for field in fields(TrainingConfig) if field.name != "hyperparameters"]
 
 Settings = dict[str, Any]  # by their full names, as "task.pheromone.half_life"
 
@@ -51,12 +54,12 @@ class Sweep:
     margin: float
 
 
-def read_sweep(path: Path, measures: Mapping[str, Iterable[str]]) -> Sweep:
+def read_sweep(path: Path, measures: Mapping[str, Mapping[str, Any]]) -> Sweep:
     """The sweep of a file.
 
     Args:
         path: The file.
-        measures: The names of all measures, by kind.
+        measures: All measures, by kind and name; their `episodes` are the fewest that they need.
 
     Raises:
         AntsError: The file cannot be read, or asks for something that cannot be.
@@ -75,14 +78,17 @@ def read_sweep(path: Path, measures: Mapping[str, Iterable[str]]) -> Sweep:
         raise AntsError(f"in {str(path)!r}, {error}") from error
 
 
-def _sweep(file: Settings, measures: Mapping[str, Iterable[str]]) -> Sweep:
+def _sweep(file: Settings, measures: Mapping[str, Mapping[str, Any]]) -> Sweep:
     kind: Any = file.get("kind")
+    if kind is None:
+        raise AntsError(f"kind is missing; write one of {', '.join(KINDS)}.")
     check_one_of("kind", kind, tuple(KINDS))
     wanted = _listed(file.get("measures", []))
     if not wanted:
         raise AntsError(f"measures is missing; name one or more of {', '.join(measures[kind])}.")
     for name in wanted:
         check_one_of("measures", name, tuple(measures[kind]))
+    _check_once("measures", wanted)
     fixed = flat({name: value for name, value in file.items() if name not in _OF_FILE})
     grids = [_grid(grid, fixed) for grid in _listed(file.get("vary", []))]
     if not grids:
@@ -95,10 +101,16 @@ def _sweep(file: Settings, measures: Mapping[str, Iterable[str]]) -> Sweep:
     built: dict[str, Any] = {}
     rows = tuple(itertools.chain(*grids))
     points: tuple[Any, ...] = tuple(_point(kind, {**fixed, **row}, checked, built) for row in rows)
+    for name in wanted:
+        least = measures[kind][name].episodes
+        if any(point.episodes < least for point in points):
+            raise AntsError(f"{name} needs {least} episodes; give more, or measure something else.")
     margin = file.get("margin", 0)
-    if not isinstance(margin, (int, float)) or margin < 0:
+    if type(margin) not in (int, float) or not 0 <= margin < math.inf:
         raise AntsError(f"margin is {shown(margin)}; it must be a number of at least 0.")
-    against = _against(flat(file.get("against", {})), rows)
+    against = _against(file["against"], rows) if "against" in file else None
+    if "margin" in file and not against:
+        raise AntsError("margin is given without against; give both, or none.")
     study = Study(points, checked)
     ends = list(itertools.accumulate(map(len, grids), initial=0))
     parts = tuple(map(slice, ends, ends[1:]))
@@ -107,6 +119,12 @@ def _sweep(file: Settings, measures: Mapping[str, Iterable[str]]) -> Sweep:
 
 def _listed(value: Any) -> list:
     return value if isinstance(value, list) else [value]
+
+
+def _check_once(name: str, values: list) -> None:
+    for place, value in enumerate(values):
+        if value in values[:place]:
+            raise AntsError(f"{name} holds {shown(value)} more than once; leave one out.")
 
 
 def _grid(grid: Any, fixed: Settings) -> list[Settings]:
@@ -119,37 +137,46 @@ def _grid(grid: Any, fixed: Settings) -> list[Settings]:
             raise AntsError(f"{name} is an empty list; give at least one value.")
         if name in fixed:
             raise AntsError(f"{name} stands among the fixed settings and in [vary]; leave out one.")
+        if name in _OF_FILE:
+            raise AntsError(f"{name} cannot vary; write it above all tables.")
+        if name == "world.ranges" and not all(isinstance(one, list) for one in several):
+            raise AntsError(
+                f"{name} is {shown(several)} in [vary]; write {shown([several])}, a list of ranges."
+            )
+        _check_once(name, several)
     return [dict(zip(values, row, strict=True)) for row in itertools.product(*values.values())]
 
 
-def _against(given: Settings, rows: Iterable[Settings]) -> tuple[str, Any] | None:
-    if not given:
-        return None
-    ((name, value), *more) = given.items()
-    if more or not any(row.get(name) == value for row in rows):
+def _against(given: Any, rows: Iterable[Settings]) -> tuple[str, Any]:
+    pairs = list(flat(given).items()) if isinstance(given, dict) else []
+    if len(pairs) != 1 or not any(pairs[0] in row.items() for row in rows):
         raise AntsError(
             f"against is {shown(given)}; give one setting, and a value of it in [vary]."
         )
-    return name, value
+    return pairs[0]
 
 
 def _point(kind: str, settings: Settings, seeds: tuple[int, ...], built: dict[str, Any]) -> Point:
     """The point of some settings; a world stands in `built` once it was built."""
-    own = [field.name for field in fields(KINDS[kind]) if field.name not in _PARTS]
-    known = [*own, *flat({"task": Task().as_dict()})]
+    learner = settings.get("training.learner")
+    more = fields(learners.get(str(learner)).hyperparameters) if learner else ()
+    known = [
+        *_own(kind),
+        *flat({"task": Task().as_dict()}),
+        *(f"training.{name}" for name in [*_OF_LEARNERS, *(field.name for field in more)]),
+    ]
     tree: dict[str, Any] = {"world": {}, "task": {}, "training": {}}
     for name, value in settings.items():
-        # What a world or a learner has besides is known where they are made.
-        if name not in known and not name.startswith(("world.", "training.")):
-            nearest = difflib.get_close_matches(name, known, 3) or known
-            raise AntsError(f"{shown(name)} is no setting; known are {', '.join(nearest)}.")
+        # What settings a world has is known where it is made.
+        if name not in known and not re.fullmatch(r"world\.[^.]*", name):
+            raise AntsError(f"{shown(name)} is no setting {_rather(name, kind, known)}.")
         *outer, last = name.split(".")
         branch = tree
         for part in outer:
             branch = branch.setdefault(part, {})
         branch[last] = value
     world, task, training = (tree.pop(part) for part in _PARTS[:3])
-    for name in ("learner", "learning_rate", "discount", "epsilon", "epsilon_decay"):
+    for name in _OF_LEARNERS[:-1]:  # the minimum of epsilon has a usual value
         if name not in training:
             raise AntsError(f"training.{name} is missing; write it, fixed or in [vary].")
     key = repr(sorted(world.items()))
@@ -158,12 +185,31 @@ def _point(kind: str, settings: Settings, seeds: tuple[int, ...], built: dict[st
     return KINDS[kind](built[key], Task.from_dict(task), TrainingConfig(**training), **tree)
 
 
+def _own(kind: str) -> list[str]:
+    """The settings of a kind that are no part of another one."""
+    return [field.name for field in fields(KINDS[kind]) if field.name not in _PARTS]
+
+
+def _rather(name: str, kind: str, known: list[str]) -> str:
+    """What may be meant by a name that is no setting."""
+    for other in KINDS:
+        if name in _own(other):
+            return f"of kind {kind!r}, but of {other!r}; leave it out"
+    near = [one for one in known if one.endswith(f".{name}")]
+    near = near or difflib.get_close_matches(name, known, 3)
+    near = near or [*_own(kind), *(f"{one}. ..." for one in _PARTS[:3])]
+    return f"here; choose among {', '.join(near)}"
+
+
 def _world(kind: str, given: Settings, seeds: tuple[int, ...]) -> Any:
     """The world of some settings, or one for each seed."""
-    preset, first = given.pop("preset", "paper"), given.pop("seed", 0)
-    if not checked_flag("world.per_seed", given.pop("per_seed", False)):
-        return worlds.build(preset, first, **given)
-    if kind == "runs":
+    preset, drawn = given.pop("preset", "paper"), "seed" in given
+    first, per_seed = given.pop("seed", 0), given.pop("per_seed", False)
+    if checked_flag("world.per_seed", per_seed) and kind == "runs":
         raise AntsError("world.per_seed is for colonies only; leave it out.")
+    if per_seed or drawn:
+        worlds.check_seed_counts(preset, "world.per_seed" if per_seed else "world.seed")
+    if not per_seed:
+        return worlds.build(preset, first, **given)
     checked_whole("world.seed", first, -(2**62), 2**62)
     return tuple(worlds.build(preset, first + seed, **given) for seed in seeds)

@@ -34,7 +34,7 @@ class Life:
         for name, least in (("lifespan", 1), ("regrowth", 0), ("wander", 1)):
             ticks = getattr(self, name)
             if ticks is not None:
-                checked_whole(name, ticks, least, MAX_STEPS, ", or None")
+                checked_whole(name, ticks, least, MAX_STEPS, ", or be left out")
 
     @property
     def changes(self) -> bool:

@@ -84,8 +84,8 @@ class Pheromone:
             object.__setattr__(self, name, usual if chosen == needed else None)
         elif chosen != needed:
             raise AntsError(
-                f"{name} is {shown(getattr(self, name))}, but {other} is {chosen!r}; give "
-                f"{other}={needed!r} with it, or leave it out."
+                f"{name} is {shown(getattr(self, name))}, but {other} is {chosen!r}; make "
+                f"{other} {needed!r}, or leave it out."
             )
 
     @property

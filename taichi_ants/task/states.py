@@ -70,23 +70,6 @@ def name_of_codes(n_cells: int, foraging: str, carrying: str) -> Callable[[int],
 
 # The name of a state by its index.
 state_name = name_of_codes(3, *CELL_LETTERS)
-_INDICES: dict[object, int] = {state_name(index).lower(): index for index in range(N_STATES)}
-
-
-def parse_state(name: str) -> int:
-    """The index of a state's name, the inverse of `state_name`; case does not matter.
-
-    Raises:
-        AntsError: The text is not the name of a state.
-    """
-    known = isinstance(name, str) and " ".join(name.lower().split())
-    if known in _INDICES:
-        return _INDICES[known]
-    raise AntsError(
-        f"{shown(name)} is not a state; write the ant's task and the three cells it sees, left, "
-        "forward, right, as in 'foraging E T O' (letters E, O, T, F) or 'carrying S E O' "
-        "(letters E, O, S, Q)."
-    )
 
 
 def _can_occur(state: State) -> bool:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Literal, get_args
 
-from taichi_ants.errors import AntsError, check_one_of, checked_flag, shown
+from taichi_ants.errors import AntsError, check_one_of, checked_flag, expect, shown
 from taichi_ants.task import observations
 from taichi_ants.task.life import Life
 from taichi_ants.task.observations import Observation
@@ -23,8 +23,8 @@ _PARTS = {"rewards": Rewards, "pheromone": Pheromone, "traffic": Traffic, "life"
 class Task:
     """What an ant perceives, may do and is paid for; the paper's by default.
 
-    `observation`, `traffic` and what kind of pheromone there is are compiled into the kernels;
-    all else is numbers that kernels read.
+    `observation` and what kind of pheromone there is are compiled into the kernels; all else is
+    numbers that kernels read.
 
     Attributes:
         observation: Name of a registered observation, which tells what row of its table an ant
@@ -62,10 +62,7 @@ class Task:
         if isinstance(self.traffic, str):
             object.__setattr__(self, "traffic", Traffic.named(self.traffic))
         for name, kind in _PARTS.items():
-            if not isinstance(getattr(self, name), kind):
-                raise AntsError(
-                    f"{name} is {shown(getattr(self, name))}; it must be {kind.__name__}(...)."
-                )
+            expect(name, getattr(self, name), kind)
         check_one_of("delivery", self.delivery, DELIVERIES)
         for name in ("turns_at_queen", "evaporation_in_training", "evaporation_in_evaluation"):
             object.__setattr__(self, name, checked_flag(name, getattr(self, name)))
@@ -97,14 +94,11 @@ class Task:
         Raises:
             AntsError: A value is not allowed, or there is no such field.
         """
-        known = {one.name for one in fields(cls)}
-        for name in facts:
-            if name not in known:
-                raise AntsError(
-                    f"a task has no {shown(name)}; choose among {', '.join(sorted(known))}."
-                )
-        parts = {name: kind(**facts[name]) for name, kind in _PARTS.items() if name in facts}
-        return cls(**{**facts, **parts})
+        given = dict(_known("a task", cls, facts))
+        for name, kind in _PARTS.items():
+            if name in given:
+                given[name] = kind(**_known(name, kind, given[name]))
+        return cls(**given)
 
 
 def foraging() -> Task:
@@ -138,3 +132,13 @@ def queueing() -> Task:
 def paper() -> Task:
     """The paper's task, which is the default everywhere."""
     return Task()
+
+
+def _known(what: str, kind: type, facts: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The facts, if each is a field of that kind."""
+    expect(what, facts, Mapping)
+    known = sorted(one.name for one in fields(kind))
+    for name in facts:
+        if name not in known:
+            raise AntsError(f"{what} has no {shown(name)}; choose among {', '.join(known)}.")
+    return facts

@@ -50,13 +50,13 @@ def settings(name_or_path: str) -> tuple[str, ...]:
     return tuple(inspect.signature(_BUILDERS[name_or_path]).parameters)[1:]
 
 
-def check_seed_counts(name_or_path: str) -> None:
+def check_seed_counts(name_or_path: str, option: str = "--world-seed") -> None:
     """Make sure that a seed can change the world; AntsError if it is the paper's or a map."""
     drawn = [name for name in names() if name != "paper"]
     if name_or_path not in drawn:
         raise AntsError(
-            f"--world-seed is for a world drawn at random, not for {name_or_path!r}; leave it out, "
-            f"or choose a --world of {', '.join(drawn)}."
+            f"{option} is for a world drawn at random, not for {name_or_path!r}; leave it out, "
+            f"or choose a world of {', '.join(drawn)}."
         )
 
 

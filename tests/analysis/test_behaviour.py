@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from named_states import parse_state
 
 from taichi_ants import AntsError, Task, rollout, train
 from taichi_ants.analysis.behaviour import (
@@ -20,7 +21,7 @@ from taichi_ants.engines.runs.traces import trace_policies
 from taichi_ants.learners import policies
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT, SEES_LURE
-from taichi_ants.task.states import parse_state, state_from_index
+from taichi_ants.task.states import state_from_index
 from taichi_ants.worlds import paper
 
 STILL = Task(evaporation_in_evaluation=False)

@@ -27,6 +27,7 @@ from command_lines import (
 from taichi_ants import Colony, Life, Pheromone, Task, TrainingConfig, load_policy, worlds
 from taichi_ants.engines.colony.layout import AntRow
 from taichi_ants.learners import registry
+from taichi_ants.learners.policies import save_policy
 
 SEEDS, EPISODES, TICKS, ROLLOUTS = (3, 4), 4, 80, 2
 SMALL = [
@@ -158,6 +159,7 @@ def test_a_finished_study_is_shown_and_nothing_is_lost(finished, tmp_path, kerne
         ("--seeds 20 --epsilon 0.3 --threads 1 --no-figures", "colony"),
         ("--quick --seeds 8", "colony-quick"),
         ("--sizes 1 8 --quick", "colony-sizes-1-8-quick"),
+        ("--hyperparameter planning_steps=3", "colony-hyperparameter-planning_steps_3"),
         ("--learner dyna_q --arenas paper", "colony-arenas-paper-learner-dyna_q"),
     ],
 )
@@ -251,6 +253,13 @@ def test_stopped_and_killed_it_goes_on_to_the_same_results(finished, kernels, tm
         ),
         (["live", "--sharing", "fixed"], "sharing is 'fixed', but q_values is None"),
         (["live", "--policy", "x.npz"], "cannot read 'x.npz'"),
+        (
+            ["live", "--policy", "x", "--observation", "paper"],
+            "--observation is that of the policy",
+        ),
+        (["live", "--observation", "nose"], "there is no observation 'nose'"),
+        (["live", "--hyperparameter", "threshold"], "'threshold' is no name and number"),
+        (["live", "--hyperparameter", "x=1"], "'x' is no hyperparameter of learner 'sarsa'"),
         (["live", "--plugin", "x.py"], "cannot read the plugin"),
     ],
 )
@@ -360,6 +369,20 @@ def test_a_colony_starts_from_a_policy(finished, capsys):
     policy = finished[1] / "policies" / "paper_alone.npz"
     fixed = ["live", "--ants", 2, "--world", "paper", "--ticks", 60, "--sharing", "fixed"]
     assert call("colony", [*fixed, "--policy", policy, "--regrowth", 0], capsys)[0] == 0
+
+
+@pytest.mark.parametrize("from_file", [True, False])
+def test_a_colony_sees_what_its_policy_or_the_option_says(from_file, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    save_policy("five.npz", np.eye(2048, 5), {}, "five_cells")
+    sees = ["--policy", "five.npz"] if from_file else ["--observation", "five_cells"]
+    more = ["--learner", "dyna_q", "--hyperparameter", "planning_steps=3", "--save", "a.npz"]
+    assert call("colony", ["live", "--ants", 2, "--ticks", 9, *sees, *more], capsys)[0] == 0
+    saved = Colony.load("a.npz")
+    assert saved.task.observation == "five_cells"
+    assert saved.q_values.any()
+    assert saved.q_values.shape == (1, 2048, 5)
+    assert dict(saved.training.hyperparameters) == {"planning_steps": 3}
 
 
 def test_colonies_live_side_by_side_and_can_start_spread(capsys, tmp_path, monkeypatch):

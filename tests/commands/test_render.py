@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from taichi_ants import commands
+from taichi_ants import AntsError, commands
 from taichi_ants.commands import render
 from taichi_ants.learners.policies import save_policy, trail_follower
 from taichi_ants.rendering import learning_frames, text
@@ -91,6 +91,8 @@ def test_a_still_and_a_sheet(tmp_path, policy) -> None:
     path = tmp_path / "a.png"
     done = run("episode", "--policy", policy, "--max-steps", 3, "--out", path)
     assert done.stdout.endswith("3 steps, return 3, not delivered\n")
+    done = run("episode", "--policy", policy, "--max-steps", 1, "--out", path)
+    assert ": 1 step, return" in done.stdout
     assert Image.open(path).size == (1280, 720)
     done = run("sheet", "--policy", policy, "--out", tmp_path / "sheet.png")
     assert done.returncode == 0, done.stderr
@@ -109,6 +111,30 @@ def test_a_policy_of_another_observation_is_shown_as_such(tmp_path, shown) -> No
     done = run(shown, "--policy", path, *length, "--out", tmp_path / "a.png")
     assert done.returncode == 0, done.stderr
     assert files_in(tmp_path) == ["a.png", "five.npz"]
+
+
+def test_a_wrong_size_is_refused_before_the_training(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(render, "find_policy", lambda *_: pytest.fail("it trains first"))
+    wrong = ["episode", "--size", "63x63", "--out", str(tmp_path / "a.gif")]
+    with pytest.raises(AntsError, match="64 and 4096"):
+        render.show(render.parse_arguments(wrong))
+
+
+@pytest.mark.parametrize("shown", ["episode", "colony", "learning", "sheet"])
+def test_what_is_trained_on_the_spot_sees_what_is_asked_for(shown, monkeypatch) -> None:
+    more = ["--stages", "1"] if shown == "learning" else ["--episodes", "1"]
+    chosen = ["--observation", "ants_seen", "--learner", "dyna_q"]
+    chosen += ["--hyperparameter", "planning_steps=2"]
+    length = ["--ticks", "5"] if shown == "colony" else []
+    settings = render.parse_arguments([shown, *more, *chosen, *length])
+    assert render.training_config(settings).planning_steps == 2
+    if shown == "learning":
+        (stage,) = render.noted_stages(settings, paper())
+        table, task = stage.episode.q_values, stage.episode.task
+    else:
+        table, task, title = render.find_policy(settings, paper())
+        assert title == "dyna_q after 1 episode"
+    assert (table.shape, task.observation) == ((250, 5), "ants_seen")
 
 
 def test_learning_and_a_colony(tmp_path) -> None:
@@ -166,6 +192,17 @@ WRONG = {
         "stages are (5, 2); they must ascend",
     ),
     "steps": (["episode", "--max-steps", "0"], "from 1 to"),
+    "training of a policy": (["sheet", "--policy", "a.npz", "--episodes", "5"], "--episodes is of"),
+    "learner of a policy": (["colony", "--learner=sarsa", "--policy", "a.npz"], "--learner is of"),
+    "observation of a policy": (
+        ["episode", "--policy", "a.npz", "--observation", "paper"],
+        "--observation is of training",
+    ),
+    "hyperparameter": (["sheet", "--hyperparameter", "x=y", "--out", "{}/a.png"], "'x=y' is no"),
+    "hyperparameter of another": (
+        ["episode", "--hyperparameter", "n_steps=2", "--out", "{}/a.gif"],
+        "'n_steps' is no hyperparameter of learner 'sarsa'",
+    ),
     "unknown option": (["episode", "--colour", "red"], "--colour"),
 }
 

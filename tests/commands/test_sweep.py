@@ -34,7 +34,7 @@ RUNS = """
 kind = "runs"
 measures = ["return_last50", "greedy_deliveries"]
 seeds = [7, 2, 5]
-episodes = 12
+episodes = 50
 max_steps = 60
 rollouts = 3
 
@@ -118,7 +118,7 @@ def test_a_row_is_a_point_and_a_seed_as_the_library_has_it(sweep):
         rate, epsilon = (float(row[name]) for name in names[:2])
         config = TrainingConfig("sarsa", rate, 0.9, epsilon, 0.99)
         task = Task(delivery="continuing", rewards=Rewards(lure=int(row[names[2]])))
-        trained = train(worlds.paper(), config, int(row["seed"]), 12, 60, task)
+        trained = train(worlds.paper(), config, int(row["seed"]), 50, 60, task)
         assert float(row["return_last50"]) == trained.returns.mean()
     summary = read_csv(folder / "summary.csv")
     assert len(summary) == 12
@@ -165,7 +165,7 @@ def test_a_finished_sweep_is_shown_and_its_figure_drawn_later(sweep):
     assert set(after) - set(before) == {"figures/return_last50.png"}
     status, out, err = sweep(RUNS.replace("lure = [1, 0]", "lure = [1, 2]"))
     assert status == 2
-    assert "task.rewards.lure" in err
+    assert "(task.rewards.lure, vary differ)" in err
 
 
 def test_stopped_and_killed_it_goes_on_to_the_same_results(kernels, tmp_path):
@@ -198,17 +198,21 @@ def test_stopped_and_killed_it_goes_on_to_the_same_results(kernels, tmp_path):
 
 WRONG = {
     "kind": ('kind = "runs"', 'kind = "run"', ["kind is 'run'", "runs, colony"]),
-    "no kind": ('kind = "runs"', "", ["kind is None", "runs, colony"]),
+    "no kind": ('kind = "runs"', "", ["kind is missing", "runs, colony"]),
     "measure": ('"return_last50"', '"return_last"', ["'return_last'", "return_last50"]),
     "no measure": (RUNS[RUNS.index("measures") : RUNS.index("seeds")], "", ["measures is missing"]),
     "unknown": ("lure =", "lures =", ["'task.rewards.lures' is no setting", "task.rewards.lure"]),
     "unknown above": ("episodes =", "episode =", ["'episode' is no setting", "episodes"]),
     "not in full": ("task.rewards.lure =", "lure =", ["'lure' is no setting", "task.rewards.lure"]),
-    "of the other kind": ("rollouts = 3", "ants = 3", ["'ants' is no setting", "known are"]),
+    "of the other kind": (
+        "rollouts = 3",
+        "ants = 3",
+        ["'ants' is no setting of kind 'runs', but of 'colony'"],
+    ),
     "hyperparameter": ("discount = 0.9", "discount = 0.9\nplanning_steps = 3", ["planning_steps"]),
     "missing": ("discount = 0.9", "", ["training.discount is missing"]),
     "value": ("discount = 0.9", "discount = 1.9", ["discount is 1.9"]),
-    "text": ("episodes = 12", 'episodes = "12"', ["episodes is '12'"]),
+    "text": ("episodes = 50", 'episodes = "12"', ["episodes is '12'"]),
     "list": ("discount = 0.9", "discount = [0.9, 1]", ["discount is [0.9, 1]"]),
     "twice": ("discount = 0.9", "discount = 0.9\nepsilon = 0.1", ["training.epsilon stands among"]),
     "empty": ("[1, 0]", "[]", ["task.rewards.lure is an empty list"]),
@@ -223,6 +227,40 @@ WRONG = {
     "for colonies": ("[vary]", "[vary]\ntask.life.regrowth = [1]", ["use a Colony"]),
     "against": ("[task]", "[against]\ntask.rewards.lure = 7\n[task]", ["against is", "in [vary]"]),
     "margin": ("seeds =", "margin = -1\nseeds =", ["margin is -1"]),
+    "no margin": ("seeds =", "against.task.rewards.lure = 0\nmargin = nan\nseeds =", ["is nan"]),
+    "flag as margin": ("seeds =", "margin = true\nseeds =", ["margin is True"]),
+    "margin alone": ("seeds =", "margin = 1\nseeds =", ["margin is given without against"]),
+    "against text": ("seeds =", 'against = "paper"\nseeds =', ["against is 'paper'"]),
+    "against list": ("seeds =", "against = [{a = 1}]\nseeds =", ["against is [{'a': 1}]"]),
+    "against nothing": ("seeds =", "against.training = {}\nseeds =", ["against is {'training'"]),
+    "measure twice": ('"greedy_deliveries"', '"return_last50"', ["'return_last50' more than once"]),
+    "value twice": ("[1, 0]", "[1, 1]", ["task.rewards.lure holds 1 more than once"]),
+    "few episodes": ("episodes = 50", "episodes = 49", ["return_last50 needs 50 episodes"]),
+    "too few": ("return_last50", "return_first50", ["return_first50 needs 100 episodes"]),
+    "seed of one world": (
+        "[task]",
+        "[world]\nseed = 1\n[task]",
+        ["world.seed is for a world drawn"],
+    ),
+    "part of a text": (
+        "[vary]",
+        "[vary]\ntraining.learner.x = [1]",
+        ["'training.learner.x' is no"],
+    ),
+    "wrong name": ("[vary]", '[vary]\ntraining.lerner = ["a"]', ["lerner' is", "training.learner"]),
+    "cut name": (
+        "epsilon_decay =",
+        "epsilon_deca =",
+        ["epsilon_deca' is", "training.epsilon_decay"],
+    ),
+    "of the file": ("[vary]", "[vary]\nseeds = [3, 4]", ["seeds cannot vary", "above all tables"]),
+    "no list of ranges": (
+        "[vary]",
+        '[world]\npreset = "open"\n[vary]\nworld.ranges = [20, 20, 20]',
+        ["world.ranges is [20, 20, 20]", "[[20, 20, 20]]"],
+    ),
+    "part of a world": ("[vary]", "[vary]\nworld.preset.x = [1]", ["'world.preset.x' is no"]),
+    "unlike any": ("episodes =", "xyz = 1\nepisodes =", ["max_steps, rollouts, world"]),
     "no toml": ("[vary]", "[vary", ["is no TOML", "mend the file"]),
     "nothing varies": (RUNS[RUNS.index("[vary]") :], "", ["[vary] is missing"]),
 }
@@ -326,7 +364,7 @@ def test_a_learner_that_cannot_share_is_refused_before_the_work(sweep):
     status, _, err = sweep(COLONY.replace('"sarsa"', '"sarsa_lambda"'))
     assert status == 2
     assert_one_sentence(err)
-    assert "'sarsa_lambda' keeps a memory of its own" in err
+    assert "'sarsa_lambda' has no TD error that can be summed" in err
     assert not Path("results").exists()
 
 
@@ -363,4 +401,12 @@ def test_help_is_quick_and_needs_no_taichi(tmp_path):
         [sys.executable, "-c", script], env=environment(tmp_path), capture_output=True, text=True
     )
     assert done.stdout.endswith("heavy: []\n")
-    assert "FILE" in done.stdout
+    assert "\n  FILE " in done.stdout
+    assert "learners, observations or worlds" in " ".join(done.stdout.split())
+
+
+def test_the_script_of_observations_asks_for_no_file(tmp_path):
+    script = [sys.executable, EXPERIMENTS / "observations.py", "--help"]
+    done = subprocess.run(script, env=environment(tmp_path), capture_output=True, text=True)
+    assert done.returncode == 0
+    assert "\n  FILE " not in done.stdout

@@ -124,17 +124,32 @@ def of_the_end(look):
     return look.codes[-1]
 
 
+def with_an_early_return(look):
+    if look.carries:
+        return 64
+    return 0
+
+
+def with_a_return_in_each_branch(look):
+    if look.carries:
+        return 64
+    else:
+        return 0
+
+
 @pytest.mark.parametrize(
     ("row", "says"),
     [
-        (beyond_the_table, "row gives 128, but it must lie between 0 and 127"),
-        (below_the_table, "row gives -1, but it must lie between 0 and 127"),
+        (beyond_the_table, "row fails (it gives 128, but it must lie between 0 and 127"),
+        (below_the_table, "row fails (it gives -1, but it must lie between 0 and 127"),
         (of_what_there_is_not, "has no attribute 'smell'"),
         (of_a_cell_too_far, "index out of range"),
         (of_the_end, "there is no entry -1"),
         (of_a_division_by_zero, "divide by zero"),
         (of_a_vector, "row fails"),
         (of_what_overflows, "overflow"),
+        (with_an_early_return, "row fails (it needs one return, as its last line)"),
+        (with_a_return_in_each_branch, "row fails (it needs one return, as its last line)"),
     ],
 )
 def test_what_gives_wrong_rows_is_refused_at_once(row, says):

@@ -119,15 +119,15 @@ def test_it_learns_to_deliver_in_the_papers_world(name, delivery):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_taken_name_is_refused(name):
-    with pytest.raises(AntsError, match=f"'{name}' exists already"):
+    with pytest.raises(AntsError, match=f"'{name}' cannot name a learner; use a new one"):
         learners.register(td_learner(name, clipped_td_error, True))
 
 
 @pytest.mark.parametrize(
     ("learner", "says"),
     [
-        (None, "None is not a Learner"),
-        (clipped_td_error, "is not a Learner"),
+        (None, "what is registered is None; it must be a Learner"),
+        (clipped_td_error, "it must be a Learner"),
         (replace(CLIPPED, name="two words"), "'two words' cannot name a learner"),
         (replace(CLIPPED, name=""), "'' cannot name a learner"),
         (replace(CLIPPED, name="a/b"), "'a/b' cannot name a learner"),

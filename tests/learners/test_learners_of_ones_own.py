@@ -405,6 +405,19 @@ class Clashing(Hyperparameters):
     discount: float = number(0.5, 0, 1)
 
 
+@dataclass(frozen=True)
+class OfText(Hyperparameters):
+    kind: str = "a"
+
+
+@dataclass(frozen=True)
+class OutOfRange(Hyperparameters):
+    depth: int = number(3, 1, 2)
+
+
+FAILS = "learner 'mine' cannot be used: "
+
+
 @pytest.mark.parametrize(
     ("changes", "says"),
     [
@@ -413,6 +426,16 @@ class Clashing(Hyperparameters):
         ({"learn": plain_function}, "the function learn of 'mine' is no Taichi function"),
         ({"plans": True, "td_error": natural_sarsa}, "the TD error of 'mine' looks at next_action"),
         ({"hyperparameters": Clashing}, "'discount' is a setting of all learners"),
+        ({"hyperparameters": OfText}, f"{FAILS}hyperparameters fails (kind is no number; make"),
+        ({"hyperparameters": OutOfRange}, f"{FAILS}hyperparameters fails (depth is 3; it must lie"),
+        ({"hyperparameters": 5}, f"{FAILS}hyperparameters fails"),
+        ({"memory": lambda settings, n: None}, f"{FAILS}memory fails (what it gives is None; it"),
+        ({"memory": lambda settings, n: Memory(floats=-3)}, f"{FAILS}memory fails (floats of a "),
+        ({"memory": lambda settings, n: n / 0}, f"{FAILS}memory fails (division by zero)"),
+        ({"memory": Memory(floats=9)}, f"{FAILS}memory fails ('Memory' object"),
+        ({"cost": 5}, f"{FAILS}cost fails ('int' object"),
+        ({"cost": lambda settings: "x"}, f"{FAILS}cost fails ("),
+        ({"cost": lambda settings: -1}, f"{FAILS}cost fails (it gives -1, but it must be above 0)"),
     ],
 )
 def test_learners_that_are_refused_when_they_are_registered(changes, says):

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from named_states import parse_state
 from plain_runs import rollout
 
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.policies import load_policy, random_policy, save_policy, trail_follower
 from taichi_ants.task import Task, observations
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, N_STATES, PICK_UP, RIGHT
-from taichi_ants.task.states import parse_state
 from taichi_ants.worlds.open_world import open_world
 from taichi_ants.worlds.paper import paper
 

@@ -6,6 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
+from named_states import parse_state
 from PIL import Image
 
 from taichi_ants import AntsError, Colony, TrainingConfig, train
@@ -25,8 +26,8 @@ from taichi_ants.rendering.colours import CELL_FOOD, CHOSEN
 from taichi_ants.rendering.observed import PAPER
 from taichi_ants.rendering.sheet import clarity, learned, usual_spread
 from taichi_ants.task import Observation, Rewards, Task, observations
-from taichi_ants.task.constants import GIVE, PICK_UP, RIGHT
-from taichi_ants.task.states import REACHABLE_STATES, parse_state
+from taichi_ants.task.constants import ACTION_NAMES, GIVE, PICK_UP, RIGHT
+from taichi_ants.task.states import REACHABLE_STATES
 from taichi_ants.worlds import open_world, paper
 
 CONFIG = TrainingConfig("sarsa", 0.01, 0.9, 0.5, 0.995)
@@ -267,6 +268,51 @@ def test_states_with_names_of_another_form_are_written_out(monkeypatch) -> None:
     policy_sheet(np.eye(4, 5))
     assert {f"crumb number {row}" for row in range(4)} <= set(lines)
     assert "4 of 4 states learned" in lines
+
+
+def test_states_without_names_are_told_by_their_numbers_and_not_split_by_load(monkeypatch) -> None:
+    episode = Episode.play(paper(), random_policy(), max_steps=1)
+    monkeypatch.setattr(Task, "sees", Observation("own", 4, lambda look: 0))
+    monkeypatch.setattr(Task, "n_states", 4)
+    lines: list[str] = []
+    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
+    policy_sheet(np.eye(4, 5))
+    assert {"0", "1", "2", "3", "States"} <= set(lines)
+    assert not any("orag" in line or "arry" in line or "trail" in line for line in lines)
+    status = episode._status(0, 0)
+    assert ("state", str(status.state)) in status.lines
+    assert not {"task", "sees"} & dict(status.lines).keys()
+
+
+@pytest.mark.parametrize("name", ["ants_seen", "trail_levels", "paper"])
+def test_letters_of_their_own_are_explained_on_the_sheet_and_in_the_panel(
+    name, monkeypatch
+) -> None:
+    task, lines = Task(name), []
+    table = np.zeros((task.n_states, 5), np.float32)
+    names = {task.sees.name_of(row) for row in range(task.n_states)}
+    strange = set("".join(one.partition(" ")[2] for one in names)) - set(" -EOTSFQ")
+    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
+    policy_sheet(table, task=task)
+    (legend,) = (line for line in lines if line.startswith("E empty"))
+    beside = dict(Episode.play(paper(), table, max_steps=1, task=task)._status(0, 0).lines)
+    assert task.sees.letters in legend
+    assert beside.get("", "") == task.sees.letters
+    assert {word.strip(",") for word in task.sees.letters.split()} >= strange
+    assert bool(strange) == (name != "paper")
+
+
+@pytest.mark.parametrize("best", [(0, 1, 3), (0, 1, 2, 4), (0, 1, 2, 3)])
+def test_no_tie_is_cut_off(best, monkeypatch) -> None:
+    table, written = random_policy(), []
+    table[parse_state("foraging E F E"), list(best)] = 1.0
+    monkeypatch.setattr(text, "write", lambda *given, **more: written.append((given, more)))
+    policy_sheet(table)
+    (found,) = ((given, more) for given, more in written if " / " in given[1])
+    (tile, words, _, _, size, *_), more = found
+    assert words == " / ".join(ACTION_NAMES[action] for action in best)
+    assert size >= text.SMALLEST
+    assert text.width(words, size) <= more.get("room", tile.shape[1])
 
 
 def test_sheets_that_are_refused() -> None:

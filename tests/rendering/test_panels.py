@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from named_states import parse_state
 
 from taichi_ants import AntsError
-from taichi_ants.rendering import Scene, Status, at_start, panel, text
+from taichi_ants.rendering import Scene, Status, at_start, frames, panel, text
 from taichi_ants.rendering.colours import CHOSEN
 from taichi_ants.rendering.rasteriser import Rasteriser
-from taichi_ants.task import Observation
-from taichi_ants.task.states import parse_state
+from taichi_ants.task import Observation, observations
 from taichi_ants.worlds import World, paper
 
 WORLD = paper()
@@ -127,6 +129,20 @@ def test_an_observation_of_five_cells_marks_five() -> None:
         assert (seen[part] != plain[part]).any() == marked
 
 
+@pytest.mark.parametrize("size", [(320, 320), (320, 200), (200, 320), (1280, 720)])
+def test_no_cell_in_view_is_cut_off_by_the_edge(size) -> None:
+    """An ant at each cell of the world that sees all six around; the page stays white behind."""
+    six, scene = observations.get("six_cells"), Scene(WORLD.grid, size, view=True)
+    start = at_start(WORLD)
+    for cell in np.flatnonzero(WORLD.grid.exists)[::5]:
+        status = Status((), state=0, observation=six)
+        frame = scene.draw(replace(start, ant_cells=np.array([cell])), status)
+        for edge in (frame[0], frame[-1], frame[:, 0], frame[:, -1]):
+            assert (edge == 255).all()
+    (drawn,) = frames([(start, status)], size)
+    assert (drawn == scene.draw(start, status)).all()
+
+
 @pytest.mark.parametrize("side", [200, 320])
 def test_no_letter_lies_on_food_or_queen(side) -> None:
     """The ant of a delivered episode sees the queen as an obstacle; her crown stays whole."""
@@ -193,7 +209,7 @@ def test_ants_of_the_legend_look_as_those_of_the_world() -> None:
 
     def legend(hexagon: float) -> np.ndarray:
         frame = np.full((260, 200, 3), 255, dtype=np.uint8)
-        panel.draw_legend(frame, 4, 4, 180, 16, 250.0, hexagon)
+        panel.draw_legend(frame, 4, 4, 180, 16, hexagon)
         return frame
 
     darts, legs, dots = legend(8.0), legend(20.0), legend(1.0)

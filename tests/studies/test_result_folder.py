@@ -179,7 +179,7 @@ def test_a_damaged_manifest_is_named(place, damage, tmp_path):
 
 def test_foreign_files_are_not_written_among(tmp_path):
     (tmp_path / "diary.txt").write_text("mine")
-    with pytest.raises(AntsError, match=r"no finished results .*--force"):
+    with pytest.raises(AntsError, match=r"but no finished results;.*--force"):
         ResultFolder(tmp_path, SETTINGS).is_finished()
     assert names(tmp_path) == ["diary.txt"]
     finish(tmp_path, replace=True)

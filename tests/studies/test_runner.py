@@ -235,7 +235,7 @@ def test_bad_points_of_runs_are_named(change, says):
         ({"ticks": 0}, "ticks is 0"),
         ({"rollouts": 0}, "rollouts is 0"),
         ({"after": replace(ALONE, sharing="own")}, "learned into one table"),
-        ({"training": LAMBDA}, "'sarsa_lambda' keeps a memory of its own"),
+        ({"training": LAMBDA}, "'sarsa_lambda' has no TD error that can be summed"),
     ],
 )
 def test_bad_points_of_colonies_are_named(change, says):

@@ -11,7 +11,6 @@ from taichi_ants.task.constants import N_STATES
 from taichi_ants.task.states import (
     REACHABLE_STATES,
     State,
-    parse_state,
     state_from_index,
     state_name,
 )
@@ -33,43 +32,16 @@ from taichi_ants.task.states import (
 def test_index_and_name_of_a_state(state: State, index: int, name: str) -> None:
     assert state_from_index(index) == state
     assert state_name(index) == name
-    assert parse_state(name) == index
 
 
 @given(st.integers(0, N_STATES - 1))
-def test_every_index_comes_back_from_its_state_and_its_name(index: int) -> None:
+def test_every_index_comes_back_from_its_state(index: int) -> None:
     state = state_from_index(index)
     assert index == 64 * state.carries + 16 * state.left + 4 * state.forward + state.right
-    assert parse_state(state_name(index)) == index
 
 
 def test_names_are_unique() -> None:
     assert len({state_name(index) for index in range(N_STATES)}) == N_STATES
-
-
-def test_parsing_ignores_case_and_spacing() -> None:
-    assert parse_state("  Foraging  e t O ") == 9
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        "",
-        "foraging",
-        "foraging E T",
-        "foraging E T O O",
-        "foraging ETO",
-        "foraging E S O",
-        "carrying E T O",
-        "carrying E X O",
-        "resting E E E",
-        "foraging EO O O",
-    ],
-)
-def test_what_is_no_name_is_refused(name: str) -> None:
-    with pytest.raises(AntsError, match="is not a state") as raised:
-        parse_state(name)
-    assert repr(name) in str(raised.value)
 
 
 @pytest.mark.parametrize("index", [-1, 128, 1.5])

@@ -45,8 +45,20 @@ def test_a_task_can_be_written_as_json():
     ):
         assert Task.from_dict(json.loads(json.dumps(task.as_dict()))) == task
     assert Task.from_dict({"rewards": {"give": 5}}) == Task(rewards=Rewards(give=5))
-    with pytest.raises(AntsError, match="a task has no 'evaporation'; choose among delivery, "):
-        Task.from_dict({"evaporation": True})
+
+
+@pytest.mark.parametrize(
+    ("facts", "message"),
+    [
+        ({"evaporation": True}, "a task has no 'evaporation'; choose among delivery, "),
+        ({"pheromone": {"haf": 1}}, "pheromone has no 'haf'; choose among cap, "),
+        ({"pheromone": 3}, "pheromone is 3; it must be a Mapping"),
+        (5, "a task is 5; it must be a Mapping"),
+    ],
+)
+def test_what_is_no_written_task_is_named(facts, message):
+    with pytest.raises(AntsError, match=message):
+        Task.from_dict(facts)
 
 
 @pytest.mark.parametrize(
@@ -54,9 +66,9 @@ def test_a_task_can_be_written_as_json():
     [
         ({"observation": "seven_cells"}, "there is no observation 'seven_cells'; .* six_cells, "),
         ({"observation": []}, r"there is no observation \[\]"),
-        ({"rewards": 3}, r"rewards is 3; it must be Rewards\(...\)"),
-        ({"pheromone": "linear"}, r"pheromone is 'linear'; it must be Pheromone\(...\)"),
-        ({"life": None}, r"life is None; it must be Life\(...\)"),
+        ({"rewards": 3}, r"rewards is 3; it must be a Rewards"),
+        ({"pheromone": "linear"}, r"pheromone is 'linear'; it must be a Pheromone"),
+        ({"life": None}, r"life is None; it must be a Life"),
         ({"traffic": "left"}, "traffic is 'left'; it must be one of blocking, right_of_way"),
         ({"delivery": "never"}, "delivery is 'never'; it must be one of absorbing, continuing"),
         ({"evaporation_in_training": 1}, "evaporation_in_training is 1; it must be True or False"),
@@ -71,8 +83,8 @@ def test_a_task_that_cannot_be(settings, message):
     ("settings", "message"),
     [
         ({"births": 1}, "births is 1; it must be True or False"),
-        ({"lifespan": 0}, "lifespan is 0; it must lie between 1 and .*, or None"),
-        ({"lifespan": 2.0}, "lifespan is 2.0; it must be a whole number, or None"),
+        ({"lifespan": 0}, "lifespan is 0; it must lie between 1 and .*, or be left out"),
+        ({"lifespan": 2.0}, "lifespan is 2.0; it must be a whole number, or be left out"),
         ({"regrowth": -1}, "regrowth is -1; it must lie between 0"),
         ({"wander": 0}, "wander is 0"),
         ({"wander": "daily"}, "wander is 'daily'"),
@@ -97,7 +109,7 @@ def test_an_observation_of_ones_own_is_known_by_its_name():
     mine = observations.register(Observation("mine", 1, always_zero))
     assert observations.get("mine") is mine
     assert Task("mine").n_states == 1
-    with pytest.raises(AntsError, match="an observation named 'mine' exists already"):
+    with pytest.raises(AntsError, match=r"'mine' cannot name an observation; use a new one"):
         observations.register(mine)
 
 
@@ -105,11 +117,17 @@ def test_an_observation_of_ones_own_is_known_by_its_name():
     ("changes", "message"),
     [
         ({"name": "two words"}, "'two words' cannot name an observation"),
-        ({"name": "paper"}, "an observation named 'paper' exists already"),
+        ({"name": "paper"}, "'paper' cannot name an observation; use a new one"),
         ({"n_states": 0}, "n_states of 'mine' is 0; it must lie between 1"),
         ({"row": 3}, "row of 'mine' is 3; it must be a function of one argument"),
         ({"row": lambda look, more: 0}, "it must be a function of one argument"),
-        ({"cells": (0, 1)}, r"cells of 'mine' is \(0, 1\); it must hold -1, 0 and 1"),
+        ({"cells": (0, 1)}, r"cells of 'mine' is \(0, 1\); it must be a tuple of -1, 0 and 1"),
+        ({"cells": None}, "cells of 'mine' is None; it must be a tuple"),
+        ({"cells": [-1, 0, 1]}, r"cells of 'mine' is \[-1, 0, 1\]; it must be a tuple"),
+        ({"summary": 5}, "summary of 'mine' is 5; it must be text"),
+        ({"name_of": 5}, "observation 'mine' cannot be used: name_of fails"),
+        ({"name_of": int}, "name_of fails .the name of row 0 is 0; it must be text.;"),
+        ({"n_states": 9999, "name_of": lambda row: "abc"[row % 9998]}, "name_of fails"),
         ({"cells": (-1, 0, 1, 1)}, "each once"),
         ({"cells": (-1, 0, 1, 4)}, "may hold -2, 2 and 3"),
     ],
@@ -144,9 +162,9 @@ def test_each_row_has_a_name_of_its_own(name):
         ({"level": 0}, "level is 0; it must lie between 1 and 1000000"),
         ({"level": 2.5}, "level is 2.5"),
         ({"cap": 1_000_001}, "cap is 1000001"),
-        ({"half_life": 10}, "half_life is 10, but evaporation is 'linear'; give evaporation='expo"),
+        ({"half_life": 10}, "half_life is 10, but evaporation is 'linear'; make evaporation 'expo"),
         ({"half_life": 10, "evaporation": "none"}, "half_life is 10, but evaporation is 'none'"),
-        ({"cap": 10}, "cap is 10, but deposit is 'set'; give deposit='add' with it, or leave"),
+        ({"cap": 10}, "cap is 10, but deposit is 'set'; make deposit 'add', or leave"),
     ],
 )
 def test_a_pheromone_that_cannot_be(settings, message):

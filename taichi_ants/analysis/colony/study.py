@@ -60,11 +60,11 @@ class Condition(NamedTuple):
 # What is measured, with the words of tables.
 MEASURES: dict[str, str] = {
     "deliveries": "deliveries per 1000 ticks",
-    "per_ant": "deliveries per ant and 1000 ticks",
+    "per_ant": "deliveries per ant at the start and 1000 ticks",
     "first_delivery": "ticks to the first delivery",
     "fruitless": "share of episodes without a delivery",
     "blocked": "share of blocked moves",
-    "reward": "reward per ant and 1000 ticks",
+    "reward": "reward per ant at the start and 1000 ticks",
 }
 # Measures of each seed, float64 (seeds,), by their names in `MEASURES`.
 Measured = Mapping[Condition, Mapping[str, np.ndarray]]

@@ -36,9 +36,10 @@ class Variant(NamedTuple):
 
     @property
     def short(self) -> list[str]:
-        """Its hyperparameters by their first letters, for example "p3"."""
-        pairs = (pair.split("=") for pair in self.hyperparameters.split())
-        return [name[0] + value for name, value in pairs]
+        """Its hyperparameters by their first letters, as "p3"; in full where these are alike."""
+        pairs = self.hyperparameters.split()
+        short = {pair[0]: pair[0] + pair.partition("=")[2] for pair in pairs}
+        return list(short.values()) if len(short) == len(pairs) else pairs
 
     @property
     def label(self) -> str:

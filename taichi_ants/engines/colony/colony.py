@@ -477,8 +477,7 @@ def _checked_worlds(
     """A world for each seed, all of the same ranges."""
     one = isinstance(world, (str, World)) or not isinstance(world, Iterable)
     given: Any = (world,) * n_seeds if one else world
-    check_world = checks.checked_food if learns else checks.checked_world
-    worlds = tuple(check_world(one) for one in given)
+    worlds = tuple(checks.checked_world(one, learns) for one in given)
     if len(worlds) != n_seeds:
         raise AntsError(f"there are {len(worlds)} worlds for {n_seeds} seeds.")
     ranges = {world.ranges for world in worlds}

@@ -18,7 +18,7 @@ from taichi_ants.task.constants import N_ACTIONS
 if TYPE_CHECKING:
     from taichi_ants.engines.colony.colony import Colony
 
-_KIND = FileKind("taichi-ants colony 5", "colony", "Colony.save")
+_KIND = FileKind("taichi-ants colony 6", "colony", "Colony.save")
 _OPTIONS = ("seeds", "ants", "capacity", "start", "ends_at_delivery", "sharing", "schedule")
 _MOMENT = ("epsilon", "learning_rate", "episode", "length", "ticks")
 
@@ -62,8 +62,8 @@ def load_colony(
     """Read a colony that `save_colony` wrote.
 
     Raises:
-        AntsError: The file is missing, damaged, or holds no colony; or its learner is not
-            registered.
+        AntsError: The file is missing, damaged, or holds no colony; or its learner or
+            observation is not registered.
     """
     stored, facts = _KIND.read(path)
     runtime.start(threads, arch)  # what is wrong with these says nothing about the file

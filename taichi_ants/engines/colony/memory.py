@@ -127,7 +127,7 @@ def lasting(colony: Colony, q_values: np.ndarray | None) -> dict[str, np.ndarray
         raise AntsError(
             f"{owners} tables, and what learner {colony.training.learner!r} keeps with each, "
             f"take more than {_MOST_NUMBERS} numbers; take fewer ants, worlds or states, or "
-            'sharing="shared".'
+            'make sharing "shared".'
         )
     return {
         "streams": np.zeros(n_worlds * slots, np.uint64),

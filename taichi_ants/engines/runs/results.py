@@ -23,7 +23,7 @@ from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS, ROW
 from taichi_ants.worlds.world import World
 
-_KIND = FileKind("taichi-ants training 4", "training result", "TrainingResult.save")
+_KIND = FileKind("taichi-ants training 5", "training result", "TrainingResult.save")
 _SUMMED_UP, _LISTED = 50, 6  # episodes and configurations that a result shows
 
 
@@ -193,7 +193,7 @@ class TrainingResult(Record):
         """Read a result that `save` wrote; its learners need not be registered.
 
         Raises:
-            AntsError: The file is missing, damaged, or holds no training result.
+            AntsError: The file is missing, damaged, of another kind, or its observation is unknown.
         """
         stored, facts = _KIND.read(path)
         with _KIND.rebuilding(path):

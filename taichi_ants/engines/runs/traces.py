@@ -138,7 +138,7 @@ def trace_training(
 
     Args and errors as in `train`; episodes * max_steps * n_states may not exceed 12.8 million.
     """
-    checks.checked_food(world)
+    checks.checked_world(world, learns=True)
     task = checks.checked_runs_task(task)
     several = checks.checked_configs(config)
     if len(several) > 1:

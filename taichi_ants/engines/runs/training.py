@@ -14,7 +14,6 @@ from taichi_ants import runtime
 from taichi_ants.checks import (
     check_finite,
     checked_configs,
-    checked_food,
     checked_max_steps,
     checked_q_values,
     checked_runs_task,
@@ -65,7 +64,7 @@ def train(
     """
     configs = checked_configs(configs)
     seeds = checked_seeds(seeds)
-    checked_food(world)
+    checked_world(world, learns=True)
     task = checked_runs_task(task)
     none_yet = np.zeros((len(configs), len(seeds), 0), dtype=np.int32)
     start = TrainingResult(

@@ -21,4 +21,5 @@ ANTS_SEEN = Observation(
     row,
     name_of=name_of_codes(3, "EOTFA", "EOSQA"),
     summary="the three cells ahead, other ants told from rocks",
+    letters="A another ant",
 )

@@ -8,22 +8,24 @@ own.
 
 from __future__ import annotations
 
+import ast
 import inspect
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from operator import index
+from textwrap import dedent
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, checked_whole, shown
+from taichi_ants.errors import AntsError, checked_whole, expect, shown, unusable
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN, SEES_LURE
 
 # Tables of this many rows hold 5 * 2**20 values; kernels index many of them by 32 bits.
 MAX_STATES = 1 << 20
 AHEAD = (-1, 0, 1)
-_LOOKS = 3000  # of a trial
+_LOOKS = 3000  # and as many names of rows, in a trial
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,8 @@ class Observation:
         n_states: The rows of a table of action values, at least 1.
         row: A function of one argument, what the ant can look at, that returns the row, from 0 to
             n_states - 1. It is compiled for the kernels, so it computes with whole numbers alone:
-            arithmetic, comparisons, `if`, and `for` over a `range`; no imports and no calls.
+            arithmetic, comparisons, `if`, and `for` over a `range`; no imports and no calls; and it
+            ends with its only `return`.
             Its argument has, each a whole number (levels are floats where trails halve or spread):
             `carries`, 1 with food, else 0; `percept`, the paper's state, 0 to 127; `codes`, what
             each cell in `cells` looks like (0 E, 1 O, 2 T or S, 3 F or Q; T is measured against
@@ -48,6 +51,7 @@ class Observation:
             and 1, the cells ahead, are among them.
         name_of: The name of a row for people.
         summary: One line for listings.
+        letters: What those letters in names mean that are none of the paper's E, O, T, S, F and Q.
     """
 
     name: str
@@ -56,6 +60,7 @@ class Observation:
     cells: tuple[int, ...] = AHEAD
     name_of: Callable[[int], str] = str
     summary: str = ""
+    letters: str = ""
 
     @property
     def ahead(self) -> tuple[int, ...]:
@@ -73,32 +78,30 @@ def register(observation: Observation) -> Observation:
         AntsError: The name is taken or not usable in files and on command lines, a field has not
             the form that it must have, or a row lies outside of the table.
     """
-    if not isinstance(observation, Observation):
-        raise AntsError(f"{shown(observation)} is not an Observation; wrap it in Observation(...).")
+    expect("what is registered", observation, Observation)
     name = observation.name
-    if not isinstance(name, str) or not name.isidentifier():
+    if not isinstance(name, str) or not name.isidentifier() or name in _OBSERVATIONS:
         raise AntsError(
-            f"{shown(name)} cannot name an observation; use letters, digits and underscores."
+            f"{shown(name)} cannot name an observation; use a new one of letters, digits and _."
         )
-    if name in _OBSERVATIONS:
-        raise AntsError(f"an observation named {name!r} exists already; choose another name.")
+    expect(f"letters of {name!r}", observation.letters, str)
     checked_whole(f"n_states of {name!r}", observation.n_states, 1, MAX_STATES)
-    row = observation.row
+    row, cells = observation.row, observation.cells
     named = inspect.isfunction(row) and row.__name__ != "<lambda>"  # kernels cannot take lambdas
     if not named or len(inspect.signature(row).parameters) != 1:
         raise AntsError(
             f"row of {name!r} is {shown(row)}; it must be a function of one argument that is "
             "written with def, see taichi_ants.task.Observation."
         )
-    cells = observation.cells
-    known = all(isinstance(cell, int) and -2 <= cell <= 3 for cell in cells)
+    known = isinstance(cells, tuple) and all(cell in range(-2, 4) for cell in cells)
     if not known or len(set(cells)) < len(cells) or not set(AHEAD) <= set(cells):
         raise AntsError(
-            f"cells of {name!r} is {shown(cells)}; it must hold -1, 0 and 1, and may hold -2, 2 "
-            "and 3, each once."
+            f"cells of {name!r} is {shown(cells)}; it must be a tuple of -1, 0 and 1, and may "
+            "hold -2, 2 and 3, each once."
         )
+    expect(f"summary of {name!r}", observation.summary, str)
     if not row.__module__.startswith("taichi_ants."):
-        _refuse_wrong_rows(observation)
+        _try_functions(observation)
     _OBSERVATIONS[name] = observation
     return observation
 
@@ -121,21 +124,24 @@ def names() -> tuple[str, ...]:
     return tuple(_OBSERVATIONS)
 
 
-def _refuse_wrong_rows(observation: Observation) -> None:
-    """Compute the rows of many looks, in Python: a kernel would not notice what is wrong."""
-    with np.errstate(all="raise"):
-        for look in _drawn_looks(observation):
-            try:
+def _try_functions(observation: Observation) -> None:
+    """Compute and name many rows, in Python: a kernel would not notice what is wrong."""
+    function, last = "row", observation.n_states - 1
+    try:
+        (source,) = ast.parse(dedent(inspect.getsource(observation.row))).body
+        returns = [one for one in ast.walk(source) if isinstance(one, ast.Return)]
+        if not isinstance(source, ast.FunctionDef) or returns != source.body[-1:]:
+            raise ValueError("it needs one return, as its last line")
+        with np.errstate(all="raise"):
+            for look in _drawn_looks(observation):
                 row = observation.row(look)
-                right = 0 <= index(row) < observation.n_states
-                fault = f"row gives {row}, but it must lie between 0 and {observation.n_states - 1}"
-            except Exception as error:
-                right, fault = False, f"row fails ({error})"
-            if not right:
-                raise AntsError(
-                    f"observation {observation.name!r} cannot be used: {fault}; see "
-                    "taichi_ants.task.Observation."
-                )
+                if not 0 <= index(row) <= last:
+                    raise ValueError(f"it gives {row}, but it must lie between 0 and {last}")
+        function = "name_of"
+        for row in np.linspace(0, last, min(last + 1, _LOOKS), dtype=int).tolist():
+            expect(f"the name of row {row}", observation.name_of(row), str)
+    except Exception as error:
+        raise unusable(observation, f"{function} fails ({error})") from error
 
 
 def _drawn_looks(observation: Observation) -> Iterator[SimpleNamespace]:

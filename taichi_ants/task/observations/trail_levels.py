@@ -37,4 +37,5 @@ TRAIL_LEVELS = Observation(
     row,
     name_of=name_of_codes(3, "EO123F", "EO--SQ"),
     summary="the three cells ahead, a trail in three strengths",
+    letters="1 2 3 a trail, weak to strong",
 )

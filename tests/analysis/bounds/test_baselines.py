@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from plain_runs import rollout
+from synthetic_comparison import GREEDY_SETTING, TRAINING_SETTING
 
 from taichi_ants.analysis.bounds import episodes
 from taichi_ants.analysis.bounds.baselines import (
@@ -18,10 +19,6 @@ from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.task import Rewards, Task
 from taichi_ants.worlds.paper import paper
 from taichi_ants.worlds.world import World
-
-# In the paper's protocol.
-TRAINING_SETTING = "training, no evaporation"
-GREEDY_SETTING = "greedy, evaporation"
 
 
 def evaluate(world: World, q_values: np.ndarray, **options: Any) -> SimpleNamespace:
@@ -70,7 +67,8 @@ def test_the_rows_of_the_world_of_the_paper() -> None:
         ("trail follower", TRAINING_SETTING, None, 45, 34, 1),
         ("trail follower", GREEDY_SETTING, None, 45, 34, 1),
     ]
-    assert [row["setting"] for row in rows if row["baseline"] == "random policy"] == []
+    random = [row["setting"] for row in rows if row["baseline"] == "random policy"]
+    assert random == [TRAINING_SETTING, GREEDY_SETTING]
 
 
 def test_only_rows_of_several_seeds_have_an_interval() -> None:

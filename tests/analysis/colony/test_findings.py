@@ -264,8 +264,8 @@ def test_what_is_computed_is_said() -> None:
     assert words[
         "jointly trained ants that lay trails get more reward than ants that lay none"
     ] == (
-        "reward per ant and 1000 ticks: trained jointly (evaporating trails) minus trained jointly "
-        "(no trails laid)"
+        "reward per ant at the start and 1000 ticks: trained jointly (evaporating trails) minus "
+        "trained jointly (no trails laid)"
     )
     growth = Series("?", "ants", Design(ON, OWN), Design(ON, OWN), against="smaller")
     assert growth.words == (

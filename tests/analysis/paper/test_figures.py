@@ -13,10 +13,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from PIL import Image
-from synthetic_comparison import build, change, level_truth, subset, unchanged
+from synthetic_comparison import (
+    GREEDY_SETTING,
+    TRAINING_SETTING,
+    build,
+    change,
+    level_truth,
+    subset,
+    unchanged,
+)
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, CIRCLES, OTHER
-from taichi_ants.analysis.bounds.baselines import GREEDY_SETTING, TRAINING_SETTING
 from taichi_ants.analysis.paper.best_of import best_of, percentile_of, shown_position
 from taichi_ants.analysis.paper.comparison import Comparison, Variant
 from taichi_ants.analysis.paper.figures import (

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from synthetic_comparison import build, change, subset, unchanged
+from synthetic_comparison import TRAINING_SETTING, build, change, subset, unchanged
 
 from taichi_ants.analysis.behaviour import CIRCLES, OTHER, WALKS
-from taichi_ants.analysis.bounds.baselines import TRAINING_SETTING
 from taichi_ants.analysis.findings import Verdict
 from taichi_ants.analysis.paper.audit import assess, claims_table
 from taichi_ants.analysis.paper.best_of import shown_position

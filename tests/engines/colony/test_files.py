@@ -56,7 +56,7 @@ def test_a_number_that_was_changed(kept, tmp_path) -> None:
     ("changes", "said"),
     [
         ({"task": None}, ""),
-        ({"task": {"traffic": "none"}}, "traffic is 'none'"),
+        ({"task": {"delivery": "never"}}, "delivery is 'never'"),
         ({"task": {"observation": "six_cells"}}, "another shape or type"),
         ({"ants": None}, "ants is None"),
         ({"training": {"learner": "sarsa"}}, ""),
@@ -78,6 +78,20 @@ def test_a_number_that_was_changed(kept, tmp_path) -> None:
 def test_wrong_facts(kept, tmp_path, changes, said) -> None:
     facts = {**json.loads(str(kept["facts"][()])), **changes}
     assert said in refused({**kept, "facts": np.array(json.dumps(facts))}, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"rows": {"own": 128}}, "of the observation 'own' with 128 rows, which is not"),
+        ({"training": {**PLANNING.as_dict(), "learner": "mine"}}, "there is no learner 'mine'; "),
+    ],
+)
+def test_a_plugin_that_is_missing_is_asked_for(kept, tmp_path, changes, said) -> None:
+    facts = {**json.loads(str(kept["facts"][()])), **changes}
+    np.savez(tmp_path / "x.npz", **{**kept, "facts": np.array(json.dumps(facts))})
+    with pytest.raises(AntsError, match=f"{said}.*--plugin"):
+        Colony.load(tmp_path / "x.npz")
 
 
 def test_other_shapes_and_missing_arrays(kept, tmp_path) -> None:

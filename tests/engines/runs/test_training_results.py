@@ -106,6 +106,16 @@ def test_damaged_facts(stored, tmp_path, changes, said):
     assert said in refused({**stored, "facts": np.array(json.dumps(facts))}, tmp_path)
 
 
+@pytest.mark.parametrize("rows", [{"own": 432}, {"trail_levels": 9}])
+def test_an_observation_that_is_not_registered_is_named(stored, tmp_path, rows):
+    facts = {**json.loads(str(stored["facts"][()])), "rows": rows}
+    np.savez(tmp_path / "x.npz", **{**stored, "facts": np.array(json.dumps(facts))})
+    ((name, n_states),) = rows.items()
+    said = f"of the observation '{name}' with {n_states} rows, which is not registered; .* --plugin"
+    with pytest.raises(AntsError, match=said):
+        TrainingResult.load(tmp_path / "x.npz")
+
+
 def refused(arrays: dict[str, np.ndarray], folder) -> str:
     np.savez(folder / "x.npz", **arrays)
     with pytest.raises(AntsError, match=r"[.]$") as caught:

@@ -1,0 +1,47 @@
+"""What tables and figures of sweeps show."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from taichi_ants.analysis import style, sweeps
+
+VALUES = np.random.default_rng(0).normal(size=(24, 10))
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """Draws 3 places by 8 lines, and returns the axes."""
+    figures = []
+    monkeypatch.setattr(style, "save", lambda figure, path: figures.append(figure))
+
+    def axes(places):
+        settings = [{"a.x": place, "a.y": line} for place in places for line in range(8)]
+        sweeps.draw(Path("none.png"), settings, VALUES, "words", "Title")
+        return figures[0].axes[0]
+
+    return axes
+
+
+def test_eight_lines_look_different(drawn):
+    lines = drawn([1, 2, 5]).get_lines()
+    assert {line.get_linestyle() for line in lines} == {"-"}
+    assert len({(line.get_color(), line.get_marker()) for line in lines}) == 8
+    assert list(lines[0].get_xdata()) == [1, 2, 5]
+
+
+def test_names_are_not_joined_and_their_points_stand_apart(drawn):
+    axes = drawn(["paper", "open", "large"])
+    lines = axes.get_lines()
+    assert {line.get_linestyle() for line in lines} == {"None"}
+    assert len({x for line in lines for x in line.get_xdata()}) == 3 * 8
+    assert [tick.get_text() for tick in axes.get_xticklabels()] == ["paper", "open", "large"]
+
+
+@pytest.mark.parametrize(("seeds", "few"), [(1, False), (2, True), (9, True), (10, False)])
+def test_intervals_of_few_seeds_are_warned_of(seeds, few):
+    report = sweeps.report([{"a.x": 1}], {"deliveries": VALUES[:1, :seeds]})
+    assert ("too few" in " ".join(report.split())) == few
