@@ -121,8 +121,7 @@ class ReferenceColony:
         self._start_world, self._training = world, training
         self._n_ants, self._ends_at_delivery = ants, ends_at_delivery
         self._slots = capacity or (2 * ants + 64 if task.life.births else ants)
-        self._seed, self._sharing = seed, sharing
-        self._starts = starts(world, seed, ants, start)
+        self._seed, self._sharing, self._start = seed, sharing, start
         self.streams = [RandomStream(stream_state(seed, STREAM_ANT, n)) for n in range(ants)]
         self.queen_stream = RandomStream(stream_state(seed, STREAM_QUEEN, 0))
         make = partial(LEARNERS[training.learner], training, task.n_states)
@@ -141,7 +140,8 @@ class ReferenceColony:
         self.over = False
         self.transitions: list[Transition] = []
         self.ants: dict[int, Ant] = {}
-        for number, (cell, heading) in enumerate(self._starts):
+        begin = starts(self._start_world, self._seed, self._n_ants, self._start)
+        for number, (cell, heading) in enumerate(begin):
             self._add(Ant(cell, heading, slot=number, number=number, stream=self.streams[number]))
         for ant in self.ants.values():
             self.look(ant)
@@ -161,8 +161,9 @@ class ReferenceColony:
         ant.percept = observe(self.world, ant)
         ant.state = self._row(self.world, ant)
 
-    def begin_episode(self) -> None:
-        """Start an episode from the world; tables, models, streams and epsilon go on."""
+    def begin_episode(self, world: World | None = None) -> None:
+        """Start an episode, in another world if one is given; all else that was learned goes on."""
+        self._start_world = world or self._start_world
         self.episode += 1
         self._set_up()
         for learner in self.minds.tables:

@@ -170,23 +170,18 @@ class Colony:
         self.seeds = checks.checked_seeds(seeds)
         self.seed_words = np.array([seed % 2**64 for seed in self.seeds], dtype=np.uint64)
         runtime.start(threads, arch)
-        self.worlds = _checked_worlds(world, len(self.seeds), learns)
-        self.grid = self.worlds[0].grid
         life = self.task.life
         self._ants_change = life.births or life.lifespan is not None
         self._food_changes = life.regrowth is not None or life.wander is not None
-        most = max(len(world.foods) for world in self.worlds)
-        self.n_homes = most if self._food_changes else 0
         usual = "by_chunk" if self.capacity >= _LARGE_COLONY else "by_world"
         self.schedule = usual if schedule is None else schedule
         check_one_of("schedule", self.schedule, ("by_world", "by_chunk"))
         by_chunk = self.schedule == "by_chunk"
         self.chunks = min(_MOST_CHUNKS, -(-self.capacity // _ANTS_PER_CHUNK)) if by_chunk else 1
-        self.at_start = memory.start_of_episode(self)
-        self.arrays = {name: array.copy() for name, array in self.at_start.items()}
-        self.arrays |= memory.lasting(self, table)
-        self.stored = tuple(self.arrays)  # the names of those that a file needs to hold
-        self.arrays |= memory.constants(self)
+        self.arrays: dict[str, np.ndarray] = {}
+        self._lay_out(_checked_worlds(world, len(self.seeds), learns))
+        self.arrays |= (lasting := memory.lasting(self, table))
+        self.stored = (*self.at_start, *lasting)  # the names of those that a file needs to hold
         self._arguments: Any = None
         self._piece = 1  # ticks that take less than _PIECE_SECONDS
         self.epsilon, self.learning_rate = self.training.epsilon, self.training.learning_rate
@@ -194,12 +189,31 @@ class Colony:
         self.length = 0  # of the episode in ticks, 0 if nobody has said
         self.ticks = 0
 
-    def begin_episode(self, length: int | None = None) -> None:
+    def _lay_out(self, worlds: tuple[World, ...]) -> None:
+        """Make the arrays that depend on the worlds."""
+        self.worlds, self.grid = worlds, worlds[0].grid
+        most = max(len(world.foods) for world in worlds)
+        self.n_homes = most if self._food_changes else 0
+        self.at_start = memory.start_of_episode(self)
+        self.arrays |= {name: array.copy() for name, array in self.at_start.items()}
+        self.arrays |= memory.constants(self)
+
+    def begin_episode(
+        self, length: int | None = None, world: World | Sequence[World] | None = None
+    ) -> None:
         """Set worlds and ants to their start; the ants look around.
 
-        Learners that need to know are told which tick is the last, if `length` says how many ticks
-        there will be.
+        Args:
+            length: How many ticks there will be. Learners that need to know which tick is the last
+                are told then.
+            world: As of the class: where the colonies live from now on, so that what they learn
+                does not depend on one world. None: where they are.
+
+        Raises:
+            AntsError: A world is not allowed.
         """
+        if world is not None:
+            self._lay_out(_checked_worlds(world, len(self.seeds), self.sharing != "fixed"))
         self.length = 0 if length is None else checked_whole("length", length, most=MAX_STEPS)
         self.episode += 1
         self.ticks = 0
@@ -256,19 +270,29 @@ class Colony:
         self.epsilon = self.training.next_epsilon(self.epsilon)
         self.learning_rate = self.training.next_learning_rate(self.learning_rate)
 
-    def run(self, episodes: int, ticks: int, progress: Progress | None = None) -> ColonyEpisodes:
+    def run(
+        self,
+        episodes: int,
+        ticks: int,
+        progress: Progress | None = None,
+        worlds: Sequence[World | Sequence[World]] | None = None,
+    ) -> ColonyEpisodes:
         """Whole episodes of a fixed number of ticks.
 
         Args:
             episodes: How many.
             ticks: Ticks of each.
             progress: Called now and then with the share of the work that is done.
+            worlds: Of each episode, see `begin_episode`; None: all take place where the colonies
+                are.
         """
         episodes = checked_whole("episodes", episodes)
         ticks = checked_whole("ticks", ticks, most=MAX_STEPS)
+        if worlds is not None and len(worlds) != episodes:
+            raise AntsError(f"worlds has {len(worlds)} entries; give one for each of {episodes}.")
         outcomes = []
         for episode in range(episodes):
-            self.begin_episode(ticks)
+            self.begin_episode(ticks, worlds[episode] if worlds is not None else None)
             for _ in self._pass(ticks):
                 if progress is not None:
                     progress((episode + self.ticks / ticks) / episodes)

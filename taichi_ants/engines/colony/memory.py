@@ -58,7 +58,7 @@ def start_of_episode(colony: Colony) -> dict[str, np.ndarray]:
         rows[row] = n
     rows[WorldRow.FIRST_DELIVERY] = -1
     rows[WorldRow.QUEEN_CELL] = [int(colony.grid.index(world.queen)) for world in worlds]
-    homes, piles = _homes(colony, rows)
+    homes, piles, home_of = _homes(colony, rows)
     return {
         # What a cell holds, and a mark of the ant on it, see `layout`.
         "ground": ground.reshape(-1),
@@ -73,15 +73,18 @@ def start_of_episode(colony: Colony) -> dict[str, np.ndarray]:
         "homes": homes,
         # By world: where each pile begins in the row HomeRow.LISTED.
         "piles": piles,
+        # The column in `homes` whose food lies in a cell, -1.
+        "home_of": home_of,
     }
 
 
-def _homes(colony: Colony, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The homes of all worlds, and their piles; their numbers are put into the rows of worlds."""
-    most, n_worlds = colony.n_homes, len(colony.worlds)
+def _homes(colony: Colony, rows: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Homes, piles and `home_of` of all worlds; their numbers are put into the rows of worlds."""
+    most, n_worlds, size = colony.n_homes, len(colony.worlds), colony.grid.size
     homes = np.zeros((len(HomeRow), max(1, n_worlds * most)), np.int32)
     begins = np.zeros((n_worlds, most + 1), np.int32)
     homes[HomeRow.TAKEN] = -1
+    home_of = np.full(n_worlds * size if most else 1, -1, np.int32)
     for w, world in enumerate(colony.worlds if most else ()):
         cells = colony.grid.index(world.foods)
         piles = _piles(colony.grid, cells)
@@ -91,7 +94,8 @@ def _homes(colony: Colony, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         of_world[HomeRow.LISTED] = np.argsort(piles, kind="stable")
         begins[w, 1 : n_piles + 1] = np.cumsum(np.bincount(piles, minlength=n_piles))
         rows[WorldRow.HOMES, w], rows[WorldRow.PILES, w] = len(cells), n_piles
-    return homes, begins.reshape(-1)
+        home_of[w * size + cells] = np.arange(w * most, w * most + len(cells))
+    return homes, begins.reshape(-1), home_of
 
 
 def _piles(grid: AxialGrid, cells: np.ndarray) -> np.ndarray:
@@ -111,7 +115,7 @@ def _piles(grid: AxialGrid, cells: np.ndarray) -> np.ndarray:
 
 
 def lasting(colony: Colony, q_values: np.ndarray | None) -> dict[str, np.ndarray]:
-    """What outlives an episode, and what is filled in when one begins.
+    """What outlives an episode.
 
     Raises:
         AntsError: Tables or memories are too large, or `q_values` has not their shape.
@@ -134,8 +138,6 @@ def lasting(colony: Colony, q_values: np.ndarray | None) -> dict[str, np.ndarray
         # By world and ant number: where the streams of the ants that start an episode stopped.
         "first_streams": first_streams.reshape(-1),
         "queen_streams": np.atleast_1d(stream_state(seeds, STREAM_QUEEN, 0)).astype(np.uint64),
-        # The column in `homes` whose food lies in a cell, -1.
-        "home_of": np.full(n_worlds * colony.grid.size if colony.n_homes else 1, -1, np.int32),
         # By world or slot: the tables, further tables of the learner behind each, and its memory.
         "q": _tables(colony, q_values),
         "floats": np.zeros(max(1, owners * memory.floats), np.float32),
@@ -211,14 +213,8 @@ def set_learning_rate(colony: Colony) -> None:
 
 def begin_episode(colony: Colony) -> None:
     """Set everything that an episode starts with; tables, memories and streams go on."""
-    arrays, n = colony.arrays, colony.n_homes
+    arrays = colony.arrays
     set_learning_rate(colony)
     for name, start in colony.at_start.items():
         arrays[name][:] = start
     arrays["streams"][:] = arrays["first_streams"]
-    if n:
-        arrays["home_of"][:] = -1
-        columns = np.arange(arrays["homes"].shape[1])
-        columns = columns[columns % n < arrays["worlds"][WorldRow.HOMES, columns // n]]
-        places = columns // n * colony.grid.size + arrays["homes"][HomeRow.CELL, columns]
-        arrays["home_of"][places] = columns
