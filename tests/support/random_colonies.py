@@ -42,16 +42,18 @@ def random_colony(
     dense: bool | None = None,
     traffic: str = "blocking",
     view: str = "half",
+    changes: bool = False,
 ) -> RandomColony:
     """The same seed gives the same colony.
 
-    `sharing`, `learner` and whether the trail is dense may be given instead of drawn.
+    `sharing`, `learner` and whether the trail is dense may be given instead of drawn. If all
+    `changes`, ants are born or die and food grows back or wanders: these take kernels of their own.
     """
     rng = np.random.default_rng([seed, 2])
     world = random_world(seed, largest_range)
     room = int(np.count_nonzero(world.ground() == EMPTY))
     sharing = str(rng.choice(SHARINGS)) if sharing is None else sharing
-    population, task = _rules(rng, min(room, most_ants), dense)
+    population, task = _rules(rng, min(room, most_ants), dense, changes)
     training, delivery = _training(rng, learner)
     given = sharing == "fixed" or rng.random() < 0.6
     return RandomColony(
@@ -89,7 +91,7 @@ def forager(observation: str = "paper") -> np.ndarray:
 
 
 def _rules(
-    rng: np.random.Generator, most_ants: int, dense: bool | None
+    rng: np.random.Generator, most_ants: int, dense: bool | None, changes: bool
 ) -> tuple[dict[str, Any], Task]:
     # One ant, any number, or as many as there is room for.
     ants = int(rng.choice([1, rng.integers(1, most_ants + 1), most_ants]))
@@ -99,6 +101,10 @@ def _rules(
     lifespan = int(rng.integers(1, 30)) if rng.random() < 0.5 else None
     regrowth = int(rng.choice([0, 0, 1, 2, 7])) if rng.random() < 0.7 else None
     wander = int(rng.choice([1, 2, 5])) if rng.random() < 0.5 else None
+    if changes and not births and lifespan is None:
+        lifespan = 9
+    if changes and regrowth is None and wander is None:
+        wander = 3
     ends = ants == 1 and not births and bool(rng.random() < 0.5)
     start = str(rng.choice(STARTS))
     task = Task(
