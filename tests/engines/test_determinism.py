@@ -19,7 +19,7 @@ CONTINUING = Task(delivery="continuing")
 CONFIGS = (
     TrainingConfig("q_learning", 0.01, 0.99, 0.3, 0.9),
     TrainingConfig("dyna_q", 0.01, 0.99, 0.5, 0.99, planning_steps=5),
-    TrainingConfig("sarsa", 0.01, 0.9, 0.3, 0.95),
+    TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.95, learning_rate_decay=0.9, initial_value=3),
     TrainingConfig("dyna_q", 0.1, 0.9, 0.3, 0.9, planning_steps=1),
     TrainingConfig("double_q", 0.37, 0.9, 0.3, 0.9),
     TrainingConfig("dyna_q", 0.001, 0.99, 0.3, 0.9, planning_steps=5),

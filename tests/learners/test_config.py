@@ -20,6 +20,10 @@ GOOD = {
     **{"epsilon_decay": 0.99, "min_epsilon": 0.05, "planning_steps": 3},
 }
 
+NOT_ZERO = ("learning_rate", "epsilon_decay", "learning_rate_decay")
+FALLING = {"learning_rate_decay": 0.25, "min_learning_rate": 0.02}
+MAY_BE_ZERO = ("discount", "epsilon", "min_epsilon", "min_learning_rate")
+
 
 def test_defaults():
     config = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 0.99)
@@ -32,8 +36,9 @@ def test_defaults():
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        *((name, value) for name in ("learning_rate", "epsilon_decay") for value in (1, 1e-300)),
-        *((name, value) for name in ("discount", "epsilon", "min_epsilon") for value in (0, 1)),
+        *((name, value) for name in NOT_ZERO for value in (1, 1e-300)),
+        *((name, value) for name in MAY_BE_ZERO for value in (0, 1)),
+        *(("initial_value", value) for value in (-1e6, 0, 1e6)),
         *(("planning_steps", 0), ("planning_steps", 1000)),
         ("learner", "not registered yet"),
     ],
@@ -46,16 +51,30 @@ NO_SHARES = [-1e-9, 1.0000001, float("nan"), float("inf"), 10**400, True, "0.5",
 
 
 @pytest.mark.parametrize("value", [*NO_SHARES, np.True_, np.array([0.5]), Decimal("0.5")])
-@pytest.mark.parametrize(
-    "name", ["learning_rate", "discount", "epsilon", "epsilon_decay", "min_epsilon"]
-)
+@pytest.mark.parametrize("name", [*NOT_ZERO, *MAY_BE_ZERO])
 def test_numbers_out_of_bounds(name, value):
     with pytest.raises(AntsError, match=rf"^{name} is .*; it must be a number .*1\.$") as caught:
         TrainingConfig(**{**GOOD, name: value})
     assert shown(value) in str(caught.value)
 
 
-@pytest.mark.parametrize("name", ["learning_rate", "epsilon_decay"])
+@pytest.mark.parametrize("value", [1e6 + 1, -2e6, float("nan"), float("inf"), True, "3", None])
+def test_initial_values_out_of_bounds(value):
+    with pytest.raises(AntsError, match=r"^initial_value is .*; it must be .* from -1000000 to 1"):
+        TrainingConfig(**GOOD, initial_value=value)
+
+
+def test_rates_fall_by_their_factors_down_to_their_least():
+    config = TrainingConfig("sarsa", 0.4, 0.9, 0.8, 0.5, 0.3, **FALLING)
+    rates, epsilons = [config.learning_rate], [config.epsilon]
+    for _ in range(3):
+        rates.append(config.next_learning_rate(rates[-1]))
+        epsilons.append(config.next_epsilon(epsilons[-1]))
+    assert rates == [0.4, 0.1, 0.025, 0.02]
+    assert epsilons == [0.8, 0.4, 0.3, 0.3]
+
+
+@pytest.mark.parametrize("name", NOT_ZERO)
 def test_numbers_that_may_not_be_zero(name):
     with pytest.raises(AntsError, match=rf"{name} is 0; .* above 0 and at most 1"):
         TrainingConfig(**{**GOOD, name: 0})

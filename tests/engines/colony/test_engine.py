@@ -214,3 +214,34 @@ def test_a_tick_needs_an_episode():
     for look in (Colony.snapshot, lambda colony: next(colony_moments(colony))):
         with pytest.raises(AntsError, match="begin_episode"):
             look(Colony(worlds.paper(), None, TRAINING))
+
+
+def test_episodes_may_take_place_in_other_worlds():
+    """Each in a world of its own gives what moving by hand does, and goes on with one table."""
+    places = [worlds.open_world(seed, ranges=(7, 7, 7)) for seed in range(3)]
+    task = Task(life=Life(regrowth=1))
+    listed, moved = (Colony(places[0], task, TRAINING, 4, ants=9) for _ in range(2))
+    outcome = listed.run(3, 40, worlds=places)
+    for episode, place in enumerate(places):
+        moved.begin_episode(40, place)
+        moved.tick(40)
+        assert moved.outcome().returns[0, 0] == outcome.returns[episode, 0]
+        moved.end_episode()
+    assert moved == listed
+    assert len(set(outcome.returns[:, 0].tolist())) > 1
+
+
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        (
+            lambda colony: colony.run(2, 5, worlds=[worlds.paper()]),
+            "worlds has 1 entries; give one",
+        ),
+        (lambda colony: colony.begin_episode(world=3), "3; "),
+        (lambda colony: colony.begin_episode(world=[worlds.paper()] * 2), "2 worlds for 1 seeds"),
+    ],
+)
+def test_other_worlds_that_do_not_fit_are_refused(call, says):
+    with pytest.raises(AntsError, match=says):
+        call(Colony(worlds.paper(), Task(), TRAINING))

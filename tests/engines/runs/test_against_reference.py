@@ -30,8 +30,8 @@ DELIVERIES = ("absorbing", "continuing")
 KERNELS = [
     *zip(
         learners.registry.BUILT_IN,
-        cycle(("trail_levels", "five_cells", "ants_seen", "paper", "six_cells")),
-        cycle(("set", "add", "none")),
+        cycle(("trail_levels", "five_cells", "ants_seen", "paper", "six_cells", "ants", "queues")),
+        cycle(("set", "add", "none", "fading")),
         strict=False,
     ),
     *((name, "paper", "set") for name in ("q_learning", "sarsa", "expected_sarsa")),
@@ -55,6 +55,9 @@ def random_config(seed: int, learner: str) -> TrainingConfig:
         epsilon_decay=float(rng.choice([0.3, 0.99, 1.0])),
         min_epsilon=float(rng.choice([0.0, 0.01, 0.2])),
         hyperparameters=hyperparameters,
+        learning_rate_decay=float(rng.choice([0.5, 0.9, 1.0])),
+        min_learning_rate=float(rng.choice([0.0, 0.1])),
+        initial_value=float(rng.choice([0.0, 1.7, -3.0])),
     )
 
 
@@ -66,12 +69,15 @@ def random_task(seed: int, observation: str = "paper", deposit: str = "set") -> 
         deposit=deposit,
         level=int(rng.choice([1, 7, 250])),
         cap=int(rng.choice([1, 10, 1000])) if deposit == "add" else None,
+        slope=int(rng.choice([1, 10, 100])) if deposit == "fading" else None,
+        view="strongest" if deposit == "fading" else "half",
     )
     return Task(
         observation=observation,
         rewards=random_rewards(seed),
         pheromone=pheromone,
         delivery=str(rng.choice(DELIVERIES)),
+        turns_at_queen=bool(rng.random() < 0.3),
         evaporation_in_training=bool(rng.random() < 0.7),
         evaporation_in_evaluation=bool(rng.random() < 0.7),
     )
