@@ -8,8 +8,8 @@ Both hold in the long run, for ants that neither die nor are born, and food that
   shortest path. An ant that is blocked by another turns on the spot, so the limit lets ants do so
   everywhere.
 - Queen: the ant that gives in tick t leaves in t + 1 at the earliest; the cell must be empty when a
-  tick starts, so that the next ant enters in t + 2 and gives in t + 3. An ant that stays needs three
-  ticks as well: give, pick up (which turns it round), turn back. So each of the queen's neighbour
+  tick starts, so that the next ant enters in t + 2 and gives in t + 3. An ant that stays needs as
+  many ticks: give, pick up (which turns it round), turn back. So each of the queen's neighbour
   cells serves one delivery in 3 ticks.
 """
 
