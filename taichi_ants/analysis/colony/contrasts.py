@@ -20,7 +20,7 @@ from taichi_ants.analysis.colony.study import (
     Design,
     Measured,
 )
-from taichi_ants.analysis.findings import Above, Contrast, Finding, judge
+from taichi_ants.analysis.findings import Contrast, Finding, above, judge
 
 # Numbers of ants, of the first and of the second condition of a difference.
 Sizes = tuple[int, int]
@@ -61,7 +61,7 @@ class Series:
         for n, other in self._sizes(measured, arena):
             values = measured[Condition(arena, *self.first, n)][self.measure]
             subtracted = measured[Condition(arena, *self.second, other)][self.measure]
-            found[n, other] = Contrast(self.words, values - subtracted, Above())
+            found[n, other] = Contrast(self.words, values - subtracted, above())
         return found
 
     def _sizes(self, measured: Measured, arena: str) -> list[Sizes]:
