@@ -99,8 +99,8 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Mappin
 
     Args:
         comparison: The comparison.
-        baselines: Rows of baselines.csv; those of the training setting are shown, the optimal
-            policies, for which delivery is the end, only in the panel of absorbing delivery.
+        baselines: Rows of baselines.csv; the optimal policies, for which delivery is the end, are
+            shown only in the panel of absorbing delivery.
     """
     settings = comparison.delivery_settings
     returns = comparison.measure("return_last50")
@@ -179,9 +179,9 @@ def _shortest_delivery(column: Sequence[Axes], baselines: Sequence[Mapping]) -> 
 def _baseline_marks(axis: Axes, baselines: Sequence[Mapping], setting: str) -> None:
     """Hollow marks, larger than those of the data and above them."""
     for row, marker in zip(baselines, cycle("osD^vph")):
-        known = row["setting"].startswith("training") and row["return_mean"] is not None
         # Optimal policies take delivery for the end; elsewhere they are no yardstick.
-        if known and (setting == "absorbing" or row["baseline"] != "optimal policy"):
+        counts_here = setting == "absorbing" or row["baseline"] != "optimal policy"
+        if row["return_mean"] is not None and counts_here:
             axis.plot(
                 *(row["deliveries_mean"], row["return_mean"], marker),
                 color=INK,

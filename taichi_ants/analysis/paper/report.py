@@ -13,7 +13,6 @@ from taichi_ants.analysis.paper.comparison import Comparison, GridPoint
 from taichi_ants.analysis.paper.published import GREEDY_RETURN, GREEDY_STEPS
 from taichi_ants.analysis.paper.table2 import APART, apart, figure_tables, label
 from taichi_ants.analysis.tables import (
-    MISSING,
     Block,
     Table,
     baseline_name,
@@ -107,15 +106,13 @@ def _behaviours(lines: Sequence[Mapping], behaviours: Sequence[Mapping]) -> Tabl
 
 
 def _baselines(baselines: Sequence[Mapping]) -> Table:
-    headers = ("Behaviour", "Setting", "Return", "Steps", "Deliveries")
     digits = {"return_mean": 1, "steps_mean": 1, "deliveries_mean": 2}
     rows, notes = [], []
     for row in baselines:
-        cells = [
-            MISSING if row[name] is None else number(row[name], places)
-            for name, places in digits.items()
-        ]
-        rows.append([baseline_name(row), row["setting"], *cells])
-        if row["return_mean"] is None and row.get("note"):
+        if row["return_mean"] is None:
             notes.append(f"{baseline_name(row)}: {row['note']}")
-    return Table("Baselines", headers, rows, notes, text_columns=2)
+        else:
+            figures = (number(row[name], places) for name, places in digits.items())
+            rows.append([baseline_name(row), *figures])
+    headers = ("Behaviour", "Return", "Steps", "Deliveries")
+    return Table("Baselines, with evaporation as in training", headers, rows, notes)
