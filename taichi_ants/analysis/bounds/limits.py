@@ -86,19 +86,13 @@ def shortest_cycle(world: World) -> float:
 
 
 def least_mean_cycle(lengths: np.ndarray) -> float:
-    """The least mean length of an edge over all cycles of a complete graph, by Karp's theorem.
+    """The least mean length of an edge over all cycles of a complete graph.
 
     Args:
         lengths: Float (n, n), from each node to each; inf where there is no edge.
     """
-    n = len(lengths)
-    walks = np.full((n + 1, n), np.inf)  # the shortest walk of k edges that ends in a node
-    walks[0] = 0.0  # from anywhere
-    for k in range(n):
-        walks[k + 1] = (walks[k][:, None] + lengths).min(axis=0)
-    ends = np.isfinite(walks[n])
-    if not ends.any():
-        return np.inf
-    with np.errstate(invalid="ignore"):
-        means = (walks[n] - walks[:n]) / (n - np.arange(n))[:, None]
-    return float(means[:, ends].max(axis=0).min())
+    mean, walks = np.inf, lengths  # the shortest walks of k edges, from each node to each
+    for k in range(1, len(lengths) + 1):
+        mean = min(mean, float(walks.diagonal().min()) / k)
+        walks = (walks[:, :, None] + lengths).min(axis=1)
+    return mean

@@ -11,7 +11,6 @@ from taichi_ants.analysis.colony.study import (
     COPIED_LONG,
     JOINT,
     LASTING,
-    MEASURES,
     OFF,
     ON,
     OWN,
@@ -49,19 +48,13 @@ class Series:
     against: Literal["same", "smaller", "one"] = "same"
     least: int = 2
 
-    @property
-    def words(self) -> str:
-        """What is computed."""
-        whom = "a smaller colony" if self.against == "smaller" else self.second.words
-        return f"{MEASURES[self.measure]}: {self.first.words} minus {whom}"
-
     def contrasts(self, measured: Measured, arena: str) -> dict[Sizes, Contrast]:
         """The contrasts of an arena; none where conditions are missing."""
         found = {}
         for n, other in self._sizes(measured, arena):
             values = measured[Condition(arena, *self.first, n)][self.measure]
             subtracted = measured[Condition(arena, *self.second, other)][self.measure]
-            found[n, other] = Contrast(self.words, values - subtracted, above())
+            found[n, other] = Contrast(self.statement, values - subtracted, above())
         return found
 
     def _sizes(self, measured: Measured, arena: str) -> list[Sizes]:

@@ -44,7 +44,8 @@ def difference_rows(judged: Judged) -> list[dict[str, Any]]:
         {
             "arena": arena,
             "question": series.question,
-            "difference": series.words,
+            "statement": series.statement,
+            "measure": series.measure,
             "ants": ants,
             "against": against,
             "mean": finding.effect,

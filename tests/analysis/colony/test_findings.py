@@ -13,9 +13,7 @@ from taichi_ants.analysis.colony.contrasts import (
     CURE,
     FIRST,
     QUESTIONS,
-    SERIES,
     TRAIL,
-    Series,
     judge_all,
 )
 from taichi_ants.analysis.colony.study import (
@@ -249,20 +247,6 @@ def test_each_arena_and_question_is_judged_for_itself() -> None:
         assert [finding.level for finding in of_question] == pytest.approx(
             [expected] * len(of_question)
         )
-
-
-def test_what_is_computed_is_said() -> None:
-    words = {series.statement: series.words for series in SERIES}
-    assert words[
-        "jointly trained ants that lay trails get more reward than ants that lay none"
-    ] == (
-        "reward per ant at the start and 1000 ticks: trained jointly (evaporating trails) minus "
-        "trained jointly (no trails laid)"
-    )
-    growth = Series("?", "ants", Design(ON, OWN), Design(ON, OWN), against="smaller")
-    assert growth.words == (
-        "deliveries per 1000 ticks: a table per ant (evaporating trails) minus a smaller colony"
-    )
 
 
 def test_seeds_are_paired() -> None:

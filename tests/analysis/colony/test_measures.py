@@ -81,9 +81,8 @@ def test_the_table_of_differences_holds_what_verdicts_rest_on() -> None:
         row
         for row in rows
         if row["question"] == CURE
-        and row["difference"]
-        == "deliveries per 1000 ticks: trained jointly (evaporating trails) minus "
-        "trained alone, copied (evaporating trails)"
+        and row["statement"]
+        == "jointly trained ants deliver more than copies of an ant trained alone"
         and row["ants"] == 8
     )
     assert row["mean"] == pytest.approx(160, rel=0.02)

@@ -80,14 +80,14 @@ def test_table_2_stands_beside_the_papers(text: str, comparison: Comparison) -> 
     ):
         centres = [f"{line[f'{name}_{centre}']:.1f}" for centre in ("mean", "iqm")]
         cells = row(text, "SARSA", after=table)
-        assert [cell for cell in cells if cell != "!"][:5] == [
-            *("SARSA", "continuing", paper, *centres),
-        ]
+        cells = [cell for cell in cells if cell != "!"]
+        assert cells[:4] == ["SARSA", "continuing", *centres]
+        assert cells[5] == paper
     deliveries = row(text, "SARSA", after="Deliveries, last 50")
-    assert deliveries[2:5] == ["1.00", "1.00", "1.00"]  # there is no IQM
+    assert deliveries[2:6] == ["1.00", "-", "1.00", "1.00"]  # there is no IQM
     lines = section(text, "Return, last 50").splitlines()
     last = next(line for line in lines if "Dyna-Q (p5) absorbing" in line)
-    assert last.split()[3:5] == ["49.0", "248"]
+    assert last.split()[3] == "248"
 
 
 def test_means_that_far_runs_have_moved_are_marked() -> None:
@@ -97,8 +97,8 @@ def test_means_that_far_runs_have_moved_are_marked() -> None:
     comparison.greedy_steps[position, 5] = 600
     text = render(comparison)
     cells = row(text, "SARSA", after="Return, last 50")
-    assert cells[4] == "!"
-    assert float(cells[5]) < 45 < 90 < float(cells[3])
+    assert cells[3] == "!"
+    assert float(cells[4]) < 45 < 90 < float(cells[2])
     greedy = row(text, "SARSA", after="Greedy")
     assert greedy == ["SARSA", "continuing", "45.0", "45.0", "44.4", "!", "35.0", "1.00"]
     assert "Few seeds" not in text
@@ -164,7 +164,7 @@ def test_a_small_comparison_is_shown_too() -> None:
     assert "absorbing: 3 not tested" in text
     assert "In our words" not in text
     mean = float(one.returns.mean())
-    assert row(text, "SARSA *", after="Return, all 7")[3:5] == ["47.3", f"{mean:.1f}"]
+    assert row(text, "SARSA *", after="Return, all 7")[3] == f"{mean:.1f}"
     assert "nan" not in text
 
 
@@ -173,7 +173,7 @@ def test_learners_beside_the_papers_are_shown_at_their_best() -> None:
     full.returns[19] = 80
     full.greedy_returns[19] = 17
     text = render(full)
-    assert row(text, "hysteretic *", after="Return, last")[3:6] == ["-", "80.0", "80.0"]
+    assert row(text, "hysteretic *", after="Return, last")[3:5] == ["80.0", "80.0"]
     assert row(text, "hysteretic *", after="Greedy")[3] == "17.0"
     assert f"hysteretic *, absorbing: {full.rows[19].point.label}" in text
     assert "* its best by the IQM of the return, on these seeds, which flatters it" in text

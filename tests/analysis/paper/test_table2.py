@@ -113,7 +113,8 @@ def test_what_the_paper_does_not_have_is_nan() -> None:
     assert math.isnan(mine["best_run_return_last50_paper_percentile"])
     assert mine["best_run_of"] == 16
     text = table2_markdown(cut, lines)
-    assert "| mine (d2) * | absorbing | - |" in text
+    (row, *_) = (line for line in text.splitlines() if line.startswith("| mine (d2) *"))
+    assert row.endswith("| - | - |")
     assert (
         f"mine (d2) *, absorbing: {cut.rows[shown_position(cut, *cut.learners[1])].point.label}"
         in text
@@ -154,10 +155,11 @@ def test_the_markdown_holds_the_numbers(comparison: Comparison) -> None:
     row = next(line for line in text.splitlines() if line.startswith("| SARSA | continuing"))
     cells = [cell.strip() for cell in row.strip("|").split("|")]
     line = lines[1]
-    assert cells[:3] == ["SARSA", "continuing", "47.3"]
-    assert cells[3].startswith(f"{line['return_last50_mean']:.1f} [")
-    assert cells[4].startswith(f"{line['return_last50_iqm']:.1f} [")
-    assert cells[5].startswith(f"{line['best_run_return_last50_median']:.1f} [")
+    assert cells[:2] == ["SARSA", "continuing"]
+    assert cells[2].startswith(f"{line['return_last50_mean']:.1f} [")
+    assert cells[3].startswith(f"{line['return_last50_iqm']:.1f} [")
+    assert cells[4].startswith(f"{line['best_run_return_last50_median']:.1f} [")
+    assert cells[5] == "47.3"
     assert "**Steps, all episodes**" in text
     assert "**Steps, last 50 episodes**" in text
     short = subset(comparison, range(len(comparison.rows)), 8, 20)
