@@ -45,9 +45,7 @@ def summary_rows(
 ) -> list[dict[str, Any]]:
     """A row for each point: means over seeds with 95 % intervals, as in `statistics.centres`.
 
-    Args:
-        settings, values: As above.
-        typical: The measures of which the interquartile mean makes sense, too.
+    Settings and values are those of `seed_rows`; `typical` measures have an interquartile mean.
     """
     columns = {
         f"{name}_{column}": numbers
@@ -74,10 +72,7 @@ def report(
 ) -> str:
     """The means with their intervals as a table for a terminal.
 
-    Args:
-        settings, values: As above.
-        against: The setting with whose value the others are compared in the first measure.
-        notes: What came out of it, for each point.
+    `notes` say, for each point, how its first measure compares with the value `against` of a setting.
     """
     names = columns_of(settings)
     ends = {name: bootstrap_interval(array) for name, array in values.items()}
@@ -105,10 +100,8 @@ def draw(
 
     Args:
         path: Where to write the .png.
-        settings: What varies, of P points.
-        values: The measure, float64 (P, S).
-        words: What it is.
-        title: One line.
+        settings, values: What varies, of P points, and the measure, float64 (P, S).
+        words, title: What it is, and one line.
 
     Raises:
         AntsError: The file cannot be written.

@@ -73,7 +73,6 @@ COPIES = "Do more copies help?"
 CROWDING = "Where does crowding begin?"
 CURE = "Does joint learning cure it?"
 TRAIL = "Does the trail that ants lay themselves help?"
-FIRST = "Does a crowd find food sooner?"
 
 _COPIES, _COPIES_OFF, _COPIES_LASTING = (Design(one, COPIED) for one in (ON, OFF, LASTING))
 _JOINT, _JOINT_OFF, _JOINT_LASTING = (Design(one, JOINT) for one in (ON, OFF, LASTING))
@@ -110,10 +109,6 @@ SERIES: tuple[Series, ...] = (
            _COPIES, _COPIES_LASTING, least=1),
     Series(TRAIL, "jointly trained ants that lay trails get more reward than ants that lay none",
            _JOINT, _JOINT_OFF, "reward"),
-    Series(FIRST, "many copies need more ticks to the first delivery than one ant",
-           _COPIES, _COPIES, "first_delivery", "one"),
-    Series(FIRST, "many jointly trained ants need more ticks to the first delivery than one ant",
-           _JOINT, _COPIES, "first_delivery", "one"),
 )
 # fmt: on
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants.analysis.bounds.limits import Limits
-from taichi_ants.analysis.colony.contrasts import FIRST, QUESTIONS, Judged, Series, Sizes
+from taichi_ants.analysis.colony.contrasts import QUESTIONS, Judged, Series, Sizes
 from taichi_ants.analysis.colony.study import ARENAS, MEASURES, Condition, Design, Measured
 from taichi_ants.analysis.findings import Finding, Verdict, weakest
 from taichi_ants.analysis.sweeps import seed_rows, summary_rows
@@ -93,8 +93,6 @@ def found(measured: Measured, judged: Judged) -> list[Block]:
                 units.append(MEASURES[series.measure])
                 shown = arena
         notes = [f"{sentence(' or '.join(dict.fromkeys(units)))}, as the statement says."]
-        if question == FIRST:
-            notes.append("An episode without a delivery counts with all its ticks.")
         if lines:
             blocks.append(Table(question, _HEADERS, lines, notes, text_columns=len(_HEADERS)))
     return [

@@ -22,11 +22,7 @@ FIGURES = ("return_last50", "steps_all", "steps_last50", "deliveries_last50")
 def best_of(
     comparison: Comparison, delivery: str, variant: Variant, draws: int = DRAWS
 ) -> dict[str, np.ndarray]:
-    """Draws an independent random seed for each configuration and reports the best of them.
-
-    Returns:
-        The winner's `FIGURES`, float64 (draws,) each.
-    """
+    """The winner's `FIGURES`, float64 (draws,) each: each configuration runs once, on any seed."""
     rows = np.array(comparison.positions(delivery, variant))
     random = np.random.default_rng(RANDOM_SEED)
     seeds = random.integers(0, len(comparison.seeds), size=(draws, len(rows)))
@@ -64,10 +60,7 @@ def examples(comparison: Comparison) -> list[tuple[int, int]]:
     """Runs to look at: for each delivery setting and learner one of each behaviour.
 
     They are of the configuration that stands for the learner. Of the runs that behave alike, the
-    one of median return is taken.
-
-    Returns:
-        Row and position of the seed of each.
+    one of median return is taken. Each is told by its row and the position of its seed.
     """
     rows = [shown_position(comparison, *learner) for learner in comparison.learners]
     return [

@@ -51,11 +51,8 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Mapping] = ()) -
     All learners are shown at the configuration that stands for the paper's figure 1. Where one of
     them lacks it, or the world is not the paper's, each is shown at the one that stands for it in
     table 2. A point is the mean over a span of episodes (`_spans`); lines are interquartile means
-    over seeds, bands the middle half of the seeds.
-
-    Args:
-        comparison: The comparison.
-        baselines: Rows of baselines.csv; of these the shortest delivery is drawn.
+    over seeds, bands the middle half of the seeds. Of the rows of baselines.csv the shortest
+    delivery is drawn.
     """
     rows = [comparison.position(*learner, FIGURE_1) for learner in comparison.learners]
     shared = comparison.in_paper_world and None not in rows
@@ -97,10 +94,8 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Mapping] = ()) -
 def return_against_deliveries(comparison: Comparison, baselines: Sequence[Mapping] = ()) -> Figure:
     """Who earns reward by delivering, and what the others do instead: a mark for each run.
 
-    Args:
-        comparison: The comparison.
-        baselines: Rows of baselines.csv; the optimal policies, for which delivery is the end, are
-            shown only in the panel of absorbing delivery.
+    Of the rows of baselines.csv the optimal policies, for which delivery is the end, are shown only
+    in the panel of absorbing delivery.
     """
     settings = comparison.delivery_settings
     returns = comparison.measure("return_last50")

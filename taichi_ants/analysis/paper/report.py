@@ -39,12 +39,8 @@ def report(
 ) -> str:
     """The report as plain text of at most `WIDTH` columns.
 
-    Args:
-        comparison: The comparison.
-        lines: Its table 2, from `table2.table2`.
-        behaviours: From `summary.summarise_behaviours`.
-        audit: Its claims, from `audit.assess`.
-        baselines: Rows of baselines.csv, see `baselines.baseline_rows`.
+    Its lines are from `table2.table2`, the rest from `summary.summarise_behaviours`, `audit.assess`
+    and `baselines.baseline_rows`.
     """
     blocks = [
         *_heading(comparison),

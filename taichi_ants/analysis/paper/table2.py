@@ -34,14 +34,9 @@ APART = "!"  # marks a mean that the interval of the IQM excludes
 def table2(comparison: Comparison, summary: Sequence[Mapping], draws: int = DRAWS) -> list[dict]:
     """The rows of table2.csv, one for each delivery setting and learner.
 
-    Each is the row of summary.csv that stands for the learner (`best_of.shown_position`), with
-    what the best run reports beside it (ranges from 2.5 % to 97.5 %), and what the paper does:
+    Each is the row of `summary.summarise` that stands for the learner (`best_of.shown_position`),
+    with what the best run reports beside it (ranges from 2.5 % to 97.5 %), and what the paper does:
     nan of a learner that it does not have, and in another world.
-
-    Args:
-        comparison: The comparison.
-        summary: Its `summary.summarise`.
-        draws: How often the best run is drawn.
     """
     lines = []
     for delivery, variant in comparison.learners:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import pytest
 from synthetic_colony_study import Truth, build, proportional
 
@@ -11,7 +9,6 @@ from taichi_ants.analysis.colony.contrasts import (
     COPIES,
     CROWDING,
     CURE,
-    FIRST,
     QUESTIONS,
     TRAIL,
     judge_all,
@@ -180,21 +177,6 @@ def test_what_the_trail_pays_is_judged_beside_what_it_delivers(reward: float) ->
     assert rows[-1][0].endswith("get more reward than ants that lay none")
     place = {0.5: 1, 2.0: 2, 1.0: 3}[reward]
     assert [cell == "2, 4, 8" for cell in rows[-1][1:4]] == [n == place for n in (1, 2, 3)]
-
-
-@pytest.mark.parametrize(
-    ("first", "place", "example"),
-    [
-        (lambda ants: 400 // ants, 2, "8: 50 against 400 with 1 (-88 %)"),
-        (lambda ants: 40 * ants, 1, "8: 320 against 40 with 1 (+700 %)"),
-        (lambda ants: 40, 3, "8: 40 against 40 with 1 (+0 %)"),
-    ],
-)
-def test_whether_a_crowd_is_sooner(first: Callable[[int], int], place: int, example: str) -> None:
-    """The statements say that it needs more ticks."""
-    for row in answer(FIRST, first=first):
-        assert [cell == "8" for cell in row[1:4]] == [n == place for n in (1, 2, 3)]
-        assert row[4] == example
 
 
 def verdicts_of(judged: dict, question: str = "") -> set[Verdict]:
