@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from taichi_ants.analysis.findings import (
-    SIMULTANEOUS_LEVEL,
     Contrast,
     Finding,
     Verdict,
@@ -86,34 +85,23 @@ def _tallies(audit: Audit) -> list[str]:
 
 
 def claims_table(audit: Audit) -> Table:
-    """The verdicts on the claims that are tested in some setting, and counts of all."""
+    """How many verdicts of each kind there are, and the claims that are contradicted."""
     rows = [
         [
             claim.section.split(",")[0],
             f"{claim.statement.removesuffix('.')} ({claim.quantity.scope})",
-            *map(_verdict, findings.values()),
+            *(one.verdict.value for one in findings.values()),
         ]
         for claim, findings in audit.items()
-        if any(one.verdict is not Verdict.NOT_TESTED for one in findings.values())
+        if any(one.verdict is Verdict.CONTRADICTED for one in findings.values())
     ]
     notes = [
         *_tallies(audit),
-        "equivalent: what the claim says differs, differs by less than matters",
-        "mean: the verdict by the mean, where it is not that on the typical run (IQM)",
         "not tested: this needs the paper's world, its configurations, and 100 episodes",
-        f"All intervals behind the verdicts hold at once with {100 * SIMULTANEOUS_LEVEL:.0f} % "
-        "(docs/statistics.md).",
-        "claims.md holds effects, intervals and what each claim was tested on.",
+        "claims.md holds all claims, their effects, intervals and what each was tested on.",
     ]
     headers = ("Section", "In our words (tested on)", *next(iter(audit.values())))
-    return Table("The paper's claims", headers, rows, notes, len(headers))
-
-
-def _verdict(finding: Finding) -> str:
-    text = finding.verdict.value
-    if finding.by_mean is not None and finding.disagrees:
-        text += f"\nmean: {finding.by_mean.verdict.value}"
-    return text
+    return Table("The paper's claims that are contradicted", headers, rows, notes, len(headers))
 
 
 def claims_markdown(audit: Audit, world: str) -> str:
@@ -156,6 +144,6 @@ def _effect(finding: Finding) -> str:
     span = interval(finding.low, finding.high, digits)
     text = f"**{finding.verdict.value}** {number(finding.effect, digits)} {span}, "
     text += finding.contrast.label
-    if finding.by_mean is not None and finding.disagrees:
+    if finding.by_mean and finding.by_mean.verdict is not finding.verdict:
         text += f"; by mean: {_effect(finding.by_mean)}"
     return text

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, counts
-from taichi_ants.analysis.paper.best_of import best_of, paper_row, percentile_of, shown_position
+from taichi_ants.analysis.paper.best_of import shown_position
 from taichi_ants.analysis.paper.comparison import Comparison, Variant
 from taichi_ants.analysis.paper.published import FIGURE_1
 from taichi_ants.analysis.statistics import interquartile_mean
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 
 _PER_DECADE = 12  # points of a learning curve between two powers of ten
 _CURVES = {"returns": "Return", "steps": "Steps", "deliveries": "Deliveries"}
-_BEST = {"return_last50": "Return of the best run", "steps_all": "Its mean length (steps)"}
 # Colours and marks of behaviours, by their places in `BEHAVIOURS`.
 BEHAVIOUR_LOOKS = ((BLUE, "o"), (ORANGE, "^"), (WINE, "s"), (INK, "x"))
 
@@ -52,11 +51,8 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Mapping] = ()) -
     All learners are shown at the configuration that stands for the paper's figure 1. Where one of
     them lacks it, or the world is not the paper's, each is shown at the one that stands for it in
     table 2. A point is the mean over a span of episodes (`_spans`); lines are interquartile means
-    over seeds, bands the middle half of the seeds.
-
-    Args:
-        comparison: The comparison.
-        baselines: Rows of baselines.csv; of these the shortest delivery is drawn.
+    over seeds, bands the middle half of the seeds. Of the rows of baselines.csv the shortest
+    delivery is drawn.
     """
     rows = [comparison.position(*learner, FIGURE_1) for learner in comparison.learners]
     shared = comparison.in_paper_world and None not in rows
@@ -95,55 +91,11 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Mapping] = ()) -
     return figure
 
 
-def best_runs(comparison: Comparison) -> Figure:
-    """What "train each configuration once, report the best" gives.
-
-    For each learner the distribution over independent draws of seeds of the winner's return and
-    length: a line's height is the share of draws that report no more. In the paper's world a
-    diamond marks the paper's figure, at the share of draws below it.
-    """
-    settings = comparison.delivery_settings
-    with styled():
-        figure = new_figure(6.0)
-        axes = figure.subplots(len(_BEST), len(settings), sharey=True, squeeze=False)
-        ends: dict[Axes, list[float]] = {}
-        for setting, variant in comparison.learners:
-            best, paper = best_of(comparison, setting, variant), paper_row(comparison, variant)
-            colour = _colours(comparison)[variant]
-            for axis, name in zip(axes[:, settings.index(setting)], _BEST, strict=True):
-                axis.ecdf(best[name], color=colour, label=variant.label)
-                ends.setdefault(axis, []).extend(np.percentile(best[name], (2.5, 97.5)))
-                if paper:
-                    place = paper.figure(name)
-                    ends[axis].append(place)
-                    below = percentile_of(place, best[name]) / 100
-                    axis.plot(place, below, "D", color=colour, mec=INK, ms=7, zorder=5)
-        for column, setting in zip(axes.T, settings, strict=True):
-            column[0].set_title(f"{setting.capitalize()} delivery")
-            for axis, label in zip(column, _BEST.values(), strict=True):
-                axis.set_xlabel(label)
-                axis.set_xlim(min(ends[axis]) - 1, max(ends[axis]) + 1)
-        for axis in axes[:, 0]:
-            axis.set_ylabel("Share of draws")
-        frame(
-            figure,
-            "What training each configuration once and reporting the best gives",
-            "A draw trains each configuration once, on a random one of "
-            f"{count(len(comparison.seeds), 'seed')}, and reports the run with the highest return."
-            "\nA line's height is the share of draws that report no more. Diamond: the paper's "
-            "figure. Up to 2.5 % of a learner's draws lie beyond either end.",
-            legend_entries(axes.flat),
-        )
-    return figure
-
-
 def return_against_deliveries(comparison: Comparison, baselines: Sequence[Mapping] = ()) -> Figure:
     """Who earns reward by delivering, and what the others do instead: a mark for each run.
 
-    Args:
-        comparison: The comparison.
-        baselines: Rows of baselines.csv; those of the training setting are shown, the optimal
-            policies, for which delivery is the end, only in the panel of absorbing delivery.
+    Of the rows of baselines.csv the optimal policies, for which delivery is the end, are shown only
+    in the panel of absorbing delivery.
     """
     settings = comparison.delivery_settings
     returns = comparison.measure("return_last50")
@@ -180,7 +132,6 @@ def save_all(comparison: Comparison, baselines: Sequence[Mapping], folder: str |
     """
     folder = check_writable_folder(folder)
     save(learning_curves(comparison, baselines), folder / "learning_curves.png")
-    save(best_runs(comparison), folder / "best_runs.png")
     save(return_against_deliveries(comparison, baselines), folder / "return_against_deliveries.png")
 
 
@@ -223,9 +174,9 @@ def _shortest_delivery(column: Sequence[Axes], baselines: Sequence[Mapping]) -> 
 def _baseline_marks(axis: Axes, baselines: Sequence[Mapping], setting: str) -> None:
     """Hollow marks, larger than those of the data and above them."""
     for row, marker in zip(baselines, cycle("osD^vph")):
-        known = row["setting"].startswith("training") and row["return_mean"] is not None
         # Optimal policies take delivery for the end; elsewhere they are no yardstick.
-        if known and (setting == "absorbing" or row["baseline"] != "optimal policy"):
+        counts_here = setting == "absorbing" or row["baseline"] != "optimal policy"
+        if row["return_mean"] is not None and counts_here:
             axis.plot(
                 *(row["deliveries_mean"], row["return_mean"], marker),
                 color=INK,

@@ -107,6 +107,18 @@ def _epsilon_at_table_2(part: Slice, measure: str, variant: Variant) -> np.ndarr
 
 EPSILON_AT_TABLE_2 = Read("epsilon 0.5 minus 0.3, all else as in table 2", _epsilon_at_table_2)
 
+
+def less_exploration(epsilon: int, decay: int) -> Read:
+    """Epsilon 0.3 with decay 0.99 minus another combination, by the places of its two values."""
+
+    def values(part: Slice, measure: str, variant: Variant) -> np.ndarray:
+        grid = part.grid(measure, variant)
+        return (grid[:, :, 0, 0] - grid[:, :, epsilon, decay]).mean(axis=(0, 1))
+
+    other = f"{FACTORS['epsilon'][epsilon]:g} / {FACTORS['epsilon_decay'][decay]:g}"
+    return Read(f"epsilon / decay 0.3 / 0.99 minus {other}, mean of 4 pairs", values)
+
+
 # What reads a number of each seed, float64 (seeds,).
 Effect = Callable[[Slice], np.ndarray]
 
@@ -165,9 +177,8 @@ def minus(read: Read, measure: str, *pairs: tuple[Variant, Variant]) -> Quantity
     return _quantity(read.words, measure, effects, DIFFERENCE)
 
 
-def effects_of(measure: str, variant: Variant, *factors: str) -> Quantity:
-    """The effect of each hyperparameter on the measure of a learner."""
-    reads = map(effect_of, factors)
+def of_each(measure: str, variant: Variant, *reads: Read) -> Quantity:
+    """The measure of a learner, read in several ways."""
     effects = {f"{variant.label}, {one.words}": _reader(one, measure, variant) for one in reads}
     return _quantity(ALL, measure, effects)
 
@@ -269,22 +280,3 @@ def _first_minus_second(centres: np.ndarray, statistic: Callable[..., Any]) -> n
     """A statistic of the first half of the rows minus that of the second."""
     first, second = np.split(centres, 2)
     return statistic(first, axis=0) - statistic(second, axis=0)
-
-
-def moderate_exploration(measure: str, variant: Variant) -> Quantity:
-    """Epsilon 0.3 with decay 0.99 minus each other combination of the two."""
-
-    def difference(epsilon: int, decay: int) -> Effect:
-        def values(part: Slice) -> np.ndarray:
-            grid = part.grid(measure, variant)
-            return (grid[:, :, 0, 0] - grid[:, :, epsilon, decay]).mean(axis=(0, 1))
-
-        return values
-
-    others = {"0.3 / 0.995": (0, 1), "0.5 / 0.99": (1, 0), "0.5 / 0.995": (1, 1)}
-    return Quantity(
-        f"{MEASURES[measure].words} of {variant.label} by epsilon / decay",
-        "mean of 4 matched configurations",
-        MEASURES[measure].unit,
-        {f"0.3 / 0.99 minus {label}": difference(*place) for label, place in others.items()},
-    )
