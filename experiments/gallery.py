@@ -1,7 +1,7 @@
 """Makes all pictures of the README and the docs anew: those of `renders/` and of `docs/figures/`.
 
 Those of `renders/` are made by `render.py`; the arguments below can be given to it by hand as well.
-Those of `docs/figures/` are drawn from the finished studies in `results/compare` and
+Those of `docs/figures/` are those of the finished studies in `results/compare` and
 `results/colony`; a study that is not there is run first, which takes about one minute for the
 comparison and five for the colony on two cores.
 """
@@ -9,7 +9,6 @@ comparison and five for the colony on two cores.
 from __future__ import annotations
 
 import argparse
-import tempfile
 from pathlib import Path
 
 from taichi_ants.commands import render
@@ -74,20 +73,14 @@ def make_gallery(settings: argparse.Namespace) -> None:
 
 
 def make_figures(folder: Path) -> None:
-    """Draw the figures of the docs from the two studies, which are run where they are missing."""
+    """Keep some figures of the two studies in the docs; a study that is missing is run first."""
     from taichi_ants.commands import colony, compare
 
-    comparison = compare.parse_arguments(["--out", str(ROOT / "results" / "compare")])
-    compare.compare(comparison)
-    study = colony.parse_arguments(["study", "--out", str(ROOT / "results" / "colony")])
-    colony.study(study)
-    world = compare.world_name(comparison)
-    with tempfile.TemporaryDirectory() as place:
-        drawn = Path(place)
-        compare.draw_figures(compare.build_study(comparison), world, comparison.out, drawn)
-        keep(drawn / compare.FIGURES, COMPARISON, folder)
-        colony.draw_figures(study.out, drawn)
-        keep(drawn / colony.FIGURES, COLONY, folder)
+    results = ROOT / "results"
+    compare.compare(compare.parse_arguments(["--out", str(results / "compare")]))
+    colony.study(colony.parse_arguments(["study", "--out", str(results / "colony")]))
+    keep(results / "compare" / "figures", COMPARISON, folder)
+    keep(results / "colony" / "figures", COLONY, folder)
 
 
 def keep(drawn: Path, names: dict[str, str], folder: Path) -> None:

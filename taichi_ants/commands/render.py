@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 
 from taichi_ants.studies.command_line import (
     HYPERPARAMETER,
-    ListAction,
     Parser,
     load_plugin,
     number,
@@ -53,7 +52,7 @@ _LENGTH: dict[str, Any] = {"type": whole_number(1, 100_000), "default": 600, "me
 _COUNT: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
 _NUMBER: dict[str, Any] = {"type": number, "metavar": "X"}
 _FLAG: dict[str, Any] = {"action": "store_true"}
-_STAGES = {"action": ListAction, "item": whole_number(0), "metavar": "N"}
+_STAGES = {"nargs": "+", "type": whole_number(0), "metavar": "N"}
 
 # Each option: the kinds of pictures that it is for, by their first letters, what it does, and how
 # it is read.
