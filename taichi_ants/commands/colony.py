@@ -19,7 +19,6 @@ from taichi_ants.studies.command_line import (
     add_common,
     add_results,
     load_plugin,
-    notice,
     number,
     progress_bar,
     run_command,
@@ -136,7 +135,7 @@ def _add_live(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument_group("files").add_argument
     add("--save", metavar="FILE", help="keep the colony at the end (.npz)")
     add("--resume", metavar="FILE", help="go on with a colony that was saved")
-    picture = "a picture of the end (.png), or an animation (.gif, .mp4, a folder)"
+    picture = "a picture of the end (.png), or an animation (.gif, a folder)"
     add("--render", metavar="PATH", help=picture)
     add("--every", **counts, default=2, help="ticks a picture of an animation")
     add_common(parser)
@@ -183,7 +182,7 @@ def do_study(
     from taichi_ants.studies.result_folder import REPORT
 
     with progress_bar("study") as progress:
-        outcomes = asked.run(blocks, settings.threads, settings.arch, progress, notice)
+        outcomes = asked.run(blocks, settings.threads, settings.arch, progress)
     values, limits = measured(conditions, outcomes), limits_by_arena(conditions)
     judged = judge_all(values)
     rows, findings = tables.condition_rows(values, limits), tables.found(values, judged)

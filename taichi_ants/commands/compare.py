@@ -17,7 +17,6 @@ from taichi_ants.studies.command_line import (
     add_common,
     add_results,
     load_plugin,
-    notice,
     number,
     progress_bar,
     run_command,
@@ -262,7 +261,7 @@ def do_comparison(
 
     where = {"threads": settings.threads, "arch": settings.arch}
     with progress_bar("training") as progress:
-        outcomes = study.run(blocks, **where, progress=progress, notice=notice)
+        outcomes = study.run(blocks, **where, progress=progress)
     in_order = [outcomes[point] for point in study.points]
     arrays = {name: np.stack([one[name] for one in in_order], dtype=np.int32) for name in _ARRAYS}
     q_values = np.stack([one["q_values"] for one in in_order])

@@ -1,8 +1,8 @@
 """Pictures of ants: an episode, a colony, learning made visible, or a policy sheet.
 
 All but learning follow a policy from a file, or one that is trained on the spot. The ending of
---out chooses the kind of file: .gif, .mp4, .png for a picture of the end, and without an ending a
-folder of PNG pictures.
+--out chooses the kind of file: .gif, .png for a picture of the end, and without an ending a folder
+of PNG pictures.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from taichi_ants.rendering.moments import Moment
 
 KINDS = {  # what each subcommand shows, and how it is called
-    "episode": ("One ant that follows a policy", "--policy my.npz --epsilon 0.1 --out ant.mp4"),
+    "episode": ("One ant that follows a policy", "--policy my.npz --epsilon 0.1 --out ant.gif"),
     "colony": ("Many ants that follow one policy", "--ants 200 --out ants.gif"),
     "learning": ("One ant before and after it learns, side by side", "--stages 0 20 500"),
     "sheet": ("What a policy does in each state", "--policy my.npz --out sheet.png"),
@@ -123,10 +123,10 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 def show(settings: argparse.Namespace) -> None:
     """Make what was asked for, and say what it is."""
     from taichi_ants import worlds
-    from taichi_ants.rendering import check_animation, check_picture
+    from taichi_ants.rendering import check_animation, check_picture, is_picture
     from taichi_ants.rendering.scene import check_size
 
-    if settings.kind == "sheet" or (settings.kind != "learning" and _is_still(settings)):
+    if settings.kind == "sheet" or (settings.kind != "learning" and is_picture(settings.out)):
         check_picture(settings.out)
     else:
         check_animation(settings.out, settings.fps)
@@ -252,18 +252,14 @@ def noted_stages(settings: argparse.Namespace, world: World) -> list[Stage]:
     ]
 
 
-def _is_still(settings: argparse.Namespace) -> bool:
-    return Path(settings.out).suffix.lower() == ".png"
-
-
 def _save_moments(
     settings: argparse.Namespace, moments: Iterable[Moment], n: int, title: str
 ) -> None:
     """Write n moments as an animation, or the last one as a picture."""
-    from taichi_ants.rendering import frames, save_picture
+    from taichi_ants.rendering import frames, is_picture, save_picture
 
     look: dict[str, Any] = {"size": settings.size, "title": title, "plain": settings.plain}
-    if _is_still(settings):
+    if is_picture(settings.out):
         (last,) = deque(moments, maxlen=1)
         save_picture(settings.out, next(frames([last], **look)))
     else:

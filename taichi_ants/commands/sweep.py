@@ -17,7 +17,6 @@ from taichi_ants.studies.command_line import (
     add_common,
     add_results,
     load_plugin,
-    notice,
     progress_bar,
     run_command,
 )
@@ -69,7 +68,7 @@ def do_sweep(settings: argparse.Namespace, asked: Sweep, blocks: Path, ready: Pa
     from taichi_ants.studies.result_folder import REPORT
 
     with progress_bar("sweep") as progress:
-        outcomes = asked.study.run(blocks, settings.threads, settings.arch, progress, notice)
+        outcomes = asked.study.run(blocks, settings.threads, settings.arch, progress)
     values = {name: measured(asked, outcomes, name) for name in asked.measures}
     rows = sweeps.seed_rows(asked.settings, asked.study.seeds, values)
     files.write_csv(ready / RUNS, rows, [*sweeps.columns_of(asked.settings), "seed", *values])

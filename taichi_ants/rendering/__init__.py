@@ -1,4 +1,4 @@
-"""Pictures of worlds and their ants, without a display: stills, GIF, MP4.
+"""Pictures of worlds and their ants, without a display: stills, GIF, folders of PNG.
 
 - A moment is a `Snapshot` of a world, as `Colony.snapshot` or `at_start` give it, with a `Status`,
   what is said of it. `Episode.moments` and `colony_moments` yield them.
@@ -18,6 +18,7 @@ from taichi_ants.rendering.writers import (
     PAUSE,
     check_animation,
     check_picture,
+    is_picture,
     save_animation,
     save_picture,
 )
@@ -34,6 +35,7 @@ __all__ = [
     "check_picture",
     "colony_moments",
     "frames",
+    "is_picture",
     "learning_frames",
     "learning_stages",
     "policy_sheet",
