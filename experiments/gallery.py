@@ -47,11 +47,11 @@ GALLERY: dict[str, list[str]] = {
 
 
 # Tracked figure -> the figure of a study that it is.
-COMPARISON = {
-    "learning_curves.png": "learning_curves.png",
-    "return_against_deliveries.png": "return_against_deliveries.png",
+FIGURES = {
+    "learning_curves.png": "compare/figures/learning_curves.png",
+    "return_against_deliveries.png": "compare/figures/return_against_deliveries.png",
+    "colony_scaling.png": "colony/figures/scaling.png",
 }
-COLONY = {"colony_scaling.png": "scaling.png"}
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -73,23 +73,20 @@ def make_gallery(settings: argparse.Namespace) -> None:
 
 
 def make_figures(folder: Path) -> None:
-    """Keep some figures of the two studies in the docs; a study that is missing is run first."""
+    """Keep some figures of the two studies in the docs; a study that is missing is run first.
+
+    They are kept in 256 colours, so that their history stays small.
+    """
+    from PIL import Image
+
     from taichi_ants.commands import colony, compare
 
     results = ROOT / "results"
     compare.compare(compare.parse_arguments(["--out", str(results / "compare")]))
     colony.study(colony.parse_arguments(["study", "--out", str(results / "colony")]))
-    keep(results / "compare" / "figures", COMPARISON, folder)
-    keep(results / "colony" / "figures", COLONY, folder)
-
-
-def keep(drawn: Path, names: dict[str, str], folder: Path) -> None:
-    """Write figures to the docs, in 256 colours, so that their history stays small."""
-    from PIL import Image
-
     folder.mkdir(parents=True, exist_ok=True)
-    for name, source in names.items():
-        with Image.open(drawn / source) as image:
+    for name, source in FIGURES.items():
+        with Image.open(results / source) as image:
             image.convert("RGB").quantize(256).save(folder / name, optimize=True)
         print(f"{folder / name}: {(folder / name).stat().st_size // 1000} kB")
 

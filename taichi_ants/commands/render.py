@@ -51,7 +51,6 @@ _SEED: dict[str, Any] = {"type": whole_number(), "default": 0, "metavar": "N"}
 _LENGTH: dict[str, Any] = {"type": whole_number(1, 100_000), "default": 600, "metavar": "N"}
 _COUNT: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
 _NUMBER: dict[str, Any] = {"type": number, "metavar": "X"}
-_FLAG: dict[str, Any] = {"action": "store_true"}
 _STAGES = {"nargs": "+", "type": whole_number(0), "metavar": "N"}
 
 # Each option: the kinds of pictures that it is for, by their first letters, what it does, and how
@@ -83,8 +82,7 @@ _OPTIONS = {
     "--size": ("ecl", "in pixels", {"type": _size, "metavar": "WxH"}),
     "--fps": ("ecl", "pictures a second", {**_NUMBER, "default": 8.0}),
     "--every": ("c", "ticks from one picture to the next", {**_COUNT, "default": 4}),
-    "--plain": ("ec", "the world alone, without text and marks", _FLAG),
-    "--all-states": ("s", "also those that were not visited", _FLAG),
+    "--plain": ("ec", "the world alone, without text and marks", {"action": "store_true"}),
 }
 # Where a kind has defaults of its own.
 _DEFAULTS: dict[str, dict[str, Any]] = {
@@ -192,8 +190,7 @@ def show_sheet(settings: argparse.Namespace, world: World) -> None:
     from taichi_ants.rendering import policy_sheet, save_picture
 
     q_values, task, title = find_policy(settings, world)
-    sheet = policy_sheet(q_values, title, complete=settings.all_states, task=task)
-    save_picture(settings.out, sheet)
+    save_picture(settings.out, policy_sheet(q_values, title, task=task))
     print(f"{settings.out}: the best action in each state")
 
 
