@@ -19,7 +19,6 @@ from taichi_ants.studies.command_line import (
     add_common,
     add_results,
     load_plugin,
-    number,
     progress_bar,
     run_command,
     whole_number,
@@ -80,9 +79,9 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 def _add_learning(parser: argparse.ArgumentParser, epsilon: float) -> None:
     add = parser.add_argument_group("learning").add_argument
     add("--learner", default="sarsa", metavar="NAME", help="name of a learner")
-    add("--learning-rate", type=number, default=0.1, metavar="X", help="in (0, 1]")
-    add("--discount", type=number, default=0.9, metavar="X", help="in [0, 1]")
-    add("--epsilon", type=number, default=epsilon, metavar="X", help="in the first episode")
+    add("--learning-rate", type=float, default=0.1, metavar="X", help="in (0, 1]")
+    add("--discount", type=float, default=0.9, metavar="X", help="in [0, 1]")
+    add("--epsilon", type=float, default=epsilon, metavar="X", help="in the first episode")
     add("--hyperparameter", **HYPERPARAMETER)
 
 
@@ -127,8 +126,8 @@ def _add_live(parser: argparse.ArgumentParser) -> None:
     add("--wander", **counts, help="ticks until a pile of food moves")
     add = parser.add_argument_group("pheromone").add_argument
     add("--evaporation", choices=("linear", "exponential", "none"), help="(default: linear)")
-    add("--half-life", type=number, metavar="X", help="ticks; trails evaporate exponentially")
-    add("--diffusion", type=number, metavar="X", help="share of a trail that spreads per tick")
+    add("--half-life", type=float, metavar="X", help="ticks; trails evaporate exponentially")
+    add("--diffusion", type=float, metavar="X", help="share of a trail that spreads per tick")
     add("--deposit", choices=("set", "add", "none"), help="(default: set)")
     add("--level", **counts, help="what a deposit sets or adds")
     add("--cap", **counts, help="most that deposits add up to")

@@ -17,7 +17,6 @@ from taichi_ants.studies.command_line import (
     add_common,
     add_results,
     load_plugin,
-    number,
     progress_bar,
     run_command,
     whole_number,
@@ -56,7 +55,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--delivery", choices=(*DELIVERIES, "both"), default="both", help="what delivery means")
     names = ("q_learning", "sarsa", "dyna_q")
     add("--learners", nargs="+", default=names, metavar="NAME", help="one or more")
-    few: dict[str, Any] = {"nargs": "+", "type": number, "metavar": "X", "help": "one or more"}
+    few: dict[str, Any] = {"nargs": "+", "type": float, "metavar": "X", "help": "one or more"}
     add("--learning-rates", **few, default=(0.001, 0.01))
     add("--discounts", **few, default=(0.9, 0.99))
     add("--epsilons", **few, default=(0.3, 0.5))
@@ -67,7 +66,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--train-evaporation", **switch, default="off", help="of trails; off in the paper")
     add("--greedy-evaporation", **switch, default="on", help="in the greedy evaluation")
     add("--world", default="paper", help="paper, open, or the path of a map file")
-    add("--world-seed", type=whole_number(), metavar="N", help="seed of an open world")
+    add("--world-seed", type=whole_number(), default=0, metavar="N", help="seed of an open world")
     add_common(parser)
     add("--quick", action="store_true", help=f"at most {QUICK_SEEDS} seeds")
     add_results(parser, "compare")
@@ -115,9 +114,7 @@ def build_study(settings: argparse.Namespace) -> Study[RunPoint]:
 
     if settings.plugin:
         load_plugin(settings.plugin)
-    if settings.world_seed is not None:
-        worlds.check_seed_counts(settings.world)
-    world = worlds.build(settings.world, settings.world_seed or 0)
+    world = worlds.build(settings.world, settings.world_seed)
     grid = points(settings, world)
     if not world.reachable_foods().any():
         raise AntsError(
@@ -135,7 +132,7 @@ def world_name(settings: argparse.Namespace, study: Study[RunPoint]) -> str:
     if study.points[0].world == worlds.paper():
         return PAPER_WORLD
     if settings.world in worlds.names():
-        return f"{settings.world}, world seed {settings.world_seed or 0}"
+        return f"{settings.world}, world seed {settings.world_seed}"
     return Path(settings.world).name
 
 

@@ -18,7 +18,6 @@ from taichi_ants.studies.command_line import (
     HYPERPARAMETER,
     Parser,
     load_plugin,
-    number,
     progress_bar,
     run_command,
     whole_number,
@@ -50,7 +49,7 @@ def _size(text: str) -> tuple[int, int]:
 _SEED: dict[str, Any] = {"type": whole_number(), "default": 0, "metavar": "N"}
 _LENGTH: dict[str, Any] = {"type": whole_number(1, 100_000), "default": 600, "metavar": "N"}
 _COUNT: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
-_NUMBER: dict[str, Any] = {"type": number, "metavar": "X"}
+_NUMBER: dict[str, Any] = {"type": float, "metavar": "X"}
 _STAGES = {"nargs": "+", "type": whole_number(0), "metavar": "N"}
 
 # Each option: the kinds of pictures that it is for, by their first letters, what it does, and how
@@ -70,7 +69,7 @@ _OPTIONS = {
     "--out": ("ecls", "file or folder", {"metavar": "PATH"}),
     "--title": ("ecls", "a line above all", {"metavar": "TEXT"}),
     "--world": ("ecls", "paper, open, or the path of a map file", {"default": "paper"}),
-    "--world-seed": ("ecls", "seed of a world drawn at random", {**_SEED, "default": None}),
+    "--world-seed": ("ecls", "seed of a world drawn at random", _SEED),
     "--seed": ("ecls", "seed of training and of what is shown", _SEED),
     "--plugin": ("ecls", "a Python file with learners, worlds, observations", {"metavar": "FILE"}),
     "--ants": ("c", "how many", {**_COUNT, "default": 80}),
@@ -132,9 +131,7 @@ def show(settings: argparse.Namespace) -> None:
         check_size(settings.size)
     if settings.plugin:
         load_plugin(settings.plugin)
-    if settings.world_seed is not None:
-        worlds.check_seed_counts(settings.world)
-    world = worlds.build(settings.world, settings.world_seed or 0)
+    world = worlds.build(settings.world, settings.world_seed)
     kinds = (show_episode, show_colony, show_learning, show_sheet)
     dict(zip(KINDS, kinds, strict=True))[settings.kind](settings, world)
 

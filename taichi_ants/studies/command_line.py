@@ -86,9 +86,6 @@ def whole_number(least: int | None = None, most: int | None = None) -> Callable[
     return parse
 
 
-number = float  # an argument type, too
-
-
 def _named_number(text: str) -> tuple[str, float]:
     name, _, value = text.partition("=")
     try:

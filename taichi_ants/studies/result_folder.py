@@ -137,25 +137,12 @@ class ResultFolder:
     def publish(self, ready: Path, manifest: Mapping[str, Any]) -> None:
         """Move what is ready into the folder, then write the manifest with the settings in it.
 
-        What an older manifest lists is replaced or removed; other files stay.
-
-        Raises:
-            AntsError: A file that is not ours is in the way.
+        What an older manifest lists is removed; other files stay, but for those of the same name.
         """
         paths = sorted(path.relative_to(ready) for path in ready.rglob("*") if path.is_file())
         hashes = {path.as_posix(): _hash(ready / path) for path in paths}
-        old = self._listed()
-        for name, digest in hashes.items():
-            there = self.path / name
-            # A kill in the middle of this may have left the same file there.
-            same = there.is_file() and _hash(there) == digest
-            if there.exists() and name not in old and not same:
-                raise AntsError(
-                    f"{str(there)!r} is in the way of results and none of ours; move it "
-                    "away, and the same command without --force goes on."
-                )
-        for name, digest in old.items():
-            self._remove(name, digest)
+        for name in self._listed():
+            self._remove(name)
         for path in paths:
             (self.path / path).parent.mkdir(parents=True, exist_ok=True)
             (ready / path).replace(self.path / path)
@@ -175,10 +162,10 @@ class ResultFolder:
         """The files of finished results, with their hashes."""
         return _manifest_in(self.path)["files"] if (self.path / MANIFEST).exists() else {}
 
-    def _remove(self, name: str, digest: str) -> None:
-        """Remove a file that an older manifest lists, if it is still that one and lies in here."""
-        file, own = self.path / name, self.path.resolve()
-        if file.is_file() and file.resolve().is_relative_to(own) and _hash(file) == digest:
+    def _remove(self, name: str) -> None:
+        """Remove a file that an older manifest lists, if it lies in here."""
+        file = self.path / name
+        if file.is_file() and file.resolve().is_relative_to(self.path.resolve()):
             file.unlink()
             with suppress(OSError):  # it holds something else
                 file.parent.rmdir()
