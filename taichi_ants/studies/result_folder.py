@@ -118,21 +118,19 @@ class ResultFolder:
         """
         self._listed()  # if it is damaged, it is so before the work
         manifest, blocks = self._unfinished / MANIFEST, self._unfinished / BLOCKS
+        files.check_writable_folder(self.path)
+        # Without a manifest nobody knows whose blocks these are.
+        if replace or not manifest.exists():
+            self._clear()
+        for folder in (blocks, self._unfinished / READY):
+            files.check_writable_folder(folder)
+        files.write_json(manifest, {"settings": self._settings})
         try:
-            files.check_writable_folder(self.path)
-            # Without a manifest nobody knows whose blocks these are.
-            if replace or not manifest.exists():
-                self._clear()
-            for folder in (blocks, self._unfinished / READY):
-                files.check_writable_folder(folder)
-            files.write_json(manifest, {"settings": self._settings})
             with tempfile.TemporaryDirectory(dir=self._unfinished / READY) as ready:
                 yield blocks, Path(ready)
         finally:
             if not any(blocks.rglob("*.npz")):
                 self._clear()
-            with suppress(OSError):  # it holds something, or was never made
-                self.path.rmdir()
 
     def publish(self, ready: Path, manifest: Mapping[str, Any]) -> None:
         """Move what is ready into the folder, then write the manifest with the settings in it.
