@@ -66,7 +66,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--train-evaporation", **switch, default="off", help="of trails; off in the paper")
     add("--greedy-evaporation", **switch, default="on", help="in the greedy evaluation")
     add("--world", default="paper", help="paper, open, or the path of a map file")
-    add("--world-seed", type=whole_number(), default=0, metavar="N", help="seed of an open world")
+    add("--world-seed", type=whole_number(), metavar="N", help="seed of an open world")
     add_common(parser)
     add("--quick", action="store_true", help=f"at most {QUICK_SEEDS} seeds")
     add_results(parser, "compare")
@@ -114,7 +114,9 @@ def build_study(settings: argparse.Namespace) -> Study[RunPoint]:
 
     if settings.plugin:
         load_plugin(settings.plugin)
-    world = worlds.build(settings.world, settings.world_seed)
+    if settings.world_seed is not None:
+        worlds.check_seed_counts(settings.world)
+    world = worlds.build(settings.world, settings.world_seed or 0)
     grid = points(settings, world)
     if not world.reachable_foods().any():
         raise AntsError(
@@ -132,7 +134,7 @@ def world_name(settings: argparse.Namespace, study: Study[RunPoint]) -> str:
     if study.points[0].world == worlds.paper():
         return PAPER_WORLD
     if settings.world in worlds.names():
-        return f"{settings.world}, world seed {settings.world_seed}"
+        return f"{settings.world}, world seed {settings.world_seed or 0}"
     return Path(settings.world).name
 
 

@@ -69,7 +69,7 @@ _OPTIONS = {
     "--out": ("ecls", "file or folder", {"metavar": "PATH"}),
     "--title": ("ecls", "a line above all", {"metavar": "TEXT"}),
     "--world": ("ecls", "paper, open, or the path of a map file", {"default": "paper"}),
-    "--world-seed": ("ecls", "seed of a world drawn at random", _SEED),
+    "--world-seed": ("ecls", "seed of a world drawn at random", {**_SEED, "default": None}),
     "--seed": ("ecls", "seed of training and of what is shown", _SEED),
     "--plugin": ("ecls", "a Python file with learners, worlds, observations", {"metavar": "FILE"}),
     "--ants": ("c", "how many", {**_COUNT, "default": 80}),
@@ -131,7 +131,9 @@ def show(settings: argparse.Namespace) -> None:
         check_size(settings.size)
     if settings.plugin:
         load_plugin(settings.plugin)
-    world = worlds.build(settings.world, settings.world_seed)
+    if settings.world_seed is not None:
+        worlds.check_seed_counts(settings.world)
+    world = worlds.build(settings.world, settings.world_seed or 0)
     kinds = (show_episode, show_colony, show_learning, show_sheet)
     dict(zip(KINDS, kinds, strict=True))[settings.kind](settings, world)
 

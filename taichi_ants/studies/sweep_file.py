@@ -203,10 +203,12 @@ def _rather(name: str, kind: str, known: list[str]) -> str:
 
 def _world(kind: str, given: Settings, seeds: tuple[int, ...]) -> Any:
     """The world of some settings, or one for each seed."""
-    preset, first = given.pop("preset", "paper"), given.pop("seed", 0)
-    per_seed = checked_flag("world.per_seed", given.pop("per_seed", False))
-    if per_seed and kind == "runs":
+    preset, drawn = given.pop("preset", "paper"), "seed" in given
+    first, per_seed = given.pop("seed", 0), given.pop("per_seed", False)
+    if checked_flag("world.per_seed", per_seed) and kind == "runs":
         raise AntsError("world.per_seed is for colonies only; leave it out.")
+    if per_seed or drawn:
+        worlds.check_seed_counts(preset, "world.per_seed" if per_seed else "world.seed")
     if not per_seed:
         return worlds.build(preset, first, **given)
     checked_whole("world.seed", first, -(2**62), 2**62)

@@ -2,13 +2,14 @@
 
 from taichi_ants.worlds.open_world import open_world
 from taichi_ants.worlds.paper import paper
-from taichi_ants.worlds.registry import build, names, register
+from taichi_ants.worlds.registry import build, check_seed_counts, names, register
 from taichi_ants.worlds.text_map import from_text, load_map, to_text
 from taichi_ants.worlds.world import World
 
 __all__ = [
     "World",
     "build",
+    "check_seed_counts",
     "from_text",
     "load_map",
     "names",

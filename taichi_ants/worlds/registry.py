@@ -43,6 +43,16 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(_BUILDERS))
 
 
+def check_seed_counts(name_or_path: str, option: str = "--world-seed") -> None:
+    """Make sure that a seed can change the world; AntsError if it is the paper's or a map."""
+    drawn = [name for name in names() if name != "paper"]
+    if name_or_path not in drawn:
+        raise AntsError(
+            f"{option} is for a world drawn at random, not for {name_or_path!r}; leave it out, "
+            f"or choose a world of {', '.join(drawn)}."
+        )
+
+
 def build(name_or_path: str | os.PathLike[str], seed: int = 0, **given: Any) -> World:
     """The world of a registered name, or of the text map in a file.
 

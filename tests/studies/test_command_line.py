@@ -11,10 +11,8 @@ import pytest
 from taichi_ants.errors import AntsError
 from taichi_ants.studies import command_line
 from taichi_ants.studies.command_line import (
-    ListAction,
     Parser,
     load_plugin,
-    number,
     progress_bar,
     run_command,
     whole_number,
@@ -27,9 +25,7 @@ def parser():
     parser.add_argument("--size", type=whole_number(1, 9), default=3, help="how large")
     parser.add_argument("--seed", type=whole_number(), default=0, help="the first")
     parser.add_argument("--count", type=whole_number(2), help="how many")
-    lists = {"action": ListAction, "metavar": "X"}
-    parser.add_argument("--rates", **lists, item=number, default=(0.1, 2.0), help="how fast")
-    parser.add_argument("--names", **lists, default=("a",), help="whose")
+    parser.add_argument("--rates", nargs="+", type=float, default=(0.1, 2.0), help="how fast")
     parser.add_argument("--loud", action="store_true", help="whether")
     return parser
 
@@ -45,18 +41,14 @@ def test_values_and_defaults(parser):
     arguments = ["--size", "9", "--seed", "-4", "--count", "2", "--rates", "1", "2", "3", "--loud"]
     parsed = vars(parser.parse_args(arguments))
     assert parsed == {
-        **{"size": 9, "seed": -4, "count": 2, "rates": (1.0, 2.0, 3.0), "names": ("a",)},
+        **{"size": 9, "seed": -4, "count": 2, "rates": [1.0, 2.0, 3.0]},
         "loud": True,
     }
     parsed = vars(parser.parse_args([]))
     assert parsed == {
-        **{"size": 3, "seed": 0, "count": None, "rates": (0.1, 2.0), "names": ("a",)},
+        **{"size": 3, "seed": 0, "count": None, "rates": (0.1, 2.0)},
         "loud": False,
     }
-
-
-def test_of_equal_values_the_first_counts(parser):
-    assert parser.parse_args(["--names", "b", "a", "b"]).names == ("b", "a")
 
 
 def test_what_was_given_is_told_even_where_it_is_the_default(parser):
