@@ -120,8 +120,9 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 def show(settings: argparse.Namespace) -> None:
     """Make what was asked for, and say what it is."""
     from taichi_ants import worlds
-    from taichi_ants.rendering import check_animation, check_picture, is_picture
+    from taichi_ants.rendering import check_animation, check_picture
     from taichi_ants.rendering.scene import check_size
+    from taichi_ants.rendering.writers import is_picture
 
     if settings.kind == "sheet" or (settings.kind != "learning" and is_picture(settings.out)):
         check_picture(settings.out)
@@ -252,7 +253,8 @@ def _save_moments(
     settings: argparse.Namespace, moments: Iterable[Moment], n: int, title: str
 ) -> None:
     """Write n moments as an animation, or the last one as a picture."""
-    from taichi_ants.rendering import frames, is_picture, save_picture
+    from taichi_ants.rendering import frames, save_picture
+    from taichi_ants.rendering.writers import is_picture
 
     look: dict[str, Any] = {"size": settings.size, "title": title, "plain": settings.plain}
     if is_picture(settings.out):

@@ -18,7 +18,6 @@ from taichi_ants.rendering.writers import (
     PAUSE,
     check_animation,
     check_picture,
-    is_picture,
     save_animation,
     save_picture,
 )
@@ -35,7 +34,6 @@ __all__ = [
     "check_picture",
     "colony_moments",
     "frames",
-    "is_picture",
     "learning_frames",
     "learning_stages",
     "policy_sheet",

@@ -20,7 +20,7 @@ _PIECE_SECONDS = 0.2
 
 def check_places(save: str | None, render: str | None) -> None:
     """Make sure, before the work begins, that what `live` shall write can be written."""
-    from taichi_ants.rendering import check_animation, check_picture, is_picture
+    from taichi_ants.rendering.writers import check_animation, check_picture, is_picture
 
     if render and is_picture(render):
         check_picture(render)
@@ -46,13 +46,8 @@ def live(
     It is saved even if its picture (.png) or animation (.gif, a folder) cannot be written. An
     animation has a picture for `every` so many ticks.
     """
-    from taichi_ants.rendering import (
-        colony_moments,
-        frames,
-        is_picture,
-        save_animation,
-        save_picture,
-    )
+    from taichi_ants.rendering import colony_moments, frames, save_animation, save_picture
+    from taichi_ants.rendering.writers import is_picture
 
     animated = render is not None and not is_picture(render)
     passing = _pieces(colony, ticks, progress, stopped, every if animated else 0)

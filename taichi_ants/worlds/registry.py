@@ -66,7 +66,7 @@ def build(name_or_path: str | os.PathLike[str], seed: int = 0, **given: Any) -> 
     """
     seed = whole("seed", seed)
     expect("the world", name_or_path, str, os.PathLike)
-    builder = _BUILDERS.get(os.fspath(name_or_path))
+    builder = _BUILDERS.get(name_or_path) if isinstance(name_or_path, str) else None
     allowed = tuple(inspect.signature(builder).parameters)[1:] if builder else ()  # a map has none
     for name in given:
         if name not in allowed:

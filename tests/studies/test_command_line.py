@@ -54,7 +54,7 @@ def test_values_and_defaults(parser):
 def test_what_was_given_is_told_even_where_it_is_the_default(parser):
     settings, given = parser.parse_given(["--size=3", "--rates", "1", "-2", "--loud"])
     assert given == {"size": "--size", "rates": "--rates", "loud": "--loud"}
-    assert (settings.size, settings.rates, settings.seed) == (3, (1.0, -2.0), 0)
+    assert (settings.size, settings.rates, settings.seed) == (3, [1.0, -2.0], 0)
 
 
 @pytest.mark.parametrize(
@@ -65,7 +65,7 @@ def test_what_was_given_is_told_even_where_it_is_the_default(parser):
         (["--size", "2.5"], "--size: invalid whole number value: '2.5'"),
         (["--count", "1"], "--count: 1 is not allowed, it must be at least 2"),
         (["--rates", "1", "x"], "--rates: invalid float value: 'x'"),
-        (["--names"], "--names: expected at least one argument"),
+        (["--rates"], "--rates: expected at least one argument"),
         (["--siz", "3"], "unrecognized arguments: --siz 3"),
         (["a\nb"], "unrecognized arguments: a b"),
     ],
@@ -80,7 +80,7 @@ def test_help_shows_the_defaults_that_say_something(parser, monkeypatch):
     assert "--size SIZE how large (default: 3)" in lines
     assert "--seed SEED the first (default: 0)" in lines
     assert "--count COUNT how many" in lines
-    assert "--rates X [X ...] how fast (default: (0.1, 2.0))" in lines
+    assert "--rates RATES [RATES ...] how fast (default: (0.1, 2.0))" in lines
     assert "--loud whether" in lines
 
 

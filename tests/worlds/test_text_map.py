@@ -132,12 +132,6 @@ def test_trails_under_the_queen_or_food_cannot_be_drawn(cell: tuple) -> None:
     assert f"a trail lies on {cell} under" in str(caught.value)
 
 
-@pytest.mark.parametrize("ranges", [(1500, 1500, 1), (3000, 3000, 1)])
-def test_worlds_too_large_for_a_map(ranges: tuple) -> None:
-    with pytest.raises(AntsError, match="more than 4194304"):
-        to_text(World(ranges, (0, 0, 0)))
-
-
 def test_ants_are_numbered_in_reading_order() -> None:
     world = World((3, 3, 3), (0, 0, 0), ants=[((0, 2, 0), 1), ((2, 0, 0), 2), ((0, 0, 1), 3)])
     in_reading_order = World((3, 3, 3), (0, 0, 0), ants=world.ants[[1, 2, 0]])
