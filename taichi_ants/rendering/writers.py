@@ -1,7 +1,7 @@
 """Files of pictures: they appear when they are whole, or not at all.
 
-A GIF or MP4 is made in memory and written at the end. A GIF holds all frames until then, as indices
-of one palette; an MP4 does not, so it is the kind for very long animations.
+A GIF is made in memory, of all frames as indices of one palette, and written at the end. A folder
+of PNG pictures is the kind for very long animations, and for programs that make films of them.
 """
 
 from __future__ import annotations
@@ -13,8 +13,6 @@ from collections.abc import Iterable, Iterator
 from itertools import chain
 from numbers import Real
 from pathlib import Path
-from types import ModuleType
-from typing import BinaryIO
 
 import numpy as np
 
@@ -38,36 +36,39 @@ def check_animation(path: files.PathLike, fps: float = DEFAULT_FPS) -> Path:
     """Make sure, before the work begins, that an animation can be written.
 
     Args:
-        path: The file, .gif or .mp4; without an ending a folder for numbered PNG pictures.
+        path: The file, .gif; without an ending a folder for numbered PNG pictures.
         fps: Frames per second, 0.1 to 50.
 
     Raises:
-        AntsError: The ending or the speed is not allowed, PyAV is missing for an .mp4, the folder
-            holds something, or the place cannot be written to.
+        AntsError: The ending or the speed is not allowed, the folder holds something, or the place
+            cannot be written to.
     """
     target = _writable(path)
-    if target.suffix.lower() not in (".gif", ".mp4", ""):
+    if target.suffix.lower() not in (".gif", ""):
         raise AntsError(
-            f"{str(path)!r} ends in {target.suffix!r}; an animation ends in .gif, .mp4, or in "
-            "nothing for a folder of PNG pictures."
+            f"{str(path)!r} ends in {target.suffix!r}; an animation ends in .gif, or in nothing "
+            "for a folder of PNG pictures."
         )
     if isinstance(fps, bool) or not isinstance(fps, Real) or not 0.1 <= fps <= 50:
         # Viewers slow a GIF down that is faster.
         raise AntsError(f"fps is {shown(fps)}; it must be a number from 0.1 to 50.")
-    if target.suffix.lower() == ".mp4":
-        _import_av()
     if not target.suffix and target.exists() and (not target.is_dir() or any(target.iterdir())):
         raise AntsError(
             f"{str(path)!r} exists already and is no empty folder; name a new folder, or a file "
-            "that ends in .gif or .mp4."
+            "that ends in .gif."
         )
     return target
+
+
+def is_picture(path: files.PathLike) -> bool:
+    """Whether a path is one of a single picture, not of an animation."""
+    return Path(path).suffix.lower() == ".png"
 
 
 def check_picture(path: files.PathLike) -> Path:
     """Make sure that a picture can be written; raises as `save_picture` does."""
     target = _writable(path)
-    if target.suffix.lower() != ".png":
+    if not is_picture(target):
         raise AntsError(f"{str(path)!r} is to hold one picture; give it a name that ends in .png.")
     return target
 
@@ -91,8 +92,7 @@ def save_animation(
     target = check_animation(path, fps)
     checked = _checked(frames, round(pause * fps) - 1)
     if target.suffix:
-        encoded = _mp4 if target.suffix.lower() == ".mp4" else _gif
-        _write(target, encoded(checked, fps))
+        _write(target, _gif(checked, fps))
     else:
         _write_folder(target, checked)
 
@@ -122,11 +122,7 @@ def _existing_folder(target: Path) -> Path:
 
 def _write(target: Path, content: bytes) -> None:
     files.check_writable_folder(target.parent)
-
-    def write(file: BinaryIO) -> None:
-        file.write(content)
-
-    files.write_atomically(target, write)
+    files.write_bytes(target, content)
 
 
 def _write_folder(folder: Path, frames: Iterable[np.ndarray]) -> None:
@@ -211,41 +207,3 @@ def _palette(first: np.ndarray) -> np.ndarray:
     # Pillow looks colours up by their upper bits, so one close by would take a kept one's place.
     away = np.abs(others[:, None].astype(int) - kept).sum(axis=2).min(axis=1)
     return np.concatenate([kept, others[away > 20]])
-
-
-def _mp4(frames: Iterable[np.ndarray], fps: float) -> bytes:
-    """An MP4 (H.264); of an odd width or height it leaves out the last column or row."""
-    av = _import_av()
-    from fractions import Fraction
-
-    waiting = iter(frames)
-    first = next(waiting)
-    height, width = first.shape[0] // 2 * 2, first.shape[1] // 2 * 2
-    buffer = io.BytesIO()
-    with av.open(buffer, "w", format="mp4") as container:
-        stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1000))
-        stream.width, stream.height = width, height
-        stream.pix_fmt = "yuv420p"
-        stream.options = {
-            **{"crf": "17", "preset": "superfast", "tune": "animation"},
-            "x264-params": "colorprim=bt709:transfer=bt709:colormatrix=bt709",
-        }
-        for frame in chain([first], waiting):
-            picture = np.ascontiguousarray(frame[:height, :width])
-            video = av.VideoFrame.from_ndarray(picture, format="rgb24")
-            # Players take pictures of this kind for BT.709, PyAV's default is BT.601.
-            video = video.reformat(format="yuv420p", dst_colorspace="ITU709")
-            container.mux(stream.encode(video))
-        container.mux(stream.encode())
-    return buffer.getvalue()
-
-
-def _import_av() -> ModuleType:
-    try:
-        import av
-    except ImportError as error:
-        raise AntsError(
-            f"MP4 needs PyAV, which cannot be imported ({error}); install it with "
-            "pip install -e '.[video]' in the project's folder, or choose .gif."
-        ) from error
-    return av

@@ -30,7 +30,7 @@ from taichi_ants.reference.learners.q_learning import QLearning
 LONG = [
     *("--seeds", 4, "--episodes", 500, "--learners", "q_learning", "dyna_q"),
     *("--planning-steps", 9, "--learning-rates", 0.001, 0.01, "--discounts", 0.9, 0.99),
-    *("--epsilons", 0.5, "--no-figures", "--no-render"),
+    *("--epsilons", 0.5, "--no-figures"),
 ]
 PICTURED = [
     *("--seeds", 2, "--episodes", 20, "--learners", "q_learning", "sarsa", "--discounts", 0.9),
@@ -41,7 +41,7 @@ BLOCKS = 2 * 2 * 2  # settings of delivery, learners, pieces of at most 333 runs
 TINY = [
     *("--seeds", 1, "--episodes", 2, "--max-steps", 30, "--learners", "q_learning"),
     *("--learning-rates", 0.1, "--discounts", 0.9, "--epsilons", 0.3, "--epsilon-decays", 0.9),
-    *("--delivery", "absorbing", "--no-figures", "--no-render"),
+    *("--delivery", "absorbing", "--no-figures"),
 ]
 
 
@@ -193,7 +193,7 @@ def test_help_is_quick_and_needs_no_taichi(tmp_path):
         *("--seeds", "--seed", "--episodes", "--max-steps", "--delivery", "--learners"),
         *("--learning-rates", "--discounts", "--epsilons", "--epsilon-decays"),
         *("--planning-steps", "--world", "--threads", "--arch", "--out", "--quick", "--force"),
-        *("--no-figures", "--no-render"),
+        *("--no-figures"),
     ):
         assert f"  {flag}" in done.stdout
 
