@@ -41,7 +41,7 @@ def begun(
     world = from_text(world) if isinstance(world, str) else world
     names = {field.name for field in fields(Life)}
     life = Life(**{name: options.pop(name) for name in names & options.keys()})
-    named = ("pheromone", "delivery", "observation", "rewards")
+    named = ("pheromone", "delivery", "observation", "rewards", "traffic")
     rules = {name: options.pop(name) for name in named if name in options}
     task = Task(evaporation_in_training=True, life=life, **rules)
     colony = ReferenceColony(

@@ -6,11 +6,13 @@ Both hold in the long run, for ants that neither die nor are born, and food that
   cycle queen -> food -> queen over (cell, heading, carrying). Food that grows back in the tick in
   which it is taken never leaves its cell free, so that the ground stays the same and this is a
   shortest path. An ant that is blocked by another turns on the spot, so the limit lets ants do so
-  everywhere.
-- Queen: the ant that gives in tick t leaves in t + 1 at the earliest; the cell must be empty when a
-  tick starts, so that the next ant enters in t + 2 and gives in t + 3. An ant that stays needs as
-  many ticks: give, pick up (which turns it round), turn back. So each of the queen's neighbour
-  cells serves one delivery in 3 ticks.
+  everywhere. Where ants with food have right of way, they may push the ant: the limit lets an ant
+  without food be pushed from every cell onto each neighbour, while it turns as it likes.
+- Queen: the ant that gives in tick t leaves in t + 1 at the earliest. If the next one can take its
+  place in that tick, by pushing or by following it, it gives in t + 2; else it enters in t + 2 and
+  gives in t + 3. An ant that stays needs as many ticks: give, pick up (which turns it round), turn
+  back; and one less where giving turns it round. So each of the queen's neighbour cells serves one
+  delivery in 3 ticks, or in 2.
 """
 
 from __future__ import annotations
@@ -19,12 +21,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_ants.analysis.bounds.surroundings import look_around
+from taichi_ants.analysis.bounds.surroundings import Surroundings, look_around
+from taichi_ants.grid.constants import N_HEADINGS
+from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.worlds.geometry import walkable
 from taichi_ants.worlds.world import World
-
-_TICKS_A_CELL = 3
 
 
 @dataclass(frozen=True)
@@ -44,29 +46,32 @@ class Limits:
         return min(ants * 1000 / self.cycle, self.queen)
 
 
-def limits_of(world: World) -> Limits:
-    """The limits of a world."""
+def limits_of(world: World, task: Task | None = None) -> Limits:
+    """The limits of a world under the traffic of a task; None is the paper's."""
+    task = Task() if task is None else task
     around = world.grid.index(world.queen) + world.grid.offsets
     cells = walkable(world.grid, world.ground(), around)[around]
-    return Limits(shortest_cycle(world), 1000 * int(cells.sum()) / _TICKS_A_CELL)
+    ticks = 2 if task.traffic.shared or task.turns_at_queen else 3
+    return Limits(shortest_cycle(world, task), 1000 * int(cells.sum()) / ticks)
 
 
-def shortest_cycle(world: World) -> float:
+def shortest_cycle(world: World, task: Task) -> float:
     """The least mean number of ticks from one delivery to the next, inf if there is no way.
 
-    A delivery leaves the ant where it is, so it is the end of one walk and the start of the next.
+    A delivery leaves the ant on its cell, so it is the end of one walk and the start of the next.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import dijkstra
 
-    # A node is (carrying, heading, cell); edges are moves, blocked or not, and pick-ups.
+    # A node is (carrying, heading, cell); edges are moves, blocked or not, pushes and pick-ups.
     around = look_around(world)
     half = around.n_states
     moves = [*around.moves(around.empty), *around.moves(np.zeros_like(around.empty))]
     walks = [np.stack([np.arange(half), move]) for move in moves]
+    pushes = _pushes(around) if task.traffic.swap else []
     picks = around.sees(around.food)
     pick_ups = np.stack([picks, around.turned_round(picks) + half])
-    edges = np.concatenate([*walks, *[walk + half for walk in walks], pick_ups], axis=1)
+    edges = np.concatenate([*walks, *[walk + half for walk in walks], *pushes, pick_ups], axis=1)
     ones = np.ones(edges.shape[1], np.int8)
     graph = coo_array((ones, tuple(edges)), shape=(2 * half, 2 * half)).tocsr()
     # Where a carrying ant can give; no ant comes to a cell that holds food.
@@ -74,7 +79,8 @@ def shortest_cycle(world: World) -> float:
     gives = gives[world.ground()[around.cells[gives % len(around.cells)]] == EMPTY]
     mean, horizon = np.inf, 64  # short walks are found quickly, and mostly enough
     while len(gives):
-        walked = dijkstra(graph, indices=gives, unweighted=True, limit=horizon)
+        begins = around.turned_round(gives) if task.turns_at_queen else gives
+        walked = dijkstra(graph, indices=begins, unweighted=True, limit=horizon)
         ticks = walked[:, half + gives] + 1
         mean = least_mean_cycle(ticks)
         # If so, a cycle of walks with one beyond the horizon has a greater mean.
@@ -83,6 +89,22 @@ def shortest_cycle(world: World) -> float:
             break
         horizon *= 4
     return mean
+
+
+def _pushes(around: Surroundings) -> list[np.ndarray]:
+    """From each state those onto each neighbour that can be empty, with each heading it may take.
+
+    Edges int64 (2, n) each.
+    """
+    n = len(around.cells)
+    edges = []
+    for neighbours, empty in zip(around.neighbours, around.empty, strict=True):
+        (cells,) = np.nonzero(empty)
+        for heading in range(N_HEADINGS):
+            for turn in (-1, 0, 1):
+                onto = (heading + turn) % N_HEADINGS * n + neighbours[cells]
+                edges.append(np.stack([heading * n + cells, onto]))
+    return edges
 
 
 def least_mean_cycle(lengths: np.ndarray) -> float:

@@ -7,13 +7,14 @@ import math
 
 import numpy as np
 import pytest
-from colonies import act, begun
+from colonies import act, begun, cells_of, load
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_worlds import random_world
 
 from taichi_ants import worlds
 from taichi_ants.analysis.bounds.limits import least_mean_cycle, limits_of
+from taichi_ants.task import Task, foraging, queueing
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT
 from taichi_ants.worlds import World
 
@@ -94,12 +95,25 @@ def test_ants_turn_on_the_spot_as_in_a_crowd() -> None:
     assert limits_of(World((9, 9, 9), (0, 0, 0), [(6, 0, 0)])).cycle == 12
 
 
-def plain_deliveries(world: World, ticks: int) -> list[int]:
+def test_with_right_of_way_a_neighbour_cell_serves_once_in_two_ticks() -> None:
+    """Ants with food push the one that has just given; the reference does it."""
+    assert limits_of(worlds.paper(), foraging()).queen == 1500
+    world = World((4, 1, 1), (0, 0, 0), [(3, 0, 0)], ants=[((1, 0, 0), 3), ((2, 0, 0), 3)])
+    colony = begun(world, traffic="right_of_way")
+    load(colony, 0, 1)
+    act(colony, GIVE, FORWARD)  # the second is blocked by one with food
+    act(colony, FORWARD, FORWARD)
+    assert cells_of(colony) == [(2, 0, 0), (1, 0, 0)]
+    act(colony, FORWARD, GIVE)
+    assert colony.record.deliveries == 2
+
+
+def plain_deliveries(world: World, ticks: int, task: Task) -> list[int]:
     """The most deliveries within 0 .. `ticks` ticks from any state without food, searched."""
     foods = set(map(tuple, world.foods.tolist()))
     rocks = set(map(tuple, world.obstacles.tolist()))
     cells = [c for c in itertools.product(*map(range, world.ranges)) if min(c) == 0]
-    free = [c for c in cells if c not in foods | rocks | {world.queen}]
+    free = {*cells} - foods - rocks - {world.queen}
 
     def beside(cell: tuple, heading: int) -> tuple:
         moved = [a + b for a, b in zip(cell, STEPS[heading % 6], strict=True)]
@@ -112,8 +126,12 @@ def plain_deliveries(world: World, ticks: int) -> list[int]:
         for turn, target in zip((-1, 0, 1), view, strict=True):
             lands = target if target in free else cell
             options += [((place, (heading + turn) % 6, carries), 0) for place in (lands, cell)]
+        if not carries and task.traffic.swap:
+            around = [beside(cell, towards) for towards in range(6)]
+            turned = itertools.product(free.intersection(around), (-1, 0, 1))
+            options += [((place, (heading + turn) % 6, False), 0) for place, turn in turned]
         if carries and world.queen in view:
-            options.append(((cell, heading, False), 1))
+            options.append(((cell, (heading + 3 * task.turns_at_queen) % 6, False), 1))
         if not carries and foods & set(view):
             options.append(((cell, (heading + 3) % 6, True), 0))
         after[cell, heading, carries] = options
@@ -128,12 +146,12 @@ def plain_deliveries(world: World, ticks: int) -> list[int]:
     return most
 
 
-@given(st.integers(0, 10_000))
-@settings(max_examples=25)
-def test_the_cycle_is_what_a_plain_search_delivers_in_the_long_run(seed: int) -> None:
+@given(st.integers(0, 10_000), st.sampled_from([Task(), foraging(), queueing()]))
+@settings(max_examples=30)
+def test_the_cycle_is_what_a_plain_search_delivers_in_the_long_run(seed: int, task: Task) -> None:
     world = random_world(seed, largest_range=4)
-    most = plain_deliveries(world, 240)
-    cycle = limits_of(world).cycle
+    most = plain_deliveries(world, 240, task)
+    cycle = limits_of(world, task).cycle
     if math.isinf(cycle):
         assert most[-1] <= 1  # none, or the one of an ant that cannot come back for a second
     else:
