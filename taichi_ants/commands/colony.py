@@ -1,7 +1,7 @@
-"""Many ants in one world: the scaling study of the colony, or one colony that lives for a while.
+"""Many ants in one world: the study of the colony, or one colony that lives for a while.
 
-`study` trains and evaluates 1 to 1000 ants in several kinds of worlds, with ways of sharing a
-policy and pheromones, over many seeds; tables, figures and findings go to a folder. `live` lets a
+`study` trains and evaluates 1 to 64 ants under several rules in several kinds of worlds, over many
+seeds; tables, figures and findings go to a folder. `live` lets a
 colony of any size live, or many side by side; it can be saved, resumed and drawn.
 """
 
@@ -33,13 +33,16 @@ if TYPE_CHECKING:
     from taichi_ants.studies.runner import Study
 
 KINDS = {
-    "study": "The scaling study of the colony",
+    "study": "The study of the colony",
     "live": "One colony, or many side by side, that live for a while",
 }
-ARENAS = ("paper", "open", "large")
+ARENAS = (
+    *("paper", "open", "piles"),
+    *("rocks", "one_pile", "moving", "slow", "small", "wide", "large"),
+)
 QUICK = {
-    "arenas": ("paper", "open"),
-    "sizes": (1, 4, 16, 64),
+    "arenas": ("paper", "open", "piles"),
+    "sizes": (1, 16, 64),
     "seeds": 8,
     "episodes": 20,
     "ticks": 500,
@@ -89,15 +92,15 @@ def _add_study(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("--arenas", nargs="+", default=ARENAS, metavar="NAME", help="kinds of world")
     several: dict[str, Any] = {"nargs": "+", "type": whole_number(1, 100_000)}
-    sizes = "numbers of ants in the paper's and the open worlds"
-    add("--sizes", **several, default=(1, 2, 4, 8, 16, 32, 64), metavar="N", help=sizes)
+    sizes = "numbers of ants where they are trained"
+    add("--sizes", **several, default=(1, 4, 16, 64), metavar="N", help=sizes)
     add("--seeds", type=whole_number(1, 1000), default=20, metavar="N", help="how many")
     add("--seed", type=whole_number(), default=0, metavar="N", help="the first of them")
     counts: dict[str, Any] = {"type": whole_number(1, 10_000_000), "metavar": "N"}
-    add("--episodes", **counts, default=50, help="of training")
+    add("--episodes", **counts, default=60, help="of training")
     add("--ticks", **counts, default=1000, help="of an episode")
     add("--rollouts", **counts, default=4, help="evaluation episodes")
-    add("--quick", action="store_true", help="fewer seeds, sizes and ticks, no large worlds")
+    add("--quick", action="store_true", help="fewer seeds, sizes and ticks, no other worlds")
     _add_learning(parser, 0.3)
     add_common(parser)
     add_results(parser, "colony")
@@ -177,14 +180,15 @@ def do_study(
     from taichi_ants.analysis.colony.contrasts import judge_all
     from taichi_ants.analysis.colony.figures import save_all
     from taichi_ants.analysis.tables import markdown, plain_text
-    from taichi_ants.studies.colony_study import limits_by_arena, measured, median_policies
+    from taichi_ants.studies.colony_study import measured, median_policies, most_deliveries
     from taichi_ants.studies.result_folder import REPORT
 
     with progress_bar("study") as progress:
         outcomes = asked.run(blocks, settings.threads, settings.arch, progress)
-    values, limits = measured(conditions, outcomes), limits_by_arena(conditions)
+    values = measured(conditions, outcomes)
     judged = judge_all(values)
-    rows, findings = tables.condition_rows(values, limits), tables.found(values, judged)
+    rows = tables.condition_rows(values, most_deliveries(conditions))
+    findings = tables.found(values, judged)
     for name, table in (
         ("seeds.csv", tables.rows_of_seeds(values, asked.seeds)),
         (CONDITIONS, rows),
@@ -195,8 +199,8 @@ def do_study(
     report = plain_text([*tables.means(rows), *findings], WIDTH)
     files.write_text(ready / REPORT, report)
     policies = files.check_writable_folder(ready / "policies")
-    for name, q_values, metadata in median_policies(conditions, asked.seeds, values, outcomes):
-        save_policy(policies / f"{name}.npz", q_values, metadata)
+    for name, table, facts, seen in median_policies(conditions, asked.seeds, values, outcomes):
+        save_policy(policies / f"{name}.npz", table, facts, seen)
     if not settings.no_figures:
         save_all(rows, ready / FIGURES)
 

@@ -1,67 +1,66 @@
-"""The scaling study of the colony: its arenas, its designs, and what is done for each condition.
+"""The study of the colony: its arenas, its designs, and what is done for each condition.
 
 Other rules of the game are an entry in `RULES` (`analysis.colony.study`) and one in `TASKS`, other
-ways to come to a policy one in `WAYS` and a case in `_point`; then they can stand in `DESIGNS`.
+worlds one in `WORLDS` there and one in `_place` here.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
 
 from taichi_ants import worlds
-from taichi_ants.analysis.bounds.limits import Limits, limits_of
+from taichi_ants.analysis.bounds.limits import limits_of
 from taichi_ants.analysis.colony.study import (
+    ABC,
+    ABC_SILENT,
+    ABROAD,
+    ALONE,
     ARENAS,
-    COPIED,
-    COPIED_LONG,
+    BC,
+    FEW,
     JOINT,
-    LASTING,
-    OFF,
-    ON,
-    OWN,
-    THEN_JOINT,
+    PAPER,
+    QUEUES,
+    SILENT,
+    SOME,
+    WORLDS,
+    A,
     Condition,
-    Design,
     Measured,
     measures_of,
 )
 from taichi_ants.errors import check_one_of
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.runner import ColonyPoint, Outcome
-from taichi_ants.task import Life, Pheromone, Task
+from taichi_ants.task import Life, Pheromone, Task, foraging, paper, queueing
+from taichi_ants.worlds.world import World
 
-_PHEROMONES = {
-    ON: Pheromone(),
-    OFF: Pheromone(deposit="none"),
-    LASTING: Pheromone(evaporation="none"),
+_SILENT, _LIVELY = Pheromone(deposit="none"), Life(regrowth=0)
+# Trails fall in training too, and food grows back at once.
+TASKS: dict[str, Task] = {
+    rules: replace(task, evaporation_in_training=True, life=_LIVELY)
+    for rules, task in {
+        PAPER: paper(),
+        SILENT: replace(paper(), pheromone=_SILENT),
+        A: replace(paper(), pheromone=foraging().pheromone),
+        BC: replace(foraging(), pheromone=paper().pheromone),
+        ABC: foraging(),
+        ABC_SILENT: replace(foraging(), pheromone=_SILENT),
+        QUEUES: queueing(),
+    }.items()
 }
-# Trails fall in training too, food grows back at once, and an ant goes on after a delivery.
-TASKS = {
-    rules: Task(
-        pheromone=pheromone,
-        delivery="continuing",
-        evaporation_in_training=True,
-        life=Life(regrowth=0),
-    )
-    for rules, pheromone in _PHEROMONES.items()
-}
-_TRAINED = (JOINT, THEN_JOINT, OWN)
-DESIGNS = (
-    *(Design(ON, way) for way in (COPIED, COPIED_LONG, *_TRAINED)),
-    *(Design(rules, way) for rules in (OFF, LASTING) for way in (COPIED, *_TRAINED)),
-)
-# The large worlds get fewer designs, other numbers of ants, and shorter training.
-LARGE_DESIGNS = (
-    *(Design(ON, way) for way in (COPIED, *_TRAINED)),
-    *(Design(OFF, way) for way in (COPIED, JOINT)),
-)
-LARGE_SIZES, LARGE_EPISODES, LARGE_ROLLOUTS = (1, 10, 100, 1000), 10, 2
-RANGES = {"open": (30, 30, 30), "large": (100, 100, 100)}
-_EXPLORING = 0.7  # of the training episodes, until epsilon has fallen to what evaluation uses
+# Of these, copies of fewer ants are evaluated, and all in other worlds than those of the training.
+COMPARED = (PAPER, ABC, QUEUES)
+TRAINED_WITH = {ALONE: 1, FEW: 4, SOME: 16}
+OPEN, LARGE_SIZE = "open", 1000
+POOL, FIRST_OF_POOL = 64, 1 << 20  # worlds for training, and the seed of the first of them
+EXPLORING = 0.7  # of the training episodes, until epsilon and the learning rate have fallen
+OPTIMISM = 10.0  # of each action before learning; more than most are worth
 
 # What is done for each condition; some have a point in common.
 Plan = dict[Condition, ColonyPoint]
@@ -79,64 +78,91 @@ def plan(
     """The conditions of some arenas.
 
     Args:
-        arenas: Names in `ARENAS`.
-        sizes: Numbers of ants, ascending; the large worlds have their own. The way `COPIED_LONG`
-            trains as many times as long as there are ants in the largest colony.
-        seeds: A seed gives its open world to all conditions.
-        training: The learner; its epsilon is that of the first episode, its `min_epsilon` that of
-            the last 30 % and of the evaluation. The decay follows from these.
-        episodes, ticks, rollouts: As of a `ColonyPoint`; `episodes` and `rollouts` are at most so
-            many in large worlds.
+        arenas: Names in `WORLDS`.
+        sizes: Numbers of ants, ascending; ants that were trained elsewhere are as many as the last.
+        seeds: A seed gives its world to all conditions of an arena.
+        training: The learner. Its epsilon is that of the first episode, its `min_epsilon` that of
+            the last 30 % and of the evaluation; its learning rate falls to a tenth meanwhile.
+        episodes, ticks, rollouts: As of a `ColonyPoint`.
+
+    Raises:
+        AntsError: There is no such arena.
     """
-    conditions = {}
     for arena in arenas:
-        check_one_of("the arena", arena, tuple(ARENAS))
-        large = arena == "large"
-        ranges = RANGES.get(arena)
-        alone = ColonyPoint(
-            tuple(worlds.open_world(s, ranges) for s in seeds) if ranges else worlds.paper(),
-            Task(),
-            training,
-            episodes=min(LARGE_EPISODES, episodes) if large else episodes,
+        check_one_of("the arena", arena, tuple(WORLDS))
+    training = _scheduled(training, episodes)
+    places = {
+        arena: worlds.paper() if arena == "paper" else tuple(_place(arena, s) for s in seeds)
+        for arena in dict.fromkeys([*arenas, OPEN])
+    }
+    pools = {arena: _pool(arena) for arena in places}
+
+    def trained(arena: str, rules: str, ants: int) -> ColonyPoint:
+        return ColonyPoint(
+            *(places[arena], TASKS[rules], training, pools[arena], ants),
+            episodes=episodes,
             ticks=ticks,
-            rollouts=min(LARGE_ROLLOUTS, rollouts) if large else rollouts,
+            rollouts=rollouts,
         )
-        for design in LARGE_DESIGNS if large else DESIGNS:
-            for ants in LARGE_SIZES if large else sizes:
-                ruled = replace(alone, task=TASKS[design.rules])
-                condition = Condition(arena, *design, ants)
-                conditions[condition] = _point(ruled, design.way, ants, sizes[-1])
+
+    conditions: Plan = {}
+    for arena in arenas:
+        for rules, n in product(TASKS, sizes if arena in ARENAS else ()):
+            conditions[Condition(arena, rules, JOINT, n)] = trained(arena, rules, n)
+        for rules, (way, few), n in product(COMPARED, TRAINED_WITH.items(), sizes):
+            if arena in ARENAS and n > few:
+                after = trained(arena, rules, few)
+                copies = replace(after, ants=n, episodes=0, after=after)
+                conditions[Condition(arena, rules, way, n)] = copies
+        for rules in COMPARED if arena != OPEN else ():
+            after = trained(OPEN, rules, sizes[-1])
+            abroad = replace(
+                after,
+                world=places[arena],
+                task=replace(after.task, life=LIVES.get(arena, _LIVELY)),
+                pool=None,
+                ants=LARGE_SIZE if arena == "large" else sizes[-1],
+                episodes=0,
+                after=after,
+            )
+            conditions[Condition(arena, rules, ABROAD, abroad.ants)] = abroad
     return conditions
 
 
-def _point(alone: ColonyPoint, way: str, ants: int, long: int) -> ColonyPoint:
-    """What is done for so many ants that come to their policy in a way.
-
-    Args:
-        alone: What is done for one ant; its epsilon need not decay yet.
-        way: A name in `WAYS`.
-        ants: How many.
-        long: How many times as long the way `COPIED_LONG` trains.
-    """
-    alone = _exploring(
-        replace(alone, episodes=alone.episodes * (long if way == COPIED_LONG else 1))
-    )
-    many = replace(alone, ants=ants)
-    if way == THEN_JOINT:
-        return replace(many, after=alone)
-    if ants == 1 or way == JOINT:  # learning jointly, or with a table of its own, is learning alone
-        return many
-    if way == OWN:
-        return replace(many, sharing="own")
-    return replace(many, episodes=0, after=alone)
+# Where food is not as in all other arenas.
+LIVES = {"moving": Life(regrowth=0, wander=100), "slow": Life(regrowth=100)}
+RANGES = {"small": (15, 15, 15), "wide": (60, 60, 60), "large": (100, 100, 100)}
+_DRAWN: dict[str, dict[str, Any]] = {
+    "piles": {"food_share": 0.0},
+    "moving": {"food_share": 0.0},
+    "one_pile": {"food_share": 0.0, "piles": 1},
+    "rocks": {"rock_share": 0.3},
+}
 
 
-def _exploring(point: ColonyPoint) -> ColonyPoint:
-    """The same with an epsilon that falls while the ants explore."""
-    training, exploring = point.training, max(1, round(_EXPLORING * point.episodes))
+def _place(arena: str, seed: int) -> World:
+    """The world of an arena, but the paper's, that a seed gives."""
+    return worlds.open_world(seed, RANGES.get(arena, (30, 30, 30)), **_DRAWN.get(arena, {}))
+
+
+def _pool(arena: str) -> tuple[World, ...] | None:
+    """Worlds for training, other ones than for evaluation; the paper's is the only one."""
+    if arena not in ARENAS or arena == "paper":
+        return None
+    return tuple(_place(arena, FIRST_OF_POOL + n) for n in range(POOL))
+
+
+def _scheduled(training: TrainingConfig, episodes: int) -> TrainingConfig:
+    """The same with an epsilon and a learning rate that fall geometrically while ants explore."""
+    exploring = max(1, round(EXPLORING * episodes))
     low = max(training.min_epsilon, 1e-6)
-    decay = min(1.0, (low / max(training.epsilon, low)) ** (1 / exploring))
-    return replace(point, training=replace(training, epsilon_decay=decay))
+    return replace(
+        training,
+        epsilon_decay=min(1.0, (low / max(training.epsilon, low)) ** (1 / exploring)),
+        learning_rate_decay=0.1 ** (1 / exploring),
+        min_learning_rate=training.learning_rate / 10,
+        initial_value=OPTIMISM,
+    )
 
 
 def measured(conditions: Plan, outcomes: Mapping[Any, Outcome]) -> Measured:
@@ -147,27 +173,34 @@ def measured(conditions: Plan, outcomes: Mapping[Any, Outcome]) -> Measured:
     }
 
 
-def limits_by_arena(conditions: Plan) -> dict[str, list[Limits]]:
-    """The limits of the world of each arena, or of each of its worlds."""
-    by_arena = {condition.arena: point.world for condition, point in conditions.items()}
-    return {
-        arena: [limits_of(one) for one in (world if isinstance(world, tuple) else (world,))]
-        for arena, world in by_arena.items()
-    }
+def most_deliveries(conditions: Plan) -> dict[Condition, float]:
+    """What no colony can deliver more per 1000 ticks: means over the worlds of a condition.
+
+    nan where food moves or takes time to grow back: there the limits do not hold.
+    """
+    found = {}
+    limits = {}
+    for condition, point in conditions.items():
+        places = point.world if isinstance(point.world, tuple) else (point.world,)
+        key = point.world, point.task.traffic, point.task.turns_at_queen
+        if key not in limits:
+            limits[key] = [limits_of(place, point.task) for place in places]
+        most = np.mean([one.deliveries(point.ants) for one in limits[key]])
+        found[condition] = float(most) if point.task.life == _LIVELY else np.nan
+    return found
 
 
 def median_policies(
     conditions: Plan, seeds: Sequence[int], found: Measured, outcomes: Mapping[Any, Outcome]
-) -> Iterator[tuple[str, np.ndarray, dict[str, Any]]]:
-    """Policies worth keeping: those of median seeds, trained alone and jointly, with trails.
+) -> Iterator[tuple[str, np.ndarray, dict[str, Any], str]]:
+    """Policies worth keeping: of the compared rules those of median seeds, trained jointly.
 
     Yields:
-        A name, the action values float32 (n_states, 5), and what made them.
+        A name, the action values float32 (n_states, 5), what made them, and their observation.
     """
     for condition, point in conditions.items():
         arena, rules, way, ants = condition
-        wanted = (way == COPIED and ants == 1) or (way == JOINT and ants > 1)
-        if rules != ON or not wanted:
+        if rules not in COMPARED or way != JOINT:
             continue
         deliveries = found[condition]["deliveries"]
         run = int(np.argsort(deliveries, kind="stable")[(len(seeds) - 1) // 2])
@@ -180,5 +213,5 @@ def median_policies(
             "ticks": point.ticks,
             "deliveries_per_1000_ticks": deliveries[run],
         }
-        trained = "alone" if way == COPIED else f"joint_{ants}"
-        yield f"{arena}_{trained}", outcomes[point]["q_values"][run], metadata
+        table = outcomes[point]["q_values"][run]
+        yield f"{arena}_{rules}_{ants}", table, metadata, point.task.observation

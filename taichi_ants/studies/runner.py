@@ -125,6 +125,9 @@ class ColonyPoint:
     Attributes:
         world: The world, or one for each seed, all of the same ranges.
         task, training: The rules of the game, and the learner.
+        pool: Worlds of the same ranges; each training episode of each seed takes place in one that
+            is drawn from these by the seed, so that evaluation in `world` tells what was learned
+            for worlds that no ant has seen. None: training takes place in `world`.
         ants: How many.
         sharing: "shared" or "own", of tables while the ants learn.
         start, capacity: As of a `Colony`.
@@ -140,6 +143,7 @@ class ColonyPoint:
     world: World | tuple[World, ...]
     task: Task
     training: TrainingConfig
+    pool: tuple[World, ...] | None = None
     ants: int = 1
     sharing: str = "shared"
     start: str = "nest"
@@ -170,6 +174,14 @@ class ColonyPoint:
         """About how much work a seed is."""
         return self.ants * self.ticks * (self.episodes + self.rollouts)
 
+    def places(self, seeds: Sequence[int]) -> list[list[World]] | None:
+        """The world of each training episode and seed; None without a pool."""
+        if self.pool is None:
+            return None
+        streams = [np.random.default_rng(seed % 2**64) for seed in seeds]
+        draws = [stream.integers(len(self.pool), size=self.episodes) for stream in streams]
+        return [[self.pool[n] for n in of_episode] for of_episode in np.transpose(draws)]
+
     @staticmethod
     def do(
         points: Sequence[ColonyPoint],
@@ -186,13 +198,14 @@ class ColonyPoint:
         share = point.episodes / (point.episodes + point.rollouts)
         tables: Any = learned
         if point.episodes:
+            places = point.places(seeds)
             learning = Colony(
-                *(point.world, point.task, point.training, seeds),
+                *(places[0] if places else point.world, point.task, point.training, seeds),
                 **options,
                 sharing=point.sharing,
                 q_values=learned,
             )
-            learning.run(point.episodes, point.ticks, _part(progress, 0.0, share))
+            learning.run(point.episodes, point.ticks, _part(progress, 0.0, share), places)
             tables = learning.q_values
         least = point.training.min_epsilon
         calm = replace(point.training, epsilon=least, epsilon_decay=1.0)
@@ -236,6 +249,9 @@ class Study(Generic[PointKind]):
                 raise AntsError(f"there are {len(several)} worlds for {len(self.seeds)} seeds.")
             for one, seed in zip(several, self.seeds, strict=False):
                 checks.checked_world(one, learns=True).start(seed, ants)
+        for pool, ants in dict.fromkeys((_pool(point), point.ants) for point in self.points):
+            for one in pool or ():
+                checks.checked_world(one, learns=True).start(0, ants)
 
     @property
     def in_order(self) -> tuple[PointKind, ...]:
@@ -258,7 +274,8 @@ class Study(Generic[PointKind]):
         What all points have in common is there once, all else as a list with an entry for each.
         """
         points = self.in_order
-        worlds = list(dict.fromkeys(point.world for point in points))
+        places: list[Any] = [place for one in points for place in (one.world, _pool(one)) if place]
+        worlds = list(dict.fromkeys(places))
         rows = [_facts(point, worlds, points) for point in points]
         columns = {name: [row.get(name) for row in rows] for row in rows for name in row}
         return {
@@ -329,10 +346,16 @@ def _pieces(whole: Sequence[Piece], size: int) -> Iterator[Sequence[Piece]]:
         yield whole[first : first + size]
 
 
+def _pool(point: Point) -> tuple[World, ...] | None:
+    return getattr(point, "pool", None)
+
+
 def _facts(point: Point, worlds: list, points: Sequence[Point]) -> dict[str, Any]:
     """A point as names and values; worlds and other points by their number."""
     facts = {field.name: getattr(point, field.name) for field in fields(point)}
     facts["world"] = worlds.index(point.world)
+    if facts.get("pool"):
+        facts["pool"] = worlds.index(facts["pool"])
     if facts.get("after"):
         facts["after"] = points.index(facts["after"])
     return flat({**facts, "task": point.task.as_dict(), "training": point.training.as_dict()})

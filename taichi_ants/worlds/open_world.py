@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, shown, whole
+from taichi_ants.errors import AntsError, checked_whole, shown, whole
 from taichi_ants.grid.hexgrid import AxialGrid, axial, cube
 from taichi_ants.grid.randomness import Stream, choose
 from taichi_ants.worlds.validation import parse_ranges
@@ -32,8 +32,9 @@ def open_world(
     ranges: Sequence[int] | None = None,
     rock_share: float = 0.15,
     food_share: float = 0.03,
+    piles: int = 3,
 ) -> World:
-    """A random world: the queen at the origin, rocks, single foods and three piles of food.
+    """A random world: the queen at the origin, rocks, single foods and up to three piles of food.
 
     Rocks are hexagons of a radius from 0 to max(1, min(X, Y, Z) // 20), placed until their share of
     the cells is reached. Piles are hexagons of radius max(1, n // 16), three quarters along each
@@ -46,14 +47,16 @@ def open_world(
         rock_share: Share of the cells that rocks cover before the clearing and the piles.
         food_share: Number of single foods as a share of all cells (piles come on top); where fewer
             cells are free, these.
+        piles: How many piles there are, 0 to 3, along the ranges in their order.
 
     Raises:
-        AntsError: A share is not a number, below 0 or both above 0.9 together; the ranges are not
-            allowed; or no food could be reached from the queen in 100 worlds drawn.
+        AntsError: A share is not a number, below 0 or both above 0.9 together; the ranges or the
+            piles are not allowed; or no food could be reached from the queen in 100 worlds drawn.
     """
     seed = whole("seed", seed)
     rock_share = _share("rock_share", rock_share)
     food_share = _share("food_share", food_share)
+    piles = checked_whole("piles", piles, least=0, most=3)
     if rock_share + food_share > MAX_SHARE:
         raise AntsError(
             f"rock_share {rock_share} and food_share {food_share} add up to more than {MAX_SHARE}; "
@@ -63,7 +66,7 @@ def open_world(
     for attempt in range(MAX_DRAWS):
         words = Stream(seed, _STREAM_RANGES, attempt).bits(3) >> np.uint64(32)
         grid = AxialGrid(given or parse_ranges(10 + choose(words, 91)))  # from 10 to 100
-        world = _draw(grid, rock_share, food_share, seed, attempt)
+        world = _draw(grid, rock_share, food_share, piles, seed, attempt)
         if world.reachable_foods().any():
             return world
     raise AntsError(
@@ -80,13 +83,17 @@ def _share(name: str, value: Any) -> float:
     return float(value)
 
 
-def _draw(grid: AxialGrid, rock_share: float, food_share: float, seed: int, attempt: int) -> World:
+def _draw(
+    grid: AxialGrid, rock_share: float, food_share: float, piles: int, seed: int, attempt: int
+) -> World:
     """One world, whether or not its food can be reached."""
     rocks = scatter_rocks(grid, rock_share, Stream(seed, _STREAM_ROCKS, attempt))
     food = np.zeros(grid.size, dtype=bool)
     ranges = np.array(grid.ranges)
-    _, piles = _hexagons(grid, np.diag(3 * ranges // 4), np.maximum(1, ranges // 16))
-    food[piles] = True
+    if piles:
+        radii = np.maximum(1, ranges // 16)
+        _, cells = _hexagons(grid, np.diag(3 * ranges // 4)[:piles], radii[:piles])
+        food[cells] = True
     rocks &= ~food
     _, clearing = _hexagons(grid, np.array([_QUEEN]), np.array([CLEARING_RADIUS]))
     rocks[clearing] = False

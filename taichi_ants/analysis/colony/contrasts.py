@@ -7,14 +7,17 @@ from itertools import combinations
 from typing import Literal
 
 from taichi_ants.analysis.colony.study import (
-    COPIED,
-    COPIED_LONG,
-    JOINT,
-    LASTING,
-    OFF,
-    ON,
-    OWN,
-    THEN_JOINT,
+    ABC,
+    ABC_SILENT,
+    ABROAD,
+    ALONE,
+    BC,
+    FEW,
+    PAPER,
+    QUEUES,
+    SILENT,
+    SOME,
+    A,
     Condition,
     Design,
     Measured,
@@ -35,9 +38,9 @@ class Series:
         first, second: The difference is first minus second.
         measure: A name in `MEASURES`.
         against: With how many ants of the second each number of ants of the first is compared:
-            with the same number, with each smaller one, or the largest with one ant.
-        least: The smallest number of ants that is compared with the same. With one ant all ways
-            but two trainings in turn are alike.
+            with the same number or with each smaller one.
+        least: The smallest number of ants that is compared with the same. For one ant all ways are
+            alike, and so are rules for several.
     """
 
     question: str
@@ -45,7 +48,7 @@ class Series:
     first: Design
     second: Design
     measure: str = "deliveries"
-    against: Literal["same", "smaller", "one"] = "same"
+    against: Literal["same", "smaller"] = "same"
     least: int = 2
 
     def contrasts(self, measured: Measured, arena: str) -> dict[Sizes, Contrast]:
@@ -64,51 +67,51 @@ class Series:
         )
         if self.against == "smaller":
             return [(n, less) for less, n in combinations(sizes, 2) if less in others]
-        if self.against == "one":
-            return [(n, 1) for n in sizes[-1:] if n > 1 and 1 in others]
         return [(n, n) for n in sizes if n >= self.least and n in others]
 
 
-COPIES = "Do more copies help?"
-CROWDING = "Where does crowding begin?"
-CURE = "Does joint learning cure it?"
-TRAIL = "Does the trail that ants lay themselves help?"
-
-_COPIES, _COPIES_OFF, _COPIES_LASTING = (Design(one, COPIED) for one in (ON, OFF, LASTING))
-_JOINT, _JOINT_OFF, _JOINT_LASTING = (Design(one, JOINT) for one in (ON, OFF, LASTING))
+ADDS = "What does each rule add?"
+TRAIL = "Do the trails help?"
+MORE = "Do more ants help?"
+TRAINING = "With how many ants to train?"
+ELSEWHERE = "Does a policy hold in other worlds?"
 
 # fmt: off
 SERIES: tuple[Series, ...] = (
-    Series(COPIES, "copies of an ant trained alone deliver more than fewer of them do",
-           _COPIES, _COPIES, against="smaller"),
-    Series(COPIES, "jointly trained ants deliver more than fewer of them do",
-           _JOINT, _JOINT, against="smaller"),
-    Series(CROWDING, "each of many copies delivers more than each of fewer",
-           _COPIES, _COPIES, "per_ant", "smaller"),
-    Series(CROWDING, "each of many copies that lay no trails delivers more than each of fewer",
-           _COPIES_OFF, _COPIES_OFF, "per_ant", "smaller"),
-    Series(CROWDING, "each of many jointly trained ants delivers more than each of fewer",
-           _JOINT, _JOINT, "per_ant", "smaller"),
-    Series(CURE, "jointly trained ants deliver more than copies of an ant trained alone",
-           _JOINT, _COPIES),
-    Series(CURE, "jointly trained ants deliver more than copies of one trained alone for long",
-           _JOINT, Design(ON, COPIED_LONG)),
-    Series(CURE, "ants with a table each deliver more than ants that share one",
-           Design(ON, OWN), _JOINT),
-    Series(CURE, "ants trained alone and then jointly deliver more than ants only trained jointly",
-           Design(ON, THEN_JOINT), _JOINT),
-    Series(CURE, "each of many jointly trained ants delivers more than one ant alone",
-           _JOINT, _COPIES, "per_ant", "one"),
-    Series(TRAIL, "jointly trained ants that lay trails deliver more than ants that lay none",
-           _JOINT, _JOINT_OFF),
-    Series(TRAIL, "copies that lay trails deliver more than copies that lay none",
-           _COPIES, _COPIES_OFF, least=1),
-    Series(TRAIL, "jointly trained ants deliver more if their trails evaporate",
-           _JOINT, _JOINT_LASTING),
-    Series(TRAIL, "copies deliver more if their trails evaporate",
-           _COPIES, _COPIES_LASTING, least=1),
-    Series(TRAIL, "jointly trained ants that lay trails get more reward than ants that lay none",
-           _JOINT, _JOINT_OFF, "reward"),
+    Series(ADDS, "ants with all three rules deliver more than under the paper's rules",
+           Design(ABC), Design(PAPER)),
+    Series(ADDS, "ants with all three rules deliver more than with trails with a direction alone",
+           Design(ABC), Design(A)),
+    Series(ADDS, "ants with all three rules deliver more than with right of way and ants in view",
+           Design(ABC), Design(BC)),
+    Series(ADDS, "ants that queue deliver more than with the three rules",
+           Design(QUEUES), Design(ABC)),
+    Series(TRAIL, "under the paper's rules, ants that lay trails deliver more than ants that do not",
+           Design(PAPER), Design(SILENT), least=1),
+    Series(TRAIL, "under the paper's rules, ants deliver more if trails have a direction",
+           Design(A), Design(PAPER), least=1),
+    Series(TRAIL, "with all three rules, ants that lay trails deliver more than ants that do not",
+           Design(ABC), Design(ABC_SILENT), least=1),
+    Series(MORE, "under the paper's rules, ants deliver more than fewer of them do",
+           Design(PAPER), Design(PAPER), against="smaller"),
+    Series(MORE, "with all three rules, ants deliver more than fewer of them do",
+           Design(ABC), Design(ABC), against="smaller"),
+    Series(MORE, "with all three rules, each ant delivers more than each of fewer",
+           Design(ABC), Design(ABC), "per_ant", "smaller"),
+    Series(TRAINING, "under the paper's rules, jointly trained ants deliver more than copies of one",
+           Design(PAPER), Design(PAPER, ALONE)),
+    Series(TRAINING, "with all three rules, jointly trained ants deliver more than copies of one",
+           Design(ABC), Design(ABC, ALONE)),
+    Series(TRAINING, "with all three rules, ants deliver more if not only 4 train",
+           Design(ABC), Design(ABC, FEW)),
+    Series(TRAINING, "with all three rules, ants deliver more if not only 16 train",
+           Design(ABC), Design(ABC, SOME)),
+    Series(ELSEWHERE, "ants trained where they are deliver more than ants trained in open worlds",
+           Design(ABC), Design(ABC, ABROAD)),
+    Series(ELSEWHERE, "trained in open worlds, all three rules deliver more than the paper's",
+           Design(ABC, ABROAD), Design(PAPER, ABROAD)),
+    Series(ELSEWHERE, "trained in open worlds, ants that queue deliver more than with three rules",
+           Design(QUEUES, ABROAD), Design(ABC, ABROAD)),
 )
 # fmt: on
 

@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from taichi_ants.analysis import style
 from taichi_ants.analysis.colony.study import (
+    ABC,
+    ABROAD,
+    ALONE,
     ARENAS,
-    COPIED,
+    BC,
+    FEW,
     JOINT,
     MEASURES,
-    ON,
+    PAPER,
+    QUEUES,
     RULES,
-    WAYS,
+    SOME,
+    WORLDS,
+    A,
     Design,
 )
 from taichi_ants.analysis.sweeps import draw_lines
@@ -23,44 +30,117 @@ from taichi_ants.analysis.tables import sentence
 from taichi_ants.files import check_writable_folder
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Rows = Sequence[Mapping[str, Any]]
-_WAYS = tuple(Design(ON, way) for way in WAYS)
-_TRAILS = tuple(Design(rules, way) for way in (COPIED, JOINT) for rules in RULES)
-_LIMITED = ("deliveries", "per_ant")
-
-# By name: a title, the measure of each row of panels, the designs.
-FIGURES: dict[str, tuple[str, tuple[str, ...], tuple[Design, ...]]] = {
-    "scaling": ("More ants: what a colony delivers, and each of its ants", _LIMITED, _WAYS),
-    "crowding": (
-        "More ants: how often they block each other, how soon one delivers",
-        ("blocked", "first_delivery"),
-        _WAYS,
-    ),
-    "trails": (
-        "Do the trails help that ants lay themselves?",
-        ("deliveries", "reward"),
-        _TRAILS,
-    ),
-}
 
 
 def save_all(rows: Rows, folder: str | Path) -> None:
-    """Write all figures as PNG files into a folder, which is made if needed.
+    """Write all figures for which there are rows as PNG files into a folder, made if needed.
 
     Raises:
         AntsError: The folder or a file in it cannot be written.
     """
     folder = check_writable_folder(folder)
-    for name in FIGURES:
-        style.save(draw(name, rows), folder / f"{name}.png")
+    for name, draw in FIGURES.items():
+        figure = draw(rows)
+        if figure is not None:
+            style.save(figure, folder / f"{name}.png")
 
 
-def draw(name: str, rows: Rows) -> Figure:
-    """One of `FIGURES`: measures against the number of ants, a column of panels for each arena."""
-    title, measures, designs = FIGURES[name]
-    arenas = list(dict.fromkeys(row["arena"] for row in rows))
+def rules(rows: Rows) -> Figure | None:
+    """What the largest colony delivers under each of the rules: a panel for each arena."""
+    at_home = [row for row in rows if row["way"] == JOINT]
+    largest = max((row["ants"] for row in at_home), default=0)
+    panels = {
+        sentence(ARENAS[arena]): [
+            (RULES[row["rules"]], row)
+            for row in at_home
+            if (row["arena"], row["ants"]) == (arena, largest)
+        ]
+        for arena in dict.fromkeys(row["arena"] for row in at_home)
+    }
+    caption = f"{_spread(rows)} Dashed: no colony can deliver more."
+    return _dots(panels, f"What each rule adds: {largest:g} ants, trained jointly", caption)
+
+
+def elsewhere(rows: Rows) -> Figure | None:
+    """What ants deliver in other worlds than those of their training: a panel for each world."""
+    abroad = [row for row in rows if row["way"] == ABROAD]
+    panels = {
+        textwrap.fill(sentence(WORLDS[arena]), 24): [
+            (RULES[row["rules"]], row) for row in abroad if row["arena"] == arena
+        ]
+        for arena in dict.fromkeys(row["arena"] for row in abroad)
+    }
+    caption = f"{_spread(rows)} All were trained in open worlds; none has seen these before."
+    return _dots(panels, "In other worlds than those of the training", caption)
+
+
+def scaling(rows: Rows) -> Figure | None:
+    """Deliveries against the number of ants."""
+    designs = [Design(rules) for rules in (PAPER, A, BC, ABC, QUEUES)]
+    return _lines(rows, designs, ("deliveries", "per_ant"), "More ants: what a colony delivers")
+
+
+def training(rows: Rows) -> Figure | None:
+    """Deliveries of ants that were trained as so many."""
+    designs = [Design(rules, way) for rules in (PAPER, ABC) for way in (JOINT, SOME, FEW, ALONE)]
+    return _lines(rows, designs, ("deliveries", "blocked"), "With how many ants to train")
+
+
+FIGURES: dict[str, Callable[[Rows], Figure | None]] = {
+    "rules": rules,
+    "scaling": scaling,
+    "training": training,
+    "elsewhere": elsewhere,
+}
+
+
+def _dots(
+    panels: Mapping[str, Sequence[tuple[str, Mapping]]], title: str, caption: str
+) -> Figure | None:
+    """Deliveries with intervals, a line for each label, in panels with axes of their own."""
+    panels = {name: lines for name, lines in panels.items() if lines}
+    if not panels:
+        return None
+    across = min(4, len(panels))
+    down = -(-len(panels) // across)
+    with style.styled():
+        figure = style.new_figure(1.6 + down * (0.9 + 0.28 * max(map(len, panels.values()))))
+        axes = figure.subplots(down, across, sharey=True, squeeze=False).flat
+        for axis, (name, lines) in zip(axes, panels.items(), strict=False):
+            axis.set_title(name, fontsize=9)
+            axis.set_xlabel(sentence(MEASURES["deliveries"]), fontsize=8)
+            for place, (_, row) in enumerate(lines):
+                _dot(axis, place, row)
+            limits = [row["deliveries_limit"] for _, row in lines]
+            axis.plot(limits, range(len(lines)), "--", color=style.GREY, drawstyle="steps-mid")
+            axis.set_yticks(range(len(lines)), [label for label, _ in lines])
+            axis.set_xlim(left=0)
+        axes[0].invert_yaxis()
+        for axis in list(axes)[len(panels) :]:
+            axis.set_axis_off()
+        style.frame(figure, title, caption, {})
+    return figure
+
+
+def _dot(axis: Axes, place: int, row: Mapping) -> None:
+    mean, low, high = (row[f"deliveries_{end}"] for end in ("mean", "ci_low", "ci_high"))
+    colour = style.COLOURS[place % len(style.COLOURS)]
+    axis.hlines(place, low, high, color=colour)
+    axis.plot(mean, place, "o", color=colour)
+    axis.annotate(f"{mean:.0f}", (mean, place), (0, 5), textcoords="offset points", ha="center")
+
+
+def _lines(
+    rows: Rows, designs: Sequence[Design], measures: Sequence[str], title: str
+) -> Figure | None:
+    """Measures against the number of ants, a column of panels for each arena."""
+    arenas = [one for one in ARENAS if any(row["arena"] == one for row in rows)]
+    if not arenas:
+        return None
     with style.styled():
         figure = style.new_figure(5.6)
         shape = len(measures), len(arenas)
@@ -70,23 +150,16 @@ def draw(name: str, rows: Rows) -> Figure:
             for axis, arena in zip(line_of_axes, arenas, strict=True):
                 of_arena = [row for row in rows if row["arena"] == arena]
                 draw_lines(axis, {one.words: _points(of_arena, one, measure) for one in designs})
-                if measure in _LIMITED:
-                    most = {row["ants"]: row["deliveries_limit"] for row in of_arena}
-                    if measure == "per_ant":
-                        most = {ants: limit / ants for ants, limit in most.items()}
-                    limit = sorted(most.items())
-                    axis.plot(*zip(*limit, strict=True), "--", color=style.GREY, label="limit")
         for column, arena in zip(axes.T, arenas, strict=True):
             column[0].set_title(sentence(ARENAS[arena]), fontsize=9)
             column[-1].set_xlabel("Ants")
-        seeds = rows[0]["seeds"]
-        spread = f"Means over {seeds:g} seeds with 95 % intervals." if seeds > 1 else "One seed."
-        caption = (
-            f"{spread} Each ant was trained under the conditions that it is shown in. An episode\n"
-            "without a delivery counts with all its ticks. Dashed grey: no colony can deliver more."
-        )
-        style.frame(figure, title, caption, style.legend_entries(axes.flat))
+        style.frame(figure, title, _spread(rows), style.legend_entries(axes.flat))
     return figure
+
+
+def _spread(rows: Rows) -> str:
+    seeds = rows[0]["seeds"]
+    return f"Means over {seeds:g} seeds with 95 % intervals." if seeds > 1 else "One seed."
 
 
 def _points(rows: Rows, design: Design, measure: str) -> list[tuple[float, ...]]:

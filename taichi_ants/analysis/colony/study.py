@@ -1,8 +1,9 @@
-"""What the scaling study of the colony compares, and what it measures.
+"""What the study of the colony compares, and what it measures.
 
 A condition is so many ants of a design in one kind of world. A design is the rules of the game and
 a way to come to a policy. Seeds are the unit of all statistics; they pair the conditions of an
-arena, since a seed gives all of them the same world.
+arena, since a seed gives all of them the same world. But in the paper's world, ants are evaluated
+in worlds that none has seen before.
 """
 
 from __future__ import annotations
@@ -12,27 +13,46 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Kinds of world, with the words of tables and figures.
+# Kinds of world in which ants are trained and evaluated, with the words of tables and figures.
 ARENAS: dict[str, str] = {
     "paper": "the paper's world",
     "open": "open worlds (30, 30, 30)",
-    "large": "large worlds (100, 100, 100)",
+    "piles": "worlds of three far piles (30, 30, 30)",
 }
-# Rules of the game: here what becomes of the trails that ants lay.
-ON, OFF, LASTING = "on", "off", "lasting"
+# Kinds of world in which ants are evaluated that were trained in open ones.
+ELSEWHERES: dict[str, str] = {
+    "rocks": "twice the rocks",
+    "one_pile": "one far pile",
+    "moving": "piles that move every 100 ticks",
+    "slow": "food that grows back after 100 ticks",
+    "small": "small worlds (15, 15, 15)",
+    "wide": "wide worlds (60, 60, 60)",
+    "large": "large worlds (100, 100, 100), 1000 ants",
+}
+WORLDS = {**ARENAS, **ELSEWHERES}
+
+# Rules of the game: A, trails that rise towards food; B, right of way; C, ants in view.
+PAPER, SILENT, A, BC, ABC, ABC_SILENT, QUEUES = (
+    *("paper", "paper_no_trails", "direction", "right_of_way"),
+    *("foraging", "foraging_no_trails", "queueing"),
+)
 RULES: dict[str, str] = {
-    ON: "evaporating trails",
-    OFF: "no trails laid",
-    LASTING: "lasting trails",
+    PAPER: "paper's rules",
+    SILENT: "paper's rules, no trails laid",
+    A: "A",
+    BC: "B + C",
+    ABC: "A + B + C",
+    ABC_SILENT: "B + C, no trails laid",
+    QUEUES: "queues",
 }
 # Ways to come to a policy.
-COPIED, COPIED_LONG, JOINT, THEN_JOINT, OWN = "copied", "copied_long", "joint", "then_joint", "own"
+JOINT, ALONE, FEW, SOME, ABROAD = "joint", "alone", "with_4", "with_16", "open"
 WAYS: dict[str, str] = {
-    COPIED: "trained alone, copied",
-    COPIED_LONG: "trained alone for long, copied",
     JOINT: "trained jointly",
-    THEN_JOINT: "trained alone, then jointly",
-    OWN: "a table per ant",
+    ALONE: "trained alone, copied",
+    FEW: "trained with 4",
+    SOME: "trained with 16",
+    ABROAD: "trained in open worlds",
 }
 
 
@@ -40,16 +60,17 @@ class Design(NamedTuple):
     """Names in `RULES` and `WAYS`."""
 
     rules: str
-    way: str
+    way: str = JOINT
 
     @property
     def words(self) -> str:
         """What tables call it."""
-        return f"{WAYS[self.way]} ({RULES[self.rules]})"
+        rules = RULES[self.rules]
+        return rules if self.way == JOINT else f"{rules}, {WAYS[self.way]}"
 
 
 class Condition(NamedTuple):
-    """What was evaluated: a name in `ARENAS`, a design, and how many ants."""
+    """What was evaluated: a name in `WORLDS`, a design, and how many ants."""
 
     arena: str
     rules: str
@@ -60,11 +81,11 @@ class Condition(NamedTuple):
 # What is measured, with the words of tables.
 MEASURES: dict[str, str] = {
     "deliveries": "deliveries per 1000 ticks",
-    "per_ant": "deliveries per ant at the start and 1000 ticks",
+    "per_ant": "deliveries per ant and 1000 ticks",
     "first_delivery": "ticks to the first delivery",
     "fruitless": "share of episodes without a delivery",
     "blocked": "share of blocked moves",
-    "reward": "reward per ant at the start and 1000 ticks",
+    "reward": "reward per ant and 1000 ticks",
 }
 # Measures of each seed, float64 (seeds,), by their names in `MEASURES`.
 Measured = Mapping[Condition, Mapping[str, np.ndarray]]

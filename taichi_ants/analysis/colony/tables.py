@@ -7,16 +7,22 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants.analysis.bounds.limits import Limits
 from taichi_ants.analysis.colony.contrasts import QUESTIONS, Judged, Series, Sizes
-from taichi_ants.analysis.colony.study import ARENAS, MEASURES, Condition, Design, Measured
+from taichi_ants.analysis.colony.study import (
+    ABROAD,
+    ARENAS,
+    MEASURES,
+    RULES,
+    WAYS,
+    WORLDS,
+    Condition,
+    Design,
+    Measured,
+)
 from taichi_ants.analysis.findings import Finding, Verdict, weakest
 from taichi_ants.analysis.sweeps import seed_rows, summary_rows
 from taichi_ants.analysis.tables import MISSING, Block, Table, figure, sentence
 from taichi_ants.errors import count
-
-# The limits of the worlds of an arena: one, or one for each seed.
-LimitsByArena = Mapping[str, Sequence[Limits]]
 
 
 def rows_of_seeds(measured: Measured, seeds: Sequence[int]) -> list[dict[str, Any]]:
@@ -29,13 +35,13 @@ def _stacked(measured: Measured) -> dict[str, np.ndarray]:
     return {name: np.stack([one[name] for one in measured.values()]) for name in MEASURES}
 
 
-def condition_rows(measured: Measured, limits: LimitsByArena) -> list[dict[str, Any]]:
+def condition_rows(measured: Measured, most: Mapping[Condition, float]) -> list[dict[str, Any]]:
     """The rows of conditions.csv: means over seeds with 95 % intervals, and the most possible."""
     rows = summary_rows([one._asdict() for one in measured], _stacked(measured))
-    for row in rows:
-        possible = [one.deliveries(row["ants"]) for one in limits[row["arena"]]]
-        row["deliveries_limit"] = float(np.mean(possible))
-    return rows
+    return [
+        {**row, "deliveries_limit": most[condition]}
+        for row, condition in zip(rows, measured, strict=True)
+    ]
 
 
 def difference_rows(judged: Judged) -> list[dict[str, Any]]:
@@ -59,20 +65,34 @@ def difference_rows(judged: Judged) -> list[dict[str, Any]]:
 
 
 def means(rows: Sequence[Mapping[str, Any]]) -> list[Table]:
-    """Mean deliveries, from `condition_rows`, a table for each arena: designs down, ants across."""
-    tables = []
-    for arena in dict.fromkeys(row["arena"] for row in rows):
-        lines: dict[str, dict[int, float]] = {}
-        of_arena = [row for row in rows if row["arena"] == arena]
-        for row in of_arena:
-            words = Design(row["rules"], row["way"]).words
-            lines.setdefault(words, {})[row["ants"]] = row["deliveries_mean"]
-        lines["limit"] = {row["ants"]: row["deliveries_limit"] for row in of_arena}
-        sizes = sorted(lines["limit"])
-        cells = [[who, *(figure(by.get(n, np.nan)) for n in sizes)] for who, by in lines.items()]
-        seeds = count(rows[0]["seeds"], "seed")
-        title = f"{sentence(ARENAS[arena])}, {seeds}: {MEASURES['deliveries']}"
-        tables.append(Table(title, ("ants", *map(str, sizes)), cells))
+    """Mean deliveries, from `condition_rows`: a table for each arena in which ants were trained,
+    designs down, ants across; then one of the policies of open worlds in others.
+    """
+    tables, seeds = [], f"{count(rows[0]['seeds'], 'seed')}: {MEASURES['deliveries']}"
+    for arena in ARENAS:
+        at_home = [row for row in rows if row["arena"] == arena and row["way"] != ABROAD]
+        sizes = sorted({row["ants"] for row in at_home})
+        lines: dict[str, dict[Any, float]] = {}
+        for row in at_home:
+            line = lines.setdefault(Design(row["rules"], row["way"]).words, {})
+            line |= {row["ants"]: row["deliveries_mean"], "limit": row["deliveries_limit"]}
+        cells = [
+            [who, *(figure(by.get(n, np.nan)) for n in (*sizes, "limit"))]
+            for who, by in lines.items()
+        ]
+        headers = ("ants", *map(str, sizes), "limit")
+        if cells:
+            tables.append(Table(f"{sentence(ARENAS[arena])}, {seeds}", headers, cells))
+    abroad = [row for row in rows if row["way"] == ABROAD]
+    if abroad:
+        rules = list(dict.fromkeys(row["rules"] for row in abroad))
+        there: dict[str, dict[str, float]] = {}
+        for row in abroad:
+            there.setdefault(row["arena"], {})[row["rules"]] = row["deliveries_mean"]
+        cells = [[WORLDS[a], *(figure(by[one]) for one in rules)] for a, by in there.items()]
+        headers = ("world", *(RULES[one] for one in rules))
+        title = f"{sentence(WAYS[ABROAD])}, {abroad[0]['ants']} ants, {seeds}"
+        tables.append(Table(title, headers, cells))
     return tables
 
 
@@ -87,7 +107,7 @@ def found(measured: Measured, judged: Judged) -> list[Block]:
         lines, units, shown = [], [], ""
         for (arena, series), findings in judged.items():
             if series.question == question:
-                world = "" if arena == shown else sentence(ARENAS[arena])
+                world = "" if arena == shown else sentence(WORLDS[arena])
                 verdicts = _verdicts(measured, arena, series, findings)
                 lines.append([world, sentence(series.statement), *verdicts])
                 units.append(MEASURES[series.measure])
