@@ -199,8 +199,8 @@ def do_study(
     report = plain_text([*tables.means(rows), *findings], WIDTH)
     files.write_text(ready / REPORT, report)
     policies = files.check_writable_folder(ready / "policies")
-    for name, table, facts, seen in median_policies(conditions, asked.seeds, values, outcomes):
-        save_policy(policies / f"{name}.npz", table, facts, seen)
+    for name, q, facts, seen in median_policies(conditions, asked.seeds, values, outcomes):
+        save_policy(policies / f"{name}.npz", q, facts, seen)
     if not settings.no_figures:
         save_all(rows, ready / FIGURES)
 

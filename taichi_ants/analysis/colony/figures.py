@@ -50,44 +50,27 @@ def save_all(rows: Rows, folder: str | Path) -> None:
 
 
 def rules(rows: Rows) -> Figure | None:
-    """What the largest colony delivers under each of the rules: a panel for each arena."""
-    at_home = [row for row in rows if row["way"] == JOINT]
-    largest = max((row["ants"] for row in at_home), default=0)
-    panels = {
-        sentence(ARENAS[arena]): [
-            (RULES[row["rules"]], row)
-            for row in at_home
-            if (row["arena"], row["ants"]) == (arena, largest)
-        ]
-        for arena in dict.fromkeys(row["arena"] for row in at_home)
-    }
-    caption = f"{_spread(rows)} Dashed: no colony can deliver more."
-    return _dots(panels, f"What each rule adds: {largest:g} ants, trained jointly", caption)
+    """What the largest colony delivers under each of the rules."""
+    designs = [Design(rules) for rules in RULES]
+    return _dots(rows, designs, "What each rule adds")
+
+
+def training(rows: Rows) -> Figure | None:
+    """What the largest colony delivers after training with so many ants."""
+    designs = [Design(rules, way) for rules in (PAPER, ABC) for way in (ALONE, FEW, SOME, JOINT)]
+    return _dots(rows, designs, "With how many ants to train")
 
 
 def elsewhere(rows: Rows) -> Figure | None:
-    """What ants deliver in other worlds than those of their training: a panel for each world."""
-    abroad = [row for row in rows if row["way"] == ABROAD]
-    panels = {
-        textwrap.fill(sentence(WORLDS[arena]), 24): [
-            (RULES[row["rules"]], row) for row in abroad if row["arena"] == arena
-        ]
-        for arena in dict.fromkeys(row["arena"] for row in abroad)
-    }
-    caption = f"{_spread(rows)} All were trained in open worlds; none has seen these before."
-    return _dots(panels, "In other worlds than those of the training", caption)
+    """What ants deliver in other worlds than those of their training."""
+    designs = [Design(rules, ABROAD) for rules in (PAPER, ABC, QUEUES)]
+    return _dots(rows, designs, "In other worlds than those of the training")
 
 
 def scaling(rows: Rows) -> Figure | None:
     """Deliveries against the number of ants."""
     designs = [Design(rules) for rules in (PAPER, A, BC, ABC, QUEUES)]
     return _lines(rows, designs, ("deliveries", "per_ant"), "More ants: what a colony delivers")
-
-
-def training(rows: Rows) -> Figure | None:
-    """Deliveries of ants that were trained as so many."""
-    designs = [Design(rules, way) for rules in (PAPER, ABC) for way in (JOINT, SOME, FEW, ALONE)]
-    return _lines(rows, designs, ("deliveries", "blocked"), "With how many ants to train")
 
 
 FIGURES: dict[str, Callable[[Rows], Figure | None]] = {
@@ -98,40 +81,46 @@ FIGURES: dict[str, Callable[[Rows], Figure | None]] = {
 }
 
 
-def _dots(
-    panels: Mapping[str, Sequence[tuple[str, Mapping]]], title: str, caption: str
-) -> Figure | None:
-    """Deliveries with intervals, a line for each label, in panels with axes of their own."""
-    panels = {name: lines for name, lines in panels.items() if lines}
+def _dots(rows: Rows, designs: Sequence[Design], title: str) -> Figure | None:
+    """Deliveries of the largest colonies, a line for each design, a panel for each arena."""
+    panels: dict[str, dict[Design, Mapping]] = {}
+    for row in sorted(rows, key=lambda row: row["ants"]):
+        design = Design(row["rules"], row["way"])
+        if design in designs:  # larger colonies come later
+            panels.setdefault(row["arena"], {})[design] = row
     if not panels:
         return None
     across = min(4, len(panels))
     down = -(-len(panels) // across)
     with style.styled():
-        figure = style.new_figure(1.6 + down * (0.9 + 0.28 * max(map(len, panels.values()))))
-        axes = figure.subplots(down, across, sharey=True, squeeze=False).flat
-        for axis, (name, lines) in zip(axes, panels.items(), strict=False):
-            axis.set_title(name, fontsize=9)
-            axis.set_xlabel(sentence(MEASURES["deliveries"]), fontsize=8)
-            for place, (_, row) in enumerate(lines):
-                _dot(axis, place, row)
-            limits = [row["deliveries_limit"] for _, row in lines]
-            axis.plot(limits, range(len(lines)), "--", color=style.GREY, drawstyle="steps-mid")
-            axis.set_yticks(range(len(lines)), [label for label, _ in lines])
+        figure = style.new_figure(1.3 + down * (0.9 + 0.28 * len(designs)))
+        axes = figure.subplots(down, across, sharey=True, squeeze=False)
+        for axis, (arena, lines) in zip(axes.flat, panels.items(), strict=False):
+            axis.set_title(textwrap.fill(sentence(WORLDS[arena]), 96 // across), fontsize=9)
+            for design, row in lines.items():
+                _dot(axis, designs.index(design), row)
             axis.set_xlim(left=0)
-        axes[0].invert_yaxis()
-        for axis in list(axes)[len(panels) :]:
+        axes[0, 0].set_ylim(len(designs) - 0.5, -0.7)
+        for axis in axes[:, 0]:
+            axis.set_yticks(range(len(designs)), [one.words for one in designs])
+        for axis in axes.flat[len(panels) :]:
             axis.set_axis_off()
-        style.frame(figure, title, caption, {})
+        largest = max(row["ants"] for lines in panels.values() for row in lines.values())
+        caption = f"{largest:g} ants. {_spread(rows)} Grey bar: no colony can deliver more."
+        style.frame(figure, f"{title}: {MEASURES['deliveries']}", caption, {})
     return figure
 
 
 def _dot(axis: Axes, place: int, row: Mapping) -> None:
+    """The mean with its interval and its value, and the most possible where it is known."""
     mean, low, high = (row[f"deliveries_{end}"] for end in ("mean", "ci_low", "ci_high"))
     colour = style.COLOURS[place % len(style.COLOURS)]
     axis.hlines(place, low, high, color=colour)
     axis.plot(mean, place, "o", color=colour)
-    axis.annotate(f"{mean:.0f}", (mean, place), (0, 5), textcoords="offset points", ha="center")
+    axis.plot(row["deliveries_limit"], place, "|", color=style.GREY, ms=12, mew=2)
+    axis.annotate(
+        f"{mean:.0f}", (mean, place), (0, 5), textcoords="offset points", ha="center", fontsize=8
+    )
 
 
 def _lines(

@@ -17,7 +17,7 @@ import numpy as np
 ARENAS: dict[str, str] = {
     "paper": "the paper's world",
     "open": "open worlds (30, 30, 30)",
-    "piles": "worlds of three far piles (30, 30, 30)",
+    "piles": "three far piles (30, 30, 30)",
 }
 # Kinds of world in which ants are evaluated that were trained in open ones.
 ELSEWHERES: dict[str, str] = {
