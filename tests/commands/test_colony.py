@@ -1,4 +1,4 @@
-"""The scaling study and single colonies as a command: files held against the library."""
+"""The study of the colony and single colonies as a command: files held against the library."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -28,29 +29,23 @@ from taichi_ants import Colony, Life, Pheromone, Task, TrainingConfig, load_poli
 from taichi_ants.engines.colony.layout import AntRow
 from taichi_ants.learners import registry
 from taichi_ants.learners.policies import save_policy
+from taichi_ants.task import foraging, queueing
 
 SEEDS, EPISODES, TICKS, ROLLOUTS = (3, 4), 4, 80, 2
 SMALL = [
-    *(
-        "study",
-        "--arenas",
-        "paper",
-        "open",
-        "--sizes",
-        1,
-        3,
-        "--seeds",
-        len(SEEDS),
-        "--seed",
-        SEEDS[0],
-    ),
+    *("study", "--arenas", "paper", "small", "--sizes", 1, 3),
+    *("--seeds", len(SEEDS), "--seed", SEEDS[0]),
     *("--episodes", EPISODES, "--ticks", TICKS, "--rollouts", ROLLOUTS),
 ]
 FILES = {
     *("conditions.csv", "differences.csv", "seeds.csv", "findings.md", "manifest.json"),
     "report.txt",
-    *(f"figures/{name}.png" for name in ("crowding", "scaling", "trails")),
-    *(f"policies/{arena}_{way}.npz" for arena in ("paper", "open") for way in ("alone", "joint_3")),
+    *(f"figures/{name}.png" for name in ("elsewhere", "rules", "scaling", "training")),
+    *(
+        f"policies/paper_{rules}_{ants}.npz"
+        for rules in ("paper", "foraging", "queueing")
+        for ants in (1, 3)
+    ),
 }
 
 
@@ -68,39 +63,56 @@ def test_all_files_are_there(finished):
     assert set(contents(folder)) == FILES
     report = (folder / "report.txt").read_text("utf-8")
     assert out.startswith(report)
-    assert "The paper's world, 2 seeds: deliveries per 1000 ticks" in report
-    assert "Does joint learning cure it?" in report
+    assert "The paper's world, 2 seeds: deliveries" in report
+    assert "Trained in open worlds, 3 ants, 2 seeds" in report
+    assert "What does each rule add?" in report
     with open(folder / "conditions.csv", newline="") as file:
         rows = list(csv.DictReader(file))
-    assert len(rows) == 2 * (5 + 4 + 4) * 2
+    # In the paper's world seven rules for one and three ants, and of three rules those that were
+    # trained alone, or in open worlds; the latter in small worlds, too.
+    assert len(rows) == 7 * 2 + 3 + 3 + 3
     manifest = json.loads((folder / "manifest.json").read_text("utf-8"))
     assert manifest["settings"]["training.learner"] == "sarsa"
     assert manifest["settings"]["seeds"] == list(SEEDS)
 
 
-TRAINING = TrainingConfig("sarsa", 0.1, 0.9, 0.3, (0.01 / 0.3) ** (1 / 3), min_epsilon=0.01)
-GREEDY = TrainingConfig("sarsa", 0.1, 0.9, 0.01, 1.0, min_epsilon=0.01)
+DECAYS = {"epsilon_decay": (0.01 / 0.3) ** (1 / 3), "learning_rate_decay": 0.1 ** (1 / 3)}
+LEAST = {"min_epsilon": 0.01, "min_learning_rate": 0.01, "initial_value": 10}
+TRAINING = TrainingConfig("sarsa", 0.1, 0.9, 0.3, **DECAYS, **LEAST)
+CALM = TrainingConfig("sarsa", 0.1, 0.9, 0.01, 1.0)
+OTHERS = [seed + 2**32 for seed in SEEDS]
 
 
 def task(pheromone=Pheromone(), life=Life(regrowth=0)):  # noqa: B008 - both are frozen
+    """That of a colony that lives for a while."""
     return Task(pheromone=pheromone, delivery="continuing", evaporation_in_training=True, life=life)
 
 
 def test_the_numbers_are_those_of_the_library(finished):
-    """Three ants in open worlds without trails: trained alone, then jointly, then evaluated."""
+    """Three ants that forage: copies of one in the paper's world, trained there."""
     _, folder = finished
-    world = [worlds.open_world(seed, (30, 30, 30)) for seed in SEEDS]
-    off = task(Pheromone(deposit="none"))
-    alone = Colony(world, off, TRAINING, SEEDS)
+    rules = replace(foraging(), life=Life(regrowth=0))
+    alone = Colony(worlds.paper(), rules, TRAINING, SEEDS)
     alone.run(EPISODES, TICKS)
-    together = Colony(world, off, TRAINING, SEEDS, 3, q_values=alone.q_values)
-    together.run(EPISODES, TICKS)
-    assert not np.array_equal(alone.q_values, together.q_values)
+    table = {"sharing": "fixed", "q_values": alone.q_values}
+    colony = Colony(worlds.paper(), rules, CALM, OTHERS, 3, **table)
+    condition = ("paper", "foraging", "alone", "3")
+    assert_measured(folder, condition, colony.run(ROLLOUTS, TICKS))
 
-    others = [seed + 2**32 for seed in SEEDS]
-    for way, table in (("copied", alone.q_values), ("then_joint", together.q_values)):
-        colony = Colony(world, off, GREEDY, others, 3, sharing="fixed", q_values=table)
-        assert_measured(folder, ("open", "off", way, "3"), colony.run(ROLLOUTS, TICKS))
+
+def test_ants_are_evaluated_in_worlds_that_they_have_not_seen(finished):
+    """Three ants that queue, each episode in another open world of a pool, then in small ones."""
+    _, folder = finished
+    rules = replace(queueing(), life=Life(regrowth=0))
+    draws = [np.random.default_rng(seed).integers(64, size=EPISODES) for seed in SEEDS]
+    pool = [[worlds.open_world(2**20 + n, (30, 30, 30)) for n in each] for each in draws]
+    places = [list(of_episode) for of_episode in zip(*pool, strict=True)]
+    together = Colony(places[0], rules, TRAINING, SEEDS, 3)
+    together.run(EPISODES, TICKS, worlds=places)
+    small = [worlds.open_world(seed, (15, 15, 15)) for seed in SEEDS]
+    table = {"sharing": "fixed", "q_values": together.q_values}
+    colony = Colony(small, rules, CALM, OTHERS, 3, **table)
+    assert_measured(folder, ("small", "queueing", "open", "3"), colony.run(ROLLOUTS, TICKS))
 
 
 def assert_measured(folder, condition, outcome):
@@ -120,21 +132,12 @@ def assert_measured(folder, condition, outcome):
         assert [float(row[name]) for row in rows] == pytest.approx(values.tolist())
 
 
-def test_tables_of_ones_own_are_trained_and_kept_apart(finished):
-    _, folder = finished
-    own = Colony(worlds.paper(), task(), TRAINING, SEEDS, 3, sharing="own")
-    own.run(EPISODES, TICKS)
-    others = [seed + 2**32 for seed in SEEDS]
-    fixed = {"sharing": "fixed", "q_values": own.q_values}
-    colony = Colony(worlds.paper(), task(), GREEDY, others, 3, **fixed)
-    assert_measured(folder, ("paper", "on", "own", "3"), colony.run(ROLLOUTS, TICKS))
-
-
 def test_policies_say_where_they_come_from(finished):
     _, folder = finished
-    q_values, _, metadata = load_policy(folder / "policies" / "open_joint_3.npz")
-    assert q_values.any()
-    assert (metadata["way"], metadata["ants"], metadata["arena"]) == ("joint", 3, "open")
+    policy = load_policy(folder / "policies" / "paper_foraging_3.npz")
+    metadata = policy.metadata
+    assert policy.observation == metadata["task"]["observation"] == "ants"
+    assert (metadata["way"], metadata["ants"], metadata["arena"]) == ("joint", 3, "paper")
     assert metadata["seed"] in SEEDS
 
 

@@ -6,11 +6,15 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from taichi_ants.analysis.bounds.limits import Limits
 from taichi_ants.analysis.colony.study import RULES, WAYS, Condition, Measured
 
 SIZES = (1, 2, 4, 8)
-LIMITS = {arena: [Limits(cycle=40.0, queen=1000.0)] for arena in ("paper", "open")}
+
+
+def limits(study: Measured) -> dict[Condition, float]:
+    """No colony delivers more than 25 for each ant."""
+    return {condition: 25.0 * condition.ants for condition in study}
+
 
 # (rules, way, ants) -> deliveries per 1000 ticks of the whole colony.
 Truth = Callable[[str, str, int], float]

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from synthetic_colony_study import LIMITS, SIZES, build
+from synthetic_colony_study import SIZES, build, limits
 
-from taichi_ants.analysis.colony.contrasts import COPIES, CURE, judge_all
+from taichi_ants.analysis.colony.contrasts import ADDS, MORE, judge_all
 from taichi_ants.analysis.colony.study import (
-    COPIED,
+    ABC,
+    ABROAD,
+    ALONE,
     JOINT,
     MEASURES,
-    OFF,
-    ON,
+    PAPER,
     RULES,
+    SILENT,
     WAYS,
     Condition,
     measures_of,
@@ -57,58 +59,62 @@ def test_measures(measure: str, expected: list[float]) -> None:
 
 def test_every_measure_is_in_the_tables() -> None:
     study = build(seeds=7, noise=20)
-    rows = condition_rows(study, LIMITS)
+    rows = condition_rows(study, limits(study))
     assert len(rows) == len(WAYS) * len(RULES) * len(SIZES)
-    (row,) = (row for row in rows if (row["rules"], row["way"], row["ants"]) == (OFF, JOINT, 4))
+    (row,) = (row for row in rows if (row["rules"], row["way"], row["ants"]) == (SILENT, JOINT, 4))
     lines = rows_of_seeds(study, range(3, 10))
     for measure in MEASURES:
-        values = study[Condition("paper", OFF, JOINT, 4)][measure]
+        values = study[Condition("paper", SILENT, JOINT, 4)][measure]
         low, high = bootstrap_interval(values[None])
         found = [row[f"{measure}_{end}"] for end in ("mean", "ci_low", "ci_high")]
         np.testing.assert_allclose(found, [values.mean(), low[0], high[0]])
-        place = {"arena": "paper", "rules": OFF, "way": JOINT, "ants": 4, "seed": 5}
+        place = {"arena": "paper", "rules": SILENT, "way": JOINT, "ants": 4, "seed": 5}
         (line,) = (line for line in lines if line.items() >= place.items())
         assert line[measure] == values[2]
     assert (row["deliveries_limit"], row["seeds"]) == (100, 7)
 
 
 def test_the_table_of_differences_holds_what_verdicts_rest_on() -> None:
-    study = build(lambda rules, way, ants: 20.0 * ants * (2 if way == JOINT else 1))
+    study = build(lambda rules, way, ants: 20.0 * ants * (2 if rules == ABC else 1))
     judged = judge_all(study)
     rows = difference_rows(judged)
     assert len(rows) == sum(len(findings) for findings in judged.values())
+    statement = "ants with all three rules deliver more than under the paper's rules"
     (row,) = (
         row
         for row in rows
-        if row["question"] == CURE
-        and row["statement"]
-        == "jointly trained ants deliver more than copies of an ant trained alone"
-        and row["ants"] == 8
+        if (row["question"], row["statement"], row["ants"]) == (ADDS, statement, 8)
     )
     assert row["mean"] == pytest.approx(160, rel=0.02)
     assert row["low"] < row["mean"] < row["high"]
     assert (row["against"], row["verdict"]) == (8, "supported")
-    growth = [row for row in rows if row["question"] == COPIES]
+    growth = [row for row in rows if row["question"] == MORE]
     assert {(row["ants"], row["against"]) for row in growth} == {
         *((2, 1), (4, 1), (8, 1), (4, 2), (8, 2), (8, 4)),
     }
 
 
 def test_means_at_a_glance() -> None:
-    study = build(noise=0)
-    del study[Condition("paper", ON, COPIED, 8)]
-    (table,) = means(condition_rows(study, LIMITS))
-    assert table.title == "The paper's world, 12 seeds: deliveries per 1000 ticks"
-    assert table.columns == ("ants", *map(str, SIZES))
-    rows = {row[0]: row[1:] for row in table.rows}
-    assert rows["trained jointly (no trails laid)"] == ["20", "40", "80", "160"]
-    assert rows["trained alone, copied (evaporating trails)"] == ["20", "40", "80", "-"]
-    assert rows["limit"] == ["25", "50", "100", "200"]
+    study = build(noise=0, arenas=("paper", "rocks"))
+    del study[Condition("paper", PAPER, ALONE, 8)]
+    at_home = {condition: one for condition, one in study.items() if condition.arena == "paper"}
+    at_home = {condition: one for condition, one in at_home.items() if condition.way != ABROAD}
+    abroad = {Condition("rocks", ABC, ABROAD, 8): study[Condition("rocks", ABC, ABROAD, 8)]}
+    study = {**at_home, **abroad}
+    home, away = means(condition_rows(study, limits(study)))
+    assert home.title == "The paper's world, 12 seeds: deliveries per 1000 ticks"
+    assert home.columns == ("ants", *map(str, SIZES), "limit")
+    rows = {row[0]: row[1:] for row in home.rows}
+    assert rows["paper's rules, no trails laid"] == ["20", "40", "80", "160", "200"]
+    assert rows["paper's rules, trained alone, copied"] == ["20", "40", "80", "-", "100"]
+    assert away.title == "Trained in open worlds, 8 ants, 12 seeds: deliveries per 1000 ticks"
+    assert away.columns == ("world", "A + B + C")
+    assert away.rows == [["twice the rocks", "160"]]
 
 
 def test_findings_stand_under_their_questions() -> None:
     study = build()
     text = markdown(found(study, judge_all(study)))
-    assert text.count("**Do more copies help?**") == 1
-    assert "| Jointly trained ants deliver more than copies of an ant trained alone |" in text
+    assert text.count("**Do more ants help?**") == 1
+    assert "| Ants with all three rules deliver more than under the paper's rules |" in text
     assert text.rstrip().endswith("hold at once with 95 %.")
