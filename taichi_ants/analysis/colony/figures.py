@@ -38,11 +38,7 @@ FIGURES: dict[str, tuple[str, tuple[str, ...], tuple[Design, ...]]] = {
         ("blocked", "first_delivery"),
         _WAYS,
     ),
-    "trails": (
-        "Do the trails help that ants lay themselves?",
-        ("deliveries", "reward"),
-        _TRAILS,
-    ),
+    "trails": ("Do the trails help that ants lay themselves?", ("deliveries", "reward"), _TRAILS),
 }
 
 

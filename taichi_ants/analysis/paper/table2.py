@@ -22,6 +22,7 @@ from taichi_ants.analysis.paper.best_of import (
     shown_position,
 )
 from taichi_ants.analysis.paper.comparison import Comparison, GridPoint, Variant
+from taichi_ants.analysis.paper.measures import WINDOW
 from taichi_ants.analysis.tables import MISSING, Block, Table, interval, number, percent
 from taichi_ants.errors import count
 
@@ -93,7 +94,8 @@ def _spread(line: Mapping, stem: str, *names: str, mark: str = "") -> str:
 
 def figure_tables(lines: Sequence[Mapping], comparison: Comparison) -> list[Block]:
     """A table for each figure of a run, beside the paper's in its world, and what they mean."""
-    late = f"{comparison.late} episodes"
+    runs = comparison.episodes
+    late = f"last {WINDOW} episodes" if runs > WINDOW else f"all {count(runs, 'episode')}"
     titles = (f"Return, {late}", "Steps, all episodes", f"Steps, {late}", f"Deliveries, {late}")
     headers = ("Learner", "Delivery", "Mean", "IQM", "Best run", "Paper", "Below")
     # The last two only where the paper has figures.
