@@ -5,13 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from taichi_ants.analysis.findings import (
-    Contrast,
-    Finding,
-    Verdict,
-    judge,
-    weakest,
-)
+from taichi_ants.analysis.findings import Contrast, Finding, Verdict, judge, weakest
 from taichi_ants.analysis.paper.claims import CLAIMS, Claim
 from taichi_ants.analysis.paper.comparison import Comparison
 from taichi_ants.analysis.paper.quantities import Slice
@@ -93,11 +87,7 @@ def _tallies(audit: Audit) -> list[str]:
 def claims_table(audit: Audit) -> Table:
     """How many verdicts of each kind there are, and the claims that are contradicted."""
     rows = [
-        [
-            claim.section.split(",")[0],
-            claim.statement,
-            *(one.verdict.value for one in findings.values()),
-        ]
+        [claim.section, claim.statement, *(one.verdict.value for one in findings.values())]
         for claim, findings in audit.items()
         if any(one.verdict is Verdict.CONTRADICTED for one in findings.values())
     ]
