@@ -228,10 +228,8 @@ def rank_correlation(first: str, second: str, variant: Variant) -> Quantity:
         scale = np.sqrt((one**2).sum(axis=0) * (other**2).sum(axis=0))
         return (one * other).sum(axis=0) / np.where(scale > 0, scale, 1.0)
 
-    words = (
-        f"rank correlation of {MEASURES[first].words} and {MEASURES[second].words} over {ALL} of a "
-        "seed"
-    )
+    pair = f"{MEASURES[first].words} and {MEASURES[second].words}"
+    words = f"rank correlation of {pair} over the 16 configurations of a seed"
     return Quantity(words, "correlation", {variant.label: correlation}, DIFFERENCE)
 
 
