@@ -81,10 +81,11 @@ def make_figures(folder: Path) -> None:
     compare.compare(comparison)
     study = colony.parse_arguments(["study", "--out", str(ROOT / "results" / "colony")])
     colony.study(study)
-    world = compare.world_name(comparison)
+    asked = compare.build_study(comparison)
+    world = compare.world_name(comparison, asked)
     with tempfile.TemporaryDirectory() as place:
         drawn = Path(place)
-        compare.draw_figures(compare.build_study(comparison), world, comparison.out, drawn)
+        compare.draw_figures(asked, world, comparison.out, drawn)
         keep(drawn / compare.FIGURES, COMPARISON, folder)
         colony.draw_figures(study.out, drawn)
         keep(drawn / colony.FIGURES, COLONY, folder)

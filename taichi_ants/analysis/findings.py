@@ -9,8 +9,7 @@ the interquartile mean decides, and the mean is judged beside it.
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -44,56 +43,37 @@ class Verdict(str, Enum):
 
 
 @dataclass(frozen=True)
-class Above:
-    """The effect is above 0, by an amount that matters, and at most a limit.
-
-    Equivalent if the interval lies within the margin on either side of 0. Else supported if it
-    lies above 0 and below the limit, contradicted if it lies below 0 or above the limit.
-    """
-
-    margin: float = 0.0
-    most: float = np.inf
-
-    def judge(self, low: float, high: float) -> Verdict:
-        """The verdict on an interval."""
-        if -self.margin <= low and high <= self.margin:
-            return Verdict.EQUIVALENT
-        if low > 0 and high <= self.most:
-            return Verdict.SUPPORTED
-        return Verdict.CONTRADICTED if high < 0 or low > self.most else Verdict.UNDECIDED
-
-    def slack(self, effect: float) -> float:
-        """How far an effect is on the criterion's side; the smallest is the weakest."""
-        return min(effect, self.most - effect)
-
-    @property
-    def words(self) -> str:
-        limit = "" if self.most == np.inf else f" and at most {self.most:g}"
-        return f"above 0{limit}, margin {self.margin:g}"
-
-
-@dataclass(frozen=True)
-class Within:
+class Criterion:
     """The effect lies in a range.
 
-    Supported if the interval lies in it, contradicted if it lies outside entirely.
+    Supported if the interval lies in it, contradicted if it lies outside entirely. Of a difference,
+    equivalent if the interval lies within the margin on either side of 0.
+
+    Attributes:
+        low, high: The ends of the range.
+        margin: What difference is too small to matter; None if it is no difference. A difference
+            must be above `low` = 0.
     """
 
     low: float
-    high: float
+    high: float = np.inf
+    margin: float | None = None
 
     def judge(self, low: float, high: float) -> Verdict:
         """The verdict on an interval."""
-        if self.low <= low and high <= self.high:
+        if self.margin is not None and -self.margin <= low and high <= self.margin:
+            return Verdict.EQUIVALENT
+        if self.low <= low and high <= self.high and (self.margin is None or low > 0):
             return Verdict.SUPPORTED
-        return Verdict.CONTRADICTED if high < self.low or low > self.high else Verdict.UNDECIDED
-
-    def slack(self, effect: float) -> float:
-        """Distance to the nearer end of the range, negative outside of it."""
-        return min(effect - self.low, self.high - effect)
+        outside = high < self.low or low > self.high
+        return Verdict.CONTRADICTED if outside else Verdict.UNDECIDED
 
     @property
     def words(self) -> str:
+        """What tables call it."""
+        if self.margin is not None:
+            limit = "" if self.high == np.inf else f" and at most {self.high:g}"
+            return f"above 0{limit}, margin {self.margin:g}"
         if self.low == -np.inf:
             return f"at most {self.high:g}"
         if self.high == np.inf:
@@ -101,7 +81,9 @@ class Within:
         return f"from {self.low:g} to {self.high:g}"
 
 
-Criterion = Above | Within
+def above(margin: float = 0.0, most: float = np.inf) -> Criterion:
+    """A difference is above 0, by an amount that matters, and at most a limit."""
+    return Criterion(0.0, most, margin)
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,11 +147,6 @@ class Finding:
     level: float
     by_mean: Finding | None = None
 
-    @property
-    def disagrees(self) -> bool:
-        """Whether the mean gives another verdict than the typical run."""
-        return self.by_mean is not None and self.by_mean.verdict is not self.verdict
-
 
 def judge(contrasts: Sequence[Contrast]) -> list[Finding]:
     """The findings on contrasts that are judged together, in their order."""
@@ -210,10 +187,7 @@ def weakest(findings: Sequence[Finding]) -> Finding:
 
 
 def _strength(finding: Finding) -> tuple[int, float]:
-    slack = finding.contrast.criterion.slack(finding.effect)
-    return list(Verdict).index(finding.verdict), slack
-
-
-def tally(verdicts: Iterable[Verdict]) -> str:
-    """How many verdicts of each kind there are, as a phrase; the most frequent first."""
-    return ", ".join(f"{n} {verdict.value}" for verdict, n in Counter(verdicts).most_common())
+    """The verdict's place, and how far the effect lies inside of the range."""
+    low, high = finding.contrast.criterion.low, finding.contrast.criterion.high
+    inside = min(finding.effect - low, high - finding.effect)
+    return list(Verdict).index(finding.verdict), inside

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,11 +13,14 @@ from taichi_ants.analysis import style
 from taichi_ants.analysis.statistics import bootstrap_interval, centres
 from taichi_ants.analysis.tables import MISSING, Table, plain_text, sentence
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 Settings = Mapping[str, Any]
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")  # 7 with 10 colours: 70 lines look different
 _FEW_SEEDS = 10  # with fewer, intervals miss more often than they say, see docs/statistics.md
 _TERMINAL = 200  # columns, at most
-_WIDE = 20  # a ratio of settings from which their axis is logarithmic
+_WIDE = 20  # a ratio of numbers from which their axis is logarithmic
 
 
 def seed_rows(
@@ -42,9 +45,7 @@ def summary_rows(
 ) -> list[dict[str, Any]]:
     """A row for each point: means over seeds with 95 % intervals, as in `statistics.centres`.
 
-    Args:
-        settings, values: As above.
-        typical: The measures of which the interquartile mean makes sense, too.
+    Settings and values are those of `seed_rows`; `typical` measures have an interquartile mean.
     """
     columns = {
         f"{name}_{column}": numbers
@@ -71,10 +72,7 @@ def report(
 ) -> str:
     """The means with their intervals as a table for a terminal.
 
-    Args:
-        settings, values: As above.
-        against: The setting with whose value the others are compared in the first measure.
-        notes: What came out of it, for each point.
+    Notes say of each point how its first measure compares with that at the value `against`.
     """
     names = columns_of(settings)
     ends = {name: bootstrap_interval(array) for name, array in values.items()}
@@ -100,55 +98,70 @@ def draw(
 ) -> None:
     """Draw a measure against the first setting that varies, a line for each value of the others.
 
-    Where that setting is no number there are no lines, but points beside each other.
-
     Args:
         path: Where to write the .png.
-        settings: What varies, of P points.
-        values: The measure, float64 (P, S).
-        words: What it is.
-        title: One line.
+        settings, values: What varies, of P points, and the measure, float64 (P, S).
+        words, title: What it is, and one line.
 
     Raises:
         AntsError: The file cannot be written.
     """
     names = columns_of(settings)
-    first = names[0]
     others = [name for name in names[1:] if len({str(one.get(name)) for one in settings}) > 1]
     alike = [f"{short(n, names)} {_shown(settings[0][n])}" for n in names[1:] if n not in others]
-    marks: list[Any] = [one.get(first) for one in settings]
-    numbers = all(isinstance(mark, (int, float)) and not isinstance(mark, bool) for mark in marks)
-    ticks = list(dict.fromkeys(map(_shown, marks)))
-    low, high = bootstrap_interval(values)
-    lines: dict[str, list[int]] = {}
-    for p, one in enumerate(settings):
+    numbers = values.mean(axis=1), *bootstrap_interval(values)
+    lines: dict[str, list[tuple[Any, ...]]] = {}
+    for one, *point in zip(settings, *numbers, strict=True):
         label = ", ".join(f"{short(n, names)} {_shown(one[n])}" for n in others if n in one)
-        lines.setdefault(label, []).append(p)
+        lines.setdefault(label or words, []).append((one.get(names[0]), *point))
     with style.styled():
         figure = style.new_figure(4.5)
         axes = figure.subplots()
-        looks = zip(itertools.cycle(style.COLOURS), itertools.cycle(_MARKERS), strict=False)
-        aside = np.linspace(-0.3, 0.3, len(lines)) if len(lines) > 1 else [0.0]
-        for shift, (label, points), look in zip(aside, lines.items(), looks, strict=False):
-            colour, marker = look
-            points.sort(key=lambda p: marks[p] if numbers else p)
-            x = [marks[p] if numbers else ticks.index(_shown(marks[p])) + shift for p in points]
-            mean, ends = values[points].mean(axis=1), (low[points], high[points])
-            (line,) = axes.plot(x, mean, marker=marker, color=colour, label=label or words)
-            if numbers:
-                axes.fill_between(x, *ends, color=colour, alpha=0.15, linewidth=0)
-            else:
-                line.set_linestyle("none")
-                axes.vlines(x, *ends, color=colour)
-        if not numbers:
-            axes.set_xticks(range(len(ticks)), ticks)
-        elif min(marks) > 0 and max(marks) / min(marks) >= _WIDE:
-            style.logarithmic(axes.xaxis, (1, 2, 5))
-        axes.set(xlabel=first, ylabel=words)
-        entries = style.legend_entries([axes])
+        draw_lines(axes, lines)
+        axes.set(xlabel=names[0], ylabel=words)
         caption = ", ".join([sentence(_spread(values.shape[1])), *alike])
-        style.frame(figure, title, f"{caption}.", entries)
+        style.frame(figure, title, f"{caption}.", style.legend_entries([axes]))
     style.save(figure, path)
+
+
+def draw_lines(axes: Axes, lines: Mapping[str, Sequence[tuple[Any, ...]]]) -> None:
+    """Draw means with their intervals, a line for each label.
+
+    Where places are no numbers there are no lines, but points beside each other.
+
+    Args:
+        axes: Where to draw.
+        lines: By label, of each point its place, the mean and the ends of its interval.
+    """
+    places = [place for points in lines.values() for place, *_ in points]
+    numbers = all(isinstance(one, (int, float)) and not isinstance(one, bool) for one in places)
+    ticks = list(dict.fromkeys(map(_shown, places)))
+    looks = zip(itertools.cycle(style.COLOURS), itertools.cycle(_MARKERS), strict=False)
+    aside = np.linspace(-0.3, 0.3, len(lines)) if len(lines) > 1 else [0.0]
+    for shift, (label, points), look in zip(aside, lines.items(), looks, strict=False):
+        colour, marker = look
+        ordered = sorted(points, key=lambda point: point[0]) if numbers else points
+        x = [place if numbers else ticks.index(_shown(place)) + shift for place, *_ in ordered]
+        mean, low, high = np.array([point[1:] for point in ordered], float).reshape(-1, 3).T
+        (line,) = axes.plot(x, mean, marker=marker, markersize=4.5, color=colour, label=label)
+        if numbers:
+            axes.fill_between(x, low, high, color=colour, alpha=0.15, linewidth=0)
+        else:
+            line.set_linestyle("none")
+            axes.vlines(x, low, high, color=colour)
+    if not numbers:
+        axes.set_xticks(range(len(ticks)), ticks)
+    elif _far_apart(places):
+        style.logarithmic(axes.xaxis, (1,))
+        axes.set_xticks(sorted(set(places)))
+    means = [mean for points in lines.values() for _, mean, *_ in points]
+    if numbers and _far_apart(means):
+        style.logarithmic(axes.yaxis, (1, 2, 5) if max(means) < 1000 * min(means) else (1,))
+
+
+def _far_apart(numbers: Sequence[float]) -> bool:
+    """Whether numbers are shown on a logarithmic axis."""
+    return min(numbers) > 0 and max(numbers) / min(numbers) >= _WIDE
 
 
 def _spread(seeds: int) -> str:

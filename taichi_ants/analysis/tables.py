@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
@@ -80,17 +80,6 @@ class Table:
         parts += ["\n".join(lines) + "\n"] if self.rows else []
         parts += ["  \n".join(self.notes) + "\n"] if self.notes else []  # two blanks break a line
         return "\n".join(parts)
-
-    def without_empty_columns(self) -> Table:
-        """The table without columns in which no row has anything."""
-        kept = [
-            place
-            for place in range(len(self.columns))
-            if any(row[place] != MISSING for row in self.rows)
-        ]
-        columns = [self.columns[place] for place in kept]
-        rows = [[row[place] for place in kept] for row in self.rows]
-        return replace(self, columns=columns, rows=rows)
 
 
 # A paragraph or a table.

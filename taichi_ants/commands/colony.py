@@ -202,7 +202,7 @@ def do_study(
     ):
         files.write_csv(ready / name, table, list(table[0]))
     files.write_text(ready / "findings.md", markdown(findings))
-    report = plain_text([*tables.means(rows, limits), *findings], WIDTH)
+    report = plain_text([*tables.means(rows), *findings], WIDTH)
     files.write_text(ready / REPORT, report)
     policies = files.check_writable_folder(ready / "policies")
     for name, q_values, metadata in median_policies(conditions, asked.seeds, values, outcomes):

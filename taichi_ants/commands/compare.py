@@ -296,7 +296,7 @@ def draw_figures(study: Study[RunPoint], world: str, results: Path, folder: Path
 
 def read_baseline(row: dict[str, str]) -> dict[str, Any]:
     """A row of baselines.csv, with numbers and None for empty fields."""
-    words = ("baseline", "setting", "note")
+    words = ("baseline", "note")
     return {
         name: text if name in words else float(text) if text else None for name, text in row.items()
     }

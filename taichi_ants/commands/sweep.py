@@ -97,7 +97,7 @@ def findings(asked: Sweep, values: np.ndarray) -> dict[int, dict[str, Any]]:
     Args:
         values: The first measure, float64 (points, seeds).
     """
-    from taichi_ants.analysis.findings import Above, Contrast, judge
+    from taichi_ants.analysis.findings import Contrast, above, judge
 
     if asked.against is None:
         return {}
@@ -107,7 +107,7 @@ def findings(asked: Sweep, values: np.ndarray) -> dict[int, dict[str, Any]]:
         others = [{**row, name: value} for row in rows]
         pairs = [(p, rows.index(other)) for p, other in enumerate(others) if other in rows]
         pairs = [(p, other) for p, other in pairs if p != other]
-        contrasts = [Contrast("", own[p] - own[other], Above(asked.margin)) for p, other in pairs]
+        contrasts = [Contrast("", own[p] - own[other], above(asked.margin)) for p, other in pairs]
         for (p, _), one in zip(pairs, judge(contrasts), strict=True):
             said = _WORDS.get(one.verdict.value, "undecided")
             numbers = {"difference": one.effect, "low": one.low, "high": one.high}

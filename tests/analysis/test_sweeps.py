@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from taichi_ants.analysis import style, sweeps
 
@@ -39,6 +40,14 @@ def test_names_are_not_joined_and_their_points_stand_apart(drawn):
     assert {line.get_linestyle() for line in lines} == {"None"}
     assert len({x for line in lines for x in line.get_xdata()}) == 3 * 8
     assert [tick.get_text() for tick in axes.get_xticklabels()] == ["paper", "open", "large"]
+
+
+@pytest.mark.parametrize(("factor", "scale"), [(2, "linear"), (100, "log")])
+def test_axes_are_logarithmic_where_numbers_lie_far_apart(factor, scale):
+    axes = Figure().subplots()
+    points = [(place, place, place, place) for place in (1, factor)]
+    sweeps.draw_lines(axes, {"line": points, "without points": []})
+    assert (axes.get_xscale(), axes.get_yscale()) == (scale, scale)
 
 
 @pytest.mark.parametrize(("seeds", "few"), [(1, False), (2, True), (9, True), (10, False)])

@@ -56,9 +56,3 @@ def test_a_table_without_rows_shows_its_notes_alone() -> None:
     empty = Table("Bees", ["Who"], [], ["None was seen."])
     assert plain_text(["Insects.", empty], 40) == "Insects.\n\nNone was seen.\n"
     assert plain_text(["Insects.", Table("Bees", ["Who"], [])], 40) == "Insects.\n"
-
-
-def test_columns_without_anything_are_left_out() -> None:
-    table = Table("Bees", ["Who", "Age", "Number"], [["queen", "-", "1"], ["drone", "-", "-"]])
-    less = table.without_empty_columns()
-    assert (less.columns, less.rows) == (["Who", "Number"], [["queen", "1"], ["drone", "-"]])

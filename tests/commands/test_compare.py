@@ -42,7 +42,7 @@ TINY = [
 ]
 COLUMNS = [
     *("learner", "hyperparameters", "learning_rate", "discount", "epsilon", "epsilon_decay"),
-    *("delivery", "seeds", "return_last50_sd"),
+    *("delivery", "seeds"),
 ]
 for measure in (
     *("return_last50", "steps_last50", "steps_all", "deliveries_last50"),
@@ -55,8 +55,7 @@ COLUMNS += [
     f"runs_{name}" for name in ("delivers", "walks_the_trail", "circles_with_food", "other")
 ]
 FIGURES = {
-    *("figures/best_runs.png", "figures/learning_curves.png"),
-    "figures/return_against_deliveries.png",
+    *("figures/learning_curves.png", "figures/return_against_deliveries.png"),
 }
 LEARNERS = {
     **{"q_learning": ("q_learning", ""), "sarsa": ("sarsa", "")},
@@ -187,7 +186,6 @@ def test_summary_figures_are_those_of_the_episodes(finished):
         "return_last50_mean": last["returns"].mean(axis=1),
         "return_last50_ci_low": low,
         "return_last50_ci_high": high,
-        "return_last50_sd": last["returns"].std(axis=1, ddof=1),
         "steps_last50_mean": last["steps"].mean(axis=1),
         "steps_all_mean": arrays["steps"].mean(axis=(1, 2)),
         "deliveries_last50_mean": last["deliveries"].mean(axis=1),
@@ -207,26 +205,18 @@ def test_summary_figures_are_those_of_the_episodes(finished):
 
 
 def test_baselines(finished):
-    rows = {
-        (row["baseline"], row["setting"], row["discount"]): row
-        for row in read_csv(finished / "baselines.csv")
-    }
-    training, greedy = "training, no evaporation", "greedy, evaporation"
+    rows = {(row["baseline"], row["discount"]): row for row in read_csv(finished / "baselines.csv")}
     assert set(rows) == {
-        ("shortest delivery", training, ""),
-        *(("optimal policy", training, "0.9"), ("optimal policy", training, "0.99")),
-        *(("random policy", setting, "") for setting in (training, greedy)),
-        *(("trail follower", setting, "") for setting in (training, greedy)),
+        *(("shortest delivery", ""), ("optimal policy", "0.9"), ("optimal policy", "0.99")),
+        *(("random policy", ""), ("trail follower", "")),
     }
-    shortest = rows["shortest delivery", training, ""]
+    shortest = rows["shortest delivery", ""]
     assert (float(shortest["return_mean"]), float(shortest["steps_mean"])) == (45, 34)
     uniform = np.zeros((len(SEEDS), 128, 5))
-    for setting, evaporation in ((training, False), (greedy, True)):
-        task = Task(evaporation_in_evaluation=evaporation)
-        outcome = evaluate(worlds.paper(), uniform, ROLLOUTS, SEEDS, MAX_STEPS, task)
-        row = rows["random policy", setting, ""]
-        assert float(row["return_mean"]) == pytest.approx(outcome.returns.mean())
-        assert float(row["steps_mean"]) == pytest.approx(outcome.steps.mean())
+    outcome = evaluate(worlds.paper(), uniform, ROLLOUTS, SEEDS, MAX_STEPS, CALM)
+    row = rows["random policy", ""]
+    assert float(row["return_mean"]) == pytest.approx(outcome.returns.mean())
+    assert float(row["steps_mean"]) == pytest.approx(outcome.steps.mean())
 
 
 def test_policies_are_those_of_median_runs_of_each_behaviour(finished):
@@ -302,9 +292,8 @@ def test_evaporation_is_chosen_told_and_kept_apart(training, greedy, tmp_path, c
     words = f"Training {'with' if training == 'on' else 'without'} evaporation of trails, greedy"
     for name in ("report.txt", "table2.md"):
         assert words in (out / name).read_text("utf-8")
-    settings = {line["setting"] for line in read_csv(out / "baselines.csv")}
-    first = "evaporation" if training == "on" else "no evaporation"
-    assert settings == {f"training, {first}", "greedy, no evaporation"}
+    first, *_ = read_csv(out / "baselines.csv")
+    assert (first["baseline"] == "exact bounds") == (training == "on")
     status, _, err = compare(*TINY, "--episodes", 30, "--out", out)
     assert status == 2
     assert "task.evaporation_in_evaluation differ)" in err
@@ -410,7 +399,7 @@ def test_figures_cannot_be_drawn_from_damaged_files(name, damage, copy, compare)
     assert not list(copy.glob(".*"))
 
 
-@pytest.mark.parametrize("damage", ["figures/best_runs.png", f"renders/{SHOWN[0]}.gif"])
+@pytest.mark.parametrize("damage", ["figures/learning_curves.png", f"renders/{SHOWN[0]}.gif"])
 def test_a_picture_that_is_gone_is_drawn_again(damage, finished, copy, compare):
     (copy / damage).unlink()
     assert compare(*SMALL, "--out", copy)[0] == 0
@@ -442,9 +431,9 @@ def test_files_of_ones_own_stay_when_pictures_are_drawn_again(copy, compare):
     own = [copy / "figures" / "mine.png", copy / "policies" / "mine.npz"]
     for path in own:
         path.write_text("mine")
-    (copy / "figures" / "best_runs.png").unlink()
+    (copy / "figures" / "learning_curves.png").unlink()
     assert compare(*SMALL, "--out", copy)[0] == 0
-    assert (copy / "figures" / "best_runs.png").exists()
+    assert (copy / "figures" / "learning_curves.png").exists()
     assert compare(*SMALL, "--out", copy, "--force", "--no-figures", "--no-render")[0] == 0
     assert [path.read_text() for path in own] == ["mine", "mine"]
 

@@ -10,10 +10,7 @@ from taichi_ants.analysis.bounds.limits import Limits
 from taichi_ants.analysis.colony.study import RULES, WAYS, Condition, Measured
 
 SIZES = (1, 2, 4, 8)
-LIMITS = {
-    arena: [Limits(cycle=40.0, crowd_cycle=40.0, food=1000.0, queen=1000.0)]
-    for arena in ("paper", "open")
-}
+LIMITS = {arena: [Limits(cycle=40.0, queen=1000.0)] for arena in ("paper", "open")}
 
 # (rules, way, ants) -> deliveries per 1000 ticks of the whole colony.
 Truth = Callable[[str, str, int], float]

@@ -16,8 +16,6 @@ from taichi_ants.analysis.paper.comparison import Comparison, GridPoint, Row, Va
 from taichi_ants.analysis.paper.published import DYNA_P3, GRID, Q_LEARNING, SARSA, VARIANTS
 
 # What rows of baselines are held against, in the paper's protocol.
-TRAINING_SETTING = "training, no evaporation"
-GREEDY_SETTING = "greedy, evaporation"
 
 EARLY = 50  # episodes before the late level is reached
 EPISODES = ("returns", "steps", "deliveries")

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from taichi_ants.analysis.bounds.limits import Limits
-from taichi_ants.analysis.colony.contrasts import FIRST, QUESTIONS, Judged, Series, Sizes
+from taichi_ants.analysis.colony.contrasts import QUESTIONS, Judged, Series, Sizes
 from taichi_ants.analysis.colony.study import ARENAS, MEASURES, Condition, Design, Measured
 from taichi_ants.analysis.findings import Finding, Verdict, weakest
 from taichi_ants.analysis.sweeps import seed_rows, summary_rows
-from taichi_ants.analysis.tables import MISSING, Block, Table, figure, number, sentence
+from taichi_ants.analysis.tables import MISSING, Block, Table, figure, sentence
 from taichi_ants.errors import count
 
 # The limits of the worlds of an arena: one, or one for each seed.
@@ -44,13 +44,13 @@ def difference_rows(judged: Judged) -> list[dict[str, Any]]:
         {
             "arena": arena,
             "question": series.question,
-            "difference": series.words,
+            "statement": series.statement,
+            "measure": series.measure,
             "ants": ants,
             "against": against,
             "mean": finding.effect,
             "low": finding.low,
             "high": finding.high,
-            "criterion": finding.contrast.criterion.words,
             "verdict": finding.verdict.value,
         }
         for (arena, series), findings in judged.items()
@@ -58,42 +58,22 @@ def difference_rows(judged: Judged) -> list[dict[str, Any]]:
     ]
 
 
-def means(rows: Sequence[Mapping[str, Any]], limits: LimitsByArena) -> list[Block]:
-    """Mean deliveries, a table for each arena: designs down, numbers of ants across.
-
-    Args:
-        rows: From `condition_rows`.
-        limits: Those of the arenas.
-    """
-    blocks: list[Block] = []
-    for arena, several in limits.items():
+def means(rows: Sequence[Mapping[str, Any]]) -> list[Table]:
+    """Mean deliveries, from `condition_rows`, a table for each arena: designs down, ants across."""
+    tables = []
+    for arena in dict.fromkeys(row["arena"] for row in rows):
         lines: dict[str, dict[int, float]] = {}
-        possible = {}
-        for row in (one for one in rows if one["arena"] == arena):
-            words, ants = Design(row["rules"], row["way"]).words, row["ants"]
-            lines.setdefault(words, {})[ants] = row["deliveries_mean"]
-            possible[ants] = row["deliveries_limit"]
-        lines["limit"] = possible
-        cells = [
-            [who, *(_short(by[n]) if n in by else MISSING for n in sorted(possible))]
-            for who, by in lines.items()
-        ]
-        cycle, food, queen = (
-            figure(float(np.mean([getattr(one, name) for one in several])))
-            for name in ("cycle", "food", "queen")
-        )
-        note = (
-            f"Limit: the shortest cycle from the queen to food and back takes {cycle} ticks; per "
-            f"1000 ticks, food can give {food} and the queen take {queen}."
-        )
+        of_arena = [row for row in rows if row["arena"] == arena]
+        for row in of_arena:
+            words = Design(row["rules"], row["way"]).words
+            lines.setdefault(words, {})[row["ants"]] = row["deliveries_mean"]
+        lines["limit"] = {row["ants"]: row["deliveries_limit"] for row in of_arena}
+        sizes = sorted(lines["limit"])
+        cells = [[who, *(figure(by.get(n, np.nan)) for n in sizes)] for who, by in lines.items()]
         seeds = count(rows[0]["seeds"], "seed")
         title = f"{sentence(ARENAS[arena])}, {seeds}: {MEASURES['deliveries']}"
-        blocks.append(Table(title, ("ants", *map(str, sorted(possible))), cells, [note]))
-    return blocks
-
-
-def _short(value: float) -> str:
-    return number(value, 0 if value >= 100 else 1)
+        tables.append(Table(title, ("ants", *map(str, sizes)), cells))
+    return tables
 
 
 _SHOWN = (Verdict.SUPPORTED, Verdict.CONTRADICTED, Verdict.UNDECIDED)
@@ -113,8 +93,6 @@ def found(measured: Measured, judged: Judged) -> list[Block]:
                 units.append(MEASURES[series.measure])
                 shown = arena
         notes = [f"{sentence(' or '.join(dict.fromkeys(units)))}, as the statement says."]
-        if question == FIRST:
-            notes.append("An episode without a delivery counts with all its ticks.")
         if lines:
             blocks.append(Table(question, _HEADERS, lines, notes, text_columns=len(_HEADERS)))
     return [
@@ -135,20 +113,18 @@ def _verdicts(
         by_verdict[of_all.verdict].append(n)
     by_verdict[Verdict.UNDECIDED] += by_verdict[Verdict.EQUIVALENT]
     cells = [", ".join(map(str, sorted(by_verdict[one]))) or MISSING for one in _SHOWN]
-    means = {
-        (n, other): tuple(
-            float(measured[Condition(arena, *design, ants)][series.measure].mean())
-            for design, ants in ((series.first, n), (series.second, other))
-        )
-        for n, other in findings
-    }
+
+    def both(n: int, other: int) -> tuple[float, float]:
+        first = measured[Condition(arena, *series.first, n)][series.measure]
+        second = measured[Condition(arena, *series.second, other)][series.measure]
+        return float(first.mean()), float(second.mean())
 
     def distance(sizes: Sizes) -> float:
-        one, other = means[sizes]
-        return abs(one - other) / (abs(one) + abs(other)) if one or other else 0.0
+        one, other = both(*sizes)
+        return abs(one - other) / (abs(one) + abs(other) or 1.0)
 
-    n, less = max(means, key=distance)
-    one, other = means[n, less]
+    n, less = max(findings, key=distance)
+    one, other = both(n, less)
     example = f"{n}: {figure(one)} against {figure(other)}"
     example += "" if less == n else f" with {less}"
     example += f" ({100 * (one / other - 1):+.0f} %)" if min(one, other) > 0 else ""

@@ -22,11 +22,7 @@ FIGURES = ("return_last50", "steps_all", "steps_last50", "deliveries_last50")
 def best_of(
     comparison: Comparison, delivery: str, variant: Variant, draws: int = DRAWS
 ) -> dict[str, np.ndarray]:
-    """Draws an independent random seed for each configuration and reports the best of them.
-
-    Returns:
-        The winner's `FIGURES`, float64 (draws,) each.
-    """
+    """The winner's `FIGURES`, float64 (draws,) each: each configuration runs once, on any seed."""
     rows = np.array(comparison.positions(delivery, variant))
     random = np.random.default_rng(RANDOM_SEED)
     seeds = random.integers(0, len(comparison.seeds), size=(draws, len(rows)))
@@ -63,23 +59,15 @@ def shown_position(comparison: Comparison, delivery: str, variant: Variant) -> i
 def examples(comparison: Comparison) -> list[tuple[int, int]]:
     """Runs to look at: for each delivery setting and learner one of each behaviour.
 
-    They are of the configuration that stands for the learner. A behaviour that occurs in other
-    configurations only is shown once in a setting, by the configuration with most such runs. Of
-    the runs that behave alike, the one of median return is taken.
-
-    Returns:
-        Row and position of the seed of each.
+    They are of the configuration that stands for the learner. Of the runs that behave alike, the
+    one of median return is taken. Each is told by its row and the position of its seed.
     """
-    behaviours = comparison.behaviours
-    cells: list[tuple[int, int]] = []  # row and behaviour
-    for delivery in comparison.delivery_settings:
-        learners = [pair for pair in comparison.learners if pair[0] == delivery]
-        shown = [shown_position(comparison, *pair) for pair in learners]
-        cells += [(row, code) for row in shown for code in counts(behaviours[row])]
-        rows = [n for n, row in enumerate(comparison.rows) if row.delivery == delivery]
-        for code in counts(behaviours[rows]).keys() - counts(behaviours[shown]).keys():
-            cells.append((rows[int((behaviours[rows] == code).sum(axis=1).argmax())], code))
-    return [(row, _median_run(comparison, row, code)) for row, code in cells]
+    rows = [shown_position(comparison, *learner) for learner in comparison.learners]
+    return [
+        (row, _median_run(comparison, row, code))
+        for row in rows
+        for code in counts(comparison.behaviours[row])
+    ]
 
 
 def _median_run(comparison: Comparison, row: int, behaviour: int) -> int:

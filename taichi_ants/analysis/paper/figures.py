@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, counts
-from taichi_ants.analysis.paper.best_of import best_of, paper_row, percentile_of, shown_position
-from taichi_ants.analysis.paper.comparison import Comparison, Variant
+from taichi_ants.analysis.paper.best_of import shown_position
+from taichi_ants.analysis.paper.comparison import Comparison
 from taichi_ants.analysis.paper.published import FIGURE_1
 from taichi_ants.analysis.statistics import interquartile_mean
 from taichi_ants.analysis.style import (
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 
 _PER_DECADE = 12  # points of a learning curve between two powers of ten
 _CURVES = {"returns": "Return", "steps": "Steps", "deliveries": "Deliveries"}
-_BEST = {"return_last50": "Return of the best run", "steps_all": "Its mean length (steps)"}
 # Colours and marks of behaviours, by their places in `BEHAVIOURS`.
 BEHAVIOUR_LOOKS = ((BLUE, "o"), (ORANGE, "^"), (WINE, "s"), (INK, "x"))
 
@@ -49,30 +48,25 @@ BEHAVIOUR_LOOKS = ((BLUE, "o"), (ORANGE, "^"), (WINE, "s"), (INK, "x"))
 def learning_curves(comparison: Comparison, baselines: Sequence[Mapping] = ()) -> Figure:
     """Return, length and deliveries per episode, a column for each delivery setting.
 
-    All learners are shown at the configuration that stands for the paper's figure 1. Where one of
-    them lacks it, or the world is not the paper's, each is shown at the one that stands for it in
-    table 2. A point is the mean over a span of episodes (`_spans`); lines are interquartile means
-    over seeds, bands the middle half of the seeds.
-
-    Args:
-        comparison: The comparison.
-        baselines: Rows of baselines.csv; of these the shortest delivery is drawn.
+    Learners are shown at the configuration that stands for the paper's figure 1, one that lacks it
+    at the one that stands for it in table 2. A point is the mean over a span of episodes; lines are
+    interquartile means over seeds, bands the middle half of the seeds. Of the rows of baselines.csv
+    the shortest delivery is drawn.
     """
-    rows = [comparison.position(*learner, FIGURE_1) for learner in comparison.learners]
-    shared = comparison.in_paper_world and None not in rows
+    colours = dict(zip(comparison.variants, cycle(COLOURS)))
     settings = comparison.delivery_settings
     with styled():
         figure = new_figure(6.5)
         shape = len(_CURVES), len(settings)
         axes = figure.subplots(*shape, sharex=True, sharey="row", squeeze=False)
-        for (setting, variant), row in zip(comparison.learners, rows, strict=True):
-            if row is None or not shared:
+        for setting, variant in comparison.learners:
+            row, label = comparison.position(setting, variant, FIGURE_1), variant.label
+            if row is None:
                 row = shown_position(comparison, setting, variant)
-            point = "" if shared else f", {setting}: {comparison.rows[row].point.label}"
-            colour = _colours(comparison)[variant]
+                label += f", {setting}: {comparison.rows[row].point.label}"
             for axis, name in zip(axes[:, settings.index(setting)], _CURVES, strict=True):
                 runs = getattr(comparison, name)[row]
-                _curve(axis, runs, name == "deliveries", colour, variant.label + point)
+                _curve(axis, runs, name == "deliveries", colours[variant], label)
         for (axis, *_), (name, label) in zip(axes, _CURVES.items(), strict=True):
             axis.set_ylabel(f"{label} of an episode")
             if name == "steps":
@@ -84,66 +78,19 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Mapping] = ()) -
             logarithmic(column[-1].xaxis, (1,) if comparison.episodes > 50 else (1, 2, 5))
         words = (
             f"Line: interquartile mean of {count(len(comparison.seeds), 'seed')} (of deliveries "
-            "the mean), band: their middle half. Later points are means over longer spans."
+            "the mean), band: their middle half. Later points are means over longer spans.\n"
+            f"Learners have {FIGURE_1.label} unless named otherwise: the paper's figure 1 names no "
+            "configuration, this one\nstands twice in its table 2."
         )
-        if shared:
-            words += (
-                f"\nAll learners have {FIGURE_1.label}: the paper's figure 1 names no "
-                "configuration, this one stands twice in its table 2."
-            )
         frame(figure, "Learning", words, legend_entries(axes.flat))
-    return figure
-
-
-def best_runs(comparison: Comparison) -> Figure:
-    """What "train each configuration once, report the best" gives.
-
-    For each learner the distribution over independent draws of seeds of the winner's return and
-    length: a line's height is the share of draws that report no more. In the paper's world a
-    diamond marks the paper's figure, at the share of draws below it.
-    """
-    settings = comparison.delivery_settings
-    with styled():
-        figure = new_figure(6.0)
-        axes = figure.subplots(len(_BEST), len(settings), sharey=True, squeeze=False)
-        ends: dict[Axes, list[float]] = {}
-        for setting, variant in comparison.learners:
-            best, paper = best_of(comparison, setting, variant), paper_row(comparison, variant)
-            colour = _colours(comparison)[variant]
-            for axis, name in zip(axes[:, settings.index(setting)], _BEST, strict=True):
-                axis.ecdf(best[name], color=colour, label=variant.label)
-                ends.setdefault(axis, []).extend(np.percentile(best[name], (2.5, 97.5)))
-                if paper:
-                    place = paper.figure(name)
-                    ends[axis].append(place)
-                    below = percentile_of(place, best[name]) / 100
-                    axis.plot(place, below, "D", color=colour, mec=INK, ms=7, zorder=5)
-        for column, setting in zip(axes.T, settings, strict=True):
-            column[0].set_title(f"{setting.capitalize()} delivery")
-            for axis, label in zip(column, _BEST.values(), strict=True):
-                axis.set_xlabel(label)
-                axis.set_xlim(min(ends[axis]) - 1, max(ends[axis]) + 1)
-        for axis in axes[:, 0]:
-            axis.set_ylabel("Share of draws")
-        frame(
-            figure,
-            "What training each configuration once and reporting the best gives",
-            "A draw trains each configuration once, on a random one of "
-            f"{count(len(comparison.seeds), 'seed')}, and reports the run with the highest return."
-            "\nA line's height is the share of draws that report no more. Diamond: the paper's "
-            "figure. Up to 2.5 % of a learner's draws lie beyond either end.",
-            legend_entries(axes.flat),
-        )
     return figure
 
 
 def return_against_deliveries(comparison: Comparison, baselines: Sequence[Mapping] = ()) -> Figure:
     """Who earns reward by delivering, and what the others do instead: a mark for each run.
 
-    Args:
-        comparison: The comparison.
-        baselines: Rows of baselines.csv; those of the training setting are shown, the optimal
-            policies, for which delivery is the end, only in the panel of absorbing delivery.
+    Of the rows of baselines.csv the optimal policies, for which delivery is the end, are shown only
+    in the panel of absorbing delivery.
     """
     settings = comparison.delivery_settings
     returns = comparison.measure("return_last50")
@@ -180,28 +127,15 @@ def save_all(comparison: Comparison, baselines: Sequence[Mapping], folder: str |
     """
     folder = check_writable_folder(folder)
     save(learning_curves(comparison, baselines), folder / "learning_curves.png")
-    save(best_runs(comparison), folder / "best_runs.png")
     save(return_against_deliveries(comparison, baselines), folder / "return_against_deliveries.png")
-
-
-def _colours(comparison: Comparison) -> dict[Variant, str]:
-    """A colour for each learner."""
-    return dict(zip(comparison.variants, cycle(COLOURS)))
-
-
-def _spans(episodes: int) -> np.ndarray:
-    """The first episodes, from 0, of the spans over which a learning curve averages, and the end.
-
-    Their lengths grow with the episode, so that points are evenly spaced on a logarithmic axis;
-    the first spans are single episodes.
-    """
-    n = max(2, round(_PER_DECADE * np.log10(episodes + 1)) + 1)
-    return np.unique(np.geomspace(1, episodes + 1, n).round().astype(int)) - 1
 
 
 def _curve(axis: Axes, runs: np.ndarray, share: bool, colour: str, label: str) -> None:
     """A learner's line with its band, of values (seeds, episodes); of a share the mean alone."""
-    edges = _spans(runs.shape[1])
+    # The first episodes, from 0, of spans that grow so that points are evenly spaced on a
+    # logarithmic axis, and the end; the first spans are single episodes.
+    n, end = max(2, round(_PER_DECADE * np.log10(runs.shape[1] + 1)) + 1), runs.shape[1] + 1
+    edges = np.unique(np.geomspace(1, end, n).round().astype(int)) - 1
     at = np.sqrt((edges[:-1] + 1) * edges[1:])  # the middle of a span on a logarithmic axis
     means = np.add.reduceat(runs.astype(float), edges[:-1], axis=1) / np.diff(edges)
     # One run of an episode delivers or does not: there is no typical half to average.
@@ -223,9 +157,9 @@ def _shortest_delivery(column: Sequence[Axes], baselines: Sequence[Mapping]) -> 
 def _baseline_marks(axis: Axes, baselines: Sequence[Mapping], setting: str) -> None:
     """Hollow marks, larger than those of the data and above them."""
     for row, marker in zip(baselines, cycle("osD^vph")):
-        known = row["setting"].startswith("training") and row["return_mean"] is not None
         # Optimal policies take delivery for the end; elsewhere they are no yardstick.
-        if known and (setting == "absorbing" or row["baseline"] != "optimal policy"):
+        counts_here = setting == "absorbing" or row["baseline"] != "optimal policy"
+        if row["return_mean"] is not None and counts_here:
             axis.plot(
                 *(row["deliveries_mean"], row["return_mean"], marker),
                 color=INK,

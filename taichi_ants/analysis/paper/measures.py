@@ -6,16 +6,25 @@ episodes needs 100, so that early and late never share an episode.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
 WINDOW = 50
-LAST = slice(-WINDOW, None)
-FIRST = slice(0, WINDOW)
-SECOND = slice(WINDOW, 2 * WINDOW)
-ALL = slice(None)
+# What an episode gives: its array in `RunOutcomes`, words, unit.
+_GIVEN = {
+    "return": ("returns", "return", "reward"),
+    "steps": ("steps", "length", "steps"),
+    "deliveries": ("deliveries", "deliveries", "deliveries per episode"),
+}
+# Episodes, their words, and how many a run needs.
+_WINDOWS = {
+    "first50": (slice(0, WINDOW), "the first 50 episodes", 2 * WINDOW),
+    "second50": (slice(WINDOW, 2 * WINDOW), "episodes 51 to 100", 2 * WINDOW),
+    "last50": (slice(-WINDOW, None), "the last 50 episodes", 1),
+    "all": (slice(None), "all episodes", 1),
+}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -74,11 +83,11 @@ class Measure:
         return self.unit in ("reward", "steps")
 
 
-def _mean(name: str, episodes: slice = ALL) -> Callable[[RunOutcomes], np.ndarray]:
+def _mean(name: str, episodes: slice = slice(None)) -> Callable[[RunOutcomes], np.ndarray]:
     return lambda runs: getattr(runs, name)[..., episodes].mean(axis=2, dtype=float)
 
 
-def _fluctuation(name: str, episodes: slice = ALL) -> Callable[[RunOutcomes], np.ndarray]:
+def _fluctuation(name: str, episodes: slice) -> Callable[[RunOutcomes], np.ndarray]:
     """Root mean square change from one episode to the next, over the square root of two.
 
     Without a trend this is the standard deviation of independent episodes; unlike that one, it
@@ -110,47 +119,26 @@ def _improved(runs: RunOutcomes) -> np.ndarray:
     return (runs.measure("return_last50") > runs.measure("return_first50")).astype(float)
 
 
-_EARLY = 2 * WINDOW
-_REWARD, _STEPS, _DELIVERIES, _SHARE = "reward", "steps", "deliveries per episode", "share of runs"
-_CHANGES = "from episode to episode"
+def _measures() -> Iterator[tuple[str, Measure]]:
+    for name, (array, words, unit) in _GIVEN.items():
+        for window, (episodes, when, least) in _WINDOWS.items():
+            mean = Measure(f"mean {words} of {when}", unit, _mean(array, episodes), least)
+            yield f"{name}_{window}", mean
+            changes = f"fluctuation of the {words} from episode to episode in {when}"
+            compute = _fluctuation(array, episodes)
+            yield f"{name}_fluctuation_{window}", Measure(changes, unit, compute, max(2, least))
+        greedy = f"mean {words} of the greedy rollouts"
+        yield f"greedy_{name}", Measure(greedy, unit, _mean(f"greedy_{array}"))
 
-# fmt: off
+
+_SHARE = "share of runs"
 MEASURES: dict[str, Measure] = {
-    "return_last50": Measure(
-        "mean return of the last 50 episodes", _REWARD, _mean("returns", LAST)),
-    "return_first50": Measure(
-        "mean return of the first 50 episodes", _REWARD, _mean("returns", FIRST), _EARLY),
-    "steps_last50": Measure(
-        "mean length of the last 50 episodes", _STEPS, _mean("steps", LAST)),
-    "steps_first50": Measure(
-        "mean length of the first 50 episodes", _STEPS, _mean("steps", FIRST), _EARLY),
-    "steps_all": Measure("mean length of all episodes", _STEPS, _mean("steps")),
-    "deliveries_last50": Measure(
-        "mean deliveries of the last 50 episodes", _DELIVERIES, _mean("deliveries", LAST)),
-    "deliveries_second50": Measure(
-        "mean deliveries of episodes 51 to 100", _DELIVERIES, _mean("deliveries", SECOND), _EARLY),
-    "return_fluctuation_first50": Measure(
-        f"fluctuation of the return {_CHANGES} in the first 50 episodes",
-        _REWARD, _fluctuation("returns", FIRST), _EARLY),
-    "return_fluctuation_last50": Measure(
-        f"fluctuation of the return {_CHANGES} in the last 50 episodes",
-        _REWARD, _fluctuation("returns", LAST), 2),
-    "return_fluctuation_all": Measure(
-        f"fluctuation of the return {_CHANGES} over all episodes",
-        _REWARD, _fluctuation("returns"), 2),
-    "steps_fluctuation_all": Measure(
-        f"fluctuation of the length {_CHANGES} over all episodes",
-        _STEPS, _fluctuation("steps"), 2),
-    "shortest_episode": Measure("length of the shortest training episode", _STEPS, _shortest),
+    **dict(_measures()),
+    "shortest_episode": Measure("length of the shortest training episode", "steps", _shortest),
     "improved": Measure(
-        "whether the last 50 episodes return more than the first 50", _SHARE, _improved, _EARLY),
-    "greedy_return": Measure(
-        "mean return of the greedy rollouts", _REWARD, _mean("greedy_returns")),
-    "greedy_steps": Measure(
-        "mean length of the greedy rollouts", _STEPS, _mean("greedy_steps")),
-    "greedy_deliveries": Measure(
-        "mean deliveries of the greedy rollouts", _DELIVERIES, _mean("greedy_deliveries")),
+        "whether the last 50 episodes return more than the first 50", _SHARE, _improved, 2 * WINDOW
+    ),
     "greedy_repeats": Measure(
-        "whether all greedy rollouts of a run are equal in return and length", _SHARE, _repeats),
+        "whether all greedy rollouts of a run are equal in return and length", _SHARE, _repeats
+    ),
 }
-# fmt: on

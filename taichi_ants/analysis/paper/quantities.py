@@ -107,6 +107,18 @@ def _epsilon_at_table_2(part: Slice, measure: str, variant: Variant) -> np.ndarr
 
 EPSILON_AT_TABLE_2 = Read("epsilon 0.5 minus 0.3, all else as in table 2", _epsilon_at_table_2)
 
+
+def less_exploration(epsilon: int, decay: int) -> Read:
+    """Epsilon 0.3 with decay 0.99 minus another combination, by the places of its two values."""
+
+    def values(part: Slice, measure: str, variant: Variant) -> np.ndarray:
+        grid = part.grid(measure, variant)
+        return (grid[:, :, 0, 0] - grid[:, :, epsilon, decay]).mean(axis=(0, 1))
+
+    other = f"{FACTORS['epsilon'][epsilon]:g} / {FACTORS['epsilon_decay'][decay]:g}"
+    return Read(f"epsilon / decay 0.3 / 0.99 minus {other}, mean of 4 pairs", values)
+
+
 # What reads a number of each seed, float64 (seeds,).
 Effect = Callable[[Slice], np.ndarray]
 
@@ -116,8 +128,7 @@ class Quantity:
     """What a claim is tested on: one or more numbers of each seed, in one unit.
 
     Attributes:
-        words: What is computed, without what is subtracted from what.
-        scope: From which configurations.
+        words: What is computed, without what is subtracted from what, from which configurations.
         unit: The unit.
         effects: What reads them, by label, such as "Q-learning minus SARSA".
         possible: The range that the numbers cannot leave.
@@ -125,16 +136,10 @@ class Quantity:
     """
 
     words: str
-    scope: str
     unit: str
     effects: dict[str, Effect]
     possible: tuple[float, float] = UNBOUNDED
     of_centres: Callable[[np.ndarray], np.ndarray] | None = None
-
-    @property
-    def text(self) -> str:
-        """What is computed, for readers."""
-        return f"{self.words}, {self.scope}: {'; '.join(self.effects)}"
 
     @property
     def typical(self) -> bool:
@@ -165,9 +170,8 @@ def minus(read: Read, measure: str, *pairs: tuple[Variant, Variant]) -> Quantity
     return _quantity(read.words, measure, effects, DIFFERENCE)
 
 
-def effects_of(measure: str, variant: Variant, *factors: str) -> Quantity:
-    """The effect of each hyperparameter on the measure of a learner."""
-    reads = map(effect_of, factors)
+def of_each(measure: str, variant: Variant, *reads: Read) -> Quantity:
+    """The measure of a learner, read in several ways."""
     effects = {f"{variant.label}, {one.words}": _reader(one, measure, variant) for one in reads}
     return _quantity(ALL, measure, effects)
 
@@ -184,7 +188,8 @@ def _quantity(
 ) -> Quantity:
     """A quantity in the unit of a measure; the bounds are those of a share or a count."""
     one = MEASURES[measure]
-    return Quantity(one.words, scope, one.unit, effects, UNBOUNDED if one.typical else bounds)
+    possible = UNBOUNDED if one.typical else bounds
+    return Quantity(f"{one.words}, {scope}", one.unit, effects, possible)
 
 
 def share_above(measure: str, first: Variant, second: Variant, below: bool = False) -> Quantity:
@@ -196,7 +201,7 @@ def share_above(measure: str, first: Variant, second: Variant, below: bool = Fal
 
     label = f"{first.label} {'below' if below else 'above'} {second.label}"
     words = f"{MEASURES[measure].words}, in which share of 16 matched configurations of a seed"
-    return Quantity(words, ALL, "share of 16 pairs", {label: share}, SHARE)
+    return Quantity(words, "share of 16 pairs", {label: share}, SHARE)
 
 
 def growth(later: str, earlier: str, *variants: Variant) -> Quantity:
@@ -223,9 +228,9 @@ def rank_correlation(first: str, second: str, variant: Variant) -> Quantity:
         scale = np.sqrt((one**2).sum(axis=0) * (other**2).sum(axis=0))
         return (one * other).sum(axis=0) / np.where(scale > 0, scale, 1.0)
 
-    words = f"rank correlation of {MEASURES[first].words} and {MEASURES[second].words} of a seed"
-    effects: dict[str, Effect] = {variant.label: correlation}
-    return Quantity(words, ALL, "correlation", effects, DIFFERENCE)
+    pair = f"{MEASURES[first].words} and {MEASURES[second].words}"
+    words = f"rank correlation of {pair} over the 16 configurations of a seed"
+    return Quantity(words, "correlation", {variant.label: correlation}, DIFFERENCE)
 
 
 def stronger(measure: str, factor: str) -> Quantity:
@@ -240,7 +245,6 @@ def stronger(measure: str, factor: str) -> Quantity:
     others = [other for other in FACTORS if other != factor]
     return Quantity(
         f"{MEASURES[measure].words}, absolute effect of a hyperparameter, mean of the learners",
-        ALL,
         MEASURES[measure].unit,
         {f"{factor} minus {other}".replace("_", " "): effects(other) for other in others},
         of_centres=lambda centres: _first_minus_second(np.abs(centres), np.mean),
@@ -258,7 +262,6 @@ def more_dependent(measure: str, factor: str, *pairs: tuple[Variant, Variant]) -
     return Quantity(
         f"{MEASURES[measure].words}, standard deviation of the effect of {factor} over 8 pairs of "
         "configurations (jackknife over seeds)",
-        ALL,
         MEASURES[measure].unit,
         {f"{one.label} minus {other.label}": effects(one, other) for one, other in pairs},
         of_centres=lambda centres: _first_minus_second(centres, partial(np.std, ddof=1)),
@@ -269,22 +272,3 @@ def _first_minus_second(centres: np.ndarray, statistic: Callable[..., Any]) -> n
     """A statistic of the first half of the rows minus that of the second."""
     first, second = np.split(centres, 2)
     return statistic(first, axis=0) - statistic(second, axis=0)
-
-
-def moderate_exploration(measure: str, variant: Variant) -> Quantity:
-    """Epsilon 0.3 with decay 0.99 minus each other combination of the two."""
-
-    def difference(epsilon: int, decay: int) -> Effect:
-        def values(part: Slice) -> np.ndarray:
-            grid = part.grid(measure, variant)
-            return (grid[:, :, 0, 0] - grid[:, :, epsilon, decay]).mean(axis=(0, 1))
-
-        return values
-
-    others = {"0.3 / 0.995": (0, 1), "0.5 / 0.99": (1, 0), "0.5 / 0.995": (1, 1)}
-    return Quantity(
-        f"{MEASURES[measure].words} of {variant.label} by epsilon / decay",
-        "mean of 4 matched configurations",
-        MEASURES[measure].unit,
-        {f"0.3 / 0.99 minus {label}": difference(*place) for label, place in others.items()},
-    )

@@ -5,7 +5,6 @@ It shows what the other tables hold, and computes nothing.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS
@@ -14,7 +13,6 @@ from taichi_ants.analysis.paper.comparison import Comparison, GridPoint
 from taichi_ants.analysis.paper.published import GREEDY_RETURN, GREEDY_STEPS
 from taichi_ants.analysis.paper.table2 import APART, apart, figure_tables, label
 from taichi_ants.analysis.tables import (
-    MISSING,
     Block,
     Table,
     baseline_name,
@@ -41,12 +39,8 @@ def report(
 ) -> str:
     """The report as plain text of at most `WIDTH` columns.
 
-    Args:
-        comparison: The comparison.
-        lines: Its table 2, from `table2.table2`.
-        behaviours: From `summary.summarise_behaviours`.
-        audit: Its claims, from `audit.assess`.
-        baselines: Rows of baselines.csv, see `baselines.baseline_rows`.
+    Its lines are from `table2.table2`, the rest from `summary.summarise_behaviours`, `audit.assess`
+    and `baselines.baseline_rows`.
     """
     blocks = [
         *_heading(comparison),
@@ -65,7 +59,13 @@ def _heading(comparison: Comparison) -> list[Block]:
         f"{count(comparison.episodes, 'episode')} of at most {comparison.max_steps} steps, "
         f"{count(comparison.greedy_returns.shape[2], 'greedy rollout')} a run."
     )
-    return [f"World: {comparison.world}.\n{sizes}\n{comparison.conditions}"]
+    task = comparison.task
+    training, greedy = (
+        "with" if falls else "without"
+        for falls in (task.evaporation_in_training, task.evaporation_in_evaluation)
+    )
+    trails = f"Training {training} evaporation of trails, greedy evaluation {greedy} it."
+    return [f"World: {comparison.world}.\n{sizes}\n{trails}"]
 
 
 def _greedy(lines: Sequence[Mapping]) -> Table:
@@ -84,49 +84,37 @@ def _greedy(lines: Sequence[Mapping]) -> Table:
 
 
 def _behaviours(lines: Sequence[Mapping], behaviours: Sequence[Mapping]) -> Table:
-    """What the final policies do: in the configurations that the tables above show, and in all."""
+    """What the final policies do, in the configurations that the tables above show."""
     headers = ("Learner", "Delivery", "Behaviour", "Runs", "Return\ntraining", "followed", "greedy")
-    rows = []
-    for line in lines:
-        names = [label(line), line["delivery"]]
-        learner = ("learner", "hyperparameters", "delivery")
-        of_learner = [one for one in behaviours if _same(one, line, *learner)]
-        here = {one["behaviour"]: one for one in of_learner if _same(one, line, *GridPoint._fields)}
-        all_runs: Counter[str] = Counter()
-        for one in of_learner:
-            all_runs[one["behaviour"]] += one["runs"]
-        for behaviour in filter(all_runs.__contains__, BEHAVIOURS):
-            cells = ["0", *[MISSING] * 3]
-            if found := here.get(behaviour):
-                means = ("return_last50_mean", "policy_return_mean", "greedy_return_mean")
-                cells = [str(found["runs"]), *(number(found[name]) for name in means)]
-            rows.append([*names, behaviour, *cells, str(all_runs[behaviour])])
-            names = ["", ""]
+    configuration = ("learner", "hyperparameters", "delivery", *GridPoint._fields)
+    means = ("return_last50_mean", "policy_return_mean", "greedy_return_mean")
+    rows = [
+        [
+            *(label(line), line["delivery"], one["behaviour"], str(one["runs"])),
+            *(number(one[name]) for name in means),
+        ]
+        for line in lines
+        for one in behaviours
+        if all(one[name] == line[name] for name in configuration)
+    ]
     notes = (
         "Each policy is followed greedily once, with evaporation as in training.",
         *(f"{one}: {means}" for one, means in zip(BEHAVIOURS, DEFINITIONS, strict=True)),
         "An episode without delivery is told by its second half.",
-        "Runs: of the configurations above. Return: mean of the last 50 training episodes,",
-        "of the episode that tells the behaviour, of the greedy evaluation.",
-        "All: runs in all configurations.",
+        "Return: mean of the last 50 training episodes, of the episode that tells the",
+        "behaviour, of the greedy evaluation. summary.csv counts all configurations.",
     )
-    return Table("What the ants do", (*headers, "All"), rows, notes, text_columns=3)
-
-
-def _same(one: Mapping, other: Mapping, *names: str) -> bool:
-    return all(one[name] == other[name] for name in names)
+    return Table("What the ants do", headers, rows, notes, text_columns=3)
 
 
 def _baselines(baselines: Sequence[Mapping]) -> Table:
-    headers = ("Behaviour", "Setting", "Return", "Steps", "Deliveries")
     digits = {"return_mean": 1, "steps_mean": 1, "deliveries_mean": 2}
     rows, notes = [], []
     for row in baselines:
-        cells = [
-            MISSING if row[name] is None else number(row[name], places)
-            for name, places in digits.items()
-        ]
-        rows.append([baseline_name(row), row["setting"], *cells])
-        if row["return_mean"] is None and row.get("note"):
+        if row["return_mean"] is None:
             notes.append(f"{baseline_name(row)}: {row['note']}")
-    return Table("Baselines", headers, rows, notes, text_columns=2)
+        else:
+            figures = (number(row[name], places) for name, places in digits.items())
+            rows.append([baseline_name(row), *figures])
+    headers = ("Behaviour", "Return", "Steps", "Deliveries")
+    return Table("Baselines, with evaporation as in training", headers, rows, notes)

@@ -7,7 +7,7 @@ import numpy as np
 from taichi_ants.analysis.behaviour import BEHAVIOURS, NAMES, counts
 from taichi_ants.analysis.paper.comparison import Comparison
 from taichi_ants.analysis.paper.measures import MEASURES
-from taichi_ants.analysis.statistics import centres
+from taichi_ants.analysis.sweeps import summary_rows
 
 _GREEDY = ("greedy_return", "greedy_steps", "greedy_deliveries")
 _MEASURES = ("return_last50", "steps_last50", "steps_all", "deliveries_last50", *_GREEDY)
@@ -16,28 +16,16 @@ _MEASURES = ("return_last50", "steps_last50", "steps_all", "deliveries_last50", 
 def summarise(comparison: Comparison) -> list[dict]:
     """The rows of summary.csv, one for each configuration, in their order.
 
-    Means and interquartile means over seeds with 95 % intervals (see `statistics`), and the
-    standard deviation (n - 1) of returns; then how many final policies behave so. What cannot
-    exist is nan: intervals and deviation of one seed, greedy figures without rollouts.
+    Means and interquartile means over seeds with 95 % intervals (see `statistics`), then how many
+    final policies behave so. What cannot exist is nan: intervals of one seed, greedy figures
+    without rollouts.
     """
-    returns, seeds = comparison.measure("return_last50"), len(comparison.seeds)
-    deviations = returns.std(axis=1, ddof=1) if seeds > 1 else np.full(len(returns), np.nan)
-    columns = {"return_last50_sd": deviations} | {
-        f"{name}_{column}": values
-        for name in _MEASURES
-        for column, values in centres(comparison.measure(name), MEASURES[name].typical).items()
-    }
-    lines = []
-    for number, row in enumerate(comparison.rows):
-        done = counts(comparison.behaviours[number])
-        lines.append(
-            {
-                **row.columns(),
-                "seeds": seeds,
-                **{name: float(values[number]) for name, values in columns.items()},
-                **{f"runs_{name}": done.get(code, 0) for code, name in enumerate(NAMES)},
-            }
-        )
+    values = {name: comparison.measure(name) for name in _MEASURES}
+    typical = [name for name in values if MEASURES[name].typical]
+    lines = summary_rows([row.columns() for row in comparison.rows], values, typical)
+    for line, behaviours in zip(lines, comparison.behaviours, strict=True):
+        done = counts(behaviours)
+        line |= {f"runs_{name}": done.get(code, 0) for code, name in enumerate(NAMES)}
     return lines
 
 

@@ -22,7 +22,8 @@ from taichi_ants.analysis.paper.best_of import (
     shown_position,
 )
 from taichi_ants.analysis.paper.comparison import Comparison, GridPoint, Variant
-from taichi_ants.analysis.tables import MISSING, Table, interval, number, percent
+from taichi_ants.analysis.paper.measures import WINDOW
+from taichi_ants.analysis.tables import MISSING, Block, Table, interval, number, percent
 from taichi_ants.errors import count
 
 # Below, a note warns that means have too few seeds; what intervals cover is measured in
@@ -34,14 +35,9 @@ APART = "!"  # marks a mean that the interval of the IQM excludes
 def table2(comparison: Comparison, summary: Sequence[Mapping], draws: int = DRAWS) -> list[dict]:
     """The rows of table2.csv, one for each delivery setting and learner.
 
-    Each is the row of summary.csv that stands for the learner (`best_of.shown_position`), with
-    what the best run reports beside it (ranges from 2.5 % to 97.5 %), and what the paper does:
+    Each is the row of `summary.summarise` that stands for the learner (`best_of.shown_position`),
+    with what the best run reports beside it (ranges from 2.5 % to 97.5 %), and what the paper does:
     nan of a learner that it does not have, and in another world.
-
-    Args:
-        comparison: The comparison.
-        summary: Its `summary.summarise`.
-        draws: How often the best run is drawn.
     """
     lines = []
     for delivery, variant in comparison.learners:
@@ -96,42 +92,44 @@ def _spread(line: Mapping, stem: str, *names: str, mark: str = "") -> str:
     return text if math.isnan(low) or low == high else f"{text}\n{interval(low, high, digits)}"
 
 
-def figure_tables(lines: Sequence[Mapping], comparison: Comparison) -> list[Table]:
+def figure_tables(lines: Sequence[Mapping], comparison: Comparison) -> list[Block]:
     """A table for each figure of a run, beside the paper's in its world, and what they mean."""
-    late = f"{comparison.late} episodes"
+    runs = comparison.episodes
+    late = f"last {WINDOW} episodes" if runs > WINDOW else f"all {count(runs, 'episode')}"
     titles = (f"Return, {late}", "Steps, all episodes", f"Steps, {late}", f"Deliveries, {late}")
-    headers = ("Learner", "Delivery", "Paper", "Mean", "IQM", "Best run", "Below")
-    tables = []
+    headers = ("Learner", "Delivery", "Mean", "IQM", "Best run", "Paper", "Below")
+    beside = not all(math.isnan(line["paper_return"]) for line in lines)
+    width = len(headers) if beside else len(headers) - 2
+    tables: list[Block] = []
     for name, title in zip(FIGURES, titles, strict=True):
         best = f"best_run_{name}"
         rows = [
             [
                 label(line),
                 line["delivery"],
-                number(line[f"paper_{name.partition('_')[0]}"], 2 if "deliver" in name else 1),
                 _spread(
                     *(line, name, "mean", "ci_low", "ci_high"),
                     mark=f" {APART}" if f"{name}_iqm" in line and apart(line, name) else "",
                 ),
                 _spread(line, name, "iqm", "iqm_ci_low", "iqm_ci_high"),
                 _spread(line, best, "median", "low", "high"),
+                number(line[f"paper_{name.partition('_')[0]}"], 2 if "deliver" in name else 1),
                 percent(line[f"{best}_paper_percentile"] / 100),
-            ]
+            ][:width]
             for line in lines
         ]
-        tables.append(Table(title, headers, rows, text_columns=2).without_empty_columns())
-    return [*tables, Table("", (), (), _notes(lines, comparison))]
+        tables.append(Table(title, headers[:width], rows, text_columns=2))
+    return [*tables, "  \n".join(_notes(lines, len(comparison.seeds), beside))]
 
 
-def _notes(lines: Sequence[Mapping], comparison: Comparison) -> list[str]:
-    seeds = len(comparison.seeds)
+def _notes(lines: Sequence[Mapping], seeds: int, beside: bool) -> list[str]:
     notes = [
         f"Mean, IQM: over {count(seeds, 'seed')}, with intervals at 95 %.",
         "IQM: interquartile mean, of the middle half of the runs: the typical run.",
         f"{APART} the mean lies outside of the IQM's interval: a few far runs have moved it.",
         "Best run: best by return of all configurations, one run each: median [95 %].",
     ]
-    if not all(math.isnan(line["paper_return"]) for line in lines):
+    if beside:
         notes += [
             "Paper: its table 2. Its steps may be of all episodes or of the last 50.",
             "Below: percentage of the best runs below the paper's figure.",

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 from plain_runs import rollout
-from synthetic_comparison import GREEDY_SETTING, TRAINING_SETTING
 
 from taichi_ants.analysis.bounds import episodes
 from taichi_ants.analysis.bounds.baselines import (
@@ -51,7 +50,6 @@ def test_the_rows_of_the_world_of_the_paper() -> None:
     figures = [
         (
             row["baseline"],
-            row["setting"],
             row["discount"],
             row["return_mean"],
             row["steps_mean"],
@@ -61,22 +59,15 @@ def test_the_rows_of_the_world_of_the_paper() -> None:
         if row["baseline"] != "random policy"
     ]
     assert figures == [
-        ("shortest delivery", TRAINING_SETTING, None, 45, 34, 1),
-        ("optimal policy", TRAINING_SETTING, 0.9, 45, 34, 1),
-        ("optimal policy", TRAINING_SETTING, 0.99, 476, 600, 0),
-        ("trail follower", TRAINING_SETTING, None, 45, 34, 1),
-        ("trail follower", GREEDY_SETTING, None, 45, 34, 1),
+        ("shortest delivery", None, 45, 34, 1),
+        ("optimal policy", 0.9, 45, 34, 1),
+        ("optimal policy", 0.99, 476, 600, 0),
+        ("trail follower", None, 45, 34, 1),
     ]
-    random = [row["setting"] for row in rows if row["baseline"] == "random policy"]
-    assert random == [TRAINING_SETTING, GREEDY_SETTING]
+    assert [row["baseline"] for row in rows].count("random policy") == 1
 
 
-def test_only_rows_of_several_seeds_have_an_interval() -> None:
-    rows = baseline_rows(paper(), Task(), evaluate, [0], rollouts=1, max_steps=40)
-    assert {(row["return_ci_low"], row["return_ci_high"]) for row in rows} == {(None, None)}
-
-
-def test_policies_are_evaluated_in_both_settings_with_one_table_for_each_seed() -> None:
+def test_policies_are_evaluated_as_in_training_with_one_table_for_each_seed() -> None:
     calls = []
 
     def record(world: World, q_values: np.ndarray, **options: Any) -> SimpleNamespace:
@@ -87,24 +78,19 @@ def test_policies_are_evaluated_in_both_settings_with_one_table_for_each_seed() 
         return SimpleNamespace(returns=returns, steps=np.full(shape, 9), deliveries=np.eye(3, 2))
 
     task = Task("five_cells", rewards=Rewards(give=77))
-    rows = baseline_rows(paper(), task, record, range(5, 8), rollouts=2, max_steps=77)[-4:]
-    expected = [random_policy()] * 2 + [trail_follower()] * 2
-    for (q_values, options), policy, evaporation in zip(
-        calls, expected, [False, True, False, True], strict=True
-    ):
+    rows = baseline_rows(paper(), task, record, range(5, 8), rollouts=2, max_steps=77)[-2:]
+    for (q_values, options), policy in zip(calls, (random_policy(), trail_follower()), strict=True):
         np.testing.assert_array_equal(q_values, np.stack([policy] * 3))
         assert options == {
             "rollouts": 2,
             "max_steps": 77,
-            "task": Task(rewards=task.rewards, evaporation_in_evaluation=evaporation),
+            "task": Task(rewards=task.rewards, evaporation_in_evaluation=False),
             "seeds": [5, 6, 7],
         }
     for row in rows:
         assert row["return_mean"] == 3
         assert row["steps_mean"] == 9
         assert row["deliveries_mean"] == pytest.approx(1 / 3)
-        # Of three seeds the interval is wide, but within their range.
-        assert 1 <= row["return_ci_low"] < 3 < row["return_ci_high"] <= 6
 
 
 def test_all_baselines_are_paid_what_the_task_pays() -> None:
@@ -114,7 +100,7 @@ def test_all_baselines_are_paid_what_the_task_pays() -> None:
     assert returns == {32 * 2 + 30 + 100}
 
 
-def test_settings_say_where_trails_evaporate() -> None:
+def test_trails_evaporate_as_in_training() -> None:
     calls = []
 
     def record(*arguments: Any, **options: Any) -> SimpleNamespace:
@@ -124,15 +110,11 @@ def test_settings_say_where_trails_evaporate() -> None:
     task = Task(evaporation_in_training=True, evaporation_in_evaluation=False)
     rows = baseline_rows(paper(), task, record, [0], 1, (0.9,), 40)
     assert rows[0]["note"] == "exact bounds are known for worlds without evaporation only."
-    assert [row["setting"] for row in rows] == [
-        "training, evaporation",
-        *("training, evaporation", "greedy, no evaporation") * 2,
-    ]
-    assert calls == [True, False] * 2
+    assert calls == [True, True]
 
 
 def test_a_discount_of_one_has_no_figures_but_a_reason() -> None:
-    rows = baseline_rows(paper(), Task(), evaluate, [0], 1, [1.0, 0.5, 1], 40)[:-4]
+    rows = baseline_rows(paper(), Task(), evaluate, [0], 1, [1.0, 0.5, 1], 40)[:-2]
     assert [row["discount"] for row in rows] == [None, 1.0, 0.5]
     assert rows[1]["return_mean"] is None
     assert "may grow without bound" in rows[1]["note"]
@@ -153,4 +135,4 @@ def test_a_world_that_is_too_large_leaves_out_the_bounds_only(
     assert first["baseline"] == "exact bounds"
     assert "choose a smaller world" in first["note"]
     assert first["return_mean"] is None
-    assert [row["baseline"] for row in others] == ["random policy"] * 2 + ["trail follower"] * 2
+    assert [row["baseline"] for row in others] == ["random policy", "trail follower"]

@@ -13,12 +13,7 @@ from hypothesis import strategies as st
 from random_worlds import random_world
 
 from taichi_ants import worlds
-from taichi_ants.analysis.bounds.limits import (
-    food_limit,
-    least_mean_cycle,
-    limits_of,
-    queen_limit,
-)
+from taichi_ants.analysis.bounds.limits import least_mean_cycle, limits_of
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT
 from taichi_ants.worlds import World
 
@@ -28,10 +23,9 @@ STEPS = [(1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1), (1, 0, 1)]
 def test_the_papers_world() -> None:
     limits = limits_of(worlds.paper())
     # There and back are 16 moves each, the food is picked up, and given.
-    assert limits.cycle == limits.crowd_cycle == 36
-    # Food and queen stand in corners, each with three neighbours that serve once in three ticks;
-    # the food is back each tick.
-    assert (limits.food, limits.queen) == (1000, 1000)
+    assert limits.cycle == 36
+    # The queen stands in a corner, with three neighbours that serve once in three ticks.
+    assert limits.queen == 1000
     assert limits.deliveries(1) == pytest.approx(1000 / 36)
     assert limits.deliveries(10) == pytest.approx(10_000 / 36)
     assert limits.deliveries(64) == 1000
@@ -46,7 +40,7 @@ def test_a_corridor_by_hand() -> None:
     limits = limits_of(corridor(3))
     # Beside both: pick up (which turns it round), give, turn by a sixth against the wall.
     assert limits.cycle == 3
-    assert (limits.food, limits.queen) == (1000 / 3, 1000 / 3)
+    assert limits.queen == 1000 / 3
     assert limits.deliveries(5) == pytest.approx(1000 / 3)
     long = limits_of(corridor(7))
     # Four moves each way and a pick-up, which turns it round, and a give, which does not: two more
@@ -80,62 +74,24 @@ def test_a_neighbour_cell_serves_once_in_three_ticks() -> None:
     assert colony.record.ticks == 4
 
 
-@pytest.mark.parametrize(
-    ("foods", "obstacles", "regrowth", "expected"),
-    [
-        # In the open a place is limited by its own regrowth, its six neighbours would serve two.
-        ([(3, 0, 0)], [], 0, 1000),
-        ([(3, 0, 0)], [], 1, 500),
-        ([(3, 0, 0)], [], 9, 100),
-        ([(3, 0, 0), (0, 3, 0)], [], 0, 2000),
-        ([], [], 0, 0),
-    ],
-)
-def test_what_food_can_give(foods, obstacles, regrowth, expected) -> None:
-    world = World((8, 8, 8), (0, 0, 0), foods, obstacles)
-    assert food_limit(world, regrowth) == pytest.approx(expected)
-
-
-def test_foods_share_the_cells_around_them() -> None:
-    # queen . . . food food: only one cell from which to take, and only the first food from it.
-    row = World((6, 1, 1), (0, 0, 0), [(4, 0, 0), (5, 0, 0)])
-    assert food_limit(row) == pytest.approx(1000 / 3)
-    # Two foods around one cell at the end of a corridor share it.
-    fork = World(
-        (5, 2, 1),
-        (0, 0, 0),
-        [(4, 0, 0), (4, 1, 0)],
-        [(1, 1, 0), (2, 1, 0), (3, 1, 0), (0, 1, 0)],
-    )
-    assert food_limit(fork) == pytest.approx(1000 / 3)
-    assert food_limit(fork, regrowth=9) == pytest.approx(200)
-    # The same cell beside the queen serves once in two ticks: pick up, give, pick up the other.
-    beside = World((3, 2, 1), (0, 0, 0), [(2, 0, 0), (2, 1, 0)], [(0, 1, 0), (1, 1, 0)])
-    assert food_limit(beside) == pytest.approx(500)
-
-
 def test_what_the_queen_can_take() -> None:
-    assert queen_limit(World((8, 8, 8), (0, 0, 0))) == pytest.approx(2000)
+    assert limits_of(World((8, 8, 8), (0, 0, 0))).queen == pytest.approx(2000)
     walled = World((8, 8, 8), (0, 0, 0), obstacles=[(1, 0, 0), (0, 1, 0), (0, 0, 1)])
-    assert queen_limit(walled) == pytest.approx(1000)
+    assert limits_of(walled).queen == pytest.approx(1000)
 
 
 def test_without_a_way_nothing_is_possible() -> None:
     shut = World((6, 1, 1), (0, 0, 0), [(5, 0, 0)], [(3, 0, 0)])
     limits = limits_of(shut)
     assert math.isinf(limits.cycle)
-    assert limits.deliveries(3) == limits.food == 0
+    assert limits.deliveries(3) == 0
 
 
-def test_in_a_crowd_ants_turn_on_the_spot() -> None:
+def test_ants_turn_on_the_spot_as_in_a_crowd() -> None:
     """Between food and queen in the open, a turn leads away, unless another ant is in the way."""
-    limits = limits_of(World((9, 9, 9), (0, 0, 0), [(2, 0, 0)]))
-    assert (limits.cycle, limits.crowd_cycle) == (6, 3)
-    # Cycles of 6 and of 7 ticks in turn.
-    assert limits_of(World((9, 9, 9), (0, 0, 0), [(2, 1, 0)])).cycle == 6.5
+    assert limits_of(World((9, 9, 9), (0, 0, 0), [(2, 0, 0)])).cycle == 3
     # Farther away, the way there and back is a loop anyway.
-    far = limits_of(World((9, 9, 9), (0, 0, 0), [(6, 0, 0)]))
-    assert far.cycle == far.crowd_cycle == 12
+    assert limits_of(World((9, 9, 9), (0, 0, 0), [(6, 0, 0)])).cycle == 12
 
 
 def plain_deliveries(world: World, ticks: int) -> list[int]:
@@ -155,7 +111,7 @@ def plain_deliveries(world: World, ticks: int) -> list[int]:
         options = []
         for turn, target in zip((-1, 0, 1), view, strict=True):
             lands = target if target in free else cell
-            options.append(((lands, (heading + turn) % 6, carries), 0))
+            options += [((place, (heading + turn) % 6, carries), 0) for place in (lands, cell)]
         if carries and world.queen in view:
             options.append(((cell, heading, False), 1))
         if not carries and foods & set(view):

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
-from matplotlib.container import ErrorbarContainer
+from matplotlib.lines import Line2D
 from PIL import Image
 from synthetic_colony_study import LIMITS, SIZES, build
 
 from taichi_ants.analysis.colony import figures
-from taichi_ants.analysis.colony.study import COPIED, JOINT, OFF, ON, OWN, RULES, WAYS
+from taichi_ants.analysis.colony.study import COPIED, JOINT, ON, OWN, RULES, WAYS, Design
 from taichi_ants.analysis.colony.tables import condition_rows
 
 ARENAS = ("paper", "open")
@@ -34,13 +34,8 @@ def column(rows: list, name: str, arena: str, rules: str, way: str) -> list[floa
     return [r[name] for r in rows if (r["arena"], r["rules"], r["way"]) == (arena, rules, way)]
 
 
-def bars(axis: Axes) -> dict[str, ErrorbarContainer]:
-    return {bar.get_label(): bar for bar in axis.containers if isinstance(bar, ErrorbarContainer)}
-
-
-def points(bar: ErrorbarContainer) -> tuple[np.ndarray, np.ndarray]:
-    line = bar.lines[0]
-    return np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
+def lines(axis: Axes) -> dict[str, Line2D]:
+    return {str(line.get_label()): line for line in axis.lines}
 
 
 @pytest.mark.parametrize(
@@ -54,18 +49,15 @@ def test_ways_against_the_number_of_ants(rows, name, measures) -> None:
     axes = np.array(figures.draw(name, rows).axes).reshape(2, 2)
     for row, measure in zip(axes, measures, strict=True):
         for axis, arena in zip(row, ARENAS, strict=True):
-            assert list(bars(axis)) == list(WAYS.values())
-            bar = bars(axis)[WAYS[OWN]]
-            x, y = points(bar)
-            np.testing.assert_allclose(y, column(rows, f"{measure}_mean", arena, ON, OWN))
-            np.testing.assert_allclose(x, SIZES, rtol=0.25)  # apart, so that bars do not hide
-            ends = np.array([segment[:, 1] for segment in bar.lines[2][0].get_segments()])
-            np.testing.assert_allclose(
-                ends.T,
-                [column(rows, f"{measure}_ci_{end}", arena, ON, OWN) for end in ("low", "high")],
-            )
-            assert axis.get_xscale() == "log"
-            assert axis.get_yscale() == ("linear" if measure == "blocked" else "log")
+            drawn = lines(axis)
+            assert list(drawn)[: len(WAYS)] == [Design(ON, way).words for way in WAYS]
+            line = drawn[Design(ON, OWN).words]
+            expected = column(rows, f"{measure}_mean", arena, ON, OWN)
+            assert line.get_xydata().tolist() == [*map(list, zip(SIZES, expected, strict=True))]
+            band = axis.collections[list(WAYS).index(OWN)].get_paths()[0].vertices[:, 1]
+            for end, extreme in (("low", band.min()), ("high", band.max())):
+                of_all = column(rows, f"{measure}_ci_{end}", arena, ON, OWN)
+                assert extreme == {"low": min, "high": max}[end](of_all)
     titles = [axis.get_title(loc="left") for axis in axes[0]]
     assert titles == ["The paper's world", "Open worlds (30, 30, 30)"]
 
@@ -73,17 +65,17 @@ def test_ways_against_the_number_of_ants(rows, name, measures) -> None:
 def test_limits_stand_above_the_data(rows) -> None:
     total, each = (np.array(figures.draw("scaling", rows).axes).reshape(2, 2))[:, 0]
     for axis, per in ((total, 1), (each, 8)):
-        (line,) = (line for line in axis.lines if line.get_label() == "limit")
+        line = lines(axis)["limit"]
         assert (line.get_xdata()[-1], line.get_ydata()[-1]) == (8, 200 / per)
 
 
 def test_trails(rows) -> None:
     axes = np.array(figures.draw("trails", rows).axes).reshape(2, 2)
-    for row, way in zip(axes, (COPIED, JOINT), strict=True):
-        found = bars(row[1])
-        assert list(found) == list(RULES.values())
-        means = column(rows, "deliveries_mean", "open", OFF, way)
-        np.testing.assert_allclose(points(found[RULES[OFF]])[1], means)
+    for row, measure in zip(axes, ("deliveries", "reward"), strict=True):
+        for rules in RULES:
+            line = lines(row[1])[Design(rules, JOINT).words]
+            means = column(rows, f"{measure}_mean", "open", rules, JOINT)
+            np.testing.assert_array_equal(line.get_ydata(), means)
 
 
 def test_files_are_wide_enough_to_read_and_little_data_can_be_drawn(rows, tmp_path: Path) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import pytest
 from synthetic_colony_study import Truth, build, proportional
 
@@ -11,11 +9,8 @@ from taichi_ants.analysis.colony.contrasts import (
     COPIES,
     CROWDING,
     CURE,
-    FIRST,
     QUESTIONS,
-    SERIES,
     TRAIL,
-    Series,
     judge_all,
 )
 from taichi_ants.analysis.colony.study import (
@@ -151,9 +146,8 @@ def test_the_clearest_example_has_the_greatest_ratio() -> None:
 @pytest.mark.parametrize(
     ("each", "noise", "verdict"),
     [
-        (20.0, 1, Verdict.SUPPORTED),
         (30.0, 1, Verdict.SUPPORTED),
-        (19.0, 1, Verdict.SUPPORTED),
+        (20.0, 1, Verdict.UNDECIDED),
         (10.0, 1, Verdict.CONTRADICTED),
         (17.0, 1, Verdict.CONTRADICTED),
         # An absent proof of a loss is no proof of its absence.
@@ -165,9 +159,7 @@ def test_whether_joint_learning_cures_crowding(each: float, noise: float, verdic
         return ants * (each if ants == 8 else 20.0)
 
     *_, last = answer(CURE, truth, noise=noise)
-    assert last[0].startswith(
-        "Joint learning cures crowding: each of many ants delivers at least 9"
-    )
+    assert last[0] == "Each of many jointly trained ants delivers more than one ant alone"
     columns = (Verdict.SUPPORTED, Verdict.CONTRADICTED, Verdict.UNDECIDED)
     assert last[1:4] == ["8" if column is verdict else "-" for column in columns]
     assert " with 1 (" in last[4]
@@ -185,21 +177,6 @@ def test_what_the_trail_pays_is_judged_beside_what_it_delivers(reward: float) ->
     assert rows[-1][0].endswith("get more reward than ants that lay none")
     place = {0.5: 1, 2.0: 2, 1.0: 3}[reward]
     assert [cell == "2, 4, 8" for cell in rows[-1][1:4]] == [n == place for n in (1, 2, 3)]
-
-
-@pytest.mark.parametrize(
-    ("first", "place", "example"),
-    [
-        (lambda ants: 400 // ants, 2, "8: 50 against 400 with 1 (-88 %)"),
-        (lambda ants: 40 * ants, 1, "8: 320 against 40 with 1 (+700 %)"),
-        (lambda ants: 40, 3, "8: 40 against 40 with 1 (+0 %)"),
-    ],
-)
-def test_whether_a_crowd_is_sooner(first: Callable[[int], int], place: int, example: str) -> None:
-    """The statements say that it needs more ticks."""
-    for row in answer(FIRST, first=first):
-        assert [cell == "8" for cell in row[1:4]] == [n == place for n in (1, 2, 3)]
-        assert row[4] == example
 
 
 def verdicts_of(judged: dict, question: str = "") -> set[Verdict]:
@@ -223,12 +200,7 @@ def test_without_differences_few_are_told() -> None:
     for seed_count in (10, 20):
         judged = judge_all(build(seeds=seed_count, noise=30))
         for question in (CURE, TRAIL):
-            plain = {
-                key: found
-                for key, found in judged.items()
-                if key[1].question == question and not key[1].share
-            }
-            assert verdicts_of(plain) <= {Verdict.UNDECIDED, Verdict.EQUIVALENT}
+            assert verdicts_of(judged, question) <= {Verdict.UNDECIDED, Verdict.EQUIVALENT}
 
 
 def test_missing_conditions_leave_out_only_what_needs_them() -> None:
@@ -257,20 +229,6 @@ def test_each_arena_and_question_is_judged_for_itself() -> None:
         assert [finding.level for finding in of_question] == pytest.approx(
             [expected] * len(of_question)
         )
-
-
-def test_what_is_computed_is_said() -> None:
-    words = {series.statement: series.words for series in SERIES}
-    assert words[
-        "jointly trained ants that lay trails get more reward than ants that lay none"
-    ] == (
-        "reward per ant at the start and 1000 ticks: trained jointly (evaporating trails) minus "
-        "trained jointly (no trails laid)"
-    )
-    growth = Series("?", "ants", Design(ON, OWN), Design(ON, OWN), against="smaller")
-    assert growth.words == (
-        "deliveries per 1000 ticks: a table per ant (evaporating trails) minus a smaller colony"
-    )
 
 
 def test_seeds_are_paired() -> None:

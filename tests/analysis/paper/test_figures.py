@@ -14,8 +14,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from PIL import Image
 from synthetic_comparison import (
-    GREEDY_SETTING,
-    TRAINING_SETTING,
     build,
     change,
     level_truth,
@@ -24,16 +22,15 @@ from synthetic_comparison import (
 )
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, CIRCLES, OTHER
-from taichi_ants.analysis.paper.best_of import best_of, percentile_of, shown_position
+from taichi_ants.analysis.paper.best_of import shown_position
 from taichi_ants.analysis.paper.comparison import Comparison, Variant
 from taichi_ants.analysis.paper.figures import (
     BEHAVIOUR_LOOKS,
-    best_runs,
     learning_curves,
     return_against_deliveries,
     save_all,
 )
-from taichi_ants.analysis.paper.published import DYNA_P5, FIGURE_1, SARSA, TABLE_2, VARIANTS
+from taichi_ants.analysis.paper.published import DYNA_P5, FIGURE_1, SARSA, VARIANTS
 from taichi_ants.analysis.statistics import interquartile_mean
 from taichi_ants.analysis.style import COLOURS
 
@@ -42,18 +39,17 @@ SARSA_AT = (SARSA, FIGURE_1)
 BASELINES = [
     {
         "baseline": name,
-        "setting": setting,
         "discount": discount,
         "return_mean": figure,
         "steps_mean": None if figure is None else 34.0,
         "deliveries_mean": deliveries,
     }
-    for name, setting, discount, figure, deliveries in (
-        ("shortest delivery", TRAINING_SETTING, None, 45.0, 1.0),
-        ("optimal policy", TRAINING_SETTING, 0.9, 45.0, 1.0),
-        ("optimal policy", TRAINING_SETTING, 0.99, 476.0, 0.0),
-        ("random policy", GREEDY_SETTING, None, -200.0, 0.1),
-        ("exact bounds", TRAINING_SETTING, None, None, None),
+    for name, discount, figure, deliveries in (
+        ("shortest delivery", None, 45.0, 1.0),
+        ("optimal policy", 0.9, 45.0, 1.0),
+        ("optimal policy", 0.99, 476.0, 0.0),
+        ("random policy", None, -200.0, 0.1),
+        ("exact bounds", None, None, None),
     )
 ]
 
@@ -112,48 +108,21 @@ def test_learning_curves_are_interquartile_means_of_growing_spans(comparison: Co
             assert (list(found.get_ydata()) if found else None) == shortest
     titles = [axis.get_title(loc="left") for axis in axes[0]]
     assert titles == ["Continuing delivery", "Absorbing delivery"]
-    assert f"All learners have {FIGURE_1.label}: the paper's figure 1 names no" in words_of(figure)
+    assert f"Learners have {FIGURE_1.label} unless named otherwise" in words_of(figure)
 
 
-def test_without_the_shared_configuration_each_learner_is_shown_at_its_own(
+def test_a_learner_without_the_shared_configuration_is_shown_at_its_own(
     comparison: Comparison,
 ) -> None:
-    """Already if one learner lacks it; and the legend names what is shown."""
+    """And the legend names what is shown."""
     rows = [n for n, row in enumerate(comparison.rows) if (row.variant, row.point) != SARSA_AT]
     some = subset(comparison, rows, 6, 120)
     figure = learning_curves(some)
-    assert "figure 1" not in words_of(figure)
     for axis, setting in zip(panels(figure), SETTINGS, strict=False):
         best = shown_position(some, setting, SARSA)
         parts = np.array([some.returns[best][:, part].mean(axis=1) for part in spans(120)])
         line = labelled(axis)[f"SARSA, {setting}: {some.rows[best].point.label}"]
         np.testing.assert_allclose(line.get_ydata(), interquartile_mean(parts))
-    assert "figure 1" not in words_of(learning_curves(replace(comparison, world="garden.txt")))
-
-
-def test_best_runs_shows_the_distribution_and_the_papers_figures(comparison: Comparison) -> None:
-    axes = np.array(panels(best_runs(comparison))).reshape(2, 2)
-    for row, name in zip(axes, ("return_last50", "steps_all"), strict=True):
-        for axis, setting in zip(row, SETTINGS, strict=True):
-            marks = [line for line in axis.lines if line.get_marker() == "D"]
-            for variant, mark in zip(VARIANTS, marks, strict=True):
-                values = best_of(comparison, setting, variant)[name]
-                line = labelled(axis)[variant.label]
-                x, y = line.get_xdata(), line.get_ydata()
-                at = np.searchsorted(x, np.unique(values), side="right") - 1
-                expected = [(values <= value).mean() for value in np.unique(values)]
-                np.testing.assert_allclose(np.asarray(y)[at], expected)
-                figure = TABLE_2[variant].figure(name)
-                assert mark.get_xdata()[0] == figure
-                assert mark.get_ydata()[0] == percentile_of(figure, values) / 100
-                left, right = axis.get_xlim()
-                low, high = np.percentile(values, (2.5, 97.5))
-                assert left < min(low, figure) <= max(high, figure) < right
-
-
-def test_other_worlds_have_none_of_the_papers_figures(comparison: Comparison) -> None:
-    for axis in panels(best_runs(replace(comparison, world="garden.txt"))):
-        assert not [line for line in axis.lines if line.get_marker() == "D"]
 
 
 def test_returns_against_deliveries_shows_what_runs_do_and_baselines(
@@ -182,7 +151,7 @@ def test_returns_against_deliveries_shows_what_runs_do_and_baselines(
         shortest = lines["shortest delivery"]
         assert (shortest.get_xdata()[0], shortest.get_ydata()[0]) == (1.0, 45.0)
         assert lines["delivers"].get_markersize() < shortest.get_markersize()
-        assert "random policy" not in lines
+        assert lines["random policy"].get_ydata()[0] == -200.0
         assert "exact bounds" not in lines
     # A baseline has the same mark in all panels.
     shared = labelled(axes[0]).keys() & labelled(axes[1]).keys()
@@ -201,9 +170,7 @@ def test_all_figures_are_files(comparison: Comparison, tmp_path: Path) -> None:
     small = subset(comparison, range(64, 128, 8), 3, 60)
     save_all(small, BASELINES, tmp_path / "new" / "folder")
     paths = sorted((tmp_path / "new" / "folder").iterdir())
-    assert [path.stem for path in paths] == [
-        *("best_runs", "learning_curves", "return_against_deliveries"),
-    ]
+    assert [path.stem for path in paths] == ["learning_curves", "return_against_deliveries"]
     for path in paths:
         with Image.open(path) as image:
             assert image.format == "PNG"
@@ -211,9 +178,9 @@ def test_all_figures_are_files(comparison: Comparison, tmp_path: Path) -> None:
             assert len(np.unique(np.asarray(image.convert("L")))) > 50
 
 
-@pytest.mark.parametrize("draw", [learning_curves, best_runs, return_against_deliveries])
+@pytest.mark.parametrize("draw", [learning_curves, return_against_deliveries])
 def test_words_stand_apart(draw: Callable[..., Figure], comparison: Comparison) -> None:
-    assert_words_stand_apart(draw(comparison, *([] if draw is best_runs else [BASELINES])))
+    assert_words_stand_apart(draw(comparison, BASELINES))
 
 
 def assert_words_stand_apart(figure: Figure) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from synthetic_comparison import build, subset, unchanged
 
-from taichi_ants.analysis.behaviour import CIRCLES, DELIVERS, OTHER, WALKS
+from taichi_ants.analysis.behaviour import CIRCLES, DELIVERS
 from taichi_ants.analysis.paper.best_of import best_of, examples, percentile_of, shown_position
 from taichi_ants.analysis.paper.comparison import Comparison, Variant
 from taichi_ants.analysis.paper.published import (
@@ -113,7 +113,8 @@ def test_what_the_paper_does_not_have_is_nan() -> None:
     assert math.isnan(mine["best_run_return_last50_paper_percentile"])
     assert mine["best_run_of"] == 16
     text = table2_markdown(cut, lines)
-    assert "| mine (d2) * | absorbing | - |" in text
+    (row, *_) = (line for line in text.splitlines() if line.startswith("| mine (d2) *"))
+    assert row.endswith("| - | - |")
     assert (
         f"mine (d2) *, absorbing: {cut.rows[shown_position(cut, *cut.learners[1])].point.label}"
         in text
@@ -154,10 +155,11 @@ def test_the_markdown_holds_the_numbers(comparison: Comparison) -> None:
     row = next(line for line in text.splitlines() if line.startswith("| SARSA | continuing"))
     cells = [cell.strip() for cell in row.strip("|").split("|")]
     line = lines[1]
-    assert cells[:3] == ["SARSA", "continuing", "47.3"]
-    assert cells[3].startswith(f"{line['return_last50_mean']:.1f} [")
-    assert cells[4].startswith(f"{line['return_last50_iqm']:.1f} [")
-    assert cells[5].startswith(f"{line['best_run_return_last50_median']:.1f} [")
+    assert cells[:2] == ["SARSA", "continuing"]
+    assert cells[2].startswith(f"{line['return_last50_mean']:.1f} [")
+    assert cells[3].startswith(f"{line['return_last50_iqm']:.1f} [")
+    assert cells[4].startswith(f"{line['best_run_return_last50_median']:.1f} [")
+    assert cells[5] == "47.3"
     assert "**Steps, all episodes**" in text
     assert "**Steps, last 50 episodes**" in text
     short = subset(comparison, range(len(comparison.rows)), 8, 20)
@@ -200,12 +202,6 @@ def test_means_of_runs_that_do_different_things_are_marked(comparison: Compariso
 def test_examples_show_each_behaviour_by_its_median_run(comparison: Comparison) -> None:
     changed = some_circle(comparison)
     shown = shown_position(comparison, "absorbing", DYNA_P3)
-    elsewhere, more = comparison.positions("absorbing", Q_LEARNING)[:2]
-    assert shown_position(comparison, "absorbing", Q_LEARNING) not in (elsewhere, more)
-    changed.behaviours[elsewhere, 3] = WALKS
-    changed.behaviours[more, [0, 3, 4]] = WALKS
-    changed.behaviours[elsewhere, 6] = OTHER
-    changed.behaviours[more, 7] = CIRCLES  # shown already
     returns = changed.measure("return_last50")
     found = examples(changed)
     whats = [(row, int(changed.behaviours[row, run])) for row, run in found]
@@ -214,7 +210,7 @@ def test_examples_show_each_behaviour_by_its_median_run(comparison: Comparison) 
         for variant in comparison.variants:
             row = shown_position(comparison, setting, variant)
             expected += [(row, DELIVERS)] + [(row, CIRCLES)] * (row == shown)
-    assert whats == [*expected, (more, WALKS), (elsewhere, OTHER)]
+    assert whats == expected
     for row, run in found:
         alike = changed.behaviours[row] == changed.behaviours[row, run]
         below = (returns[row, alike] < returns[row, run]).sum()
