@@ -110,8 +110,8 @@ class ResultFolder:
         """A folder for blocks of work, which survive an interruption, and one for results.
 
         With `replace` the work starts anew, whatever the folder holds; old results stay until the
-        new ones are complete. Two processes at the same work cannot spoil it: blocks appear whole, each
-        process has its own folder for results, and one whose folder is gone ends with an error.
+        new ones are complete. Two processes at the same work cannot spoil it: blocks appear
+        whole, each has its own folder for results, and one whose folder is gone ends with an error.
 
         Raises:
             AntsError: The folder cannot be written.
