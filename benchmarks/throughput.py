@@ -1,6 +1,6 @@
 """How fast the paper's grid trains: environment steps per second, beside the same in plain C.
 
-Trains 64 configurations with 100 seeds each in one delivery setting, after a short run that
+Trains 64 configurations with 100 seeds each, delivery continuing, after a short run that
 compiles. CPU time is that of all threads together, so other processes hardly disturb it. The
 yardstick is ant.c, one thread, compiled with -O3 for this processor; it learns by Q-learning only.
 """
@@ -23,6 +23,7 @@ from taichi_ants.analysis.paper.published import GRID
 from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.studies.command_line import Parser, run_command, whole_number
+from taichi_ants.task.constants import EPISODE_STEPS, EPISODES
 
 SOURCE = Path(__file__).with_name("ant.c")
 FLAGS = ("-O3", "-march=native", "-std=c11", "-ffp-contract=off", "-shared", "-fPIC")
@@ -94,33 +95,30 @@ def grid(learner: str, planning_steps: int) -> list[TrainingConfig]:
     return [TrainingConfig(learner, *point, hyperparameters=more) for point in GRID]
 
 
-def measure_c(command: str, delivery: str, seeds: int, episodes: int, max_steps: int) -> float:
+def measure_c(command: str, seeds: int) -> float:
     """CPU nanoseconds of a step of Q-learning in C."""
-    total, seconds, continuing = 0, 0.0, delivery == "continuing"
+    total, seconds = 0, 0.0
     with tempfile.TemporaryDirectory() as folder:
         yardstick = load_yardstick(command, folder)
         for config, seed in itertools.product(grid("q_learning", 0), range(seeds)):
-            run = train_in_c(
-                yardstick, worlds.paper(), config, continuing, seed, episodes, max_steps
-            )
+            run = train_in_c(yardstick, worlds.paper(), config, True, seed, EPISODES, EPISODE_STEPS)
             total += int(run[1].sum(dtype=np.int64))
             seconds += run[3]
     return seconds * 1e9 / total
 
 
-def measure(seeds: int, episodes: int, max_steps: int, delivery: str, threads: int | None) -> None:
+def measure(seeds: int, threads: int | None) -> None:
     """Print a line for each learner, and for C."""
     print(
         f"{'':16}{'runs':>6}{'steps':>13}{'wall s':>9}{'CPU s':>9}{'M steps/s':>11}{'ns/step':>9}"
     )
     line = "{:16}{:6}{:13,}{:9.2f}{:9.2f}{:11.1f}{:9.1f}"
-    fastest = 0.0
+    fastest, task = 0.0, Task(delivery="continuing")
     for learner, planning_steps in LEARNERS:
         configs = grid(learner, planning_steps)
-        task = Task(delivery=delivery)
         train(worlds.paper(), configs, 0, 1, 1, threads=threads)
         began = time.perf_counter()
-        result = train(worlds.paper(), configs, range(seeds), episodes, max_steps, task)
+        result = train(worlds.paper(), configs, range(seeds), task=task)
         wall, steps = time.perf_counter() - began, int(result.steps.sum(dtype=np.int64))
         nanoseconds = result.seconds * 1e9 / steps
         fastest = fastest or nanoseconds
@@ -130,7 +128,7 @@ def measure(seeds: int, episodes: int, max_steps: int, delivery: str, threads: i
     if (command := compiler()) is None:
         print("There is no C compiler (cc, gcc, clang or CC), so no comparison with plain C.")
         return
-    in_c = measure_c(command, delivery, min(seeds, SEEDS_IN_C), episodes, max_steps)
+    in_c = measure_c(command, min(seeds, SEEDS_IN_C))
     print(f"Q-learning in plain C takes {in_c:.1f} ns a step: {in_c / fastest:.2f} times ours.")
 
 
@@ -139,9 +137,6 @@ def main(arguments: list[str] | None = None) -> None:
     parser = Parser(__doc__.split("\n", 1)[0])
     add = parser.add_argument
     add("--seeds", type=whole_number(1), default=100, metavar="N", help="seeds of each setting")
-    add("--episodes", type=whole_number(1), default=500, metavar="N", help="episodes of a run")
-    add("--max-steps", type=whole_number(1), default=600, metavar="N", help="step limit")
-    add("--delivery", choices=("continuing", "absorbing"), default="continuing", help="setting")
     add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
     run_command(lambda: measure(**vars(parser.parse_args(arguments))))
 

@@ -1,7 +1,7 @@
 """Makes all pictures of the README and the docs anew: those of `renders/` and of `docs/figures/`.
 
 Those of `renders/` are made by `render.py`; the arguments below can be given to it by hand as well.
-Those of `docs/figures/` are drawn from the finished studies in `results/compare` and
+Those of `docs/figures/` are those of the finished studies in `results/compare` and
 `results/colony`; a study that is not there is run first, which takes about one minute for the
 comparison and five for the colony on two cores.
 """
@@ -9,7 +9,6 @@ comparison and five for the colony on two cores.
 from __future__ import annotations
 
 import argparse
-import tempfile
 from pathlib import Path
 
 from taichi_ants.commands import render
@@ -48,11 +47,11 @@ GALLERY: dict[str, list[str]] = {
 
 
 # Tracked figure -> the figure of a study that it is.
-COMPARISON = {
-    "learning_curves.png": "learning_curves.png",
-    "return_against_deliveries.png": "return_against_deliveries.png",
+FIGURES = {
+    "learning_curves.png": "compare/figures/learning_curves.png",
+    "return_against_deliveries.png": "compare/figures/return_against_deliveries.png",
+    "colony_scaling.png": "colony/figures/scaling.png",
 }
-COLONY = {"colony_scaling.png": "scaling.png"}
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -74,30 +73,20 @@ def make_gallery(settings: argparse.Namespace) -> None:
 
 
 def make_figures(folder: Path) -> None:
-    """Draw the figures of the docs from the two studies, which are run where they are missing."""
-    from taichi_ants.commands import colony, compare
+    """Keep some figures of the two studies in the docs; a study that is missing is run first.
 
-    comparison = compare.parse_arguments(["--out", str(ROOT / "results" / "compare")])
-    compare.compare(comparison)
-    study = colony.parse_arguments(["study", "--out", str(ROOT / "results" / "colony")])
-    colony.study(study)
-    asked = compare.build_study(comparison)
-    world = compare.world_name(comparison, asked)
-    with tempfile.TemporaryDirectory() as place:
-        drawn = Path(place)
-        compare.draw_figures(asked, world, comparison.out, drawn)
-        keep(drawn / compare.FIGURES, COMPARISON, folder)
-        colony.draw_figures(study.out, drawn)
-        keep(drawn / colony.FIGURES, COLONY, folder)
-
-
-def keep(drawn: Path, names: dict[str, str], folder: Path) -> None:
-    """Write figures to the docs, in 256 colours, so that their history stays small."""
+    They are kept in 256 colours, so that their history stays small.
+    """
     from PIL import Image
 
+    from taichi_ants.commands import colony, compare
+
+    results = ROOT / "results"
+    compare.compare(compare.parse_arguments(["--out", str(results / "compare")]))
+    colony.study(colony.parse_arguments(["study", "--out", str(results / "colony")]))
     folder.mkdir(parents=True, exist_ok=True)
-    for name, source in names.items():
-        with Image.open(drawn / source) as image:
+    for name, source in FIGURES.items():
+        with Image.open(results / source) as image:
             image.convert("RGB").quantize(256).save(folder / name, optimize=True)
         print(f"{folder / name}: {(folder / name).stat().st_size // 1000} kB")
 

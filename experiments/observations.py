@@ -3,6 +3,7 @@
 python experiments/observations.py
 """
 
+import sys
 from pathlib import Path
 
 from taichi_ants.commands import run
@@ -10,4 +11,4 @@ from taichi_ants.commands import run
 SWEEP = Path(__file__).parent / "sweeps" / "observations.toml"
 
 if __name__ == "__main__":
-    run("sweep", file=SWEEP)
+    run("sweep", [str(SWEEP), *sys.argv[1:]])

@@ -58,11 +58,16 @@ def write_atomically(path: PathLike, writer: Callable[[BinaryIO], None]) -> None
 
 def write_text(path: PathLike, text: str) -> None:
     """Write text as UTF-8 with the line ends that it has; raises as `write_atomically` does."""
+    write_bytes(path, text.encode("utf-8"))
 
-    def write_content(file: BinaryIO) -> None:
-        file.write(text.encode("utf-8"))
 
-    write_atomically(path, write_content)
+def write_bytes(path: PathLike, content: bytes) -> None:
+    """Write a file; raises as `write_atomically` does."""
+
+    def write(file: BinaryIO) -> None:
+        file.write(content)
+
+    write_atomically(path, write)
 
 
 def write_json(path: PathLike, value: Any) -> None:

@@ -110,11 +110,8 @@ def quiet() -> Iterator[None]:
     """
     from taichi._lib import core
 
-    levels = ("trace", "debug", "info", "warn")
-    before = next((level for level in levels if core.logging_effective(level)), None)
-    if before is None:  # quieter already
-        yield
-        return
+    levels = ("trace", "debug", "info", "warn", "error")
+    before = next((level for level in levels if core.logging_effective(level)), "critical")
     core.set_logging_level("error")
     try:
         yield

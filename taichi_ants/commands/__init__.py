@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from typing import Any
 
 import taichi_ants
 from taichi_ants.studies.interruption import stoppable
@@ -18,18 +17,16 @@ COMMANDS = {  # modules beside this one, and what they do
 }
 
 
-def run(
-    name: str, arguments: Sequence[str] | None = None, program: str | None = None, **given: Any
-) -> None:
+def run(name: str, arguments: Sequence[str] | None = None, program: str | None = None) -> None:
     """Run a command to its exit; it can be stopped while it is imported, too.
 
-    Its --help calls it `program`, by default the name of the script; its `main` is `given` more.
+    Its --help calls it `program`, by default the name of the script.
     """
     with stoppable():
         from taichi_ants.studies.command_line import Parser
 
         Parser.program = program
-        import_module(f"{__name__}.{name}").main(arguments, **given)
+        import_module(f"{__name__}.{name}").main(arguments)
 
 
 def main() -> None:

@@ -8,26 +8,21 @@ colony of any size live, or many side by side; it can be saved, resumed and draw
 from __future__ import annotations
 
 import argparse
-import csv
 import time
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from taichi_ants.studies.command_line import (
-    BESIDE_DEFAULTS,
     HYPERPARAMETER,
-    ListAction,
     Parser,
     add_common,
     add_results,
-    default_folder,
     load_plugin,
-    notice,
-    number,
     progress_bar,
     run_command,
     whole_number,
+    with_folder,
 )
 from taichi_ants.studies.interruption import held
 
@@ -68,13 +63,10 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
         options[kind](one)
     settings, given = parser.parse_given(arguments)
     if settings.kind == "study":
-        usual: dict[str, Any] = QUICK if settings.quick else {}
-        for name in usual.keys() - given.keys():
-            setattr(settings, name, usual[name])
+        for name in QUICK.keys() - given.keys() if settings.quick else ():
+            setattr(settings, name, QUICK[name])
         settings.sizes = tuple(sorted({1, *settings.sizes}))
-        settings.out = settings.out or default_folder(
-            kinds.choices["study"], "colony", settings, **usual
-        )
+        with_folder(settings, "colony")
     elif settings.resume:
         for name, flag in given.items():
             if name not in _OF_RESUMED:
@@ -87,16 +79,16 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 def _add_learning(parser: argparse.ArgumentParser, epsilon: float) -> None:
     add = parser.add_argument_group("learning").add_argument
     add("--learner", default="sarsa", metavar="NAME", help="name of a learner")
-    add("--learning-rate", type=number, default=0.1, metavar="X", help="in (0, 1]")
-    add("--discount", type=number, default=0.9, metavar="X", help="in [0, 1]")
-    add("--epsilon", type=number, default=epsilon, metavar="X", help="in the first episode")
+    add("--learning-rate", type=float, default=0.1, metavar="X", help="in (0, 1]")
+    add("--discount", type=float, default=0.9, metavar="X", help="in [0, 1]")
+    add("--epsilon", type=float, default=epsilon, metavar="X", help="in the first episode")
     add("--hyperparameter", **HYPERPARAMETER)
 
 
 def _add_study(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("--arenas", action=ListAction, default=ARENAS, metavar="NAME", help="kinds of world")
-    several: dict[str, Any] = {"action": ListAction, "item": whole_number(1, 100_000)}
+    add("--arenas", nargs="+", default=ARENAS, metavar="NAME", help="kinds of world")
+    several: dict[str, Any] = {"nargs": "+", "type": whole_number(1, 100_000)}
     sizes = "numbers of ants in the paper's and the open worlds"
     add("--sizes", **several, default=(1, 2, 4, 8, 16, 32, 64), metavar="N", help=sizes)
     add("--seeds", type=whole_number(1, 1000), default=20, metavar="N", help="how many")
@@ -108,7 +100,7 @@ def _add_study(parser: argparse.ArgumentParser) -> None:
     add("--quick", action="store_true", help="fewer seeds, sizes and ticks, no large worlds")
     _add_learning(parser, 0.3)
     add_common(parser)
-    add_results(parser, BESIDE_DEFAULTS.format("colony", "sizes-1-8-quick"))
+    add_results(parser, "colony")
 
 
 def _add_live(parser: argparse.ArgumentParser) -> None:
@@ -134,8 +126,8 @@ def _add_live(parser: argparse.ArgumentParser) -> None:
     add("--wander", **counts, help="ticks until a pile of food moves")
     add = parser.add_argument_group("pheromone").add_argument
     add("--evaporation", choices=("linear", "exponential", "none"), help="(default: linear)")
-    add("--half-life", type=number, metavar="X", help="ticks; trails evaporate exponentially")
-    add("--diffusion", type=number, metavar="X", help="share of a trail that spreads per tick")
+    add("--half-life", type=float, metavar="X", help="ticks; trails evaporate exponentially")
+    add("--diffusion", type=float, metavar="X", help="share of a trail that spreads per tick")
     add("--deposit", choices=("set", "add", "none"), help="(default: set)")
     add("--level", **counts, help="what a deposit sets or adds")
     add("--cap", **counts, help="most that deposits add up to")
@@ -173,25 +165,23 @@ def study(settings: argparse.Namespace) -> None:
         settings.rollouts,
     )
     asked = Study(tuple(conditions.values()), seeds)
-    pictures = {} if settings.no_figures else {FIGURES: draw_figures}
-    work_or_show(
-        settings, asked.settings(), partial(do_study, settings, conditions, asked), pictures
-    )
+    work_or_show(settings, asked.settings(), partial(do_study, settings, conditions, asked))
 
 
 def do_study(
     settings: argparse.Namespace, conditions: Plan, asked: Study, blocks: Path, ready: Path
 ) -> None:
-    """All but the pictures."""
+    """Do what is not done yet, and write all results."""
     from taichi_ants import files, save_policy
     from taichi_ants.analysis.colony import tables
     from taichi_ants.analysis.colony.contrasts import judge_all
+    from taichi_ants.analysis.colony.figures import save_all
     from taichi_ants.analysis.tables import markdown, plain_text
     from taichi_ants.studies.colony_study import limits_by_arena, measured, median_policies
     from taichi_ants.studies.result_folder import REPORT
 
     with progress_bar("study") as progress:
-        outcomes = asked.run(blocks, settings.threads, settings.arch, progress, notice)
+        outcomes = asked.run(blocks, settings.threads, settings.arch, progress)
     values, limits = measured(conditions, outcomes), limits_by_arena(conditions)
     judged = judge_all(values)
     rows, findings = tables.condition_rows(values, limits), tables.found(values, judged)
@@ -207,21 +197,8 @@ def do_study(
     policies = files.check_writable_folder(ready / "policies")
     for name, q_values, metadata in median_policies(conditions, asked.seeds, values, outcomes):
         save_policy(policies / f"{name}.npz", q_values, metadata)
-
-
-def draw_figures(results: Path, folder: Path) -> None:
-    """Draw the figures from the table in one folder into the folder `figures` of another."""
-    from taichi_ants.analysis.colony.figures import save_all
-
-    with open(results / CONDITIONS, newline="", encoding="utf-8") as file:
-        rows = [
-            {
-                name: text if name in ("arena", "rules", "way") else float(text or "nan")
-                for name, text in row.items()
-            }
-            for row in csv.DictReader(file)
-        ]
-    save_all(rows, folder / FIGURES)
+    if not settings.no_figures:
+        save_all(rows, ready / FIGURES)
 
 
 def live(settings: argparse.Namespace) -> None:

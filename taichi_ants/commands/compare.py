@@ -7,25 +7,20 @@ against the paper and against exact bounds, and writes tables, figures and polic
 from __future__ import annotations
 
 import argparse
-import csv
 import itertools
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from taichi_ants.studies.command_line import (
-    BESIDE_DEFAULTS,
-    ListAction,
     Parser,
     add_common,
     add_results,
-    default_folder,
     load_plugin,
-    notice,
-    number,
     progress_bar,
     run_command,
     whole_number,
+    with_folder,
 )
 
 if TYPE_CHECKING:
@@ -59,38 +54,26 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--max-steps", **counts, default=600, help="step limit")
     add("--delivery", choices=(*DELIVERIES, "both"), default="both", help="what delivery means")
     names = ("q_learning", "sarsa", "dyna_q")
-    add("--learners", action=ListAction, default=names, metavar="NAME", help="one or more")
-    few: dict[str, Any] = {"action": ListAction, "item": number, "metavar": "X"}
-    few["help"] = "one or more"
+    add("--learners", nargs="+", default=names, metavar="NAME", help="one or more")
+    few: dict[str, Any] = {"nargs": "+", "type": float, "metavar": "X", "help": "one or more"}
     add("--learning-rates", **few, default=(0.001, 0.01))
     add("--discounts", **few, default=(0.9, 0.99))
     add("--epsilons", **few, default=(0.3, 0.5))
     add("--epsilon-decays", **few, default=(0.99, 0.995))
-    several: dict[str, Any] = {"action": ListAction, "item": whole_number(1), "metavar": "N"}
+    several: dict[str, Any] = {"nargs": "+", "type": whole_number(1), "metavar": "N"}
     add("--planning-steps", **several, default=(3, 5), help="one or more, for learners that plan")
     switch: dict[str, Any] = {"choices": ("on", "off"), "metavar": "on|off"}
     add("--train-evaporation", **switch, default="off", help="of trails; off in the paper")
-    add(
-        "--greedy-evaporation",
-        **switch,
-        default="on",
-        help="in the greedy evaluation; so the paper",
-    )
+    add("--greedy-evaporation", **switch, default="on", help="in the greedy evaluation")
     add("--world", default="paper", help="paper, open, or the path of a map file")
-    add("--world-seed", type=whole_number(), default=0, metavar="N", help="seed of an open world")
+    add("--world-seed", type=whole_number(), metavar="N", help="seed of an open world")
     add_common(parser)
     add("--quick", action="store_true", help=f"at most {QUICK_SEEDS} seeds")
-    add_results(parser, BESIDE_DEFAULTS.format("compare", "seeds-20-quick"))
-    add("--no-render", action="store_true", help="show no episodes of the learned policies")
-    settings, given = parser.parse_given(arguments)
-    settings.given = given
-    usual = {}
+    add_results(parser, "compare")
+    settings = parser.parse_args(arguments)
     if settings.quick:
         settings.seeds = min(settings.seeds, QUICK_SEEDS)
-        usual = {"seeds": QUICK_SEEDS}
-    if settings.out is None:
-        settings.out = default_folder(parser, "compare", settings, **usual)
-    return settings
+    return with_folder(settings, "compare")
 
 
 def points(settings: argparse.Namespace, world: World) -> tuple[RunPoint, ...]:
@@ -117,10 +100,11 @@ def points(settings: argparse.Namespace, world: World) -> tuple[RunPoint, ...]:
     )
     grid = itertools.product(tasks, variants, tuple(numbers))
     lengths = settings.episodes, settings.max_steps, ROLLOUTS
-    return tuple(
+    every = (
         RunPoint(world, task, TrainingConfig(name, *four, **more), *lengths)
         for task, (name, more), four in grid
     )
+    return tuple(dict.fromkeys(every))  # some may be asked for twice
 
 
 def build_study(settings: argparse.Namespace) -> Study[RunPoint]:
@@ -130,9 +114,9 @@ def build_study(settings: argparse.Namespace) -> Study[RunPoint]:
 
     if settings.plugin:
         load_plugin(settings.plugin)
-    if "world_seed" in settings.given:
+    if settings.world_seed is not None:
         worlds.check_seed_counts(settings.world)
-    world = worlds.build(settings.world, settings.world_seed)
+    world = worlds.build(settings.world, settings.world_seed or 0)
     grid = points(settings, world)
     if not world.reachable_foods().any():
         raise AntsError(
@@ -150,22 +134,8 @@ def world_name(settings: argparse.Namespace, study: Study[RunPoint]) -> str:
     if study.points[0].world == worlds.paper():
         return PAPER_WORLD
     if settings.world in worlds.names():
-        return f"{settings.world}, world seed {settings.world_seed}"
+        return f"{settings.world}, world seed {settings.world_seed or 0}"
     return Path(settings.world).name
-
-
-def to_comparison(study: Study[RunPoint], arrays: dict[str, np.ndarray], world: str) -> Comparison:
-    """What the analysis reads: the arrays of `EPISODES`, and the world's name."""
-    from taichi_ants.analysis.paper.comparison import Comparison, Row
-
-    return Comparison(
-        rows=tuple(Row.of(point.task, point.training) for point in study.points),
-        seeds=study.seeds,
-        **arrays,
-        max_steps=study.points[0].max_steps,
-        task=study.points[0].task,
-        world=world,
-    )
 
 
 def as_in_training(task: Task) -> Task:
@@ -213,29 +183,59 @@ def write_tables(folder: Path, comparison: Comparison, baselines: list[dict[str,
 
 
 def write_policies(
-    folder: Path, study: Study[RunPoint], comparison: Comparison, tables: np.ndarray
+    settings: argparse.Namespace,
+    folder: Path,
+    study: Study[RunPoint],
+    comparison: Comparison,
+    tables: np.ndarray,
 ) -> None:
     """Write the final Q-tables of some runs, with what an ant that follows them does."""
     from taichi_ants import files, save_policy
     from taichi_ants.analysis.behaviour import BEHAVIOURS, NAMES
     from taichi_ants.analysis.paper.best_of import examples
 
-    files.check_writable_folder(folder)
-    for row, run in examples(comparison):
-        point, variant = study.points[row], comparison.rows[row].variant
-        behaviour = comparison.behaviours[row, run]
-        own = "".join(f"_{part}" for part in variant.short)
-        metadata = {
-            "task": point.task.as_dict(),
-            "config": point.training.as_dict(),
-            "seed": study.seeds[run],
-            "episodes": point.episodes,
-            "max_steps": point.max_steps,
-            "return_last50": comparison.measure("return_last50")[row, run],
-            "behaviour": BEHAVIOURS[behaviour],
-        }
-        name = f"{point.task.delivery}_{variant.learner}{own}_{NAMES[behaviour]}"
-        save_policy(folder / f"{name}.npz", tables[row, run], metadata)
+    for place in (POLICIES, RENDERS):
+        files.check_writable_folder(folder / place)
+    chosen = examples(comparison)
+    with progress_bar("policies") as report_progress:
+        for done, (row, run) in enumerate(chosen, start=1):
+            point, variant = study.points[row], comparison.rows[row].variant
+            behaviour = comparison.behaviours[row, run]
+            own = "".join(f"_{part}" for part in variant.short)
+            metadata = {
+                "task": point.task.as_dict(),
+                "config": point.training.as_dict(),
+                "seed": study.seeds[run],
+                "episodes": point.episodes,
+                "max_steps": point.max_steps,
+                "return_last50": comparison.measure("return_last50")[row, run],
+                "behaviour": BEHAVIOURS[behaviour],
+            }
+            name = f"{point.task.delivery}_{variant.learner}{own}_{NAMES[behaviour]}"
+            save_policy(folder / POLICIES / f"{name}.npz", tables[row, run], metadata)
+            if not settings.no_figures:
+                title = f"{variant.label}, {point.task.delivery}"
+                shown = folder / RENDERS / f"{name}.gif"
+                render_policy(shown, point, tables[row, run], metadata, title)
+            report_progress(done / len(chosen))
+
+
+def render_policy(
+    path: Path, point: RunPoint, q_values: np.ndarray, metadata: dict[str, Any], title: str
+) -> None:
+    """Show the beginning of the episode that told the behaviour of a policy.
+
+    It has evaporation as in training, not as in the greedy evaluation. The first of the lines
+    beside the world says what the ant does.
+    """
+    from dataclasses import replace
+
+    from taichi_ants.rendering import PAUSE, Episode, frames, save_animation
+
+    steps, task = min(point.max_steps, RENDERED_STEPS), as_in_training(point.task)
+    episode = Episode.play(point.world, q_values, seed=metadata["seed"], max_steps=steps, task=task)
+    episode = replace(episode, name=metadata["behaviour"])
+    save_animation(path, frames(episode.moments(), (720, 480), title=title), pause=PAUSE)
 
 
 def compare(settings: argparse.Namespace) -> None:
@@ -243,97 +243,48 @@ def compare(settings: argparse.Namespace) -> None:
     from taichi_ants.studies.result_folder import work_or_show
 
     study = build_study(settings)
-    world = world_name(settings, study)
-    pictures: dict[str, Any] = {}
-    if not settings.no_render:
-        pictures[RENDERS] = partial(render_policies, study)
-    if not settings.no_figures:
-        pictures[FIGURES] = partial(draw_figures, study, world)
-    work = partial(do_comparison, settings, study, world)
-    work_or_show(settings, study.settings(), work, pictures)
+    work_or_show(settings, study.settings(), partial(do_comparison, settings, study))
 
 
 def do_comparison(
-    settings: argparse.Namespace, study: Study[RunPoint], world: str, blocks: Path, ready: Path
+    settings: argparse.Namespace, study: Study[RunPoint], blocks: Path, ready: Path
 ) -> None:
-    """All but the pictures."""
+    """Do what is not done yet, and write all results."""
     import numpy as np
 
     from taichi_ants import files
     from taichi_ants.analysis.bounds.baselines import BASELINE_COLUMNS, baseline_rows
+    from taichi_ants.analysis.paper.comparison import Comparison, Row
+    from taichi_ants.analysis.paper.figures import save_all
     from taichi_ants.engines.runs.training import evaluate
 
     where = {"threads": settings.threads, "arch": settings.arch}
     with progress_bar("training") as progress:
-        outcomes = study.run(blocks, **where, progress=progress, notice=notice)
+        outcomes = study.run(blocks, **where, progress=progress)
     in_order = [outcomes[point] for point in study.points]
     arrays = {name: np.stack([one[name] for one in in_order], dtype=np.int32) for name in _ARRAYS}
     q_values = np.stack([one["q_values"] for one in in_order])
     arrays |= what_policies_do(study, q_values)
     small = {name: files.smallest(array) for name, array in arrays.items()}
     files.write_npz(ready / EPISODES, small)
-    comparison = to_comparison(study, arrays, world)
     first = study.points[0]
+    comparison = Comparison(
+        rows=tuple(Row.of(point.task, point.training) for point in study.points),
+        seeds=study.seeds,
+        **arrays,
+        max_steps=first.max_steps,
+        task=first.task,
+        world=world_name(settings, study),
+    )
     baselines = baseline_rows(
         *(first.world, first.task, partial(evaluate, **where), study.seeds),
-        *(ROLLOUTS, settings.discounts, first.max_steps),
+        *(ROLLOUTS, tuple(dict.fromkeys(settings.discounts)), first.max_steps),
     )
     files.write_csv(ready / BASELINES, baselines, BASELINE_COLUMNS)
     write_tables(ready, comparison, baselines)
-    write_policies(ready / POLICIES, study, comparison, q_values)
-
-
-def draw_figures(study: Study[RunPoint], world: str, results: Path, folder: Path) -> None:
-    """Draw the figures of the comparison in one folder into the folder `figures` of another."""
-    from taichi_ants import files
-    from taichi_ants.analysis.paper.figures import save_all
-
-    arrays = {name: one.astype(int) for name, one in files.read_npz(results / EPISODES).items()}
-    with open(results / BASELINES, newline="", encoding="utf-8") as file:
-        baselines = [read_baseline(row) for row in csv.DictReader(file)]
-    save_all(to_comparison(study, arrays, world), baselines, folder / FIGURES)
-
-
-def read_baseline(row: dict[str, str]) -> dict[str, Any]:
-    """A row of baselines.csv, with numbers and None for empty fields."""
-    words = ("baseline", "note")
-    return {
-        name: text if name in words else float(text) if text else None for name, text in row.items()
-    }
-
-
-def render_policies(study: Study[RunPoint], results: Path, folder: Path) -> None:
-    """Show what each policy of some results does, in the folder `renders` of another folder.
-
-    Each picture is the beginning of the episode that told the behaviour: with evaporation as in
-    training, not as in the greedy evaluation. The title names learner and delivery, the first of
-    the lines beside the world what the ant does.
-    """
-    from dataclasses import replace
-
-    from taichi_ants import Task, TrainingConfig, files, load_policy
-    from taichi_ants.analysis.paper.comparison import Row
-    from taichi_ants.rendering import PAUSE, Episode, frames, save_animation
-
-    first, place = study.points[0], files.check_writable_folder(folder / RENDERS)
-    with progress_bar("rendering") as report_progress:
-        paths = sorted((results / POLICIES).glob("*.npz"))
-        for done, path in enumerate(paths):
-            q_values, _, metadata = load_policy(path)
-            task = Task.from_dict(metadata["task"])
-            row = Row.of(task, TrainingConfig(**metadata["config"]))
-            episode = Episode.play(
-                first.world,
-                q_values,
-                seed=metadata["seed"],
-                max_steps=min(first.max_steps, RENDERED_STEPS),
-                task=as_in_training(task),
-            )
-            episode = replace(episode, name=metadata["behaviour"])
-            title = f"{row.variant.label}, {row.delivery}"
-            pictures = frames(episode.moments(), (720, 480), title=title)
-            save_animation(place / f"{path.stem}.gif", pictures, pause=PAUSE)
-            report_progress((done + 1) / len(paths))
+    write_policies(settings, ready, study, comparison, q_values)
+    if not settings.no_figures:
+        save_all(comparison, baselines, ready / FIGURES)
 
 
 def main(arguments: list[str] | None = None) -> None:

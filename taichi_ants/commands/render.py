@@ -16,10 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 from taichi_ants.studies.command_line import (
     HYPERPARAMETER,
-    ListAction,
     Parser,
     load_plugin,
-    number,
     progress_bar,
     run_command,
     whole_number,
@@ -51,9 +49,8 @@ def _size(text: str) -> tuple[int, int]:
 _SEED: dict[str, Any] = {"type": whole_number(), "default": 0, "metavar": "N"}
 _LENGTH: dict[str, Any] = {"type": whole_number(1, 100_000), "default": 600, "metavar": "N"}
 _COUNT: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
-_NUMBER: dict[str, Any] = {"type": number, "metavar": "X"}
-_FLAG: dict[str, Any] = {"action": "store_true"}
-_STAGES = {"action": ListAction, "item": whole_number(0), "metavar": "N"}
+_NUMBER: dict[str, Any] = {"type": float, "metavar": "X"}
+_STAGES = {"nargs": "+", "type": whole_number(0), "metavar": "N"}
 
 # Each option: the kinds of pictures that it is for, by their first letters, what it does, and how
 # it is read.
@@ -84,8 +81,7 @@ _OPTIONS = {
     "--size": ("ecl", "in pixels", {"type": _size, "metavar": "WxH"}),
     "--fps": ("ecl", "pictures a second", {**_NUMBER, "default": 8.0}),
     "--every": ("c", "ticks from one picture to the next", {**_COUNT, "default": 4}),
-    "--plain": ("ec", "the world alone, without text and marks", _FLAG),
-    "--all-states": ("s", "also those that were not visited", _FLAG),
+    "--plain": ("ec", "the world alone, without text and marks", {"action": "store_true"}),
 }
 # Where a kind has defaults of its own.
 _DEFAULTS: dict[str, dict[str, Any]] = {
@@ -126,8 +122,9 @@ def show(settings: argparse.Namespace) -> None:
     from taichi_ants import worlds
     from taichi_ants.rendering import check_animation, check_picture
     from taichi_ants.rendering.scene import check_size
+    from taichi_ants.rendering.writers import is_picture
 
-    if settings.kind == "sheet" or (settings.kind != "learning" and _is_still(settings)):
+    if settings.kind == "sheet" or (settings.kind != "learning" and is_picture(settings.out)):
         check_picture(settings.out)
     else:
         check_animation(settings.out, settings.fps)
@@ -193,8 +190,7 @@ def show_sheet(settings: argparse.Namespace, world: World) -> None:
     from taichi_ants.rendering import policy_sheet, save_picture
 
     q_values, task, title = find_policy(settings, world)
-    sheet = policy_sheet(q_values, title, complete=settings.all_states, task=task)
-    save_picture(settings.out, sheet)
+    save_picture(settings.out, policy_sheet(q_values, title, task=task))
     print(f"{settings.out}: the best action in each state")
 
 
@@ -253,18 +249,15 @@ def noted_stages(settings: argparse.Namespace, world: World) -> list[Stage]:
     ]
 
 
-def _is_still(settings: argparse.Namespace) -> bool:
-    return Path(settings.out).suffix.lower() == ".png"
-
-
 def _save_moments(
     settings: argparse.Namespace, moments: Iterable[Moment], n: int, title: str
 ) -> None:
     """Write n moments as an animation, or the last one as a picture."""
     from taichi_ants.rendering import frames, save_picture
+    from taichi_ants.rendering.writers import is_picture
 
     look: dict[str, Any] = {"size": settings.size, "title": title, "plain": settings.plain}
-    if _is_still(settings):
+    if is_picture(settings.out):
         (last,) = deque(moments, maxlen=1)
         save_picture(settings.out, next(frames([last], **look)))
     else:

@@ -17,7 +17,6 @@ from taichi_ants.studies.command_line import (
     add_common,
     add_results,
     load_plugin,
-    notice,
     progress_bar,
     run_command,
 )
@@ -32,17 +31,13 @@ FIGURES, RUNS, SUMMARY, FINDINGS = "figures", "runs.csv", "summary.csv", "findin
 _WORDS = {"supported": "more", "contradicted": "less", "equivalent": "equal"}
 
 
-def parse_arguments(
-    arguments: list[str] | None = None, file: Path | None = None
-) -> argparse.Namespace:
-    """The settings of the command line, which names a file if none is given."""
+def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
+    """The settings of the command line."""
     summary, more = __doc__.split("\n", 1)
     parser = Parser(summary, epilog=more)
-    parser.set_defaults(file=file)
-    if file is None:
-        parser.add_argument("file", type=Path, metavar="FILE", help="what to do (.toml)")
+    parser.add_argument("file", type=Path, metavar="FILE", help="what to do (.toml)")
     add_common(parser)
-    add_results(parser, "results/sweep-NAME, by the name of FILE")
+    add_results(parser, "sweep-NAME, by the name of FILE")
     settings = parser.parse_args(arguments)
     settings.out = settings.out or Path("results", f"sweep-{settings.file.stem}")
     return settings
@@ -56,7 +51,6 @@ def sweep(settings: argparse.Namespace) -> None:
     if settings.plugin:
         load_plugin(settings.plugin)
     asked = read_sweep(settings.file, {kind: measures(kind) for kind in ("runs", "colony")})
-    pictures = {} if settings.no_figures else {FIGURES: partial(draw_figure, asked)}
     facts = {
         **asked.study.settings(),
         "measures": asked.measures,
@@ -64,17 +58,17 @@ def sweep(settings: argparse.Namespace) -> None:
         "against": asked.against,
         "margin": asked.margin,
     }
-    work_or_show(settings, facts, partial(do_sweep, settings, asked), pictures)
+    work_or_show(settings, facts, partial(do_sweep, settings, asked))
 
 
 def do_sweep(settings: argparse.Namespace, asked: Sweep, blocks: Path, ready: Path) -> None:
-    """All but the figure."""
+    """Do what is not done yet, and write all results."""
     from taichi_ants import files
     from taichi_ants.analysis import sweeps
     from taichi_ants.studies.result_folder import REPORT
 
     with progress_bar("sweep") as progress:
-        outcomes = asked.study.run(blocks, settings.threads, settings.arch, progress, notice)
+        outcomes = asked.study.run(blocks, settings.threads, settings.arch, progress)
     values = {name: measured(asked, outcomes, name) for name in asked.measures}
     rows = sweeps.seed_rows(asked.settings, asked.study.seeds, values)
     files.write_csv(ready / RUNS, rows, [*sweeps.columns_of(asked.settings), "seed", *values])
@@ -87,6 +81,8 @@ def do_sweep(settings: argparse.Namespace, asked: Sweep, blocks: Path, ready: Pa
         files.write_csv(ready / FINDINGS, found.values(), columns)
     notes = [found.get(p, {}).get("finding", "") for p in range(len(asked.settings))]
     files.write_text(ready / REPORT, sweeps.report(asked.settings, values, asked.against, notes))
+    if not settings.no_figures:
+        draw_figures(asked, values[asked.measures[0]], ready / FIGURES)
 
 
 def findings(asked: Sweep, values: np.ndarray) -> dict[int, dict[str, Any]]:
@@ -115,26 +111,18 @@ def findings(asked: Sweep, values: np.ndarray) -> dict[int, dict[str, Any]]:
     return found
 
 
-def draw_figure(asked: Sweep, results: Path, folder: Path) -> None:
-    """Draw the first measure from the table in one folder, a figure for each [vary]."""
-    import csv
-
-    import numpy as np
-
+def draw_figures(asked: Sweep, values: np.ndarray, folder: Path) -> None:
+    """Draw the first measure, float64 (points, seeds), a figure for each [vary]."""
     from taichi_ants import files
     from taichi_ants.analysis import sweeps
 
     name = asked.measures[0]
-    with open(results / RUNS, newline="", encoding="utf-8") as file:
-        values = [float(row[name] or "nan") for row in csv.DictReader(file)]
-    array = np.array(values).reshape(len(asked.settings), len(asked.study.seeds))
-    place = files.check_writable_folder(folder / FIGURES)
+    files.check_writable_folder(folder)
     words = measures(asked.kind)[name].words
+    label = f"{words[0].upper()}{words[1:]}"
     for number, some in enumerate(asked.grids, start=1):
-        path = place / (f"{name}.png" if len(asked.grids) == 1 else f"{name}-{number}.png")
-        sweeps.draw(
-            path, asked.settings[some], array[some], words, f"{words[0].upper()}{words[1:]}"
-        )
+        path = folder / (f"{name}.png" if len(asked.grids) == 1 else f"{name}-{number}.png")
+        sweeps.draw(path, asked.settings[some], values[some], words, label)
 
 
 def measures(kind: str) -> dict[str, Any]:
@@ -167,7 +155,7 @@ def measured(asked: Sweep, outcomes: dict[Any, Outcome], name: str) -> np.ndarra
     return np.stack([of(point, outcomes[point]) for point in asked.study.points])
 
 
-def main(arguments: list[str] | None = None, file: Path | None = None) -> None:
+def main(arguments: list[str] | None = None) -> None:
     """The command line."""
     again = "Stopped; finished parts are kept, and the same command goes on from there."
-    run_command(lambda: sweep(parse_arguments(arguments, file)), again)
+    run_command(lambda: sweep(parse_arguments(arguments)), again)

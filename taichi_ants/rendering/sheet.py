@@ -2,7 +2,7 @@
 
 The states stand in two parts, foraging and carrying, or in one if their names tell no task, ordered
 by the cell ahead, then by the other cells in view. A sheet shows the states in which something was
-learned, or all that an ant can come into; of very many the first.
+learned; of very many the first.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from taichi_ants.checks import checked_q_values, checked_task
-from taichi_ants.errors import checked_flag, expect
+from taichi_ants.errors import expect
 from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
 from taichi_ants.grid.hexgrid import centre_of
 from taichi_ants.rendering import colours, text
@@ -44,7 +44,6 @@ _EXPLANATION = (
     "The longer the bar, the worse the second best action; where the bar is empty, it is as good.",
     "E empty, O obstacle (or the outside), T trail, S nearer to the queen",
 )
-_PALE = 0.4  # how much of its colours a state keeps in which nothing was learned
 _GOALS = "FQ"
 _ARROW_COLOURS = {PICK_UP: colours.CELL_FOOD, GIVE: colours.CELL_QUEEN}
 
@@ -79,19 +78,13 @@ def learned(values: np.ndarray, spread: float) -> bool:
 
 
 def policy_sheet(
-    q_values: np.ndarray,
-    title: str = "Policy",
-    *,
-    complete: bool = False,
-    task: Task | None = None,
+    q_values: np.ndarray, title: str = "Policy", *, task: Task | None = None
 ) -> np.ndarray:
     """The sheet of a policy, uint8 (height, 1280, 3).
 
     Args:
         q_values: float (n_states, 5), finite action values.
         title: Stands above it, in ASCII.
-        complete: Whether to draw all states that can occur, and not only those in which something
-            was learned; the others are pale.
         task: Whose states they are; None is the paper's.
 
     Raises:
@@ -100,24 +93,23 @@ def policy_sheet(
     task = checked_task(Task() if task is None else task)
     table = checked_q_values(q_values, task)
     expect("title", title, str)
-    complete = checked_flag("complete", complete)
     observation, spread = task.sees, usual_spread(table, task.sees)
     picture = _Picture(observation)
     parts: dict[str, list[int]] = {}
     for state in possible_states(observation):
         parts.setdefault(name_parts(observation, state)[0], []).append(state)
-    known = {state for part in parts.values() for state in part if learned(table[state], spread)}
-    drawn = [
-        sorted((state for state in part if complete or state in known), key=picture.order)[:MOST]
-        for part in parts.values()
-    ]
+    known = {
+        name: [state for state in part if learned(table[state], spread)]
+        for name, part in parts.items()
+    }
+    drawn = [sorted(states, key=picture.order)[:MOST] for states in known.values()]
     tile = picture.height + _BELOW
     heights = [_HEADING + max(1, math.ceil(len(states) / _COLUMNS)) * tile for states in drawn]
     sheet = np.full((_TOP + sum(heights) + _MARGIN, WIDTH, 3), colours.channels(colours.PAGE))
     _write_head(sheet, title, observation)
     top = _TOP
     for (task_name, every), states, height in zip(parts.items(), drawn, heights, strict=True):
-        n = len(known.intersection(every))
+        n = len(known[task_name])
         words = f"{n} of {len(every)} states learned" if n else "nothing was learned here"
         if len(states) == MOST:
             words += f"; {MOST} are shown"
@@ -128,9 +120,9 @@ def policy_sheet(
             row, column = divmod(place, _COLUMNS)
             x, y = _MARGIN + column * _TILE, top + _HEADING + row * tile
             part, values = sheet[y : y + tile, x : x + _TILE], table[state]
-            best = np.flatnonzero(values == values.max()).tolist() if state in known else []
+            best = np.flatnonzero(values == values.max()).tolist()
             part[: picture.height] = picture.draw(state, best)
-            _write_action(part, picture.height, best, clarity(values, spread) if best else 0.0)
+            _write_action(part, picture.height, best, clarity(values, spread))
         top += height
     return sheet
 
@@ -151,15 +143,12 @@ def _write_head(sheet: np.ndarray, title: str, observation: Observation) -> None
 
 def _write_action(tile: np.ndarray, top: int, best: list[int], clear: float) -> None:
     """Write the best actions below a state, with a bar of how clear they are."""
-    words, ink, size = "not learned", colours.FAINT_INK, _SMALL
-    if best:
-        words = " / ".join(ACTION_NAMES[action] for action in best)
-        while text.width(words, size) > _TILE:
-            size -= 1
-        ink = _ARROW_COLOURS.get(best[0], colours.CHOSEN)
-        length = 0.72 * _TILE
-        fill(tile, (_TILE - length) / 2, top + 23, length, 6, colours.CELL_EMPTY)
-        fill(tile, (_TILE - length) / 2, top + 23, length * clear, 6, ink)
+    words, size = " / ".join(ACTION_NAMES[action] for action in best), _SMALL
+    while text.width(words, size) > _TILE:
+        size -= 1
+    ink, length = _ARROW_COLOURS.get(best[0], colours.CHOSEN), 0.72 * _TILE
+    fill(tile, (_TILE - length) / 2, top + 23, length, 6, colours.CELL_EMPTY)
+    fill(tile, (_TILE - length) / 2, top + 23, length * clear, 6, ink)
     text.write(tile, words, _TILE / 2, top + 15, size, ink, align="middle")
 
 
@@ -184,7 +173,7 @@ class _Picture:
         return [*(CELL_LETTERS.find(letter[0]) for letter in letters), state]
 
     def draw(self, state: int, actions: list[int]) -> np.ndarray:
-        """The picture, uint8 (height, width, 3); pale without actions."""
+        """The picture, uint8 (height, width, 3)."""
         frame = np.full((self.height, _TILE, 3), colours.channels(colours.PAGE))
         task, rest, letters = name_parts(self._observation, state)
         carries, radius = np.array([task == TASK_NAMES[1]]), 0.96 * _HEXAGON
@@ -198,8 +187,6 @@ class _Picture:
             if letter not in _GOALS:
                 place = x, y - 0.12 * _HEXAGON
                 text.write_on(frame, letter, place, _HEXAGON, cell_colour(letter))
-        if not actions:
-            frame[:] = _PALE * frame + (1 - _PALE) * 255
         return frame
 
     def _arrows(self, letters: list[str], actions: list[int]) -> Iterator[np.ndarray]:

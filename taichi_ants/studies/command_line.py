@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import importlib.util
 import os
-import re
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -59,35 +58,18 @@ def add_common(parser: argparse.ArgumentParser) -> None:
     add("--arch", choices=("cpu", "cuda"), default="cpu", help="where kernels run")
 
 
-def add_results(parser: argparse.ArgumentParser, place: str) -> None:
-    """The options of commands with a folder of results."""
+def add_results(parser: argparse.ArgumentParser, name: str) -> None:
+    """The options of commands with a folder of results; `with_folder` chooses its place."""
     add = parser.add_argument
-    add("--out", type=Path, metavar="FOLDER", help=f"for the results (default: {place})")
+    add("--out", type=Path, metavar="FOLDER", help=f"for the results (default: results/{name})")
     add("--force", action="store_true", help="replace what FOLDER holds")
-    add("--no-figures", action="store_true", help="draw no figures")
+    add("--no-figures", action="store_true", help="draw no figures and no animations")
 
 
-BESIDE_DEFAULTS = "results/{0}, and behind it what differs from the defaults, as in results/{0}-{1}"
-_NOT_IN_NAMES = ("out", "threads", "force", "no_figures", "no_render")  # they change no results
-
-
-def default_folder(
-    parser: Parser, command: str, settings: argparse.Namespace, **usual: Any
-) -> Path:
-    """A folder for each way to call a command, as results/compare-world-garden.txt-quick.
-
-    Behind the name comes what differs from the defaults: the parser's, or the `usual` ones.
-    """
-    parts = [command]
-    for action in parser._actions:
-        default = usual.get(action.dest, action.default)
-        value = getattr(settings, action.dest, default)
-        if value != default and action.dest not in _NOT_IN_NAMES:
-            values = value if isinstance(value, tuple) else (value,)
-            shown = [] if value is True else [str(one).rpartition("/")[2] for one in values]
-            parts += [action.option_strings[0].removeprefix("--"), *shown]
-    parts = [re.sub(r"[^\w.+-]+", "_", part).strip("_") for part in parts]
-    return Path("results", "-".join(parts))
+def with_folder(settings: argparse.Namespace, name: str) -> argparse.Namespace:
+    """The settings with a folder for the results; with --quick it is one of its own."""
+    settings.out = settings.out or Path("results", f"{name}-quick" if settings.quick else name)
+    return settings
 
 
 def whole_number(least: int | None = None, most: int | None = None) -> Callable[[str], int]:
@@ -104,9 +86,6 @@ def whole_number(least: int | None = None, most: int | None = None) -> Callable[
     return parse
 
 
-number = float  # an argument type, too
-
-
 def _named_number(text: str) -> tuple[str, float]:
     name, _, value = text.partition("=")
     try:
@@ -121,22 +100,6 @@ HYPERPARAMETER: dict[str, Any] = {
     **{"type": _named_number, "action": "extend", "nargs": 1, "default": []},
     **{"metavar": "NAME=VALUE", "help": "of the learner; may be given several times"},
 }
-
-
-class ListAction(argparse.Action):
-    """Collects one value or more as a tuple; of equal ones the first counts."""
-
-    def __init__(self, *args: Any, item: Callable[[str], object] = str, **settings: Any) -> None:
-        super().__init__(*args, **{**settings, "nargs": "+", "type": item})
-
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: Any,
-        option_string: str | None = None,
-    ) -> None:
-        setattr(namespace, self.dest, tuple(dict.fromkeys(values)))
 
 
 def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> NoReturn:

@@ -18,19 +18,14 @@ FRAMES_PER_SECOND = 12.0
 _PIECE_SECONDS = 0.2
 
 
-def is_animation(render: str) -> bool:
-    """Whether a path is one of several pictures, not of one."""
-    return Path(render).suffix.lower() != ".png"
-
-
 def check_places(save: str | None, render: str | None) -> None:
     """Make sure, before the work begins, that what `live` shall write can be written."""
-    from taichi_ants.rendering import check_animation, check_picture
+    from taichi_ants.rendering.writers import check_animation, check_picture, is_picture
 
-    if render and is_animation(render):
-        check_animation(render, FRAMES_PER_SECOND)
-    elif render:
+    if render and is_picture(render):
         check_picture(render)
+    elif render:
+        check_animation(render, FRAMES_PER_SECOND)
     if save:
         if Path(save).is_dir():
             raise AntsError(f"{save!r} is a folder; name a file to save to.")
@@ -48,37 +43,29 @@ def live(
 ) -> None:
     """Let time pass in a colony, then write its files; it ends early once `stopped()` is true.
 
-    It is saved even if its picture (.png) or animation (.gif, .mp4, a folder) cannot be written;
-    the AntsError says where. An animation has a picture for `every` so many ticks.
+    It is saved even if its picture (.png) or animation (.gif, .mp4, a folder) cannot be written. An
+    animation has a picture for `every` so many ticks.
     """
-    animated = render is not None and is_animation(render)
+    from taichi_ants.rendering import colony_moments, frames, save_animation, save_picture
+    from taichi_ants.rendering.writers import is_picture
+
+    animated = render is not None and not is_picture(render)
     passing = _pieces(colony, ticks, progress, stopped, every if animated else 0)
     try:
-        _draw(colony, passing, render)
-    except (AntsError, OSError) as error:
-        if not save:
-            raise
+        if render and animated:
+            moments = (moment for _ in chain([0], passing) for moment in colony_moments(colony))
+            save_animation(render, frames(moments), FRAMES_PER_SECOND)
+        for _ in passing:
+            pass
+        if render and not animated:
+            save_picture(render, next(frames(colony_moments(colony))))
+    except (AntsError, OSError):
         # Pictures are drawn between ticks, so this one is whole, and may have taken hours.
-        colony.save(save)
-        reason = str(error).rstrip(".")
-        raise AntsError(
-            f"{reason}; the colony is saved in {save!r}, at tick {colony.ticks}."
-        ) from error
+        if save:
+            colony.save(save)
+        raise
     if save:
         colony.save(save)
-
-
-def _draw(colony: Colony, passing: Iterator[int], render: str | None) -> None:
-    """Let time pass, and draw it, or what is there at the end."""
-    from taichi_ants.rendering import colony_moments, frames, save_animation, save_picture
-
-    if render and is_animation(render):
-        moments = (moment for _ in chain([0], passing) for moment in colony_moments(colony))
-        save_animation(render, frames(moments), FRAMES_PER_SECOND)
-    for _ in passing:
-        pass
-    if render and not is_animation(render):
-        save_picture(render, next(frames(colony_moments(colony))))
 
 
 def _pieces(

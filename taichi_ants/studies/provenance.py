@@ -21,19 +21,14 @@ _PACKAGES = ("taichi", "numpy", "scipy", "matplotlib")
 
 def world_facts(world: World) -> dict[str, Any]:
     """A world in a few numbers, and a hash of all of it."""
-    digest = hashlib.sha256()
-    for array in (world.foods, world.obstacles, world.trails, world.ants):
+    digest, numbers = hashlib.sha256(), {}
+    for name in ("foods", "obstacles", "trails", "ants"):
+        array = getattr(world, name)
+        numbers[name] = len(array)
         digest.update(repr(array.shape).encode())
         digest.update(array.tobytes())
-    return {
-        "ranges": list(world.ranges),
-        "queen": list(world.queen),
-        "foods": len(world.foods),
-        "obstacles": len(world.obstacles),
-        "trail_cells": len(world.trails),
-        "ants": len(world.ants),
-        "sha256": digest.hexdigest(),
-    }
+    where = {"ranges": list(world.ranges), "queen": list(world.queen)}
+    return {**where, **numbers, "sha256": digest.hexdigest()}
 
 
 def provenance(arguments: Sequence[str]) -> dict[str, Any]:

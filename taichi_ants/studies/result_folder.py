@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import shutil
 import sys
+import tempfile
 import time
 from argparse import Namespace
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -23,24 +23,13 @@ from taichi_ants import files
 from taichi_ants.errors import AntsError
 from taichi_ants.studies.provenance import provenance
 
-try:
-    import fcntl
-except ImportError:  # not on Windows: there nobody checks for a second process
-    fcntl = None  # type: ignore[assignment]
-
 MANIFEST = "manifest.json"
 UNFINISHED, BLOCKS, READY = "unfinished", "blocks", "ready"
 REPORT = "report.txt"  # what commands print
-PICTURES = ("figures", "renders")  # can be drawn again from the other results
-
-Draw = Callable[[Path, Path], None]
 
 
 def work_or_show(
-    settings: Namespace,
-    determines: Mapping[str, Any],
-    work: Callable[[Path, Path], Mapping[str, Any] | None],
-    pictures: Mapping[str, Draw],
+    settings: Namespace, determines: Mapping[str, Any], work: Callable[[Path, Path], None]
 ) -> None:
     """Do the work of a command, or show what its folder holds already; print the report.
 
@@ -48,9 +37,6 @@ def work_or_show(
         settings: The command's `out`, `force`, `plugin` and `arch`.
         determines: What determines the results besides these.
         work: Called with a folder for blocks and one for the results, among them the report.
-            Returns what the manifest says besides where the results come from.
-        pictures: What is drawn from the results, at once or later: the folder's name, and a
-            function of the folder of the results and of the one in which to make it.
 
     Raises:
         AntsError: The folder holds something else, cannot be written, or was altered.
@@ -58,17 +44,16 @@ def work_or_show(
     plugin = _hash(Path(settings.plugin)) if settings.plugin else None
     folder = ResultFolder(settings.out, {**determines, "arch": settings.arch, "plugin": plugin})
     if not settings.force and folder.is_finished():
-        folder.show(pictures)
+        folder.check_whole()
+        print((settings.out / REPORT).read_text("utf-8"))
         print(f"{settings.out}/ holds these results already; --force makes them again.")
         return
     began = time.perf_counter()
     with folder.work(settings.force) as (blocks, ready):
-        manifest = work(blocks, ready) or {}
-        for draw in pictures.values():
-            draw(ready, ready)
+        work(blocks, ready)
         report = (ready / REPORT).read_text("utf-8")
         seconds = time.perf_counter() - began
-        folder.publish({**provenance(sys.argv), "seconds": seconds, **manifest})
+        folder.publish(ready, {**provenance(sys.argv), "seconds": seconds})
     print(f"{report}\n{seconds:.1f} s; everything is in {settings.out}/")
 
 
@@ -110,151 +95,82 @@ class ResultFolder:
             )
         return False
 
-    def show(self, pictures: Mapping[str, Draw]) -> None:
-        """Print the report of finished results, and draw the pictures that are not there.
-
-        Raises:
-            AntsError: A file of the results, apart from pictures, is gone or was altered.
-        """
-        manifest = _manifest_in(self.path)
-        for name, digest in manifest["files"].items():
+    def check_whole(self) -> None:
+        """Raises AntsError if a file of finished results is gone or was altered."""
+        for name, digest in self._listed().items():
             path = self.path / name
-            whole = path.is_file() and _hash(path) == digest
-            if not whole and name.partition("/")[0] not in PICTURES:
+            if not path.is_file() or _hash(path) != digest:
                 raise AntsError(
                     f"{str(path)!r}, a part of the results, is gone or was altered since they were "
                     "finished; put it back, or give --force to run all again."
                 )
-        print((self.path / REPORT).read_text("utf-8"))
-        for name, draw in pictures.items():
-            drawn = [file for file in manifest["files"] if file.startswith(f"{name}/")]
-            if drawn and all((self.path / file).is_file() for file in drawn):
-                continue
-            with self._working() as (_, ready):
-                draw(self.path, ready)
-                hashes = self._ready_beside(manifest["files"])
-                for file in drawn:
-                    del manifest["files"][file]
-                manifest["files"] = dict(sorted({**manifest["files"], **hashes}.items()))
-                self._move_up(hashes)
-                files.write_json(self.path / MANIFEST, manifest)
 
     @contextmanager
     def work(self, replace: bool = False) -> Iterator[tuple[Path, Path]]:
-        """Hold a folder for blocks of work, which survive an interruption, and one for results.
+        """A folder for blocks of work, which survive an interruption, and one for results.
 
         With `replace` the work starts anew, whatever the folder holds; old results stay until the
-        new ones are complete.
+        new ones are complete. Two processes at the same work cannot spoil it: blocks appear
+        whole, each has its own folder for results, and one whose folder is gone ends with an error.
 
         Raises:
-            AntsError: The folder cannot be written, or another process works in it.
+            AntsError: The folder cannot be written.
         """
         self._listed()  # if it is damaged, it is so before the work
-        with self._working(replace) as places:
-            if not (self._unfinished / MANIFEST).exists():
-                files.write_json(self._unfinished / MANIFEST, {"settings": self._settings})
-            yield places
-
-    def publish(self, manifest: Mapping[str, Any]) -> None:
-        """Move what is ready into the folder, then the manifest with the settings in it.
-
-        What an older manifest lists is replaced or removed; other files stay.
-
-        Raises:
-            AntsError: A file that is not ours is in the way.
-        """
-        half_moved = _manifest_in(self._unfinished)["files"]  # where a kill has left some
-        old = {**half_moved, **self._listed()}
-        hashes = self._ready_beside(old)
-        for name, digest in old.items():
-            self._remove(name, digest)
-        contents = {**manifest, "files": hashes, "settings": self._settings}
-        files.write_json(self._unfinished / MANIFEST, contents)
-        self._move_up(hashes)
-        os.replace(self._unfinished / MANIFEST, self.path / MANIFEST)  # now it is finished
-        self._clear()
-
-    @contextmanager
-    def _working(self, replace: bool = False) -> Iterator[tuple[Path, Path]]:
-        """Make the folders for blocks and for what is ready, and keep other processes away.
-
-        At the end all goes again that is of no use, that is if there is no block.
-        """
+        manifest, blocks = self._unfinished / MANIFEST, self._unfinished / BLOCKS
         new = [part for part in (self.path, *self.path.parents) if not part.exists()]
-        blocks, ready = self._unfinished / BLOCKS, self._unfinished / READY
         try:
             files.check_writable_folder(self.path)
-            self._unfinished.mkdir(exist_ok=True)
-            with _locked(self._unfinished):
-                # Without a manifest nobody knows whose blocks these are.
-                if replace or not (self._unfinished / MANIFEST).exists():
-                    self._clear()
-                shutil.rmtree(ready, ignore_errors=True)
-                try:
-                    yield files.check_writable_folder(blocks), files.check_writable_folder(ready)
-                finally:
-                    if not any(blocks.rglob("*.npz")):
-                        self._clear()
+            # Without a manifest nobody knows whose blocks these are.
+            if replace or not manifest.exists():
+                self._clear()
+            for folder in (blocks, self._unfinished / READY):
+                files.check_writable_folder(folder)
+            files.write_json(manifest, {"settings": self._settings})
+            with tempfile.TemporaryDirectory(dir=self._unfinished / READY) as ready:
+                yield blocks, Path(ready)
         finally:
-            for folder in (self._unfinished, *new):
-                with suppress(OSError, ValueError):  # it is not empty, or was never made
+            if self._unfinished.is_dir() and not any(blocks.rglob("*.npz")):
+                self._clear()
+            for folder in new:
+                with suppress(OSError, ValueError):  # it holds something, or was never made
                     folder.rmdir()
 
+    def publish(self, ready: Path, manifest: Mapping[str, Any]) -> None:
+        """Move what is ready into the folder, then write the manifest with the settings in it.
+
+        What an older manifest lists is removed; other files stay, but for those of the same name.
+        """
+        paths = sorted(path.relative_to(ready) for path in ready.rglob("*") if path.is_file())
+        hashes = {path.as_posix(): _hash(ready / path) for path in paths}
+        for name in self._listed():
+            self._remove(name)
+        for path in paths:
+            (self.path / path).parent.mkdir(parents=True, exist_ok=True)
+            (ready / path).replace(self.path / path)
+        contents = {**manifest, "files": hashes, "settings": self._settings}
+        files.write_json(self.path / MANIFEST, contents)
+        self._clear()  # now it is finished
+
     def _clear(self) -> None:
-        """Remove what is ours in `unfinished`."""
+        """Remove what is ours in `unfinished`, and the folder if that was all."""
         (self._unfinished / MANIFEST).unlink(missing_ok=True)
         for name in (BLOCKS, READY):
             shutil.rmtree(self._unfinished / name, ignore_errors=True)
+        with suppress(OSError):
+            self._unfinished.rmdir()
 
     def _listed(self) -> dict[str, str]:
         """The files of finished results, with their hashes."""
         return _manifest_in(self.path)["files"] if (self.path / MANIFEST).exists() else {}
 
-    def _ready_beside(self, old: Collection[str]) -> dict[str, str]:
-        """The hashes of all files that are ready; AntsError if another than an old one is there."""
-        ready = self._unfinished / READY
-        paths = (path.relative_to(ready) for path in ready.rglob("*") if path.is_file())
-        names = sorted(path.as_posix() for path in paths)
-        for name in names:
-            if (self.path / name).exists() and name not in old:
-                raise AntsError(
-                    f"{str(self.path / name)!r} is in the way of results and none of ours; move it "
-                    "away, and the same command without --force goes on."
-                )
-        return {name: _hash(ready / name) for name in names}
-
-    def _move_up(self, names: Iterable[str]) -> None:
-        for name in names:
-            (self.path / name).parent.mkdir(parents=True, exist_ok=True)
-            (self._unfinished / READY / name).replace(self.path / name)
-
-    def _remove(self, name: str, digest: str) -> None:
-        """Remove a file that an older manifest lists, if it is still that one and lies in here."""
-        file, own = self.path / name, self.path.resolve()
-        if file.is_file() and file.resolve().is_relative_to(own) and _hash(file) == digest:
+    def _remove(self, name: str) -> None:
+        """Remove a file that an older manifest lists, if it lies in here."""
+        file = self.path / name
+        if file.is_file() and file.resolve().is_relative_to(self.path.resolve()):
             file.unlink()
             with suppress(OSError):  # it holds something else
                 file.parent.rmdir()
-
-
-@contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Keep other processes out of a folder."""
-    if fcntl is None:
-        yield
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise AntsError(
-                f"another process is writing to {str(folder)!r}; wait for it, or choose another "
-                "--out."
-            ) from None
-        yield
-    finally:
-        os.close(handle)
 
 
 def _manifest_in(folder: Path) -> dict[str, Any]:

@@ -282,7 +282,6 @@ class Study(Generic[PointKind]):
         threads: int | None = None,
         arch: str | None = None,
         progress: Progress = lambda share: None,
-        notice: Callable[[str], None] = lambda text: None,
     ) -> dict[PointKind, Outcome]:
         """Do the blocks that the folder does not hold yet; the outcome of each point.
 
@@ -290,7 +289,6 @@ class Study(Generic[PointKind]):
             folder: Where finished blocks are kept; it must belong to this study alone.
             threads, arch: As in `train`.
             progress: Called now and then with the share of the work that is done.
-            notice: Called with what a person should know, as that a block is damaged.
 
         Raises:
             AntsError: A block cannot be written, or an argument is not allowed.
@@ -302,8 +300,9 @@ class Study(Generic[PointKind]):
         progress(0.0)
         for number, ((points, seeds), weight) in enumerate(zip(blocks, weights, strict=True)):
             path = folder / f"{number:06d}.npz"
-            block = _read(path, notice)
-            if block is None:
+            try:
+                block = files.read_npz(path)
+            except AntsError:  # it is not there, or is damaged
                 after = getattr(points[0], "after", None)
                 learned = pieces[after][0]["q_values"] if after else None
                 part = _part(progress, begun / total, weight / total)
@@ -328,17 +327,6 @@ def _part(progress: Progress, begin: float, share: float) -> Progress:
 def _pieces(whole: Sequence[Piece], size: int) -> Iterator[Sequence[Piece]]:
     for first in range(0, len(whole), size):
         yield whole[first : first + size]
-
-
-def _read(path: Path, notice: Callable[[str], None]) -> Outcome | None:
-    """A finished block; None if there is none, or, with a word on it, if it is damaged."""
-    if not path.exists():
-        return None
-    try:
-        return files.read_npz(path)
-    except AntsError:
-        notice(f"{str(path)!r} is damaged, so this part is done again.")
-        return None
 
 
 def _facts(point: Point, worlds: list, points: Sequence[Point]) -> dict[str, Any]:

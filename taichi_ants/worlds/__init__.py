@@ -2,7 +2,7 @@
 
 from taichi_ants.worlds.open_world import open_world
 from taichi_ants.worlds.paper import paper
-from taichi_ants.worlds.registry import build, check_seed_counts, names, register, settings
+from taichi_ants.worlds.registry import build, check_seed_counts, names, register
 from taichi_ants.worlds.text_map import from_text, load_map, to_text
 from taichi_ants.worlds.world import World
 
@@ -16,7 +16,6 @@ __all__ = [
     "open_world",
     "paper",
     "register",
-    "settings",
     "to_text",
 ]
 

@@ -22,7 +22,7 @@ def register(name: str, builder: Builder) -> None:
     Args:
         name: A new name.
         builder: Called with a seed (int), returns a `World`; the same seed must give the same.
-            Further arguments, which need defaults, are settings of the world, see `settings`.
+            Further arguments, which need defaults, are settings of the world.
 
     Raises:
         AntsError: The name is taken or no name, or the builder cannot be called.
@@ -43,13 +43,6 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(_BUILDERS))
 
 
-def settings(name_or_path: str) -> tuple[str, ...]:
-    """The settings that a registered world has besides its seed; a map has none."""
-    if name_or_path not in _BUILDERS:
-        return ()
-    return tuple(inspect.signature(_BUILDERS[name_or_path]).parameters)[1:]
-
-
 def check_seed_counts(name_or_path: str, option: str = "--world-seed") -> None:
     """Make sure that a seed can change the world; AntsError if it is the paper's or a map."""
     drawn = [name for name in names() if name != "paper"]
@@ -66,19 +59,20 @@ def build(name_or_path: str | os.PathLike[str], seed: int = 0, **given: Any) -> 
     Args:
         name_or_path: A registered name (it goes before a file of that name) or a path.
         seed: Any whole number; what it changes is up to the builder, a file ignores it.
-        given: Settings of the world, see `settings`.
+        given: Settings of a registered world, see `register`.
 
     Raises:
         AntsError: There is neither such a name nor such a file, or building fails.
     """
     seed = whole("seed", seed)
     expect("the world", name_or_path, str, os.PathLike)
-    allowed = settings(name_or_path) if isinstance(name_or_path, str) else ()
+    builder = _BUILDERS.get(name_or_path) if isinstance(name_or_path, str) else None
+    allowed = tuple(inspect.signature(builder).parameters)[1:] if builder else ()  # a map has none
     for name in given:
         if name not in allowed:
             has = f"it has {', '.join(allowed)}" if allowed else "it has none"
             raise AntsError(f"{name} is no setting of the world {shown(name_or_path)}; {has}.")
-    if name_or_path not in _BUILDERS:
+    if builder is None:
         if os.path.exists(name_or_path):
             return load_map(name_or_path)
         known = ", ".join(names())
@@ -87,7 +81,7 @@ def build(name_or_path: str | os.PathLike[str], seed: int = 0, **given: Any) -> 
             f"one of {known}, or give the path of a map file."
         )
     try:
-        world = _BUILDERS[str(name_or_path)](seed, **given)
+        world = builder(seed, **given)
     except AntsError:
         raise
     except Exception as error:

@@ -28,7 +28,6 @@ from taichi_ants.worlds.map_fit import smallest_world
 from taichi_ants.worlds.world import World
 
 DEFAULT_TRAIL_LEVEL = 25
-MAX_MAP_CHARACTERS = 1 << 22
 EMPTY, OBSTACLE, FOOD, QUEEN, TRAIL = ".#FQt"
 ANTS = "012345"  # by heading
 ANTS_ON_TRAIL = "abcdef"
@@ -63,7 +62,7 @@ def from_text(text: str, source: str = "the map") -> World:
     drawn become obstacles.
 
     Args:
-        text: The map, at most `MAX_MAP_CHARACTERS` characters.
+        text: The map.
         source: What error messages call it.
 
     Raises:
@@ -71,8 +70,6 @@ def from_text(text: str, source: str = "the map") -> World:
     """
     if not isinstance(text, str):
         raise AntsError(f"{source} is {type(text).__name__}; it must be text.")
-    if len(text) > MAX_MAP_CHARACTERS:
-        raise AntsError(_too_long(source))
     text = text.removeprefix("\ufeff")  # the byte-order mark with which some editors begin a file
     level, drawn = _read(text, source)
     axials = _axials(drawn, source)
@@ -178,13 +175,11 @@ def to_text(world: World) -> str:
 
     Raises:
         AntsError: The world has trails of several levels, or under food or the queen, which a map
-            cannot show; or its map would have more than `MAX_MAP_CHARACTERS` characters.
+            cannot show.
     """
     expect("world", world, World)
     size_x, size_y, size_z = world.ranges
     height, width = 2 * size_x + size_y + size_z - 3, 2 * (size_y + size_z) - 3
-    if height * (width + 1) > MAX_MAP_CHARACTERS:
-        raise AntsError(_too_long("the map"))
     levels = np.unique(world.trails[:, 3])
     if len(levels) > 1:
         raise AntsError(
@@ -213,7 +208,3 @@ def to_text(world: World) -> str:
         draw(np.array([cell]), (ANTS_ON_TRAIL if tuple(cell) in on_trail else ANTS)[heading])
     drawn = ["".join(row).rstrip() for row in page]
     return "\n".join([f"trail = {level}" for level in levels] + drawn) + "\n"
-
-
-def _too_long(source: str) -> str:
-    return f"{source} has more than {MAX_MAP_CHARACTERS} characters; choose a smaller one."

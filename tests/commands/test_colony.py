@@ -152,21 +152,10 @@ def test_a_finished_study_is_shown_and_nothing_is_lost(finished, tmp_path, kerne
     assert contents(folder) == before
 
 
-@pytest.mark.parametrize(
-    ("arguments", "folder"),
-    [
-        ("", "colony"),
-        ("--seeds 20 --epsilon 0.3 --threads 1 --no-figures", "colony"),
-        ("--quick --seeds 8", "colony-quick"),
-        ("--sizes 1 8 --quick", "colony-sizes-1-8-quick"),
-        ("--hyperparameter planning_steps=3", "colony-hyperparameter-planning_steps_3"),
-        ("--learner dyna_q --arenas paper", "colony-arenas-paper-learner-dyna_q"),
-    ],
-)
-def test_default_folders_tell_what_is_run(arguments, folder):
-    assert load("colony").parse_arguments(["study", *arguments.split()]).out == Path(
-        "results", folder
-    )
+def test_quick_has_a_folder_of_its_own():
+    parse = load("colony").parse_arguments
+    assert parse(["study"]).out == Path("results", "colony")
+    assert parse(["study", "--quick"]).out == Path("results", "colony-quick")
 
 
 def blocks_in(folder):
@@ -199,24 +188,16 @@ def test_stopped_and_killed_it_goes_on_to_the_same_results(finished, kernels, tm
     process, *_ = stop_after_blocks(arguments, kernels, tmp_path, signal.SIGKILL, len(kept) + 2)
     assert process.returncode == -signal.SIGKILL
     assert kept.items() < blocks_in(folder).items()  # none of them was done again
-    # A block that was damaged meanwhile is done again, with a word on it.
+    # A block that was damaged meanwhile is done again.
     damaged = next(iter(kept))
     (folder / "unfinished" / "blocks" / damaged).write_bytes(b"nothing")
 
-    done = run("colony", [*arguments, "--no-figures"], kernels, tmp_path)
-    said = f"'out/unfinished/blocks/{damaged}' is damaged, so this part is done again.\n"
-    assert (done.returncode, done.stderr) == (0, said)
+    done = run("colony", arguments, kernels, tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
     after, expected = contents(folder), contents(finished[1])
-    assert set(after) == {name for name in FILES if not name.startswith("figures")}
+    assert set(after) == FILES
     for name in set(after) - {"manifest.json"}:
         assert after[name] == expected[name], name
-
-    # Figures that were left out are drawn later, from what the folder holds.
-    later = run("colony", arguments, kernels, tmp_path)
-    assert later.returncode == 0
-    assert set(contents(folder)) == FILES
-    for name in ("figures/scaling.png", "figures/trails.png"):
-        assert contents(folder)[name] == expected[name]
 
 
 @pytest.mark.parametrize(

@@ -38,7 +38,7 @@ SMALL = [
 TINY = [
     *("--seeds", 1, "--episodes", 2, "--max-steps", 30, "--learners", "q_learning"),
     *("--learning-rates", 0.1, "--discounts", 0.9, "--epsilons", 0.3, "--epsilon-decays", 0.9),
-    *("--delivery", "absorbing", "--no-figures", "--no-render"),
+    *("--delivery", "absorbing", "--no-figures"),
 ]
 COLUMNS = [
     *("learner", "hyperparameters", "learning_rate", "discount", "epsilon", "epsilon_decay"),
@@ -315,11 +315,11 @@ def test_pictures_show_the_episode_that_told_the_behaviour(finished, tmp_path):
         assert (path.read_bytes() == shown) == (not evaporation)
 
 
-def test_pictures_name_learner_delivery_and_behaviour(finished, tmp_path, monkeypatch):
+def test_pictures_name_learner_delivery_and_behaviour(tmp_path, monkeypatch):
     lines = []
     monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
-    study = commands.build_study(commands.parse_arguments([str(one) for one in SMALL]))
-    commands.render_policies(study, finished, tmp_path)
+    arguments = [*SMALL, "--out", tmp_path / "again"]
+    commands.compare(commands.parse_arguments([str(one) for one in arguments]))
     for delivery in ("continuing", "absorbing"):
         assert {f"{name}, {delivery}" for name in ("SARSA", "Dyna-Q (p2)")} <= set(lines)
     assert {"delivers", "circles with food", "delivered"} <= set(lines)
@@ -348,7 +348,7 @@ def test_the_same_command_shows_the_finished_comparison(copy, compare):
 def test_force_runs_again_and_leaves_no_old_pictures(copy, compare):
     before = contents(copy)
     (copy / "notes.txt").write_text("mine")
-    status, out, _ = compare(*SMALL, "--out", copy, "--force", "--no-figures", "--no-render")
+    status, out, _ = compare(*SMALL, "--out", copy, "--force", "--no-figures")
     after = contents(copy)
     assert status == 0
     assert "already" not in out
@@ -363,49 +363,6 @@ def test_force_runs_again_and_leaves_no_old_pictures(copy, compare):
     assert after["manifest.json"] != before["manifest.json"]
 
 
-@pytest.mark.parametrize(
-    ("missing", "flag"), [("figures", "--no-render"), ("renders", "--no-figures")]
-)
-def test_pictures_that_were_left_out_are_drawn_from_the_files(
-    missing, flag, finished, copy, compare
-):
-    shutil.rmtree(copy / missing)
-    before = contents(copy)
-    status, out, err = compare(*SMALL, "--out", copy, flag)
-    assert (status, err) == (0, "")
-    assert "holds these results already" in out
-    after = contents(copy)
-    assert after == contents(finished)
-    assert before.items() <= after.items()  # nothing was computed again
-
-
-def test_pictures_can_be_left_out(finished, copy, compare):
-    for folder in ("figures", "renders"):
-        shutil.rmtree(copy / folder)
-    before = contents(copy)
-    assert compare(*SMALL, "--out", copy, "--no-figures", "--no-render")[0] == 0
-    assert contents(copy) == before
-
-
-@pytest.mark.parametrize("name", ["episodes.npz", "baselines.csv"])
-@pytest.mark.parametrize("damage", [lambda path: path.unlink(), lambda path: path.write_text("x")])
-def test_figures_cannot_be_drawn_from_damaged_files(name, damage, copy, compare):
-    shutil.rmtree(copy / "figures")
-    damage(copy / name)
-    status, _, err = compare(*SMALL, "--out", copy)
-    assert status == 2
-    assert_one_sentence(err)
-    assert not (copy / "figures").exists()
-    assert not list(copy.glob(".*"))
-
-
-@pytest.mark.parametrize("damage", ["figures/learning_curves.png", f"renders/{SHOWN[0]}.gif"])
-def test_a_picture_that_is_gone_is_drawn_again(damage, finished, copy, compare):
-    (copy / damage).unlink()
-    assert compare(*SMALL, "--out", copy)[0] == 0
-    assert contents(copy) == contents(finished)
-
-
 GONE = [
     ("summary.csv", None),
     (POLICY, b""),
@@ -418,24 +375,11 @@ def test_results_that_are_gone_are_not_passed_over(name, content, copy, compare)
     (copy / name).unlink()
     if content is not None:
         (copy / name).write_bytes(content)
-    shutil.rmtree(copy / "renders")
     status, out, err = compare(*SMALL, "--out", copy)
     assert (status, out) == (2, "")
     assert_one_sentence(err)
     assert name in err
     assert "--force" in err
-    assert not (copy / "renders").exists()
-
-
-def test_files_of_ones_own_stay_when_pictures_are_drawn_again(copy, compare):
-    own = [copy / "figures" / "mine.png", copy / "policies" / "mine.npz"]
-    for path in own:
-        path.write_text("mine")
-    (copy / "figures" / "learning_curves.png").unlink()
-    assert compare(*SMALL, "--out", copy)[0] == 0
-    assert (copy / "figures" / "learning_curves.png").exists()
-    assert compare(*SMALL, "--out", copy, "--force", "--no-figures", "--no-render")[0] == 0
-    assert [path.read_text() for path in own] == ["mine", "mine"]
 
 
 @pytest.mark.parametrize("name", ["summary.csv", "episodes.npz", POLICY])
@@ -485,43 +429,11 @@ def test_quick_takes_few_seeds_and_a_folder_of_its_own(tmp_path, compare, monkey
     monkeypatch.chdir(tmp_path)
     for seeds, taken in ((50, 10), (2, 2)):
         assert compare(*TINY, "--quick", "--seeds", seeds)[0] == 0
-        (folder,) = (tmp_path / "results").glob("compare-*-quick")
-        assert ("seeds-2" in folder.name) == (taken == 2)
+        folder = tmp_path / "results" / "compare-quick"
         assert {row["seeds"] for row in read_csv(folder / "summary.csv")} == {str(taken)}
         shutil.rmtree(folder)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "folder"),
-    [
-        ("", "compare"),
-        ("--seeds 100 --world paper --threads 1 --no-figures --no-render --force", "compare"),
-        ("--quick", "compare-quick"),
-        ("--quick --seeds 10", "compare-quick"),
-        ("--world experiments/maps/garden.txt --quick", "compare-world-garden.txt-quick"),
-        ("--world open --world-seed 7", "compare-world-open-world-seed-7"),
-        ("--learners sarsa --discounts 0.8 0.9", "compare-learners-sarsa-discounts-0.8-0.9"),
-        (
-            "--learners q_learning mine --plugin my/own.py",
-            "compare-learners-q_learning-mine-plugin-own.py",
-        ),
-        ("--delivery absorbing --quick", "compare-delivery-absorbing-quick"),
-        ("--learners ../mine", "compare-learners-mine"),
-        ("--quick --out here", "here"),
-    ],
-)
-def test_default_folders_tell_what_is_run(arguments, folder):
-    out = load("compare").parse_arguments(arguments.split()).out
-    assert out == (Path(folder) if folder == "here" else Path("results", folder))
-
-
-def test_the_sequence_of_the_readme(tmp_path, compare, monkeypatch):
-    """One way to call it after another, each without --out."""
-    monkeypatch.chdir(tmp_path)
-    for world in ([], ["--world", GARDEN], ["--world", "open"]):
-        status, _, err = compare(*TINY, "--quick", *world)
-        assert (status, err) == (0, "")
-    assert len(list((tmp_path / "results").iterdir())) == 3
+    assert load("compare").parse_arguments([]).out == Path("results", "compare")
+    assert load("compare").parse_arguments(["--quick", "--out", "here"]).out == Path("here")
 
 
 @pytest.mark.parametrize("world", ["open", "garden"])

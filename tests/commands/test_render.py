@@ -98,9 +98,6 @@ def test_a_still_and_a_sheet(tmp_path, policy) -> None:
     assert done.returncode == 0, done.stderr
     assert Image.open(tmp_path / "sheet.png").width == 1280
     assert files_in(tmp_path) == ["a.png", "sheet.png"]
-    done = run("sheet", "--policy", policy, "--all-states", "--out", tmp_path / "all.png")
-    assert done.returncode == 0, done.stderr
-    assert Image.open(tmp_path / "all.png").height > 1500
 
 
 @pytest.mark.parametrize("shown", ["episode", "colony", "sheet"])
@@ -173,7 +170,6 @@ WRONG = {
     "policy": (["episode", "--policy", "nope.npz", "--out", "{}/a.gif"], "nope.npz"),
     "policy and learning": (["learning", "--policy", "a.npz"], "--policy"),
     "episodes of learning": (["learning", "--episodes", "500"], "--episodes"),
-    "states of an episode": (["episode", "--all-states"], "--all-states"),
     "world seed of the paper": (
         ["episode", "--world-seed", "3"],
         "--world-seed is for a world drawn at random",
@@ -216,23 +212,6 @@ def test_mistakes_are_one_sentence(tmp_path, policy, name) -> None:
     assert done.stderr.startswith("error: ")
     assert done.stderr.count("\n") == 1
     assert done.stdout == ""
-    assert files_in(tmp_path) == []
-
-
-def test_without_pyav(tmp_path, policy) -> None:
-    hidden = "import sys, runpy; sys.modules['av'] = None; sys.argv = sys.argv[1:]; "
-    hidden += "runpy.run_path(sys.argv[0], run_name='__main__')"
-    done = subprocess.run(
-        [sys.executable, "-c", hidden, str(SCRIPT), "episode", "--out", str(tmp_path / "a.mp4")],
-        env=environment(),
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    assert done.returncode == 2
-    assert ".[video]" in done.stderr
-    assert done.stderr.count("\n") == 1
     assert files_in(tmp_path) == []
 
 
@@ -353,7 +332,7 @@ def test_the_gallery_is_there_and_small() -> None:
             assert np.asarray(image.convert("RGB")).std() > 5
     assert len(sizes) == 5
     assert sum(sizes) < 3_000_000
-    figures = [ROOT / "docs" / "figures" / name for name in (*gallery.COMPARISON, *gallery.COLONY)]
+    figures = [ROOT / "docs" / "figures" / name for name in gallery.FIGURES]
     assert sum(path.stat().st_size for path in figures) < 600_000
 
 
@@ -372,7 +351,7 @@ def test_the_tracked_pictures_are_those_of_the_gallery() -> None:
         for path in listed.stdout.split()
         if Path(path).suffix in (".png", ".gif", ".mp4") and not path.startswith("tests/")
     }
-    figures = {f"docs/figures/{name}" for name in (*gallery.COMPARISON, *gallery.COLONY)}
+    figures = {f"docs/figures/{name}" for name in gallery.FIGURES}
     assert pictures == figures | {f"renders/{name}" for name in gallery.GALLERY}
 
 
@@ -388,14 +367,3 @@ def test_by_default_no_tracked_picture_is_replaced(shown) -> None:
     if ignored.returncode == 128:
         pytest.skip("not a git repository")
     assert ignored.returncode == 0
-
-
-def test_figures_of_the_docs_are_those_of_the_studies(tmp_path) -> None:
-    """As the gallery keeps them: the same picture in at most 256 colours."""
-    drawn = tmp_path / "drawn"
-    drawn.mkdir()
-    picture = np.random.default_rng(1).integers(0, 4, (90, 160, 3), dtype=np.uint8) * 60
-    Image.fromarray(picture).save(drawn / "scaling.png")
-    gallery.keep(drawn, gallery.COLONY, tmp_path / "docs")
-    with Image.open(tmp_path / "docs" / "colony_scaling.png") as kept:
-        assert (np.asarray(kept.convert("RGB")) == picture).all()

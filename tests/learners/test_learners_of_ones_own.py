@@ -454,8 +454,12 @@ def test_a_learner_that_has_come_to_need_more_memory(tmp_path):
         continue_training(TrainingResult.load(tmp_path / "x.npz"), 1)
 
 
-def test_the_examples_memory_makes_the_difference():
-    path = ROOT / "experiments" / "plugins" / "eligible.py"
+def test_the_examples_memory_makes_the_difference(tmp_path):
+    """That of docs/learners.md."""
+    blocks = (ROOT / "docs" / "learners.md").read_text("utf-8").split("```python\n")
+    (code,) = [block.partition("```")[0] for block in blocks if '"eligible"' in block]
+    path = tmp_path / "eligible.py"
+    path.write_text(code)
     runpy.run_path(str(path))
     configs = [
         TrainingConfig("eligible", 0.1, 0.9, 0.3, 0.97, trace_decay=decay) for decay in (0, 0.8)

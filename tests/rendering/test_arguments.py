@@ -77,7 +77,6 @@ CALLS: dict[str, list[tuple[str, Callable[[object], object]]]] = {
     "policy_sheet": [
         ("q_values", of(rendering.policy_sheet)),
         ("title", lambda wrong: rendering.policy_sheet(TABLE, wrong)),
-        ("complete", lambda wrong: rendering.policy_sheet(TABLE, complete=wrong)),
         ("task", lambda wrong: rendering.policy_sheet(TABLE, task=wrong)),
     ],
     "save_animation": [

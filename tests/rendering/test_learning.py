@@ -26,7 +26,7 @@ from taichi_ants.rendering.colours import CELL_FOOD, CHOSEN
 from taichi_ants.rendering.observed import PAPER
 from taichi_ants.rendering.sheet import clarity, learned, usual_spread
 from taichi_ants.task import Observation, Rewards, Task, observations
-from taichi_ants.task.constants import ACTION_NAMES, GIVE, PICK_UP, RIGHT
+from taichi_ants.task.constants import ACTION_NAMES, PICK_UP, RIGHT
 from taichi_ants.task.states import REACHABLE_STATES
 from taichi_ants.worlds import open_world, paper
 
@@ -144,12 +144,12 @@ def test_a_hairline_is_no_clear_choice(values) -> None:
     assert learned(np.array(values), 100 * 2.5e-6)
     table = random_policy()
     table[parse_state("foraging E F E")] = (0.0, 0.0, 0.0, 0.8, 0.0)
-    blank = policy_sheet(table, complete=True)
+    blank = policy_sheet(table)
     place = parse_state("foraging O O O")
     table[place] = values
-    hardly = policy_sheet(table, complete=True)
+    hardly = policy_sheet(table)
     table[place] = (0.0, 0.8, 0.0, 0.0, 0.0)
-    clear = policy_sheet(table, complete=True)
+    clear = policy_sheet(table)
     assert (hardly == blank).all()
     assert coloured(clear, CHOSEN).sum(axis=1).max() > 60
 
@@ -161,25 +161,27 @@ def test_a_sheet_without_any_visited_state() -> None:
     assert not coloured(sheet, CHOSEN).any()
 
 
-def places(table: np.ndarray, blank: np.ndarray) -> list[int]:
-    """Left, right, top and bottom of what differs from another complete sheet."""
-    differs = (policy_sheet(table, complete=True) != blank).any(axis=2)
-    rows, columns = np.nonzero(differs)
+def all_known() -> np.ndarray:
+    """A table in which something was learned in each state that an ant can come into."""
+    table = random_policy()
+    table[list(REACHABLE_STATES), RIGHT] = 1.0
+    return table
+
+
+def changed_place(name: int | str) -> list[int]:
+    """Left, right, top and bottom of what differs where the best action of a state does."""
+    table = all_known()
+    table[parse_state(name) if isinstance(name, str) else name] = (1.0, 0.0, 0.0, 0.0, 0.0)
+    rows, columns = np.nonzero((policy_sheet(table) != policy_sheet(all_known())).any(axis=2))
     return [columns.min(), columns.max(), rows.min(), rows.max()]
 
 
-def test_one_visited_state_has_a_bar_at_its_place(monkeypatch) -> None:
-    monkeypatch.setattr(text, "write", lambda *_, **__: None)  # counts would differ
-    blank = policy_sheet(random_policy(), complete=True)
+def test_a_state_has_its_place(monkeypatch) -> None:
     found = {}
     for name in ("foraging E E E", "foraging F E E", "foraging E E F", "foraging E F E"):
-        table = random_policy()
-        table[parse_state(name)] = (0.0, 4.0, 3.0, -1.0, 0.0)
-        left, right, top, bottom = places(table, blank)
+        left, right, top, bottom = changed_place(name)
         assert right - left < 155
         assert bottom - top < 140
-        bar = coloured(policy_sheet(table, complete=True), CHOSEN).sum(axis=1).max()
-        assert 15 <= bar < 40  # a fifth of 112 pixels
         found[name] = np.array([left + right, top + bottom]) / 2
     # By the cell ahead, two rows each, then by the one to the left, then by the one to the right.
     first = found["foraging E E E"]
@@ -189,19 +191,17 @@ def test_one_visited_state_has_a_bar_at_its_place(monkeypatch) -> None:
     assert found["foraging E F E"][1] > first[1] + 6 * 130
 
 
-def test_all_reachable_states_are_on_the_complete_sheet(monkeypatch) -> None:
-    """Each of the 100 states that is visited changes the sheet, each of the others does not."""
-    monkeypatch.setattr(text, "write", lambda *_, **__: None)
-    blank = policy_sheet(random_policy(), complete=True)
+def test_the_bar_of_a_state_is_as_long_as_its_choice_is_clear() -> None:
     table = random_policy()
+    table[parse_state("foraging E E E")] = (0.0, 4.0, 3.0, -1.0, 0.0)
+    assert 15 <= coloured(policy_sheet(table), CHOSEN).sum(axis=1).max() < 40  # a fifth of 112
+
+
+def test_only_states_that_can_occur_are_on_a_sheet() -> None:
+    sheet, table = policy_sheet(all_known()), all_known()
     table[[index for index in range(128) if index not in REACHABLE_STATES]] = (1, 0, 0, 0, 0)
-    assert (policy_sheet(table, complete=True) == blank).all()
-    seen = set()
-    for index in REACHABLE_STATES[::9]:
-        table = random_policy()
-        table[index, GIVE] = 1
-        left, _, top, _ = places(table, blank)
-        seen.add((left // 20, top // 20))
+    assert (policy_sheet(table) == sheet).all()
+    seen = {tuple(place // 20 for place in changed_place(row)) for row in REACHABLE_STATES[::9]}
     assert len(seen) == len(REACHABLE_STATES[::9])
 
 
@@ -211,7 +211,7 @@ def test_a_sheet_shows_only_what_was_learned() -> None:
     one = random_policy()
     one[parse_state("foraging E F E"), PICK_UP] = 1.0
     heights = [policy_sheet(one).shape[0], policy_sheet(table).shape[0]]
-    heights.append(policy_sheet(table, complete=True).shape[0])
+    heights.append(policy_sheet(all_known()).shape[0])
     assert heights == sorted(set(heights))
 
 
@@ -255,8 +255,6 @@ def test_of_very_many_states_a_sheet_shows_the_first_and_says_so(monkeypatch) ->
     policy_sheet(table, task=Task(observation="five_cells"))
     assert "300 of 1024 states learned; 128 are shown" in lines
     assert lines.count("right") == 128
-    sheet = policy_sheet(table, complete=True, task=Task(observation="five_cells"))
-    assert sheet.shape[0] < 6000
 
 
 def test_states_with_names_of_another_form_are_written_out(monkeypatch) -> None:

@@ -11,10 +11,8 @@ import pytest
 from taichi_ants.errors import AntsError
 from taichi_ants.studies import command_line
 from taichi_ants.studies.command_line import (
-    ListAction,
     Parser,
     load_plugin,
-    number,
     progress_bar,
     run_command,
     whole_number,
@@ -27,9 +25,9 @@ def parser():
     parser.add_argument("--size", type=whole_number(1, 9), default=3, help="how large")
     parser.add_argument("--seed", type=whole_number(), default=0, help="the first")
     parser.add_argument("--count", type=whole_number(2), help="how many")
-    lists = {"action": ListAction, "metavar": "X"}
-    parser.add_argument("--rates", **lists, item=number, default=(0.1, 2.0), help="how fast")
-    parser.add_argument("--names", **lists, default=("a",), help="whose")
+    parser.add_argument(
+        "--rates", nargs="+", type=float, metavar="X", default=(0.1, 2.0), help="how fast"
+    )
     parser.add_argument("--loud", action="store_true", help="whether")
     return parser
 
@@ -45,24 +43,20 @@ def test_values_and_defaults(parser):
     arguments = ["--size", "9", "--seed", "-4", "--count", "2", "--rates", "1", "2", "3", "--loud"]
     parsed = vars(parser.parse_args(arguments))
     assert parsed == {
-        **{"size": 9, "seed": -4, "count": 2, "rates": (1.0, 2.0, 3.0), "names": ("a",)},
+        **{"size": 9, "seed": -4, "count": 2, "rates": [1.0, 2.0, 3.0]},
         "loud": True,
     }
     parsed = vars(parser.parse_args([]))
     assert parsed == {
-        **{"size": 3, "seed": 0, "count": None, "rates": (0.1, 2.0), "names": ("a",)},
+        **{"size": 3, "seed": 0, "count": None, "rates": (0.1, 2.0)},
         "loud": False,
     }
-
-
-def test_of_equal_values_the_first_counts(parser):
-    assert parser.parse_args(["--names", "b", "a", "b"]).names == ("b", "a")
 
 
 def test_what_was_given_is_told_even_where_it_is_the_default(parser):
     settings, given = parser.parse_given(["--size=3", "--rates", "1", "-2", "--loud"])
     assert given == {"size": "--size", "rates": "--rates", "loud": "--loud"}
-    assert (settings.size, settings.rates, settings.seed) == (3, (1.0, -2.0), 0)
+    assert (settings.size, settings.rates, settings.seed) == (3, [1.0, -2.0], 0)
 
 
 @pytest.mark.parametrize(
@@ -73,7 +67,7 @@ def test_what_was_given_is_told_even_where_it_is_the_default(parser):
         (["--size", "2.5"], "--size: invalid whole number value: '2.5'"),
         (["--count", "1"], "--count: 1 is not allowed, it must be at least 2"),
         (["--rates", "1", "x"], "--rates: invalid float value: 'x'"),
-        (["--names"], "--names: expected at least one argument"),
+        (["--rates"], "--rates: expected at least one argument"),
         (["--siz", "3"], "unrecognized arguments: --siz 3"),
         (["a\nb"], "unrecognized arguments: a b"),
     ],

@@ -25,7 +25,7 @@ def finish(path, settings=SETTINGS, names=("table.csv",), text="result", replace
         for name in ("report.txt", *names):
             (ready / name).parent.mkdir(exist_ok=True)
             (ready / name).write_text(text)
-        folder.publish({"made": text})
+        folder.publish(ready, {"made": text})
     return folder
 
 
@@ -74,16 +74,10 @@ def test_blocks_survive_what_is_ready_does_not(tmp_path):
     assert names(tmp_path / "out") == ["manifest.json", "report.txt", "table.csv"]
 
 
-@pytest.mark.parametrize("existed", [False, True])
-def test_work_without_a_block_leaves_nothing(existed, tmp_path):
-    path = tmp_path / "new" / "out"
-    if existed:
-        path.mkdir(parents=True)
+def test_work_without_a_block_leaves_nothing(tmp_path):
     with pytest.raises(KeyboardInterrupt):
-        interrupted_work(path, block="")
-    assert path.exists() == existed
-    assert (tmp_path / "new").exists() == existed
-    assert not existed or names(path) == []
+        interrupted_work(tmp_path, block="")
+    assert names(tmp_path) == []
 
 
 def test_results_of_other_settings_are_kept_apart(tmp_path):
@@ -134,7 +128,7 @@ def test_what_a_killed_clean_up_has_left_does_not_matter(tmp_path):
     assert folder.is_finished()
 
 
-@pytest.mark.parametrize("moment", ["pathlib.Path.replace", "os.replace", "shutil.rmtree"])
+@pytest.mark.parametrize("moment", ["pathlib.Path.replace", "pathlib.Path.unlink"])
 def test_a_kill_while_results_move_up_loses_nothing(moment, tmp_path, monkeypatch):
     finish(tmp_path, names=("table.csv", "old.csv"), text="old")
 
@@ -148,12 +142,11 @@ def test_a_kill_while_results_move_up_loses_nothing(moment, tmp_path, monkeypatc
             (ready / name).write_text("new")
         monkeypatch.setattr(moment, interrupt)
         with pytest.raises(KeyboardInterrupt):
-            folder.publish({})
+            folder.publish(ready, {})
         monkeypatch.undo()
-    assert folder.is_finished() == (moment == "shutil.rmtree")
-    if not folder.is_finished():
-        assert (tmp_path / "unfinished" / "blocks" / "0.npz").exists()
-        finish(tmp_path, OTHER, text="new")
+    assert not folder.is_finished()
+    assert (tmp_path / "unfinished" / "blocks" / "0.npz").exists()
+    finish(tmp_path, OTHER, text="new")
     assert "old.csv" not in names(tmp_path)
     assert (tmp_path / "table.csv").read_text() == "new"
 
@@ -186,22 +179,24 @@ def test_foreign_files_are_not_written_among(tmp_path):
     assert names(tmp_path) == ["diary.txt", "manifest.json", "report.txt", "table.csv"]
 
 
-def test_one_process_at_a_time(tmp_path):
-    with ResultFolder(tmp_path, SETTINGS).work() as (blocks, _):
+def test_two_processes_at_the_same_work_do_not_harm_each_other(tmp_path):
+    first = ResultFolder(tmp_path, SETTINGS)
+    with first.work() as (blocks, ready):
+        (ready / "report.txt").write_text("result")
         (blocks / "0.npz").write_text("done")
-        for replace in (False, True):
-            with pytest.raises(AntsError, match="another process"):
-                ResultFolder(tmp_path, SETTINGS).work(replace).__enter__()
-    assert (tmp_path / "unfinished" / "blocks" / "0.npz").exists()
-    finish(tmp_path)
+        with pytest.raises(KeyboardInterrupt):
+            interrupted_work(tmp_path)
+        assert (blocks / "0.npz").exists()
+        finish(tmp_path)
+        assert first.is_finished()
+        assert (ready.exists(), blocks.exists()) == (False, False)
+    first.check_whole()
 
 
-@pytest.mark.parametrize("text", ["result", "mine"])
-def test_only_files_of_the_folder_itself_are_removed(text, tmp_path):
+def test_only_files_of_the_folder_itself_are_removed(tmp_path):
     """Whatever a manifest lists, and even if a file outside is the same."""
     finish(tmp_path / "out", names=("table.csv", "old.csv"))
     (tmp_path / "precious").write_text("result")
-    (tmp_path / "out" / "old.csv").write_text(text)
     path = tmp_path / "out" / "manifest.json"
     manifest = json.loads(path.read_text())
     digest = manifest["files"]["old.csv"]
@@ -210,8 +205,7 @@ def test_only_files_of_the_folder_itself_are_removed(text, tmp_path):
     path.write_text(json.dumps(manifest))
     finish(tmp_path / "out", replace=True)
     assert names(tmp_path) == ["out", "precious"]
-    kept = ["old.csv"] if text == "mine" else []  # altered, so it is the user's now
-    assert names(tmp_path / "out") == ["manifest.json", *kept, "report.txt", "table.csv"]
+    assert names(tmp_path / "out") == ["manifest.json", "report.txt", "table.csv"]
 
 
 def test_an_unfinished_folder_of_ones_own_stays(tmp_path):
@@ -224,38 +218,12 @@ def test_an_unfinished_folder_of_ones_own_stays(tmp_path):
 def test_a_folder_of_ones_own_in_the_way_stays(tmp_path):
     (tmp_path / "table.csv").mkdir()
     (tmp_path / "table.csv" / "mine").write_text("mine")
-    with pytest.raises(AntsError, match=r"table\.csv' is in the way"):
+    with pytest.raises(OSError, match="directory"):
         finish(tmp_path, replace=True)
     assert (tmp_path / "table.csv" / "mine").exists()
     assert not ResultFolder(tmp_path, SETTINGS).is_finished()
     (tmp_path / "table.csv").rename(tmp_path / "elsewhere")
     assert finish(tmp_path).is_finished()
-
-
-@pytest.mark.parametrize("name", ["table.csv", "figures/one.png"])
-def test_a_file_of_ones_own_in_the_way_stays(name, tmp_path):
-    """Even with --force; what was edited of ours is replaced."""
-    mine = tmp_path / name
-    mine.parent.mkdir(exist_ok=True)
-    mine.write_text("mine")
-    with pytest.raises(AntsError, match=rf"{mine.name}' is in the way .* move it away"):
-        finish(tmp_path, names=(name,), replace=True)
-    assert mine.read_text() == "mine"
-    mine.unlink()
-    finish(tmp_path, names=(name,))
-    mine.write_text("edited")
-    finish(tmp_path, names=(name,), text="new", replace=True)
-    assert mine.read_text() == "new"
-
-
-def test_a_picture_of_ones_own_in_the_way_stays(tmp_path):
-    folder = finish(tmp_path)
-    (tmp_path / "figures").mkdir()
-    (tmp_path / "figures" / "one.png").write_text("mine")
-    with pytest.raises(AntsError, match=r"one\.png' is in the way"):
-        folder.show(draw("one.png"))
-    assert (tmp_path / "figures" / "one.png").read_text() == "mine"
-    assert names(tmp_path) == ["figures", "manifest.json", "report.txt", "table.csv"]
 
 
 def test_what_lies_behind_a_link_is_not_removed(tmp_path):
@@ -266,52 +234,10 @@ def test_what_lies_behind_a_link_is_not_removed(tmp_path):
     assert names(tmp_path / "figures") == ["one.png"]
 
 
-def draw(name, text="drawn"):
-    def one(results, folder):
-        assert (results / "report.txt").exists()
-        (folder / "figures").mkdir()
-        (folder / "figures" / name).write_text(text)
-
-    return {"figures": one}
-
-
-def test_pictures_are_drawn_where_they_are_missing_and_go_with_the_results(tmp_path, capsys):
-    folder = finish(tmp_path)
-    folder.show({})
-    assert capsys.readouterr().out == "result\n"
-    assert names(tmp_path) == ["manifest.json", "report.txt", "table.csv"]
-    folder.show(draw("one.png"))
-    assert names(tmp_path) == ["figures", "manifest.json", "report.txt", "table.csv"]
-    folder.show(draw("one.png", "drawn again"))  # it is there
-    assert (tmp_path / "figures" / "one.png").read_text() == "drawn"
-    manifest = json.loads((tmp_path / "manifest.json").read_text())
-    assert set(manifest["files"]) == {"figures/one.png", "report.txt", "table.csv"}
-    assert manifest["made"] == "result"
-    (tmp_path / "figures" / "one.png").unlink()
-    folder.show(draw("one.png", "drawn again"))
-    assert (tmp_path / "figures" / "one.png").read_text() == "drawn again"
-    finish(tmp_path, replace=True)
-    assert names(tmp_path) == ["manifest.json", "report.txt", "table.csv"]
-
-
-def test_pictures_that_are_stopped_leave_nothing(tmp_path):
-    def stopped(results, folder):
-        (folder / "half.png").write_text("half")
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        finish(tmp_path).show({"figures": stopped})
-    assert names(tmp_path) == ["manifest.json", "report.txt", "table.csv"]
-
-
 def test_files_of_ones_own_among_ours_stay(tmp_path):
-    """In folders of ours, too, and whether pictures are drawn again or all is replaced."""
-    folder = finish(tmp_path)
-    folder.show(draw("one.png"))
+    """In folders of ours, too."""
+    finish(tmp_path, names=("figures/one.png",))
     (tmp_path / "figures" / "mine.png").write_text("mine")
-    (tmp_path / "figures" / "one.png").unlink()
-    folder.show(draw("one.png"))
-    assert names(tmp_path / "figures") == ["mine.png", "one.png"]
     finish(tmp_path, replace=True)
     assert names(tmp_path / "figures") == ["mine.png"]
 
@@ -325,20 +251,12 @@ ALTERED = {
 
 
 @pytest.mark.parametrize("change", ALTERED)
-def test_what_was_altered_is_noticed(change, tmp_path, capsys):
+def test_what_was_altered_is_noticed(change, tmp_path):
     folder = finish(tmp_path, names=("policy.npz", "figures/one.png"))
     ALTERED[change](tmp_path / "policy.npz")
     said = r"policy\.npz', a part of the results, is gone or was altered .* give --force"
     with pytest.raises(AntsError, match=said):
-        folder.show({})
-    assert capsys.readouterr().out == ""
-
-
-def test_an_altered_picture_is_the_users_business(tmp_path):
-    folder = finish(tmp_path, names=("figures/one.png",))
-    (tmp_path / "figures" / "one.png").write_text("cropped")
-    folder.show(draw("one.png"))
-    assert (tmp_path / "figures" / "one.png").read_text() == "cropped"
+        folder.check_whole()
 
 
 @pytest.mark.parametrize("place", ["file", "file/below", "/proc/nothing", "a\0b"])
@@ -363,6 +281,6 @@ def test_a_full_disk_while_publishing_loses_nothing(tmp_path, monkeypatch):
         (ready / "table.csv").write_text("new")
         monkeypatch.setattr("pathlib.Path.replace", fail)
         with pytest.raises(OSError, match="No space left"):
-            folder.publish({})
+            folder.publish(ready, {})
     monkeypatch.undo()
     finish(tmp_path / "out")

@@ -9,7 +9,7 @@ from taichi_ants import worlds
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import HEADING_STEPS
 from taichi_ants.task.constants import EMPTY
-from taichi_ants.worlds import World, from_text, load_map, text_map, to_text
+from taichi_ants.worlds import World, from_text, load_map, to_text
 
 GARDEN = Path(__file__).parents[2] / "experiments" / "maps" / "garden.txt"
 GUIDE = Path(__file__).parents[2] / "docs" / "worlds.md"
@@ -118,11 +118,6 @@ def test_a_map_is_text(text: object) -> None:
         from_text(text)
 
 
-def test_a_map_has_a_sane_size() -> None:
-    with pytest.raises(AntsError, match="has more than 4194304 characters"):
-        from_text("Q" + " " * text_map.MAX_MAP_CHARACTERS)
-
-
 def test_several_trail_levels_cannot_be_drawn() -> None:
     world = World((3, 3, 3), (0, 0, 0), trails=[((1, 0, 0), 3), ((2, 0, 0), 4)])
     with pytest.raises(AntsError, match="2 levels from 3 to 4"):
@@ -135,12 +130,6 @@ def test_trails_under_the_queen_or_food_cannot_be_drawn(cell: tuple) -> None:
     with pytest.raises(AntsError) as caught:
         to_text(world)
     assert f"a trail lies on {cell} under" in str(caught.value)
-
-
-@pytest.mark.parametrize("ranges", [(1500, 1500, 1), (3000, 3000, 1)])
-def test_worlds_too_large_for_a_map(ranges: tuple) -> None:
-    with pytest.raises(AntsError, match="more than 4194304"):
-        to_text(World(ranges, (0, 0, 0)))
 
 
 def test_ants_are_numbered_in_reading_order() -> None:
@@ -182,7 +171,6 @@ def test_the_examples_of_the_guide_work() -> None:
         (b"Q\n\x00\n", r"line 2, column 1 of .*map.txt has '\\x00'"),
         ("Q\n  .".encode("utf-16"), "map.txt is no text file"),
         (b"Q\n  x", "line 2, column 3 of .*map.txt has 'x'"),
-        (b" " * (text_map.MAX_MAP_CHARACTERS + 1), "map.txt has more than 4194304 characters"),
     ],
 )
 def test_damaged_files(tmp_path: Path, content: bytes, message: str) -> None:
