@@ -38,12 +38,8 @@ def classify(trace: Trace, max_steps: int) -> tuple[np.ndarray, np.ndarray]:
 
     Rewards play no part in it, so it holds whatever the steps are paid.
 
-    Args:
-        trace: The steps of m episodes; an episode without delivery uses all of its steps.
-        max_steps: The step limit of an episode.
-
-    Returns:
-        Places in `BEHAVIOURS`, int8 (m,), and returns, int64 (m,).
+    Of m episodes, places in `BEHAVIOURS`, int8 (m,), and returns, int64 (m,). An episode without
+    delivery uses all of its steps, `max_steps`.
     """
     episode = np.asarray(trace.episodes) - trace.episodes[0]
     late = np.asarray(trace.steps) >= max_steps // 2

@@ -9,8 +9,7 @@ the interquartile mean decides, and the mean is judged beside it.
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -192,8 +191,3 @@ def _strength(finding: Finding) -> tuple[int, float]:
     low, high = finding.contrast.criterion.low, finding.contrast.criterion.high
     inside = min(finding.effect - low, high - finding.effect)
     return list(Verdict).index(finding.verdict), inside
-
-
-def tally(verdicts: Iterable[Verdict]) -> str:
-    """How many verdicts of each kind there are, as a phrase; the most frequent first."""
-    return ", ".join(f"{n} {verdict.value}" for verdict, n in Counter(verdicts).most_common())

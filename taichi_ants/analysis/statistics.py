@@ -6,8 +6,7 @@ run brings (Agarwal et al. 2021). Each has two intervals:
 - The bootstrap's. For the mean it is BCa with the expansion of Hesterberg (2015): the normal
   quantile z in the percentile levels is replaced by sqrt(n / (n - 1)) times the t quantile with
   n - 1 degrees of freedom. For the IQM it is the percentile interval, as in rliable.
-- Student's t. For the IQM it is that of Tukey and McLaughlin (1963): the deviation is that of the
-  winsorised values, the degrees of freedom those of the values that remain.
+- Student's t. For the IQM it is that of Tukey and McLaughlin (1963).
 
 Tables and figures show the first. Verdicts on claims use the hull of both, at a level corrected
 for their number: far in the tails a bootstrap of few seeds ends at its most extreme resample,
@@ -133,10 +132,7 @@ def bootstrap_interval(
 def student_interval(
     values: np.ndarray, level: float = 0.95, iqm: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Student's t interval of the mean over seeds, or Tukey and McLaughlin's of the IQM.
-
-    Arguments and results as above.
-    """
+    """Student's t interval of the mean over seeds, or Tukey and McLaughlin's of the IQM."""
     from scipy.special import stdtrit
 
     values = np.asarray(values, float)
@@ -155,7 +151,7 @@ def student_interval(
 def cautious_interval(
     values: np.ndarray, level: float, resamples: int = RESAMPLES, iqm: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The hull of both intervals, on which verdicts rest; arguments and results as above.
+    """The hull of both intervals, on which verdicts rest.
 
     Where all n seeds agree there is no spread to estimate. That they agree by chance, although
     half of all seeds would differ, has probability 2^(1-n) (the sign test). If this is not below
@@ -183,11 +179,8 @@ def jackknife_values(
     """Pseudo-values of a statistic of means over seeds, one for each seed.
 
     Their mean is the statistic with its bias of order 1/n removed, and their spread is that of
-    the statistic; so they can be averaged over seeds like any other effect.
-
-    Args:
-        statistic: Smooth function of means, float (..., k) -> float (k,).
-        values: Float (..., seeds); of one seed the pseudo-value is nan.
+    the statistic; so they can be averaged over seeds like any other effect. It is a smooth function
+    of means, float (..., k) -> float (k,); of one seed the pseudo-value is nan.
     """
     n = values.shape[-1]
     if n < 2:

@@ -73,14 +73,7 @@ def new_figure(height: float) -> Figure:
 
 
 def frame(figure: Figure, title: str, caption: str, entries: Mapping[str, Artist]) -> None:
-    """Title and legend above everything else, the caption below.
-
-    Args:
-        figure: The figure.
-        title: One line.
-        caption: Lines of at most about 120 characters.
-        entries: The legend, label -> what to show beside it.
-    """
+    """Title and legend above everything else, the caption below in lines of 120 characters."""
     widest = max(map(len, entries), default=0)
     columns = int(WIDTH / (0.6 + 0.068 * widest))  # inches at 9 points
     # The title is the legend's: the layout engine would put a title of the figure on top of it.

@@ -72,7 +72,7 @@ def report(
 ) -> str:
     """The means with their intervals as a table for a terminal.
 
-    `notes` say, for each point, how its first measure compares with the value `against` of a setting.
+    Notes say of each point how its first measure compares with that at the value `against`.
     """
     names = columns_of(settings)
     ends = {name: bootstrap_interval(array) for name, array in values.items()}

@@ -137,7 +137,7 @@ def _add_live(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument_group("files").add_argument
     add("--save", metavar="FILE", help="keep the colony at the end (.npz)")
     add("--resume", metavar="FILE", help="go on with a colony that was saved")
-    picture = "a picture of the end (.png), or an animation (.gif, a folder)"
+    picture = "a picture of the end (.png), or an animation (.gif, .mp4, a folder)"
     add("--render", metavar="PATH", help=picture)
     add("--every", **counts, default=2, help="ticks a picture of an animation")
     add_common(parser)

@@ -1,8 +1,8 @@
 """Pictures of ants: an episode, a colony, learning made visible, or a policy sheet.
 
 All but learning follow a policy from a file, or one that is trained on the spot. The ending of
---out chooses the kind of file: .gif, .png for a picture of the end, and without an ending a folder
-of PNG pictures.
+--out chooses the kind of file: .gif, .mp4, .png for a picture of the end, and without an ending a
+folder of PNG pictures.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from taichi_ants.rendering.moments import Moment
 
 KINDS = {  # what each subcommand shows, and how it is called
-    "episode": ("One ant that follows a policy", "--policy my.npz --epsilon 0.1 --out ant.gif"),
+    "episode": ("One ant that follows a policy", "--policy my.npz --epsilon 0.1 --out ant.mp4"),
     "colony": ("Many ants that follow one policy", "--ants 200 --out ants.gif"),
     "learning": ("One ant before and after it learns, side by side", "--stages 0 20 500"),
     "sheet": ("What a policy does in each state", "--policy my.npz --out sheet.png"),

@@ -1,4 +1,4 @@
-"""Pictures of worlds and their ants, without a display: stills, GIF, folders of PNG.
+"""Pictures of worlds and their ants, without a display: stills, GIF, MP4.
 
 - A moment is a `Snapshot` of a world, as `Colony.snapshot` or `at_start` give it, with a `Status`,
   what is said of it. `Episode.moments` and `colony_moments` yield them.

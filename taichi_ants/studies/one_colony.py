@@ -43,7 +43,7 @@ def live(
 ) -> None:
     """Let time pass in a colony, then write its files; it ends early once `stopped()` is true.
 
-    It is saved even if its picture (.png) or animation (.gif, a folder) cannot be written. An
+    It is saved even if its picture (.png) or animation (.gif, .mp4, a folder) cannot be written. An
     animation has a picture for `every` so many ticks.
     """
     from taichi_ants.rendering import colony_moments, frames, save_animation, save_picture

@@ -110,27 +110,31 @@ class ResultFolder:
         """A folder for blocks of work, which survive an interruption, and one for results.
 
         With `replace` the work starts anew, whatever the folder holds; old results stay until the
-        new ones are complete. Of two processes at the same work the later one loses nothing but
-        its time: blocks appear whole, and each process has its own folder for results.
+        new ones are complete. Two processes at the same work cannot spoil it: blocks appear
+        whole, each has its own folder for results, and one whose folder is gone ends with an error.
 
         Raises:
             AntsError: The folder cannot be written.
         """
         self._listed()  # if it is damaged, it is so before the work
         manifest, blocks = self._unfinished / MANIFEST, self._unfinished / BLOCKS
-        files.check_writable_folder(self.path)
-        # Without a manifest nobody knows whose blocks these are.
-        if replace or not manifest.exists():
-            self._clear()
-        for folder in (blocks, self._unfinished / READY):
-            files.check_writable_folder(folder)
-        files.write_json(manifest, {"settings": self._settings})
+        new = [part for part in (self.path, *self.path.parents) if not part.exists()]
         try:
+            files.check_writable_folder(self.path)
+            # Without a manifest nobody knows whose blocks these are.
+            if replace or not manifest.exists():
+                self._clear()
+            for folder in (blocks, self._unfinished / READY):
+                files.check_writable_folder(folder)
+            files.write_json(manifest, {"settings": self._settings})
             with tempfile.TemporaryDirectory(dir=self._unfinished / READY) as ready:
                 yield blocks, Path(ready)
         finally:
-            if not any(blocks.rglob("*.npz")):
+            if self._unfinished.is_dir() and not any(blocks.rglob("*.npz")):
                 self._clear()
+            for folder in new:
+                with suppress(OSError, ValueError):  # it holds something, or was never made
+                    folder.rmdir()
 
     def publish(self, ready: Path, manifest: Mapping[str, Any]) -> None:
         """Move what is ready into the folder, then write the manifest with the settings in it.

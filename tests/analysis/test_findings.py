@@ -15,7 +15,6 @@ from taichi_ants.analysis.findings import (
     Verdict,
     above,
     judge,
-    tally,
     weakest,
 )
 
@@ -205,7 +204,3 @@ def test_what_is_missing_is_not_tested_and_counts_for_no_level() -> None:
     for finding in (*others, others[0].by_mean, weakest([first, others[0]])):
         assert finding.verdict is Verdict.NOT_TESTED
         assert np.isnan([finding.effect, finding.low, finding.high]).all()
-
-
-def test_verdicts_are_counted_the_most_frequent_first() -> None:
-    assert tally([UNDECIDED, SUPPORTED, SUPPORTED]) == "2 supported, 1 undecided"

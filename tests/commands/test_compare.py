@@ -186,7 +186,6 @@ def test_summary_figures_are_those_of_the_episodes(finished):
         "return_last50_mean": last["returns"].mean(axis=1),
         "return_last50_ci_low": low,
         "return_last50_ci_high": high,
-        "return_last50_sd": last["returns"].std(axis=1, ddof=1),
         "steps_last50_mean": last["steps"].mean(axis=1),
         "steps_all_mean": arrays["steps"].mean(axis=(1, 2)),
         "deliveries_last50_mean": last["deliveries"].mean(axis=1),

@@ -25,7 +25,9 @@ def parser():
     parser.add_argument("--size", type=whole_number(1, 9), default=3, help="how large")
     parser.add_argument("--seed", type=whole_number(), default=0, help="the first")
     parser.add_argument("--count", type=whole_number(2), help="how many")
-    parser.add_argument("--rates", nargs="+", type=float, default=(0.1, 2.0), help="how fast")
+    parser.add_argument(
+        "--rates", nargs="+", type=float, metavar="X", default=(0.1, 2.0), help="how fast"
+    )
     parser.add_argument("--loud", action="store_true", help="whether")
     return parser
 
@@ -80,7 +82,7 @@ def test_help_shows_the_defaults_that_say_something(parser, monkeypatch):
     assert "--size SIZE how large (default: 3)" in lines
     assert "--seed SEED the first (default: 0)" in lines
     assert "--count COUNT how many" in lines
-    assert "--rates RATES [RATES ...] how fast (default: (0.1, 2.0))" in lines
+    assert "--rates X [X ...] how fast (default: (0.1, 2.0))" in lines
     assert "--loud whether" in lines
 
 

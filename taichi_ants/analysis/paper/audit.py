@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
-from taichi_ants.analysis.findings import (
-    Contrast,
-    Finding,
-    Verdict,
-    judge,
-    tally,
-    weakest,
-)
+from taichi_ants.analysis.findings import Contrast, Finding, Verdict, judge, weakest
 from taichi_ants.analysis.paper.claims import CLAIMS, Claim
 from taichi_ants.analysis.paper.comparison import Comparison
 from taichi_ants.analysis.paper.quantities import Slice
@@ -46,52 +40,54 @@ def assess(comparison: Comparison, claims: Sequence[Claim] = CLAIMS) -> Audit:
 
 
 def claims_rows(audit: Audit) -> list[dict]:
-    """The rows of claims.csv; numbers are nan if not tested, texts "" if not read by mean."""
-    return [
-        {
-            "claim": claim.id,
-            "section": claim.section,
-            "statement": claim.statement,
-            "quantity": claim.tested_on,
-            "criterion": claim.criterion.words,
-            "unit": claim.quantity.unit,
-            "delivery": delivery,
-            "contrast": one.contrast.label,
-            "centre": claim.centre,
-            "effect": one.effect,
-            "ci_low": one.low,
-            "ci_high": one.high,
-            "level": one.level,
-            "verdict": one.verdict.value,
-            "mean_contrast": one.by_mean.contrast.label if one.by_mean else "",
-            "mean_effect": one.by_mean.effect if one.by_mean else None,
-            "mean_ci_low": one.by_mean.low if one.by_mean else None,
-            "mean_ci_high": one.by_mean.high if one.by_mean else None,
-            "mean_verdict": one.by_mean.verdict.value if one.by_mean else "",
-            "seeds": one.contrast.seeds,
-        }
-        for claim, findings in audit.items()
-        for delivery, one in findings.items()
-    ]
+    """The rows of claims.csv; numbers are nan if not tested, None if not read by mean."""
+    rows = []
+    for claim, findings in audit.items():
+        for delivery, one in findings.items():
+            numbers = _numbers(one)
+            by_mean = _numbers(one.by_mean) if one.by_mean else dict.fromkeys(numbers)
+            row = {
+                "claim": claim.id,
+                "section": claim.section,
+                "statement": claim.statement,
+                "quantity": claim.tested_on,
+                "criterion": claim.criterion.words,
+                "unit": claim.quantity.unit,
+                "delivery": delivery,
+                "centre": claim.centre,
+                **numbers,
+                **{f"mean_{name}": value for name, value in by_mean.items()},
+                "level": one.level,
+                "seeds": one.contrast.seeds,
+            }
+            rows.append(row)
+    return rows
+
+
+def _numbers(finding: Finding) -> dict:
+    return {
+        "contrast": finding.contrast.label,
+        "effect": finding.effect,
+        "ci_low": finding.low,
+        "ci_high": finding.high,
+        "verdict": finding.verdict.value,
+    }
 
 
 def _tallies(audit: Audit) -> list[str]:
     """How many verdicts of each kind there are, a line for each delivery setting."""
-    settings = next(iter(audit.values()))
-    return [
-        f"{setting}: {tally(findings[setting].verdict for findings in audit.values())}"
-        for setting in settings
-    ]
+    lines = []
+    for setting in next(iter(audit.values())):
+        counted = Counter(findings[setting].verdict.value for findings in audit.values())
+        numbers = ", ".join(f"{n} {verdict}" for verdict, n in counted.most_common())
+        lines.append(f"{setting}: {numbers}")
+    return lines
 
 
 def claims_table(audit: Audit) -> Table:
     """How many verdicts of each kind there are, and the claims that are contradicted."""
     rows = [
-        [
-            claim.section.split(",")[0],
-            f"{claim.statement.removesuffix('.')} ({claim.quantity.scope})",
-            *(one.verdict.value for one in findings.values()),
-        ]
+        [claim.section, claim.statement, *(one.verdict.value for one in findings.values())]
         for claim, findings in audit.items()
         if any(one.verdict is Verdict.CONTRADICTED for one in findings.values())
     ]
@@ -100,7 +96,7 @@ def claims_table(audit: Audit) -> Table:
         "not tested: this needs the paper's world, its configurations, and 100 episodes",
         "claims.md holds all claims, their effects, intervals and what each was tested on.",
     ]
-    headers = ("Section", "In our words (tested on)", *next(iter(audit.values())))
+    headers = ("Section", "In our words", *next(iter(audit.values())))
     return Table("The paper's claims that are contradicted", headers, rows, notes, len(headers))
 
 
@@ -127,13 +123,9 @@ def claims_markdown(audit: Audit, world: str) -> str:
 
 
 _EXPLANATION = """\
-Effects are paired by seed, claims in reward or steps by the typical run: the interquartile mean \
-over seeds. Where the mean gives another verdict, it stands behind. Of claims with several \
-contrasts the weakest is shown. Intervals are at {:.3f} % each: all hold at once with 95 %, as far \
-as an interval of a mean with heavy tails can. docs/statistics.md says what verdicts mean. \
-Margins are what is too small to matter: one reward is one step on a trail, two steps are what the \
-paper itself calls alike. Not tested is what lacks something: the paper's world, a configuration, \
-or 50 episodes (100 where early ones are compared with late ones)."""
+Effects are paired by seed. Where the verdict by the mean is another, it stands behind. Of claims \
+with several contrasts the weakest is shown. Intervals are at {:.3f} % each, so that all hold at \
+once with 95 %. docs/statistics.md says what centres, verdicts and margins mean."""
 
 
 def _effect(finding: Finding) -> str:

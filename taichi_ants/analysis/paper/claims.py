@@ -47,9 +47,7 @@ class Claim:
     """An empirical claim of the paper, made precise.
 
     Attributes:
-        id: Short name, unique.
-        section: Section of the paper.
-        statement: What the paper claims, in our words.
+        id, section, statement: A unique name, the paper's section, its claim in our words.
         criterion: What every effect of the quantity must fulfil.
         quantity: What is computed.
         why: Why this criterion or quantity, where it is not plain.
@@ -65,7 +63,8 @@ class Claim:
     @property
     def tested_on(self) -> str:
         """What is computed, and why so."""
-        return f"{self.quantity.text}; {self.why}" if self.why else self.quantity.text
+        text = f"{self.quantity.words}: {'; '.join(self.quantity.effects)}"
+        return f"{text}; {self.why}" if self.why else text
 
     @property
     def centre(self) -> str:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from taichi_ants.analysis.paper.measures import WINDOW, RunOutcomes
+from taichi_ants.analysis.paper.measures import RunOutcomes
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
 
@@ -110,11 +110,6 @@ class Comparison(RunOutcomes):
         return self.world == PAPER_WORLD
 
     @property
-    def late(self) -> str:
-        """The episodes that "last 50" measures speak of: "last 50", or "all 20" of a short run."""
-        return f"last {WINDOW}" if self.episodes > WINDOW else f"all {self.episodes}"
-
-    @property
     def delivery_settings(self) -> tuple[str, ...]:
         """The delivery settings, in order of appearance."""
         return tuple(dict.fromkeys(row.delivery for row in self.rows))
@@ -130,15 +125,6 @@ class Comparison(RunOutcomes):
         present = {(row.delivery, row.variant) for row in self.rows}
         pairs = product(self.delivery_settings, self.variants)
         return [pair for pair in pairs if pair in present]
-
-    @property
-    def conditions(self) -> str:
-        """Where trails evaporate, as a sentence for readers."""
-        training, greedy = (
-            "with" if falls else "without"
-            for falls in (self.task.evaporation_in_training, self.task.evaporation_in_evaluation)
-        )
-        return f"Training {training} evaporation of trails, greedy evaluation {greedy} it."
 
     def position(self, delivery: str, variant: Variant, point: GridPoint) -> int | None:
         """The number of a configuration's row, None where it is not in the comparison."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, counts
 from taichi_ants.analysis.paper.best_of import shown_position
-from taichi_ants.analysis.paper.comparison import Comparison, Variant
+from taichi_ants.analysis.paper.comparison import Comparison
 from taichi_ants.analysis.paper.published import FIGURE_1
 from taichi_ants.analysis.statistics import interquartile_mean
 from taichi_ants.analysis.style import (
@@ -48,27 +48,25 @@ BEHAVIOUR_LOOKS = ((BLUE, "o"), (ORANGE, "^"), (WINE, "s"), (INK, "x"))
 def learning_curves(comparison: Comparison, baselines: Sequence[Mapping] = ()) -> Figure:
     """Return, length and deliveries per episode, a column for each delivery setting.
 
-    All learners are shown at the configuration that stands for the paper's figure 1. Where one of
-    them lacks it, or the world is not the paper's, each is shown at the one that stands for it in
-    table 2. A point is the mean over a span of episodes (`_spans`); lines are interquartile means
-    over seeds, bands the middle half of the seeds. Of the rows of baselines.csv the shortest
-    delivery is drawn.
+    Learners are shown at the configuration that stands for the paper's figure 1, one that lacks it
+    at the one that stands for it in table 2. A point is the mean over a span of episodes; lines are
+    interquartile means over seeds, bands the middle half of the seeds. Of the rows of baselines.csv
+    the shortest delivery is drawn.
     """
-    rows = [comparison.position(*learner, FIGURE_1) for learner in comparison.learners]
-    shared = comparison.in_paper_world and None not in rows
+    colours = dict(zip(comparison.variants, cycle(COLOURS)))
     settings = comparison.delivery_settings
     with styled():
         figure = new_figure(6.5)
         shape = len(_CURVES), len(settings)
         axes = figure.subplots(*shape, sharex=True, sharey="row", squeeze=False)
-        for (setting, variant), row in zip(comparison.learners, rows, strict=True):
-            if row is None or not shared:
+        for setting, variant in comparison.learners:
+            row, label = comparison.position(setting, variant, FIGURE_1), variant.label
+            if row is None:
                 row = shown_position(comparison, setting, variant)
-            point = "" if shared else f", {setting}: {comparison.rows[row].point.label}"
-            colour = _colours(comparison)[variant]
+                label += f", {setting}: {comparison.rows[row].point.label}"
             for axis, name in zip(axes[:, settings.index(setting)], _CURVES, strict=True):
                 runs = getattr(comparison, name)[row]
-                _curve(axis, runs, name == "deliveries", colour, variant.label + point)
+                _curve(axis, runs, name == "deliveries", colours[variant], label)
         for (axis, *_), (name, label) in zip(axes, _CURVES.items(), strict=True):
             axis.set_ylabel(f"{label} of an episode")
             if name == "steps":
@@ -80,13 +78,10 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Mapping] = ()) -
             logarithmic(column[-1].xaxis, (1,) if comparison.episodes > 50 else (1, 2, 5))
         words = (
             f"Line: interquartile mean of {count(len(comparison.seeds), 'seed')} (of deliveries "
-            "the mean), band: their middle half. Later points are means over longer spans."
+            "the mean), band: their middle half. Later points are means over longer spans.\n"
+            f"Learners have {FIGURE_1.label} unless named otherwise: the paper's figure 1 names no "
+            "configuration, this one\nstands twice in its table 2."
         )
-        if shared:
-            words += (
-                f"\nAll learners have {FIGURE_1.label}: the paper's figure 1 names no "
-                "configuration, this one stands twice in its table 2."
-            )
         frame(figure, "Learning", words, legend_entries(axes.flat))
     return figure
 
@@ -135,24 +130,12 @@ def save_all(comparison: Comparison, baselines: Sequence[Mapping], folder: str |
     save(return_against_deliveries(comparison, baselines), folder / "return_against_deliveries.png")
 
 
-def _colours(comparison: Comparison) -> dict[Variant, str]:
-    """A colour for each learner."""
-    return dict(zip(comparison.variants, cycle(COLOURS)))
-
-
-def _spans(episodes: int) -> np.ndarray:
-    """The first episodes, from 0, of the spans over which a learning curve averages, and the end.
-
-    Their lengths grow with the episode, so that points are evenly spaced on a logarithmic axis;
-    the first spans are single episodes.
-    """
-    n = max(2, round(_PER_DECADE * np.log10(episodes + 1)) + 1)
-    return np.unique(np.geomspace(1, episodes + 1, n).round().astype(int)) - 1
-
-
 def _curve(axis: Axes, runs: np.ndarray, share: bool, colour: str, label: str) -> None:
     """A learner's line with its band, of values (seeds, episodes); of a share the mean alone."""
-    edges = _spans(runs.shape[1])
+    # The first episodes, from 0, of spans that grow so that points are evenly spaced on a
+    # logarithmic axis, and the end; the first spans are single episodes.
+    n, end = max(2, round(_PER_DECADE * np.log10(runs.shape[1] + 1)) + 1), runs.shape[1] + 1
+    edges = np.unique(np.geomspace(1, end, n).round().astype(int)) - 1
     at = np.sqrt((edges[:-1] + 1) * edges[1:])  # the middle of a span on a logarithmic axis
     means = np.add.reduceat(runs.astype(float), edges[:-1], axis=1) / np.diff(edges)
     # One run of an episode delivers or does not: there is no typical half to average.

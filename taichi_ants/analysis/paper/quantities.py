@@ -128,8 +128,7 @@ class Quantity:
     """What a claim is tested on: one or more numbers of each seed, in one unit.
 
     Attributes:
-        words: What is computed, without what is subtracted from what.
-        scope: From which configurations.
+        words: What is computed, without what is subtracted from what, from which configurations.
         unit: The unit.
         effects: What reads them, by label, such as "Q-learning minus SARSA".
         possible: The range that the numbers cannot leave.
@@ -137,16 +136,10 @@ class Quantity:
     """
 
     words: str
-    scope: str
     unit: str
     effects: dict[str, Effect]
     possible: tuple[float, float] = UNBOUNDED
     of_centres: Callable[[np.ndarray], np.ndarray] | None = None
-
-    @property
-    def text(self) -> str:
-        """What is computed, for readers."""
-        return f"{self.words}, {self.scope}: {'; '.join(self.effects)}"
 
     @property
     def typical(self) -> bool:
@@ -195,7 +188,8 @@ def _quantity(
 ) -> Quantity:
     """A quantity in the unit of a measure; the bounds are those of a share or a count."""
     one = MEASURES[measure]
-    return Quantity(one.words, scope, one.unit, effects, UNBOUNDED if one.typical else bounds)
+    possible = UNBOUNDED if one.typical else bounds
+    return Quantity(f"{one.words}, {scope}", one.unit, effects, possible)
 
 
 def share_above(measure: str, first: Variant, second: Variant, below: bool = False) -> Quantity:
@@ -207,7 +201,7 @@ def share_above(measure: str, first: Variant, second: Variant, below: bool = Fal
 
     label = f"{first.label} {'below' if below else 'above'} {second.label}"
     words = f"{MEASURES[measure].words}, in which share of 16 matched configurations of a seed"
-    return Quantity(words, ALL, "share of 16 pairs", {label: share}, SHARE)
+    return Quantity(words, "share of 16 pairs", {label: share}, SHARE)
 
 
 def growth(later: str, earlier: str, *variants: Variant) -> Quantity:
@@ -234,9 +228,9 @@ def rank_correlation(first: str, second: str, variant: Variant) -> Quantity:
         scale = np.sqrt((one**2).sum(axis=0) * (other**2).sum(axis=0))
         return (one * other).sum(axis=0) / np.where(scale > 0, scale, 1.0)
 
-    words = f"rank correlation of {MEASURES[first].words} and {MEASURES[second].words} of a seed"
-    effects: dict[str, Effect] = {variant.label: correlation}
-    return Quantity(words, ALL, "correlation", effects, DIFFERENCE)
+    pair = f"{MEASURES[first].words} and {MEASURES[second].words}"
+    words = f"rank correlation of {pair} over the 16 configurations of a seed"
+    return Quantity(words, "correlation", {variant.label: correlation}, DIFFERENCE)
 
 
 def stronger(measure: str, factor: str) -> Quantity:
@@ -251,7 +245,6 @@ def stronger(measure: str, factor: str) -> Quantity:
     others = [other for other in FACTORS if other != factor]
     return Quantity(
         f"{MEASURES[measure].words}, absolute effect of a hyperparameter, mean of the learners",
-        ALL,
         MEASURES[measure].unit,
         {f"{factor} minus {other}".replace("_", " "): effects(other) for other in others},
         of_centres=lambda centres: _first_minus_second(np.abs(centres), np.mean),
@@ -269,7 +262,6 @@ def more_dependent(measure: str, factor: str, *pairs: tuple[Variant, Variant]) -
     return Quantity(
         f"{MEASURES[measure].words}, standard deviation of the effect of {factor} over 8 pairs of "
         "configurations (jackknife over seeds)",
-        ALL,
         MEASURES[measure].unit,
         {f"{one.label} minus {other.label}": effects(one, other) for one, other in pairs},
         of_centres=lambda centres: _first_minus_second(centres, partial(np.std, ddof=1)),

@@ -59,7 +59,13 @@ def _heading(comparison: Comparison) -> list[Block]:
         f"{count(comparison.episodes, 'episode')} of at most {comparison.max_steps} steps, "
         f"{count(comparison.greedy_returns.shape[2], 'greedy rollout')} a run."
     )
-    return [f"World: {comparison.world}.\n{sizes}\n{comparison.conditions}"]
+    task = comparison.task
+    training, greedy = (
+        "with" if falls else "without"
+        for falls in (task.evaporation_in_training, task.evaporation_in_evaluation)
+    )
+    trails = f"Training {training} evaporation of trails, greedy evaluation {greedy} it."
+    return [f"World: {comparison.world}.\n{sizes}\n{trails}"]
 
 
 def _greedy(lines: Sequence[Mapping]) -> Table:

@@ -22,6 +22,7 @@ from taichi_ants.analysis.paper.best_of import (
     shown_position,
 )
 from taichi_ants.analysis.paper.comparison import Comparison, GridPoint, Variant
+from taichi_ants.analysis.paper.measures import WINDOW
 from taichi_ants.analysis.tables import MISSING, Block, Table, interval, number, percent
 from taichi_ants.errors import count
 
@@ -93,11 +94,12 @@ def _spread(line: Mapping, stem: str, *names: str, mark: str = "") -> str:
 
 def figure_tables(lines: Sequence[Mapping], comparison: Comparison) -> list[Block]:
     """A table for each figure of a run, beside the paper's in its world, and what they mean."""
-    late = f"{comparison.late} episodes"
+    runs = comparison.episodes
+    late = f"last {WINDOW} episodes" if runs > WINDOW else f"all {count(runs, 'episode')}"
     titles = (f"Return, {late}", "Steps, all episodes", f"Steps, {late}", f"Deliveries, {late}")
     headers = ("Learner", "Delivery", "Mean", "IQM", "Best run", "Paper", "Below")
-    # The last two only where the paper has figures.
-    width = len(headers) if comparison.in_paper_world else len(headers) - 2
+    beside = not all(math.isnan(line["paper_return"]) for line in lines)
+    width = len(headers) if beside else len(headers) - 2
     tables: list[Block] = []
     for name, title in zip(FIGURES, titles, strict=True):
         best = f"best_run_{name}"
@@ -117,18 +119,17 @@ def figure_tables(lines: Sequence[Mapping], comparison: Comparison) -> list[Bloc
             for line in lines
         ]
         tables.append(Table(title, headers[:width], rows, text_columns=2))
-    return [*tables, "  \n".join(_notes(lines, comparison))]
+    return [*tables, "  \n".join(_notes(lines, len(comparison.seeds), beside))]
 
 
-def _notes(lines: Sequence[Mapping], comparison: Comparison) -> list[str]:
-    seeds = len(comparison.seeds)
+def _notes(lines: Sequence[Mapping], seeds: int, beside: bool) -> list[str]:
     notes = [
         f"Mean, IQM: over {count(seeds, 'seed')}, with intervals at 95 %.",
         "IQM: interquartile mean, of the middle half of the runs: the typical run.",
         f"{APART} the mean lies outside of the IQM's interval: a few far runs have moved it.",
         "Best run: best by return of all configurations, one run each: median [95 %].",
     ]
-    if comparison.in_paper_world:
+    if beside:
         notes += [
             "Paper: its table 2. Its steps may be of all episodes or of the last 50.",
             "Below: percentage of the best runs below the paper's figure.",
