@@ -23,14 +23,14 @@ LAYERS = (
     {"task"},
     {"runtime", "worlds", "learners"},
     {"checks"},
-    {"engines", "reference"},
+    {"baselines", "engines", "reference"},
     {"analysis", "rendering"},
     {"studies"},
     {"commands"},
     {"__main__"},
 )
 # Kernels live in these; runtime starts Taichi.
-PARTS_WITH_TAICHI = {"task", "learners", "engines", "rendering", "envs", "runtime"}
+PARTS_WITH_TAICHI = {"baselines", "task", "learners", "engines", "rendering", "envs", "runtime"}
 
 FILES = sorted([*(ROOT / "taichi_ants").rglob("*.py"), *(ROOT / "experiments").rglob("*.py")])
 PACKAGE = [path for path in FILES if "taichi_ants" in path.relative_to(ROOT).parts]

@@ -20,3 +20,5 @@ STREAM_START_CELL = 2  # number: the cell, in lexicographic order of (x, y, z)
 STREAM_START_HEADING = 3  # number: the ant
 STREAM_BORN = 4  # number: episode * 2**32 + the ant
 STREAM_QUEEN = 5  # number: 0
+STREAM_BRIDGE = 6  # number: the colony at the double bridge of `baselines.goss`
+STREAM_TOUR = 7  # number: colony * 2**32 + the ant of `baselines.ant_system`

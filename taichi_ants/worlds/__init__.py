@@ -1,5 +1,6 @@
 """Worlds and where they come from: the paper, chance, a drawing, or a name for any of these."""
 
+from taichi_ants.worlds.double_bridge import double_bridge
 from taichi_ants.worlds.open_world import open_world
 from taichi_ants.worlds.paper import paper
 from taichi_ants.worlds.registry import build, check_seed_counts, names, register
@@ -10,6 +11,7 @@ __all__ = [
     "World",
     "build",
     "check_seed_counts",
+    "double_bridge",
     "from_text",
     "load_map",
     "names",
@@ -21,3 +23,7 @@ __all__ = [
 
 register("paper", lambda seed: paper())
 register("open", open_world)
+register(
+    "double_bridge",
+    lambda seed, short=23, long=36, mirrored=False: double_bridge(short, long, mirrored),
+)

@@ -44,8 +44,8 @@ def names() -> tuple[str, ...]:
 
 
 def check_seed_counts(name_or_path: str, option: str = "--world-seed") -> None:
-    """Make sure that a seed can change the world; AntsError if it is the paper's or a map."""
-    drawn = [name for name in names() if name != "paper"]
+    """Make sure that a seed can change the world; AntsError if nothing is drawn, as in a map."""
+    drawn = [name for name in names() if name not in ("paper", "double_bridge")]
     if name_or_path not in drawn:
         raise AntsError(
             f"{option} is for a world drawn at random, not for {name_or_path!r}; leave it out, "

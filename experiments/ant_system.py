@@ -1,0 +1,60 @@
+"""Ant colony optimisation on the maps of the package: who finds the shortest way, and when.
+
+Prints, for Ant System and MAX-MIN Ant System in each world, how many colonies find a shortest way
+from the queen to food, in which iteration (the median of those that do), and how long the tours of
+the first and the last iteration are. See docs/baselines.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+import numpy as np
+
+from taichi_ants import worlds
+from taichi_ants.baselines.ant_system import METHODS, search
+from taichi_ants.studies.command_line import ListAction, Parser, run_command, whole_number
+
+
+def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
+    """The settings of the command line."""
+    parser = Parser(__doc__.split("\n", 1)[0], epilog=__doc__.split("\n", 1)[1])
+    add = parser.add_argument
+    places = ("paper", "double_bridge")
+    add("--worlds", action=ListAction, default=places, metavar="WORLD", help="names or map files")
+    add("--iterations", type=whole_number(1), default=500, metavar="N", help="of each colony")
+    add("--ants", type=whole_number(1), default=32, metavar="N", help="of each colony")
+    add("--colonies", type=whole_number(1), default=20, metavar="N", help="in each world")
+    add("--evaporation", type=float, metavar="RHO", help="(default: 0.5, of max_min 0.02)")
+    add("--seed", type=whole_number(), default=0, help="of all colonies")
+    add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
+    return parser.parse_args(arguments)
+
+
+def print_table(settings: argparse.Namespace) -> None:
+    """A row for each world and method."""
+    print(f"{'world':20} {'method':11} shortest  found by  iteration  first and last mean length")
+    for name in settings.worlds:
+        world = worlds.build(name, settings.seed)
+        for method in METHODS:
+            result = search(
+                world,
+                method,
+                iterations=settings.iterations,
+                ants=settings.ants,
+                colonies=settings.colonies,
+                evaporation=settings.evaporation,
+                seed=settings.seed,
+                threads=settings.threads,
+            )
+            found = result.found[result.found > 0]
+            when = f"{np.median(found):.0f}" if len(found) else "-"
+            first, last = np.nanmean(result.mean[:, [0, -1]], axis=0)
+            print(
+                f"{name:20} {method:11} {result.shortest:8} {len(found):5}/{settings.colonies:<4}"
+                f"{when:>9} {first:11.1f} {last:8.1f}"
+            )
+
+
+if __name__ == "__main__":
+    run_command(lambda: print_table(parse_arguments()))

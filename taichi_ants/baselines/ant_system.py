@@ -1,0 +1,213 @@
+"""Ant colony optimisation: the shortest way from the queen to food.
+
+- Ant System: M. Dorigo, V. Maniezzo, A. Colorni. Ant system: optimization by a colony of
+  cooperating agents. IEEE Transactions on Systems, Man, and Cybernetics, Part B 26 (1996), 29-41.
+- MAX-MIN Ant System: T. Stuetzle, H. H. Hoos. MAX-MIN Ant System. Future Generation Computer
+  Systems 16 (2000), 889-914.
+
+In each iteration, every ant walks at random from the queen until it comes to food; then the loops
+are taken out of its walk, and what remains is its *tour*. The pheromone tau lies on *arcs*, steps
+from a cell to a neighbour, in one direction. Of the arcs that leave its cell an ant takes one with
+a probability proportional to tau^alpha; it goes straight back only out of a dead end (as in Dorigo
+and Stuetzle, Ant Colony Optimization, 2004, section 1.3). Then all tau lose the share rho, and
+tours of length L add 1 / L to each of their arcs.
+
+There is no heuristic eta: both methods were made for problems where an ant knows how far it is to
+the next city. Here all steps are equally long and nobody knows where the food is, so eta would be
+1 and beta would change nothing.
+
+Unlike the ants of this package, these deposit after they know how long the tour was, all at once,
+never meet, and the food is never used up. They show what trails alone can find.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from numbers import Real
+from typing import Literal, get_args
+
+import numpy as np
+
+from taichi_ants import runtime
+from taichi_ants.checks import checked_world
+from taichi_ants.errors import AntsError, check_one_of, checked_whole, shown, whole
+from taichi_ants.grid.constants import N_HEADINGS, STREAM_TOUR
+from taichi_ants.grid.randomness import stream_state
+from taichi_ants.task.constants import EMPTY, FOOD, QUEEN
+from taichi_ants.worlds.world import World
+
+Method = Literal["ant_system", "max_min"]
+METHODS: tuple[str, ...] = get_args(Method)
+# The share that evaporates, where none is given: as the authors chose it.
+EVAPORATION = {"ant_system": 0.5, "max_min": 0.02}
+# MAX-MIN: the probability to build the best tour once all pheromone lies on it, as the authors'.
+P_BEST = 0.05
+_MAX_ENTRIES = 1 << 28  # of the arrays of tours: a gibibyte each
+
+
+@dataclass(frozen=True)
+class Search:
+    """What colonies found.
+
+    Attributes:
+        shortest: Steps from the queen to the nearest food.
+        best: int32 (colonies, iterations): the shortest tour of each iteration; 0 if no ant found
+            food.
+        mean: float64 (colonies, iterations): the mean length of the tours; NaN if there was none.
+        lost: int32 (colonies, iterations): ants that gave up.
+    """
+
+    shortest: int
+    best: np.ndarray
+    mean: np.ndarray
+    lost: np.ndarray
+
+    @property
+    def found(self) -> np.ndarray:
+        """int64 (colonies,): the first iteration, from 1, with a shortest tour; 0 if none had."""
+        hits = self.best == self.shortest
+        return np.where(hits.any(axis=1), hits.argmax(axis=1) + 1, 0)
+
+
+def search(
+    world: World,
+    method: Method = "max_min",
+    *,
+    iterations: int = 200,
+    ants: int = 32,
+    colonies: int = 20,
+    alpha: int = 1,
+    evaporation: float | None = None,
+    max_steps: int = 100_000,
+    seed: int = 0,
+    threads: int | None = None,
+) -> Search:
+    """Let colonies look for the shortest way, each for itself.
+
+    Args:
+        world: Where; rocks block, trails and listed ants do not matter.
+        method: "ant_system": all ants deposit. "max_min": the best of the iteration does, and tau
+            stays between bounds that follow from the best length so far.
+        iterations: Rounds of tours.
+        ants: Of each colony.
+        colonies: How many; the first ones stay the same if there are more.
+        alpha: How strongly pheromone attracts, a whole number from 1 to 8.
+        evaporation: rho, above 0 and at most 1; None takes 0.5, with "max_min" 0.02.
+        max_steps: After so many an ant gives up and deposits nothing.
+        seed: Any whole number.
+        threads: CPU threads; None keeps what runs, or takes all.
+
+    Raises:
+        AntsError: An argument is not allowed, or no food can be reached.
+    """
+    check_one_of("method", method, METHODS)
+    for name, value in (("iterations", iterations), ("ants", ants), ("colonies", colonies)):
+        checked_whole(name, value)
+    checked_whole("alpha", alpha, 1, 8)
+    checked_whole("max_steps", max_steps)
+    rho = EVAPORATION[method] if evaporation is None else evaporation
+    if not (isinstance(rho, Real) and not isinstance(rho, bool) and 0 < rho <= 1):
+        raise AntsError(f"evaporation is {shown(rho)}; it must be above 0 and at most 1.")
+    neighbours, is_food, start = _graph(checked_world(world, learns=True))
+    n, n_ants = len(neighbours), colonies * ants
+    if n * n_ants > _MAX_ENTRIES:
+        raise AntsError(
+            f"{colonies} colonies of {ants} ants in a world of {n} open cells need arrays of "
+            f"{n * n_ants} entries; at most {_MAX_ENTRIES} are allowed, so choose fewer."
+        )
+    shortest = _shortest(neighbours, is_food, start)
+    numbers = np.arange(colonies)[:, None] * 2**32 + np.arange(ants)
+    states = stream_state(whole("seed", seed), STREAM_TOUR, numbers).reshape(-1)
+
+    runtime.start(threads)
+    # Taichi is imported once it is configured.
+    from taichi_ants.baselines.tour_kernels import lay, walk
+
+    tau = np.ones((colonies, N_HEADINGS * n))
+    place, tours = np.zeros((2, n_ants, n), np.int32)
+    lengths = np.zeros(n_ants, np.int32)
+    bounds = _Bounds(method, float(rho), ants, _ways(neighbours), colonies)
+    best, lost = np.zeros((2, colonies, iterations), np.int32)
+    mean = np.full((colonies, iterations), np.nan)
+    with runtime.quiet():
+        for i in range(iterations):
+            walk(
+                *(neighbours, is_food, start, tau, alpha, max_steps),
+                *(states, place, tours, lengths),
+            )
+            by_colony = lengths.reshape(colonies, ants)
+            lost[:, i] = (by_colony == 0).sum(axis=1)
+            has = lost[:, i] < ants
+            best[:, i] = np.where(has, np.where(by_colony, by_colony, n).min(axis=1), 0)
+            mean[has, i] = by_colony[has].sum(axis=1) / (ants - lost[has, i])
+            deposits, lowest, highest = bounds.after(by_colony, best[:, i], tau)
+            lay(tau, float(rho), tours, lengths, deposits.reshape(-1), lowest, highest)
+    return Search(shortest, best, mean, lost)
+
+
+class _Bounds:
+    """What tells the methods apart: who deposits, the first tau, and its bounds."""
+
+    def __init__(self, method: str, rho: float, ants: int, ways: float, colonies: int) -> None:
+        self._max_min, self._rho, self._ants, self._ways = method == "max_min", rho, ants, ways
+        self._best = np.zeros(colonies)  # the shortest tour so far, 0 for none
+
+    def after(
+        self, lengths: np.ndarray, best: np.ndarray, tau: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What each ant deposits (colonies, ants), and the bounds of tau (colonies,).
+
+        Args:
+            lengths: Of the tours, (colonies, ants), 0 for none.
+            best: The shortest of each colony, 0 for none.
+            tau: Set to its first level where a colony has found food for the first time: what ants
+                would keep up if they all went that way. Until then it is equal everywhere.
+        """
+        first = (self._best == 0) & (best > 0)
+        shorter = first | ((best > 0) & (best < self._best))
+        self._best[shorter] = best[shorter]
+        has = self._best > 0
+        length = np.where(has, self._best, 1)
+        deposits = np.where(lengths > 0, 1 / np.maximum(lengths, 1), 0)
+        if not self._max_min:
+            tau[first] = self._ants / length[first, None]
+            nothing = np.zeros(len(length))
+            return deposits, nothing, nothing + np.inf
+        winner = lengths == best[:, None]
+        winner &= winner.cumsum(axis=1) == 1  # of equals the first
+        highest = 1 / (self._rho * length)
+        tau[first] = highest[first, None]
+        right = P_BEST ** (1 / length)  # the probability to go right at one cell
+        lowest = np.minimum(highest * (1 - right) / ((self._ways - 1) * right), highest)
+        # Where no food was found yet, all tau stay 1.
+        return np.where(winner, deposits, 0), np.where(has, lowest, 1), np.where(has, highest, 1)
+
+
+def _graph(world: World) -> tuple[np.ndarray, np.ndarray, int]:
+    """Neighbours int32 (n, 6) of the open cells, which of them are food, int32 (n,), the queen."""
+    ground = world.ground()
+    cells = np.flatnonzero(np.isin(ground, (EMPTY, FOOD, QUEEN)))
+    number = np.full(ground.size, -1, np.int32)
+    number[cells] = np.arange(len(cells), dtype=np.int32)
+    neighbours = number[cells[:, None] + world.grid.offsets]
+    is_food = (ground[cells] == FOOD).astype(np.int32)
+    return neighbours, is_food, int(number[world.grid.index(world.queen)])
+
+
+def _shortest(neighbours: np.ndarray, is_food: np.ndarray, start: int) -> int:
+    """Steps to the nearest food, breadth first."""
+    seen = np.zeros(len(neighbours) + 1, bool)
+    seen[-1] = True  # no neighbour
+    layer, steps = np.array([start]), 0
+    while len(layer):
+        if is_food[layer].any():
+            return steps
+        seen[layer] = True
+        around = np.unique(neighbours[layer])
+        layer, steps = around[~seen[around]], steps + 1
+    raise AntsError("no food can be reached from the queen; give the world a way.")
+
+
+def _ways(neighbours: np.ndarray) -> float:
+    """How many ways on an ant has from a cell in the mean, at least 2."""
+    return max(2.0, float((neighbours >= 0).sum(axis=1).mean()) - 1)

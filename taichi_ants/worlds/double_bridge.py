@@ -1,0 +1,108 @@
+"""The double bridge: a nest and food at the ends of a bridge with two branches.
+
+The experiment of Goss, Aron, Deneubourg and Pasteels (Naturwissenschaften 76, 1989) on hexagons.
+The queen, the junction at the nest, the junction at the food and the middle of the food lie on one
+line, along heading 0. A branch leads away from this line, along it, and back to it: between
+junctions that are D steps apart, k steps to the side, D - k ahead and k to the other side are D + k
+steps. So the branches differ in k alone, both turn off by one heading at a junction, and where they
+are equally long the world is its own mirror image.
+
+Corridors are two cells wide, so that ants that meet can pass. In a corridor of one cell they would
+stand in front of each other for ever, except where carriers have right of way. The second lane lies
+around the first, so that no way over it is shorter.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from taichi_ants.errors import AntsError, checked_flag, checked_whole
+from taichi_ants.grid.hexgrid import AxialGrid
+from taichi_ants.worlds import geometry
+from taichi_ants.worlds.world import World
+
+ROOM_RADIUS = 5  # of the rooms around queen and food: room for 90 ants beside the queen
+PILE_RADIUS = 3  # of the food: 37 cells
+MIN_STEPS, MAX_STEPS = 4, 1000  # of the short branch
+_NEST_JUNCTION = ROOM_RADIUS + 1  # its x coordinate; the queen is at the origin
+_BULGE = 3  # steps of the short branch to the side, if the long one leaves the choice
+
+
+def double_bridge(short: int = 23, long: int = 36, mirrored: bool = False) -> World:
+    """A short and a long branch between nest and food, walled by rocks.
+
+    The queen is at the origin, in the middle of a room; the food is a pile in the middle of another
+    one. No trail, no listed ants: they start around the queen.
+
+    Args:
+        short: Length of the shorter branch, in steps from junction to junction, 4 to 1000.
+        long: Length of the other one, from `short` to 2 * short - 3.
+        mirrored: The short branch lies to the left of an ant that leaves the nest, not to the
+            right.
+
+    Raises:
+        AntsError: A length is not whole or not allowed, or mirrored is not True or False.
+    """
+    apart = _apart(short, long)
+    queen, pile = (0, 0, 0), (2 * _NEST_JUNCTION + apart, 0, 0)
+    corridors = np.concatenate(
+        [*branch_cells(short, long, mirrored), *junction_cells(short, long)[:, None]]
+    )
+    # A cell of rock around all that can be walked.
+    widest = np.maximum(corridors.max(axis=0), ROOM_RADIUS) + 2
+    grid = AxialGrid((pile[0] + ROOM_RADIUS + 2, int(widest[1]), int(widest[2])))
+    to_pile = geometry.distances(grid, pile)
+    walled = np.minimum(geometry.distances(grid, queen), to_pile) > ROOM_RADIUS
+    walled[grid.index(corridors)] = False
+    return World(
+        grid.ranges,
+        queen,
+        foods=grid.cells(np.flatnonzero(grid.exists & (to_pile <= PILE_RADIUS))),
+        obstacles=grid.cells(np.flatnonzero(grid.exists & walled)),
+    )
+
+
+def junction_cells(short: int = 23, long: int = 36) -> np.ndarray:
+    """The junction at the nest and the one at the food, int64 (2, 3); arguments as the world's."""
+    apart = _apart(short, long)
+    return np.array([(_NEST_JUNCTION, 0, 0), (_NEST_JUNCTION + apart, 0, 0)])
+
+
+def branch_cells(
+    short: int = 23, long: int = 36, mirrored: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
+    """The cells of the short and of the long branch, int64 (n, 3) each, junctions left out.
+
+    With them, one can count who takes which branch. Arguments and errors are those of the world.
+    """
+    apart = _apart(short, long)
+    right, left = (_corridor(length - apart, apart) for length in (short, long))
+    # In the mirror, y and z change places.
+    if checked_flag("mirrored", mirrored):
+        return right[:, [0, 2, 1]], left
+    return right, left[:, [0, 2, 1]]
+
+
+def _apart(short: int, long: int) -> int:
+    """Steps from junction to junction straight ahead, if there were no rocks."""
+    checked_whole("short", short, MIN_STEPS, MAX_STEPS)
+    checked_whole("long", long)
+    if not short <= long <= 2 * short - 3:
+        raise AntsError(
+            f"long is {long} with short {short}; it must lie between short and {2 * short - 3}, "
+            "twice short less 3."
+        )
+    # A branch that went as far to the side as ahead would have a corner that can be cut.
+    return max(short - _BULGE, long // 2 + 1)
+
+
+def _corridor(side: int, apart: int) -> np.ndarray:
+    """The two lanes of a branch to the right that leads `side` steps to the side."""
+    cells = []
+    for outer in (0, 1):
+        start, end = _NEST_JUNCTION - outer, _NEST_JUNCTION + apart + outer
+        widest = side + outer
+        cells += [(start + y, y, 0) for y in range(1, widest)]
+        cells += [(x, widest, 0) for x in range(start + widest, end + 1)]
+        cells += [(end, y, 0) for y in range(widest - 1, 0, -1)]
+    return np.array(cells)

@@ -1,0 +1,139 @@
+"""The double bridge, walked breadth first with the reference's geometry."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import pytest
+
+from taichi_ants import worlds
+from taichi_ants.errors import AntsError
+from taichi_ants.reference.geometry import Cell, existing_cells, listed_cells, neighbour
+from taichi_ants.worlds import World
+from taichi_ants.worlds.double_bridge import branch_cells, double_bridge, junction_cells
+
+LENGTHS = [(23, 36), (23, 23), (23, 43), (4, 4), (4, 5), (5, 7), (10, 13), (30, 56)]
+
+
+def walkable(world: World) -> set[Cell]:
+    """All cells without rocks."""
+    return set(existing_cells(world.ranges)) - set(listed_cells(world.obstacles))
+
+
+def steps(cells: set[Cell], start: Cell) -> dict[Cell, int]:
+    """The steps from a cell to all others that can be walked to."""
+    found, todo = {start: 0}, [start]
+    for cell in todo:
+        for heading in range(6):
+            ahead = neighbour(cell, heading)
+            if ahead in cells and ahead not in found:
+                found[ahead] = found[cell] + 1
+                todo.append(ahead)
+    return found
+
+
+def mirrored(cells: Iterable[Cell]) -> set[Cell]:
+    """Left and right exchanged: up stays, up-right becomes up-left."""
+    return {(x, z, y) for x, y, z in cells}
+
+
+@pytest.mark.parametrize("flip", [False, True])
+@pytest.mark.parametrize(("short", "long"), LENGTHS)
+def test_branches_are_as_long_as_asked_for(short: int, long: int, flip: bool) -> None:
+    cells = walkable(double_bridge(short, long, flip))
+    nest, food = listed_cells(junction_cells(short, long))
+    branches = [set(listed_cells(branch)) for branch in branch_cells(short, long, flip)]
+    assert branches[0] | branches[1] < cells
+    assert not branches[0] & branches[1]
+    for closed, length in zip(reversed(branches), (short, long), strict=True):
+        assert steps(cells - closed, nest)[food] == length
+    assert food not in steps(cells - branches[0] - branches[1], nest)
+
+
+@pytest.mark.parametrize(("short", "long"), LENGTHS)
+def test_a_mirrored_bridge_is_the_mirror_image(short: int, long: int) -> None:
+    world, mirror = double_bridge(short, long), double_bridge(short, long, mirrored=True)
+    assert walkable(mirror) == mirrored(walkable(world))
+    assert set(listed_cells(mirror.foods)) == mirrored(listed_cells(world.foods))
+    assert mirror.queen == world.queen == (0, 0, 0)
+    assert (world == mirror) == (short == long)
+
+
+@pytest.mark.parametrize(("short", "long"), LENGTHS)
+def test_ants_can_pass_each_other_everywhere(short: int, long: int) -> None:
+    """No cell but the junctions, taken for itself, is a place that all of a branch goes through."""
+    cells = walkable(double_bridge(short, long))
+    nest, food = listed_cells(junction_cells(short, long))
+    branches = [set(listed_cells(branch)) for branch in branch_cells(short, long)]
+    for open_branch, closed in (branches, branches[::-1]):
+        for blocked in open_branch:
+            assert food in steps(cells - closed - {blocked}, nest)
+
+
+def test_the_short_branch_lies_to_the_right_unless_mirrored() -> None:
+    (nest, _) = listed_cells(junction_cells())
+    for flip, heading in ((False, 1), (True, 5)):
+        short, long = (set(listed_cells(branch)) for branch in branch_cells(mirrored=flip))
+        assert neighbour(nest, heading) in short
+        assert neighbour(nest, -heading) in long
+
+
+def test_an_ant_at_a_junction_sees_the_same_on_both_sides() -> None:
+    cells = walkable(double_bridge())
+    closer = double_bridge().closer()
+    for junction, ahead in zip(listed_cells(junction_cells()), (0, 3), strict=True):
+        assert neighbour(junction, ahead) not in cells
+        for turn in (1, 2, 3):
+            sides = [neighbour(junction, ahead + side * turn) for side in (1, -1)]
+            assert len({cell in cells for cell in sides}) == 1
+        bits = int(closer[double_bridge().grid.index(junction)])
+        assert (bits >> (ahead + 1) % 6) & 1 == (bits >> (ahead - 1) % 6) & 1
+
+
+def test_the_way_to_the_food_and_who_starts_where() -> None:
+    world = double_bridge()
+    assert world.reachable_foods().any()
+    around_food = min(
+        length
+        for cell, length in steps(
+            walkable(world) - set(listed_cells(world.foods)), (0, 0, 0)
+        ).items()
+        if any(neighbour(cell, heading) in listed_cells(world.foods) for heading in range(6))
+    )
+    assert around_food == 6 + 23 + 2  # to the junction, over the bridge, to the pile
+    cells, _ = world.start(3, 90)
+    assert world.distances()[cells].max() == 5  # all in the nest
+    assert len(world.trails) == len(world.ants) == 0
+
+
+def test_it_has_a_name_with_settings() -> None:
+    assert worlds.settings("double_bridge") == ("short", "long", "mirrored")
+    built = worlds.build("double_bridge", 7, short=10, long=13, mirrored=True)
+    assert built == double_bridge(10, 13, True)
+    assert worlds.build("double_bridge") == double_bridge()
+    with pytest.raises(AntsError, match="--world-seed is for a world drawn at random"):
+        worlds.check_seed_counts("double_bridge")
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"short": 3, "long": 3}, "short is 3; it must lie between 4 and 1000"),
+        ({"short": 23.0}, "short is 23.0; it must be a whole number"),
+        ({"long": True}, "long is True; it must be a whole number"),
+        ({"long": 22}, "long is 22 with short 23; it must lie between short and 43"),
+        ({"long": 44}, "long is 44 with short 23"),
+        ({"mirrored": 1}, "mirrored is 1; it must be True or False"),
+    ],
+)
+def test_errors_name_what_is_wrong(given: dict, message: str) -> None:
+    for build in (double_bridge, branch_cells):
+        with pytest.raises(AntsError, match=message):
+            build(**given)
+
+
+def test_cells_are_listed_once() -> None:
+    for length in LENGTHS:
+        cells = np.concatenate([*branch_cells(*length), junction_cells(*length)])
+        assert len(np.unique(cells, axis=0)) == len(cells)
