@@ -68,7 +68,7 @@ _TRAINING: dict[str, tuple[str, str, dict[str, Any]]] = {  # of no use beside --
 _OPTIONS = {
     "--out": ("ecls", "file or folder", {"metavar": "PATH"}),
     "--title": ("ecls", "a line above all", {"metavar": "TEXT"}),
-    "--world": ("ecls", "paper, open, or the path of a map file", {"default": "paper"}),
+    "--world": ("ecls", "a name as paper or open, or the path of a map file", {"default": "paper"}),
     "--world-seed": ("ecls", "seed of a world drawn at random", {**_SEED, "default": None}),
     "--seed": ("ecls", "seed of training and of what is shown", _SEED),
     "--plugin": ("ecls", "a Python file with learners, worlds, observations", {"metavar": "FILE"}),
@@ -202,7 +202,8 @@ def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray,
     if settings.policy:
         policy = load_policy(settings.policy)
         title = settings.title or f"policy {Path(settings.policy).stem}"
-        return policy.q_values, Task(policy.observation), title
+        task = Task.from_dict(policy.metadata.get("task", {"observation": policy.observation}))
+        return policy.q_values, task, title
     config, seed, episodes = training_config(settings), settings.seed, settings.episodes
     title = settings.title or f"{settings.learner} after {count(episodes, 'episode')}"
     with progress_bar("Training") as progress:

@@ -132,17 +132,15 @@ def plan(
 # Where food is not as in all other arenas.
 LIVES = {"moving": Life(regrowth=0, wander=100), "slow": Life(regrowth=100)}
 RANGES = {"small": (15, 15, 15), "wide": (60, 60, 60), "large": (100, 100, 100)}
-_DRAWN: dict[str, dict[str, Any]] = {
-    "piles": {"food_share": 0.0},
-    "moving": {"food_share": 0.0},
-    "one_pile": {"food_share": 0.0, "piles": 1},
-    "rocks": {"rock_share": 0.3},
-}
+_PILES = {"piles": 3, "moving": 3, "one_pile": 1}  # and no other food
 
 
 def _place(arena: str, seed: int) -> World:
     """The world of an arena, but the paper's, that a seed gives."""
-    return worlds.open_world(seed, RANGES.get(arena, (30, 30, 30)), **_DRAWN.get(arena, {}))
+    ranges = RANGES.get(arena, (30, 30, 30))
+    if arena in _PILES:
+        return worlds.far_piles(seed, ranges, piles=_PILES[arena])
+    return worlds.open_world(seed, ranges, rock_share=0.3 if arena == "rocks" else 0.15)
 
 
 def _pool(arena: str) -> tuple[World, ...] | None:

@@ -1,7 +1,7 @@
 """Worlds and where they come from: the paper, chance, a drawing, or a name for any of these."""
 
 from taichi_ants.worlds.double_bridge import double_bridge
-from taichi_ants.worlds.open_world import open_world
+from taichi_ants.worlds.open_world import far_piles, open_world
 from taichi_ants.worlds.paper import paper
 from taichi_ants.worlds.registry import build, check_seed_counts, names, register
 from taichi_ants.worlds.text_map import from_text, load_map, to_text
@@ -12,6 +12,7 @@ __all__ = [
     "build",
     "check_seed_counts",
     "double_bridge",
+    "far_piles",
     "from_text",
     "load_map",
     "names",
@@ -23,6 +24,7 @@ __all__ = [
 
 register("paper", lambda seed: paper())
 register("open", open_world)
+register("far_piles", far_piles)
 register(
     "double_bridge",
     lambda seed, short=23, long=36, mirrored=False: double_bridge(short, long, mirrored),

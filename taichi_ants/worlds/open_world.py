@@ -76,6 +76,19 @@ def open_world(
     )
 
 
+def far_piles(
+    seed: int = 0,
+    ranges: Sequence[int] | None = (30, 30, 30),
+    rock_share: float = 0.15,
+    piles: int = 3,
+) -> World:
+    """An open world without single foods: all food lies in piles far from the queen.
+
+    Arguments and errors as of `open_world`; with at least one pile.
+    """
+    return open_world(seed, ranges, rock_share, 0.0, checked_whole("piles", piles, most=3))
+
+
 def _share(name: str, value: Any) -> float:
     number = isinstance(value, Real) and not isinstance(value, bool)
     if not (number and 0 <= value <= MAX_SHARE):

@@ -10,7 +10,7 @@ from taichi_ants.errors import AntsError
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.grid.randomness import Stream
 from taichi_ants.task.constants import EMPTY
-from taichi_ants.worlds import World, open_world
+from taichi_ants.worlds import World, far_piles, open_world
 
 # The package's name `open_world` is the function, which hides the module of that name.
 module = importlib.import_module("taichi_ants.worlds.open_world")
@@ -154,7 +154,7 @@ def test_a_world_without_reachable_food_is_drawn_again(monkeypatch: pytest.Monke
     monkeypatch.setattr(module, "_draw", shut_in)
     world = open_world(0, (20, 20, 20))
     assert attempts == [0, 1, 2]
-    assert world == draw(world.grid, 0.15, 0.03, 0, 2)
+    assert world == draw(world.grid, 0.15, 0.03, 3, 0, 2)
     assert world != draw(world.grid, 0.15, 0.03, 0, 0)
 
 
@@ -197,3 +197,14 @@ def test_ranges_are_checked(ranges: object) -> None:
 def test_seeds_are_whole(seed: object) -> None:
     with pytest.raises(AntsError, match="seed is"):
         open_world(seed, (20, 20, 20))
+
+
+def test_piles_lie_along_the_first_ranges_and_may_be_all_food() -> None:
+    three, one = (far_piles(3, (30, 30, 30), piles=n) for n in (3, 1))
+    assert set(map(tuple, three.foods.tolist())) == pile_cells(three)
+    assert set(map(tuple, one.foods.tolist())) < pile_cells(three)
+    assert (one.foods[:, 0] > 15).all()
+    assert far_piles(3, (30, 30, 30)) == open_world(3, (30, 30, 30), food_share=0)
+    for piles in (0, 4, 1.5):
+        with pytest.raises(AntsError, match=f"piles is {piles}; it must"):
+            far_piles(3, piles=piles)

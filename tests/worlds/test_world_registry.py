@@ -29,9 +29,9 @@ def test_every_registered_world_can_be_used(name: str) -> None:
 
 
 def test_names_and_seeds() -> None:
-    assert worlds.names() == ("double_bridge", "open", "paper")
+    assert worlds.names() == ("double_bridge", "far_piles", "open", "paper")
     worlds.register("tiny", tiny)
-    assert worlds.names() == ("double_bridge", "open", "paper", "tiny")
+    assert worlds.names() == ("double_bridge", "far_piles", "open", "paper", "tiny")
     assert worlds.build("tiny") == tiny(0)
     assert worlds.build("tiny", np.int64(1)) == tiny(1)
     assert worlds.build("open", 3) == worlds.open_world(3)
@@ -81,7 +81,7 @@ def test_names_go_before_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 @pytest.mark.parametrize("name", ["papr", "", "Paper", None, 4, "x" * 5000, "a\0b"])
 def test_unknown_names_list_the_known_ones(name: object) -> None:
     with pytest.raises(
-        AntsError, match=r"choose one of double_bridge, open, paper|must be text or a path"
+        AntsError, match=r"choose one of double_bridge, far_piles, open, paper|must be text or a path"
     ):
         worlds.build(name)
 

@@ -99,7 +99,7 @@ def test_every_tick_in_crowded_micro_worlds(kernel):
     """Two episodes each: something goes on between them, in every other case in another world."""
     learner, sharing, observation, dense, *rules = kernel
     happened = np.zeros(5, dtype=int)
-    for seed in range(12 if observation in ("five_cells", "six_cells") else 40):  # large tables
+    for seed in range(32 if observations.get(observation).n_states < 1000 else 12):
         drawn = random_colony(
             seed,
             sharing=sharing,
