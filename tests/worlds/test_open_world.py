@@ -155,7 +155,7 @@ def test_a_world_without_reachable_food_is_drawn_again(monkeypatch: pytest.Monke
     world = open_world(0, (20, 20, 20))
     assert attempts == [0, 1, 2]
     assert world == draw(world.grid, 0.15, 0.03, 3, 0, 2)
-    assert world != draw(world.grid, 0.15, 0.03, 0, 0)
+    assert world != draw(world.grid, 0.15, 0.03, 3, 0, 0)
 
 
 @pytest.mark.parametrize("ranges", [(1, 1, 1), (3, 3, 1), (4, 4, 4)])

@@ -80,9 +80,8 @@ def test_names_go_before_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 @pytest.mark.parametrize("name", ["papr", "", "Paper", None, 4, "x" * 5000, "a\0b"])
 def test_unknown_names_list_the_known_ones(name: object) -> None:
-    with pytest.raises(
-        AntsError, match=r"choose one of double_bridge, far_piles, open, paper|must be text or a path"
-    ):
+    known = r"choose one of double_bridge, far_piles, open, paper|must be text or a path"
+    with pytest.raises(AntsError, match=known):
         worlds.build(name)
 
 
