@@ -17,15 +17,16 @@ from taichi_ants.studies.command_line import Parser, run_command
 ROOT = Path(__file__).parents[1]
 _MAP = str(ROOT / "experiments" / "maps" / "garden.txt")
 
+# That of the study's median seed: 64 ants that queue, trained together in worlds of far piles.
+_POLICY = str(ROOT / "experiments" / "policies" / "far_piles.npz")
 _COLONY = [
-    *("colony", "--world", "open", "--world-seed", "3", "--seed", "1"),
-    *("--learning-rate", "0.01", "--epsilon", "0.05"),
-    *("--title", "a colony that learned together"),
+    *("colony", "--policy", _POLICY, "--world", "far_piles", "--world-seed", "3", "--ants", "64"),
+    *("--epsilon", "0.01", "--title", "a colony that learned together"),
 ]
 GALLERY: dict[str, list[str]] = {
-    "still.png": [*_COLONY, "--ticks", "400", "--every", "400", "--size", "1280x720"],
+    "still.png": [*_COLONY, "--ticks", "500", "--every", "500", "--size", "1280x720"],
     "colony.gif": [
-        *(*_COLONY, "--ticks", "300", "--every", "6", "--fps", "10"),
+        *(*_COLONY, "--ticks", "400", "--every", "8", "--fps", "10"),
         *("--size", "800x450"),
     ],
     "episode.gif": [
@@ -50,7 +51,10 @@ GALLERY: dict[str, list[str]] = {
 FIGURES = {
     "learning_curves.png": "compare/figures/learning_curves.png",
     "return_against_deliveries.png": "compare/figures/return_against_deliveries.png",
+    "colony_rules.png": "colony/figures/rules.png",
     "colony_scaling.png": "colony/figures/scaling.png",
+    "colony_training.png": "colony/figures/training.png",
+    "colony_elsewhere.png": "colony/figures/elsewhere.png",
 }
 
 

@@ -147,7 +147,7 @@ def show_episode(settings: argparse.Namespace, world: World) -> None:
     q_values, task, title = find_policy(settings, world)
     rules = {"seed": settings.seed, "max_steps": settings.max_steps, "epsilon": settings.epsilon}
     episode = Episode.play(world, q_values, task=task, **rules)
-    _save_moments(settings, episode.moments(), len(episode), title)
+    _save_moments(settings, episode.moments(), len(episode), title, task)
     outcome = "delivered" if episode.delivered else "not delivered"
     rewards = int(episode.trace.rewards.sum())
     print(f"{settings.out}: {count(len(episode.trace), 'step')}, return {rewards}, {outcome}")
@@ -168,7 +168,7 @@ def show_colony(settings: argparse.Namespace, world: World) -> None:
     colony = Colony(world, task, *who, sharing="fixed", q_values=q_values)
     colony.begin_episode()
     moments = colony_moments(colony, settings.ticks, settings.every)
-    _save_moments(settings, moments, 1 + -(-settings.ticks // settings.every), title)
+    _save_moments(settings, moments, 1 + -(-settings.ticks // settings.every), title, task)
     delivered = count(int(colony.outcome().deliveries.sum()), "delivery")
     ants, ticks = count(settings.ants, "ant"), count(colony.ticks, "tick")
     print(f"{settings.out}: {ants}, {ticks}, {delivered}")
@@ -251,13 +251,14 @@ def noted_stages(settings: argparse.Namespace, world: World) -> list[Stage]:
 
 
 def _save_moments(
-    settings: argparse.Namespace, moments: Iterable[Moment], n: int, title: str
+    settings: argparse.Namespace, moments: Iterable[Moment], n: int, title: str, task: Task
 ) -> None:
-    """Write n moments as an animation, or the last one as a picture."""
+    """Write n moments of a task as an animation, or the last one as a picture."""
     from taichi_ants.rendering import frames, save_picture
     from taichi_ants.rendering.writers import is_picture
 
     look: dict[str, Any] = {"size": settings.size, "title": title, "plain": settings.plain}
+    look["strongest"] = task.pheromone.level
     if is_picture(settings.out):
         (last,) = deque(moments, maxlen=1)
         save_picture(settings.out, next(frames([last], **look)))

@@ -10,7 +10,7 @@ from taichi_ants.rendering import colours, text
 from taichi_ants.rendering.marks import ants, cell
 from taichi_ants.rendering.observed import PAPER, Observation
 from taichi_ants.rendering.rasteriser import draw_marks
-from taichi_ants.task.constants import ACTION_NAMES, DEPOSIT_LEVEL, N_ACTIONS
+from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS
 
 # A cell by its letter, whether an ant on it carries food, a letter on it, and what it is called.
 _LEGEND = (
@@ -87,11 +87,12 @@ def _draw_bars(
 
 
 def draw_legend(
-    frame: np.ndarray, left: int, top: int, width: int, size: int, hexagon: float
+    frame: np.ndarray, left: int, top: int, width: int, size: int, hexagon: float, strongest: int
 ) -> None:
     """Draw what colours, shapes and letters mean, `LEGEND_HEIGHT` sizes of the text high.
 
-    `hexagon` is the size of the world's hexagons in pixels, on which the look of its ants depends.
+    `hexagon` is the size of the world's hexagons in pixels, on which the look of its ants depends,
+    `strongest` the trail level of the darkest colour.
     The rest is as in `draw_status`.
     """
     pitch, radius = round(1.55 * size), 0.82 * size
@@ -112,8 +113,8 @@ def draw_legend(
     frame[y : y + round(0.7 * size), left : left + width] = ramp
     y += round(1.75 * size)
     text.write(frame, "1", left, y, size, colours.FAINT_INK)
-    strongest = f"{DEPOSIT_LEVEL} and more"
-    text.write(frame, strongest, left + width, y, size, colours.FAINT_INK, align="right")
+    most = f"{strongest} and more"
+    text.write(frame, most, left + width, y, size, colours.FAINT_INK, align="right")
 
 
 def fill(

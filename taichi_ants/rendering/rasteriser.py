@@ -50,6 +50,7 @@ class Rasteriser:
         width, height: Of the pictures, in pixels.
         margin: Pixels to leave free at each side.
         beyond: Whether to leave room for the cells just beyond the border of the world.
+        strongest: The trail level of the darkest colour.
 
     Attributes:
         hexagon: Pixels from the centre of a cell to its corners.
@@ -62,8 +63,9 @@ class Rasteriser:
         height: int,
         margin: float = 0.0,
         beyond: bool = False,
+        strongest: int = DEPOSIT_LEVEL,
     ) -> None:
-        self.grid = grid
+        self.grid, self._strongest = grid, strongest
         self.width, self.height = width, height
         x_range, y_range, z_range = grid.ranges
         # The lowest and the highest (x, y), in sizes of a hexagon from the cell (0, 0, 0). By
@@ -136,7 +138,8 @@ class Rasteriser:
         of_ground[QUEEN] = colours.CELL_QUEEN if small else colours.FLOOR_QUEEN
         of_cells = of_ground[snapshot.ground & 15]
         marked = np.flatnonzero((snapshot.ground == EMPTY) & (snapshot.trail >= 1))
-        share = np.minimum(snapshot.trail[marked].astype(np.float32) / np.float32(DEPOSIT_LEVEL), 1)
+        levels = snapshot.trail[marked].astype(np.float32)
+        share = np.minimum(levels / np.float32(self._strongest), 1)
         of_cells[marked] = colours.TRAIL_RAMP[(share * 255 + 0.5).astype(np.int32)]
         of_cells[~self.grid.exists] = colours.PAGE
         return of_cells

@@ -12,7 +12,7 @@ from taichi_ants.rendering.observed import name_parts
 from taichi_ants.rendering.panel import Status
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.rendering.snapshot import Snapshot
-from taichi_ants.task.constants import FOOD, QUEEN
+from taichi_ants.task.constants import DEPOSIT_LEVEL, FOOD, QUEEN
 
 SMALLEST_SIDE, LARGEST_SIDE = 64, 4096
 DEFAULT_SIZE = (1280, 720)
@@ -44,6 +44,7 @@ class Scene:
         title: A line above the panel.
         plain: Whether to draw the world alone, without panel and marks.
         view: Whether to leave room for the cells in view beyond the border of the world.
+        strongest: The trail level, 1 or more, from which trails have the darkest colour.
 
     Raises:
         AntsError: An argument is of the wrong kind, or the size is not allowed.
@@ -57,11 +58,13 @@ class Scene:
         title: str = "",
         plain: bool = False,
         view: bool = False,
+        strongest: int = DEPOSIT_LEVEL,
     ) -> None:
         expect("grid", grid, AxialGrid)
         width, height = check_size(size)
         expect("title", title, str)
         view = checked_flag("view", view)
+        strongest = checked_whole("strongest", strongest)
         self._plain = checked_flag("plain", plain)
         letters = round(min(width, height) / 38)
         self._background = np.full((height, width, 3), colours.channels(colours.PAGE))
@@ -70,7 +73,7 @@ class Scene:
         room = width  # of the world, on the left
         if self._has_panel:
             room -= _PANEL_WIDTH * letters + margin
-        self._rasteriser = Rasteriser(grid, room, height, margin, view and not plain)
+        self._rasteriser = Rasteriser(grid, room, height, margin, view and not plain, strongest)
         if self._has_panel:
             column = width - margin - room
             bottom = height - margin - round(panel.LEGEND_HEIGHT * letters)
@@ -78,7 +81,7 @@ class Scene:
             top = margin + round(_TITLE_HEIGHT * letters) * bool(title)
             self._status_place = room, top, column, letters
             hexagon = self._rasteriser.hexagon
-            panel.draw_legend(self._background, room, bottom, column, letters, hexagon)
+            panel.draw_legend(self._background, room, bottom, column, letters, hexagon, strongest)
 
     def draw(self, snapshot: Snapshot, status: Status | None = None) -> np.ndarray:
         """A picture, uint8 (height, width, 3), of a world and of what is said of it.

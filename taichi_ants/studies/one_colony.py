@@ -49,16 +49,17 @@ def live(
     from taichi_ants.rendering import colony_moments, frames, save_animation, save_picture
     from taichi_ants.rendering.writers import is_picture
 
+    strongest = colony.task.pheromone.level
     animated = render is not None and not is_picture(render)
     passing = _pieces(colony, ticks, progress, stopped, every if animated else 0)
     try:
         if render and animated:
             moments = (moment for _ in chain([0], passing) for moment in colony_moments(colony))
-            save_animation(render, frames(moments), FRAMES_PER_SECOND)
+            save_animation(render, frames(moments, strongest=strongest), FRAMES_PER_SECOND)
         for _ in passing:
             pass
         if render and not animated:
-            save_picture(render, next(frames(colony_moments(colony))))
+            save_picture(render, next(frames(colony_moments(colony), strongest=strongest)))
     except (AntsError, OSError):
         # Pictures are drawn between ticks, so this one is whole, and may have taken hours.
         if save:

@@ -64,7 +64,7 @@ def training(rows: Rows) -> Figure | None:
 def elsewhere(rows: Rows) -> Figure | None:
     """What ants deliver in other worlds than those of their training."""
     designs = [Design(rules, ABROAD) for rules in (PAPER, ABC, QUEUES)]
-    return _dots(rows, designs, "In other worlds than those of the training")
+    return _dots(rows, designs, "Trained in open worlds, in others")
 
 
 def scaling(rows: Rows) -> Figure | None:
@@ -90,23 +90,26 @@ def _dots(rows: Rows, designs: Sequence[Design], title: str) -> Figure | None:
             panels.setdefault(row["arena"], {})[design] = row
     if not panels:
         return None
-    across = min(4, len(panels))
+    across = min(3, len(panels))
     down = -(-len(panels) // across)
+    alike = len({one.way for one in designs}) == 1  # then the title says it
+    names = [RULES[one.rules] if alike else one.words for one in designs]
     with style.styled():
         figure = style.new_figure(1.3 + down * (0.9 + 0.28 * len(designs)))
         axes = figure.subplots(down, across, sharey=True, squeeze=False)
         for axis, (arena, lines) in zip(axes.flat, panels.items(), strict=False):
-            axis.set_title(textwrap.fill(sentence(WORLDS[arena]), 96 // across), fontsize=9)
+            axis.set_title(textwrap.fill(sentence(WORLDS[arena]), 32), fontsize=9)
             for design, row in lines.items():
                 _dot(axis, designs.index(design), row)
             axis.set_xlim(left=0)
         axes[0, 0].set_ylim(len(designs) - 0.5, -0.7)
         for axis in axes[:, 0]:
-            axis.set_yticks(range(len(designs)), [one.words for one in designs])
+            axis.set_yticks(range(len(designs)), names)
         for axis in axes.flat[len(panels) :]:
             axis.set_axis_off()
-        largest = max(row["ants"] for lines in panels.values() for row in lines.values())
-        caption = f"{largest:g} ants. {_spread(rows)} Grey bar: no colony can deliver more."
+        ants = sorted({int(row["ants"]) for lines in panels.values() for row in lines.values()})
+        sizes = " or ".join(map(str, ants))
+        caption = f"{sizes} ants. {_spread(rows)} Grey bar: no colony can deliver more."
         style.frame(figure, f"{title}: {MEASURES['deliveries']}", caption, {})
     return figure
 

@@ -60,7 +60,7 @@ def test_a_line_shows_the_largest_colony_of_a_design(rows, draw, designs) -> Non
     for axis, arena in zip(figure.axes, ARENAS, strict=True):
         means = dots(axis)
         labels = [text.get_text() for text in figure.axes[0].get_yticklabels()]
-        assert labels == [design.words for design in designs]
+        assert labels == [RULES[design.rules] for design in designs]
         for place, design in enumerate(designs):
             *_, low = column(rows, "deliveries_ci_low", arena, *design)
             *_, mean = column(rows, "deliveries_mean", arena, *design)
