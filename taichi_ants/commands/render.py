@@ -73,6 +73,7 @@ _OPTIONS = {
     "--seed": ("ecls", "seed of training and of what is shown", _SEED),
     "--plugin": ("ecls", "a Python file with learners, worlds, observations", {"metavar": "FILE"}),
     "--ants": ("c", "how many", {**_COUNT, "default": 80}),
+    "--follow": ("c", "number of an ant whose view is shown", {**_SEED, "default": None}),
     "--max-steps": ("el", "step limit of the episode shown", _LENGTH),
     "--ticks": ("c", "length of an episode", _LENGTH),
     "--epsilon": ("ecl", "probability of a random action", {**_NUMBER, "default": 0.0}),
@@ -167,7 +168,7 @@ def show_colony(settings: argparse.Namespace, world: World) -> None:
     who = (config, settings.seed, settings.ants)
     colony = Colony(world, task, *who, sharing="fixed", q_values=q_values)
     colony.begin_episode()
-    moments = colony_moments(colony, settings.ticks, settings.every)
+    moments = colony_moments(colony, settings.ticks, settings.every, settings.follow)
     _save_moments(settings, moments, 1 + -(-settings.ticks // settings.every), title, task)
     delivered = count(int(colony.outcome().deliveries.sum()), "delivery")
     ants, ticks = count(settings.ants, "ant"), count(colony.ticks, "tick")

@@ -6,14 +6,16 @@ An episode is played by a colony of one ant, so what is drawn is what the engine
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from taichi_ants.engines.colony.colony import Colony
+from taichi_ants.engines.colony.layout import AntRow, Stage
+from taichi_ants.engines.looks import is_percept
 from taichi_ants.engines.runs.traces import Trace, rollout
-from taichi_ants.errors import checked_whole, expect
+from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.learners.config import TrainingConfig
@@ -125,13 +127,17 @@ class Episode:
         return Status(tuple(lines), state, self.q_values[state], action, q_range, observation)
 
 
-def colony_moments(colony: Colony, ticks: int = 0, every: int = 1) -> Iterator[Moment]:
+def colony_moments(
+    colony: Colony, ticks: int = 0, every: int = 1, follow: int | None = None
+) -> Iterator[Moment]:
     """The first world of a colony as it is now, then every few ticks while time passes.
 
     Args:
         colony: In an episode; it is moved on by `ticks`.
         ticks: How many; 0 gives the moment as it is. The last step is shorter if need be.
         every: Ticks from one moment to the next, at least 1.
+        follow: The number of an ant, from 0, whose view, state and action values are shown while
+            it lives; None: of no ant.
 
     Raises:
         AntsError: A number is not allowed, or no episode has begun.
@@ -139,18 +145,53 @@ def colony_moments(colony: Colony, ticks: int = 0, every: int = 1) -> Iterator[M
     expect("colony", colony, Colony)
     ticks = checked_whole("ticks", ticks, least=0)
     every = checked_whole("every", every)
-    yield _moment(colony)
+    if follow is not None:
+        follow = checked_whole("follow", follow, least=0)
+        if follow >= colony.ants and not colony.task.life.births:
+            raise AntsError(f"follow is {follow}; the {colony.ants} ants have numbers from 0.")
+    yield _moment(colony, follow)
     for done in range(0, ticks, every):
         colony.tick(min(every, ticks - done))
-        yield _moment(colony)
+        yield _moment(colony, follow)
 
 
-def _moment(colony: Colony) -> Moment:
-    snapshot = colony.snapshot()
-    numbers = {
-        "tick": colony.ticks,
-        "ants": len(snapshot.ant_cells),
-        "with food": snapshot.ant_carries.sum(),
-        "delivered": colony.outcome().deliveries[0, 0],
-    }
-    return snapshot, Status(tuple((name, str(number)) for name, number in numbers.items()))
+def _moment(colony: Colony, follow: int | None) -> Moment:
+    snapshot, outcome = colony.snapshot(), colony.outcome()
+    blocked = outcome.blocked[0, 0] / max(1, outcome.moves[0, 0])
+    lines = [
+        ("tick", str(colony.ticks)),
+        ("ants", str(len(snapshot.ant_cells))),
+        ("with food", str(snapshot.ant_carries.sum())),
+        ("delivered", str(outcome.deliveries[0, 0])),
+        ("moves blocked", f"{100 * blocked:.0f} %"),
+    ]
+    ants = colony.arrays["ants"][:, : colony.capacity]
+    (slots,) = np.nonzero(ants[AntRow.STAGE] == Stage.LIVING)  # those of the snapshot
+    followed = ants[AntRow.NUMBER, slots] == follow
+    if follow is None or not followed.any():
+        return snapshot, Status(tuple(lines))
+    # The one that is followed comes first, since pictures mark what the first one sees.
+    order = np.argsort(~followed, kind="stable")
+    snapshot = replace(
+        snapshot,
+        ant_cells=snapshot.ant_cells[order],
+        ant_headings=snapshot.ant_headings[order],
+        ant_carries=snapshot.ant_carries[order],
+    )
+    # There is no room for all lines.
+    lines = [lines[0], lines[3], ("ant", str(follow))]
+    return snapshot, _status_of(colony, int(slots[order[0]]), lines)
+
+
+def _status_of(colony: Colony, slot: int, lines: list[tuple[str, str]]) -> Status:
+    """The lines, then what the ant in a slot of the first world sees, and its action values."""
+    observation, table = colony.task.sees, colony.q_values[0]
+    row = AntRow.PERCEPT if is_percept(observation) else AntRow.STATE
+    state = int(colony.arrays["ants"][row, slot])
+    task, seen, _ = name_parts(observation, state)
+    lines += [("task", task), ("sees", seen)] if task else [("state", seen)]
+    lines += [("", observation.letters)] if observation.letters else []
+    low, high = min(float(table.min()), 0.0), max(float(table.max()), 0.0)
+    q_range = (low, high) if low < high else (0.0, 1.0)
+    q_values = (table[slot] if colony.one_a_slot else table)[state]
+    return Status(tuple(lines), state, q_values, None, q_range, observation)

@@ -10,6 +10,7 @@ from named_states import parse_state
 from PIL import Image
 
 from taichi_ants import AntsError, Colony, TrainingConfig, train
+from taichi_ants.engines.colony.layout import AntRow
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.rendering import (
     Episode,
@@ -25,7 +26,7 @@ from taichi_ants.rendering import (
 from taichi_ants.rendering.colours import CELL_FOOD, CHOSEN
 from taichi_ants.rendering.observed import PAPER
 from taichi_ants.rendering.sheet import clarity, learned, usual_spread
-from taichi_ants.task import Observation, Rewards, Task, observations
+from taichi_ants.task import Life, Observation, Rewards, Task, observations
 from taichi_ants.task.constants import ACTION_NAMES, PICK_UP, RIGHT
 from taichi_ants.task.states import REACHABLE_STATES
 from taichi_ants.worlds import open_world, paper
@@ -337,6 +338,30 @@ def test_a_colony_on_the_move() -> None:
     for wrong in ({"every": 0}, {"ticks": -1}):
         with pytest.raises(AntsError, match=next(iter(wrong))):
             list(colony_moments(colony(), **{"ticks": 5, **wrong}))
+
+
+@pytest.mark.parametrize("observation", ["paper", "ants"])
+def test_one_ant_of_a_colony_is_followed(observation) -> None:
+    """With its state and its action values; as without it once it is dead."""
+    table = random_policy(observation)
+    table += np.arange(table.shape[0])[:, None]
+    task = Task(observation, life=Life(lifespan=9))
+    made = Colony(open_world(3), task, CONFIG, 0, 20, sharing="fixed", q_values=table)
+    made.begin_episode()
+    for _ in range(8):
+        snapshot, status = next(colony_moments(made, follow=5))
+        slot = int(np.flatnonzero(made.arrays["ants"][AntRow.NUMBER, :20] == 5)[0])
+        assert snapshot.ant_cells[0] == made.arrays["ants"][AntRow.CELL, slot]
+        assert sorted(snapshot.ant_cells) == sorted(made.snapshot().ant_cells)
+        assert status.q_values[0] == status.state == table[status.state, 0]
+        assert ("ant", "5") in status.lines
+        assert ("sees", task.sees.name_of(status.state).split(" ", 1)[1]) in status.lines
+        made.tick()
+    made.tick()
+    _, status = next(colony_moments(made, follow=5))
+    assert status.state is None
+    with pytest.raises(AntsError, match="follow is 20; the 20 ants have numbers from 0"):
+        next(colony_moments(made, follow=20))
 
 
 def test_the_legend_of_learning_tells_the_rewards_of_the_task(monkeypatch) -> None:

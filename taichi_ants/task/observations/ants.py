@@ -30,4 +30,5 @@ ANTS = Observation(
     row,
     name_of=name_of_codes(3, "EOTFPA", "EOSQPA"),
     summary="the three cells ahead, ants with the other load told from rocks",
+    letters="P ant on a better cell, A not",
 )
