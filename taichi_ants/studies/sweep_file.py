@@ -25,7 +25,7 @@ else:
 
 KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
 _OF_FILE = ("kind", "seeds", "measures", "margin", "against", "vary")
-_PARTS = ("world", "task", "training", "after")  # of a point; they have settings of their own
+_PARTS = ("world", "task", "training", "after", "pool")  # of a point; not settings themselves
 _OF_LEARNERS = [field.name for field in fields(TrainingConfig) if field.name != "hyperparameters"]
 
 Settings = dict[str, Any]  # by their full names, as "task.pheromone.half_life"
@@ -163,6 +163,7 @@ def _point(kind: str, settings: Settings, seeds: tuple[int, ...], built: dict[st
     known = [
         *_own(kind),
         *flat({"task": Task().as_dict()}),
+        "task.traffic",  # by its name
         *(f"training.{name}" for name in [*_OF_LEARNERS, *(field.name for field in more)]),
     ]
     tree: dict[str, Any] = {"world": {}, "task": {}, "training": {}}
@@ -176,7 +177,7 @@ def _point(kind: str, settings: Settings, seeds: tuple[int, ...], built: dict[st
             branch = branch.setdefault(part, {})
         branch[last] = value
     world, task, training = (tree.pop(part) for part in _PARTS[:3])
-    for name in _OF_LEARNERS[:-1]:  # the minimum of epsilon has a usual value
+    for name in _OF_LEARNERS[:5]:  # the others have usual values
         if name not in training:
             raise AntsError(f"training.{name} is missing; write it, fixed or in [vary].")
     key = repr(sorted(world.items()))

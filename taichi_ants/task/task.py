@@ -96,7 +96,7 @@ class Task:
         """
         given = dict(_known("a task", cls, facts))
         for name, kind in _PARTS.items():
-            if name in given:
+            if name in given and not (kind is Traffic and isinstance(given[name], str)):
                 given[name] = kind(**_known(name, kind, given[name]))
         return cls(**given)
 

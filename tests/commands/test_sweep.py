@@ -380,6 +380,15 @@ def test_a_preset_of_ones_own_and_its_settings_can_be_named(tmp_path, monkeypatc
     assert {point.world for point in points} == {line(0, 4), line(0, 6)}
 
 
+def test_traffic_has_names_and_learners_first_values(tmp_path):
+    grid = '[vary]\ntask.traffic = ["blocking", "following"]\ntraining.initial_value = [0, 10]\n'
+    more = "learning_rate = 0.1\nepsilon = 0.3\n"
+    (tmp_path / "a.toml").write_text(RUNS[: RUNS.index("[vary]")] + more + grid)
+    points = read_sweep(tmp_path / "a.toml", NAMES).study.points
+    found = [(point.task.traffic.follow, point.training.initial_value) for point in points]
+    assert found == [(False, 0), (False, 10), (True, 0), (True, 10)]
+
+
 @pytest.mark.parametrize("name", ["crowds", "learning_rates", "observations", "trails"])
 def test_the_examples_can_be_read(name):
     assert len(read_sweep(EXPERIMENTS / "sweeps" / f"{name}.toml", NAMES).settings) > 4

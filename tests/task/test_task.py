@@ -11,7 +11,7 @@ import pytest
 from random_rewards import random_rewards
 
 from taichi_ants.errors import AntsError
-from taichi_ants.task import Life, Pheromone, Rewards, Task, observations
+from taichi_ants.task import Life, Pheromone, Rewards, Task, Traffic, observations
 from taichi_ants.task.observations import Observation, registry
 
 
@@ -45,6 +45,7 @@ def test_a_task_can_be_written_as_json():
     ):
         assert Task.from_dict(json.loads(json.dumps(task.as_dict()))) == task
     assert Task.from_dict({"rewards": {"give": 5}}) == Task(rewards=Rewards(give=5))
+    assert Task.from_dict({"traffic": "following"}) == Task(traffic=Traffic.named("following"))
 
 
 @pytest.mark.parametrize(
