@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ import numpy.typing as npt
 
 from taichi_ants.errors import AntsError, shown
 from taichi_ants.files import PathLike, read_npz, to_json, write_npz
-from taichi_ants.task import observations
+from taichi_ants.task import Task, observations
 from taichi_ants.task.constants import (
     FORWARD,
     GIVE,
@@ -46,6 +47,16 @@ class Policy(NamedTuple):
     q_values: ActionValues
     observation: str
     metadata: dict[str, Any]
+
+    @property
+    def task(self) -> Task:
+        """The rules for which it was made, as its metadata say; the paper's if they do not.
+
+        Raises:
+            AntsError: The metadata name other rules than there are.
+        """
+        task = Task.from_dict(self.metadata.get("task", {}))
+        return replace(task, observation=self.observation)
 
 
 def random_policy(observation: str = "paper") -> ActionValues:
