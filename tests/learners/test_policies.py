@@ -13,7 +13,7 @@ from plain_runs import rollout
 
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.policies import load_policy, random_policy, save_policy, trail_follower
-from taichi_ants.task import Task, observations
+from taichi_ants.task import Task, foraging, observations
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, N_STATES, PICK_UP, RIGHT
 from taichi_ants.worlds.open_world import open_world
 from taichi_ants.worlds.paper import paper
@@ -125,6 +125,22 @@ def test_a_policy_of_any_observation_comes_back_with_its_name(
     policy = load_policy(tmp_path / "policy.npz")
     assert policy.observation == observation
     np.testing.assert_array_equal(policy.q_values, q_values)
+
+
+def task_of(path, metadata, observation="ants"):
+    save_policy(path, random_policy(observation), metadata, observation)
+    return load_policy(path).task
+
+
+def test_a_policy_knows_the_rules_for_which_it_was_made(tmp_path: Path) -> None:
+    path = tmp_path / "policy.npz"
+    assert task_of(path, {"task": foraging().as_dict()}) == foraging()
+    assert task_of(path, {}) == Task("ants")
+    # The rows of its table are those of its observation, whatever else its metadata say.
+    assert task_of(path, {"task": Task().as_dict()}) == Task("ants")
+    for wrong in ({"smell": 1}, 3):
+        with pytest.raises(AntsError):
+            task_of(path, {"task": wrong})
 
 
 def test_a_policy_of_an_observation_that_nobody_registered_is_refused(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from taichi_ants.files import PathLike, write_csv
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MOST_SPANS = 100
+MOST_SPANS = 60
 COLUMNS = ("from_tick", "to_tick", "foods_per_tick", "blocked")
 Rates = Sequence[Mapping[str, float]]
 
