@@ -34,17 +34,20 @@ WORLDS = {
 # NetLogo's model Ants: in each tick 10 % of a trail evaporates and half of it spreads. An ant there
 # adds 60, and smells 0.05; here it smells 1.
 NETLOGO = Pheromone(
-    *("exponential", math.log(0.5) / math.log(0.9)),
-    **{"diffusion": 0.5, "deposit": "add", "level": 1200, "cap": 1_000_000, "view": "strongest"},
+    evaporation="exponential",
+    half_life=math.log(0.5) / math.log(0.9),
+    diffusion=0.5,
+    deposit="add",
+    level=1200,
+    cap=1_000_000,
+    view="strongest",
 )
 TASKS = {
     "paper": task.paper(),
     "foraging": task.foraging(),
     "queueing": task.queueing(),
     "netlogo": Task(pheromone=NETLOGO),
-    "netlogo, in queues": Task(
-        "queues", pheromone=NETLOGO, traffic="following", turns_at_queen=True
-    ),
+    "netlogo, in queues": replace(task.queueing(), pheromone=NETLOGO),
 }
 TICKS, EPISODES = 1000, 4
 
