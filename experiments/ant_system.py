@@ -13,7 +13,7 @@ import numpy as np
 
 from taichi_ants import worlds
 from taichi_ants.baselines.ant_system import METHODS, search
-from taichi_ants.studies.command_line import ListAction, Parser, run_command, whole_number
+from taichi_ants.studies.command_line import Parser, run_command, whole_number
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -21,7 +21,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     parser = Parser(__doc__.split("\n", 1)[0], epilog=__doc__.split("\n", 1)[1])
     add = parser.add_argument
     places = ("paper", "double_bridge")
-    add("--worlds", action=ListAction, default=places, metavar="WORLD", help="names or map files")
+    add("--worlds", nargs="+", default=places, metavar="WORLD", help="names or map files")
     add("--iterations", type=whole_number(1), default=500, metavar="N", help="of each colony")
     add("--ants", type=whole_number(1), default=32, metavar="N", help="of each colony")
     add("--colonies", type=whole_number(1), default=20, metavar="N", help="in each world")

@@ -3,7 +3,7 @@
 Those of `renders/` are made by `render.py`; the arguments below can be given to it by hand as well.
 Those of `docs/figures/` are those of the finished studies in `results/compare` and
 `results/colony`; a study that is not there is run first, which takes about one minute for the
-comparison and five for the colony on two cores.
+comparison and five for the colony on two cores. The one of a million ants takes a minute.
 """
 
 from __future__ import annotations
@@ -55,7 +55,13 @@ FIGURES = {
     "colony_scaling.png": "colony/figures/scaling.png",
     "colony_training.png": "colony/figures/training.png",
     "colony_elsewhere.png": "colony/figures/elsewhere.png",
+    "million.png": "million.png",
 }
+_QUEUEING = str(ROOT / "experiments" / "policies" / "queueing.npz")
+MILLION = [
+    *("live", "--policy", _QUEUEING, "--sharing", "fixed", "--epsilon", "0.01"),
+    *("--ants", "64", "--colonies", "15625", "--ranges", "30", "30", "30", "--ticks", "300"),
+]
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -77,7 +83,7 @@ def make_gallery(settings: argparse.Namespace) -> None:
 
 
 def make_figures(folder: Path) -> None:
-    """Keep some figures of the two studies in the docs; a study that is missing is run first.
+    """Keep figures of the two studies and of a million ants; a study that is missing is run first.
 
     They are kept in 256 colours, so that their history stays small.
     """
@@ -88,6 +94,7 @@ def make_figures(folder: Path) -> None:
     results = ROOT / "results"
     compare.compare(compare.parse_arguments(["--out", str(results / "compare")]))
     colony.study(colony.parse_arguments(["study", "--out", str(results / "colony")]))
+    colony.live(colony.parse_arguments([*MILLION, "--figure", str(results / "million.png")]))
     folder.mkdir(parents=True, exist_ok=True)
     for name, source in FIGURES.items():
         with Image.open(results / source) as image:

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Iterable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,8 +29,9 @@ from taichi_ants.studies.command_line import (
 from taichi_ants.studies.interruption import held
 
 if TYPE_CHECKING:
-    from taichi_ants import Colony
+    from taichi_ants import Colony, Task
     from taichi_ants.learners.config import TrainingConfig
+    from taichi_ants.learners.policies import Policy
     from taichi_ants.studies.colony_study import Plan
     from taichi_ants.studies.runner import Study
 
@@ -50,8 +53,14 @@ QUICK = {
 }
 EVALUATION_EPSILON = 0.01
 WIDTH = 100  # of the report, in columns
+COUNT: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
 CONDITIONS, FIGURES = "conditions.csv", "figures"
-_OF_RESUMED = ("resume", "ticks", "save", "render", "every", "plugin", "threads", "arch")
+_OF_RESUMED = ("resume", "ticks", "save", "render", "every", "figure", "plugin", "threads", "arch")
+_OF_LIFE = ("births", "lifespan", "regrowth", "wander")
+_OF_PHEROMONE = (
+    *("evaporation", "half_life", "diffusion"),
+    *("deposit", "level", "slope", "cap", "view"),
+)
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -108,10 +117,9 @@ def _add_study(parser: argparse.ArgumentParser) -> None:
 
 def _add_live(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    counts: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
-    add("--ants", **counts, default=80, help="how many start")
+    add("--ants", **COUNT, default=80, help="how many start")
     add("--ticks", type=whole_number(1, 10_000_000), default=1000, metavar="N", help="how long")
-    add("--colonies", **counts, default=1, help="side by side, by seed")
+    add("--colonies", **COUNT, default=1, help="side by side, by seed")
     add("--seed", type=whole_number(), default=0, metavar="N", help="the first of them")
     start = "of ants, by the queen or anywhere"
     add("--start", choices=("nest", "spread"), default="nest", help=start)
@@ -119,28 +127,47 @@ def _add_live(parser: argparse.ArgumentParser) -> None:
     add("--ranges", type=whole_number(1), nargs=3, metavar=("X", "Y", "Z"), help="of an open world")
     add("--sharing", choices=("shared", "own", "fixed"), default="shared", help="of tables")
     add("--policy", metavar="FILE", help="a policy file to start from (.npz)")
-    add("--observation", metavar="NAME", help="what ants see (default: the policy's, or paper)")
     _add_learning(parser, 0.1)
-    add = parser.add_argument_group("what comes and goes").add_argument
-    add("--births", action="store_true", help="the queen turns food into ants")
-    add("--capacity", **counts, help="most ants at once, with births")
-    add("--lifespan", **counts, help="ticks after which an ant dies")
-    add("--regrowth", type=whole_number(0), metavar="N", help="ticks until taken food is back")
-    add("--wander", **counts, help="ticks until a pile of food moves")
-    add = parser.add_argument_group("pheromone").add_argument
-    add("--evaporation", choices=("linear", "exponential", "none"), help="(default: linear)")
-    add("--half-life", type=float, metavar="X", help="ticks; trails evaporate exponentially")
-    add("--diffusion", type=float, metavar="X", help="share of a trail that spreads per tick")
-    add("--deposit", choices=("set", "add", "none"), help="(default: set)")
-    add("--level", **counts, help="what a deposit sets or adds")
-    add("--cap", **counts, help="most that deposits add up to")
+    _add_rules(parser)
+    _add_pheromone(parser)
     add = parser.add_argument_group("files").add_argument
     add("--save", metavar="FILE", help="keep the colony at the end (.npz)")
     add("--resume", metavar="FILE", help="go on with a colony that was saved")
     picture = "a picture of the end (.png), or an animation (.gif, .mp4, a folder)"
     add("--render", metavar="PATH", help=picture)
-    add("--every", **counts, default=2, help="ticks a picture of an animation")
+    add("--every", **COUNT, default=2, help="ticks a picture of an animation")
+    figure = "foods delivered per tick over time, of all colonies together (.png and .csv)"
+    add("--figure", metavar="FILE.png", help=figure)
     add_common(parser)
+
+
+def _add_rules(parser: argparse.ArgumentParser) -> None:
+    which = "All rules are those of --task; without it those for which --policy was made; else the "
+    which += "paper's. The options below change single ones."
+    add = parser.add_argument_group("rules", which).add_argument
+    add("--task", choices=("paper", "foraging", "queueing"), help="rules that go together")
+    add("--observation", metavar="NAME", help="what ants see; with --policy always the policy's")
+    traffic = "who may enter a cell with an ant on it"
+    add("--traffic", choices=("blocking", "right_of_way", "following"), help=traffic)
+    add = parser.add_argument_group("what comes and goes").add_argument
+    add("--births", action="store_true", help="the queen turns food into ants")
+    add("--capacity", **COUNT, help="most ants at once, with births")
+    add("--lifespan", **COUNT, help="ticks after which an ant dies")
+    add("--regrowth", type=whole_number(0), metavar="N", help="ticks until taken food is back")
+    add("--wander", **COUNT, help="ticks until a pile of food moves")
+
+
+def _add_pheromone(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument_group("pheromone").add_argument
+    add("--evaporation", choices=("linear", "exponential", "none"), help="how trails fall")
+    add("--half-life", type=float, metavar="X", help="ticks; trails evaporate exponentially")
+    add("--diffusion", type=float, metavar="X", help="share of a trail that spreads per tick")
+    add("--deposit", choices=("set", "add", "fading", "none"), help="how ants with food lay them")
+    add("--level", **COUNT, help="what a deposit sets or adds, or from which it fades")
+    add("--slope", **COUNT, help="how much a deposit fades per tick (default: 10)")
+    add("--cap", **COUNT, help="most that deposits add up to (default: 1000)")
+    views = ("half", "strongest", "strongest_under_carriers")
+    add("--view", choices=views, help="which trails ants without food see")
 
 
 def training_config(settings: argparse.Namespace, least: float) -> TrainingConfig:
@@ -210,7 +237,8 @@ def live(settings: argparse.Namespace) -> None:
     from taichi_ants import Colony
     from taichi_ants.studies.one_colony import check_places, live, summary
 
-    check_places(settings.save, settings.render)
+    files = settings.save, settings.render, settings.figure
+    check_places(*files)
     if settings.resume:
         colony = Colony.load(settings.resume, settings.threads, arch=settings.arch)
     else:
@@ -218,10 +246,9 @@ def live(settings: argparse.Namespace) -> None:
     begun, began = colony.ticks, time.perf_counter()
     with held() as stopped:
         with progress_bar("colony") as progress:
-            more = settings.save, settings.render, settings.every
-            live(colony, settings.ticks, progress, stopped, *more)
+            live(colony, settings.ticks, progress, stopped, *files, every=settings.every)
         print(summary(colony, colony.ticks - begun, time.perf_counter() - began))
-        for path in filter(None, (settings.save, settings.render)):
+        for path in filter(None, files):
             print(f"{path} is written.")
         if stopped():
             kept = f"; --resume {settings.save} goes on from there" if settings.save else ""
@@ -230,7 +257,7 @@ def live(settings: argparse.Namespace) -> None:
 
 def new_colony(settings: argparse.Namespace) -> Colony:
     """A colony at the start of its episode; deliveries do not end it, so updates look beyond."""
-    from taichi_ants import AntsError, Colony, Life, Pheromone, Task, load_policy, worlds
+    from taichi_ants import AntsError, Colony, load_policy, worlds
 
     if settings.ranges and settings.world != "open":
         raise AntsError(f"--ranges are those of an open world, not of {settings.world!r}.")
@@ -238,21 +265,10 @@ def new_colony(settings: argparse.Namespace) -> Colony:
         world = worlds.open_world(settings.seed, settings.ranges)
     else:
         world = worlds.build(settings.world, settings.seed)
-    names = ("evaporation", "half_life", "diffusion", "deposit", "level", "cap")
-    given = {name: getattr(settings, name) for name in names if getattr(settings, name) is not None}
-    if "half_life" in given:
-        given.setdefault("evaporation", "exponential")
     policy = load_policy(settings.policy) if settings.policy else None
-    task = Task(
-        policy.observation if policy else settings.observation or "paper",
-        pheromone=Pheromone(**given),
-        delivery="continuing",
-        evaporation_in_training=True,
-        life=Life(settings.births, settings.lifespan, settings.regrowth, settings.wander),
-    )
     colony = Colony(
         world,
-        task,
+        rules(settings, policy),
         training_config(settings, settings.epsilon),
         range(settings.seed, settings.seed + settings.colonies),
         ants=settings.ants,
@@ -265,6 +281,38 @@ def new_colony(settings: argparse.Namespace) -> Colony:
     )
     colony.begin_episode()
     return colony
+
+
+def rules(settings: argparse.Namespace, policy: Policy | None) -> Task:
+    """The task that is named, else the policy's, else the paper's; with what options change."""
+    from taichi_ants import Task, task
+
+    named = getattr(task, settings.task)() if settings.task else None
+    base = named or (policy.task if policy else Task())
+    of_trails = _given(settings, _OF_PHEROMONE)
+    if "half_life" in of_trails:
+        of_trails.setdefault("evaporation", "exponential")
+    # Numbers that belong to another kind of evaporation or deposit go with it.
+    if "evaporation" in of_trails:
+        of_trails.setdefault("half_life", None)
+    if "deposit" in of_trails:
+        of_trails = {"slope": None, "cap": None, **of_trails}
+    seen = {"observation": policy.observation} if policy else _given(settings, ("observation",))
+    return replace(
+        base,
+        pheromone=replace(base.pheromone, **of_trails),
+        life=replace(base.life, **_given(settings, _OF_LIFE)),
+        delivery="continuing",
+        evaporation_in_training=True,
+        **_given(settings, ("traffic",)),
+        **seen,
+    )
+
+
+def _given(settings: argparse.Namespace, names: Iterable[str]) -> dict[str, Any]:
+    """Of some options those that are given; flags that are off are not."""
+    values = {name: getattr(settings, name) for name in names}
+    return {name: one for name, one in values.items() if one is not None and one is not False}
 
 
 def start(settings: argparse.Namespace) -> None:

@@ -8,28 +8,18 @@ a random choice, but no other probabilities.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from taichi_ants.errors import AntsError, shown
+from taichi_ants.errors import AntsError, check_one_of, shown
 from taichi_ants.files import PathLike, read_npz, to_json, write_npz
-from taichi_ants.task import observations
-from taichi_ants.task.constants import (
-    FORWARD,
-    GIVE,
-    LEFT,
-    N_ACTIONS,
-    N_STATES,
-    PICK_UP,
-    RIGHT,
-    SEES_EMPTY,
-    SEES_GOAL,
-    SEES_LURE,
-)
-from taichi_ants.task.states import State, state_from_index
+from taichi_ants.task import Task, observations
+from taichi_ants.task.constants import FORWARD, GIVE, LEFT, N_ACTIONS, PICK_UP, RIGHT
+from taichi_ants.task.states import TASK_NAMES
 
 ActionValues = npt.NDArray[np.float32]
 
@@ -47,44 +37,69 @@ class Policy(NamedTuple):
     observation: str
     metadata: dict[str, Any]
 
+    @property
+    def task(self) -> Task:
+        """The rules for which it was made, as its metadata say; the paper's if they do not.
+
+        Raises:
+            AntsError: The metadata name other rules than there are.
+        """
+        task = Task.from_dict(self.metadata.get("task", {}))
+        return replace(task, observation=self.observation)
+
 
 def random_policy(observation: str = "paper") -> ActionValues:
     """The policy that takes each of the five actions with equal probability, in every state."""
     return np.zeros((observations.get(observation).n_states, N_ACTIONS), np.float32)
 
 
-def trail_follower() -> ActionValues:
-    """A hand-written policy of the paper's observation that forages well.
+# Observations whose states the trail follower reads, by their letters.
+FOLLOWED = ("paper", "ants", "queues")
+
+
+def trail_follower(observation: str = "paper") -> ActionValues:
+    """A hand-written policy that forages well, of one of the observations in `FOLLOWED`.
 
     Values are 1 for the actions that it takes, 0 for the others.
 
-    Without food it picks up what it sees, follows a trail (straight on where it can), and
-    otherwise walks straight over open ground and turns at random beside anything that blocks.
-    With food it gives it to the queen, moves nearer to her, or wanders at random until a nearer
-    cell comes into view. In a dead end it turns left, which opens a way out after two turns.
+    Without food it picks up what it sees, follows a trail (straight on where it can), then an ant
+    that is worth following (P, p), and otherwise walks straight over open ground and turns at
+    random beside anything that blocks. With food it gives it to the queen, moves nearer to her,
+    then towards an ant on a nearer cell (P, p), or wanders at random until a nearer cell comes into
+    view. In a dead end it turns left, which opens a way out after two turns.
+
+    Raises:
+        AntsError: It does not know the observation.
     """
-    q_values = random_policy()
-    for index in range(N_STATES):
-        q_values[index, _choices(state_from_index(index))] = 1.0
+    check_one_of("observation", observation, FOLLOWED)
+    name_of, q_values = observations.get(observation).name_of, random_policy(observation)
+    for row, values in enumerate(q_values):
+        task, *view = name_of(row).split()
+        values[_choices(task == TASK_NAMES[1], view)] = 1.0
     return q_values
 
 
-def _choices(state: State) -> list[int]:
-    """The actions among which the trail follower chooses at random."""
-    moves = (LEFT, FORWARD, RIGHT)
-    if SEES_GOAL in state.view:
-        return [GIVE if state.carries else PICK_UP]
-    lured = [move for move in moves if state.view[move] == SEES_LURE]
-    if lured:
-        straight = FORWARD in lured and not state.carries
-        return [FORWARD] if straight else lured
-    empty = [move for move in moves if state.view[move] == SEES_EMPTY]
+def _choices(carries: bool, view: Sequence[str]) -> list[int]:
+    """The actions among which the trail follower chooses at random.
+
+    `view` has the letters of the cells in the order of the moves: left, forward, right.
+    """
+
+    def towards(letters: str) -> list[int]:
+        return [move for move in (LEFT, FORWARD, RIGHT) if view[move] in letters]
+
+    if towards("FQ"):
+        return [GIVE if carries else PICK_UP]
+    for better in (towards("TS"), towards("Pp")):
+        if better:
+            return [FORWARD] if FORWARD in better and not carries else better
+    empty = towards("E")
     if not empty:
         return [LEFT]
     # Straight on only in the open: along a wall it would run round the world forever. With food,
     # straight on would lead away from the queen, since no cell in view is nearer to her.
-    in_the_open = len(empty) == len(moves)
-    return [FORWARD] if in_the_open and not state.carries else empty
+    in_the_open = len(empty) == len(view)
+    return [FORWARD] if in_the_open and not carries else empty
 
 
 def save_policy(

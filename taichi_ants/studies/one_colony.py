@@ -9,6 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from taichi_ants import files
+from taichi_ants.analysis.colony import over_time
+from taichi_ants.analysis.colony.over_time import Moment
+from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.errors import AntsError, count
 
 if TYPE_CHECKING:
@@ -18,7 +21,7 @@ FRAMES_PER_SECOND = 12.0
 _PIECE_SECONDS = 0.2
 
 
-def check_places(save: str | None, render: str | None) -> None:
+def check_places(save: str | None, render: str | None, figure: str | None = None) -> None:
     """Make sure, before the work begins, that what `live` shall write can be written."""
     from taichi_ants.rendering.writers import check_animation, check_picture, is_picture
 
@@ -26,6 +29,8 @@ def check_places(save: str | None, render: str | None) -> None:
         check_picture(render)
     elif render:
         check_animation(render, FRAMES_PER_SECOND)
+    if figure:
+        check_picture(figure)
     if save:
         if Path(save).is_dir():
             raise AntsError(f"{save!r} is a folder; name a file to save to.")
@@ -39,27 +44,40 @@ def live(
     stopped: Callable[[], bool],
     save: str | None = None,
     render: str | None = None,
+    figure: str | None = None,
     every: int = 2,
 ) -> None:
     """Let time pass in a colony, then write its files; it ends early once `stopped()` is true.
 
     It is saved even if its picture (.png) or animation (.gif, .mp4, a folder) cannot be written. An
-    animation has a picture for `every` so many ticks.
+    animation has a picture for `every` so many ticks. A figure (.png) shows what was delivered over
+    time, and has its numbers beside it (.csv).
     """
     from taichi_ants.rendering import colony_moments, frames, save_animation, save_picture
     from taichi_ants.rendering.writers import is_picture
 
     strongest = colony.task.pheromone.level
     animated = render is not None and not is_picture(render)
-    passing = _pieces(colony, ticks, progress, stopped, every if animated else 0)
+    every = every if animated else 0
+    least = every or 1  # a span is a whole number of pictures
+    span = -(-ticks // (least * over_time.MOST_SPANS)) * least if figure else ticks
+    passing = _pieces(colony, ticks, progress, stopped, every, span)
+    moments = [_so_far(colony)]
+    if figure:
+        passing = _noted(passing, colony, span, moments)
     try:
         if render and animated:
-            moments = (moment for _ in chain([0], passing) for moment in colony_moments(colony))
-            save_animation(render, frames(moments, strongest=strongest), FRAMES_PER_SECOND)
+            shown = (moment for _ in chain([0], passing) for moment in colony_moments(colony))
+            save_animation(render, frames(shown, strongest=strongest), FRAMES_PER_SECOND)
         for _ in passing:
             pass
         if render and not animated:
             save_picture(render, next(frames(colony_moments(colony), strongest=strongest)))
+        if figure:
+            if moments[-1].tick < colony.ticks:  # stopped within a span, or the last one is shorter
+                moments.append(_so_far(colony))
+            who = _who(colony.ants * len(colony.seeds), colony)
+            over_time.save(over_time.rates(moments), who, figure)
     except (AntsError, OSError):
         # Pictures are drawn between ticks, so this one is whole, and may have taken hours.
         if save:
@@ -75,17 +93,40 @@ def _pieces(
     progress: Callable[[float], None],
     stopped: Callable[[], bool],
     every: int,
+    span: int,
 ) -> Iterator[int]:
-    """Move a colony on by pieces of `every` ticks, with 0 by short ones; yields after each."""
+    """Move a colony on by pieces of `every` ticks, with 0 by short ones; yields after each.
+
+    One also ends after every `span` ticks.
+    """
     begun, piece = colony.ticks, every or 1
     while colony.ticks < begun + ticks and not stopped():
         began = time.perf_counter()
-        colony.tick(min(piece, begun + ticks - colony.ticks))
+        passed = colony.ticks - begun
+        colony.tick(min(piece, ticks - passed, span - passed % span))
         if not every:
             short = time.perf_counter() - began < _PIECE_SECONDS
             piece = 2 * piece if short else max(1, piece // 2)
         yield colony.ticks
         progress((colony.ticks - begun) / ticks)
+
+
+def _noted(
+    passing: Iterator[int], colony: Colony, span: int, moments: list[Moment]
+) -> Iterator[int]:
+    """Let time pass, and note what has happened after every `span` ticks."""
+    begun = colony.ticks
+    for tick in passing:
+        if (tick - begun) % span == 0:
+            moments.append(_so_far(colony))
+        yield tick
+
+
+def _so_far(colony: Colony) -> Moment:
+    """What all colonies together have done in this episode."""
+    of_worlds = colony.arrays["worlds"]
+    rows = WorldRow.DELIVERIES, WorldRow.MOVES, WorldRow.BLOCKED
+    return Moment(colony.ticks, *(int(of_worlds[row].sum()) for row in rows))
 
 
 def summary(colony: Colony, ticks: int, seconds: float) -> str:
@@ -94,9 +135,13 @@ def summary(colony: Colony, ticks: int, seconds: float) -> str:
     blocked = 100 * outcome["blocked"] / max(1, outcome["moves"])
     changes = [count(outcome[f"{one}s"], one) for one in ("birth", "death") if outcome[f"{one}s"]]
     changes += [f"{outcome['regrown']} regrown"] if outcome["regrown"] else []
-    colonies = f" in {len(colony.seeds)} colonies" if len(colony.seeds) > 1 else ""
     return (
-        f"{count(outcome['living'], 'ant')}{colonies}, {count(ticks, 'tick')} in {seconds:.1f} s.\n"
+        f"{_who(outcome['living'], colony)}, {count(ticks, 'tick')} in {seconds:.1f} s.\n"
         f"{count(outcome['deliveries'], 'delivery')} by tick {colony.ticks}, "
         f"{', '.join([f'{blocked:.1f} % of the moves blocked', *changes])}."
     )
+
+
+def _who(ants: int, colony: Colony) -> str:
+    colonies = f" in {len(colony.seeds):,} colonies" if len(colony.seeds) > 1 else ""
+    return f"{ants:,} ant{'s' if ants != 1 else ''}{colonies}"

@@ -26,10 +26,11 @@ from command_lines import (
 )
 
 from taichi_ants import Colony, Life, Pheromone, Task, TrainingConfig, load_policy, worlds
+from taichi_ants.commands import colony as command
 from taichi_ants.engines.colony.layout import AntRow
 from taichi_ants.learners import registry
 from taichi_ants.learners.policies import save_policy
-from taichi_ants.task import foraging, queueing
+from taichi_ants.task import Traffic, foraging, paper, queueing
 
 SEEDS, EPISODES, TICKS, ROLLOUTS = (3, 4), 4, 80, 2
 SMALL = [
@@ -216,7 +217,13 @@ def test_stopped_and_killed_it_goes_on_to_the_same_results(finished, kernels, tm
         (["live", "--resume", "x", "--seed", 0], "--seed cannot change a colony that is resumed"),
         (["live", "--resume", "x", "--learner", "sarsa"], "--learner cannot change a colony"),
         (["live", "--resume", "x", "--births"], "--births cannot change a colony"),
+        (["live", "--resume", "x", "--task", "paper"], "--task cannot change a colony that is"),
         (["live", "--cap", 5], "cap is 5, but deposit is 'set'"),
+        (["live", "--slope", 5], "slope is 5, but deposit is 'set'"),
+        (["live", "--task", "foraging", "--cap", 5], "cap is 5, but deposit is 'fading'"),
+        (["live", "--task", "running"], "invalid choice: 'running'"),
+        (["live", "--figure", "a.gif"], "'a.gif' is to hold one picture"),
+        (["live", "--figure", "/proc/x/a.png"], "cannot write to the folder '/proc"),
         (["live", "--resume", "x"], "cannot read 'x'"),
         (["study", "--arenas", "moon"], "the arena is 'moon'"),
         (["study", "--sizes", "300", "8", "--arenas", "paper"], "300 ants are asked for"),
@@ -350,9 +357,102 @@ def test_stopped_a_colony_is_saved_at_a_whole_tick(sent, status, kernels, tmp_pa
 
 
 def test_a_colony_starts_from_a_policy(finished, capsys):
-    policy = finished[1] / "policies" / "paper_alone.npz"
+    policy = finished[1] / "policies" / "paper_foraging_3.npz"
     fixed = ["live", "--ants", 2, "--world", "paper", "--ticks", 60, "--sharing", "fixed"]
     assert call("colony", [*fixed, "--policy", policy, "--regrowth", 0], capsys)[0] == 0
+
+
+LASTING = {"delivery": "continuing", "evaporation_in_training": True}
+FOOD_IS_BACK = replace(queueing(), life=Life(regrowth=0))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "made_for", "expected"),
+    [
+        ([], None, paper()),
+        (["--task", "queueing"], None, queueing()),
+        ([], FOOD_IS_BACK, FOOD_IS_BACK),
+        (["--task", "queueing"], FOOD_IS_BACK, queueing()),
+        (["--task", "foraging"], queueing(), replace(foraging(), observation="queues")),
+        (["--regrowth", 0, "--births"], queueing(), replace(queueing(), life=Life(True, None, 0))),
+        (["--lifespan", 9], FOOD_IS_BACK, replace(queueing(), life=Life(False, 9, 0))),
+        (["--traffic", "right_of_way"], None, Task(traffic=Traffic(swap=True))),
+        (
+            ["--task", "foraging", "--observation", "paper", "--traffic", "blocking"],
+            None,
+            Task(pheromone=Pheromone(deposit="fading", level=500, view="strongest")),
+        ),
+        (
+            ["--deposit", "fading", "--slope", 7, "--view", "strongest", "--level", 90],
+            None,
+            Task(pheromone=Pheromone(deposit="fading", slope=7, view="strongest", level=90)),
+        ),
+        (
+            ["--task", "foraging", "--deposit", "add", "--half-life", 20],
+            None,
+            replace(
+                foraging(),
+                pheromone=Pheromone("exponential", 20, deposit="add", level=500, view="strongest"),
+            ),
+        ),
+        (
+            ["--evaporation", "linear"],
+            replace(paper(), pheromone=Pheromone("exponential", 20)),
+            paper(),
+        ),
+    ],
+)
+def test_rules_are_those_named_else_the_policys_else_the_papers(
+    arguments, made_for, expected, tmp_path
+):
+    policy = None
+    if made_for:
+        table = np.zeros((made_for.n_states, 5))
+        facts = {"task": made_for.as_dict()}
+        save_policy(tmp_path / "a.npz", table, facts, made_for.observation)
+        policy = load_policy(tmp_path / "a.npz")
+    settings = command.parse_arguments(["live", *map(str, arguments)])
+    assert command.rules(settings, policy) == replace(expected, **LASTING)
+
+
+def test_a_figure_shows_what_all_colonies_deliver_by_tick(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    policy = EXPERIMENTS / "policies" / "queueing.npz"
+    fixed = ["--policy", policy, "--sharing", "fixed", "--epsilon", 0.01, "--ants", 16]
+    where = ["--ranges", 15, 15, 15, "--colonies", 2, "--seed", 3]
+    more = ["--ticks", 230, "--figure", "a.png", "--render", "a.gif", "--every", 4]
+    status, out, err = call("colony", ["live", *fixed, *where, *more], capsys)
+    assert (status, err) == (0, "")
+    assert "a.png is written" in out
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv", "a.gif", "a.png"]
+    with open("a.csv", newline="") as file:
+        rows = [{name: float(text) for name, text in row.items()} for row in csv.DictReader(file)]
+    world, q = worlds.open_world(3, (15, 15, 15)), load_policy(policy)
+    colony = Colony(world, q.task, CALM, (3, 4), 16, sharing="fixed", q_values=q.q_values)
+    colony.begin_episode()
+    before = colony.outcome()
+    # Spans are whole pictures, at most sixty of them; the last one is shorter.
+    assert [row["to_tick"] for row in rows] == [*range(4, 229, 4), 230]
+    for row in rows:
+        colony.tick(int(row["to_tick"] - row["from_tick"]))
+        after = colony.outcome()
+        foods, moves, blocked = (
+            (getattr(after, name) - getattr(before, name)).sum()
+            for name in ("deliveries", "moves", "blocked")
+        )
+        assert row["foods_per_tick"] == foods / (row["to_tick"] - row["from_tick"])
+        assert row["blocked"] == blocked / moves
+        before = after
+    assert before.deliveries.sum() > 100
+
+
+@pytest.mark.parametrize(("name", "observation"), [("foraging", "ants"), ("queueing", "queues")])
+def test_policies_are_kept_for_colonies_that_learn_nothing(name, observation):
+    path = EXPERIMENTS / "policies" / f"{name}.npz"
+    policy = load_policy(path)
+    assert policy.task.observation == policy.observation == observation
+    assert policy.task.life == Life(regrowth=0)
+    assert path.stat().st_size < 12_000
 
 
 @pytest.mark.parametrize("from_file", [True, False])

@@ -8,20 +8,22 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from named_states import parse_state
 from plain_runs import rollout
 
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.policies import load_policy, random_policy, save_policy, trail_follower
-from taichi_ants.task import Task, observations
-from taichi_ants.task.constants import FORWARD, GIVE, LEFT, N_STATES, PICK_UP, RIGHT
+from taichi_ants.task import Task, foraging, observations
+from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT
 from taichi_ants.worlds.open_world import open_world
 from taichi_ants.worlds.paper import paper
 
+MOVES = {LEFT, FORWARD, RIGHT}
 
-def best_actions(q_values: np.ndarray, name: str) -> set[int]:
-    row = q_values[parse_state(name)]
-    return set(np.flatnonzero(row == row.max()).tolist())
+
+def best_actions(q_values: np.ndarray, name: str, observation: str = "paper") -> set[int]:
+    sees = observations.get(observation)
+    (row,) = (row for row in range(sees.n_states) if sees.name_of(row) == name)
+    return set(np.flatnonzero(q_values[row] == q_values[row].max()).tolist())
 
 
 def test_the_random_policy_makes_no_difference_between_actions() -> None:
@@ -56,18 +58,74 @@ def test_what_the_trail_follower_does(name: str, actions: set[int]) -> None:
     assert best_actions(trail_follower(), name) == actions
 
 
-def test_the_trail_follower_only_does_what_succeeds_except_in_a_dead_end() -> None:
-    policy = trail_follower()
-    for index in range(N_STATES):
-        carries, codes = index >= 64, (index >> 4 & 3, index >> 2 & 3, index & 3)
-        for action in np.flatnonzero(policy[index]):
-            if codes == (1, 1, 1):
-                assert action == LEFT
-            elif action in (PICK_UP, GIVE):
-                assert 3 in codes
-                assert action == (GIVE if carries else PICK_UP)
-            else:
-                assert codes[action] in (0, 2)
+@pytest.mark.parametrize("observation", ["ants", "queues"])
+@pytest.mark.parametrize(
+    ("name", "actions"),
+    [
+        ("foraging F P T", {PICK_UP}),
+        ("foraging T P E", {LEFT}),
+        ("foraging E E P", {RIGHT}),
+        ("foraging P P P", {FORWARD}),
+        ("foraging P O P", {LEFT, RIGHT}),
+        ("foraging A E O", {FORWARD}),
+        ("foraging E A E", {LEFT, RIGHT}),
+        ("foraging A A O", {LEFT}),
+        ("carrying P Q A", {GIVE}),
+        ("carrying P S O", {FORWARD}),
+        ("carrying E P P", {FORWARD, RIGHT}),
+        ("carrying E A E", {LEFT, RIGHT}),
+        ("carrying A A A", {LEFT}),
+    ],
+)
+def test_what_the_trail_follower_does_about_ants(
+    observation: str, name: str, actions: set[int]
+) -> None:
+    assert best_actions(trail_follower(observation), name, observation) == actions
+
+
+@pytest.mark.parametrize(
+    ("name", "actions"),
+    [
+        ("foraging p E E", {LEFT}),
+        ("foraging p P A", {FORWARD}),
+        ("foraging T p p", {LEFT}),
+        ("carrying p P E", {LEFT, FORWARD}),
+        ("carrying A E p", {RIGHT}),
+        ("carrying p p S", {RIGHT}),
+    ],
+)
+def test_what_the_trail_follower_does_in_a_queue(name: str, actions: set[int]) -> None:
+    assert best_actions(trail_follower("queues"), name, "queues") == actions
+
+
+RANKS = {"T": 0, "S": 0, "P": 1, "p": 1, "E": 2, "O": 3, "A": 3}
+
+
+@pytest.mark.parametrize("observation", ["paper", "ants", "queues"])
+def test_in_each_state_the_trail_follower_goes_where_it_is_best(observation: str) -> None:
+    """Never towards what blocks, but in a dead end, where it turns left."""
+    policy, sees = trail_follower(observation), observations.get(observation)
+    assert policy.shape == (sees.n_states, 5)
+    for row, values in enumerate(policy):
+        assert set(values.tolist()) <= {0.0, 1.0}
+        actions = set(np.flatnonzero(values).tolist())
+        load, *view = sees.name_of(row).split()
+        if {"F", "Q"} & set(view):
+            assert actions == {GIVE if load == "carrying" else PICK_UP}
+        elif set(view) <= {"O", "A"}:
+            assert actions == {LEFT}
+        else:
+            ranks = [RANKS[letter] for letter in view]
+            best = {move for move in MOVES if ranks[move] == min(ranks)}
+            chosen = {FORWARD} if load == "foraging" and FORWARD in best else best
+            if min(ranks) == RANKS["E"] and len(best) < 3:  # beside what blocks
+                chosen = best
+            assert actions == chosen, sees.name_of(row)
+
+
+def test_the_trail_follower_of_another_observation_is_refused() -> None:
+    with pytest.raises(AntsError, match=r"observation is 'five_cells'; .*paper, ants"):
+        trail_follower("five_cells")
 
 
 @pytest.mark.parametrize("evaporation", [False, True])
@@ -125,6 +183,22 @@ def test_a_policy_of_any_observation_comes_back_with_its_name(
     policy = load_policy(tmp_path / "policy.npz")
     assert policy.observation == observation
     np.testing.assert_array_equal(policy.q_values, q_values)
+
+
+def task_of(path, metadata, observation="ants"):
+    save_policy(path, random_policy(observation), metadata, observation)
+    return load_policy(path).task
+
+
+def test_a_policy_knows_the_rules_for_which_it_was_made(tmp_path: Path) -> None:
+    path = tmp_path / "policy.npz"
+    assert task_of(path, {"task": foraging().as_dict()}) == foraging()
+    assert task_of(path, {}) == Task("ants")
+    # The rows of its table are those of its observation, whatever else its metadata say.
+    assert task_of(path, {"task": Task().as_dict()}) == Task("ants")
+    for wrong in ({"smell": 1}, 3):
+        with pytest.raises(AntsError):
+            task_of(path, {"task": wrong})
 
 
 def test_a_policy_of_an_observation_that_nobody_registered_is_refused(tmp_path: Path) -> None:

@@ -1,0 +1,39 @@
+"""Deliveries over time: rows, their file, and the figure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from taichi_ants.analysis.colony.over_time import Moment, draw, rates, save
+
+MOMENTS = [Moment(5, 10, 100, 50), Moment(7, 14, 300, 100), Moment(8, 14, 300, 100)]
+ROWS = [
+    {"from_tick": 5, "to_tick": 7, "foods_per_tick": 2.0, "blocked": 0.25},
+    {"from_tick": 7, "to_tick": 8, "foods_per_tick": 0.0, "blocked": 0.0},
+]
+
+
+def test_rates_are_means_over_spans_even_where_nobody_moves() -> None:
+    assert rates(MOMENTS) == ROWS
+    assert rates(MOMENTS[:1]) == []
+
+
+def test_the_figure_shows_its_rows() -> None:
+    upper, lower = draw(ROWS, "3 ants").axes
+    for axis, expected in ((upper, [2.0, 0.0]), (lower, [25.0, 0.0])):
+        steps = axis.patches[-1].get_data()
+        assert steps.values.tolist() == expected
+        assert np.array_equal(steps.edges, [5, 7, 8])
+    assert lower.get_xlim() == (5, 8)
+
+
+def test_both_files_are_written_even_of_no_time_at_all(tmp_path: Path) -> None:
+    save(ROWS, "3 ants", tmp_path / "a.b.png")
+    save([], "3 ants", tmp_path / "none.png")
+    lines = (tmp_path / "a.b.csv").read_text("utf-8").splitlines()
+    assert lines == ["from_tick,to_tick,foods_per_tick,blocked", "5,7,2.0,0.25", "7,8,0.0,0.0"]
+    for name in ("a.b.png", "none.png"):
+        assert Image.open(tmp_path / name).width == 1620
