@@ -25,5 +25,7 @@ register("paper", lambda seed: paper())
 register("open", open_world)
 register(
     "double_bridge",
-    lambda seed, short=23, long=36, mirrored=False: double_bridge(short, long, mirrored),
+    lambda seed, short=23, long=36, mirrored=False, aside=0: double_bridge(
+        short, long, mirrored, aside
+    ),
 )
