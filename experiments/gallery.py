@@ -1,9 +1,9 @@
 """Makes all pictures of the README and the docs anew: those of `renders/` and of `docs/figures/`.
 
 Those of `renders/` are made by `render.py`; the arguments below can be given to it by hand as well.
-Those of `docs/figures/` are those of the finished studies in `results/compare` and
-`results/colony`; a study that is not there is run first, which takes about one minute for the
-comparison and five for the colony on two cores.
+Those of `docs/figures/` are those of the finished studies in `results/compare`, `results/colony` and
+`results/bridge`; a study that is not there is run first, which takes about one minute for the
+comparison and five for each of the others on two cores.
 """
 
 from __future__ import annotations
@@ -51,6 +51,7 @@ FIGURES = {
     "learning_curves.png": "compare/figures/learning_curves.png",
     "return_against_deliveries.png": "compare/figures/return_against_deliveries.png",
     "colony_scaling.png": "colony/figures/scaling.png",
+    "bridge.png": "bridge/figures/bridge.png",
 }
 
 
@@ -73,17 +74,18 @@ def make_gallery(settings: argparse.Namespace) -> None:
 
 
 def make_figures(folder: Path) -> None:
-    """Keep some figures of the two studies in the docs; a study that is missing is run first.
+    """Keep some figures of the studies in the docs; a study that is missing is run first.
 
     They are kept in 256 colours, so that their history stays small.
     """
     from PIL import Image
 
-    from taichi_ants.commands import colony, compare
+    from taichi_ants.commands import bridge, colony, compare
 
     results = ROOT / "results"
     compare.compare(compare.parse_arguments(["--out", str(results / "compare")]))
     colony.study(colony.parse_arguments(["study", "--out", str(results / "colony")]))
+    bridge.bridge(bridge.parse_arguments(["--out", str(results / "bridge")]))
     folder.mkdir(parents=True, exist_ok=True)
     for name, source in FIGURES.items():
         with Image.open(results / source) as image:
