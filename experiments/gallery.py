@@ -1,8 +1,8 @@
 """Makes all pictures of the README and the docs anew: those of `renders/` and of `docs/figures/`.
 
 Those of `renders/` are made by `render.py`; the arguments below can be given to it by hand as well.
-Those of `docs/figures/` are those of the finished studies in `results/compare`, `results/colony` and
-`results/bridge`; a study that is not there is run first, which takes about one minute for the
+Those of `docs/figures/` are those of the finished studies in `results/compare`, `results/colony`
+and `results/bridge`; a study that is not there is run first, which takes about one minute for the
 comparison and five for each of the others on two cores.
 """
 

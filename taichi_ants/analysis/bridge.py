@@ -114,36 +114,37 @@ def draw(path: Path, found: Crossings, ticks: int) -> None:
             EQUAL: "Equal branches: the right one",
         }
         for axes, (bridge, title) in zip(above, titles.items(), strict=True):
-            _draw_time(axes, found[Design()][bridge], ticks)
+            _draw_time(axes, found, bridge, ticks)
             axes.set(title=title, xlabel="tick")
         for axes, name in zip(below, PANELS, strict=True):
             _draw_panel(axes, found, name)
         for axes in (above[0], below[0]):
-            axes.set(ylabel="% by the short branch", ylim=(0, 100))
+            axes.set(ylabel="% by the short branch", ylim=(0, 103))
         seeds = found[Design()][SHORT_RIGHT].shape[-1]
         caption = (
-            f"Means over {seeds} seeds with 95 % intervals. Above: 32 ants. Below: one setting "
-            "varies; second half, mean of both mirror images.\n"
-            "Evaporation: none, 1 a tick (linear), or a half-life in ticks."
+            f"Means over {seeds} seeds with 95 % intervals. Above: {Design().ants} ants. "
+            "Below, food aside: one setting varies; second half of the\ntime, mean of both mirror "
+            "images. Evaporation: none, 1 a tick (linear), or a half-life in ticks."
         )
-        title = "Ants without food and carriers on the short branch of a double bridge"
+        title = "Who crosses a double bridge by the short branch"
         style.frame(figure, title, caption, style.legend_entries(above))
     style.save(figure, path)
 
 
-def _draw_time(axes: Axes, crossed: np.ndarray, ticks: int) -> None:
-    shares = _shares(crossed)
+def _draw_time(axes: Axes, found: Crossings, bridge: str, ticks: int) -> None:
     middle = [(w + 0.5) * ticks / WINDOWS for w in range(WINDOWS)]
+    lines = {}
+    shown = {"": Design(), ", food ahead": Design(aside=0)}
+    if bridge == EQUAL:  # its food is never aside
+        del shown[", food ahead"]
+    for words, design in shown.items():
+        shares = _shares(found[design][bridge])
+        for k, load in enumerate(LOADS):
+            points = [(t, *_percent(_centre(shares[w, k]))) for w, t in enumerate(middle)]
+            lines[f"{load}{words}"] = points
     axes.axhline(50, color=style.GREY, linewidth=0.7, linestyle="dashed")
-    draw_lines(
-        axes,
-        {
-            load: [(t, *_percent(_centre(shares[w, k]))) for w, t in enumerate(middle)]
-            for k, load in enumerate(LOADS)
-        },
-    )
-    axes.set(xscale="linear", xlim=(0, ticks), xticks=np.linspace(0, ticks, 4))
-    axes.set_yscale("linear")
+    draw_lines(axes, lines)
+    axes.set(xlim=(0, ticks), xticks=np.linspace(0, ticks, 4))
 
 
 def _draw_panel(axes: Axes, found: Crossings, name: str) -> None:
@@ -152,10 +153,12 @@ def _draw_panel(axes: Axes, found: Crossings, name: str) -> None:
         bridges = found[replace(Design(), **{name: value})]
         both = np.mean([late_shares(bridges[one]) for one in (SHORT_RIGHT, SHORT_LEFT)], axis=0)
         for k, load in enumerate(LOADS):
-            lines[load].append((str(value), *_percent(_centre(both[k]))))
+            lines[load].append((value, *_percent(_centre(both[k]))))
     axes.axhline(50, color=style.GREY, linewidth=0.7, linestyle="dashed")
     draw_lines(axes, lines)
     axes.set(title=name.capitalize())
+    if name != "evaporation":
+        axes.set_xticks(PANELS[name])
 
 
 def _shares(crossed: np.ndarray) -> np.ndarray:
