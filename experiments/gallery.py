@@ -1,9 +1,9 @@
 """Makes all pictures of the README and the docs anew: those of `renders/` and of `docs/figures/`.
 
 Those of `renders/` are made by `render.py`; the arguments below can be given to it by hand as well.
-Those of `docs/figures/` are those of the finished studies in `results/compare` and
-`results/colony`; a study that is not there is run first, which takes about one minute for the
-comparison and five for the colony on two cores. The one of a million ants takes a minute.
+Those of `docs/figures/` are those of the finished studies in `results/compare`, `results/colony`
+and `results/bridge`; a study that is not there is run first, which takes about one minute for the
+comparison, six for the colony and five for the bridge on two cores. A million ants take another.
 """
 
 from __future__ import annotations
@@ -56,6 +56,7 @@ FIGURES = {
     "colony_training.png": "colony/figures/training.png",
     "colony_elsewhere.png": "colony/figures/elsewhere.png",
     "million.png": "million.png",
+    "bridge.png": "bridge/figures/bridge.png",
 }
 _QUEUEING = str(ROOT / "experiments" / "policies" / "queueing.npz")
 MILLION = [
@@ -83,18 +84,19 @@ def make_gallery(settings: argparse.Namespace) -> None:
 
 
 def make_figures(folder: Path) -> None:
-    """Keep figures of the two studies and of a million ants; a study that is missing is run first.
+    """Keep some figures of the studies, and of a million ants; a missing study is run first.
 
     They are kept in 256 colours, so that their history stays small.
     """
     from PIL import Image
 
-    from taichi_ants.commands import colony, compare
+    from taichi_ants.commands import bridge, colony, compare
 
     results = ROOT / "results"
     compare.compare(compare.parse_arguments(["--out", str(results / "compare")]))
     colony.study(colony.parse_arguments(["study", "--out", str(results / "colony")]))
     colony.live(colony.parse_arguments([*MILLION, "--figure", str(results / "million.png")]))
+    bridge.bridge(bridge.parse_arguments(["--out", str(results / "bridge")]))
     folder.mkdir(parents=True, exist_ok=True)
     for name, source in FIGURES.items():
         with Image.open(results / source) as image:

@@ -12,6 +12,7 @@ from taichi_ants.studies.interruption import stoppable
 COMMANDS = {  # modules beside this one, and what they do
     "compare": "the paper's comparison of learners, over many seeds",
     "colony": "the scaling study of the colony, or one colony of any size",
+    "bridge": "colonies on a double bridge, where the shorter branch wins",
     "sweep": "any settings against any measure, from a file",
     "render": "pictures of ants: an episode, a colony, learning, a policy",
 }

@@ -203,8 +203,7 @@ def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray,
     if settings.policy:
         policy = load_policy(settings.policy)
         title = settings.title or f"policy {Path(settings.policy).stem}"
-        task = Task.from_dict(policy.metadata.get("task", {"observation": policy.observation}))
-        return policy.q_values, task, title
+        return policy.q_values, policy.task, title
     config, seed, episodes = training_config(settings), settings.seed, settings.episodes
     title = settings.title or f"{settings.learner} after {count(episodes, 'episode')}"
     with progress_bar("Training") as progress:

@@ -90,7 +90,7 @@ def plan(
     """
     for arena in arenas:
         check_one_of("the arena", arena, tuple(WORLDS))
-    training = _scheduled(training, episodes)
+    training = scheduled(training, episodes)
     places = {
         arena: worlds.paper() if arena == "paper" else tuple(_place(arena, s) for s in seeds)
         for arena in dict.fromkeys([*arenas, OPEN])
@@ -150,7 +150,7 @@ def _pool(arena: str) -> tuple[World, ...] | None:
     return tuple(_place(arena, FIRST_OF_POOL + n) for n in range(POOL))
 
 
-def _scheduled(training: TrainingConfig, episodes: int) -> TrainingConfig:
+def scheduled(training: TrainingConfig, episodes: int) -> TrainingConfig:
     """The same with an epsilon and a learning rate that fall geometrically while ants explore."""
     exploring = max(1, round(EXPLORING * episodes))
     low = max(training.min_epsilon, 1e-6)

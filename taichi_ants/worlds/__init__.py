@@ -27,5 +27,7 @@ register("open", open_world)
 register("far_piles", far_piles)
 register(
     "double_bridge",
-    lambda seed, short=23, long=36, mirrored=False: double_bridge(short, long, mirrored),
+    lambda seed, short=23, long=36, mirrored=False, aside=0: double_bridge(
+        short, long, mirrored, aside
+    ),
 )

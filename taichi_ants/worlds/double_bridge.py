@@ -7,6 +7,9 @@ junctions that are D steps apart, k steps to the side, D - k ahead and k to the 
 steps. So the branches differ in k alone, both turn off by one heading at a junction, and where they
 are equally long the world is its own mirror image.
 
+The food and its junction can lie aside of that line, away from the short branch. Lengths and turns
+at the junctions stay, but a carrier at the food then has the nest on the side of the short branch.
+
 Corridors are two cells wide, so that ants that meet can pass. In a corridor of one cell they would
 stand in front of each other for ever, except where carriers have right of way. The second lane lies
 around the first, so that no way over it is shorter.
@@ -17,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from taichi_ants.errors import AntsError, checked_flag, checked_whole
-from taichi_ants.grid.hexgrid import AxialGrid
+from taichi_ants.grid.hexgrid import AxialGrid, normal_form
 from taichi_ants.worlds import geometry
 from taichi_ants.worlds.world import World
 
@@ -28,7 +31,7 @@ _NEST_JUNCTION = ROOM_RADIUS + 1  # its x coordinate; the queen is at the origin
 _BULGE = 3  # steps of the short branch to the side, if the long one leaves the choice
 
 
-def double_bridge(short: int = 23, long: int = 36, mirrored: bool = False) -> World:
+def double_bridge(short: int = 23, long: int = 36, mirrored: bool = False, aside: int = 0) -> World:
     """A short and a long branch between nest and food, walled by rocks.
 
     The queen is at the origin, in the middle of a room; the food is a pile in the middle of another
@@ -36,21 +39,23 @@ def double_bridge(short: int = 23, long: int = 36, mirrored: bool = False) -> Wo
 
     Args:
         short: Length of the shorter branch, in steps from junction to junction, 4 to 1000.
-        long: Length of the other one, from `short` to 2 * short - 3.
+        long: Length of the other one, from `short` to 2 * short - 3 - aside.
         mirrored: The short branch lies to the left of an ant that leaves the nest, not to the
             right.
+        aside: Steps by which the food and its junction lie to the side of the long branch. With 0
+            the first cells of both branches are as far from the queen as the food's junction; with
+            more, that of the short branch is nearer to her, that of the long one is not.
 
     Raises:
         AntsError: A length is not whole or not allowed, or mirrored is not True or False.
     """
-    apart = _apart(short, long)
-    queen, pile = (0, 0, 0), (2 * _NEST_JUNCTION + apart, 0, 0)
-    corridors = np.concatenate(
-        [*branch_cells(short, long, mirrored), *junction_cells(short, long)[:, None]]
-    )
-    # A cell of rock around all that can be walked.
-    widest = np.maximum(corridors.max(axis=0), ROOM_RADIUS) + 2
-    grid = AxialGrid((pile[0] + ROOM_RADIUS + 2, int(widest[1]), int(widest[2])))
+    junctions = junction_cells(short, long, mirrored, aside)
+    queen, pile = (0, 0, 0), tuple((junctions[1] + junctions[0]).tolist())
+    corridors = np.concatenate([*branch_cells(short, long, mirrored, aside), junctions])
+    # A cell of rock around all that can be walked. A bridge and its mirror image have equal ranges.
+    widest = np.maximum(corridors.max(axis=0), np.array(pile) + ROOM_RADIUS) + 2
+    widest[1:] = widest[1:].max()
+    grid = AxialGrid(tuple(widest.tolist()))
     to_pile = geometry.distances(grid, pile)
     walled = np.minimum(geometry.distances(grid, queen), to_pile) > ROOM_RADIUS
     walled[grid.index(corridors)] = False
@@ -62,47 +67,59 @@ def double_bridge(short: int = 23, long: int = 36, mirrored: bool = False) -> Wo
     )
 
 
-def junction_cells(short: int = 23, long: int = 36) -> np.ndarray:
+def junction_cells(
+    short: int = 23, long: int = 36, mirrored: bool = False, aside: int = 0
+) -> np.ndarray:
     """The junction at the nest and the one at the food, int64 (2, 3); arguments as the world's."""
-    apart = _apart(short, long)
-    return np.array([(_NEST_JUNCTION, 0, 0), (_NEST_JUNCTION + apart, 0, 0)])
+    ahead = _ahead(short, long, aside)
+    cells = np.array([(_NEST_JUNCTION, 0, 0), (_NEST_JUNCTION + ahead, -aside, 0)])
+    return _placed(cells, checked_flag("mirrored", mirrored))
 
 
 def branch_cells(
-    short: int = 23, long: int = 36, mirrored: bool = False
+    short: int = 23, long: int = 36, mirrored: bool = False, aside: int = 0
 ) -> tuple[np.ndarray, np.ndarray]:
     """The cells of the short and of the long branch, int64 (n, 3) each, junctions left out.
 
     With them, one can count who takes which branch. Arguments and errors are those of the world.
     """
-    apart = _apart(short, long)
-    right, left = (_corridor(length - apart, apart) for length in (short, long))
-    # In the mirror, y and z change places.
-    if checked_flag("mirrored", mirrored):
-        return right[:, [0, 2, 1]], left
-    return right, left[:, [0, 2, 1]]
+    ahead, mirrored = _ahead(short, long, aside), checked_flag("mirrored", mirrored)
+    right = _corridor(short - ahead - aside, ahead, -aside)
+    left = _corridor(long - ahead, ahead + aside, aside)
+    return _placed(right, mirrored), _placed(left, not mirrored)
 
 
-def _apart(short: int, long: int) -> int:
-    """Steps from junction to junction straight ahead, if there were no rocks."""
+def _ahead(short: int, long: int, aside: int) -> int:
+    """Steps ahead from junction to junction, on the way of the short branch."""
     checked_whole("short", short, MIN_STEPS, MAX_STEPS)
     checked_whole("long", long)
-    if not short <= long <= 2 * short - 3:
+    checked_whole("aside", aside, least=0, most=short - MIN_STEPS)
+    most = 2 * short - 3 - aside
+    if not short <= long <= most:
         raise AntsError(
-            f"long is {long} with short {short}; it must lie between short and {2 * short - 3}, "
-            "twice short less 3."
+            f"long is {long} with short {short} and aside {aside}; it must lie between short and "
+            f"{most}, twice short less 3 and aside."
         )
     # A branch that went as far to the side as ahead would have a corner that can be cut.
-    return max(short - _BULGE, long // 2 + 1)
+    return max(short - _BULGE - aside, (long - aside) // 2 + 1)
 
 
-def _corridor(side: int, apart: int) -> np.ndarray:
-    """The two lanes of a branch to the right that leads `side` steps to the side."""
+def _corridor(side: int, ahead: int, shift: int) -> np.ndarray:
+    """The two lanes of a branch to the right that leads `side` steps to the side.
+
+    The food's junction is `ahead` steps ahead of the one at the nest, and `shift` to the right.
+    """
     cells = []
     for outer in (0, 1):
-        start, end = _NEST_JUNCTION - outer, _NEST_JUNCTION + apart + outer
+        start, end = _NEST_JUNCTION - outer, _NEST_JUNCTION + ahead + outer
         widest = side + outer
         cells += [(start + y, y, 0) for y in range(1, widest)]
         cells += [(x, widest, 0) for x in range(start + widest, end + 1)]
-        cells += [(end, y, 0) for y in range(widest - 1, 0, -1)]
+        cells += [(end, y, 0) for y in range(widest - 1, shift, -1)]
     return np.array(cells)
+
+
+def _placed(cells: np.ndarray, mirrored: bool) -> np.ndarray:
+    """Cells in their normal form; in the mirror, y and z change places."""
+    cells = normal_form(cells)
+    return cells[:, [0, 2, 1]] if mirrored else cells

@@ -38,12 +38,16 @@ def mirrored(cells: Iterable[Cell]) -> set[Cell]:
     return {(x, z, y) for x, y, z in cells}
 
 
+# With steps by which the food lies aside.
+ASIDE = [*((*one, 0) for one in LENGTHS), (23, 36, 1), (23, 23, 1), (23, 40, 3), (10, 13, 4)]
+
+
 @pytest.mark.parametrize("flip", [False, True])
-@pytest.mark.parametrize(("short", "long"), LENGTHS)
-def test_branches_are_as_long_as_asked_for(short: int, long: int, flip: bool) -> None:
-    cells = walkable(double_bridge(short, long, flip))
-    nest, food = listed_cells(junction_cells(short, long))
-    branches = [set(listed_cells(branch)) for branch in branch_cells(short, long, flip)]
+@pytest.mark.parametrize(("short", "long", "aside"), ASIDE)
+def test_branches_are_as_long_as_asked_for(short: int, long: int, aside: int, flip: bool) -> None:
+    cells = walkable(double_bridge(short, long, flip, aside))
+    nest, food = listed_cells(junction_cells(short, long, flip, aside))
+    branches = [set(listed_cells(one)) for one in branch_cells(short, long, flip, aside)]
     assert branches[0] | branches[1] < cells
     assert not branches[0] & branches[1]
     for closed, length in zip(reversed(branches), (short, long), strict=True):
@@ -51,21 +55,22 @@ def test_branches_are_as_long_as_asked_for(short: int, long: int, flip: bool) ->
     assert food not in steps(cells - branches[0] - branches[1], nest)
 
 
-@pytest.mark.parametrize(("short", "long"), LENGTHS)
-def test_a_mirrored_bridge_is_the_mirror_image(short: int, long: int) -> None:
-    world, mirror = double_bridge(short, long), double_bridge(short, long, mirrored=True)
+@pytest.mark.parametrize(("short", "long", "aside"), ASIDE)
+def test_a_mirrored_bridge_is_the_mirror_image(short: int, long: int, aside: int) -> None:
+    world, mirror = (double_bridge(short, long, flip, aside) for flip in (False, True))
+    assert world.ranges == mirror.ranges
     assert walkable(mirror) == mirrored(walkable(world))
     assert set(listed_cells(mirror.foods)) == mirrored(listed_cells(world.foods))
     assert mirror.queen == world.queen == (0, 0, 0)
-    assert (world == mirror) == (short == long)
+    assert (world == mirror) == (short == long and not aside)
 
 
-@pytest.mark.parametrize(("short", "long"), LENGTHS)
-def test_ants_can_pass_each_other_everywhere(short: int, long: int) -> None:
+@pytest.mark.parametrize(("short", "long", "aside"), ASIDE)
+def test_ants_can_pass_each_other_everywhere(short: int, long: int, aside: int) -> None:
     """No cell but the junctions, taken for itself, is a place that all of a branch goes through."""
-    cells = walkable(double_bridge(short, long))
-    nest, food = listed_cells(junction_cells(short, long))
-    branches = [set(listed_cells(branch)) for branch in branch_cells(short, long)]
+    cells = walkable(double_bridge(short, long, aside=aside))
+    nest, food = listed_cells(junction_cells(short, long, aside=aside))
+    branches = [set(listed_cells(one)) for one in branch_cells(short, long, aside=aside)]
     for open_branch, closed in (branches, branches[::-1]):
         for blocked in open_branch:
             assert food in steps(cells - closed - {blocked}, nest)
@@ -91,6 +96,20 @@ def test_an_ant_at_a_junction_sees_the_same_on_both_sides() -> None:
         assert (bits >> (ahead + 1) % 6) & 1 == (bits >> (ahead - 1) % 6) & 1
 
 
+@pytest.mark.parametrize("flip", [False, True])
+def test_with_food_aside_the_short_branch_alone_leads_nearer_to_the_queen(flip: bool) -> None:
+    for aside in (1, 2, 3):
+        world = double_bridge(mirrored=flip, aside=aside)
+        _, food = listed_cells(junction_cells(mirrored=flip, aside=aside))
+        far, grid = world.distances(), world.grid
+        found = []
+        for branch in branch_cells(mirrored=flip, aside=aside):
+            cells = set(listed_cells(branch))
+            first = [one for one in (neighbour(food, h) for h in range(6)) if one in cells]
+            found.append(int(min(far[grid.index(one)] for one in first) - far[grid.index(food)]))
+        assert found == [-1, 0]
+
+
 def test_the_way_to_the_food_and_who_starts_where() -> None:
     world = double_bridge()
     assert world.reachable_foods().any()
@@ -108,9 +127,10 @@ def test_the_way_to_the_food_and_who_starts_where() -> None:
 
 
 def test_it_has_a_name_with_settings() -> None:
-    assert worlds.settings("double_bridge") == ("short", "long", "mirrored")
-    built = worlds.build("double_bridge", 7, short=10, long=13, mirrored=True)
-    assert built == double_bridge(10, 13, True)
+    with pytest.raises(AntsError, match="it has short, long, mirrored, aside"):
+        worlds.build("double_bridge", width=3)
+    built = worlds.build("double_bridge", 7, short=10, long=13, mirrored=True, aside=2)
+    assert built == double_bridge(10, 13, True, 2)
     assert worlds.build("double_bridge") == double_bridge()
     with pytest.raises(AntsError, match="--world-seed is for a world drawn at random"):
         worlds.check_seed_counts("double_bridge")
@@ -122,8 +142,10 @@ def test_it_has_a_name_with_settings() -> None:
         ({"short": 3, "long": 3}, "short is 3; it must lie between 4 and 1000"),
         ({"short": 23.0}, "short is 23.0; it must be a whole number"),
         ({"long": True}, "long is True; it must be a whole number"),
-        ({"long": 22}, "long is 22 with short 23; it must lie between short and 43"),
+        ({"long": 22}, "long is 22 with short 23 and aside 0; it must lie between short and 43"),
         ({"long": 44}, "long is 44 with short 23"),
+        ({"long": 43, "aside": 1}, "long is 43 with short 23 and aside 1"),
+        ({"aside": -1}, "aside is -1; it must lie between 0 and 19"),
         ({"mirrored": 1}, "mirrored is 1; it must be True or False"),
     ],
 )
@@ -134,6 +156,7 @@ def test_errors_name_what_is_wrong(given: dict, message: str) -> None:
 
 
 def test_cells_are_listed_once() -> None:
-    for length in LENGTHS:
-        cells = np.concatenate([*branch_cells(*length), junction_cells(*length)])
+    for short, long, aside in ASIDE:
+        where = {"short": short, "long": long, "aside": aside}
+        cells = np.concatenate([*branch_cells(**where), junction_cells(**where)])
         assert len(np.unique(cells, axis=0)) == len(cells)

@@ -1,0 +1,96 @@
+"""Colonies on a double bridge: does the shorter branch win?
+
+Colonies learn on a bridge with branches of 23 and 36 steps and are then followed on it, on its
+mirror image and on one with equal branches. The table says which share of the ants crosses by the
+short branch, without food and with it; counts and a figure go to a folder. See docs/bridge.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from taichi_ants.studies.command_line import (
+    Parser,
+    add_common,
+    add_results,
+    load_plugin,
+    progress_bar,
+    run_command,
+    whole_number,
+    with_folder,
+)
+
+if TYPE_CHECKING:
+    from taichi_ants.studies.runner import Study
+
+QUICK = {"seeds": 4, "episodes": 20, "ticks": 500, "evaluation_ticks": 1000}
+SHARES, FIGURE = "shares.csv", "figures/bridge.png"
+
+
+def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
+    """The settings of the command line."""
+    summary, more = __doc__.split("\n", 1)
+    parser = Parser(summary, epilog=more)
+    add = parser.add_argument
+    add("--seeds", type=whole_number(1, 1000), default=40, metavar="N", help="how many")
+    add("--seed", type=whole_number(), default=0, metavar="N", help="the first of them")
+    counts: dict[str, Any] = {"type": whole_number(1, 10_000_000), "metavar": "N"}
+    add("--episodes", **counts, default=60, help="of training")
+    add("--ticks", **counts, default=1000, help="of an episode of training")
+    add("--evaluation-ticks", **counts, default=3000, help="for which colonies are followed")
+    add("--quick", action="store_true", help="fewer seeds, episodes and ticks")
+    add_common(parser)
+    add_results(parser, "bridge")
+    settings, given = parser.parse_given(arguments)
+    for name in QUICK.keys() - given.keys() if settings.quick else ():
+        setattr(settings, name, QUICK[name])
+    return with_folder(settings, "bridge")
+
+
+def bridge(settings: argparse.Namespace) -> None:
+    """Do the study, or show the finished one."""
+    from taichi_ants.analysis.bridge import DESIGNS
+    from taichi_ants.studies.bridge import point
+    from taichi_ants.studies.result_folder import work_or_show
+    from taichi_ants.studies.runner import Study
+
+    if settings.plugin:
+        load_plugin(settings.plugin)
+    seeds = tuple(range(settings.seed, settings.seed + settings.seeds))
+    points = tuple(point(design, settings.episodes, settings.ticks) for design in DESIGNS)
+    study = Study(points, seeds)
+    facts = {**study.settings(), "evaluation_ticks": settings.evaluation_ticks}
+    work_or_show(settings, facts, partial(do_bridge, settings, study))
+
+
+def do_bridge(settings: argparse.Namespace, study: Study, blocks: Path, ready: Path) -> None:
+    """Do what is not done yet, and write all results."""
+    from taichi_ants import files
+    from taichi_ants.analysis import bridge as analysis
+    from taichi_ants.studies.bridge import followed
+    from taichi_ants.studies.result_folder import REPORT
+
+    ticks, found = settings.evaluation_ticks, {}
+    with progress_bar("bridge") as progress:
+        where = settings.threads, settings.arch
+        outcomes = study.run(blocks, *where, lambda share: progress(0.6 * share))
+        for number, (design, one) in enumerate(zip(analysis.DESIGNS, study.points, strict=True)):
+            tables = outcomes[one]["q_values"]
+            path = blocks / f"followed-{number:06d}.npz"
+            found[design] = followed(path, design, one, study.seeds, tables, ticks, where)
+            progress(0.6 + 0.4 * (number + 1) / len(analysis.DESIGNS))
+    rows = analysis.rows(found, study.seeds, ticks)
+    files.write_csv(ready / SHARES, rows, list(rows[0]))
+    files.write_text(ready / REPORT, analysis.report(found))
+    if not settings.no_figures:
+        files.check_writable_folder((ready / FIGURE).parent)
+        analysis.draw(ready / FIGURE, found, ticks)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """The command line."""
+    again = "Stopped; finished parts are kept, and the same command goes on from there."
+    run_command(lambda: bridge(parse_arguments(arguments)), again)

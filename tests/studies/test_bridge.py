@@ -1,0 +1,90 @@
+"""The study of the double bridge: how crossings are counted, and its designs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from taichi_ants.analysis.bridge import (
+    BRIDGES,
+    DESIGNS,
+    EQUAL,
+    SHORT_LEFT,
+    SHORT_RIGHT,
+    WINDOWS,
+    Design,
+)
+from taichi_ants.engines.colony.layout import AntRow
+from taichi_ants.studies.bridge import bridges, crossings, point, task
+from taichi_ants.worlds.double_bridge import branch_cells, double_bridge, junction_cells
+
+TICKS = 100
+BRIDGE = {"short": 10, "long": 13, "mirrored": True, "aside": 1}
+
+
+class Scripted:
+    """A colony of ants that stand where a script says: (place, load) of each ant by tick."""
+
+    def __init__(self, script: list[dict[int, tuple[str, int]]]) -> None:
+        grid, (nest, food) = double_bridge(**BRIDGE).grid, junction_cells(**BRIDGE)
+        short, long = (cells[len(cells) // 4] for cells in branch_cells(**BRIDGE))
+        places = {"nest": nest, "food": food, "short": short, "long": long}
+        self.cells = {name: int(grid.index(cell)) for name, cell in places.items()}
+        assert len(set(self.cells.values())) == 4
+        self.script, self.seeds, self.ticks = script, (7, 8), 0
+        self.capacity = len(script) // 2
+        self.arrays = {"ants": np.zeros((len(AntRow), len(script)), np.int32)}
+
+    def begin_episode(self, length: int) -> None:
+        self.ticks = 0
+        self._place()
+
+    def tick(self, n: int) -> None:
+        self.ticks += n
+        self._place()
+
+    def _place(self) -> None:
+        for ant, moments in enumerate(self.script):
+            name, load = moments[max(tick for tick in moments if tick <= self.ticks)]
+            self.arrays["ants"][AntRow.CELL, ant] = self.cells[name]
+            self.arrays["ants"][AntRow.CARRIES, ant] = load
+
+
+def test_an_ant_crosses_when_it_comes_to_the_other_room_by_its_last_branch() -> None:
+    there_and_back = {
+        **{0: ("nest", 0), 8: ("short", 0), 20: ("food", 0)},
+        **{40: ("long", 1), 60: ("short", 1), 72: ("long", 1), 80: ("nest", 1)},
+    }
+    turns_round = {0: ("nest", 0), 20: ("long", 0), 40: ("nest", 0), 60: ("long", 0)}
+    without_food = {0: ("nest", 0), 4: ("long", 0), 24: ("food", 0), 48: ("short", 0)}
+    without_food[88] = ("nest", 0)
+    with_food = {0: ("nest", 1), 8: ("short", 1), 20: ("food", 1), 48: ("short", 0)}
+    colony = Scripted([there_and_back, turns_round, without_food, with_food])
+    found = crossings(colony, BRIDGE, TICKS)
+    assert found.shape == (WINDOWS, 2, 2, 2)
+    # Window, load, branch, world: only useful crossings count.
+    counted = [tuple(one) for one in np.argwhere(found).tolist()]
+    assert counted == [(1, 0, 0, 0), (2, 0, 1, 1), (7, 1, 1, 0)]
+    assert found.sum() == 3
+
+
+def test_colonies_learn_where_the_short_branch_lies_on_either_side() -> None:
+    one = point(Design(), episodes=60, ticks=10)
+    assert one.pool == (double_bridge(aside=1), double_bridge(mirrored=True, aside=1))
+    drawn = np.array([[place is one.pool[0] for place in of] for of in one.places(range(20))])
+    assert 0.4 < drawn.mean() < 0.6
+    assert one.training.initial_value > 0
+    assert one.training.next_epsilon(one.training.epsilon) < one.training.epsilon
+
+
+def test_a_design_is_a_task_and_bridges() -> None:
+    assert len(set(DESIGNS)) == len(DESIGNS)
+    for design in DESIGNS:
+        rules = task(design)
+        assert rules.observation == {"queueing": "queues", "foraging": "ants"}[design.rules]
+        assert rules.pheromone.fades_after == 50
+        assert rules.life.regrowth == 0
+    assert task(Design(evaporation="20")).pheromone.half_life == 20
+    assert task(Design(evaporation="none")).pheromone.evaporation == "none"
+    assert tuple(bridges(Design())) == BRIDGES
+    assert tuple(bridges(Design(aside=0))) == (SHORT_RIGHT, SHORT_LEFT, EQUAL)
+    assert bridges(Design())[EQUAL].get("aside", 0) == 0
