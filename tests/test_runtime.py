@@ -143,6 +143,7 @@ assert same()
     python(BEGINNING + script, tmp_path, PYTHONWARNINGS="ignore")
 
 
+@pytest.mark.slow
 def test_a_loud_taichi_of_the_callers_is_no_louder_for_our_kernels(tmp_path):
     """And is as loud as before afterwards; `python` demands that nothing is on stderr."""
     script = """
@@ -213,6 +214,7 @@ except AntsError as error:
     python(BEGINNING + script, tmp_path)
 
 
+@pytest.mark.slow
 def test_all_goes_on_after_a_reset_of_the_callers(tmp_path):
     """With kernels, colonies and pictures made before; a colony goes on bit for bit."""
     script = """

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
 from command_lines import assert_one_sentence, run
 
 from taichi_ants import Colony, Life, TrainingConfig
@@ -39,6 +40,7 @@ def test_mistakes_end_in_a_sentence(kernels: Path, tmp_path: Path) -> None:
     assert "double_bridge" in done.stderr
 
 
+@pytest.mark.slow
 def test_fixed_rules_prints_a_row_for_each_world_and_task(kernels: Path, tmp_path: Path) -> None:
     arguments = ["--seeds", 2, "--ants", 3, "--epsilon", 0.05]
     done = run("fixed_rules", arguments, kernels, tmp_path)

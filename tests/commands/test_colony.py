@@ -59,6 +59,7 @@ def finished(tmp_path_factory, kernels):
     return done.stdout, place / "out"
 
 
+@pytest.mark.slow
 def test_all_files_are_there(finished):
     out, folder = finished
     assert set(contents(folder)) == FILES
@@ -89,6 +90,7 @@ def task(pheromone=Pheromone(), life=Life(regrowth=0)):  # noqa: B008 - both are
     return Task(pheromone=pheromone, delivery="continuing", evaporation_in_training=True, life=life)
 
 
+@pytest.mark.slow
 def test_the_numbers_are_those_of_the_library(finished):
     """Three ants that forage: copies of one in the paper's world, trained there."""
     _, folder = finished
@@ -101,6 +103,7 @@ def test_the_numbers_are_those_of_the_library(finished):
     assert_measured(folder, condition, colony.run(ROLLOUTS, TICKS))
 
 
+@pytest.mark.slow
 def test_ants_are_evaluated_in_worlds_that_they_have_not_seen(finished):
     """Three ants that queue, each episode in another open world of a pool, then in small ones."""
     _, folder = finished
@@ -133,6 +136,7 @@ def assert_measured(folder, condition, outcome):
         assert [float(row[name]) for row in rows] == pytest.approx(values.tolist())
 
 
+@pytest.mark.slow
 def test_policies_say_where_they_come_from(finished):
     _, folder = finished
     policy = load_policy(folder / "policies" / "paper_foraging_3.npz")
@@ -142,6 +146,7 @@ def test_policies_say_where_they_come_from(finished):
     assert metadata["seed"] in SEEDS
 
 
+@pytest.mark.slow
 def test_a_finished_study_is_shown_and_nothing_is_lost(finished, tmp_path, kernels):
     _, folder = finished
     before = contents(folder)
@@ -179,6 +184,7 @@ def stop_after_blocks(arguments, kernels, place, stop_signal, least):
     return process, complaint, time.perf_counter() - sent
 
 
+@pytest.mark.slow
 def test_stopped_and_killed_it_goes_on_to_the_same_results(finished, kernels, tmp_path):
     arguments, folder = [*SMALL, "--out", "out"], tmp_path / "out"
     process, complaint, seconds = stop_after_blocks(arguments, kernels, tmp_path, signal.SIGINT, 2)
@@ -334,7 +340,10 @@ def test_a_colony_as_the_library_makes_it(capsys, tmp_path, monkeypatch):
     assert f"{colony.outcome().deliveries.sum()} deliveries by tick 90" in out
 
 
-@pytest.mark.parametrize(("sent", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(
+    ("sent", "status"),
+    [(signal.SIGINT, 130), pytest.param(signal.SIGTERM, 143, marks=pytest.mark.slow)],
+)
 def test_stopped_a_colony_is_saved_at_a_whole_tick(sent, status, kernels, tmp_path, monkeypatch):
     arguments = ["live", "--ants", 60, "--world", "paper", "--ticks", 10_000_000, "--regrowth", 0]
     process = start("colony", [*arguments, "--save", "colony.npz"], kernels, tmp_path)
@@ -356,8 +365,8 @@ def test_stopped_a_colony_is_saved_at_a_whole_tick(sent, status, kernels, tmp_pa
     assert saved.outcome().deliveries == colony.outcome().deliveries
 
 
-def test_a_colony_starts_from_a_policy(finished, capsys):
-    policy = finished[1] / "policies" / "paper_foraging_3.npz"
+def test_a_colony_starts_from_a_policy(capsys):
+    policy = EXPERIMENTS / "policies" / "foraging.npz"
     fixed = ["live", "--ants", 2, "--world", "paper", "--ticks", 60, "--sharing", "fixed"]
     assert call("colony", [*fixed, "--policy", policy, "--regrowth", 0], capsys)[0] == 0
 

@@ -150,6 +150,7 @@ def test_an_interruption_of_the_pictures_keeps_the_runs(seconds, kernels, tmp_pa
     assert len(blocks_in(tmp_path / "out")) == 2 * 2
 
 
+@pytest.mark.slow
 def test_a_second_process_at_the_same_work_may_finish_it(kernels, tmp_path):
     arguments = [*MANY, "--out", "out"]
     process = start("compare", arguments, kernels, tmp_path)

@@ -220,7 +220,7 @@ def test_mistakes_are_one_sentence(tmp_path, policy, name) -> None:
     [
         ("a.gif", signal.SIGINT, 130),
         ("frames", signal.SIGINT, 130),
-        ("a.gif", signal.SIGTERM, 143),
+        pytest.param("a.gif", signal.SIGTERM, 143, marks=pytest.mark.slow),
     ],
 )
 def test_stopped_midway_it_leaves_nothing_behind(tmp_path, policy, name, sent, status) -> None:

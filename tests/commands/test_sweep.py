@@ -167,6 +167,7 @@ def test_a_finished_sweep_is_shown(sweep):
     assert "(task.rewards.lure, vary differ)" in err
 
 
+@pytest.mark.slow
 def test_stopped_and_killed_it_goes_on_to_the_same_results(kernels, tmp_path):
     long = COLONY.replace("episodes = 2", "episodes = 60")
     long = long.replace("[5, 10, 20]", "[5, 10, 20, 40, 80, 160, 320]")

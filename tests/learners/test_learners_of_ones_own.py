@@ -52,6 +52,8 @@ def in_a_colony(name="mine", sharing="shared"):
 
 
 ENGINES = (in_runs, in_a_colony)
+# What costs a kernel each is tried in one engine, and among the slow tests in the other.
+ONE_ENGINE = (in_runs, pytest.param(in_a_colony, marks=pytest.mark.slow))
 
 
 @ti.func
@@ -78,7 +80,7 @@ NATURAL = {
 }
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ONE_ENGINE)
 @pytest.mark.parametrize(("like", "td_error"), NATURAL.items())
 def test_what_is_natural_works(like, td_error, engine):
     """To the bit what the package's own learners do, which equal the reference."""
@@ -110,7 +112,7 @@ def of_its_own_value_kept_inside(value, reward, discount, next_values, next_acti
 
 
 @pytest.mark.filterwarnings("ignore:overflow encountered in exp")
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", ONE_ENGINE)
 def test_a_number_of_pythons_is_a_td_error(engine):
     register(td_learner("mine", of_zero))
     assert not engine().any()

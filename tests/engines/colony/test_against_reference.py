@@ -94,7 +94,12 @@ def assert_equal_records(colony: Colony, plain: ReferenceColony) -> None:
         assert colony.arrays["integers"][0] == len(plain.minds.tables[0].model)
 
 
-@pytest.mark.parametrize("kernel", KERNELS, ids=str)
+# With tables of their own, learners do what they do in independent runs, which are compared, too.
+SLOW = [one for one in KERNELS if one[1] == "own" and one[0] not in ("q_learning", "double_q")]
+MARKED = [pytest.param(one, marks=pytest.mark.slow) if one in SLOW else one for one in KERNELS]
+
+
+@pytest.mark.parametrize("kernel", MARKED, ids=str)
 def test_every_tick_in_crowded_micro_worlds(kernel):
     """Two episodes each: something goes on between them, in every other case in another world."""
     learner, sharing, observation, dense, *rules = kernel

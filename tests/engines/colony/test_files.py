@@ -110,7 +110,10 @@ def test_no_colony_at_all(tmp_path, content) -> None:
         Colony.load(path)
 
 
-@pytest.mark.parametrize("name", ["dyna_q", "double_q", "sarsa_lambda"])
+@pytest.mark.parametrize(
+    "name",
+    ["dyna_q", *(pytest.param(n, marks=pytest.mark.slow) for n in ("double_q", "sarsa_lambda"))],
+)
 def test_what_was_saved_goes_on_bit_for_bit(name, tmp_path) -> None:
     """At many moments of its life: a model, further tables, or traces are part of it."""
     one = random_colony(7, sharing="own", learner=name, observation="ants_seen")

@@ -43,7 +43,7 @@ def test_threads_and_schedules_give_the_same(monkeypatch):
     expected = history(threads=1)
     assert_same(expected, history(threads=1, schedule="by_chunk"))
     # Another number of threads starts Taichi anew.
-    for schedule in ("by_world", "by_chunk", "by_chunk"):
+    for schedule in ("by_world", "by_chunk"):
         assert_same(expected, history(threads=2, schedule=schedule))
 
 

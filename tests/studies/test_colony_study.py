@@ -1,0 +1,59 @@
+"""What the study of the colony plans; what comes out is tried as a command."""
+
+from __future__ import annotations
+
+import pytest
+
+from taichi_ants import AntsError, TrainingConfig, worlds
+from taichi_ants.analysis.colony.study import ARENAS, ELSEWHERES, Condition
+from taichi_ants.studies.colony_study import COMPARED, POOL, TASKS, plan
+
+SARSA = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 1.0, 0.01)
+SEEDS = (3, 4)
+
+
+@pytest.fixture(scope="module")
+def planned():
+    return plan([*ARENAS, *ELSEWHERES], (1, 4, 16, 64), SEEDS, SARSA, 60, 1000, 4)
+
+
+def test_every_design_has_its_conditions(planned) -> None:
+    jointly = [one for one in planned if one.way == "joint"]
+    assert len(jointly) == len(ARENAS) * len(TASKS) * 4
+    for way, sizes in (("alone", {4, 16, 64}), ("with_4", {16, 64}), ("with_16", {64})):
+        found = {
+            one.ants for one in planned if (one.arena, one.rules, one.way) == ("open", "paper", way)
+        }
+        assert found == sizes
+    abroad = {one.arena: one.ants for one in planned if one.way == "open"}
+    assert abroad.keys() == {"paper", "piles", *ELSEWHERES}
+    assert {arena for arena, ants in abroad.items() if ants != 64} == {"large"}
+    assert len(planned) == len(jointly) + len(ARENAS) * len(COMPARED) * 6 + len(abroad) * 3
+
+
+def test_nobody_is_evaluated_where_it_was_trained(planned) -> None:
+    for (arena, *_), point in planned.items():
+        teacher = point.after or point
+        if arena == "paper" and point.after is None:
+            assert point.pool is None
+            assert point.world == worlds.paper()
+        elif teacher.pool is not None:
+            assert len(set(teacher.pool)) == POOL
+            seen = point.world if isinstance(point.world, tuple) else (point.world,)
+            assert not set(seen) & set(teacher.pool)
+        places = teacher.places(SEEDS)
+        assert places is None or len(places) == 60
+
+
+def test_epsilon_and_learning_rate_fall_in_the_first_70_percent(planned) -> None:
+    training = planned[Condition("paper", "foraging", "joint", 64)].training
+    epsilon, rate = training.epsilon, training.learning_rate
+    for _ in range(42):
+        epsilon, rate = training.next_epsilon(epsilon), training.next_learning_rate(rate)
+    assert (epsilon, rate) == pytest.approx((0.01, 0.01))
+    assert training.next_epsilon(epsilon) == pytest.approx(0.01)
+
+
+def test_an_unknown_arena_is_named() -> None:
+    with pytest.raises(AntsError, match="the arena is 'moon'; it must be one of paper, open, pil"):
+        plan(["moon"], (1,), SEEDS, SARSA, 2, 10, 1)
