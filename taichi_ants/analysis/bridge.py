@@ -17,7 +17,7 @@ from taichi_ants.analysis.tables import Table, interval, number, plain_text
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-SHORT_RIGHT, SHORT_LEFT, EQUAL = "23 and 36", "36 and 23", "23 and 23"
+SHORT_RIGHT, SHORT_LEFT, EQUAL = "23 and 36", "36 and 23", "23 and 23, food ahead"
 EQUAL_ASIDE = "23 and 23, food aside"
 BRIDGES = (SHORT_RIGHT, SHORT_LEFT, EQUAL, EQUAL_ASIDE)
 LOADS = ("foragers", "carriers")

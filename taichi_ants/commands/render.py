@@ -197,13 +197,16 @@ def show_sheet(settings: argparse.Namespace, world: World) -> None:
 
 def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray, Task, str]:
     """The action values (n_states, 5) to follow, their task, and a title that says whence."""
-    from taichi_ants import Colony, Task, load_policy, train
+    from taichi_ants import Colony, Life, Task, load_policy, train
     from taichi_ants.errors import count
 
     if settings.policy:
         policy = load_policy(settings.policy)
         title = settings.title or f"policy {Path(settings.policy).stem}"
-        return policy.q_values, policy.task, title
+        task = policy.task
+        if settings.kind == "episode":  # of one ant: nothing comes and goes
+            task = replace(task, life=Life())
+        return policy.q_values, task, title
     config, seed, episodes = training_config(settings), settings.seed, settings.episodes
     title = settings.title or f"{settings.learner} after {count(episodes, 'episode')}"
     with progress_bar("Training") as progress:

@@ -135,8 +135,11 @@ def _grid(grid: Any, fixed: Settings) -> list[Settings]:
     for name, several in values.items():
         if not several:
             raise AntsError(f"{name} is an empty list; give at least one value.")
-        if name in fixed:
-            raise AntsError(f"{name} stands among the fixed settings and in [vary]; leave out one.")
+        for one in fixed:  # a part of it is one of the settings that it stands for
+            if f"{one}.".startswith(f"{name}.") or f"{name}.".startswith(f"{one}."):
+                raise AntsError(
+                    f"{name} stands in [vary] and {one} among the fixed settings; leave out one."
+                )
         if name in _OF_FILE:
             raise AntsError(f"{name} cannot vary; write it above all tables.")
         if name == "world.ranges" and not all(isinstance(one, list) for one in several):
@@ -197,6 +200,9 @@ def _rather(name: str, kind: str, known: list[str]) -> str:
         if name in _own(other):
             return f"of kind {kind!r}, but of {other!r}; leave it out"
     near = [one for one in known if one.endswith(f".{name}")]
+    part = name if any(one.startswith(f"{name}.") for one in known) else name.rpartition(".")[0]
+    if part and part not in _PARTS:
+        near = near or [one for one in known if one.rpartition(".")[0] == part]
     near = near or difflib.get_close_matches(name, known, 3)
     near = near or [*_own(kind), *(f"{one}. ..." for one in _PARTS[:3])]
     return f"here; choose among {', '.join(near)}"

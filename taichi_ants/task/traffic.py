@@ -13,7 +13,7 @@ class Traffic:
 
     Where somebody may, every ant that tries to move claims the cell ahead of it, unless a rock,
     food, the queen or the end of the world is there. Of several claims to a cell the one with the
-    smallest hash wins, see `docs/foraging.md`.
+    smallest hash wins, see `docs/colony.md`.
 
     Attributes:
         swap: Right of way. An ant with food that wins a cell changes places with the ant on it, if

@@ -214,7 +214,11 @@ WRONG = {
     "value": ("discount = 0.9", "discount = 1.9", ["discount is 1.9"]),
     "text": ("episodes = 50", 'episodes = "12"', ["episodes is '12'"]),
     "list": ("discount = 0.9", "discount = [0.9, 1]", ["discount is [0.9, 1]"]),
-    "twice": ("discount = 0.9", "discount = 0.9\nepsilon = 0.1", ["training.epsilon stands among"]),
+    "twice": (
+        "discount = 0.9",
+        "discount = 0.9\nepsilon = 0.1",
+        ["training.epsilon stands in [vary]"],
+    ),
     "empty": ("[1, 0]", "[]", ["task.rewards.lure is an empty list"]),
     "seeds": ("seeds = [7, 2, 5]", "seeds = 0", ["seeds is 0", "or a list of seeds"]),
     "seed twice": ("[7, 2, 5]", "[7, 7]", ["seeds holds 7 more than once"]),
@@ -245,7 +249,12 @@ WRONG = {
     "part of a text": (
         "[vary]",
         "[vary]\ntraining.learner.x = [1]",
-        ["'training.learner.x' is no"],
+        ["training.learner.x stands in [vary] and training.learner among"],
+    ),
+    "a part twice": (
+        "[task]",
+        "[task]\nrewards = 3",
+        ["task.rewards.lure stands in [vary] and task.rewards among"],
     ),
     "wrong name": ("[vary]", '[vary]\ntraining.lerner = ["a"]', ["lerner' is", "training.learner"]),
     "cut name": (

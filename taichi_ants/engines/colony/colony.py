@@ -288,11 +288,10 @@ class Colony:
         """
         episodes = checked_whole("episodes", episodes)
         ticks = checked_whole("ticks", ticks, most=MAX_STEPS)
-        if worlds is not None and len(worlds) != episodes:
-            raise AntsError(f"worlds has {len(worlds)} entries; give one for each of {episodes}.")
+        places = self._checked_places(worlds, episodes)
         outcomes = []
         for episode in range(episodes):
-            self.begin_episode(ticks, worlds[episode] if worlds is not None else None)
+            self.begin_episode(ticks, places[episode])
             for _ in self._pass(ticks):
                 if progress is not None:
                     progress((episode + self.ticks / ticks) / episodes)
@@ -304,6 +303,21 @@ class Colony:
             **{name: np.stack([vars(one)[name][0] for one in outcomes])
                for name in vars(outcomes[0])}
         )  # fmt: skip
+
+    def _checked_places(self, worlds: Any, episodes: int) -> Sequence[Any]:
+        """The worlds of each episode, all of them allowed; None where the colonies stay."""
+        if worlds is None:
+            return [None] * episodes
+        if not isinstance(worlds, (list, tuple)) or len(worlds) != episodes:
+            raise AntsError(
+                f"worlds is {shown(worlds)}; give a list with an entry for each of the {episodes} "
+                "episodes."
+            )
+        for place in worlds:
+            several = _checked_worlds(place, len(self.seeds), self.sharing != "fixed")
+            for one, seed in dict.fromkeys(zip(several, self.seeds, strict=True)):
+                one.start(seed, self.ants, self.start)  # whether there is room
+        return worlds
 
     def outcome(self) -> ColonyEpisodes:
         """What the episode has given so far, arrays (1, W).

@@ -234,9 +234,11 @@ def test_episodes_may_take_place_in_other_worlds():
 @pytest.mark.parametrize(
     ("call", "says"),
     [
+        (lambda colony: colony.run(2, 5, worlds=[worlds.paper()]), "each of the 2 episodes"),
+        (lambda colony: colony.run(1, 5, worlds=worlds.paper()), "give a list with an entry"),
         (
-            lambda colony: colony.run(2, 5, worlds=[worlds.paper()]),
-            "worlds has 1 entries; give one",
+            lambda colony: colony.run(1, 5, worlds={"a": worlds.paper()}),
+            "give a list with an entry",
         ),
         (lambda colony: colony.begin_episode(world=3), "3; "),
         (lambda colony: colony.begin_episode(world=[worlds.paper()] * 2), "2 worlds for 1 seeds"),
@@ -245,3 +247,14 @@ def test_episodes_may_take_place_in_other_worlds():
 def test_other_worlds_that_do_not_fit_are_refused(call, says):
     with pytest.raises(AntsError, match=says):
         call(Colony(worlds.paper(), Task(), TRAINING))
+
+
+@pytest.mark.parametrize(
+    ("last", "says"),
+    [("paper", "'paper'"), (World((2, 1, 1), (0, 0, 0), [(1, 0, 0)]), "room|free")],
+)
+def test_worlds_are_checked_before_the_first_episode(last, says):
+    one, other = (Colony(worlds.paper(), Task(), TRAINING, ants=5) for _ in range(2))
+    with pytest.raises(AntsError, match=says):
+        one.run(2, 9, worlds=[worlds.paper(), last])
+    assert one == other
