@@ -11,6 +11,7 @@ from command_lines import call, load
 from taichi_ants.analysis import bridge as analysis
 
 
+@pytest.mark.slow
 def test_it_writes_counts_and_a_report_and_shows_them_again(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -424,6 +424,7 @@ def test_rules_are_those_named_else_the_policys_else_the_papers(
     assert command.rules(settings, policy) == replace(expected, **LASTING)
 
 
+@pytest.mark.slow
 def test_a_figure_shows_what_all_colonies_deliver_by_tick(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     policy = EXPERIMENTS / "policies" / "queueing.npz"

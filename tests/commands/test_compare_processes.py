@@ -68,6 +68,7 @@ def uninterrupted(tmp_path_factory, kernels):
     return contents(place / "out")
 
 
+@pytest.mark.slow
 def test_stopped_and_killed_it_goes_on_to_the_same_results(uninterrupted, kernels, tmp_path):
     folder = tmp_path / "out"
     arguments = [*MANY, "--out", "out"]
@@ -261,6 +262,7 @@ class Hysteretic(QLearning):
         return error * np.float32(0.25) if error < 0 else error
 
 
+@pytest.mark.slow
 def test_a_learner_from_a_file_of_ones_own(kernels, tmp_path, monkeypatch):
     (tmp_path / "own.py").write_text(HYSTERETIC)
     arguments = [

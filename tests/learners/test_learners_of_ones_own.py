@@ -482,7 +482,9 @@ def that_explodes(value, reward, discount, next_values, next_action, epsilon):
     return (reward - value) * 1e30
 
 
-@pytest.mark.parametrize("td_error", [of_a_logarithm, that_explodes])
+@pytest.mark.parametrize(
+    "td_error", [of_a_logarithm, pytest.param(that_explodes, marks=pytest.mark.slow)]
+)
 def test_values_that_are_not_finite_are_named(td_error):
     register(td_learner("mine", td_error))
     named = r"^learner 'mine' made action values that are not finite, with .*rate=0\.1.* seed 0; "
