@@ -25,6 +25,7 @@ LAYERS = (
     {"checks"},
     {"baselines", "engines", "reference"},
     {"analysis", "rendering"},
+    {"envs"},
     {"studies"},
     {"commands"},
     {"__main__"},

@@ -31,4 +31,5 @@ ANTS = Observation(
     name_of=name_of_codes(3, "EOTFPA", "EOSQPA"),
     summary="the three cells ahead, ants with the other load told from rocks",
     letters="P ant on a better cell, A not",
+    shape=(2, 6, 6, 6),
 )

@@ -22,4 +22,5 @@ ANTS_SEEN = Observation(
     name_of=name_of_codes(3, "EOTFA", "EOSQA"),
     summary="the three cells ahead, other ants told from rocks",
     letters="A another ant",
+    shape=(2, 5, 5, 5),
 )

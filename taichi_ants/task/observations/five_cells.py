@@ -21,4 +21,5 @@ FIVE_CELLS = Observation(
     CELLS,
     name_of_codes(len(CELLS), "EOTF", "EOSQ"),
     "all cells around but the one behind",
+    shape=(2, *[4] * 5),
 )

@@ -10,5 +10,10 @@ def row(look):
 
 
 PAPER = Observation(
-    "paper", 128, row, name_of=state_name, summary="the three cells ahead, four codes each"
+    "paper",
+    128,
+    row,
+    name_of=state_name,
+    summary="the three cells ahead, four codes each",
+    shape=(2, 4, 4, 4),
 )

@@ -33,4 +33,5 @@ QUEUES = Observation(
     name_of=name_of_codes(3, "EOTFPAp", "EOSQPAp"),
     summary="as ants; also ants with the same load on a better cell",
     letters="P p ant on a better cell",
+    shape=(2, 7, 7, 7),
 )

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from operator import index
@@ -52,6 +53,8 @@ class Observation:
         name_of: The name of a row for people.
         summary: One line for listings.
         letters: What those letters in names mean that are none of the paper's E, O, T, S, F and Q.
+        shape: The sizes of what a row is made of, if it is a number of several parts, as of digits:
+            `np.unravel_index(row, shape)` are the parts. Environments show them to neural networks.
     """
 
     name: str
@@ -61,6 +64,12 @@ class Observation:
     name_of: Callable[[int], str] = str
     summary: str = ""
     letters: str = ""
+    shape: tuple[int, ...] = ()
+
+    @property
+    def parts(self) -> tuple[int, ...]:
+        """The sizes of the parts of a row: its `shape`, or the row itself."""
+        return self.shape or (self.n_states,)
 
     @property
     def ahead(self) -> tuple[int, ...]:
@@ -100,6 +109,15 @@ def register(observation: Observation) -> Observation:
             "hold -2, 2 and 3, each once."
         )
     expect(f"summary of {name!r}", observation.summary, str)
+    shape = observation.shape
+    expect(f"shape of {name!r}", shape, tuple)
+    if shape and math.prod(checked_whole(f"shape of {name!r}", n) for n in shape) != (
+        observation.n_states
+    ):
+        raise AntsError(
+            f"shape of {name!r} is {shape}, whose product is not its n_states, "
+            f"{observation.n_states}; mend one of them."
+        )
     if not row.__module__.startswith("taichi_ants."):
         _try_functions(observation)
     _OBSERVATIONS[name] = observation

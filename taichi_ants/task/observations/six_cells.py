@@ -15,5 +15,11 @@ def row(look):
 
 
 SIX_CELLS = Observation(
-    "six_cells", 2 * 4**6, row, CELLS, name_of_codes(len(CELLS), "EOTF", "EOSQ"), "all cells around"
+    "six_cells",
+    2 * 4**6,
+    row,
+    CELLS,
+    name_of_codes(len(CELLS), "EOTF", "EOSQ"),
+    "all cells around",
+    shape=(2, *[4] * 6),
 )

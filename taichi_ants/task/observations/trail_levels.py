@@ -38,4 +38,5 @@ TRAIL_LEVELS = Observation(
     name_of=name_of_codes(3, "EO123F", "EO--SQ"),
     summary="the three cells ahead, a trail in three strengths",
     letters="1 2 3 a trail, weak to strong",
+    shape=(2, 6, 6, 6),
 )

@@ -1,0 +1,1 @@
+"""Environments for agents of others: Gymnasium, batches of environments, PettingZoo."""

@@ -1,0 +1,83 @@
+"""How environments show an ant what it sees: as cells, as the number of a state, or one-hot."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from itertools import pairwise
+from typing import Literal, get_args
+
+import numpy as np
+from gymnasium import spaces
+
+from taichi_ants.errors import AntsError, check_one_of
+from taichi_ants.task import Observation
+
+ObservationFormat = Literal["cells", "index", "one_hot"]
+FORMATS: tuple[str, ...] = get_args(ObservationFormat)
+_MOST_NUMBERS = 1 << 25  # of the table of all states
+
+
+class Shown:
+    """What an ant sees, in one of the formats.
+
+    A state is a row of a table of action values, see `taichi_ants.task.Observation`. In the
+    paper's, and in all others of this package, it is made of the load (1 with food) and a code for
+    each cell in view.
+
+    Attributes:
+        space: The space of one ant. "cells": MultiDiscrete (k,), int64: the k parts of a state.
+            "index": Discrete, the state itself. "one_hot": Box (sum of the sizes of all parts,),
+            float32: a 1 for each part, at its value, as `gymnasium.spaces.flatten` of "cells".
+
+    Raises:
+        AntsError: There is no such format, or one_hot would take too much memory.
+    """
+
+    def __init__(self, observation: Observation, form: ObservationFormat) -> None:
+        check_one_of("observation_format", form, FORMATS)
+        self.observation, self.form = observation, form
+        parts, n_states = observation.parts, observation.n_states
+        if form == "index":
+            self.space: spaces.Space = spaces.Discrete(n_states)
+        elif form == "cells":
+            self.space = spaces.MultiDiscrete(list(parts))
+        else:
+            if sum(parts) * n_states > _MOST_NUMBERS:
+                raise AntsError(
+                    f"observation_format is 'one_hot', but {observation.name!r} has {n_states} "
+                    'states of one part; use "index", or register it with a shape.'
+                )
+            self.space = spaces.Box(0.0, 1.0, (sum(parts),), np.float32)
+
+    @cached_property
+    def table(self) -> np.ndarray:
+        """What each state is shown as: (n_states, ...) of the space's shape and dtype."""
+        states = np.arange(self.observation.n_states)
+        if self.form == "index":
+            return states
+        cells = np.stack(np.unravel_index(states, self.observation.parts), axis=-1)
+        if self.form == "cells":
+            return cells
+        ends = np.cumsum(self.observation.parts)
+        flat = np.zeros((len(states), ends[-1]), np.float32)
+        np.put_along_axis(flat, cells + ends - self.observation.parts, 1.0, axis=1)
+        return flat
+
+    def show(self, states: np.ndarray) -> np.ndarray:
+        """What these states are shown as: integers of any shape (...) -> (..., *space.shape)."""
+        return states.astype(np.int64) if self.form == "index" else self.table[states]
+
+    def states(self, shown: np.ndarray) -> np.ndarray:
+        """The states of what was shown: (..., *space.shape) -> int64 (...)."""
+        shown = np.asarray(shown)
+        if self.form == "index":
+            return shown.astype(np.int64)
+        if self.form == "one_hot":
+            begins = np.cumsum((0, *self.observation.parts))
+            pieces = [shown[..., a:b].argmax(axis=-1) for a, b in pairwise(begins)]
+            shown = np.stack(pieces, axis=-1)
+        # Digits, the last part the least significant.
+        sizes = self.observation.parts
+        weights = [math.prod(sizes[k + 1 :]) for k in range(len(sizes))]
+        return shown.astype(np.int64) @ np.array(weights)
