@@ -118,7 +118,7 @@ def forage(
     # Taichi is imported once it is configured.
     from taichi_ants.baselines.utility_kernels import live, measure
 
-    place = neighbours, is_food, nest
+    goals = np.stack([np.arange(len(cells)) == nest, is_food == 1]).astype(np.int32)
     settings = capacity, float(discount), kept, exploration, momentum
     of_ants = np.zeros((colonies, ants, 3), np.int32)
     of_ants[..., 0] = nest
@@ -131,9 +131,10 @@ def forage(
     with runtime.quiet():
         for first in range(0, ticks, EVERY):
             last = min(first + EVERY, ticks)
-            live(*place, *settings, first, last, states, of_ants, standing, utilities, deliveries)
+            state = states, of_ants, standing, utilities, deliveries
+            live(neighbours, goals, *settings, first, last, *state)
             if last == first + EVERY:
-                measure(*place, utilities, first // EVERY, lengths)
+                measure(neighbours, goals, nest, utilities, first // EVERY, lengths)
     spread = np.zeros((colonies, 2, world.grid.size))
     spread[..., cells] = utilities
     return Foraging(shortest, deliveries, lengths, spread)
