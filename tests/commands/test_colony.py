@@ -254,7 +254,10 @@ def test_stopped_and_killed_it_goes_on_to_the_same_results(finished, kernels, tm
         (["live", "--figure", "/proc/x/a.png"], "cannot write to the folder '/proc"),
         (["live", "--resume", "x"], "cannot read 'x'"),
         (["study", "--arenas", "moon"], "--arenas: invalid choice: 'moon' (choose from"),
-        (["study", "--learner", "sarsa_lambda"], "learn together; choose one of q_learning, sarsa,"),
+        (
+            ["study", "--learner", "sarsa_lambda"],
+            "learn together; choose one of q_learning, sarsa,",
+        ),
         (["study", "--sizes", "300", "8", "--arenas", "paper"], "300 ants are asked for"),
         (["study", "--learner", "none"], "there is no learner 'none'"),
         (["study", "--epsilon", 2], "epsilon is 2.0"),
