@@ -43,9 +43,7 @@ class Arguments:
         if self._taichi() is not taichi:
             self._values, self._taichi = dict(values), ref(taichi)
             # As `kind(**values)`, which makes two packs.
-            self._pack = ArgPack(kind.members, kind.dtype, dict(values))
-            # Taichi would delete a pack of a program that is gone, which ends the process.
-            type(self._pack).__del__ = _nothing
+            self._pack = _Pack(kind.members, kind.dtype, dict(values))
             memory = self._pack._ArgPack__argpack
             finalize(self._pack, _delete, self._taichi, memory).atexit = False
         for name, value in values.items():
@@ -122,8 +120,11 @@ def compile_once(kernel: Callable[[Any], None], nothing: Callable[[], Any]) -> N
         launched.add(kernel)
 
 
-def _nothing(pack: Any) -> None:
-    pass
+class _Pack(ArgPack):
+    """A pack whose memory is deleted by `_delete`."""
+
+    def __del__(self) -> None:
+        """Not as Taichi, which would delete that of a program that is gone, and end the process."""
 
 
 def _delete(taichi: ref, memory: Any) -> None:

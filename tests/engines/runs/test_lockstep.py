@@ -48,7 +48,7 @@ def plain(world: World, task: Task, seed: int, ends: str, falls: bool) -> Refere
 
 def drawn_task(rng: np.random.Generator, observation: str, deposit: str, view: str) -> Task:
     more = {"add": {"cap": int(rng.choice([1, 300]))}, "fading": {"slope": int(rng.choice([1, 9]))}}
-    pheromone = Pheromone(deposit=deposit, level=int(rng.choice([3, 40, 250])), view=view)
+    pheromone = Pheromone(deposit=deposit, view=view)
     if deposit != "none":
         pheromone = Pheromone(
             evaporation=str(rng.choice(["linear", "none"])),
