@@ -68,3 +68,6 @@ class Drawing:
         marks.append((grid.cells(now.ant_cells), letters[now.ant_headings[0]]))
         head = ", ".join(f"{name} {value}" for name, value in self._facts(number))
         return f"; {head}\n" + text_map.drawing(grid.ranges, marks)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "_scene": None}  # it is drawn anew

@@ -151,8 +151,8 @@ class Lockstep:
         from taichi_ants.engines.runs.lockstep_kernel import step_kernel
 
         pheromone, kind = self.task.pheromone, Arguments.type_of(self.arrays)
-        half = pheromone.view == "half"
-        return Launch(step_kernel(self.task.sees, pheromone.deposit, half, kind))
+        half, serial = pheromone.view == "half", self.n <= _PER_CHUNK
+        return Launch(step_kernel(self.task.sees, pheromone.deposit, half, serial, kind))
 
     def __getstate__(self) -> dict[str, Any]:
         """All but what Taichi holds, which is made anew; so copies and pickles go on alike."""

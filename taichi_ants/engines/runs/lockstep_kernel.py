@@ -59,7 +59,7 @@ def outcome_of(a: ti.template(), base, before, after, action):
 
 @cache
 def step_kernel(
-    observation: Observation, deposit: str, half: bool, arguments: Any
+    observation: Observation, deposit: str, half: bool, serial: bool, arguments: Any
 ) -> Callable[..., None]:
     """The kernel; it is compiled on first use.
 
@@ -67,6 +67,7 @@ def step_kernel(
         observation: What row of its table an ant looks at.
         deposit: How trails are laid, see `Pheromone`.
         half: Whether trails of half the strongest look like one, see `Pheromone.view`.
+        serial: Whether one thread does all, which saves to wake the others.
         arguments: The type of the argument pack, which `lockstep` lists.
     """
     state_of = state_seen(observation, half)
@@ -124,7 +125,7 @@ def step_kernel(
 
     @ti.kernel
     def step(a: arguments):
-        ti.loop_config(block_dim=1)
+        ti.loop_config(block_dim=1, serialize=serial)
         for chunk in range((a.n + a.per_chunk - 1) // a.per_chunk):
             for i in range(chunk * a.per_chunk, ti.min((chunk + 1) * a.per_chunk, a.n)):
                 origin = a.worlds[i] * a.size
