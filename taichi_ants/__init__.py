@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from taichi_ants.errors import AntsError
     from taichi_ants.learners.config import TrainingConfig
     from taichi_ants.learners.policies import load_policy, save_policy
+    from taichi_ants.offline.dataset import Dataset
+    from taichi_ants.offline.recording import record, record_colony
     from taichi_ants.task import Life, Observation, Pheromone, Rewards, Task, states
     from taichi_ants.worlds import World
 
@@ -31,6 +33,8 @@ _HOMES = {
     "errors": ("AntsError",),
     "learners.config": ("TrainingConfig",),
     "learners.policies": ("load_policy", "save_policy"),
+    "offline.dataset": ("Dataset",),
+    "offline.recording": ("record", "record_colony"),
     "task": ("Life", "Observation", "Pheromone", "Rewards", "Task"),
     "worlds": ("World",),
 }
@@ -40,6 +44,7 @@ __all__ = [
     "AntsError",
     "Colony",
     "ColonyEpisodes",
+    "Dataset",
     "Life",
     "Observation",
     "Pheromone",
@@ -56,6 +61,8 @@ __all__ = [
     "evaluate",
     "learners",
     "load_policy",
+    "record",
+    "record_colony",
     "reference",
     "rendering",
     "rollout",
