@@ -99,7 +99,7 @@ def importance_sampling(
         squares = np.square(whole).sum()
         size = whole.sum() ** 2 / squares if squares > 0 else 0.0
         outcomes.append((*_interval(estimates, level), size))
-    return PolicyValues(*np.array(outcomes).T.reshape(4, *shape))
+    return _values(outcomes, shape)
 
 
 def model_based(
@@ -133,7 +133,13 @@ def model_based(
         q = model.solve(discount, model.rewards, initial_value, policy, threads=threads)
         values = (policy[first] * q[:, first]).sum(axis=-1)
         outcomes.append((*_interval((starts * values).sum(axis=1), level), np.nan))
-    return PolicyValues(*np.array(outcomes).T.reshape(4, *shape))
+    return _values(outcomes, shape)
+
+
+def _values(outcomes: list[tuple[float, ...]], shape: tuple[int, ...]) -> PolicyValues:
+    """From the four numbers of each policy."""
+    value, low, high, size = (np.reshape(column, shape) for column in np.array(outcomes).T)
+    return PolicyValues(value, low, high, size)
 
 
 def _policies(data: Dataset, q_values: np.ndarray, epsilon: float) -> tuple[np.ndarray, tuple]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-
 import numpy as np
 import pytest
 from plain_runs import train_with_tables
@@ -21,6 +20,7 @@ from taichi_ants import (
     worlds,
 )
 from taichi_ants.learners.policies import trail_follower
+from taichi_ants.offline.dataset import COLUMNS
 from taichi_ants.reference import ReferenceColony
 
 FIELDS = ("step", "state", "action", "reward", "next_state", "terminated")
@@ -42,7 +42,10 @@ def test_a_learner_while_it_learns(learner):
     """SARSA draws its next action by the table as it is before the update."""
     config, seeds = TrainingConfig(learner, 0.5, 0.9, 0.4, 0.7), (3, -1)
     for number in range(8):
-        world, task = random_world(number), Task(delivery="continuing" if number % 2 else "absorbing")
+        world, task = (
+            random_world(number),
+            Task(delivery="continuing" if number % 2 else "absorbing"),
+        )
         data = record(world, config, 5, seeds, 30, task)
         for run, seed in enumerate(seeds):
             plain, tables = train_with_tables(world, config, seed, 5, 30, task)
@@ -134,13 +137,24 @@ def test_a_colony_that_sorts_its_ants_is_recorded_alike():
     config, life = TrainingConfig("q_learning", 0.3, 0.9, 0.3, 1.0), Life(regrowth=0)
     both = [
         record_colony(
-            Colony(worlds.open_world(5, (9, 9, 9)), Task(life=life), config, (1, 2), 12, schedule=how),
+            Colony(
+                worlds.open_world(5, (9, 9, 9)), Task(life=life), config, (1, 2), 12, schedule=how
+            ),
             *(1, 70),
         )
         for how in ("by_world", "by_chunk")
     ]
     assert both[0] == both[1]
     assert len(both[0]) == 2 * 12 * 70
+
+
+def test_a_colony_of_one_with_a_table_of_its_own_is_a_run():
+    config, world = TrainingConfig("sarsa", 0.5, 0.9, 0.4, 0.7), random_world(3)
+    colony = Colony(world, None, config, (1, 2), sharing="own", ends_at_delivery=True)
+    both = record_colony(colony, 6, 60), record(world, config, 6, (1, 2), 60)
+    for name in COLUMNS:
+        assert np.array_equal(*(getattr(one, name) for one in both)), name
+    assert both[0].terminated.any()
 
 
 @pytest.mark.parametrize(
