@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from taichi_ants.engines.runs.results import Rollouts, TrainingResult
     from taichi_ants.engines.runs.traces import Trace, rollout, trace_training
     from taichi_ants.engines.runs.training import continue_training, evaluate, train
+    from taichi_ants.envs.minari_data import from_minari, to_minari
     from taichi_ants.errors import AntsError
     from taichi_ants.learners.config import TrainingConfig
     from taichi_ants.learners.policies import load_policy, save_policy
@@ -30,6 +31,7 @@ _HOMES = {
     "engines.runs.results": ("Rollouts", "TrainingResult"),
     "engines.runs.traces": ("Trace", "rollout", "trace_training"),
     "engines.runs.training": ("continue_training", "evaluate", "train"),
+    "envs.minari_data": ("from_minari", "to_minari"),
     "errors": ("AntsError",),
     "learners.config": ("TrainingConfig",),
     "learners.policies": ("load_policy", "save_policy"),
@@ -59,6 +61,7 @@ __all__ = [
     "analysis",
     "continue_training",
     "evaluate",
+    "from_minari",
     "learners",
     "load_policy",
     "record",
@@ -69,6 +72,7 @@ __all__ = [
     "save_policy",
     "states",
     "task",
+    "to_minari",
     "trace_training",
     "train",
     "worlds",

@@ -6,6 +6,7 @@ value of a policy is its expected discounted return from where the episodes of t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -136,7 +137,7 @@ def model_based(
     return _values(outcomes, shape)
 
 
-def _values(outcomes: list[tuple[float, ...]], shape: tuple[int, ...]) -> PolicyValues:
+def _values(outcomes: Sequence[tuple[float, ...]], shape: tuple[int, ...]) -> PolicyValues:
     """From the four numbers of each policy."""
     value, low, high, size = (np.reshape(column, shape) for column in np.array(outcomes).T)
     return PolicyValues(value, low, high, size)
