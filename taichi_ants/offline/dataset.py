@@ -44,7 +44,8 @@ class Dataset(Record):
         seeds: One for each run.
         behaviour: What chose the actions: names and numbers, as JSON knows them.
         run: int32 (n,), the number of the seed, ascending.
-        episode: int32 (n,), from 0, ascending; its steps come in order.
+        episode: int32 (n,), from 0, ascending: in a run, those that began first come first. The
+            steps of an episode come in order.
         agent: int32 (n,), the number of the ant in its colony, 0 of an ant that is alone.
         step: int32 (n,), the tick of its world, from 0. A newborn's first is larger.
         state: int32 (n,), the row of a table of action values.
@@ -141,7 +142,7 @@ class Dataset(Record):
         return np.bincount(self.episode, weights=discount**ages * self.reward)
 
     def first(self, transitions: int | None = None, episodes: int | None = None) -> Dataset:
-        """The first transitions, or episodes, of each run; a last episode that is cut is truncated.
+        """The first rows, or episodes, of each run; a last episode that is cut is truncated.
 
         Raises:
             AntsError: A number is not whole or below 1.

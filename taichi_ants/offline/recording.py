@@ -199,7 +199,7 @@ def _drawn(values: np.ndarray, epsilon: float, streams: np.ndarray) -> np.ndarra
 
 
 def _dataset(pieces: Iterable[dict[str, np.ndarray]], **known: Any) -> Dataset:
-    """The data set of rows, those of one ant in order; it knows where the episodes end."""
+    """The data set of rows, those of an ant in order; it finds out where episodes end."""
     several = list(pieces)
     rows: dict[str, Any] = {
         name: np.concatenate([piece[name] for piece in several]) for name in _GIVEN
@@ -209,7 +209,14 @@ def _dataset(pieces: Iterable[dict[str, np.ndarray]], **known: Any) -> Dataset:
     for name in ("episode", "agent"):
         key = key * (int(rows[name].max(initial=0)) + 1) + rows[name]
     order = np.argsort(key, kind="stable")
-    rows = {name: array[order] for name, array in rows.items()}
-    last = np.append(np.diff(key[order]) != 0, True) | rows["terminated"]
-    rows["episode"] = np.cumsum(last, dtype=np.int32) - last.astype(np.int32)
+    last = np.append(np.diff(key[order]) != 0, True) | rows["terminated"][order]
+    number = np.cumsum(last) - last
+    # What began first comes first.
+    begins = order[np.append(0, np.flatnonzero(last)[:-1] + 1)]
+    by_age = np.lexsort([rows[name][begins] for name in ("agent", "step", "episode", "run")])
+    place = np.argsort(by_age)[number]
+    of_place = np.argsort(place, kind="stable")
+    rows = {name: array[order[of_place]] for name, array in rows.items()}
+    rows["episode"] = place[of_place].astype(np.int32)
+    last = last[of_place]
     return Dataset(**known, **rows, truncated=last & ~rows["terminated"])

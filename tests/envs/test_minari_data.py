@@ -67,6 +67,7 @@ def test_an_episode_of_an_ant_is_one_of_minaris():
         assert loaded.action_space == spaces.Discrete(5)
 
 
+@pytest.mark.filterwarnings("ignore::UserWarning:minari")
 def test_what_others_wrote_needs_a_world():
     """And does not know the probabilities of actions."""
     data = record(worlds.paper(), None, 3, 4, 20)

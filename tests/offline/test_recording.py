@@ -121,13 +121,17 @@ def test_ants_of_a_colony_that_appear_and_die(learner, sharing, delivery, life):
                 ant.append((step, chance(values, step.action, epsilon)))
             before, tables = tables, plain.q_values
     assert np.array_equal(colony.q_values[0], plain.q_values)
-    expected = [lives[key] for key in sorted(lives)]
-    steps = [step for life in expected for step, _ in life]
+    spans = []  # an ant's life, cut after each terminal step, with where it belongs
+    for (episode, number), life in lives.items():
+        ends = [k + 1 for k, (step, _) in enumerate(life) if step.terminated or k + 1 == len(life)]
+        for first, end in zip([0, *ends], ends, strict=False):
+            spans.append((episode, life[first][0].step, number, life[first:end]))
+    spans.sort(key=lambda span: span[:3])
+    steps = [step for *_, span in spans for step, _ in span]
     assert rows(data) == [tuple(getattr(step, name) for name in FIELDS) for step in steps]
     assert data.agent.tolist() == [step.number for step in steps]
-    assert data.behaviour_probability.tolist() == [c for life in expected for _, c in life]
-    ends = [step.terminated or step is life[-1][0] for life in expected for step, _ in life]
-    assert (data.terminated | data.truncated).tolist() == ends
+    assert data.behaviour_probability.tolist() == [c for *_, span in spans for _, c in span]
+    assert np.diff(data.begins).tolist() == [len(span) for *_, span in spans]
     assert data.step[data.begins[:-1]].max() > 0  # some appear while others live
     assert data.terminated.any() == (delivery == "absorbing")
     assert len(lives) > 20
