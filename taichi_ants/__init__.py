@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from taichi_ants.environment import prepare_for_taichi
 
 if TYPE_CHECKING:
-    from taichi_ants import analysis, learners, reference, rendering, task, worlds
+    from taichi_ants import analysis, learners, offline, reference, rendering, task, worlds
     from taichi_ants.engines.colony.colony import Colony, ColonyEpisodes
     from taichi_ants.engines.runs.results import Rollouts, TrainingResult
     from taichi_ants.engines.runs.traces import Trace, rollout, trace_training
@@ -40,7 +40,9 @@ _HOMES = {
     "task": ("Life", "Observation", "Pheromone", "Rewards", "Task"),
     "worlds": ("World",),
 }
-_MODULES = ("analysis", "learners", "reference", "rendering", "task", "task.states", "worlds")
+_MODULES = (
+    *("analysis", "learners", "offline", "reference", "rendering", "task", "task.states", "worlds"),
+)
 
 __all__ = [
     "AntsError",
@@ -64,6 +66,7 @@ __all__ = [
     "from_minari",
     "learners",
     "load_policy",
+    "offline",
     "record",
     "record_colony",
     "reference",
