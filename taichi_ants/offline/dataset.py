@@ -148,7 +148,8 @@ class Dataset(Record):
             AntsError: A number is not whole or below 1.
         """
         keep = np.ones(len(self), bool)
-        where = np.searchsorted(self.run, self.run)  # where the run of each row begins
+        # Where the run of each row begins.
+        where = np.searchsorted(self.run, np.arange(len(self.seeds)))[self.run]
         if transitions is not None:
             keep &= np.arange(len(self)) - where < checked_whole("transitions", transitions)
         if episodes is not None:

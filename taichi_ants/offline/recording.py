@@ -137,6 +137,9 @@ def record_colony(
             pieces.append({name: piece[name].astype(dtype) for name, dtype in _GIVEN.items()})
             if progress is not None:
                 progress((episode + (tick + 1) / ticks) / episodes)
+            if not len(piece["run"]) and tick + 1 < ticks:  # all have died
+                colony.tick(ticks - tick - 1)
+                break
         colony.end_episode()
     known = {"task": colony.task, "seeds": colony.seeds, "behaviour": facts}
     return _dataset(pieces, world=colony.worlds[0], **known)
