@@ -122,7 +122,7 @@ def model_based(
     Args:
         initial_value: Value of the pairs that the data lack.
 
-    Others, and errors, are those of `importance_sampling`; the discount must be below 1.
+    Others, and errors, are those of `importance_sampling`; the discount must be at most 0.9999.
     """
     expect("data", data, Dataset)
     policies, shape = _policies(data, q_values, epsilon)

@@ -23,7 +23,7 @@ from taichi_ants.errors import AntsError, checked_whole, expect, shown
 from taichi_ants.offline.dataset import Dataset
 from taichi_ants.task.constants import N_ACTIONS
 
-TOLERANCE = 1e-9  # Q iteration ends when no action value changes by more
+_MOST_DISCOUNT = 0.9999  # with which Q iteration takes half a second
 
 
 def batch_q_learning(
@@ -78,7 +78,7 @@ def fitted_q_iteration(
     JMLR 6, 2005) with a table for regression: its fit to all targets is their mean over the
     transitions of a pair, so that it iterates Q on that model. The order of the data is irrelevant.
     Pairs that the data lack keep `initial_value`. Arguments and errors are those of
-    `batch_q_learning`, but the discount must be below 1.
+    `batch_q_learning`, but the discount must be at most 0.9999.
     """
     model = EmpiricalModel.of(data, _groups(data, by_run))
     q = model.solve(discount, model.rewards, initial_value, threads=threads).astype(np.float32)
@@ -120,6 +120,7 @@ class EmpiricalModel:
 
     Attributes:
         n_states: Rows of a table.
+        largest: What the task pays, or takes, at most.
         groups: int32 (groups + 1,), where the pairs of a group of rows begin.
         pairs: int32 (pairs,), state * 5 + action, ascending in a group.
         counts: int64 (pairs,), transitions.
@@ -131,6 +132,7 @@ class EmpiricalModel:
     """
 
     n_states: int
+    largest: float
     groups: np.ndarray
     pairs: np.ndarray
     counts: np.ndarray
@@ -144,7 +146,7 @@ class EmpiricalModel:
         """Of each group of rows; (groups + 1,) their beginnings."""
         group = np.repeat(np.arange(len(groups) - 1), np.diff(groups))
         pair = (group * data.task.n_states + data.state) * N_ACTIONS + data.action
-        return cls._counted(data.task.n_states, len(groups) - 1, *_tally(data, pair)[:4])
+        return cls._counted(data, len(groups) - 1, *_tally(data, pair)[:4])
 
     @classmethod
     def resampled(cls, data: Dataset, times: np.ndarray) -> EmpiricalModel:
@@ -159,12 +161,12 @@ class EmpiricalModel:
             rewards, there = np.bincount(triple, rows * data.reward, len(pairs)), counts > 0
             moved = pairs + number * n_states * N_ACTIONS
             several.append([one[there] for one in (moved, successors, counts, rewards)])
-        return cls._counted(n_states, len(times), *map(np.concatenate, zip(*several, strict=True)))
+        return cls._counted(data, len(times), *map(np.concatenate, zip(*several, strict=True)))
 
     @classmethod
     def _counted(
         cls,
-        n_states: int,
+        data: Dataset,
         n_groups: int,
         pair: np.ndarray,
         successor: np.ndarray,
@@ -172,12 +174,14 @@ class EmpiricalModel:
         rewards: np.ndarray,
     ) -> EmpiricalModel:
         """From counts and sums of rewards by pair, that of group g moved by g tables, and state."""
+        n_states = data.task.n_states
         pairs, first = np.unique(pair, return_index=True)
         total = np.add.reduceat(counts, first)
         goes_on = successor < n_states
         share = counts / np.repeat(total, np.diff(first, append=len(pair)))
         return cls(
             n_states=n_states,
+            largest=float(np.abs(data.task.rewards.by_event()).max()),
             groups=np.searchsorted(pairs // (n_states * N_ACTIONS), np.arange(n_groups + 1)).astype(
                 np.int32
             ),
@@ -223,8 +227,9 @@ class EmpiricalModel:
         # An array of length 0 cannot be an argument.
         successors, probabilities = np.append(self.successors, np.int32(0)), self.probabilities
         model = (self.groups, self.pairs, rewards, self.begins, successors)
-        numbers = (self.n_states, discount, lowest, TOLERANCE)
-        iterate(*flat, int(policy is None), *model, np.append(probabilities, 0.0), *numbers)
+        numbers = (discount, lowest, tolerance(self.largest, discount, initial_value))
+        probabilities = np.append(probabilities, 0.0)
+        iterate(*flat, int(policy is None), *model, probabilities, self.n_states, *numbers)
         return q
 
 
@@ -242,10 +247,18 @@ def _tally(data: Dataset, pair: np.ndarray) -> tuple[np.ndarray, ...]:
     return keys // (ends + 1), keys % (ends + 1), counts, rewards, which
 
 
+def tolerance(largest: float, discount: float, initial_value: float) -> float:
+    """Q iteration ends when no action value changes by more: far above rounding errors."""
+    return 1e-12 * max(1.0, largest / (1.0 - discount), abs(initial_value))
+
+
 def checked_discount(discount: float) -> float:
     """A discount factor with which values of endless episodes are finite."""
-    if checked_share("discount", discount) == 1:
-        raise AntsError("discount is 1; without an end of episodes it must be below 1.")
+    if checked_share("discount", discount) > _MOST_DISCOUNT:
+        raise AntsError(
+            f"discount is {discount}; where episodes need not end it must be at most "
+            f"{_MOST_DISCOUNT}."
+        )
     return float(discount)
 
 

@@ -12,7 +12,7 @@ from random_worlds import random_world
 from taichi_ants import AntsError, Task, record, worlds
 from taichi_ants.learners.policies import action_probabilities
 from taichi_ants.offline.evaluation import importance_sampling, model_based
-from taichi_ants.offline.learners import TOLERANCE
+from taichi_ants.offline.learners import tolerance
 from taichi_ants.reference import offline as plain
 
 STILL = Task(evaporation_in_evaluation=False)
@@ -32,7 +32,7 @@ def test_both_equal_the_reference(seed):
         assert np.isnan(ours.low).all()
     ours = model_based(data, tables, 0.95, 0.4, 0.5, resamples=0)
     for k, target in enumerate(targets):
-        q = plain.q_iteration(steps, 128, 0.95, 0.5, TOLERANCE, target)
+        q = plain.q_iteration(steps, 128, 0.95, 0.5, tolerance(10, 0.95, 0.5), target)
         firsts = [episode[0][0] for episode in steps]
         value = sum(target[s, a] * q[s, a] for s in firsts for a in range(5)) / len(firsts)
         assert ours.value[k] == pytest.approx(value, rel=1e-12)

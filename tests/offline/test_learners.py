@@ -13,19 +13,21 @@ from taichi_ants import (
     AntsError,
     Dataset,
     Task,
+    TrainingConfig,
     evaluate,
     load_policy,
     record,
     save_policy,
+    train,
     worlds,
 )
 from taichi_ants.offline.dataset import COLUMNS
 from taichi_ants.offline.learners import (
-    TOLERANCE,
     EmpiricalModel,
     batch_q_learning,
     fitted_q_iteration,
     pessimistic_q_iteration,
+    tolerance,
 )
 from taichi_ants.reference import offline as plain
 
@@ -43,10 +45,11 @@ def test_all_equal_the_reference(seed):
     for k, one in enumerate(parts):
         steps = episodes_of(one), 128, 0.95
         assert np.array_equal(batch[k], plain.batch_q_learning(*steps, 0.3, 3, 0.5))
-        best = plain.q_iteration(*steps, 0.5, TOLERANCE)
+        best = plain.q_iteration(*steps, 0.5, tolerance(10, 0.95, 0.5))
         assert np.array_equal(fitted[k], best.astype(np.float32))
         lowest = -1 / (1 - 0.95)
-        low = plain.q_iteration(*steps, lowest, TOLERANCE, penalty=0.7, lowest=lowest)
+        near = tolerance(10, 0.95, lowest)
+        low = plain.q_iteration(*steps, lowest, near, penalty=0.7, lowest=lowest)
         assert np.array_equal(careful[k], low.astype(np.float32))
     by_run = [batch_q_learning(data, 0.95, 0.3, 3, 0.5, by_run=True)]
     by_run += [fitted_q_iteration(data, 0.95, 0.5, by_run=True)]
@@ -64,7 +67,8 @@ def test_the_values_of_a_policy_equal_the_reference():
     steps = episodes_of(data)
     for k, counts in enumerate(times):
         drawn = [one for one, n in zip(steps, counts, strict=True) for _ in range(n)]
-        assert np.array_equal(ours[k], plain.q_iteration(drawn, 128, 0.9, 0.25, TOLERANCE, policy))
+        near = tolerance(10, 0.9, 0.25)
+        assert np.array_equal(ours[k], plain.q_iteration(drawn, 128, 0.9, 0.25, near, policy))
 
 
 def by_hand(rows, task=None) -> Dataset:
@@ -132,6 +136,13 @@ def test_what_is_learned_from_random_ants_delivers(tmp_path):
     assert outcome.steps.max() <= 40
 
 
+def test_one_sweep_over_a_learners_history_is_what_it_learned_online():
+    config = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 0.99)
+    data = record(worlds.paper(), config, 30, range(3))
+    offline = batch_q_learning(data, 0.9, 0.1, sweeps=1, by_run=True)
+    assert np.array_equal(offline, train(worlds.paper(), config, range(3), 30).q_values[0])
+
+
 @pytest.mark.parametrize("learn", LEARNERS)
 @pytest.mark.parametrize("given", [{"discount": 1.5}, {"data": 3}])
 def test_what_cannot_be_learned_from(learn, given):
@@ -141,7 +152,7 @@ def test_what_cannot_be_learned_from(learn, given):
 
 
 def test_arguments_of_single_learners():
-    with pytest.raises(AntsError, match="discount is 1; without an end"):
+    with pytest.raises(AntsError, match="discount is 1"):
         fitted_q_iteration(by_hand(CHAIN), 1.0)
     with pytest.raises(AntsError, match="penalty is -1"):
         pessimistic_q_iteration(by_hand(CHAIN), penalty=-1)
