@@ -72,7 +72,7 @@ class ColonyVectorEnv(VectorEnv):
     - `state`: int64, the state as a number.
     - `action_mask`: int8 (num_envs, 5), 1 for what can succeed if no other ant is faster.
     - `event`: int8, what came of the action, a number among `taichi_ants.envs.colony.EVENTS`:
-      moved, blocked, pushed, picked_up, delivered, failed. Not after a reset.
+      moved, blocked, pushed, picked_up, delivered, failed. Of ants that acted in this step.
     - `final_obs`, `final_info`: what the ants saw when they ended, before worlds were reset; in the
       steps of `SAME_STEP` in which ants end. `final_obs` has the form of the observations.
 
@@ -231,21 +231,21 @@ class ColonyVectorEnv(VectorEnv):
         terminated = acted & (events == GAVE) & self._absorbing
         ended = worlds.ended & ~waited
         truncated = self._by_ant(ended)
-        final = {}
+        everyone, final = np.ones(self.num_envs, bool), {}
+        observations, infos = self._observations(), self._infos(everyone, events, acted)
         if self._mode is AutoresetMode.SAME_STEP:
-            over = terminated | truncated
+            begins, over = ended, terminated | truncated
             if over.any():
-                final = {"final_obs": self._observations(), "_final_obs": over}
-                final |= {"final_info": self._infos(over, events), "_final_info": over.copy()}
-            begins = ended
+                last = {k: over.copy() if k[0] == "_" else v.copy() for k, v in infos.items()}
+                final = {"final_obs": observations.copy(), "_final_obs": over}
+                final |= {"final_info": last, "_final_info": over.copy()}
         else:
             worlds.stop(ended)
-            self._ended = ended
-            begins = waited
+            begins, self._ended = waited, ended
         if begins.any():
             worlds.begin(begins)
-        infos = {**self._infos(np.ones(self.num_envs, bool), events, acted), **final}
-        return self._observations(), rewards, terminated, truncated, infos
+            observations, infos = self._observations(), self._infos(everyone, events, acted)
+        return observations, rewards, terminated, truncated, {**infos, **final}
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """A picture of each world, uint8 (height, width, 3); None without a render mode."""
@@ -279,7 +279,7 @@ class ColonyVectorEnv(VectorEnv):
         events: np.ndarray | None = None,
         acted: np.ndarray | None = None,
     ) -> dict[str, Any]:
-        """What is said of the ants that `have` it; events of those that acted."""
+        """What is said of the ants that `have` it, and what came of the actions of some."""
         worlds = self._worlds
         infos = {
             "state": worlds.colony.states.reshape(-1).astype(np.int64),
@@ -287,6 +287,6 @@ class ColonyVectorEnv(VectorEnv):
             "action_mask": worlds.action_masks().reshape(self.num_envs, N_ACTIONS),
             "_action_mask": have.copy(),
         }
-        if events is not None:
-            infos |= {"event": events.copy(), "_event": (have if acted is None else acted).copy()}
+        if events is not None and acted is not None:
+            infos |= {"event": events.copy(), "_event": acted.copy()}
         return infos
