@@ -8,12 +8,15 @@ the first and the last iteration are. See docs/baselines.md.
 from __future__ import annotations
 
 import argparse
+from itertools import product
 
 import numpy as np
 
-from taichi_ants import worlds
-from taichi_ants.baselines.ant_system import METHODS, search
-from taichi_ants.studies.command_line import Parser, run_command, whole_number
+from taichi_ants import World, worlds
+from taichi_ants.baselines.ant_system import METHODS, Method, search
+from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
+
+HEAD = f"{'world':20} {'method':11} shortest  found by  iteration  first and last mean length"
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -32,28 +35,27 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 
 
 def print_table(settings: argparse.Namespace) -> None:
-    """A row for each world and method."""
-    print(f"{'world':20} {'method':11} shortest  found by  iteration  first and last mean length")
-    for name in settings.worlds:
-        world = worlds.build(name, settings.seed)
-        for method in METHODS:
-            result = search(
-                world,
-                method,
-                iterations=settings.iterations,
-                ants=settings.ants,
-                colonies=settings.colonies,
-                evaporation=settings.evaporation,
-                seed=settings.seed,
-                threads=settings.threads,
-            )
-            found = result.found[result.found > 0]
-            when = f"{np.median(found):.0f}" if len(found) else "-"
-            first, last = np.nanmean(result.mean[:, [0, -1]], axis=0)
-            print(
-                f"{name:20} {method:11} {result.shortest:8} {len(found):5}/{settings.colonies:<4}"
-                f"{when:>9} {first:11.1f} {last:8.1f}"
-            )
+    """A row for each world and method, once all are known to be allowed."""
+    places = {name: worlds.build(name, settings.seed) for name in settings.worlds}
+    rows: list[str] = []
+    with progress_bar("Ant colony optimisation") as progress:
+        for (name, world), method in product(places.items(), METHODS):
+            rows.append(f"{name:20} {method:11} {row(settings, world, method)}")
+            progress(len(rows) / (len(places) * len(METHODS)))
+    print(HEAD, *rows, sep="\n")
+
+
+def row(settings: argparse.Namespace, world: World, method: Method) -> str:
+    """What the colonies of one method find in one world."""
+    names = ("iterations", "ants", "colonies", "evaporation", "seed", "threads")
+    result = search(world, method, **{name: getattr(settings, name) for name in names})
+    found = result.found[result.found > 0]
+    when = f"{np.median(found):.0f}" if len(found) else "-"
+    first, last = np.nanmean(result.mean[:, [0, -1]], axis=0)
+    return (
+        f"{result.shortest:8} {len(found):5}/{settings.colonies:<4}"
+        f"{when:>9} {first:11.1f} {last:8.1f}"
+    )
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ import numpy as np
 from taichi_ants import Colony, Life, Pheromone, Task, TrainingConfig, World, task, worlds
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.learners.policies import trail_follower
-from taichi_ants.studies.command_line import Parser, run_command, whole_number
+from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
 
 if TYPE_CHECKING:
     from taichi_ants.engines.colony.colony import ColonyEpisodes
@@ -50,6 +50,7 @@ TASKS = {
     "netlogo, in queues": replace(task.queueing(), pheromone=NETLOGO),
 }
 TICKS, EPISODES = 1000, 4
+HEAD = "world  rules              epsilon  deliveries  interval      first  blocked"
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -64,21 +65,28 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 
 
 def print_table(settings: argparse.Namespace) -> None:
-    """A row for each kind of world, task and epsilon."""
-    print("world  rules              epsilon  deliveries  interval      first  blocked")
-    for kind, build in WORLDS.items():
-        places = [build(seed) for seed in range(settings.seeds)]
-        for (name, rules), epsilon in product(TASKS.items(), settings.epsilon):
-            outcome = evaluate(settings, places, rules, epsilon)
-            deliveries = outcome.deliveries.mean(axis=0) * 1000 / TICKS
-            (low,), (high,) = bootstrap_interval(deliveries[None])
-            # An episode without any delivery counts with all its ticks.
-            first = np.where(outcome.first_delivery < 0, TICKS, outcome.first_delivery).mean()
-            blocked = 100 * outcome.blocked.sum() / outcome.moves.sum()
-            print(
-                f"{kind:6} {name:18} {epsilon:7g} {deliveries.mean():11.0f}  "
-                f"{f'{low:.0f} to {high:.0f}':12} {first:6.0f} {blocked:6.0f} %"
-            )
+    """A row for each kind of world, task and epsilon, once all are known to be allowed."""
+    choices = list(product(WORLDS, TASKS, settings.epsilon))
+    places = {kind: [build(n) for n in range(settings.seeds)] for kind, build in WORLDS.items()}
+    rows: list[str] = []
+    with progress_bar("Ants with a fixed rule") as progress:
+        for kind, name, epsilon in choices:
+            outcome = evaluate(settings, places[kind], TASKS[name], epsilon)
+            rows.append(f"{kind:6} {name:18} {epsilon:7g} {row(outcome)}")
+            progress(len(rows) / len(choices))
+    print(HEAD, *rows, sep="\n")
+
+
+def row(outcome: ColonyEpisodes) -> str:
+    """What the ants do in one kind of world."""
+    deliveries = outcome.deliveries.mean(axis=0) * 1000 / TICKS
+    (low,), (high,) = bootstrap_interval(deliveries[None])
+    # An episode without any delivery counts with all its ticks.
+    first = np.where(outcome.first_delivery < 0, TICKS, outcome.first_delivery).mean()
+    blocked = 100 * outcome.blocked.sum() / outcome.moves.sum()
+    return (
+        f"{deliveries.mean():11.0f}  {f'{low:.0f} to {high:.0f}':12} {first:6.0f} {blocked:6.0f} %"
+    )
 
 
 def evaluate(

@@ -1,7 +1,8 @@
 """The double bridge of Goss and others: how often a colony's ants take the shorter branch.
 
 Prints the distribution of colonies by the share of their ants on the short branch, for branches
-whose lengths have the ratio r, beside the published one. See docs/baselines.md.
+whose lengths have the ratio r, beside the published one, and how exact so many colonies make it.
+See docs/baselines.md.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import argparse
 
 from taichi_ants.baselines.goss import PUBLISHED, choices, class_shares, crossing_steps
+from taichi_ants.errors import count
 from taichi_ants.studies.command_line import Parser, run_command, whole_number
 
 
@@ -31,6 +33,11 @@ def print_table(settings: argparse.Namespace) -> None:
         took = choices(short, long, settings.colonies, seed=settings.seed, threads=settings.threads)
         for name, row in (("ours", class_shares(took)), ("published", published)):
             print(f"  {ratio:3}  {name:9}" + "".join(f"{percent:9.1f}" for percent in row))
+    # A share p of N colonies has the standard error sqrt(p (1 - p) / N), most with p one half.
+    print(
+        f"\nour shares are of {count(settings.colonies, 'colony')} for each r: their standard "
+        f"error is at most {50 / settings.colonies**0.5:.1f} points"
+    )
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from taichi_ants.environment import prepare_for_taichi
+from taichi_ants.envs.registration import register_in_time
 
 if TYPE_CHECKING:
     from taichi_ants import analysis, learners, reference, rendering, task, worlds
@@ -68,6 +69,7 @@ __all__ = [
 ]
 
 prepare_for_taichi()
+register_in_time()
 
 
 def __getattr__(name: str) -> object:

@@ -9,6 +9,7 @@ import contextlib
 import gc
 import io
 import os
+import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,9 @@ from taichi_ants.errors import AntsError, check_one_of, checked_whole
 
 ARCHITECTURES = ("cpu", "cuda")
 MAX_THREADS = 1024
+
+# Taichi compiles and launches for one thread at a time; environments of several threads hold this.
+alone = threading.RLock()
 
 _kept: list[object] = []  # see start_for_trial
 

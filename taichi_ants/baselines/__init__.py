@@ -1,1 +1,1 @@
-"""What is no learner: the published model of the double bridge, and ant colony optimisation."""
+"""What is no learner: the double bridge's published model, colony optimisation, utilities."""

@@ -29,11 +29,11 @@ from typing import Literal, get_args
 import numpy as np
 
 from taichi_ants import runtime
+from taichi_ants.baselines.open_cells import open_cells, shortest_way
 from taichi_ants.checks import checked_world
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, shown, whole
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_TOUR
 from taichi_ants.grid.randomness import stream_state
-from taichi_ants.task.constants import EMPTY, FOOD, QUEEN
 from taichi_ants.worlds.world import World
 
 Method = Literal["ant_system", "max_min"]
@@ -108,14 +108,14 @@ def search(
     rho = EVAPORATION[method] if evaporation is None else evaporation
     if not (isinstance(rho, Real) and not isinstance(rho, bool) and 0 < rho <= 1):
         raise AntsError(f"evaporation is {shown(rho)}; it must be above 0 and at most 1.")
-    neighbours, is_food, start = _graph(checked_world(world, learns=True))
+    _, neighbours, is_food, start = open_cells(checked_world(world, learns=True))
     n, n_ants = len(neighbours), colonies * ants
     if n * n_ants > _MAX_ENTRIES:
         raise AntsError(
             f"{colonies} colonies of {ants} ants in a world of {n} open cells need arrays of "
             f"{n * n_ants} entries; at most {_MAX_ENTRIES} are allowed, so choose fewer."
         )
-    shortest = _shortest(neighbours, is_food, start)
+    shortest = shortest_way(neighbours, is_food, start)
     numbers = np.arange(colonies)[:, None] * 2**32 + np.arange(ants)
     states = stream_state(whole("seed", seed), STREAM_TOUR, numbers).reshape(-1)
 
@@ -181,31 +181,6 @@ class _Bounds:
         lowest = np.minimum(highest * (1 - right) / ((self._ways - 1) * right), highest)
         # Where no food was found yet, all tau stay 1.
         return np.where(winner, deposits, 0), np.where(has, lowest, 1), np.where(has, highest, 1)
-
-
-def _graph(world: World) -> tuple[np.ndarray, np.ndarray, int]:
-    """Neighbours int32 (n, 6) of the open cells, which of them are food, int32 (n,), the queen."""
-    ground = world.ground()
-    cells = np.flatnonzero(np.isin(ground, (EMPTY, FOOD, QUEEN)))
-    number = np.full(ground.size, -1, np.int32)
-    number[cells] = np.arange(len(cells), dtype=np.int32)
-    neighbours = number[cells[:, None] + world.grid.offsets]
-    is_food = (ground[cells] == FOOD).astype(np.int32)
-    return neighbours, is_food, int(number[world.grid.index(world.queen)])
-
-
-def _shortest(neighbours: np.ndarray, is_food: np.ndarray, start: int) -> int:
-    """Steps to the nearest food, breadth first."""
-    seen = np.zeros(len(neighbours) + 1, bool)
-    seen[-1] = True  # no neighbour
-    layer, steps = np.array([start]), 0
-    while len(layer):
-        if is_food[layer].any():
-            return steps
-        seen[layer] = True
-        around = np.unique(neighbours[layer])
-        layer, steps = around[~seen[around]], steps + 1
-    raise AntsError("no food can be reached from the queen; give the world a way.")
 
 
 def _ways(neighbours: np.ndarray) -> float:

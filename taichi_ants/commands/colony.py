@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from taichi_ants.studies.command_line import (
     HYPERPARAMETER,
+    WORLDS,
     Parser,
     add_common,
     add_results,
@@ -56,6 +57,7 @@ WIDTH = 100  # of the report, in columns
 COUNT: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
 CONDITIONS, FIGURES = "conditions.csv", "figures"
 _OF_RESUMED = ("resume", "ticks", "save", "render", "every", "figure", "plugin", "threads", "arch")
+_OF_LEARNING = ("learner", "learning_rate", "discount", "hyperparameter")
 _OF_LIFE = ("births", "lifespan", "regrowth", "wander")
 _OF_PHEROMONE = (
     *("evaporation", "half_life", "diffusion"),
@@ -77,15 +79,27 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     if settings.kind == "study":
         for name in QUICK.keys() - given.keys() if settings.quick else ():
             setattr(settings, name, QUICK[name])
+        settings.arenas = tuple(one for one in ARENAS if one in settings.arenas)
         settings.sizes = tuple(sorted({1, *settings.sizes}))
         with_folder(settings, "colony")
-    elif settings.resume:
-        for name, flag in given.items():
-            if name not in _OF_RESUMED:
-                parser.error(f"{flag} cannot change a colony that is resumed, leave it out")
-    elif settings.policy and settings.observation:
-        parser.error("--observation is that of the policy, leave it out")
+    else:
+        _check_live(settings, given, parser.error)
     return settings
+
+
+def _check_live(
+    settings: argparse.Namespace, given: Mapping[str, str], error: Callable[[str], NoReturn]
+) -> None:
+    """Refuse options that would change nothing beside others."""
+    for name, flag in given.items():
+        if settings.resume and name not in _OF_RESUMED:
+            error(f"{flag} cannot change a colony that is resumed, leave it out")
+        if settings.sharing == "fixed" and name in _OF_LEARNING:
+            error(f"{flag} is of learning, but with --sharing fixed nobody learns, leave one out")
+    if settings.policy and settings.observation:
+        error("--observation is that of the policy, leave it out")
+    if "every" in given and (not settings.render or settings.render.lower().endswith(".png")):
+        error("--every is of an animation, name one with --render, or leave it out")
 
 
 def _add_learning(parser: argparse.ArgumentParser, epsilon: float) -> None:
@@ -99,7 +113,8 @@ def _add_learning(parser: argparse.ArgumentParser, epsilon: float) -> None:
 
 def _add_study(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("--arenas", nargs="+", default=ARENAS, metavar="NAME", help="kinds of world")
+    arenas: dict[str, Any] = {"nargs": "+", "choices": ARENAS, "metavar": "NAME"}
+    add("--arenas", **arenas, default=ARENAS, help="kinds of world")
     several: dict[str, Any] = {"nargs": "+", "type": whole_number(1, 100_000)}
     sizes = "numbers of ants where they are trained"
     add("--sizes", **several, default=(1, 4, 16, 64), metavar="N", help=sizes)
@@ -123,7 +138,7 @@ def _add_live(parser: argparse.ArgumentParser) -> None:
     add("--seed", type=whole_number(), default=0, metavar="N", help="the first of them")
     start = "of ants, by the queen or anywhere"
     add("--start", choices=("nest", "spread"), default="nest", help=start)
-    add("--world", default="open", metavar="NAME", help="paper, open, or the path of a map file")
+    add("--world", default="open", metavar="NAME", help=WORLDS)
     add("--ranges", type=whole_number(1), nargs=3, metavar=("X", "Y", "Z"), help="of an open world")
     add("--sharing", choices=("shared", "own", "fixed"), default="shared", help="of tables")
     add("--policy", metavar="FILE", help="a policy file to start from (.npz)")
@@ -195,7 +210,9 @@ def study(settings: argparse.Namespace) -> None:
         settings.rollouts,
     )
     asked = Study(tuple(conditions.values()), seeds)
-    work_or_show(settings, asked.settings(), partial(do_study, settings, conditions, asked))
+    words = {name: getattr(settings, name) for name in ("arenas", "sizes")}
+    facts = {**words, **asked.settings()}
+    work_or_show(settings, facts, partial(do_study, settings, conditions, asked), tuple(words))
 
 
 def do_study(
@@ -285,7 +302,7 @@ def new_colony(settings: argparse.Namespace) -> Colony:
 
 def rules(settings: argparse.Namespace, policy: Policy | None) -> Task:
     """The task that is named, else the policy's, else the paper's; with what options change."""
-    from taichi_ants import Task, task
+    from taichi_ants import Pheromone, Task, task
 
     named = getattr(task, settings.task)() if settings.task else None
     base = named or (policy.task if policy else Task())
@@ -297,6 +314,8 @@ def rules(settings: argparse.Namespace, policy: Policy | None) -> Task:
         of_trails.setdefault("half_life", None)
     if "deposit" in of_trails:
         of_trails = {"slope": None, "cap": None, **of_trails}
+    if of_trails.get("deposit") == "none":
+        of_trails.setdefault("level", Pheromone().level)
     seen = {"observation": policy.observation} if policy else _given(settings, ("observation",))
     return replace(
         base,

@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import argparse
 import itertools
+from dataclasses import fields
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from taichi_ants.studies.command_line import (
+    HYPERPARAMETER,
+    WORLDS,
     Parser,
     add_common,
     add_results,
@@ -62,11 +65,13 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--epsilon-decays", **few, default=(0.99, 0.995))
     several: dict[str, Any] = {"nargs": "+", "type": whole_number(1), "metavar": "N"}
     add("--planning-steps", **several, default=(3, 5), help="one or more, for learners that plan")
+    words = "of all learners that have it; may be given several times"
+    add("--hyperparameter", **{**HYPERPARAMETER, "help": words})
     switch: dict[str, Any] = {"choices": ("on", "off"), "metavar": "on|off"}
     add("--train-evaporation", **switch, default="off", help="of trails; off in the paper")
     add("--greedy-evaporation", **switch, default="on", help="in the greedy evaluation")
-    add("--world", default="paper", help="paper, open, or the path of a map file")
-    add("--world-seed", type=whole_number(), metavar="N", help="seed of an open world")
+    add("--world", default="paper", help=WORLDS)
+    add("--world-seed", type=whole_number(), metavar="N", help="seed of a world drawn at random")
     add_common(parser)
     add("--quick", action="store_true", help=f"at most {QUICK_SEEDS} seeds")
     add_results(parser, "compare")
@@ -76,9 +81,28 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     return with_folder(settings, "compare")
 
 
+def variants(settings: argparse.Namespace) -> list[tuple[str, dict[str, Any]]]:
+    """The learners, each with what it has of the hyperparameters, once for each planning depth."""
+    from taichi_ants import AntsError, learners
+
+    given: dict[str, Any] = dict(settings.hyperparameter)
+    if _DEPTH in given:
+        raise AntsError(f"{_DEPTH} is an option of its own; write --planning-steps.")
+    kinds = {name: fields(learners.get(name).hyperparameters) for name in settings.learners}
+    own = {name: [field.name for field in kind] for name, kind in kinds.items()}
+    for one in given:
+        if not any(one in names for names in own.values()):
+            raise AntsError(f"{one!r} is no hyperparameter of {', '.join(own)}; leave it out.")
+    return [
+        (name, {one: value for one, value in {**given, _DEPTH: n}.items() if one in names})
+        for name, names in own.items()
+        for n in (settings.planning_steps if _DEPTH in names else [0])
+    ]
+
+
 def points(settings: argparse.Namespace, world: World) -> tuple[RunPoint, ...]:
     """The grid: tasks, learners and planning steps, times rates, discounts and exploration."""
-    from taichi_ants import Task, TrainingConfig, learners
+    from taichi_ants import Task, TrainingConfig
     from taichi_ants.studies.runner import RunPoint
 
     tasks = [
@@ -89,16 +113,10 @@ def points(settings: argparse.Namespace, world: World) -> tuple[RunPoint, ...]:
         )
         for delivery in (DELIVERIES if settings.delivery == "both" else (settings.delivery,))
     ]
-    depths: list[dict[str, Any]] = [{_DEPTH: n} for n in settings.planning_steps]
-    variants = [
-        (name, more)
-        for name in settings.learners
-        for more in (depths if hasattr(learners.get(name).hyperparameters, _DEPTH) else [{}])
-    ]
     numbers = itertools.product(
         settings.learning_rates, settings.discounts, settings.epsilons, settings.epsilon_decays
     )
-    grid = itertools.product(tasks, variants, tuple(numbers))
+    grid = itertools.product(tasks, variants(settings), tuple(numbers))
     lengths = settings.episodes, settings.max_steps, ROLLOUTS
     every = (
         RunPoint(world, task, TrainingConfig(name, *four, **more), *lengths)

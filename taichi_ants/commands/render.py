@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from taichi_ants.studies.command_line import (
     HYPERPARAMETER,
+    WORLDS,
     Parser,
     load_plugin,
     progress_bar,
@@ -68,7 +69,7 @@ _TRAINING: dict[str, tuple[str, str, dict[str, Any]]] = {  # of no use beside --
 _OPTIONS = {
     "--out": ("ecls", "file or folder", {"metavar": "PATH"}),
     "--title": ("ecls", "a line above all", {"metavar": "TEXT"}),
-    "--world": ("ecls", "a name as paper or open, or the path of a map file", {"default": "paper"}),
+    "--world": ("ecls", WORLDS, {"default": "paper"}),
     "--world-seed": ("ecls", "seed of a world drawn at random", {**_SEED, "default": None}),
     "--seed": ("ecls", "seed of training and of what is shown", _SEED),
     "--plugin": ("ecls", "a Python file with learners, worlds, observations", {"metavar": "FILE"}),
@@ -115,6 +116,8 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     for flag in given.values():
         if flag in _TRAINING and getattr(settings, "policy", None):
             parser.error(f"{flag} is of training, but --policy is trained already, leave one out")
+        if flag in ("--follow", "--title") and getattr(settings, "plain", False):
+            parser.error(f"--plain leaves out what {flag} shows, leave out one of them")
     return settings
 
 

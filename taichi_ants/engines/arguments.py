@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cache
+from functools import cache, partial
 from typing import Any
 from weakref import WeakKeyDictionary, finalize, ref
 
@@ -43,15 +43,69 @@ class Arguments:
         if self._taichi() is not taichi:
             self._values, self._taichi = dict(values), ref(taichi)
             # As `kind(**values)`, which makes two packs.
-            self._pack = ArgPack(kind.members, kind.dtype, dict(values))
-            # Taichi would delete a pack of a program that is gone, which ends the process.
-            type(self._pack).__del__ = _nothing
+            self._pack = _Pack(kind.members, kind.dtype, dict(values))
             memory = self._pack._ArgPack__argpack
             finalize(self._pack, _delete, self._taichi, memory).atexit = False
         for name, value in values.items():
             if self._values[name] is not value:
                 self._pack[name] = self._values[name] = value
         return self._pack
+
+
+class Launch:
+    """A kernel of one argument pack, launched again and again.
+
+    For each launch Taichi looks at every array of the pack anew, 10 microseconds each. On the CPU
+    what it finds is kept here, so that a launch takes 10 in all.
+    """
+
+    def __init__(self, kernel: Callable[[Any], None]) -> None:
+        self._kernel, self._arguments = kernel, Arguments()
+        self._taichi: Any = lambda: None  # in which the launch was prepared
+        self._launch: Any = None  # what it launches, and with what
+        self._context: Any = None
+        self._known: dict[str, Any] = {}  # the values that it has
+
+    def __call__(self, values: Mapping[str, Any]) -> None:
+        """Launch on these values; names and types are the same in each call.
+
+        Arrays are C-contiguous, as all of the engines are.
+        """
+        taichi = ti.lang.impl.get_runtime()
+        if self._taichi() is not taichi:
+            self._prepare(taichi, values)
+        known = self._known
+        for name, value in values.items():
+            if known[name] is not value:
+                self._set(values)
+                break
+        self._launch(self._context)
+
+    def _prepare(self, taichi: Any, values: Mapping[str, Any]) -> None:
+        """Compile the kernel, as Taichi would."""
+        kernel, program = self._kernel._primal, taichi.prog  # type: ignore[attr-defined]
+        pack = self._arguments.pack(values)
+        with runtime.quiet():
+            one = kernel.compiled_kernels[kernel.ensure_compiled(pack)]
+            compiled = program.compile_kernel(program.config(), program.get_device_caps(), one)
+        self._context = one.make_launch_context()
+        self._context.set_arg_argpack((0,), pack._ArgPack__argpack)
+        self._taichi, self._launch = ref(taichi), partial(program.launch_kernel, compiled)
+        self._known = dict.fromkeys(values)
+        if program.config().arch not in (ti.x64, ti.arm64):  # arrays move for each launch
+            self._launch = lambda _: self._kernel(pack)
+
+    def _set(self, values: Mapping[str, Any]) -> None:
+        """Tell what has changed; the arrays of a pack are arguments of their own behind it."""
+        self._arguments.pack(values)
+        arrays = [name for name, value in values.items() if isinstance(value, np.ndarray)]
+        for number, name in enumerate(arrays):
+            array = values[name]
+            if self._known[name] is not array:
+                self._context.set_arg_external_array_with_shape(
+                    (1 + number,), array.ctypes.data, array.nbytes, array.shape, 0
+                )
+        self._known = dict(values)
 
 
 _LAUNCHED: WeakKeyDictionary[Any, set] = WeakKeyDictionary()
@@ -66,8 +120,11 @@ def compile_once(kernel: Callable[[Any], None], nothing: Callable[[], Any]) -> N
         launched.add(kernel)
 
 
-def _nothing(pack: Any) -> None:
-    pass
+class _Pack(ArgPack):
+    """A pack whose memory is deleted by `_delete`."""
+
+    def __del__(self) -> None:
+        """Not as Taichi, which would delete that of a program that is gone, and end the process."""
 
 
 def _delete(taichi: ref, memory: Any) -> None:

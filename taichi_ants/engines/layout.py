@@ -1,5 +1,7 @@
 """Names of the columns and rows of arrays that engines and kernels share; no Taichi here."""
 
+from enum import IntEnum, auto
+
 # The settings of a run, columns in front of the hyperparameters of its learner.
 SETTINGS = (
     *("discount", "epsilon_decay", "min_epsilon"),
@@ -27,3 +29,29 @@ TRACE = (
     "terminated",
     "events",
 )
+
+
+class Command(IntEnum):
+    """What an ant in lockstep is told to do."""
+
+    STEP = 0
+    BEGIN = auto()  # an episode
+    WAIT = auto()
+
+
+class Outcome(IntEnum):
+    """What came of the last action of an ant in lockstep, and why nothing did."""
+
+    NONE = 0  # the episode has just begun
+    MOVED = auto()
+    PICKED_UP = auto()
+    DELIVERED = auto()
+    # Blocked; the ant turned all the same.
+    ROCK_AHEAD = auto()  # or the edge of the world
+    FOOD_AHEAD = auto()
+    QUEEN_AHEAD = auto()
+    # Failed to pick up, or to give.
+    HAS_FOOD = auto()
+    SEES_NO_FOOD = auto()
+    HAS_NO_FOOD = auto()
+    SEES_NO_QUEEN = auto()

@@ -27,6 +27,12 @@ def pack_cells(world: World) -> np.ndarray:
     return np.ascontiguousarray(packed, dtype=np.int32)
 
 
+def unpack_cells(packed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What packed cells (n,) hold, uint8 (n,), and the trails that are stored there, int32 (n,)."""
+    ground = np.where(packed >= 0, EMPTY, packed + _OCCUPIED).astype(np.uint8)
+    return ground, np.maximum(packed, 0)
+
+
 def compass_of(grid: AxialGrid) -> np.ndarray:
     """Index steps and turns by heading, i32 (38,); its layout is that of `rules.actions`."""
     headings = np.arange(N_HEADINGS)

@@ -22,3 +22,4 @@ STREAM_BORN = 4  # number: episode * 2**32 + the ant
 STREAM_QUEEN = 5  # number: 0
 STREAM_BRIDGE = 6  # number: the colony at the double bridge of `baselines.goss`
 STREAM_TOUR = 7  # number: colony * 2**32 + the ant of `baselines.ant_system`
+STREAM_FORAGER = 8  # number: colony * 2**32 + the ant of `baselines.utility`

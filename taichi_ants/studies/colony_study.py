@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants import worlds
+from taichi_ants import learners, worlds
 from taichi_ants.analysis.bounds.limits import limits_of
 from taichi_ants.analysis.colony.study import (
     ABC,
@@ -34,7 +34,7 @@ from taichi_ants.analysis.colony.study import (
     Measured,
     measures_of,
 )
-from taichi_ants.errors import check_one_of
+from taichi_ants.errors import AntsError, check_one_of
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.runner import ColonyPoint, Outcome
 from taichi_ants.task import Life, Pheromone, Task, foraging, paper, queueing
@@ -86,10 +86,16 @@ def plan(
         episodes, ticks, rollouts: As of a `ColonyPoint`.
 
     Raises:
-        AntsError: There is no such arena.
+        AntsError: There is no such arena, or ants cannot learn together with the learner.
     """
     for arena in arenas:
         check_one_of("the arena", arena, tuple(WORLDS))
+    if learners.get(training.learner).td_error is None:
+        able = [name for name in learners.names() if learners.get(name).td_error]
+        raise AntsError(
+            f"learner {training.learner!r} has no TD error that can be summed over ants, and here "
+            f"they learn together; choose one of {', '.join(able)}."
+        )
     training = scheduled(training, episodes)
     places = {
         arena: worlds.paper() if arena == "paper" else tuple(_place(arena, s) for s in seeds)

@@ -22,6 +22,8 @@ class _HelpFormatter(argparse.ArgumentDefaultsHelpFormatter):
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
         silent = action.default in (None, []) or action.default is False
+        if isinstance(action.default, (list, tuple)) and not silent:
+            return f"{action.help} (default: {' '.join(map(str, action.default))})"
         return action.help if silent else super()._get_help_string(action)
 
 
@@ -94,6 +96,9 @@ def _named_number(text: str) -> tuple[str, float]:
         words = f"{text!r} is no name and number, write it as planning_steps=3"
         raise argparse.ArgumentTypeError(words) from None
 
+
+# What --world takes. The names stand here since those of the registry come with NumPy.
+WORLDS = "paper, open, far_piles, double_bridge, or the path of a map file"
 
 # The option of commands that train one learner; `dict(settings.hyperparameter)` has its numbers.
 HYPERPARAMETER: dict[str, Any] = {

@@ -14,7 +14,7 @@ import sys
 import tempfile
 import time
 from argparse import Namespace
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,10 @@ REPORT = "report.txt"  # what commands print
 
 
 def work_or_show(
-    settings: Namespace, determines: Mapping[str, Any], work: Callable[[Path, Path], None]
+    settings: Namespace,
+    determines: Mapping[str, Any],
+    work: Callable[[Path, Path], None],
+    leading: Sequence[str] = (),
 ) -> None:
     """Do the work of a command, or show what its folder holds already; print the report.
 
@@ -37,12 +40,14 @@ def work_or_show(
         settings: The command's `out`, `force`, `plugin` and `arch`.
         determines: What determines the results besides these.
         work: Called with a folder for blocks and one for the results, among them the report.
+        leading: Settings from which others follow, see `ResultFolder`.
 
     Raises:
         AntsError: The folder holds something else, cannot be written, or was altered.
     """
     plugin = _hash(Path(settings.plugin)) if settings.plugin else None
-    folder = ResultFolder(settings.out, {**determines, "arch": settings.arch, "plugin": plugin})
+    facts = {**determines, "arch": settings.arch, "plugin": plugin}
+    folder = ResultFolder(settings.out, facts, leading)
     if not settings.force and folder.is_finished():
         folder.check_whole()
         print((settings.out / REPORT).read_text("utf-8"))
@@ -52,7 +57,7 @@ def work_or_show(
     with folder.work(settings.force) as (blocks, ready):
         work(blocks, ready)
         report = (ready / REPORT).read_text("utf-8")
-        seconds = time.perf_counter() - began
+        seconds = folder.seconds_before + time.perf_counter() - began
         folder.publish(ready, {**provenance(sys.argv), "seconds": seconds})
     print(f"{report}\n{seconds:.1f} s; everything is in {settings.out}/")
 
@@ -63,10 +68,18 @@ class ResultFolder:
     Args:
         path: The folder; it need not exist.
         settings: All that determines the results, as `files.to_json` knows it.
+        leading: Settings from which others follow: where these differ, only they are named.
+
+    Attributes:
+        seconds_before: Of the processes that stopped, each until its last block, known in `work`.
     """
 
-    def __init__(self, path: str | Path, settings: Mapping[str, Any]) -> None:
+    def __init__(
+        self, path: str | Path, settings: Mapping[str, Any], leading: Sequence[str] = ()
+    ) -> None:
         self.path = Path(path)
+        self.seconds_before = 0.0
+        self._leading = leading
         self._settings = json.loads(files.to_json(settings))
         self._unfinished = self.path / UNFINISHED
 
@@ -82,6 +95,7 @@ class ResultFolder:
             other = _manifest_in(place)["settings"]
             keys = dict.fromkeys([*self._settings, *other])
             different = [key for key in keys if self._settings.get(key) != other.get(key)]
+            different = [key for key in different if key in self._leading] or different
             if different:
                 raise AntsError(
                     f"{str(self.path)!r} holds {what} of other settings ({', '.join(different)} "
@@ -126,7 +140,9 @@ class ResultFolder:
                 self._clear()
             for folder in (blocks, self._unfinished / READY):
                 files.check_writable_folder(folder)
-            files.write_json(manifest, {"settings": self._settings})
+            self.seconds_before = self._seconds_so_far()
+            contents = {"settings": self._settings, "seconds": self.seconds_before}
+            files.write_json(manifest, contents)
             with tempfile.TemporaryDirectory(dir=self._unfinished / READY) as ready:
                 yield blocks, Path(ready)
         finally:
@@ -151,6 +167,20 @@ class ResultFolder:
         contents = {**manifest, "files": hashes, "settings": self._settings}
         files.write_json(self.path / MANIFEST, contents)
         self._clear()  # now it is finished
+
+    def _seconds_so_far(self) -> float:
+        """The seconds of the processes that have worked in `unfinished`, even if they were killed.
+
+        Each writes the manifest when it begins, with the seconds of those before it; its own are
+        from then to its last block.
+        """
+        manifest = self._unfinished / MANIFEST
+        if not manifest.exists():
+            return 0.0
+        begun = manifest.stat().st_mtime
+        blocks = (self._unfinished / BLOCKS).rglob("*.npz")
+        last = max((block.stat().st_mtime for block in blocks), default=begun)
+        return float(_manifest_in(self._unfinished).get("seconds", 0.0)) + max(0.0, last - begun)
 
     def _clear(self) -> None:
         """Remove what is ours in `unfinished`, and the folder if that was all."""

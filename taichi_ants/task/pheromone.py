@@ -33,7 +33,8 @@ class Pheromone:
         deposit: "set": a carrying ant sets the trail of a cell to `level`. "add": it adds `level`,
             up to `cap`. "fading": it raises the trail to `level` less `slope` for each tick that it
             has carried its food, so that trails rise towards food. "none": it lays nothing.
-        level: What a deposit sets or adds, in ticks of linear evaporation, 1 .. 1 000 000.
+        level: What a deposit sets or adds, in ticks of linear evaporation, 1 .. 1 000 000; where
+            nothing is laid, the usual one.
         slope: How much less an ant lays after each tick with food, 1 .. 1 000 000; of "fading"
             only, there 10 if None. Trails rise towards food if it is above what evaporates.
         cap: No deposit that adds leaves a trail above this, 1 .. 1 000 000; of "add" only, there
@@ -73,6 +74,11 @@ class Pheromone:
         if self.slope is not None:
             checked_whole("slope", self.slope, 1, MAX_DEPOSIT)
         check_one_of("view", self.view, VIEWS)
+        if self.deposit == "none" and self.level != DEPOSIT_LEVEL:
+            raise AntsError(
+                f"level is {shown(self.level)}, but deposit is 'none'; make deposit another one, "
+                "or leave it out."
+            )
         self._settle("half_life", 50.0, "evaporation", "exponential")
         self._settle("cap", 1000, "deposit", "add")
         self._settle("slope", 10, "deposit", "fading")

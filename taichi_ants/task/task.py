@@ -97,7 +97,10 @@ class Task:
         given = dict(_known("a task", cls, facts))
         for name, kind in _PARTS.items():
             if name in given and not (kind is Traffic and isinstance(given[name], str)):
-                given[name] = kind(**_known(name, kind, given[name]))
+                part = dict(_known(name, kind, given[name]))
+                if part.get("deposit") == "none":  # older files have a level beside it
+                    part.pop("level", None)
+                given[name] = kind(**part)
         return cls(**given)
 
 

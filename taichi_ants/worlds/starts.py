@@ -36,6 +36,27 @@ def place(world: World, seed: int, n: int, where: str) -> tuple[np.ndarray, np.n
     return listed.astype(np.int32), headings.astype(np.int32)
 
 
+def first_starts(world: World, seeds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where the first ant starts by each of many seeds, uint64 (n,), as `place` with "nest".
+
+    Returns:
+        Flat indices and headings, both int32 (n,).
+    """
+    if len(world.ants) or not len(seeds):
+        listed = world.grid.index(world.ants[:1, :3]), world.ants[:1, 3]
+        cells, headings = (np.broadcast_to(one, len(seeds)) for one in listed)
+        return cells.astype(np.int32), headings.astype(np.int32)
+    free = np.flatnonzero(world.ground() == EMPTY)
+    if not len(free):
+        place(world, 0, 1, "nest")  # says that there is no room
+    distance = world.distances()[free]
+    nearest = free[distance == distance.min()]
+    numbers = world.grid.number(world.grid.cells(nearest))
+    words = stream_state(seeds[:, None], STREAM_START_CELL, numbers[None, :])
+    headings = choose(stream_state(seeds, STREAM_START_HEADING, 0) >> np.uint64(32), N_HEADINGS)
+    return nearest[words.argmin(axis=1)].astype(np.int32), headings.astype(np.int32)
+
+
 def _free_cells(world: World, seed: int, n: int, taken: np.ndarray, where: str) -> np.ndarray:
     """The first n free cells by their distance to the queen ("nest" only), then by a hash.
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -178,24 +179,12 @@ def to_text(world: World) -> str:
             cannot show.
     """
     expect("world", world, World)
-    size_x, size_y, size_z = world.ranges
-    height, width = 2 * size_x + size_y + size_z - 3, 2 * (size_y + size_z) - 3
     levels = np.unique(world.trails[:, 3])
     if len(levels) > 1:
         raise AntsError(
             f"the trails have {len(levels)} levels from {levels[0]} to {levels[-1]}, but a map can "
             "show one only; give all trails the same level."
         )
-    page = np.full((height, width), " ")
-
-    def draw(cells: np.ndarray, mark: str) -> None:
-        x, y, z = cells.T
-        page[y + z - 2 * (x - size_x + 1), 2 * (y - z + size_z - 1)] = mark
-
-    draw(world.grid.cells(np.flatnonzero(world.grid.exists)), EMPTY)
-    draw(world.obstacles, OBSTACLE)
-    draw(world.foods, FOOD)
-    draw(np.array([world.queen]), QUEEN)
     on_trail = {tuple(cell) for *cell, _ in world.trails.tolist()}
     hidden = on_trail & {world.queen, *map(tuple, world.foods.tolist())}
     if hidden:
@@ -203,8 +192,25 @@ def to_text(world: World) -> str:
             f"a trail lies on {min(hidden)} under the queen or food, which a map cannot show; "
             "take it out of the trails."
         )
-    draw(world.trails[:, :3], TRAIL)
+    marks = [(world.grid.cells(np.flatnonzero(world.grid.exists)), EMPTY)]
+    marks += [(world.obstacles, OBSTACLE), (world.foods, FOOD), (np.array([world.queen]), QUEEN)]
+    marks += [(world.trails[:, :3], TRAIL)]
     for *cell, heading in world.ants.tolist():
-        draw(np.array([cell]), (ANTS_ON_TRAIL if tuple(cell) in on_trail else ANTS)[heading])
-    drawn = ["".join(row).rstrip() for row in page]
-    return "\n".join([f"trail = {level}" for level in levels] + drawn) + "\n"
+        letters = ANTS_ON_TRAIL if tuple(cell) in on_trail else ANTS
+        marks.append((np.array([cell]), letters[heading]))
+    return "".join(f"trail = {level}\n" for level in levels) + drawing(world.ranges, marks)
+
+
+def drawing(ranges: tuple[int, int, int], marks: Iterable[tuple[np.ndarray, str]]) -> str:
+    """Characters on the cells of a world of these ranges.
+
+    Args:
+        ranges: Of the world.
+        marks: Cells (n, 3), in normal form, and the character on them; later ones lie above.
+    """
+    size_x, size_y, size_z = ranges
+    page = np.full((2 * size_x + size_y + size_z - 3, 2 * (size_y + size_z) - 3), " ")
+    for cells, mark in marks:
+        x, y, z = cells.T
+        page[y + z - 2 * (x - size_x + 1), 2 * (y - z + size_z - 1)] = mark
+    return "".join("".join(row).rstrip() + "\n" for row in page)

@@ -9,6 +9,7 @@ import pytest
 from command_lines import assert_one_sentence, run
 
 from taichi_ants import Colony, Life, TrainingConfig
+from taichi_ants.baselines.utility import forage
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.task import queueing
 from taichi_ants.worlds import paper
@@ -23,6 +24,12 @@ def test_goss_prints_ours_beside_the_published(kernels: Path, tmp_path: Path) ->
     for row, said in zip(ours, rows, strict=True):
         assert abs(float(row[-1]) - float(said[-1])) < 10
     assert all(abs(sum(map(float, row[2:])) - 100) < 0.3 for row in ours)
+    assert "of 500 colonies for each r: their standard error is at most 2.2 points" in done.stdout
+
+
+def test_goss_says_that_one_colony_says_nothing(kernels: Path, tmp_path: Path) -> None:
+    done = run("goss", ["--colonies", 1], kernels, tmp_path)
+    assert "of 1 colony for each r: their standard error is at most 50.0 points" in done.stdout
 
 
 def test_ant_system_prints_a_row_for_each_world_and_method(kernels: Path, tmp_path: Path) -> None:
@@ -33,11 +40,38 @@ def test_ant_system_prints_a_row_for_each_world_and_method(kernels: Path, tmp_pa
     assert [row[:3] for row in rows] == [["paper", "ant_system", "18"], ["paper", "max_min", "18"]]
 
 
-def test_mistakes_end_in_a_sentence(kernels: Path, tmp_path: Path) -> None:
-    done = run("ant_system", ["--worlds", "mars"], kernels, tmp_path)
+def test_utility_prints_a_row_for_each_world_and_room(kernels: Path, tmp_path: Path) -> None:
+    arguments = ["--seeds", 2, "--ants", 5, "--ticks", 300, "--room", 1, 3]
+    done = run("utility", arguments, kernels, tmp_path)
+    assert done.returncode == 0, done.stderr
+    rows = [line.split() for line in done.stdout.splitlines()[1:]]
+    expected = [[kind, room] for kind in ("paper", "open", "piles", "bridge") for room in "13"]
+    assert [row[:2] for row in rows] == expected
+    each = [forage(paper(), ticks=300, ants=5, colonies=4, capacity=3, seed=n) for n in (0, 1)]
+    mean = sum(outcome.deliveries.mean() for outcome in each) / 2
+    assert rows[1][2] == f"{1000 * mean:.0f}"
+    assert rows[1][7] == f"{sum((outcome.found > 0).sum() for outcome in each)}/8"
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "said"),
+    [
+        ("ant_system", ["--worlds", "paper", "mars"], "double_bridge"),
+        ("ant_system", ["--evaporation", 2], "evaporation is 2.0"),
+        ("fixed_rules", ["--epsilon", 2], "epsilon is 2.0"),
+        ("fixed_rules", ["--ants", 10**6], "1000000 ants"),
+        ("utility", ["--discount", 1], "discount is 1.0"),
+        ("goss", ["--colonies", 0], "0 is not allowed"),
+    ],
+)
+def test_mistakes_end_in_a_sentence_and_nothing_else(
+    name: str, arguments: list, said: str, kernels: Path, tmp_path: Path
+) -> None:
+    done = run(name, arguments, kernels, tmp_path)
     assert done.returncode == 2
     assert_one_sentence(done.stderr)
-    assert "double_bridge" in done.stderr
+    assert said in done.stderr
+    assert done.stdout == ""
 
 
 @pytest.mark.slow

@@ -167,6 +167,24 @@ def test_quick_has_a_folder_of_its_own():
     assert parse(["study", "--quick"]).out == Path("results", "colony-quick")
 
 
+def test_other_arenas_are_the_only_difference_and_their_order_is_none(
+    capsys, tmp_path, monkeypatch
+):
+    def stop(settings, conditions, asked, blocks, ready):
+        (blocks / "0.npz").touch()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command, "do_study", stop)
+    monkeypatch.chdir(tmp_path)
+    small = ["study", "--out", "out", "--seeds", 1, "--sizes", 2, "--arenas"]
+    for arenas in (["paper", "small"], ["small", "paper", "small"]):
+        assert call("colony", [*small, *arenas], capsys)[0] == 130
+    _, _, err = call("colony", [*small, "paper"], capsys)
+    assert "(arenas differ)" in err
+    _, _, err = call("colony", [*small, "paper", "small", "--discount", 0.8], capsys)
+    assert "(training.discount differ)" in err
+
+
 def blocks_in(folder):
     """Finished blocks with the time at which they were written."""
     found = (folder / "unfinished" / "blocks").glob("*.npz")
@@ -224,6 +242,10 @@ def test_stopped_and_killed_it_goes_on_to_the_same_results(finished, kernels, tm
         (["live", "--resume", "x", "--learner", "sarsa"], "--learner cannot change a colony"),
         (["live", "--resume", "x", "--births"], "--births cannot change a colony"),
         (["live", "--resume", "x", "--task", "paper"], "--task cannot change a colony that is"),
+        (["live", "--deposit", "none", "--level", 3], "level is 3, but deposit is 'none'"),
+        (["live", "--sharing", "fixed", "--discount", 0.9], "--discount is of learning, but with"),
+        (["live", "--every", 2], "--every is of an animation, name one with --render"),
+        (["live", "--render", "a.PNG", "--every", 2], "--every is of an animation"),
         (["live", "--cap", 5], "cap is 5, but deposit is 'set'"),
         (["live", "--slope", 5], "slope is 5, but deposit is 'set'"),
         (["live", "--task", "foraging", "--cap", 5], "cap is 5, but deposit is 'fading'"),
@@ -231,7 +253,11 @@ def test_stopped_and_killed_it_goes_on_to_the_same_results(finished, kernels, tm
         (["live", "--figure", "a.gif"], "'a.gif' is to hold one picture"),
         (["live", "--figure", "/proc/x/a.png"], "cannot write to the folder '/proc"),
         (["live", "--resume", "x"], "cannot read 'x'"),
-        (["study", "--arenas", "moon"], "the arena is 'moon'"),
+        (["study", "--arenas", "moon"], "--arenas: invalid choice: 'moon' (choose from"),
+        (
+            ["study", "--learner", "sarsa_lambda"],
+            "learn together; choose one of q_learning, sarsa,",
+        ),
         (["study", "--sizes", "300", "8", "--arenas", "paper"], "300 ants are asked for"),
         (["study", "--learner", "none"], "there is no learner 'none'"),
         (["study", "--epsilon", 2], "epsilon is 2.0"),
@@ -385,6 +411,11 @@ FOOD_IS_BACK = replace(queueing(), life=Life(regrowth=0))
         (["--task", "foraging"], queueing(), replace(foraging(), observation="queues")),
         (["--regrowth", 0, "--births"], queueing(), replace(queueing(), life=Life(True, None, 0))),
         (["--lifespan", 9], FOOD_IS_BACK, replace(queueing(), life=Life(False, 9, 0))),
+        (
+            ["--task", "foraging", "--deposit", "none"],
+            None,
+            replace(foraging(), pheromone=Pheromone(deposit="none", view="strongest")),
+        ),
         (["--traffic", "right_of_way"], None, Task(traffic=Traffic(swap=True))),
         (
             ["--task", "foraging", "--observation", "paper", "--traffic", "blocking"],

@@ -478,16 +478,17 @@ def test_a_learner_of_ones_own_and_a_discount_of_one_are_reported(tmp_path, comp
 
 def test_all_learners_of_the_library_can_be_compared(tmp_path, compare):
     names = ["expected_sarsa", "dyna_q", "sarsa_lambda"]
-    status, out, _ = compare(*TINY, "--learners", *names, "--out", tmp_path / "out")
+    more = ["--hyperparameter", "trace_decay=0.5"]
+    status, out, _ = compare(*TINY, "--learners", *names, *more, "--out", tmp_path / "out")
     rows = read_csv(tmp_path / "out" / "summary.csv")
     assert status == 0
     assert [(row["learner"], row["hyperparameters"]) for row in rows] == [
         ("expected_sarsa", ""),
         *(("dyna_q", "planning_steps=3"), ("dyna_q", "planning_steps=5")),
-        ("sarsa_lambda", "trace_decay=0.9 trace_length=32"),
+        ("sarsa_lambda", "trace_decay=0.5 trace_length=32"),
     ]
     assert "Expected SARSA" in out
-    assert "trace_decay=0.9" in " ".join(out.split())
+    assert "trace_decay=0.5" in " ".join(out.split())
 
 
 def test_training_of_the_comparison_can_be_continued(finished):

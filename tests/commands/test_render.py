@@ -194,6 +194,11 @@ WRONG = {
         ["episode", "--policy", "a.npz", "--observation", "paper"],
         "--observation is of training",
     ),
+    "view of a plain picture": (
+        ["colony", "--plain", "--follow", "0"],
+        "--plain leaves out what --follow shows",
+    ),
+    "title of a plain picture": (["episode", "--plain", "--title", "a"], "what --title shows"),
     "hyperparameter": (["sheet", "--hyperparameter", "x=y", "--out", "{}/a.png"], "'x=y' is no"),
     "hyperparameter of another": (
         ["episode", "--hyperparameter", "n_steps=2", "--out", "{}/a.gif"],

@@ -28,6 +28,7 @@ from taichi_ants import Colony, Life, Pheromone, Rewards, Task, TrainingConfig, 
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.studies.runner import EVALUATION_SEEDS
 from taichi_ants.studies.sweep_file import read_sweep
+from taichi_ants.task import observations
 from taichi_ants.worlds import registry
 
 RUNS = """
@@ -428,3 +429,10 @@ def test_the_script_of_observations_takes_the_options_of_a_sweep(tmp_path):
     done = subprocess.run(script, env=environment(tmp_path), capture_output=True, text=True)
     assert done.returncode == 0
     assert "--no-figures" in done.stdout
+
+
+def test_what_observations_gain_is_asked_of_all_of_them():
+    asked = read_sweep(EXPERIMENTS / "sweeps" / "observations.toml", NAMES)
+    for grid in asked.grids:
+        seen = {one["task.observation"] for one in asked.settings[grid]}
+        assert seen == set(observations.names())

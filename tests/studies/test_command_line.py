@@ -8,6 +8,7 @@ import sys
 
 import pytest
 
+from taichi_ants import worlds
 from taichi_ants.errors import AntsError
 from taichi_ants.studies import command_line
 from taichi_ants.studies.command_line import (
@@ -82,8 +83,13 @@ def test_help_shows_the_defaults_that_say_something(parser, monkeypatch):
     assert "--size SIZE how large (default: 3)" in lines
     assert "--seed SEED the first (default: 0)" in lines
     assert "--count COUNT how many" in lines
-    assert "--rates X [X ...] how fast (default: (0.1, 2.0))" in lines
+    assert "--rates X [X ...] how fast (default: 0.1 2.0)" in lines
     assert "--loud whether" in lines
+
+
+def test_help_names_all_worlds():
+    *names, path = command_line.WORLDS.split(", ")
+    assert (sorted(names), path) == (list(worlds.names()), "or the path of a map file")
 
 
 def fail_with(error):

@@ -74,6 +74,20 @@ def test_blocks_survive_what_is_ready_does_not(tmp_path):
     assert names(tmp_path / "out") == ["manifest.json", "report.txt", "table.csv"]
 
 
+def test_time_is_that_of_all_processes_until_their_last_block(tmp_path):
+    for n in (1, 2):
+        stop_after_a_block(tmp_path, block=f"block {n}")
+        last = (tmp_path / "unfinished" / "blocks" / "0.npz").stat().st_mtime
+        os.utime(tmp_path / "unfinished" / "manifest.json", (last, last - 100 * n))
+    folder = ResultFolder(tmp_path, SETTINGS)
+    with folder.work():
+        assert folder.seconds_before == pytest.approx(300)
+    with folder.work():  # the one before it made nothing that is kept
+        assert folder.seconds_before == pytest.approx(300, abs=1)
+    with folder.work(replace=True):
+        assert folder.seconds_before == 0
+
+
 def test_work_without_a_block_leaves_nothing(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         interrupted_work(tmp_path, block="")
@@ -86,6 +100,15 @@ def test_results_of_other_settings_are_kept_apart(tmp_path):
         ResultFolder(tmp_path, OTHER).is_finished()
     with pytest.raises(AntsError, match=r"\(more, rate, world differ\)"):
         ResultFolder(tmp_path, {"seeds": [0, 1], "more": 1}).is_finished()
+
+
+def test_of_settings_that_follow_from_others_only_these_are_named(tmp_path):
+    finish(tmp_path)
+    other = {**OTHER, "seeds": (1, 2)}
+    with pytest.raises(AntsError, match=r"\(seeds differ\)"):
+        ResultFolder(tmp_path, other, ("seeds", "more")).is_finished()
+    with pytest.raises(AntsError, match=r"\(rate differ\)"):
+        ResultFolder(tmp_path, OTHER, ("seeds", "more")).is_finished()
 
 
 def test_unfinished_work_of_other_settings_is_kept_apart(tmp_path):

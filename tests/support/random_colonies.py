@@ -124,12 +124,13 @@ def _pheromone(rng: np.random.Generator, dense: bool | None) -> Pheromone:
         diffusion = max(diffusion, 0.05)
     elif dense is False:
         evaporation, diffusion = "linear" if evaporation == "exponential" else evaporation, 0.0
+    level = int(rng.choice([1, 7, 250]))
     return Pheromone(
         evaporation=evaporation,
         half_life=half_life if evaporation == "exponential" else None,
         diffusion=diffusion,
         deposit=deposit,
-        level=int(rng.choice([1, 7, 250])),
+        level=250 if deposit == "none" else level,
         cap=int(rng.choice([1, 10, 1000])) if deposit == "add" else None,
         slope=int(rng.choice([1, 10, 100])) if deposit == "fading" else None,
     )

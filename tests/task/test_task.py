@@ -44,6 +44,8 @@ def test_a_task_can_be_written_as_json():
         Task(pheromone=Pheromone("exponential", 7.5, 0.1, "add", 9, 99), life=Life(True, 5, 0, 2)),
     ):
         assert Task.from_dict(json.loads(json.dumps(task.as_dict()))) == task
+    older = {"pheromone": {"deposit": "none", "level": 500}}  # a level that changed nothing
+    assert Task.from_dict(older) == Task(pheromone=Pheromone(deposit="none"))
     assert Task.from_dict({"rewards": {"give": 5}}) == Task(rewards=Rewards(give=5))
     assert Task.from_dict({"traffic": "following"}) == Task(traffic=Traffic.named("following"))
 
@@ -162,6 +164,7 @@ def test_each_row_has_a_name_of_its_own(name):
         ({"deposit": "drop"}, "deposit is 'drop'; .* set, add, fading, none"),
         ({"level": 0}, "level is 0; it must lie between 1 and 1000000"),
         ({"level": 2.5}, "level is 2.5"),
+        ({"deposit": "none", "level": 3}, "level is 3, but deposit is 'none'; make deposit anoth"),
         ({"cap": 1_000_001}, "cap is 1000001"),
         ({"half_life": 10}, "half_life is 10, but evaporation is 'linear'; make evaporation 'expo"),
         ({"half_life": 10, "evaporation": "none"}, "half_life is 10, but evaporation is 'none'"),

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from taichi_ants.analysis import style
-from taichi_ants.files import PathLike, write_csv
+from taichi_ants.files import PathLike, check_writable_folder, write_csv
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -48,6 +48,7 @@ def save(rows: Rates, who: str, path: PathLike) -> None:
     Raises:
         AntsError: A file cannot be written.
     """
+    check_writable_folder(Path(path).parent)
     write_csv(Path(path).with_suffix(".csv"), rows, COLUMNS)
     style.save(draw(rows, who), Path(path))
 

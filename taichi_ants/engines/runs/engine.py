@@ -50,6 +50,7 @@ _NO_WORK: dict[str, Any] = {
     "fades_after": 0,
     "turns_at_queen": 0,
     "cap": 0,  # of deposits that add
+    "regrows": 0,  # 1 if food grows back at once; not while an episode ends at a delivery
     "continuing": 0,  # 1 if a delivery is no terminal state
     "rewards": np.zeros(1, np.int32),  # (5,) by event
     # The world.
@@ -137,6 +138,28 @@ class Runs:
         return len(self.seeds)
 
 
+def laid_out(worlds: Sequence[World], task: Task, falls: bool) -> dict[str, Any]:
+    """What kernels read of a task, and of worlds of one grid, one behind the other.
+
+    `falls` tells whether trails evaporate.
+    """
+    pheromone, grid = task.pheromone, worlds[0].grid
+    return {
+        "size": grid.size,
+        "falls": int(falls and pheromone.evaporation == "linear"),
+        "level": pheromone.level,
+        "cap": pheromone.cap or 0,
+        "slope": pheromone.slope or 0,
+        "fades_after": pheromone.fades_after,
+        "turns_at_queen": int(task.turns_at_queen),
+        "rewards": task.rewards.by_event(),
+        "world": np.concatenate([pack_cells(world) for world in worlds]),
+        "trails": np.concatenate([world.trail_levels() for world in worlds]),
+        "closer": np.concatenate([world.closer() for world in worlds]),
+        "compass": compass_of(grid),
+    }
+
+
 class Launcher:
     """The compiled kernel of some runs in one world, and its arguments."""
 
@@ -157,22 +180,8 @@ class Launcher:
         )
         compile_once(self._kernel, lambda: Arguments().pack(_NO_WORK))
         falls = task.evaporation_in_training if learns else task.evaporation_in_evaluation
-        self._values = _NO_WORK | {
-            "max_steps": max_steps,
-            "size": world.grid.size,
-            "falls": int(falls and pheromone.evaporation == "linear"),
-            "level": pheromone.level,
-            "cap": pheromone.cap or 0,
-            "slope": pheromone.slope or 0,
-            "fades_after": pheromone.fades_after,
-            "turns_at_queen": int(task.turns_at_queen),
-            "continuing": int(task.delivery == "continuing"),
-            "rewards": task.rewards.by_event(),
-            "world": pack_cells(world),
-            "trails": world.trail_levels(),
-            "closer": world.closer().copy(),
-            "compass": compass_of(world.grid),
-        }
+        self._values = _NO_WORK | laid_out([world], task, falls)
+        self._values |= {"max_steps": max_steps, "continuing": int(task.delivery == "continuing")}
 
     def launch(self, some: slice, episodes: slice, **arrays: np.ndarray) -> None:
         """Do some episodes of some runs; what comes out is written into the arrays."""

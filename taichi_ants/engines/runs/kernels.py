@@ -87,7 +87,7 @@ def run_kernel(
             base, first = i * (a.size + EXTRA_CELLS), i * columns
             at = At(i * a.tables * table, i * a.floats_by_8 * 8, i * a.integers_by_8 * 8)
             discount = ti.cast(a.settings[first + DISCOUNT], ti.f32)
-            restore(a, base, 0, a.size - 1)
+            restore(a, base, 0, 0, a.size - 1)
             rng, exploration, rate = a.random_states[i], a.epsilon[i], a.learning_rate[i]
             n_recorded = i * a.n_episodes * a.max_steps
             for episode in range(a.n_episodes):
@@ -154,7 +154,7 @@ def run_kernel(
                 rng = ant.random_state
                 a.outcomes[RETURNS, i, episode], a.outcomes[STEPS, i, episode] = total, step
                 a.outcomes[DELIVERIES, i, episode] = ti.cast(ant.event == DELIVERED, ti.i32)
-                restore(a, base, a.cells[base + a.size], a.cells[base + a.size + 1])
+                restore(a, base, 0, a.cells[base + a.size], a.cells[base + a.size + 1])
                 exploration = ti.max(
                     a.settings[first + MIN_EPSILON],
                     exploration * a.settings[first + EPSILON_DECAY],

@@ -39,6 +39,7 @@ from taichi_ants.task.rules.vision import (
 
 # An ant, and what came of its last action.
 Ant = ti.types.struct(
+    origin=ti.i32,  # where its world begins in `world`, `trails` and `closer`
     cell=ti.i32,
     heading=ti.i32,
     carries=ti.i32,
@@ -52,10 +53,10 @@ EXTRA_CELLS = 2
 
 
 @ti.func
-def restore(a: ti.template(), base, first, last):
-    """Set the cells from `first` to `last` of a run back to the world's."""
+def restore(a: ti.template(), base, origin, first, last):
+    """Set the cells from `first` to `last` of a run back to those of its world."""
     for c in range(first, last + 1):
-        a.cells[base + c] = a.world[c]
+        a.cells[base + c] = a.world[origin + c]
     a.cells[base + a.size] = a.size
     a.cells[base + a.size + 1] = -1
 
@@ -95,7 +96,7 @@ def percept_of(half: ti.template(), a: ti.template(), base, ant, clock):
     right = a.cells[here + step_towards(a.compass, ant.heading, RIGHT)]
     percept = 0
     if ant.carries == 1:
-        nearer = nearer_from(a.closer[ant.cell], ant.heading)
+        nearer = nearer_from(a.closer[ant.origin + ant.cell], ant.heading)
         percept = percept_carrying(ground_of(left), ground_of(forward), ground_of(right), nearer)
     else:
         trail_left, trail_forward = ti.max(left - clock, 0), ti.max(forward - clock, 0)
@@ -124,7 +125,7 @@ def state_seen(observation: Observation, half: bool) -> Callable[..., Any]:
 
     @ti.func
     def see(a: ti.template(), base, ant, clock, percept):
-        here, nearer = base + ant.cell, nearer_from(a.closer[ant.cell], ant.heading)
+        here, nearer = base + ant.cell, nearer_from(a.closer[ant.origin + ant.cell], ant.heading)
         look = look_of(carries=ant.carries, own_level=ti.max(a.cells[here] - clock, 0))
         for k in ti.static(range(len(view))):
             towards = (ant.heading + view[k] + N_HEADINGS) % N_HEADINGS
@@ -168,7 +169,8 @@ def act(deposit: ti.template(), a: ti.template(), base, ant, percept, action, cl
                 k, after.random_state = draw_below(ant.random_state, popcnt(goals))
                 position = bit_number(goals, k)
             food = ant.cell + step_towards(a.compass, ant.heading, position)
-            lay(deposit, a, base, food, clock, a.trails[food], 0)
+            if a.regrows == 0:  # else the food is back before anybody sees what is under it
+                lay(deposit, a, base, food, clock, a.trails[ant.origin + food], 0)
             lay(deposit, a, base, ant.cell, clock, a.cells[base + ant.cell], 0)
             after.heading = turn_round(ant.heading)
             after.carries = 1

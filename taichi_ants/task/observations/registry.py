@@ -66,6 +66,11 @@ class Observation:
     letters: str = ""
     shape: tuple[int, ...] = ()
 
+    def __reduce__(self) -> Any:
+        # Pickles hold the name: where they are read, the same observation is registered.
+        registered = _OBSERVATIONS.get(self.name) is self
+        return (get, (self.name,)) if registered else object.__reduce_ex__(self, 2)
+
     @property
     def parts(self) -> tuple[int, ...]:
         """The sizes of the parts of a row: its `shape`, or the row itself."""

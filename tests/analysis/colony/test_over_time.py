@@ -31,6 +31,7 @@ def test_the_figure_shows_its_rows() -> None:
 
 
 def test_both_files_are_written_even_of_no_time_at_all(tmp_path: Path) -> None:
+    tmp_path /= "new"
     save(ROWS, "3 ants", tmp_path / "a.b.png")
     save([], "3 ants", tmp_path / "none.png")
     lines = (tmp_path / "a.b.csv").read_text("utf-8").splitlines()

@@ -1,0 +1,88 @@
+"""Ants for which pheromone is a utility (Panait and Luke 2004) on the maps of the package.
+
+Prints, for each kind of world and number of ants that fit into a cell: deliveries per 1000 ticks
+with their 95 % interval over seeds, the tick of the first delivery, in how many colonies the path
+found was ever a shortest, after how many ticks (the median of those), and how long it is at the
+end, as a multiple of the shortest (the mean of the colonies that have one, and how many do). The
+path found is a walk from the nest to food and back that always takes the highest utility. See
+docs/baselines.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+from itertools import product
+
+import numpy as np
+
+from taichi_ants import World, worlds
+from taichi_ants.analysis.statistics import bootstrap_interval
+from taichi_ants.baselines.utility import Foraging, forage
+from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
+
+SIZE = (30, 30, 30)
+WORLDS = {
+    "paper": lambda seed: worlds.paper(),
+    "open": lambda seed: worlds.open_world(seed, SIZE),
+    "piles": lambda seed: worlds.open_world(seed, SIZE, food_share=0.0),
+    "bridge": lambda seed: worlds.double_bridge(mirrored=bool(seed % 2)),
+}
+EPISODES = 4  # of each seed, as in fixed_rules.py
+HEAD = "world   room  deliveries  interval      first  found by  tick  length  at the end"
+
+
+def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
+    """The settings of the command line."""
+    parser = Parser(__doc__.split("\n", 1)[0], epilog=__doc__.split("\n", 1)[1])
+    add = parser.add_argument
+    add("--ants", type=whole_number(1), default=64, metavar="N", help="of each colony")
+    add("--room", type=whole_number(1), nargs="+", default=[1, 10], metavar="N", help="in a cell")
+    add("--ticks", type=whole_number(1), default=1000, metavar="N", help="how long")
+    add("--seeds", type=whole_number(2), default=20, metavar="N", help="how many, from 0 on")
+    add("--discount", type=float, default=0.9, metavar="X", help="of what is backed up")
+    add("--evaporation", type=float, default=0.001, metavar="X", help="the share lost per tick")
+    add("--exploration", type=float, default=0.1, metavar="X", help="share of random steps")
+    add("--momentum", type=float, default=0.8, metavar="X", help="to go on where nothing leads")
+    add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
+    return parser.parse_args(arguments)
+
+
+def print_table(settings: argparse.Namespace) -> None:
+    """A row for each kind of world and room of a cell, once all are known to be allowed."""
+    places = {kind: [build(n) for n in range(settings.seeds)] for kind, build in WORLDS.items()}
+    rows: list[str] = []
+    with progress_bar("Ants that back up utilities") as progress:
+        for kind, room in product(WORLDS, settings.room):
+            outcomes = [run(settings, world, n, room) for n, world in enumerate(places[kind])]
+            rows.append(f"{kind:6} {room:5} {row(outcomes)}")
+            progress(len(rows) / (len(WORLDS) * len(settings.room)))
+    print(HEAD, *rows, sep="\n")
+
+
+def run(settings: argparse.Namespace, world: World, seed: int, room: int) -> Foraging:
+    """Four colonies in one world."""
+    names = ("ticks", "ants", "discount", "evaporation", "exploration", "momentum", "threads")
+    given = {name: getattr(settings, name) for name in names}
+    return forage(world, colonies=EPISODES, capacity=room, seed=seed, **given)
+
+
+def row(outcomes: list[Foraging]) -> str:
+    """What all colonies in a kind of world did."""
+    deliveries = 1000 * np.array([one.deliveries.mean() for one in outcomes])
+    (low,), (high,) = bootstrap_interval(deliveries[None])
+    first = np.concatenate([one.first_delivery for one in outcomes])
+    # A colony without any delivery counts with all its ticks.
+    first = np.where(first == 0, outcomes[0].deliveries.shape[1], first).mean()
+    found = np.concatenate([one.found for one in outcomes])
+    when = f"{np.median(found[found > 0]):.0f}" if found.any() else "-"
+    ends = np.concatenate([one.lengths[:, -1:].ravel() / one.shortest for one in outcomes])
+    has = ends > 0
+    length = f"{ends[has].mean():.2f}" if has.any() else "-"
+    return (
+        f"{deliveries.mean():11.0f}  {f'{low:.0f} to {high:.0f}':12} {first:6.0f} "
+        f"{(found > 0).sum():5}/{len(found):<3} {when:>5} {length:>7} {has.sum():8}"
+    )
+
+
+if __name__ == "__main__":
+    run_command(lambda: print_table(parse_arguments()))

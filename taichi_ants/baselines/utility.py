@@ -1,0 +1,146 @@
+"""Ants for which pheromone is a utility that every visit backs up.
+
+L. Panait, S. Luke. A pheromone-based utility model for collaborative foraging. Third International
+Joint Conference on Autonomous Agents and Multiagent Systems (AAMAS 2004), 36-43.
+
+There are two pheromones, one of the nest and one of food. U_p(s) says how near the cell s is to
+goal p. An ant with food comes from food and looks for the nest, an ant without comes from the nest
+and looks for food. In each tick an ant in cell s backs up the utility of p, where it comes from:
+
+    U_p(s) <- max(U_p(s), R_p(s) + discount * max over the neighbours s' of U_p(s'))
+
+where the reward R_p is 1 in a cell of goal p, else 0. Then it goes to the neighbour with the
+highest utility of its other goal. So the trail of the one leads the other, and both rise towards
+their goals as state values do in value iteration. `docs/baselines.md` says what of this was read
+where, and what was chosen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from taichi_ants import runtime
+from taichi_ants.baselines.open_cells import open_cells, shortest_way
+from taichi_ants.checks import checked_share, checked_world
+from taichi_ants.errors import AntsError, checked_whole, whole
+from taichi_ants.grid.constants import N_HEADINGS, STREAM_FORAGER
+from taichi_ants.grid.randomness import stream_state
+from taichi_ants.worlds.world import World
+
+EVERY = 10  # ticks between two looks at the path
+_MAX_ENTRIES = 1 << 27  # of the utilities: a gibibyte
+
+
+@dataclass(frozen=True)
+class Foraging:
+    """What colonies did.
+
+    Attributes:
+        shortest: Steps from the queen to the nearest food and back.
+        deliveries: int32 (colonies, ticks): foods that come to the nest in each tick.
+        lengths: int32 (colonies, ticks // 10): steps of the path found, after every 10 ticks: of a
+            walk to food and back that always takes the highest utility; 0 if it does not get there.
+        utilities: float64 (colonies, 2, grid.size): of the nest and of food, at the end.
+    """
+
+    shortest: int
+    deliveries: np.ndarray
+    lengths: np.ndarray
+    utilities: np.ndarray
+
+    @property
+    def first_delivery(self) -> np.ndarray:
+        """int64 (colonies,): the tick of the first delivery, from 1; 0 if there is none."""
+        return _first(self.deliveries > 0)
+
+    @property
+    def found(self) -> np.ndarray:
+        """int64 (colonies,): after how many ticks the path found is first a shortest; 0 if never.
+
+        It is looked at after every 10 ticks.
+        """
+        return EVERY * _first(self.lengths == self.shortest)
+
+
+def forage(
+    world: World,
+    *,
+    ticks: int = 1000,
+    ants: int = 64,
+    colonies: int = 20,
+    capacity: int = 10,
+    discount: float = 0.9,
+    evaporation: float = 0.001,
+    exploration: float = 0.1,
+    momentum: float = 0.8,
+    seed: int = 0,
+    threads: int | None = None,
+) -> Foraging:
+    """Let colonies collect food, each for itself; food grows back at once.
+
+    Args:
+        world: Where; rocks block, trails and listed ants do not matter.
+        ticks: How long.
+        ants: Of each colony; all start in the nest.
+        colonies: How many; the first ones stay the same if there are more.
+        capacity: How many ants fit into a cell; the nest has room for all.
+        discount: What a step costs, above 0 and below 1.
+        evaporation: The share of all utilities that is lost per tick, 0 to 1.
+        exploration: The probability of a random step, where an ant has something to follow.
+        momentum: The probability to go straight on, if it can, where it has not.
+        seed: Any whole number.
+        threads: CPU threads; None keeps what runs, or takes all.
+
+    Raises:
+        AntsError: An argument is not allowed, or no food can be reached.
+    """
+    counts = {"ticks": ticks, "ants": ants, "colonies": colonies, "capacity": capacity}
+    for name, value in counts.items():
+        checked_whole(name, value)
+    if not 0 < checked_share("discount", discount) < 1:
+        raise AntsError(f"discount is {discount}; it must be above 0 and below 1.")
+    kept = 1 - checked_share("evaporation", evaporation)
+    exploration = checked_share("exploration", exploration)
+    momentum = checked_share("momentum", momentum)
+    cells, neighbours, is_food, nest = open_cells(checked_world(world, learns=True))
+    if colonies * max(2 * world.grid.size, ticks, ants) > _MAX_ENTRIES:
+        raise AntsError(
+            f"{colonies} colonies of {ants} ants for {ticks} ticks in a world of {len(cells)} open "
+            "cells need too much memory; choose fewer."
+        )
+    shortest = 2 * shortest_way(neighbours, is_food, nest)
+    numbers = np.arange(colonies)[:, None] * 2**32 + np.arange(ants)
+    states = stream_state(whole("seed", seed), STREAM_FORAGER, numbers)
+
+    runtime.start(threads)
+    # Taichi is imported once it is configured.
+    from taichi_ants.baselines.utility_kernels import live, measure
+
+    goals = np.stack([np.arange(len(cells)) == nest, is_food == 1]).astype(np.int32)
+    settings = capacity, float(discount), kept, exploration, momentum
+    of_ants = np.zeros((colonies, ants, 3), np.int32)
+    of_ants[..., 0] = nest
+    of_ants[..., 1] = np.arange(ants) % N_HEADINGS
+    standing = np.zeros((colonies, len(cells)), np.int32)
+    standing[:, nest] = ants
+    utilities = np.zeros((colonies, 2, len(cells)))
+    deliveries = np.zeros((colonies, ticks), np.int32)
+    lengths = np.zeros((colonies, ticks // EVERY), np.int32)
+    with runtime.quiet():
+        for first in range(0, ticks, EVERY):
+            last = min(first + EVERY, ticks)
+            state = states, of_ants, standing, utilities, deliveries
+            live(neighbours, goals, *settings, first, last, *state)
+            if last == first + EVERY:
+                measure(neighbours, goals, nest, utilities, first // EVERY, lengths)
+    spread = np.zeros((colonies, 2, world.grid.size))
+    spread[..., cells] = utilities
+    return Foraging(shortest, deliveries, lengths, spread)
+
+
+def _first(hits: np.ndarray) -> np.ndarray:
+    """The first column that is true, from 1; 0 if none is."""
+    # A column of False before it, so that no hits and no columns give 0.
+    return np.pad(hits, ((0, 0), (1, 0))).argmax(axis=1)

@@ -1,0 +1,159 @@
+"""Many single ants, each in a world of its own, that do one step at a time; actions come from
+outside."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from taichi_ants import runtime
+from taichi_ants.engines.colony.colony import ColonySnapshot
+from taichi_ants.engines.layout import Command
+from taichi_ants.engines.packing import unpack_cells
+from taichi_ants.engines.runs.engine import laid_out
+from taichi_ants.grid.constants import STREAM_ANT
+from taichi_ants.grid.randomness import stream_state
+from taichi_ants.task import Task
+from taichi_ants.worlds.starts import first_starts
+from taichi_ants.worlds.world import World
+
+_PER_CHUNK = 256  # ants that one thread steps together
+
+
+class Lockstep:
+    """n ants, each in a world of its own.
+
+    An ant depends on its world, the task, its seed and its actions alone.
+
+    Args:
+        worlds: Worlds of the same ranges; ant i lives in number i modulo their number.
+        task: The rules of the game.
+        n: How many ants, at least 1.
+        max_steps: Steps after which an episode is truncated.
+        ends: What a delivery does: "absorbing" terminates the episode, "continuing" truncates it,
+            "endless" does neither, and food grows back at once.
+        falls: Whether trails evaporate.
+
+    Attributes:
+        arrays: By name, one row for each ant: percepts uint8 and states int32, what it sees;
+            rewards_of float64, terminations and truncations uint8, outcomes uint8 (`Outcome`), what
+            came of its last action; final_states int32 and final_percepts uint8, what it saw when
+            the episode ended that `step` has restarted; and where it stands.
+    """
+
+    def __init__(
+        self,
+        worlds: Sequence[World],
+        task: Task,
+        n: int,
+        max_steps: int,
+        ends: str,
+        falls: bool,
+    ) -> None:
+        self.worlds, self.task, self.n = tuple(worlds), task, n
+        self.arrays = self._laid_out(max_steps, ends, falls)
+        self._launch: Any = None
+
+    def _laid_out(self, max_steps: int, ends: str, falls: bool) -> dict[str, Any]:
+        common = laid_out(self.worlds, self.task, falls)
+        size, n = common["size"], self.n
+        number = np.arange(n, dtype=np.int32) % len(self.worlds)
+        own = np.empty((n, size + 2), np.int32)
+        own[:, :size] = common["world"].reshape(-1, size)[number]
+        own[:, size:] = size, -1  # nothing has changed, see `step.restore`
+        return {
+            **common,
+            "n": n,
+            "per_chunk": _PER_CHUNK,
+            "max_steps": max_steps,
+            "regrows": int(ends == "endless"),
+            "delivery_terminates": int(ends == "absorbing"),
+            "delivery_truncates": int(ends == "continuing"),
+            "same_step": 0,
+            # The cells of all worlds, then those of each ant.
+            "shared_cells": common["world"].size,
+            "cells": np.concatenate([common["world"], own.reshape(-1)]),
+            "worlds": number,
+            "start_cells": np.zeros(n, np.int32),
+            "start_headings": np.zeros(n, np.int32),
+            "random_states": np.zeros(n, np.uint64),
+            "commands": np.full(n, Command.BEGIN, np.uint8),
+            "actions": np.zeros(n, np.uint8),
+            "ant_cells": np.zeros(n, np.int32),
+            "headings": np.zeros(n, np.uint8),
+            "carries": np.zeros(n, np.uint8),
+            "carried": np.zeros(n, np.int32),
+            "steps": np.zeros(n, np.int32),
+            "changed": np.zeros(n, np.uint8),
+            "percepts": np.zeros(n, np.uint8),
+            "states": np.zeros(n, np.int32),
+            "rewards_of": np.zeros(n, np.float64),
+            "terminations": np.zeros(n, np.uint8),
+            "truncations": np.zeros(n, np.uint8),
+            "outcomes": np.zeros(n, np.uint8),
+            "final_states": np.zeros(n, np.int32),
+            "final_percepts": np.zeros(n, np.uint8),
+        }
+
+    def seed(self, seeds: Sequence[int], which: np.ndarray) -> None:
+        """Give some ants, int (k,), new random streams and start places.
+
+        A seed decides where an ant starts if its world lists none, and which food it takes if it
+        sees several; both for all episodes to come.
+        """
+        words = np.array([seed % 2**64 for seed in seeds], dtype=np.uint64)
+        self.arrays["random_states"][which] = stream_state(words, STREAM_ANT, 0)
+        for number, world in enumerate(self.worlds):
+            here = self.arrays["worlds"][which] == number
+            cells, headings = first_starts(world, words[here])
+            self.arrays["start_cells"][which[here]] = cells
+            self.arrays["start_headings"][which[here]] = headings
+
+    def begin(self, which: np.ndarray) -> None:
+        """Begin an episode for the ants where `which`, bool (n,), is True."""
+        self._go(np.where(which, Command.BEGIN, Command.WAIT), same_step=False)
+
+    def step(
+        self, actions: np.ndarray, begins: np.ndarray | int = 0, same_step: bool = False
+    ) -> None:
+        """Let all ants do these actions, 0 .. 4; but where `begins` is 1 an episode begins.
+
+        With `same_step` an ant whose episode ends begins the next one at once.
+        """
+        self.arrays["actions"][:] = actions
+        self._go(begins, same_step)
+
+    def snapshot(self, number: int) -> ColonySnapshot:
+        """The world of an ant as it is now; arrays are copies."""
+        arrays, grid = self.arrays, self.worlds[0].grid
+        own = self.arrays["shared_cells"] + number * (grid.size + 2)
+        ground, levels = unpack_cells(arrays["cells"][own : own + grid.size])
+        trail = np.maximum(levels - arrays["steps"][number] * arrays["falls"], 0)
+        one = slice(number, number + 1)
+        headings = arrays["headings"][one].astype(np.int32)
+        cells, carries = arrays["ant_cells"][one].copy(), arrays["carries"][one].astype(bool)
+        return ColonySnapshot(grid, ground, trail, cells, headings, carries)
+
+    def _go(self, commands: np.ndarray | int, same_step: bool) -> None:
+        self.arrays["commands"][:] = commands
+        self.arrays["same_step"] = int(same_step)
+        with runtime.alone:
+            if self._launch is None:
+                self._launch = self._compiled()
+            self._launch(self.arrays)
+
+    def _compiled(self) -> Any:
+        # Taichi is imported once it is configured, see `runtime`.
+        runtime.start()
+        from taichi_ants.engines.arguments import Arguments, Launch
+        from taichi_ants.engines.runs.lockstep_kernel import step_kernel
+
+        pheromone, kind = self.task.pheromone, Arguments.type_of(self.arrays)
+        half, serial = pheromone.view == "half", self.n <= _PER_CHUNK
+        return Launch(step_kernel(self.task.sees, pheromone.deposit, half, serial, kind))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but what Taichi holds, which is made anew; so copies and pickles go on alike."""
+        return {**vars(self), "_launch": None}

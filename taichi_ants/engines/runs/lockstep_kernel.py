@@ -1,0 +1,143 @@
+"""The kernel of one step of many single ants, each in a world of its own: act, observe, begin anew.
+
+It does in one launch what `run_kernel` does in each of its steps; the actions come from outside.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import taichi as ti
+
+from taichi_ants.engines.layout import Command, Outcome
+from taichi_ants.engines.runs.step import (
+    EXTRA_CELLS,
+    Ant,
+    act,
+    ground_of,
+    percept_of,
+    restore,
+    state_seen,
+)
+from taichi_ants.task.constants import (
+    DELIVERED,
+    FAILED,
+    FOOD,
+    FORWARD,
+    PICK_UP,
+    PICKED_UP,
+    QUEEN,
+    RIGHT,
+)
+from taichi_ants.task.observations import Observation
+from taichi_ants.task.rules.actions import step_towards
+
+
+@ti.func
+def outcome_of(a: ti.template(), base, before, after, action):
+    """What came of an action, as an `Outcome`."""
+    outcome = Outcome.MOVED
+    if after.event == FAILED:
+        if action <= RIGHT:
+            ahead = before.cell + step_towards(a.compass, after.heading, FORWARD)
+            ground = ground_of(a.cells[base + ahead])
+            outcome = Outcome.ROCK_AHEAD
+            if ground == FOOD:
+                outcome = Outcome.FOOD_AHEAD
+            elif ground == QUEEN:
+                outcome = Outcome.QUEEN_AHEAD
+        elif action == PICK_UP:
+            outcome = ti.select(before.carries == 1, Outcome.HAS_FOOD, Outcome.SEES_NO_FOOD)
+        else:
+            outcome = ti.select(before.carries == 1, Outcome.SEES_NO_QUEEN, Outcome.HAS_NO_FOOD)
+    elif after.event == PICKED_UP:
+        outcome = Outcome.PICKED_UP
+    elif after.event == DELIVERED:
+        outcome = Outcome.DELIVERED
+    return outcome
+
+
+@cache
+def step_kernel(
+    observation: Observation, deposit: str, half: bool, serial: bool, arguments: Any
+) -> Callable[..., None]:
+    """The kernel; it is compiled on first use.
+
+    Args:
+        observation: What row of its table an ant looks at.
+        deposit: How trails are laid, see `Pheromone`.
+        half: Whether trails of half the strongest look like one, see `Pheromone.view`.
+        serial: Whether one thread does all, which saves to wake the others.
+        arguments: The type of the argument pack, which `lockstep` lists.
+    """
+    state_of = state_seen(observation, half)
+
+    @ti.func
+    def put(a: ti.template(), i, ant):
+        """Write down an ant."""
+        a.ant_cells[i], a.random_states[i] = ant.cell, ant.random_state
+        a.headings[i], a.carries[i] = ti.cast(ant.heading, ti.u8), ti.cast(ant.carries, ti.u8)
+        a.carried[i] = ant.carried
+
+    @ti.func
+    def look(a: ti.template(), i, base, ant, clock):
+        """Write down what an ant sees; its cells, or those of its unchanged world, are at base."""
+        percept = percept_of(half, a, base, ant, clock)
+        a.percepts[i] = ti.cast(percept, ti.u8)
+        a.states[i] = state_of(a, base, ant, clock, percept)
+
+    @ti.func
+    def begin(a: ti.template(), i, own, origin):
+        """Set a world and its ant to where an episode starts."""
+        if a.changed[i] == 1:
+            restore(a, own, origin, a.cells[own + a.size], a.cells[own + a.size + 1])
+        ant = Ant(origin=origin, cell=a.start_cells[i], heading=a.start_headings[i])
+        ant.random_state = a.random_states[i]
+        a.steps[i], a.changed[i] = 0, ti.cast(0, ti.u8)
+        put(a, i, ant)
+        look(a, i, origin, ant, 0)
+
+    @ti.func
+    def do(a: ti.template(), i, own, origin, action):
+        """An action of an ant; returns whether the episode has ended."""
+        before = Ant(origin=origin, cell=a.ant_cells[i], heading=ti.cast(a.headings[i], ti.i32))
+        before.carries, before.carried = ti.cast(a.carries[i], ti.i32), a.carried[i]
+        before.random_state = a.random_states[i]
+        # As long as an ant has changed nothing, it sees the cells that all ants of its world share:
+        # they stay in the processor's cache.
+        changed = ti.cast(a.changed[i], ti.i32)
+        base = ti.select((changed == 1) | (action == PICK_UP), own, origin)
+        clock, percept = a.steps[i] * a.falls, ti.cast(a.percepts[i], ti.i32)
+        after = act(deposit, a, base, before, percept, action, clock)
+        a.outcomes[i] = ti.cast(outcome_of(a, base, before, after, action), ti.u8)
+        changed |= ti.cast(after.event == PICKED_UP, ti.i32)
+        a.changed[i] = ti.cast(changed, ti.u8)
+        a.steps[i] += 1
+        put(a, i, after)
+        look(a, i, ti.select(changed == 1, own, origin), after, clock + a.falls)
+        delivered = ti.cast(after.event == DELIVERED, ti.i32)
+        terminated = delivered & a.delivery_terminates
+        last = ti.cast(a.steps[i] == a.max_steps, ti.i32) | delivered & a.delivery_truncates
+        truncated = last & (1 - terminated)
+        a.rewards_of[i] = a.rewards[after.event]
+        a.terminations[i], a.truncations[i] = ti.cast(terminated, ti.u8), ti.cast(truncated, ti.u8)
+        return terminated | truncated
+
+    @ti.kernel
+    def step(a: arguments):
+        ti.loop_config(block_dim=1, serialize=serial)
+        for chunk in range((a.n + a.per_chunk - 1) // a.per_chunk):
+            for i in range(chunk * a.per_chunk, ti.min((chunk + 1) * a.per_chunk, a.n)):
+                origin = a.worlds[i] * a.size
+                own = a.shared_cells + i * (a.size + EXTRA_CELLS)
+                if a.commands[i] == Command.STEP:
+                    ended = do(a, i, own, origin, ti.cast(a.actions[i], ti.i32))
+                    if ended & a.same_step == 1:
+                        a.final_states[i], a.final_percepts[i] = a.states[i], a.percepts[i]
+                        begin(a, i, own, origin)
+                elif a.commands[i] == Command.BEGIN:
+                    a.rewards_of[i], a.outcomes[i] = 0.0, ti.cast(Outcome.NONE, ti.u8)
+                    a.terminations[i], a.truncations[i] = ti.cast(0, ti.u8), ti.cast(0, ti.u8)
+                    begin(a, i, own, origin)
+
+    return step

@@ -1,0 +1,450 @@
+"""One ant as a Gymnasium environment, and many such ants as one vector environment."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.error import InvalidAction, ResetNeeded
+from gymnasium.spaces import Discrete, MultiDiscrete
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from taichi_ants import checks
+from taichi_ants.engines.layout import Outcome
+from taichi_ants.engines.runs.lockstep import Lockstep
+from taichi_ants.envs.drawing import Drawing
+from taichi_ants.envs.formats import ObservationFormat, Shown
+from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, shown
+from taichi_ants.task import Task
+from taichi_ants.task.constants import EPISODE_STEPS, GIVE, N_ACTIONS, N_STATES, PICK_UP
+from taichi_ants.task.states import state_from_index
+from taichi_ants.worlds import World, build
+
+DELIVERIES = ("absorbing", "continuing", "endless")
+RENDER_MODES = ("rgb_array", "ansi")
+_MOST_ENVS = 1 << 24
+
+_EVENTS = {
+    Outcome.NONE: None,
+    Outcome.MOVED: "moved",
+    Outcome.PICKED_UP: "picked_up",
+    Outcome.DELIVERED: "delivered",
+    Outcome.ROCK_AHEAD: "blocked",
+    Outcome.FOOD_AHEAD: "blocked",
+    Outcome.QUEEN_AHEAD: "blocked",
+}
+_REASONS = {
+    Outcome.ROCK_AHEAD: "rock_or_edge_ahead",
+    Outcome.FOOD_AHEAD: "food_ahead",
+    Outcome.QUEEN_AHEAD: "queen_ahead",
+    Outcome.HAS_FOOD: "carries_food_already",
+    Outcome.SEES_NO_FOOD: "no_food_in_view",
+    Outcome.HAS_NO_FOOD: "carries_no_food",
+    Outcome.SEES_NO_QUEEN: "no_queen_in_view",
+}
+# By outcome.
+EVENTS = np.array([_EVENTS.get(outcome, "failed") for outcome in Outcome], dtype=object)
+REASONS = np.array([_REASONS.get(outcome) for outcome in Outcome], dtype=object)
+
+
+def _action_masks() -> np.ndarray:
+    """What can succeed, by percept: int8 (128, 5)."""
+    masks = np.zeros((N_STATES, N_ACTIONS), np.int8)
+    for percept, mask in enumerate(masks):
+        state = state_from_index(percept)
+        mask[:PICK_UP] = [code % 2 == 0 for code in state.view]  # E, T and S can be entered
+        mask[GIVE if state.carries else PICK_UP] = 3 in state.view
+        if not mask.any():  # a dead end, which an ant leaves by turning
+            mask[:PICK_UP] = 1
+    return masks
+
+
+ACTION_MASKS = _action_masks()
+
+
+HAS_EVENT, HAS_REASON = EVENTS != None, REASONS != None  # noqa: E711
+_AT_RESET = ("state", "action_mask")
+
+
+class _Ants:
+    """What both environments have: the ants, what they see, and what is said of them."""
+
+    def __init__(
+        self,
+        n: int,
+        world: str | World | Sequence[World],
+        task: Task | None,
+        delivery: str | None,
+        evaporation: bool | None,
+        max_steps: int,
+        observation_format: ObservationFormat,
+        render_mode: str | None,
+    ) -> None:
+        self.task = checks.checked_runs_task(task)
+        delivery = self.task.delivery if delivery is None else delivery
+        check_one_of("delivery", delivery, DELIVERIES)
+        falls = self.task.evaporation_in_training
+        if evaporation is not None:
+            falls = checked_flag("evaporation", evaporation)
+        if render_mode is not None:
+            check_one_of("render_mode", render_mode, RENDER_MODES)
+        max_steps = checks.checked_max_steps(max_steps, self.task)
+        self.shown = Shown(self.task.sees, observation_format)
+        self.lockstep = Lockstep(_worlds(world), self.task, n, max_steps, delivery, falls)
+        self._seeded = False
+        self.drawing = Drawing(self.lockstep, render_mode)
+
+    def seed(
+        self, seeds: Sequence[int | None], which: np.ndarray, chance: np.random.Generator
+    ) -> None:
+        """Seed those ants, of bool (n,), that are given a seed; by chance if none ever was."""
+        if not self._seeded and any(seed is None for seed in seeds):
+            first = int(chance.integers(2**62))
+            seeds = [first + i if seed is None else seed for i, seed in enumerate(seeds)]
+        pairs = ((i, seeds[i]) for i in np.flatnonzero(which).tolist())
+        given = {i: seed for i, seed in pairs if seed is not None}
+        if given:
+            self.lockstep.seed(list(given.values()), np.array(list(given)))
+        self._seeded = True
+
+    def observations(self) -> np.ndarray:
+        """What the ants see, (n, ...)."""
+        return self.shown.show(self.lockstep.arrays["states"])
+
+
+def _worlds(world: str | World | Sequence[World]) -> tuple[World, ...]:
+    """The worlds that were asked for, all of the same ranges."""
+    given = [world] if isinstance(world, (str, World)) else world
+    if not isinstance(given, (list, tuple)) or not given:
+        raise AntsError(
+            f"world is {shown(world)}; give the name of a world, a World, or a list of them."
+        )
+    several = tuple(
+        checks.checked_world(build(one) if isinstance(one, str) else one) for one in given
+    )
+    ranges = {one.ranges for one in several}
+    if len(ranges) > 1:
+        raise AntsError(f"the worlds have the ranges {sorted(ranges)}; all must have the same.")
+    return several
+
+
+class HexForageEnv(gymnasium.Env[Any, Any]):
+    """One ant on a hexagonal grid looks for food and carries it to its queen.
+
+    ## Description
+    The ant stands on a cell and looks along one of six headings. It sees the three cells ahead:
+    left, forward and right. It picks up a food in view, finds its way back and gives the food to
+    the queen. With food it lays a trail, which it sees later without food. The rules are those of
+    "Ants and Reinforcement Learning Algorithms", see `docs/environments.md`.
+
+    ## Observation Space
+    By `observation_format`, for a task whose observation has states of parts (p1, ..., pk), in the
+    paper's case 128 states of (2, 4, 4, 4): the load, then the codes of the cells left, forward and
+    right (0 empty, 1 obstacle, 2 trail or, with food, nearer to the queen, 3 food or, with food,
+    queen).
+
+    - "cells": `MultiDiscrete([p1, ..., pk])`, int64 (k,).
+    - "index": `Discrete(p1 * ... * pk)`, the state's index, a row of a table of action values.
+    - "one_hot": `Box(0, 1, (p1 + ... + pk,), float32)`, each part one-hot.
+
+    ## Action Space
+    `Discrete(5)`: 0, 1, 2 turn to the cell left, forward or right and enter it; 3 picks up a food
+    in view, 4 gives the food to the queen in view. A move that is blocked turns the ant all the
+    same.
+
+    ## Rewards
+    As the task pays, by default 0 for a step onto an empty cell, 1 onto a cell that was seen as 2,
+    3 for a pick-up, 10 for a delivery, and -1 for an action that fails.
+
+    ## Starting State
+    The world as it was given, with the ant where the world lists it; else beside the queen, at a
+    place and with a heading that the seed decides.
+
+    ## Episode End
+    Terminated when the food is delivered ("absorbing"); truncated then ("continuing"); or neither:
+    food grows back at once and the ant goes on ("endless"). Truncated after `max_steps` steps.
+
+    ## Info
+    - `state`: int64, the state's index.
+    - `action_mask`: int8 (5,), 1 for actions that can succeed; in a dead end for the moves, which
+      turn the ant.
+    - `event`: what came of the action: "moved", "blocked", "picked_up", "delivered" or "failed".
+    - `reason`: why a move was blocked ("rock_or_edge_ahead", "food_ahead", "queen_ahead"), or a
+      pick-up or give failed ("carries_food_already", "no_food_in_view", "carries_no_food",
+      "no_queen_in_view").
+
+    `reset` gives `state` and `action_mask`; `reason` is there when there is one.
+
+    ## Arguments
+    world: Name of a registered world, path of a text map, or a World.
+    task: The rules, a `taichi_ants.Task`; None is the paper's.
+    delivery: "absorbing", "continuing" or "endless"; None is the task's, by default "absorbing".
+    evaporation: Whether trails evaporate; None is as the task says of training, by default not.
+    max_steps: Steps after which an episode is truncated.
+    observation_format: "cells", "index" or "one_hot".
+    render_mode: "rgb_array": `render` draws uint8 (720, 1280, 3). "ansi": it writes a text map of
+        the world as it is, its heading for the ant.
+
+    Raises:
+        AntsError: An argument is not allowed, or the task has what only colonies have.
+    """
+
+    metadata = {"render_modes": list(RENDER_MODES), "render_fps": 10}  # noqa: RUF012
+
+    def __init__(
+        self,
+        world: str | World = "paper",
+        task: Task | None = None,
+        delivery: str | None = None,
+        evaporation: bool | None = None,
+        max_steps: int = EPISODE_STEPS,
+        observation_format: ObservationFormat = "cells",
+        render_mode: str | None = None,
+    ) -> None:
+        self._ants = _Ants(
+            *(1, world, task, delivery, evaporation, max_steps, observation_format, render_mode)
+        )
+        self.render_mode = render_mode
+        self.observation_space = self._ants.shown.space
+        self.action_space = Discrete(N_ACTIONS)
+        self._all, self._over = np.ones(1, bool), True  # nothing has begun
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Begin an episode. With a seed, which decides all chance, episodes repeat exactly."""
+        super().reset(seed=seed)
+        self._ants.seed([seed], self._all, self.np_random)
+        self._ants.lockstep.begin(self._all)
+        self._over = False
+        return self._ants.observations()[0], self._info()
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Do an action, 0 to 4.
+
+        Raises:
+            ResetNeeded: No episode has begun, or it has ended.
+            InvalidAction: There is no such action.
+        """
+        if self._over:
+            raise ResetNeeded("no episode is under way; call reset() before step().")
+        ants, arrays = self._ants, self._ants.lockstep.arrays
+        if not self.action_space.contains(action):
+            raise InvalidAction(f"the action is {shown(action)}; it must be 0, 1, 2, 3 or 4.")
+        ants.lockstep.step(action, begins=0)
+        terminated, truncated = bool(arrays["terminations"][0]), bool(arrays["truncations"][0])
+        self._over = terminated or truncated
+        reward = float(arrays["rewards_of"][0])
+        return ants.observations()[0], reward, terminated, truncated, self._info()
+
+    def _info(self) -> dict[str, Any]:
+        arrays = self._ants.lockstep.arrays
+        info = {
+            "state": np.int64(arrays["states"][0]),
+            "action_mask": ACTION_MASKS[arrays["percepts"][0]].copy(),
+        }
+        outcome = arrays["outcomes"][0]
+        more = {"event": EVENTS[outcome], "reason": REASONS[outcome]}
+        return info | {name: value for name, value in more.items() if value is not None}
+
+    def render(self) -> Any:
+        """A picture or a text map of the world as it is, see `render_mode`."""
+        return self._ants.drawing.draw(0)
+
+
+class HexForageVectorEnv(VectorEnv[Any, Any, Any]):
+    """Many ants, each alone in a world of its own: all of them do a step in one launch.
+
+    Environment i is a `HexForageEnv` with seed `seed + i`, step by step. What it sees, is paid and
+    is told is described there; arrays have a leading axis of `num_envs`.
+
+    ## Arguments
+    num_envs: How many, 1 to 2**24.
+    world: As of `HexForageEnv`, or a list of worlds of the same ranges: environment i lives in
+        number i modulo their number.
+    autoreset_mode: What follows the end of an episode, `gymnasium.vector.AutoresetMode` or its
+        name. "NextStep": the next step begins an episode, whatever the action. "SameStep": the step
+        that ends one begins the next; `infos["final_obs"]` and `infos["final_info"]` tell how it
+        ended. "Disabled": the caller resets with `options={"reset_mask": ended}`.
+    All others: as of `HexForageEnv`; `render` draws all worlds.
+
+    ## Info
+    `infos` has an array for each name, and one of the same name with an underscore that tells which
+    environments it is of, as Gymnasium's own vector environments have.
+
+    Raises:
+        AntsError: An argument is not allowed, or the task has what only colonies have.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 10}  # noqa: RUF012
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        world: str | World | Sequence[World] = "paper",
+        task: Task | None = None,
+        delivery: str | None = None,
+        evaporation: bool | None = None,
+        max_steps: int = EPISODE_STEPS,
+        observation_format: ObservationFormat = "cells",
+        render_mode: str | None = None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+    ) -> None:
+        self.num_envs = n = checked_whole("num_envs", num_envs, most=_MOST_ENVS)
+        self.autoreset_mode = checked_autoreset(autoreset_mode)
+        self._ants = _Ants(
+            *(n, world, task, delivery, evaporation, max_steps, observation_format, render_mode)
+        )
+        self.render_mode = render_mode
+        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
+        self.single_observation_space = self._ants.shown.space
+        self.observation_space = batch_space(self.single_observation_space, n)
+        self.single_action_space = Discrete(N_ACTIONS)
+        self.action_space = MultiDiscrete(np.full(n, N_ACTIONS))
+        self._over: np.ndarray | None = None  # whose episode is over, bool (n,); None: none began
+        self._all = np.ones(n, bool)
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Begin an episode in all environments, or in some.
+
+        Args:
+            seed: Of the first environment, the others have the next ones; or one for each, None to
+                go on with its stream. Seeds decide all chance: episodes repeat exactly.
+            options: "reset_mask", bool (num_envs,): where to begin; the other episodes go on.
+
+        Raises:
+            TypeError, ValueError: Seeds or mask have not this form.
+            ResetNeeded: There is a mask, but there are no other episodes to go on with.
+        """
+        which = checked_reset_mask(options, self.num_envs)
+        if self._over is None and not which.all():
+            raise ResetNeeded("no episode is under way; call reset() without a reset_mask first.")
+        super().reset(seed=int(seed) if isinstance(seed, (int, np.integer)) else None)
+        self._ants.seed(seeds_of(seed, self.num_envs), which, self.np_random)
+        self._ants.lockstep.begin(which)
+        self._over = np.zeros(self.num_envs, bool) if self._over is None else self._over & ~which
+        arrays = self._ants.lockstep.arrays
+        nothing = np.zeros(self.num_envs, np.uint8)
+        infos = _infos(arrays["states"], arrays["percepts"], nothing, which)
+        return self._ants.observations(), {k: infos[k] for k in infos if k.strip("_") in _AT_RESET}
+
+    def step(
+        self, actions: Any
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """Do an action in each environment, int (num_envs,), 0 to 4.
+
+        Raises:
+            ResetNeeded: No episode has begun; or one has ended, and autoreset_mode is "Disabled".
+            InvalidAction: There are not as many actions, or one of them is none.
+        """
+        ants, arrays, mode = self._ants, self._ants.lockstep.arrays, self.autoreset_mode
+        if self._over is None:
+            raise ResetNeeded("no episode is under way; call reset() before step().")
+        if mode == AutoresetMode.DISABLED and self._over.any():
+            raise ResetNeeded(
+                f"the episode of environment {self._over.argmax()} has ended; call reset() with "
+                'options={"reset_mask": ...} before step().'
+            )
+        ants.lockstep.step(
+            checked_actions(actions, self.num_envs),
+            begins=self._over if mode == AutoresetMode.NEXT_STEP else 0,
+            same_step=mode == AutoresetMode.SAME_STEP,
+        )
+        # Copies: the next step writes into the arrays of this one.
+        terminations = arrays["terminations"].astype(bool)
+        truncations = arrays["truncations"].astype(bool)
+        ended, outcomes, all_of_them = terminations | truncations, arrays["outcomes"], self._all
+        if mode == AutoresetMode.SAME_STEP:
+            outcomes = np.where(ended, Outcome.NONE, outcomes)
+        else:
+            self._over = ended
+        infos = _infos(arrays["states"], arrays["percepts"], outcomes, all_of_them)
+        if mode == AutoresetMode.SAME_STEP and ended.any():
+            states, percepts = arrays["final_states"], arrays["final_percepts"]
+            final = np.full(self.num_envs, None, dtype=object)
+            final[ended] = np.fromiter(ants.shown.show(states[ended]), dtype=object)
+            infos |= {"final_obs": final, "_final_obs": ended}
+            infos["final_info"] = _infos(states, percepts, arrays["outcomes"], ended)
+            infos["_final_info"] = ended.copy()
+        rewards = arrays["rewards_of"].copy()
+        return ants.observations(), rewards, terminations, truncations, infos
+
+    def render(self) -> tuple[Any, ...] | None:
+        """A picture or a text map of each world as it is, see `render_mode`."""
+        if self.render_mode is None:
+            return None
+        return tuple(self._ants.drawing.draw(number) for number in range(self.num_envs))
+
+
+def _infos(
+    states: np.ndarray, percepts: np.ndarray, outcomes: np.ndarray, which: np.ndarray
+) -> dict[str, Any]:
+    """What is said of some environments, `which` bool (n,); nothing of the others."""
+    masks = ACTION_MASKS.take(percepts, axis=0, mode="clip")
+    if not which.all():
+        states, masks = np.where(which, states, 0), masks * which[:, None]
+        outcomes = np.where(which, outcomes, Outcome.NONE)
+    told = {
+        "state": (states.astype(np.int64), which.copy()),
+        "action_mask": (masks, which.copy()),
+        "event": (EVENTS[outcomes], HAS_EVENT[outcomes]),
+        "reason": (REASONS[outcomes], HAS_REASON[outcomes]),
+    }
+    infos = {name: values for name, (values, _) in told.items()}
+    return infos | {f"_{name}": of for name, (_, of) in told.items()}
+
+
+def seeds_of(seed: Any, n: int) -> Sequence[int | None]:
+    """The seed of each of n environments, None for those that go on, as Gymnasium counts them."""
+    if seed is None:
+        return [None] * n
+    if isinstance(seed, (int, np.integer)):
+        return range(int(seed), int(seed) + n)
+    if not isinstance(seed, (list, tuple, np.ndarray)) or len(seed) != n:
+        raise ValueError(f"seed is {shown(seed)}; give a whole number, or a list of {n}.")
+    for one in seed:
+        if one is not None and not (isinstance(one, (int, np.integer)) and one >= 0):
+            raise ValueError(f"a seed is {shown(one)}; it must be a whole number from 0 on.")
+    return [None if one is None else int(one) for one in seed]
+
+
+def checked_reset_mask(options: dict[str, Any] | None, n: int) -> np.ndarray:
+    """Where to begin, bool (n,): the mask in the options of a reset, everywhere without one."""
+    mask = (options or {}).get("reset_mask")
+    if mask is None:
+        return np.ones(n, bool)
+    if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
+        raise TypeError(f"reset_mask is {shown(mask)}; it must be a NumPy array of bool.")
+    if mask.shape != (n,) or not mask.any():
+        raise ValueError(f"reset_mask is {shown(mask)}; it must have shape ({n},) and hold a True.")
+    return mask.copy()
+
+
+def checked_autoreset(mode: Any) -> AutoresetMode:
+    """The mode of a name, or itself."""
+    try:
+        return AutoresetMode(mode)
+    except ValueError:
+        allowed = ", ".join(repr(one.value) for one in AutoresetMode)
+        raise AntsError(f"autoreset_mode is {shown(mode)}; choose one of {allowed}.") from None
+
+
+def checked_actions(actions: Any, n: int) -> np.ndarray:
+    """The actions of n ants, whole numbers (n,) from 0 to 4."""
+    given = np.asarray(actions)
+    if given.shape != (n,) or given.dtype.kind not in "iu":
+        raise InvalidAction(
+            f"the actions are {shown(actions)}; they must be whole numbers, an array of ({n},)."
+        )
+    if ((given < 0) | (given >= N_ACTIONS)).any():
+        wrong = given[(given < 0) | (given >= N_ACTIONS)][0]
+        raise InvalidAction(f"an action is {wrong}; it must be 0, 1, 2, 3 or 4.")
+    return given

@@ -1,0 +1,215 @@
+"""Ants in lockstep equal the plain reference: every step, whatever they are told to do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from colonies import act, training
+from random_rewards import random_rewards
+from random_worlds import random_world
+
+from taichi_ants import Life, Pheromone, Task, runtime
+from taichi_ants.engines.layout import Outcome
+from taichi_ants.engines.runs.lockstep import Lockstep
+from taichi_ants.reference import ReferenceColony
+from taichi_ants.reference.ants import Event
+from taichi_ants.task.constants import GIVE, PICK_UP
+from taichi_ants.worlds import World, from_text, paper, starts
+
+# Each is a kernel of its own: observation, deposit, view.
+KERNELS = [
+    ("paper", "set", "half"),
+    ("six_cells", "add", "strongest"),
+    ("queues", "fading", "strongest_under_carriers"),
+    ("trail_levels", "none", "half"),
+]
+EVENTS = {
+    Event.MOVED: {Outcome.MOVED},
+    Event.BLOCKED: {Outcome.ROCK_AHEAD, Outcome.FOOD_AHEAD, Outcome.QUEEN_AHEAD},
+    Event.PICKED_UP: {Outcome.PICKED_UP},
+    Event.DELIVERED: {Outcome.DELIVERED},
+    Event.FAILED: {
+        *(Outcome.HAS_FOOD, Outcome.SEES_NO_FOOD),
+        *(Outcome.HAS_NO_FOOD, Outcome.SEES_NO_QUEEN),
+    },
+}
+
+
+def plain(world: World, task: Task, seed: int, ends: str, falls: bool) -> ReferenceColony:
+    """A colony of one ant that does what it is told."""
+    life = Life(regrowth=0) if ends == "endless" else Life()
+    rules = {name: getattr(task, name) for name in vars(task) if name != "life"}
+    rules |= {"evaporation_in_evaluation": falls, "life": life}
+    nothing = np.zeros((task.n_states, 5), np.float32)
+    return ReferenceColony(
+        world, Task(**rules), training(), seed, sharing="fixed", q_values=nothing
+    )
+
+
+def drawn_task(rng: np.random.Generator, observation: str, deposit: str, view: str) -> Task:
+    more = {"add": {"cap": int(rng.choice([1, 300]))}, "fading": {"slope": int(rng.choice([1, 9]))}}
+    pheromone = Pheromone(deposit=deposit, view=view)
+    if deposit != "none":
+        pheromone = Pheromone(
+            evaporation=str(rng.choice(["linear", "none"])),
+            deposit=deposit,
+            level=int(rng.choice([3, 40, 250])),
+            view=view,
+            **more.get(deposit, {}),
+        )
+    return Task(
+        observation,
+        random_rewards(int(rng.integers(99))),
+        pheromone,
+        turns_at_queen=bool(rng.integers(2)),
+    )
+
+
+def sensible(rng: np.random.Generator, percept: int) -> int:
+    """An action that often succeeds, so that much happens."""
+    if rng.random() < 0.3:
+        return int(rng.integers(5))
+    codes = percept >> 4 & 3, percept >> 2 & 3, percept & 3
+    if 3 in codes:
+        return GIVE if percept >> 6 else PICK_UP
+    lures = [move for move, code in enumerate(codes) if code == 2]
+    return int(rng.choice(lures or [0, 1, 2]))
+
+
+def check_equal(ants: Lockstep, i: int, colony: ReferenceColony, world: World) -> None:
+    """What the ant is and sees, and how its world looks, is that of the reference."""
+    arrays, (ant,) = ants.arrays, colony.ants.values()
+    now = ants.snapshot(i)
+    assert tuple(world.grid.cells(now.ant_cells)[0].tolist()) == ant.cell
+    assert (now.ant_headings[0], now.ant_carries[0]) == (ant.heading, ant.carries)
+    assert (arrays["percepts"][i], arrays["states"][i]) == (ant.percept, ant.state)
+    assert arrays["random_states"][i] == ant.stream.state
+    for cell, ground in colony.world.ground.items():
+        place = world.grid.index(cell)
+        assert now.ground[place] == ground
+        if ground == 0:
+            assert now.trail[place] == colony.world.level(cell)
+
+
+@pytest.mark.parametrize("kernel", KERNELS, ids="-".join)
+def test_each_step_equals_the_reference(kernel):
+    rng = np.random.default_rng(KERNELS.index(kernel))
+    delivered = 0
+    for number in range(24):
+        world, ends = (
+            random_world(1000 + number),
+            ("absorbing", "continuing", "endless")[number % 3],
+        )
+        task, falls = drawn_task(rng, *kernel), bool(rng.integers(2))
+        n, max_steps, seed = 3, int(rng.integers(2, 60)), int(rng.integers(2**60))
+        ants = Lockstep([world], task, n, max_steps, ends, falls)
+        ants.seed(range(seed, seed + n), np.arange(n))
+        ants.begin(np.ones(n, bool))
+        colonies = [plain(world, task, seed + i, ends, falls) for i in range(n)]
+        for colony in colonies:
+            colony.begin_episode()
+        same_step = number % 2 == 1
+        begins, arrays = np.zeros(n, bool), ants.arrays
+        for _ in range(80):
+            percepts = arrays["percepts"].tolist()
+            actions = [sensible(rng, percept) for percept in percepts]
+            ants.step(np.array(actions), begins & (not same_step), same_step)
+            for i, colony in enumerate(colonies):
+                if begins[i] and not same_step:
+                    colony.begin_episode()
+                    assert arrays["outcomes"][i] == Outcome.NONE
+                    assert arrays["rewards_of"][i] == arrays["terminations"][i] == 0
+                    assert arrays["truncations"][i] == 0
+                    check_equal(ants, i, colony, world)
+                    continue
+                act(colony, actions[i])
+                (step,) = colony.transitions
+                gave = step.event is Event.DELIVERED
+                delivered += gave
+                terminated = gave and ends == "absorbing"
+                last = colony.record.ticks == max_steps or (gave and ends != "endless")
+                assert arrays["rewards_of"][i] == step.reward
+                assert arrays["outcomes"][i] in EVENTS[step.event]
+                assert arrays["terminations"][i] == terminated
+                assert arrays["truncations"][i] == (last and not terminated)
+                if last and same_step:
+                    (ant,) = colony.ants.values()
+                    assert arrays["final_states"][i] == ant.state
+                    assert arrays["final_percepts"][i] == ant.percept
+                    colony.begin_episode()
+                check_equal(ants, i, colony, world)
+            begins = (arrays["terminations"] | arrays["truncations"]).astype(bool)
+    assert delivered > 50
+
+
+BESIDE_FOOD = """
+      #
+    .   F
+  .   0   Q
+    .   .
+      .
+"""
+BEFORE_QUEEN = """
+      Q
+    .   .
+  .   0   F
+    .   .
+      .
+"""
+
+
+@pytest.mark.parametrize(
+    ("drawing", "actions", "outcomes"),
+    [
+        (BESIDE_FOOD, [1, 4, 2], ["ROCK_AHEAD", "HAS_NO_FOOD", "FOOD_AHEAD"]),
+        (BESIDE_FOOD, [3, 4, 3], ["PICKED_UP", "SEES_NO_QUEEN", "HAS_FOOD"]),
+        (BESIDE_FOOD, [3, 1, 1], ["PICKED_UP", "MOVED", "ROCK_AHEAD"]),  # the edge of the world
+        (BEFORE_QUEEN, [1, 3, 0], ["QUEEN_AHEAD", "SEES_NO_FOOD", "MOVED"]),
+    ],
+)
+def test_outcomes_say_why_nothing_happened(drawing, actions, outcomes):
+    ants = Lockstep([from_text(drawing)], Task(), 1, 100, "endless", falls=False)
+    ants.seed([0], np.arange(1))
+    ants.begin(np.ones(1, bool))
+    told = []
+    for action in actions:
+        ants.step(np.array([action]))
+        told.append(Outcome(ants.arrays["outcomes"][0]).name)
+    assert told == outcomes
+
+
+def test_ants_of_different_worlds_and_threads_do_not_meet():
+    worlds = [random_world(seed, 4) for seed in range(400)]
+    ranges = max({world.ranges for world in worlds}, key=[w.ranges for w in worlds].count)
+    worlds = [world for world in worlds if world.ranges == ranges][:3]
+    assert len(worlds) == 3
+    n, rng = 700, np.random.default_rng(0)
+    actions = rng.integers(0, 5, (60, n))
+    seen = []
+    for threads in (1, 2):
+        runtime.start(threads)
+        ants = Lockstep(worlds, Task(), n, 20, "absorbing", falls=True)
+        ants.seed(range(n), np.arange(n))
+        ants.begin(np.ones(n, bool))
+        for row in actions:
+            ants.step(row, same_step=True)
+        seen.append({k: v for k, v in ants.arrays.items() if isinstance(v, np.ndarray)})
+    for name, array in seen[0].items():
+        np.testing.assert_array_equal(array, seen[1][name], err_msg=name)
+    for k, world in enumerate(worlds):
+        alone = Lockstep([world], Task(), 5, 20, "absorbing", falls=True)
+        mine = np.arange(k, 15, 3)
+        alone.seed(mine.tolist(), np.arange(5))
+        alone.begin(np.ones(5, bool))
+        for row in actions:
+            alone.step(row[mine], same_step=True)
+        for name in ("states", "rewards_of", "steps", "ant_cells", "random_states"):
+            np.testing.assert_array_equal(alone.arrays[name], seen[1][name][mine], err_msg=name)
+
+
+def test_first_starts_are_those_of_the_world():
+    seeds = np.arange(40, dtype=np.uint64) * np.uint64(2**58 + 7)
+    for world in (paper(), *(random_world(seed) for seed in range(30))):
+        cells, headings = starts.first_starts(world, seeds)
+        for seed, cell, heading in zip(seeds.tolist(), cells, headings, strict=True):
+            assert (cell, heading) == tuple(one[0] for one in world.start(seed))

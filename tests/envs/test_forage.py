@@ -1,0 +1,401 @@
+"""One ant as a Gymnasium environment, and many of them in one vector environment."""
+
+from __future__ import annotations
+
+import copy
+import gc
+import pickle
+import resource
+import subprocess
+import sys
+import threading
+import warnings
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from command_lines import environment
+from gymnasium.error import InvalidAction, ResetNeeded
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
+
+from taichi_ants import AntsError, Life, Pheromone, Task, World, rollout, task, worlds
+from taichi_ants.envs.forage import HexForageEnv, HexForageVectorEnv
+from taichi_ants.envs.formats import FORMATS
+from taichi_ants.learners.policies import trail_follower
+
+ID = "taichi_ants/HexForage-v0"
+SMALL = [worlds.open_world(seed, (8, 8, 8)) for seed in range(3)]
+SETTINGS: list[dict[str, Any]] = [
+    {},
+    {"task": task.foraging(), "delivery": "endless", "evaporation": True},
+    {
+        "task": Task(pheromone=Pheromone(deposit="add")),
+        "delivery": "continuing",
+        "observation_format": "one_hot",
+    },
+]
+
+
+def sensible(rng: np.random.Generator, masks: np.ndarray) -> np.ndarray:
+    """Actions that can succeed, most of the time."""
+    any_of_them = rng.integers(0, 5, len(masks))
+    good = [rng.choice(np.flatnonzero(mask)) for mask in masks]
+    return np.where(rng.random(len(masks)) < 0.8, good, any_of_them)
+
+
+def assert_same(ours: Any, theirs: Any, where: str = "") -> None:
+    """Equal in values and types; names of which nothing is said may be missing."""
+    if isinstance(ours, dict):
+        for name in ours.keys() | theirs.keys():
+            if name in ours and name in theirs:
+                assert_same(ours[name], theirs[name], f"{where} {name}")
+            else:
+                there = ours.get(name, theirs.get(name))
+                assert name.strip("_") in ("event", "reason"), where
+                assert not any(there.tolist()), (where, name)
+        return
+    assert ours.dtype == theirs.dtype, where
+    assert ours.shape == theirs.shape, where
+    for one, other in zip(ours.tolist(), theirs.tolist(), strict=True):
+        np.testing.assert_array_equal(one, other, err_msg=where)
+
+
+@pytest.mark.parametrize("settings", SETTINGS, ids=["paper", "foraging", "adding"])
+@pytest.mark.parametrize("mode", AutoresetMode, ids=lambda mode: mode.value)
+def test_many_ants_equal_single_environments(mode, settings):
+    n, rng, settings = 6, np.random.default_rng(1), {**settings, "max_steps": 40}
+    ours = gymnasium.make_vec(ID, num_envs=n, world=SMALL, autoreset_mode=mode, **settings)
+    one_by_one = [
+        lambda i=i: gymnasium.make(ID, world=SMALL[i % len(SMALL)], **settings) for i in range(n)
+    ]
+    theirs = SyncVectorEnv(one_by_one, autoreset_mode=mode)
+    assert ours.single_observation_space == theirs.single_observation_space
+    assert ours.observation_space == theirs.observation_space
+    assert ours.action_space == theirs.action_space
+    assert ours.metadata["autoreset_mode"] is mode
+    first, other = ours.reset(seed=5), theirs.reset(seed=5)
+    assert_same(first[0], other[0])
+    assert_same(first[1], other[1])
+    masks, delivered = first[1]["action_mask"], 0
+    for step in range(300):
+        actions = sensible(rng, masks)
+        now, then = ours.step(actions), theirs.step(actions)
+        for part in range(4):
+            assert_same(now[part], then[part], f"step {step}, part {part}")
+        assert_same(now[4], then[4], f"step {step}")
+        delivered += (now[4]["event"] == "delivered").sum()
+        if "final_info" in now[4]:
+            delivered += (now[4]["final_info"]["event"] == "delivered").sum()
+        masks, ended = now[4]["action_mask"], now[2] | now[3]
+        if mode is AutoresetMode.DISABLED and ended.any():
+            now, then = (env.reset(options={"reset_mask": ended.copy()}) for env in (ours, theirs))
+            assert_same(now[0], then[0], f"reset after {step}")
+            assert_same(now[1], then[1], f"reset after {step}")
+            masks = np.where(ended[:, None], now[1]["action_mask"], masks)
+    assert delivered > 5
+
+
+@pytest.mark.parametrize("observation_format", FORMATS)
+@pytest.mark.parametrize("rules", [None, task.queueing()], ids=["paper", "queueing"])
+def test_gymnasium_has_nothing_to_say(rules, observation_format):
+    for world in ("paper", "open"):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            env = gymnasium.make(
+                f"taichi_ants:{ID}",
+                world=world,
+                task=rules,
+                observation_format=observation_format,
+                render_mode="ansi",
+            )
+            check_env(env.unwrapped)
+
+
+def test_the_id_is_known_whichever_is_imported_first(kernels):
+    for lines in (
+        "import taichi_ants, sys; assert 'gymnasium' not in sys.modules; import gymnasium",
+        "import gymnasium, taichi_ants",
+    ):
+        code = f"{lines}; print(gymnasium.make('{ID}').reset(seed=0)[0])"
+        said = subprocess.run(
+            [sys.executable, "-c", code],
+            env=environment(kernels),
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert said.stdout.strip() == "[0 0 2 0]"
+
+
+def test_a_table_gets_in_an_environment_what_its_rollout_gets():
+    q_values = trail_follower()
+    # Of one best action only: what ties are broken by is the agent's own chance.
+    q_values += np.linspace(0, 0.1, 5, dtype=np.float32)
+    world = worlds.paper()
+    trace = rollout(world, q_values, task=Task(evaporation_in_evaluation=False))
+    env = gymnasium.make(ID, observation_format="index")
+    state, _ = env.reset(seed=0)
+    for step in range(len(trace)):
+        assert (state, q_values[state].argmax()) == (trace.states[step], trace.actions[step])
+        state, reward, terminated, truncated, _ = env.step(int(q_values[state].argmax()))
+        assert reward == trace.rewards[step]
+    assert terminated == trace.delivered[-1]
+    assert truncated == (len(trace) == 600)
+
+
+@pytest.mark.parametrize(
+    ("delivery", "ends"),
+    [
+        ("absorbing", (True, False)),
+        ("continuing", (False, True)),
+        ("endless", (False, False)),
+        (None, (False, True)),  # as the task says
+    ],
+)
+def test_a_delivery_ends_an_episode_as_is_asked_for(delivery, ends):
+    q_values, rng = trail_follower(), np.random.default_rng(0)
+    rules, foods = Task(delivery="continuing"), len(worlds.paper().foods)
+    env = gymnasium.make(ID, task=rules, delivery=delivery, render_mode="ansi")
+    _, info = env.reset(seed=0)
+    delivered = 0
+    for step in range(600):
+        values = q_values[info["state"]]
+        action = rng.choice(np.flatnonzero(values == values.max()))
+        _, _, *ended, info = env.step(int(action))
+        if info["event"] == "delivered":
+            delivered += 1
+            assert tuple(ended) == ends
+        elif step < 599:
+            assert not any(ended)
+        if any(ended):
+            break
+    assert delivered >= (3 if delivery == "endless" else 1)
+    left = worlds.from_text(env.render()).foods
+    assert len(left) == (foods if delivery == "endless" else foods - 1)
+
+
+def test_episodes_are_truncated_at_the_step_limit():
+    env = gymnasium.make(ID, max_steps=3)
+    env.reset(seed=0)
+    assert [env.step(1)[2:4] for _ in range(3)] == [(False, False)] * 2 + [(False, True)]
+
+
+def test_seeds_repeat_all_chance_and_without_one_it_goes_on():
+    world = World((9, 9, 9), (0, 0, 0), foods=[(4, 0, 4), (4, 0, 5), (5, 0, 4)])
+    env = gymnasium.make(ID, world=world, delivery="endless", max_steps=200)
+
+    def played(**seed: int) -> list[tuple]:
+        observation, info = env.reset(**seed)
+        rng, told = np.random.default_rng(0), [tuple(observation)]
+        for _ in range(200):
+            (action,) = sensible(rng, info["action_mask"][None])
+            observation, reward, *_, info = env.step(int(action))
+            told.append((*observation.tolist(), reward))
+        return told
+
+    first, second = played(seed=3), played()
+    assert played(seed=3) == first
+    assert played() == second
+    assert any(played(seed=seed) != first for seed in range(4, 9))
+
+
+def test_two_tasks_in_turn_do_not_meet():
+    def steps(envs: list) -> list[list]:
+        rngs = [np.random.default_rng(7) for _ in envs]
+        told: list[list] = [[env.reset(seed=1)[1]["state"]] for env in envs]
+        for _ in range(150):
+            for number, env in enumerate(envs):
+                _, reward, terminated, truncated, info = env.step(int(rngs[number].integers(5)))
+                told[number].append((info["state"], reward))
+                if terminated or truncated:
+                    env.reset()
+        return told
+
+    def make() -> list:
+        return [gymnasium.make(ID, max_steps=50), gymnasium.make(ID, task=task.foraging())]
+
+    assert steps(make()) == [steps([env])[0] for env in make()]
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])
+def test_copies_go_on_alike(copied):
+    rng = np.random.default_rng(0)
+    for env, draw in (
+        (HexForageEnv(SMALL[0], max_steps=30, render_mode="rgb_array"), lambda: rng.integers(5)),
+        (HexForageVectorEnv(5, SMALL, max_steps=30), lambda: rng.integers(0, 5, 5)),
+    ):
+        env.reset(seed=2)
+        env.step(draw())
+        if isinstance(env, HexForageEnv):
+            env.render()
+        twin = copied(env)
+        for _ in range(25):
+            action = draw()
+            one, other = env.step(action), twin.step(action)
+            for part in range(4):
+                np.testing.assert_array_equal(one[part], other[part])
+
+
+def test_what_is_returned_is_not_written_again():
+    env = HexForageVectorEnv(4, SMALL)
+    kept = [env.reset(seed=0)[0]]
+    kept += env.step(np.ones(4, int))[:4]
+    before = copy.deepcopy(kept)
+    for _ in range(5):
+        env.step(np.zeros(4, int))
+    for one, other in zip(kept, before, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_a_thousand_environments_leave_no_memory_behind():
+    def one_life(make: Any) -> None:
+        env = make()
+        env.reset(seed=0)
+        env.step(env.action_space.sample())
+        env.close()
+
+    def megabytes() -> float:
+        gc.collect()
+        with open("/proc/self/statm") as file:
+            return int(file.read().split()[1]) * resource.getpagesize() / 2**20
+
+    if not sys.platform.startswith("linux"):
+        pytest.skip("needs /proc")
+    for make in (lambda: gymnasium.make(ID), lambda: HexForageVectorEnv(64)):
+        for _ in range(60):
+            one_life(make)
+        before = megabytes()
+        for _ in range(500):
+            one_life(make)
+        assert megabytes() - before < 10
+
+
+def test_threads_step_environments_of_their_own():
+    told: dict[int, list] = {}
+
+    def live(number: int) -> None:
+        env, rng = HexForageEnv("paper"), np.random.default_rng(number % 2)
+        env.reset(seed=0)
+        told[number] = [env.step(int(rng.integers(5)))[4]["state"] for _ in range(200)]
+
+    threads = [threading.Thread(target=live, args=(number,)) for number in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert told[0] == told[2] != told[1] == told[3]
+
+
+def test_pictures_and_maps_show_the_world_as_it_is():
+    env = HexForageEnv("paper", render_mode="ansi")
+    env.reset(seed=0)
+    drawn = env.render()
+    start, shown = worlds.paper(), worlds.from_text(drawn)
+    assert (shown.queen, shown.ranges) == (start.queen, start.ranges)
+    np.testing.assert_array_equal(shown.ants, start.ants)
+    np.testing.assert_array_equal(shown.foods, start.foods)
+    np.testing.assert_array_equal(shown.trails[:, :3], start.trails[:, :3])
+    assert drawn.startswith("; step 0, reward 0, state foraging E T E\n")
+    env.step(2)
+    assert env.render() != drawn
+    pictures = HexForageVectorEnv(2, render_mode="rgb_array")
+    pictures.reset(seed=0)
+    before = pictures.render()
+    pictures.step(np.array([1, 2]))
+    after = pictures.render()
+    assert before is not None
+    assert after is not None
+    assert [one.shape for one in before] == [(720, 1280, 3)] * 2
+    np.testing.assert_array_equal(before[0], before[1])
+    assert (after[0] != after[1]).any()
+
+
+def test_wrong_steps_raise_what_gymnasium_raises():
+    for env, good in ((HexForageEnv(max_steps=2), 0), (HexForageVectorEnv(2), np.zeros(2, int))):
+        with pytest.raises(ResetNeeded, match="reset"):
+            env.step(good)
+        env.reset(seed=0)
+        for wrong in (5, -1, 1.0, "left", None, [0, 5], [0, 0, 0], np.array([0.0, 1.0])):
+            with pytest.raises(InvalidAction, match="must be"):
+                env.step(wrong)
+    env = HexForageEnv(max_steps=1)
+    env.reset(seed=0)
+    env.step(0)
+    with pytest.raises(ResetNeeded):
+        env.step(0)
+    many = HexForageVectorEnv(2, max_steps=1, autoreset_mode="Disabled")
+    with pytest.raises(ResetNeeded):
+        many.reset(options={"reset_mask": np.array([True, False])})
+    many.reset(seed=0)
+    many.step(np.zeros(2, int))
+    with pytest.raises(ResetNeeded, match="environment 0 has ended"):
+        many.step(np.zeros(2, int))
+    many.reset(options={"reset_mask": np.array([True, False])})
+    with pytest.raises(ResetNeeded, match="environment 1 has ended"):
+        many.step(np.zeros(2, int))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ({"world": "nowhere"}, "there is no world named 'nowhere'"),
+        ({"world": 3}, "world is 3; give the name of a world"),
+        ({"world": []}, "world is []"),
+        ({"world": [*SMALL, worlds.paper()]}, "all must have the same"),
+        ({"task": "paper"}, "a Task"),
+        ({"task": Task(life=Life(regrowth=0))}, "use a Colony"),
+        ({"task": Task(pheromone=Pheromone(diffusion=0.5))}, "use a Colony"),
+        ({"delivery": "never"}, "delivery is 'never'"),
+        ({"evaporation": 2}, "evaporation is 2"),
+        ({"max_steps": 0}, "max_steps is 0"),
+        ({"observation_format": "pixels"}, "observation_format is 'pixels'"),
+        ({"render_mode": "human"}, "render_mode is 'human'"),
+        ({"autoreset_mode": "sometimes"}, "autoreset_mode is 'sometimes'"),
+        ({"num_envs": 0}, "num_envs is 0"),
+    ],
+)
+def test_wrong_arguments_are_named(arguments, told):
+    with pytest.raises(AntsError) as caught:
+        HexForageVectorEnv(**arguments)
+    assert told in str(caught.value)
+    if not {"num_envs", "autoreset_mode"} & arguments.keys():
+        with pytest.raises(AntsError) as caught:
+            HexForageEnv(**arguments)
+        assert told in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error"),
+    [
+        ({"seed": "one"}, ValueError),
+        ({"seed": [1, 2, 3]}, ValueError),
+        ({"seed": [1, -2]}, ValueError),
+        ({"options": {"reset_mask": [True, False]}}, TypeError),
+        ({"options": {"reset_mask": np.array([1, 0])}}, TypeError),
+        ({"options": {"reset_mask": np.array([False, False])}}, ValueError),
+        ({"options": {"reset_mask": np.array([True])}}, ValueError),
+    ],
+)
+def test_wrong_resets_are_refused_and_change_nothing(arguments, error):
+    env = HexForageVectorEnv(2)
+    env.reset(seed=0)
+    with pytest.raises(error, match=r"must|give"):
+        env.reset(**arguments)
+    env.step(np.zeros(2, int))
+
+
+@pytest.mark.slow
+def test_workers_of_other_processes_step_environments(kernels, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(kernels))
+    make = gymnasium.envs.registration.load_env_creator("taichi_ants.envs.forage:HexForageEnv")
+    env = AsyncVectorEnv([make] * 2, context="spawn", shared_memory=False)
+    here = SyncVectorEnv([make] * 2)
+    try:
+        np.testing.assert_array_equal(env.reset(seed=0)[0], here.reset(seed=0)[0])
+        for action in (1, 2, 0, 3, 4):
+            actions = np.full(2, action)
+            np.testing.assert_array_equal(env.step(actions)[0], here.step(actions)[0])
+    finally:
+        env.close()
