@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,51 +11,29 @@ import numpy as np
 from taichi_ants import checks
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.colony.layout import PUSHES, AntRow, WorldRow
+from taichi_ants.envs.forage import ACTION_MASKS
 from taichi_ants.envs.formats import ObservationFormat, Shown
 from taichi_ants.errors import AntsError, check_one_of, checked_flag, count, shown
 from taichi_ants.grid.constants import N_HEADINGS
-from taichi_ants.task import Task, states
-from taichi_ants.task.constants import (
-    DELIVERED,
-    FAILED,
-    GIVE,
-    N_ACTIONS,
-    N_STATES,
-    PICK_UP,
-    PICKED_UP,
-    RIGHT,
-    SEES_GOAL,
-)
+from taichi_ants.task import Task
+from taichi_ants.task.constants import DELIVERED, FAILED, N_ACTIONS, PICKED_UP, RIGHT
 from taichi_ants.worlds import World, build
 
-# What can come of an action, as `info["event"]` says it.
-EVENTS: tuple[str, ...] = ("moved", "blocked", "pushed", "picked_up", "delivered", "failed")
-PUSHED, GAVE = EVENTS.index("pushed"), EVENTS.index("delivered")
 # The usual length of an episode of a colony, in ticks.
 MAX_STEPS = 1000
 METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
 
 
 def _events() -> np.ndarray:
-    """The number of a word among EVENTS, by action and event of the engine: int8 (5, 5)."""
-    table = np.zeros((N_ACTIONS, 5), np.int8)
-    table[:, FAILED] = EVENTS.index("failed")
-    table[: RIGHT + 1, FAILED] = EVENTS.index("blocked")
-    table[:, PICKED_UP], table[:, DELIVERED] = EVENTS.index("picked_up"), GAVE
+    """What came of an action, by action and event of the engine: object (5, 5) of text."""
+    table = np.full((N_ACTIONS, 5), "moved", dtype=object)
+    table[:, FAILED] = "failed"
+    table[: RIGHT + 1, FAILED] = "blocked"
+    table[:, PICKED_UP], table[:, DELIVERED] = "picked_up", "delivered"
     return table
 
 
-def _action_masks() -> np.ndarray:
-    """Which actions can succeed, by the paper's state: int8 (128, 5)."""
-    masks = np.zeros((N_STATES, N_ACTIONS), np.int8)
-    for index in range(N_STATES):
-        state = states.state_from_index(index)
-        masks[index, : RIGHT + 1] = [code % 2 == 0 for code in state.view]  # E, T and S
-        masks[index, GIVE if state.carries else PICK_UP] = SEES_GOAL in state.view
-    return masks
-
-
-_EVENTS, _ACTION_MASKS = _events(), _action_masks()
+_EVENTS = _events()
 
 
 class ColonyWorlds:
@@ -68,7 +45,8 @@ class ColonyWorlds:
         max_steps: Ticks of an episode.
         acted: Which slots held an ant that acted in the last step.
         rewards: float64, what that paid.
-        events: int8, what came of it, a number among EVENTS.
+        events: What came of it, text: "moved", "blocked" (only turned), "pushed" (another ant
+            changed places with it), "picked_up", "delivered" or "failed".
     """
 
     def __init__(
@@ -104,7 +82,7 @@ class ColonyWorlds:
         )
         shape = n_worlds, self.colony.capacity
         self.acted, self.rewards = np.zeros(shape, bool), np.zeros(shape)
-        self.events = np.zeros(shape, np.int8)
+        self.events = np.full(shape, None, dtype=object)
         self._scene: Any = None
 
     def begin(self, which: np.ndarray, seeds: Sequence[int | None] | None = None) -> None:
@@ -137,7 +115,7 @@ class ColonyWorlds:
         self.rewards = np.where(self.acted, colony.arrays["rewards"][of_engine], 0.0)
         self.events = _EVENTS[actions, of_engine]
         if colony.task.traffic.swap:
-            self.events[colony.ants_by_slot(AntRow.FILLED) == PUSHES] = PUSHED
+            self.events[colony.ants_by_slot(AntRow.FILLED) == PUSHES] = "pushed"
 
     @property
     def ended(self) -> np.ndarray:
@@ -148,10 +126,12 @@ class ColonyWorlds:
         """Which actions can succeed, int8 (W, slots, 5).
 
         A move onto another ant counts if the traffic lets ants of this load enter such cells at
-        all. Whether it does succeed depends on what the others do in the same tick.
+        all. Whether it does succeed depends on what the others do in the same tick. In a dead end
+        the moves count, which turn the ant.
         """
         colony, traffic = self.colony, self.colony.task.traffic
-        masks = _ACTION_MASKS[colony.ants_by_slot(AntRow.PERCEPT)]
+        percepts = colony.ants_by_slot(AntRow.PERCEPT)
+        masks = ACTION_MASKS.take(percepts, axis=0, mode="clip")
         if traffic.shared:
             turned = colony.ants_by_slot(AntRow.HEADING)[..., None] + np.array([-1, 0, 1])
             ahead = colony.ants_by_slot(AntRow.CELL)[..., None]
@@ -192,13 +172,12 @@ class ColonyWorlds:
 
 
 def _worlds(given: Any, n_worlds: int) -> list[World]:
-    """A world for each, from a name, a World, or a sequence of these."""
-    alone = isinstance(given, (str, os.PathLike, World)) or not isinstance(given, Iterable)
-    several = [given] if alone else list(given)
-    if not alone and len(several) != n_worlds:
+    """A world for each: of one name or World, or of a list of them number w modulo their number."""
+    several = [given] if isinstance(given, (str, World)) else given
+    if not isinstance(several, (list, tuple)) or not 0 < len(several) <= n_worlds:
         raise AntsError(
-            f"world is {shown(given)}; there {'is' if n_worlds == 1 else 'are'} "
-            f"{count(n_worlds, 'world')}, so give one for each, or one for all."
+            f"world is {shown(given)}; give the name of a world, a World, or a list of them, for "
+            f"{count(n_worlds, 'world')}."
         )
-    built = [build(one) if isinstance(one, (str, os.PathLike)) else one for one in several]
-    return built * n_worlds if alone else built
+    built = [build(one) if isinstance(one, str) else one for one in several]
+    return [built[w % len(built)] for w in range(n_worlds)]

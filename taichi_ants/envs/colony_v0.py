@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium import spaces
 
 from taichi_ants.engines.colony.layout import AntRow
-from taichi_ants.envs.colony import EVENTS, MAX_STEPS, METADATA, ColonyWorlds
+from taichi_ants.envs.colony import MAX_STEPS, METADATA, ColonyWorlds
 from taichi_ants.envs.formats import ObservationFormat
 from taichi_ants.errors import shown
 from taichi_ants.grid.constants import N_HEADINGS
@@ -25,69 +25,61 @@ except ImportError as error:
     ) from error
 
 
-class ColonyParallelEnv(ParallelEnv):
+class HexColonyParallelEnv(ParallelEnv):
     """The ants of one world, as agents of a `pettingzoo.ParallelEnv`.
 
     ## Description
-
     Ants on a hexagonal grid search food and carry it to the queen. Agent `"ant_7"` is ant number 7.
     The ants that start an episode have the numbers 0, 1, ...; each ant that is born has the next
     one, is in `agents` from then on, and acts from the next step on. All agents act at once.
 
     ## Action Space
-
     `Discrete(5)`: 0 left, 1 forward, 2 right are moves, relative to the heading; 3 picks up food in
     view; 4 gives food to a queen in view. `info["action_mask"]` tells which can succeed.
 
     ## Observation Space
-
     What an ant sees is a state of the task's observation: a number, made of its load and a code for
     each cell in view. `observation_format` shows it: "cells" as `MultiDiscrete` (load and codes,
     int64), "index" as `Discrete` (the number), "one_hot" as `Box` (float32). `state()` is a map of
     the whole world, for centralised critics.
 
     ## Rewards
-
     Each ant gets what its own action pays by the task's `Rewards`: by default 0 for a move onto an
     empty cell, 1 onto one with a trail (with food: one nearer to the queen), -1 for what cannot be
     done, 3 for a food picked up, 10 for a food given.
 
     ## Starting State
-
     The world as it is drawn. The ants that it lists come first; all others start where `start`
     says, on cells and with headings that the seed decides.
 
     ## Episode End
-
     An ant that dies of age is terminated, and leaves `agents`; its number does not come back. After
     `max_steps` steps all are truncated. A delivery ends nothing, whatever the task's `delivery`
     says: its ant goes on, and `info["event"]` tells.
 
     ## Info
-
     - `state`: the state as a number.
-    - `action_mask`: int8 (5,), 1 for what can succeed if no other ant is faster.
+    - `action_mask`: int8 (5,), 1 for what can succeed if no other ant is faster; in a dead end for
+      the moves, which turn the ant.
     - `event`: what came of the action: "moved", "blocked" (only turned), "pushed" (another ant
       changed places with it), "picked_up", "delivered" or "failed". Not in the first step of an
       ant.
 
     ## Arguments
-
-    Args:
-        world: A registered name, the path of a map, or a `World`.
-        task: The rules; None: the paper's.
-        ants: How many start.
-        start: "nest", near the queen, or "spread", anywhere.
-        capacity: How many can live at once; None: `ants` if none are born, else 2 * `ants` + 64.
-        max_steps: Steps of an episode.
-        observation_format: "cells", "index" or "one_hot".
-        evaporation: Whether trails fall; None: as the task says for training.
-        render_mode: "rgb_array": `render` gives a picture. None: it is not called.
+    world: A registered name, the path of a map, or a `World`.
+    task: The rules; None: the paper's.
+    ants: How many start.
+    start: "nest", near the queen, or "spread", anywhere.
+    capacity: How many can live at once; None: `ants` if none are born, else 2 * `ants` + 64.
+    max_steps: Steps of an episode.
+    observation_format: "cells", "index" or "one_hot".
+    evaporation: Whether trails fall; None: as the task says for training.
+    render_mode: "rgb_array": `render` gives a picture. None: it is not called.
 
     Attributes:
-        possible_agents: All that can ever live in one episode: the ants that start, and as many as
-            food can become, see `most_births`.
-        agents: Those that live now; only after the first reset.
+    possible_agents: All that can ever live in one episode: the ants that start, and as many as
+        food can become, see `most_births`.
+    agents: Those that live now; only after the first reset.
 
     Raises:
         AntsError: An argument is not allowed.
@@ -222,7 +214,7 @@ class ColonyParallelEnv(ParallelEnv):
         for name, state, mask, event in zip(names, states.tolist(), masks, events, strict=True):
             infos[name] = {"state": state, "action_mask": mask}
             if name in acted:
-                infos[name]["event"] = EVENTS[event]
+                infos[name]["event"] = event
         return observations, infos
 
     def state(self) -> np.ndarray:
@@ -258,4 +250,4 @@ def most_births(life: Life, foods: int, ticks: int) -> int:
     return min(N_HEADINGS * ticks, foods * (1 + again))
 
 
-parallel_env = ColonyParallelEnv
+parallel_env = HexColonyParallelEnv

@@ -11,49 +11,51 @@ from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from taichi_ants.envs.colony import GAVE, MAX_STEPS, METADATA, ColonyWorlds
+from taichi_ants.envs.colony import MAX_STEPS, METADATA, ColonyWorlds
+from taichi_ants.envs.forage import (
+    checked_actions,
+    checked_autoreset,
+    checked_reset_mask,
+    seeds_of,
+)
 from taichi_ants.envs.formats import ObservationFormat
-from taichi_ants.errors import AntsError, checked_whole, shown
+from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.worlds import World
 
+NOTHING = np.array(None, dtype=object)
 
-class ColonyVectorEnv(VectorEnv):
+
+class HexColonyVectorEnv(VectorEnv):
     """Ants of one or more worlds, each of them an environment of a `gymnasium.vector.VectorEnv`.
 
     ## Description
-
     Ants on a hexagonal grid search food and carry it to the queen of their world. Environment
     number w * ants + i is ant number i of world number w. The ants of a world share its cells, its
     food and its trails, and act at the same time. Any library that trains one agent on a vector
     environment so trains one policy that all ants follow ("parameter sharing").
 
     ## Action Space
-
     `Discrete(5)` for each ant: 0 left, 1 forward, 2 right are moves, relative to the heading; 3
     picks up food in view; 4 gives food to a queen in view. `info["action_mask"]` tells which can
     succeed.
 
     ## Observation Space
-
     What an ant sees is a state of the task's observation: a number, made of its load and a code for
     each cell in view. `observation_format` shows it: "cells" as `MultiDiscrete` (load and codes,
     int64), "index" as `Discrete` (the number), "one_hot" as `Box` (float32).
 
     ## Rewards
-
     Each ant gets what its own action pays by the task's `Rewards`: by default 0 for a move onto an
     empty cell, 1 onto one with a trail (with food: one nearer to the queen), -1 for what cannot be
     done, 3 for a food picked up, 10 for a food given.
 
     ## Starting State
-
     The world as it is drawn. The ants that it lists come first; all others start where `start`
     says, on cells and with headings that the seed of the world decides.
 
     ## Episode End
-
     After `max_steps` steps all ants of a world are truncated at once. A delivery ends nothing in
     the world; its ant goes on from where it stands. If the task's delivery is "absorbing", the
     default, the delivering ant is nevertheless `terminated`: what comes later is no longer credited
@@ -66,30 +68,28 @@ class ColonyVectorEnv(VectorEnv):
     `options={"reset_mask": ...}` for some worlds.
 
     ## Info
-
     Arrays with an entry for each ant, and for each key `_key`, bool, which ants have one:
 
     - `state`: int64, the state as a number.
-    - `action_mask`: int8 (num_envs, 5), 1 for what can succeed if no other ant is faster.
-    - `event`: int8, what came of the action, a number among `taichi_ants.envs.colony.EVENTS`:
-      moved, blocked, pushed, picked_up, delivered, failed. Of ants that acted in this step.
-    - `final_obs`, `final_info`: what the ants saw when they ended, before worlds were reset; in the
-      steps of `SAME_STEP` in which ants end. `final_obs` has the form of the observations.
+    - `action_mask`: int8 (num_envs, 5), 1 for what can succeed if no other ant is faster; in a
+      dead end for the moves, which turn the ant.
+    - `event`: what came of the action: "moved", "blocked" (only turned), "pushed" (another ant
+      changed places with it), "picked_up", "delivered" or "failed".
+    - `final_obs`, `final_info`: with `SAME_STEP`, what ants saw and did in the step that ended
+      their episode; `event` is in `final_info` then.
 
     ## Arguments
-
-    Args:
-        num_envs: How many ants there are in all worlds together, a multiple of `ants`.
-        world: A registered name, the path of a map, a `World`, or a sequence of these, one for each
-            of the num_envs / ants worlds, with the same ranges.
-        task: The rules; None: the paper's. Ants are neither born nor do they die here.
-        ants: How many live in each world.
-        start: "nest", near the queen, or "spread", anywhere.
-        max_steps: Steps of an episode.
-        observation_format: "cells", "index" or "one_hot".
-        evaporation: Whether trails fall; None: as the task says for training.
-        autoreset_mode: `SAME_STEP`, `NEXT_STEP` or `DISABLED` of `gymnasium.vector.AutoresetMode`.
-        render_mode: "rgb_array": `render` gives a picture of each world. None: it is not called.
+    num_envs: How many ants there are in all worlds together, a multiple of `ants`.
+    world: A registered name, the path of a map, a `World`, or a list of these, of the same
+        ranges: world number w is number w modulo their number.
+    task: The rules; None: the paper's. Ants are neither born nor do they die here.
+    ants: How many live in each world.
+    start: "nest", near the queen, or "spread", anywhere.
+    max_steps: Steps of an episode.
+    observation_format: "cells", "index" or "one_hot".
+    evaporation: Whether trails fall; None: as the task says for training.
+    autoreset_mode: `SAME_STEP`, `NEXT_STEP` or `DISABLED` of `gymnasium.vector.AutoresetMode`.
+    render_mode: "rgb_array": `render` gives a picture of each world. None: it is not called.
 
     Raises:
         AntsError: An argument is not allowed.
@@ -114,13 +114,7 @@ class ColonyVectorEnv(VectorEnv):
                 f"num_envs is {num_envs}; it counts ants, so make it a multiple of ants, {ants}."
             )
         self._n_worlds = self.num_envs // ants
-        try:
-            self._mode = AutoresetMode(autoreset_mode)
-        except ValueError:
-            allowed = ", ".join(mode.value for mode in AutoresetMode)
-            raise AntsError(
-                f"autoreset_mode is {shown(autoreset_mode)}; it must be one of {allowed}."
-            ) from None
+        self.autoreset_mode = checked_autoreset(autoreset_mode)
         self._worlds = ColonyWorlds(
             *(world, self._n_worlds, task, ants, start, None, max_steps),
             *(observation_format, evaporation, render_mode),
@@ -132,18 +126,18 @@ class ColonyVectorEnv(VectorEnv):
                 "ants, so leave out births and lifespan, or take the parallel_env of colony_v0."
             )
         self._absorbing = rules.delivery == "absorbing"
-        if self._absorbing and self._mode is not AutoresetMode.SAME_STEP:
+        if self._absorbing and self.autoreset_mode is not AutoresetMode.SAME_STEP:
             raise AntsError(
-                f"autoreset_mode is {self._mode.value!r}, but an ant that delivers must go on at "
-                'once; take "SameStep", or a task with delivery "continuing".'
+                f"autoreset_mode is {self.autoreset_mode.value!r}, but an ant that delivers goes "
+                'on at once; take "SameStep", or a task with delivery "continuing".'
             )
-        self.metadata = {**METADATA, "autoreset_mode": self._mode}
+        self.metadata = {**METADATA, "autoreset_mode": self.autoreset_mode}
         self.render_mode = render_mode
         self.single_observation_space = self._worlds.shown.space
         self.single_action_space = spaces.Discrete(N_ACTIONS)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._begun = False
+        self._begun, self._everyone = False, np.ones(self.num_envs, bool)
         self._ended = np.zeros(self._n_worlds, bool)  # worlds that wait for their reset
 
     def reset(
@@ -164,40 +158,24 @@ class ColonyVectorEnv(VectorEnv):
         Returns:
             Observations and infos.
         """
-        which = self._reset_worlds((options or {}).get("reset_mask"))
-        if seed is None or isinstance(seed, (int, np.integer)):
-            super().reset(seed=None if seed is None else int(seed))
-            seeds = None if seed is None else [int(seed) + w for w in range(self._n_worlds)]
-        else:
-            seeds = list(seed)  # type: ignore[arg-type]
-            if len(seeds) != self._n_worlds:
-                raise ValueError(
-                    f"there are {len(seeds)} seeds for {self._n_worlds} worlds; the ants of a "
-                    "world share one."
-                )
+        which = self._reset_worlds(options)
+        super().reset(seed=int(seed) if isinstance(seed, (int, np.integer)) else None)
+        seeds = seeds_of(seed, self._n_worlds)
         if not self._begun:
             drawn = self.np_random.integers(2**63, size=self._n_worlds).tolist()
-            seeds = [a if b is None else b for a, b in zip(drawn, seeds or drawn, strict=True)]
+            seeds = [a if b is None else b for a, b in zip(drawn, seeds, strict=True)]
         self._worlds.begin(which, seeds)
         self._begun, self._ended = True, self._ended & ~which
         return self._observations(), self._infos(self._by_ant(which))
 
-    def _reset_worlds(self, mask: Any) -> np.ndarray:
-        """Which worlds a mask of environments names, bool (W,); raises as SyncVectorEnv does."""
-        if mask is None:
-            return np.ones(self._n_worlds, bool)
-        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
-            raise TypeError(f"reset_mask is {shown(mask)}; give a bool array.")
-        if mask.shape != (self.num_envs,):
-            raise ValueError(f"reset_mask has shape {mask.shape}; give ({self.num_envs},).")
-        by_world = mask.reshape(self._n_worlds, -1)
+    def _reset_worlds(self, options: dict[str, Any] | None) -> np.ndarray:
+        """Which worlds the options of a reset name, bool (W,)."""
+        by_world = checked_reset_mask(options, self.num_envs).reshape(self._n_worlds, -1)
         which = np.asarray(by_world.any(axis=1))
-        if not which.any() or (which != by_world.all(axis=1)).any():
-            raise ValueError(
-                "reset_mask must name all ants of a world or none, and those of one world at least."
-            )
-        if not self._begun:
-            raise ResetNeeded("no world has begun yet; call reset without reset_mask first.")
+        if (which != by_world.all(axis=1)).any():
+            raise ValueError("reset_mask names some ants of a world alone; name all or none of it.")
+        if not self._begun and not which.all():
+            raise ResetNeeded("no world has begun yet; call reset() without a reset_mask first.")
         return which
 
     def step(
@@ -212,39 +190,41 @@ class ColonyVectorEnv(VectorEnv):
             Observations; rewards, float64; terminated and truncated, bool (num_envs,); infos.
 
         Raises:
-            ResetNeeded: `reset` was not called before.
-            AssertionError: Actions are not in the action space; or, with `DISABLED`, worlds whose
-                episode has ended were not reset.
+            ResetNeeded: No episode has begun; or one has ended, and the mode is `DISABLED`.
+            InvalidAction: There are not as many actions, or one of them is none.
         """
         if not self._begun:
-            raise ResetNeeded("Cannot call env.step() before calling env.reset()")
-        actions, waited = self._checked(actions), self._ended
-        if self._mode is AutoresetMode.DISABLED and waited.any():
-            raise AssertionError(
-                f"the episodes of the worlds {np.flatnonzero(waited).tolist()} have ended; reset "
-                'them, with options={"reset_mask": ...}.'
+            raise ResetNeeded("no episode is under way; call reset() before step().")
+        actions, waited = checked_actions(actions, self.num_envs), self._ended
+        if self.autoreset_mode is AutoresetMode.DISABLED and waited.any():
+            raise ResetNeeded(
+                f"the episode of world {waited.argmax()} has ended; call reset() with "
+                'options={"reset_mask": ...} before step().'
             )
         worlds = self._worlds
         worlds.step(actions.reshape(self._n_worlds, -1))
         acted = worlds.acted.reshape(-1)
         rewards, events = worlds.rewards.reshape(-1), worlds.events.reshape(-1)
-        terminated = acted & (events == GAVE) & self._absorbing
+        terminated = acted & (events == "delivered") & self._absorbing
         ended = worlds.ended & ~waited
         truncated = self._by_ant(ended)
-        everyone, final = np.ones(self.num_envs, bool), {}
-        observations, infos = self._observations(), self._infos(everyone, events, acted)
-        if self._mode is AutoresetMode.SAME_STEP:
-            begins, over = ended, terminated | truncated
+        over, final = terminated | truncated, {}
+        observations = self._observations()
+        if self.autoreset_mode is AutoresetMode.SAME_STEP:
+            begins = ended
             if over.any():
-                last = {k: over.copy() if k[0] == "_" else v.copy() for k, v in infos.items()}
-                final = {"final_obs": observations.copy(), "_final_obs": over}
-                final |= {"final_info": last, "_final_info": over.copy()}
+                last = np.full(self.num_envs, None, dtype=object)
+                last[over] = np.fromiter(observations[over], dtype=object)
+                final = {"final_obs": last, "_final_obs": over}
+                final |= {"final_info": self._infos(over, events, over), "_final_info": over.copy()}
+                acted = acted & ~over
         else:
             worlds.stop(ended)
             begins, self._ended = waited, ended
         if begins.any():
             worlds.begin(begins)
-            observations, infos = self._observations(), self._infos(everyone, events, acted)
+            observations = self._observations()
+        infos = self._infos(self._everyone, events, acted)
         return observations, rewards, terminated, truncated, {**infos, **final}
 
     def render(self) -> tuple[np.ndarray, ...] | None:
@@ -252,19 +232,8 @@ class ColonyVectorEnv(VectorEnv):
         if self.render_mode is None:
             return None
         if not self._begun:
-            raise ResetNeeded("Cannot call env.render() before calling env.reset()")
+            raise ResetNeeded("no episode is under way; call reset() before render().")
         return self._worlds.render()
-
-    def _checked(self, actions: Any) -> np.ndarray:
-        """The actions, if they are in the action space."""
-        given = np.asarray(actions)
-        fits = given.shape == (self.num_envs,) and given.dtype.kind in "iu"
-        if not fits or given.min() < 0 or given.max() >= N_ACTIONS:
-            raise AssertionError(
-                f"actions is {shown(actions)}; give {self.num_envs} integers from 0 to "
-                f"{N_ACTIONS - 1}."
-            )
-        return given
 
     def _by_ant(self, of_worlds: np.ndarray) -> np.ndarray:
         """What holds for worlds, for each of their ants."""
@@ -274,19 +243,17 @@ class ColonyVectorEnv(VectorEnv):
         return self._worlds.shown.show(self._worlds.colony.states.reshape(-1))
 
     def _infos(
-        self,
-        have: np.ndarray,
-        events: np.ndarray | None = None,
-        acted: np.ndarray | None = None,
+        self, have: np.ndarray, events: np.ndarray | None = None, of: np.ndarray | None = None
     ) -> dict[str, Any]:
-        """What is said of the ants that `have` it, and what came of the actions of some."""
+        """What is said of the ants that `have` it, and events `of` those of whom there are any."""
         worlds = self._worlds
-        infos = {
-            "state": worlds.colony.states.reshape(-1).astype(np.int64),
-            "_state": have,
-            "action_mask": worlds.action_masks().reshape(self.num_envs, N_ACTIONS),
+        masks = worlds.action_masks().reshape(self.num_envs, N_ACTIONS)
+        said = {
+            "state": worlds.colony.states.reshape(-1).astype(np.int64) * have,
+            "_state": have.copy(),
+            "action_mask": masks * have[:, None],
             "_action_mask": have.copy(),
         }
-        if events is not None and acted is not None:
-            infos |= {"event": events.copy(), "_event": acted.copy()}
-        return infos
+        if events is not None and of is not None:
+            said |= {"event": np.where(of, events, NOTHING), "_event": of.copy()}
+        return said

@@ -11,7 +11,7 @@ from random_colonies import RandomColony, random_colony
 from random_rewards import random_rewards
 from same_colonies import assert_equal
 
-from taichi_ants.envs.colony import EVENTS, ColonyWorlds
+from taichi_ants.envs.colony import ColonyWorlds
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.reference.ants import Event
 from taichi_ants.task.constants import GIVE, N_ACTIONS, PICK_UP
@@ -52,7 +52,7 @@ def compare_step(worlds: ColonyWorlds, world: int, plain: ReferenceColony, actio
     assert np.flatnonzero(worlds.acted[world]).tolist() == slots
     for step in plain.transitions:
         assert worlds.rewards[world, step.slot] == step.reward
-        assert EVENTS[worlds.events[world, step.slot]] == step.event.value.replace(" ", "_")
+        assert worlds.events[world, step.slot] == step.event.value.replace(" ", "_")
     assert not worlds.rewards[world, ~worlds.acted[world]].any()
 
 
@@ -125,9 +125,10 @@ def test_what_the_mask_allows_succeeds_where_an_ant_is_alone():
         mask = worlds.action_masks()[0, 0]
         action = likely(rng, mask[None])[0]
         worlds.step(np.array([[action]]))
-        succeeds = EVENTS[worlds.events[0, 0]] in ("moved", "picked_up", "delivered")
-        assert succeeds == mask[action]
-        seen[mask[action], action] += 1
+        succeeds = worlds.events[0, 0] in ("moved", "picked_up", "delivered")
+        if worlds.events[0, 0] != "blocked" or not mask[:PICK_UP].all():  # no dead end
+            assert succeeds == mask[action]
+            seen[mask[action], action] += 1
     assert (seen[0] > 0).all()
     assert (seen[1, :3] > 0).all()
 
