@@ -83,6 +83,7 @@ def place_newborn(c: ti.template(), w, ant, cell, heading):
     c.ants[AntRow.CELL, ant] = cell
     c.ants[AntRow.HEADING, ant] = heading
     c.ants[AntRow.CARRIES, ant] = 0
+    c.ants[AntRow.CARRIED, ant] = 0  # the last ant in the slot may have died with food
     c.ants[AntRow.STAGE, ant] = Stage.NEWBORN
     c.ants[AntRow.AGE, ant] = 0
     c.ants[AntRow.NUMBER, ant] = number
