@@ -10,11 +10,10 @@ import numpy as np
 
 from taichi_ants import checks
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.engines.colony.layout import PUSHES, AntRow, WorldRow
+from taichi_ants.engines.colony.layout import ANT_GROUND, PUSHES, AntRow, WorldRow
 from taichi_ants.envs.forage import ACTION_MASKS
 from taichi_ants.envs.formats import ObservationFormat, Shown
 from taichi_ants.errors import AntsError, check_one_of, checked_flag, count, shown
-from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import Task
 from taichi_ants.task.constants import DELIVERED, FAILED, N_ACTIONS, PICKED_UP, RIGHT
 from taichi_ants.worlds import World, build
@@ -133,14 +132,11 @@ class ColonyWorlds:
         percepts = colony.ants_by_slot(AntRow.PERCEPT)
         masks = ACTION_MASKS.take(percepts, axis=0, mode="clip")
         if traffic.shared:
-            turned = colony.ants_by_slot(AntRow.HEADING)[..., None] + np.array([-1, 0, 1])
-            ahead = colony.ants_by_slot(AntRow.CELL)[..., None]
-            ahead = ahead + colony.grid.offsets[turned % N_HEADINGS]
-            standing = np.zeros((len(ahead), colony.grid.size), bool)
-            worlds, slots = np.nonzero(colony.living)
-            standing[worlds, colony.ants_by_slot(AntRow.CELL)[worlds, slots]] = True
-            enters = np.take_along_axis(standing, ahead.reshape(len(ahead), -1), axis=1)
-            enters = enters.reshape(ahead.shape)
+            base = np.arange(len(masks))[:, None] * colony.grid.size
+            here = base + colony.ants_by_slot(AntRow.CELL)
+            towards = colony.ants_by_slot(AntRow.HEADING)[..., None] + np.arange(RIGHT + 1)
+            ahead = here[..., None] + colony.arrays["compass"].take(towards)
+            enters = colony.arrays["ground"].take(ahead) >= ANT_GROUND
             if not traffic.follow:
                 enters &= (colony.ants_by_slot(AntRow.CARRIES) == 1)[..., None]
             masks[..., : RIGHT + 1] |= enters
