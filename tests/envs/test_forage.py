@@ -15,6 +15,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+import taichi
 from command_lines import environment
 from gymnasium.error import InvalidAction, ResetNeeded
 from gymnasium.utils.env_checker import check_env
@@ -236,6 +237,19 @@ def test_copies_go_on_alike(copied):
             one, other = env.step(action), twin.step(action)
             for part in range(4):
                 np.testing.assert_array_equal(one[part], other[part])
+
+
+def test_environments_outlive_a_reset_of_taichi():
+    envs = HexForageEnv(SMALL[0]), HexForageEnv(SMALL[0])
+    for env in envs:
+        env.reset(seed=0)
+    for number, action in enumerate((0, 1, 2, 2, 1, 0)):
+        one, other = (env.step(action)[4]["state"] for env in envs)
+        assert one == other
+        if number % 2:
+            taichi.reset()
+        else:
+            envs[0].reset(seed=0), envs[1].reset(seed=0)
 
 
 def test_what_is_returned_is_not_written_again():
