@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from taichi_ants.engines.runs.results import Rollouts, TrainingResult
     from taichi_ants.engines.runs.traces import Trace, rollout, trace_training
     from taichi_ants.engines.runs.training import continue_training, evaluate, train
+    from taichi_ants.envs.tabulation import tabulate
     from taichi_ants.errors import AntsError
     from taichi_ants.learners.config import TrainingConfig
     from taichi_ants.learners.policies import load_policy, save_policy
@@ -29,6 +30,7 @@ _HOMES = {
     "engines.runs.results": ("Rollouts", "TrainingResult"),
     "engines.runs.traces": ("Trace", "rollout", "trace_training"),
     "engines.runs.training": ("continue_training", "evaluate", "train"),
+    "envs.tabulation": ("tabulate",),
     "errors": ("AntsError",),
     "learners.config": ("TrainingConfig",),
     "learners.policies": ("load_policy", "save_policy"),
@@ -62,6 +64,7 @@ __all__ = [
     "rollout",
     "save_policy",
     "states",
+    "tabulate",
     "task",
     "trace_training",
     "train",
