@@ -21,7 +21,7 @@ from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.registry import Memory
 from taichi_ants.task import Task
-from taichi_ants.task.constants import EMPTY, MAX_STEPS, N_ACTIONS, ROW
+from taichi_ants.task.constants import ACTION_NAMES, EMPTY, MAX_STEPS, N_ACTIONS, ROW
 from taichi_ants.worlds.starts import Start
 from taichi_ants.worlds.world import World
 
@@ -34,6 +34,9 @@ _ANTS_PER_CHUNK = 2048
 _MOST_CHUNKS = 256
 _TICKS_BETWEEN_SORTS = 32
 _PIECE_SECONDS = 0.4
+
+# Where actions are given, nobody chooses or learns, and none of these matters.
+_NO_TRAINING = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
 
 _DEPOSITS = {"none": 0, "set": SETS, "add": ADDS, "fading": FADES}  # as kernels read them
 
@@ -97,7 +100,8 @@ class Colony:
         world: One world for all seeds, or one for each, of the same ranges.
         task: The rules of the game; None is the paper's. Colonies that learn have its evaporation
             in training, others that in evaluation.
-        training: The learner and its settings.
+        training: The learner and its settings. None, with sharing "fixed": ants do what `act` is
+            given, and there are no action values.
         seeds: One seed for each of the W worlds.
         ants: How many start each episode, 1 to 2**24: the listed ants of the World first, then
             others on free cells, see `start`.
@@ -110,8 +114,8 @@ class Colony:
         sharing: "shared": one table for all ants of a world, for learners with a TD error. "own":
             one, and a memory of the learner, for each slot. "fixed": nobody learns.
         q_values: Action values to start from, float (n_states, 5) or (W, n_states, 5); None: zeros,
-            but if nobody learns they must be given. If tables are not shared, (W, slots, n_states,
-            5) too.
+            but if nobody learns they must be given, unless `training` is None. If tables are not
+            shared, (W, slots, n_states, 5) too.
         threads: CPU threads; None keeps what runs, or takes all.
         arch: "cpu" or "cuda"; None keeps what runs, or takes the CPU.
         schedule: "by_world" hands worlds to threads, "by_chunk" groups of ants; None chooses by
@@ -126,7 +130,7 @@ class Colony:
         self,
         world: World | Sequence[World],
         task: Task | None,
-        training: TrainingConfig,
+        training: TrainingConfig | None,
         seeds: int | Sequence[int] = 0,
         ants: int = 1,
         capacity: int | None = None,
@@ -143,12 +147,18 @@ class Colony:
         self.capacity = checks.checked_capacity(self.task, ants, capacity, start, ends_at_delivery)
         self.ants, self.start = int(ants), start
         self.ends_at_delivery = bool(ends_at_delivery)
-        if not isinstance(training, TrainingConfig):
-            raise AntsError(f"training is {shown(training)}; it must be one TrainingConfig.")
-        (self.training,) = checks.checked_configs(training)
         check_one_of("sharing", sharing, SHARINGS)
         self.sharing, learns = sharing, sharing != "fixed"
-        if not learns and q_values is None:
+        self.is_given_actions = training is None and not learns and q_values is None
+        if self.is_given_actions:
+            training = _NO_TRAINING
+        if not isinstance(training, TrainingConfig):
+            raise AntsError(
+                f"training is {shown(training)}; it must be one TrainingConfig, or None with "
+                'sharing="fixed" and without q_values.'
+            )
+        (self.training,) = checks.checked_configs(training)
+        if not learns and q_values is None and not self.is_given_actions:
             raise AntsError(
                 "sharing is 'fixed', but q_values is None; nobody learns, so give the action "
                 "values that the ants follow."
@@ -185,9 +195,13 @@ class Colony:
         self._arguments: Any = None
         self._piece = 1  # ticks that take less than _PIECE_SECONDS
         self.epsilon, self.learning_rate = self.training.epsilon, self.training.learning_rate
-        self.episode = -1
         self.length = 0  # of the episode in ticks, 0 if nobody has said
-        self.ticks = 0
+        self.ticks = 0  # since an episode began for all worlds
+
+    @property
+    def episode(self) -> int:
+        """The number of the present episode, -1 before the first; of the world that had most."""
+        return int(self.arrays["episodes"].max())
 
     def _lay_out(self, worlds: tuple[World, ...]) -> None:
         """Make the arrays that depend on the worlds."""
@@ -215,16 +229,112 @@ class Colony:
         if world is not None:
             self._lay_out(_checked_worlds(world, len(self.seeds), self.sharing != "fixed"))
         self.length = 0 if length is None else checked_whole("length", length, most=MAX_STEPS)
-        self.episode += 1
         self.ticks = 0
         memory.begin_episode(self)
         self._launch("begin_phases")
 
+    def begin_some(self, which: np.ndarray, seeds: Sequence[int] | None = None) -> None:
+        """Let some worlds begin their next episode, while the others go on with theirs.
+
+        For these it is as `end_episode` and `begin_episode`; epsilon and the learning rate stay.
+
+        Args:
+            which: bool (W,).
+            seeds: One for each of these worlds, which then begin a new life, as in a new `Colony`;
+                tables and memories of learners go on. Seeds of a colony may repeat then, but
+                `save` refuses them. None: their streams go on.
+
+        Raises:
+            AntsError: There are other numbers of worlds or seeds, or a seed is not allowed.
+        """
+        which = np.asarray(which)
+        if which.dtype != bool or which.shape != (len(self.seeds),):
+            raise AntsError(f"which is {shown(which)}; give a bool for each of the worlds.")
+        if seeds is None:
+            memory.keep_streams(self, which)
+        else:
+            self._reseed(which, [seed for one in seeds for seed in checks.checked_seeds(one)])
+        memory.begin_episode(self, which)
+        self._launch("begin_phases")
+
+    def _reseed(self, which: np.ndarray, seeds: list[int]) -> None:
+        """Take other seeds for some worlds, as if nothing had happened in them yet."""
+        (places,) = np.nonzero(which)
+        if len(seeds) != len(places):
+            raise AntsError(f"there are {len(seeds)} seeds for {len(places)} worlds.")
+        changed = list(self.seeds)
+        for place, seed in zip(places, seeds, strict=True):
+            changed[place] = seed
+        self.seeds = tuple(changed)
+        self.seed_words = np.array([seed % 2**64 for seed in self.seeds], dtype=np.uint64)
+        self.arrays["seeds"][:] = self.seed_words
+        self.at_start = memory.start_of_episode(self)
+        memory.copy_worlds(self.arrays, memory.seeded(self), len(self.seeds), which)
+
     def tick(self, n: int = 1) -> None:
-        """Let n ticks pass; worlds whose episode has ended stand still."""
+        """Let n ticks pass; worlds whose episode has ended stand still.
+
+        Raises:
+            AntsError: No episode has begun, or actions are given to this colony, see `act`.
+        """
         self._check_begun()
+        if self.is_given_actions:
+            raise AntsError(
+                "training is None, so nobody chooses; give the actions of each tick to act."
+            )
         for _ in self._pass(checked_whole("n", n)):
             pass
+
+    def act(self, actions: np.ndarray) -> None:
+        """Let one tick pass in which each ant does what is given; for colonies without training.
+
+        Args:
+            actions: Whole numbers 0 to 4 (W, capacity): left, forward, right, pick up, give; those
+                of vacant slots, and of worlds whose episode has ended, are ignored.
+
+        Raises:
+            AntsError: No episode has begun, the colony has a training, or an action is not allowed.
+        """
+        self._check_begun()
+        if not self.is_given_actions:
+            raise AntsError(
+                "this colony has a training by which ants choose; call tick, or make it with "
+                'training=None and sharing="fixed".'
+            )
+        given, shape = np.asarray(actions), (len(self.seeds), self.capacity)
+        if given.dtype.kind not in "iu" or given.shape != shape:
+            raise AntsError(
+                f"actions is {shown(given)}; give whole numbers of shape {shape}, one a slot."
+            )
+        if given.min() < 0 or given.max() >= N_ACTIONS:
+            given = np.where(self.living, given, 0)
+            wrong = given[(given < 0) | (given >= N_ACTIONS)]
+            if len(wrong):
+                raise AntsError(
+                    f"an action is {wrong[0]}; it must lie between 0 and {N_ACTIONS - 1}: "
+                    f"{', '.join(ACTION_NAMES)}."
+                )
+        self.arrays["ants"][AntRow.ACTION] = given.reshape(-1)
+        self._advance(1)
+
+    @property
+    def living(self) -> np.ndarray:
+        """In which slots ants live, bool (W, capacity)."""
+        return self.ants_by_slot(AntRow.STAGE) == Stage.LIVING
+
+    @property
+    def states(self) -> np.ndarray:
+        """The row of its table that each ant looks at, int32 (W, capacity), as it is now.
+
+        In a slot whose ant has died it is what the ant saw last.
+        """
+        from taichi_ants.engines.looks import is_percept
+
+        return self.ants_by_slot(AntRow.PERCEPT if is_percept(self.task.sees) else AntRow.STATE)
+
+    def ants_by_slot(self, row: AntRow) -> np.ndarray:
+        """What is stored of each ant, int32 (W, capacity); not a copy."""
+        return self.arrays["ants"][row].reshape(len(self.seeds), self.capacity)
 
     def _pass(self, n: int) -> Iterator[None]:
         """Let n ticks pass, in short pieces: a launch of a kernel cannot be interrupted."""
@@ -247,11 +357,14 @@ class Colony:
         for _ in range(n):
             if self.ticks % _TICKS_BETWEEN_SORTS == 0:
                 self._sort_ants()
+            worlds = self.arrays["worlds"]
+            running = worlds[WorldRow.RUNNING].copy()
             self._launch("tick_phases")
             for _ in range(rounds):
                 self._launch("planning_phases")
             if self._ants_change or self.ends_at_delivery:
                 self._launch("last_phases")
+            worlds[WorldRow.TICKS] += running
             self.ticks += 1
 
     def end_episode(self) -> None:
@@ -260,12 +373,7 @@ class Colony:
         Raises:
             AntsError: The learner has made action values that are not finite.
         """
-        ants, slots = self.arrays["ants"], self.capacity
-        number = ants[AntRow.NUMBER]
-        there = ants[AntRow.STAGE] != Stage.VACANT
-        (columns,) = np.nonzero(there & (number >= 0) & (number < self.ants))
-        places = columns // slots * slots + number[columns]
-        self.arrays["first_streams"][places] = self.arrays["streams"][columns]
+        memory.keep_streams(self)
         self._check_finite()
         self.epsilon = self.training.next_epsilon(self.epsilon)
         self.learning_rate = self.training.next_learning_rate(self.learning_rate)
@@ -374,9 +482,10 @@ class Colony:
 
         Raises:
             AntsError: The learner has made action values that are not finite, so that `load` would
-                refuse the file; or it cannot be written.
+                refuse the file; seeds repeat; or it cannot be written.
         """
         self._check_finite()
+        checks.checked_seeds(self.seeds)
         colony_files.save_colony(self, path)
 
     @classmethod
@@ -387,6 +496,15 @@ class Colony:
             AntsError: The file is missing, damaged, or holds no colony.
         """
         return colony_files.load_colony(cls, path, threads, arch)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but what belongs to the Taichi that runs: copies and pickles go on alike."""
+        return {**vars(self), "_arguments": None, "_learner": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        learns = self.sharing != "fixed"
+        self._learner = learners.get(self.training.learner) if learns else None
 
     def __eq__(self, other: object) -> bool:
         """Whether both are at the same point of the same life, so that they go on alike."""
@@ -402,7 +520,7 @@ class Colony:
         lines = [
             f"world: {self.worlds[0]}{more}",
             f"task: {self.task}",
-            f"training: {self.training}",
+            f"training: {None if self.is_given_actions else self.training}",
             f"seeds: {shown(self.seeds)}",
             f"ants: {self.ants}, capacity: {self.capacity}, start: {self.start!r}",
             f"sharing: {self.sharing!r}, epsilon: {self.epsilon:.4g}",
@@ -427,10 +545,11 @@ class Colony:
         """Store the ants of a world in the order of their cells, so that neighbours share caches.
 
         Their order changes nothing but the speed: ants have numbers. Slots do matter where ants are
-        born or have tables of their own, and vacant ones stay behind the others; there the order
-        stays.
+        born, have tables of their own or are given actions, and vacant ones stay behind the others;
+        there the order stays.
         """
-        if self._ants_change or self.one_a_slot or self.capacity > self.ants:
+        slots_matter = self._ants_change or self.one_a_slot or self.is_given_actions
+        if slots_matter or self.capacity > self.ants:
             return
         ants = self.arrays["ants"]
         cells = ants[AntRow.CELL].reshape(len(self.seeds), -1)
@@ -463,9 +582,9 @@ class Colony:
         with runtime.quiet():
             pack = self._arguments.pack(values)
             if phases:
-                kernels.by_chunk(variant, getattr(kernels, phases), kind)(pack, self.ticks)
+                kernels.by_chunk(variant, getattr(kernels, phases), kind)(pack)
             else:
-                kernels.by_world(variant, kind)(pack, self.ticks, n_ticks)
+                kernels.by_world(variant, kind)(pack, n_ticks)
 
     def _numbers(self) -> dict[str, Any]:
         """What kernels know besides arrays; -1 stands for an option that is off."""
@@ -478,7 +597,6 @@ class Colony:
             "n_chunks": self.chunks,
             "n_homes": self.n_homes,  # room for homes in each world
             "size": self.grid.size,
-            "episode": self.episode,
             "length": self.length,
             "evaporates": int(pheromone.evaporation == "linear"),  # of integer trails: the clock
             "deposits": _DEPOSITS[pheromone.deposit],

@@ -18,9 +18,9 @@ from taichi_ants.task.constants import N_ACTIONS
 if TYPE_CHECKING:
     from taichi_ants.engines.colony.colony import Colony
 
-_KIND = FileKind("taichi-ants colony 6", "colony", "Colony.save")
+_KIND = FileKind("taichi-ants colony 7", "colony", "Colony.save")
 _OPTIONS = ("seeds", "ants", "capacity", "start", "ends_at_delivery", "sharing", "schedule")
-_MOMENT = ("epsilon", "learning_rate", "episode", "length", "ticks")
+_MOMENT = ("epsilon", "learning_rate", "length", "ticks")
 
 
 def save_colony(colony: Colony, path: files.PathLike) -> None:
@@ -47,7 +47,7 @@ def _contents(colony: Colony) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
         arrays |= world_arrays(world, f"world{number}")
     facts = {
         "task": colony.task.as_dict(),
-        "training": colony.training.as_dict(),
+        "training": None if colony.is_given_actions else colony.training.as_dict(),
         "worlds": [world_facts(world) for world in numbers],
         "world_of": [numbers[world] for world in colony.worlds],
         "one_a_slot": colony.one_a_slot,
@@ -68,21 +68,24 @@ def load_colony(
     stored, facts = _KIND.read(path)
     runtime.start(threads, arch)  # what is wrong with these says nothing about the file
     with _KIND.rebuilding(path):
-        training = TrainingConfig(**facts["training"])
-    learners.get(training.learner)
+        given = facts["training"]
+        training = None if given is None else TrainingConfig(**given)
+    if training is not None:
+        learners.get(training.learner)
     with _KIND.rebuilding(path):
         worlds = [
             world_from(stored, f"world{number}", one) for number, one in enumerate(facts["worlds"])
         ]
         task, options = Task.from_dict(facts["task"]), {name: facts[name] for name in _OPTIONS}
-        if options["sharing"] == "fixed":  # tables of the right shape, until its own are put in
+        if (
+            options["sharing"] == "fixed" and training is not None
+        ):  # tables of the right shape, until its own are put in
             leading = (len(facts["seeds"]), facts["capacity"]) if facts["one_a_slot"] else ()
             options["q_values"] = np.zeros((*leading, task.n_states, N_ACTIONS), np.float32)
         colony = cls([worlds[number] for number in facts["world_of"]], task, training, **options)
         for name in ("epsilon", "learning_rate"):
             setattr(colony, name, checks.checked_share(name, facts[name]))
         set_learning_rate(colony)
-        colony.episode = checked_whole("episode", facts["episode"], least=-1)
         colony.length = checked_whole("length", facts["length"], least=0)
         colony.ticks = checked_whole("ticks", facts["ticks"], least=0)
         for name in colony.stored:

@@ -140,12 +140,12 @@ def last_phases(v: Variant) -> Iterator[Phase]:
 
 
 @ti.func
-def do(phase: ti.template(), c: ti.template(), v: ti.template(), chunk, tick):
+def do(phase: ti.template(), c: ti.template(), v: ti.template(), chunk):
     """A phase of a chunk, or of the world of that number; nothing if its episode has ended."""
     w = chunk
     if ti.static(phase.of != WORLD):
         w = chunk // c.n_chunks
-    running = c.worlds[WorldRow.RUNNING, w]
+    running, tick = c.worlds[WorldRow.RUNNING, w], c.worlds[WorldRow.TICKS, w]
     if ti.static(phase.of == ANTS):
         first, last = share_of(c, chunk, c.n_slots)
         last = ti.min(last, c.worlds[WorldRow.TOP, w]) * running
@@ -172,40 +172,41 @@ def share_of(c: ti.template(), chunk, n):
 def by_chunk(
     v: Variant, phases_of: Callable[[Variant], Iterator[Phase]], arguments: Any
 ) -> Callable[..., None]:
-    """A kernel (arguments, tick) of some phases, each a parallel loop over chunks or worlds."""
+    """A kernel of some phases, each a parallel loop over chunks or worlds."""
     phases = tuple(phases_of(v))
 
     @ti.kernel
-    def advance_colony(c: arguments, tick: ti.i32):
+    def advance_colony(c: arguments):
         for phase in ti.static(phases):
             ti.loop_config(block_dim=1)
             for chunk in range(
                 c.n_worlds if ti.static(phase.of == WORLD) else c.n_worlds * c.n_chunks
             ):
-                do(phase, c, v, chunk, tick)
+                do(phase, c, v, chunk)
 
     return advance_colony
 
 
 @cache
 def by_world(v: Variant, arguments: Any) -> Callable[..., None]:
-    """A kernel (arguments, first tick, ticks) of whole ticks of worlds with a single chunk each."""
+    """A kernel (arguments, ticks) of whole ticks of worlds with a single chunk each."""
     phases, last = tuple(tick_phases(v)), tuple(last_phases(v))
     planning = tuple(planning_phases(v))
 
     @ti.kernel
-    def advance_colony(c: arguments, first_tick: ti.i32, n_ticks: ti.i32):
+    def advance_colony(c: arguments, n_ticks: ti.i32):
         ti.loop_config(block_dim=1)
         for w in range(c.n_worlds):
-            for tick in range(first_tick, first_tick + n_ticks):
+            for _ in range(n_ticks):
                 if c.worlds[WorldRow.RUNNING, w] == 1:
                     for phase in ti.static(phases):
-                        do(phase, c, v, w, tick)
+                        do(phase, c, v, w)
                     if ti.static(v.plans_together):
-                        for _ in range(c.planning_steps):
+                        for _round in range(c.planning_steps):
                             for phase in ti.static(planning):
-                                do(phase, c, v, w, tick)
+                                do(phase, c, v, w)
                     for phase in ti.static(last):
-                        do(phase, c, v, w, tick)
+                        do(phase, c, v, w)
+                    c.worlds[WorldRow.TICKS, w] = c.worlds[WorldRow.TICKS, w] + 1
 
     return advance_colony

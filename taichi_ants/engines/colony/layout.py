@@ -23,7 +23,7 @@ class AntRow(IntEnum):
     WANT = auto()  # the cell to enter, or of the food to take, -1
     EVENT = auto()  # what came of the last action
     GOES = auto()  # where it is after the tick, and whether another ant enters the cell that it
-    FILLED = auto()  # leaves; only where cells with ants can be entered
+    FILLED = auto()  # leaves, or PUSHES it out; only where cells with ants can be entered
 
 
 class Stage(IntEnum):
@@ -47,7 +47,7 @@ class WorldRow(IntEnum):
     PILES = auto()
     QUEEN_CELL = auto()
     # What `ColonyEpisodes` counts, by the names of its fields.
-    TICKS = auto()
+    TICKS = auto()  # also the number of the present tick, from 0; its end adds 1
     DELIVERIES = auto()
     FIRST_DELIVERY = auto()
     MOVES = auto()
@@ -95,6 +95,7 @@ ENTER, TAKE = 1, 9  # plus the heading
 STANDS, STANDS_WITH_FOOD = 7, 15
 # What else the others need to know of an ant then, in `crowd` at its cell.
 HAS_FOOD, TAKES_FOOD, WINS = 1, 2, 4
+PUSHES = 2  # in FILLED, instead of 1
 ANT_GROUND = OBSTACLE | STANDS << 4  # the cell of an ant without food
 
 # What kernels read of the pheromone: how deposits are laid, 0 for none, and the value of `decay`

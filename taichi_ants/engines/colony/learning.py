@@ -28,9 +28,10 @@ _ONE = 4294967296.0  # fixed-point numbers have 32 binary places
 
 @ti.func
 def begin(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
-    """An ant looks around, and its learner begins an episode."""
-    c.ants[AntRow.PERCEPT, ant], c.ants[v.row_at, ant] = observe(c, v, w, ant, 0)
-    begin_to_learn(c, v, ant)
+    """An ant looks around, and its learner begins an episode; worlds in the midst of one go on."""
+    if tick == 0:
+        c.ants[AntRow.PERCEPT, ant], c.ants[v.row_at, ant] = observe(c, v, w, ant, 0)
+        begin_to_learn(c, v, ant)
 
 
 @ti.func

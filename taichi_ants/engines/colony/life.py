@@ -38,7 +38,6 @@ def count(c: ti.template(), v: ti.template(), w, tick):
         c.worlds[WorldRow.LIVING, w] -= deaths
         for row in ti.static(range(len(TallyRow))):
             c.tallies[row, chunk] = 0
-    c.worlds[WorldRow.TICKS, w] = tick + 1
     c.worlds[WorldRow.DELIVERIES, w] += gives
     c.worlds[WorldRow.STORE, w] += gives * c.births
     if gives > 0 and c.worlds[WorldRow.FIRST_DELIVERY, w] < 0:
@@ -84,10 +83,11 @@ def place_newborn(c: ti.template(), w, ant, cell, heading):
     c.ants[AntRow.CELL, ant] = cell
     c.ants[AntRow.HEADING, ant] = heading
     c.ants[AntRow.CARRIES, ant] = 0
+    c.ants[AntRow.CARRIED, ant] = 0  # the last ant in the slot may have died with food
     c.ants[AntRow.STAGE, ant] = Stage.NEWBORN
     c.ants[AntRow.AGE, ant] = 0
     c.ants[AntRow.NUMBER, ant] = number
-    born = ti.cast(c.episode, ti.u64) << ti.u64(32) | ti.cast(number, ti.u64)
+    born = ti.cast(c.episodes[w], ti.u64) << ti.u64(32) | ti.cast(number, ti.u64)
     c.streams[ant] = stream_of(c.seeds[w], STREAM_BORN, born)
     c.ground[w * c.size + cell] = ANT_GROUND
     c.worlds[WorldRow.NEXT_NUMBER, w] = number + 1

@@ -28,6 +28,8 @@ from taichi_ants.worlds.world import World
 if TYPE_CHECKING:
     from taichi_ants.engines.colony.colony import Colony
 
+Which = slice | np.ndarray
+ALL = slice(None)  # the worlds, where a bool (W,) would name some
 _MOST_NUMBERS = 2**31 - 1  # kernels index arrays by 32 bits
 
 
@@ -120,11 +122,7 @@ def lasting(colony: Colony, q_values: np.ndarray | None) -> dict[str, np.ndarray
     Raises:
         AntsError: Tables or memories are too large, or `q_values` has not their shape.
     """
-    slots, memory = colony.capacity, colony.memory
-    seeds, n_worlds = colony.seed_words, len(colony.seeds)
-    first_streams = np.zeros((n_worlds, slots), np.uint64)
-    numbers = np.arange(colony.ants, dtype=np.uint64)
-    first_streams[:, : colony.ants] = stream_state(seeds[:, None], STREAM_ANT, numbers[None, :])
+    slots, memory, n_worlds = colony.capacity, colony.memory, len(colony.seeds)
     owners = n_worlds * (slots if colony.one_a_slot else 1)
     sizes = ((1 + memory.tables) * colony.task.n_states * ROW, memory.floats, memory.integers)
     if owners * max(sizes) > _MOST_NUMBERS:
@@ -135,13 +133,25 @@ def lasting(colony: Colony, q_values: np.ndarray | None) -> dict[str, np.ndarray
         )
     return {
         "streams": np.zeros(n_worlds * slots, np.uint64),
-        # By world and ant number: where the streams of the ants that start an episode stopped.
-        "first_streams": first_streams.reshape(-1),
-        "queen_streams": np.atleast_1d(stream_state(seeds, STREAM_QUEEN, 0)).astype(np.uint64),
+        **seeded(colony),
         # By world or slot: the tables, further tables of the learner behind each, and its memory.
         "q": _tables(colony, q_values),
         "floats": np.zeros(max(1, owners * memory.floats), np.float32),
         "integers": np.zeros(max(1, owners * memory.integers), np.int32),
+    }
+
+
+def seeded(colony: Colony) -> dict[str, np.ndarray]:
+    """What a life begins with, by the seeds of the worlds, and goes on through its episodes."""
+    seeds, n_worlds = colony.seed_words, len(colony.seeds)
+    first_streams = np.zeros((n_worlds, colony.capacity), np.uint64)
+    numbers = np.arange(colony.ants, dtype=np.uint64)
+    first_streams[:, : colony.ants] = stream_state(seeds[:, None], STREAM_ANT, numbers[None, :])
+    return {
+        # By world and ant number: where the streams of the ants that start an episode stopped.
+        "first_streams": first_streams.reshape(-1),
+        "queen_streams": np.atleast_1d(stream_state(seeds, STREAM_QUEEN, 0)).astype(np.uint64),
+        "episodes": np.full(n_worlds, -1, np.int32),  # the number of the present one
     }
 
 
@@ -211,10 +221,36 @@ def set_learning_rate(colony: Colony) -> None:
     weights[:] = update_weights(colony.learning_rate, len(weights) - 1)
 
 
-def begin_episode(colony: Colony) -> None:
-    """Set everything that an episode starts with; tables, memories and streams go on."""
+def begin_episode(colony: Colony, which: Which = ALL) -> None:
+    """Set everything that an episode of these worlds starts with; tables, memories, streams go on.
+
+    Args:
+        which: bool (W,).
+    """
     arrays = colony.arrays
     set_learning_rate(colony)
-    for name, start in colony.at_start.items():
-        arrays[name][:] = start
-    arrays["streams"][:] = arrays["first_streams"]
+    copy_worlds(arrays, colony.at_start, len(colony.seeds), which)
+    copy_worlds(arrays, {"streams": arrays["first_streams"]}, len(colony.seeds), which)
+    arrays["episodes"][which] += 1
+
+
+def copy_worlds(
+    into: dict[str, np.ndarray], source: dict[str, np.ndarray], n_worlds: int, which: Which
+) -> None:
+    """Copy what belongs to some of the worlds, which lie one after another in the last axis."""
+    for name, array in source.items():
+        if array.shape[-1] % n_worlds == 0:  # others are not in use
+            shape = (*array.shape[:-1], n_worlds, -1)
+            into[name].reshape(shape)[..., which, :] = array.reshape(shape)[..., which, :]
+
+
+def keep_streams(colony: Colony, which: Which = ALL) -> None:
+    """At the end of an episode of these worlds, keep the streams of the ants that started it."""
+    ants, slots = colony.arrays["ants"], colony.capacity
+    number = ants[AntRow.NUMBER]
+    ours = np.zeros((len(colony.seeds), slots), bool)
+    ours[which] = True
+    there = (ants[AntRow.STAGE] != Stage.VACANT) & ours.reshape(-1)
+    (columns,) = np.nonzero(there & (number >= 0) & (number < colony.ants))
+    places = columns // slots * slots + number[columns]
+    colony.arrays["first_streams"][places] = colony.arrays["streams"][columns]

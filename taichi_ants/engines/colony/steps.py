@@ -17,6 +17,7 @@ from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
     ENTER,
     HAS_FOOD,
+    PUSHES,
     STANDS,
     TAKE,
     TAKES_FOOD,
@@ -346,10 +347,11 @@ def settle(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     if ti.static(v.traffic.swap):
         if not enters and follower >= 0:
             if c.crowd[base + follower] & HAS_FOOD != 0 and gives_way(c, v, base, cell):
-                goes, filled, event = follower, 1, ENTERED_EMPTY
+                goes, filled, event = follower, PUSHES, ENTERED_EMPTY
                 if ti.static(v.traffic.grant):
                     if moves and cell + step_ahead(c, ant) == follower:
-                        enters, event = True, event_of(c, v, base, ant, clock)
+                        enters, filled = True, 1
+                        event = event_of(c, v, base, ant, clock)
     c.ants[AntRow.GOES, ant], c.ants[AntRow.FILLED, ant] = goes, filled
     c.ants[AntRow.EVENT, ant] = event
     tally(c, TallyRow.BLOCKED, chunk, ti.cast(moves and not enters, ti.i32))

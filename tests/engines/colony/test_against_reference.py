@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from random_colonies import RandomColony, random_colony
 from random_rewards import random_rewards
+from same_colonies import assert_equal
 
 from taichi_ants import AntsError, Colony, TrainingConfig, World, learners, worlds
-from taichi_ants.engines.colony.layout import AntRow, HomeRow, Stage, WorldRow
+from taichi_ants.engines.colony.layout import AntRow, Stage
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.task import Observation, Task, observations
 from taichi_ants.task.observations import registry
@@ -45,53 +46,6 @@ def both(drawn: RandomColony) -> tuple[Colony, ReferenceColony]:
 def without_rocks(world: World) -> World:
     """Nor half of the food, nor trails."""
     return World(world.ranges, world.queen, foods=world.foods[::2], ants=world.ants)
-
-
-def assert_equal(colony: Colony, plain: ReferenceColony) -> None:
-    """Compare all that both hold between two ticks."""
-    ours = colony.snapshot()
-    grid, arrays = ours.grid, colony.arrays
-    ants = arrays["ants"]
-    (slots,) = np.nonzero(ants[AntRow.STAGE] == Stage.LIVING)
-    assert slots.tolist() == sorted(plain.ants)
-    cells = grid.cells(ants[AntRow.CELL, slots]).tolist()
-    row_at = AntRow.PERCEPT if colony.task.observation == "paper" else AntRow.STATE
-    for slot, cell in zip(slots.tolist(), cells, strict=True):
-        ant = plain.ants[slot]
-        mine = ants[:, slot]
-        assert tuple(cell) == ant.cell
-        assert (mine[AntRow.HEADING], mine[AntRow.CARRIES]) == (ant.heading, ant.carries)
-        assert (mine[AntRow.NUMBER], mine[AntRow.AGE]) == (ant.number, ant.age)
-        assert (mine[AntRow.PERCEPT], mine[row_at]) == (ant.percept, ant.state)
-        assert int(arrays["streams"][slot]) == ant.stream.state
-        assert ant.action < 0 or arrays["rewards"][mine[AntRow.EVENT]] == ant.reward
-    existing = np.array(list(plain.world.ground), dtype=np.int64).reshape(-1, 3)
-    places = grid.index(existing)
-    assert ours.ground[places].tolist() == list(plain.world.ground.values())
-    levels = np.array([plain.world.level(cell) for cell in plain.world.ground])
-    assert np.array_equal(ours.trail[places], levels.astype(ours.trail.dtype))
-    assert np.array_equal(colony.q_values[0], plain.q_values)
-    assert int(arrays["queen_streams"][0]) == plain.queen_stream.state
-    assert_equal_records(colony, plain)
-
-
-def assert_equal_records(colony: Colony, plain: ReferenceColony) -> None:
-    """Compare the counters of the episode, the store, the places of food, the size of the model."""
-    outcome, record, row = colony.outcome(), plain.record, colony.arrays["worlds"][:, 0]
-    assert outcome.returns[0, 0] == record.episode_return
-    for name in ("ticks", "deliveries", "first_delivery", "moves", "blocked", "births", "deaths"):
-        assert getattr(outcome, name)[0, 0] == getattr(record, name), name
-    assert outcome.regrown[0, 0] == record.regrown
-    assert row[WorldRow.STORE] == plain.store
-    homes = colony.arrays["homes"][:, : row[WorldRow.HOMES]]
-    theirs = plain.homes.homes[: homes.shape[1]]
-    assert homes[HomeRow.TAKEN].tolist() == [
-        -1 if home.waiting_since is None else home.waiting_since for home in theirs
-    ]
-    cells = colony.snapshot().grid.cells(homes[HomeRow.CELL]).tolist()
-    assert cells == [list(home.cell) for home in theirs]
-    if colony.sharing == "shared" and colony.training.learner == "dyna_q":
-        assert colony.arrays["integers"][0] == len(plain.minds.tables[0].model)
 
 
 # With tables of their own, learners do what they do in independent runs, which are compared, too;

@@ -68,7 +68,6 @@ def test_a_number_that_was_changed(kept, tmp_path) -> None:
         ({"world_of": [7, 7]}, ""),
         ({"sharing": "maybe"}, "sharing is 'maybe'"),
         ({"epsilon": 7}, "epsilon is 7"),
-        ({"episode": 10**12}, "episode is 1000000000000"),
         ({"ticks": -1}, "ticks is -1"),
         ({"ticks": "many"}, "ticks is 'many'"),
         ({"schedule": "never"}, "schedule is 'never'"),

@@ -1,0 +1,183 @@
+"""Worlds of ants whose actions are given: what the environments of a colony have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from taichi_ants import checks
+from taichi_ants.engines.colony.colony import Colony
+from taichi_ants.engines.colony.layout import PUSHES, AntRow, WorldRow
+from taichi_ants.envs.forage import ACTION_MASKS
+from taichi_ants.envs.formats import ObservationFormat, Shown
+from taichi_ants.errors import AntsError, check_one_of, checked_flag, count, shown
+from taichi_ants.grid.constants import N_HEADINGS
+from taichi_ants.task import Task
+from taichi_ants.task.constants import DELIVERED, FAILED, N_ACTIONS, PICKED_UP, RIGHT
+from taichi_ants.worlds import World, build
+
+# The usual length of an episode of a colony, in ticks.
+MAX_STEPS = 1000
+METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
+
+
+def _events() -> np.ndarray:
+    """What came of an action, by action and event of the engine: object (5, 5) of text."""
+    table = np.full((N_ACTIONS, 5), "moved", dtype=object)
+    table[:, FAILED] = "failed"
+    table[: RIGHT + 1, FAILED] = "blocked"
+    table[:, PICKED_UP], table[:, DELIVERED] = "picked_up", "delivered"
+    return table
+
+
+_EVENTS = _events()
+
+
+class ColonyWorlds:
+    """W worlds of ants that do what is given; all arrays are by world and slot, (W, slots).
+
+    Attributes:
+        colony: The ants.
+        shown: How they show what they see.
+        max_steps: Ticks of an episode.
+        acted: Which slots held an ant that acted in the last step.
+        rewards: float64, what that paid.
+        events: What came of it, text: "moved", "blocked" (only turned), "pushed" (another ant
+            changed places with it), "picked_up", "delivered" or "failed".
+    """
+
+    def __init__(
+        self,
+        world: str | World | Sequence[str | World],
+        n_worlds: int,
+        task: Task | None,
+        ants: int,
+        start: str,
+        capacity: int | None,
+        max_steps: int,
+        observation_format: ObservationFormat,
+        evaporation: bool | None,
+        render_mode: str | None,
+    ) -> None:
+        task = checks.checked_task(Task() if task is None else task)
+        falls = task.evaporation_in_training
+        if evaporation is not None:
+            falls = checked_flag("evaporation", evaporation)
+        if render_mode is not None:
+            check_one_of("render_mode", render_mode, METADATA["render_modes"])
+        self.max_steps = checks.checked_max_steps(max_steps, task)
+        self.shown = Shown(task.sees, observation_format)
+        self.colony = Colony(
+            _worlds(world, n_worlds),
+            replace(task, evaporation_in_evaluation=falls),
+            training=None,
+            seeds=range(n_worlds),
+            ants=ants,
+            capacity=capacity,
+            start=start,  # type: ignore[arg-type]  # the colony checks it
+            sharing="fixed",
+        )
+        shape = n_worlds, self.colony.capacity
+        self.acted, self.rewards = np.zeros(shape, bool), np.zeros(shape)
+        self.events = np.full(shape, None, dtype=object)
+        self._scene: Any = None
+
+    def begin(self, which: np.ndarray, seeds: Sequence[int | None] | None = None) -> None:
+        """Begin an episode in some worlds, bool (W,).
+
+        Args:
+            which: These worlds.
+            seeds: One for each of all W worlds, of which those of `which` count. A world with a
+                seed begins a new life; one with None goes on, with other random numbers.
+        """
+        if seeds is None:
+            seeds = [None] * len(which)
+        new = np.array([seed is not None for seed in seeds]) & which
+        if new.any():
+            given = [seed for seed, is_new in zip(seeds, new, strict=True) if is_new]
+            self.colony.begin_some(new, given)  # type: ignore[arg-type]
+        if (which & ~new).any():
+            self.colony.begin_some(which & ~new)
+
+    def stop(self, which: np.ndarray) -> None:
+        """Let some worlds, bool (W,), stand still until they begin again."""
+        self.colony.arrays["worlds"][WorldRow.RUNNING, which] = 0
+
+    def step(self, actions: np.ndarray) -> None:
+        """Let each ant do what is given, integers 0 to 4; worlds that were stopped stand still."""
+        colony = self.colony
+        self.acted = colony.living & (colony.arrays["worlds"][WorldRow.RUNNING] == 1)[:, None]
+        colony.act(actions)
+        of_engine = colony.ants_by_slot(AntRow.EVENT)
+        self.rewards = np.where(self.acted, colony.arrays["rewards"][of_engine], 0.0)
+        self.events = _EVENTS[actions, of_engine]
+        if colony.task.traffic.swap:
+            self.events[colony.ants_by_slot(AntRow.FILLED) == PUSHES] = "pushed"
+
+    @property
+    def ended(self) -> np.ndarray:
+        """In which worlds the episode has come to its last step, bool (W,)."""
+        return self.colony.arrays["worlds"][WorldRow.TICKS] >= self.max_steps
+
+    def action_masks(self) -> np.ndarray:
+        """Which actions can succeed, int8 (W, slots, 5).
+
+        A move onto another ant counts if the traffic lets ants of this load enter such cells at
+        all. Whether it does succeed depends on what the others do in the same tick. In a dead end
+        the moves count, which turn the ant.
+        """
+        colony, traffic = self.colony, self.colony.task.traffic
+        percepts = colony.ants_by_slot(AntRow.PERCEPT)
+        masks = ACTION_MASKS.take(percepts, axis=0, mode="clip")
+        if traffic.shared:
+            turned = colony.ants_by_slot(AntRow.HEADING)[..., None] + np.array([-1, 0, 1])
+            ahead = colony.ants_by_slot(AntRow.CELL)[..., None]
+            ahead = ahead + colony.grid.offsets[turned % N_HEADINGS]
+            standing = np.zeros((len(ahead), colony.grid.size), bool)
+            worlds, slots = np.nonzero(colony.living)
+            standing[worlds, colony.ants_by_slot(AntRow.CELL)[worlds, slots]] = True
+            enters = np.take_along_axis(standing, ahead.reshape(len(ahead), -1), axis=1)
+            enters = enters.reshape(ahead.shape)
+            if not traffic.follow:
+                enters &= (colony.ants_by_slot(AntRow.CARRIES) == 1)[..., None]
+            masks[..., : RIGHT + 1] |= enters
+        return masks
+
+    def render(self) -> tuple[np.ndarray, ...]:
+        """A picture of each world, uint8 (height, width, 3)."""
+        from taichi_ants.rendering import Scene, Status
+
+        if self._scene is None:
+            self._scene = Scene(self.colony.grid)
+        pictures = []
+        deliveries = self.colony.arrays["worlds"][WorldRow.DELIVERIES]
+        for world, ticks in enumerate(self.colony.arrays["worlds"][WorldRow.TICKS].tolist()):
+            snapshot = self.colony.snapshot(world)
+            lines = {
+                "step": ticks,
+                "ants": len(snapshot.ant_cells),
+                "with food": snapshot.ant_carries.sum(),
+                "delivered": deliveries[world],
+            }
+            status = Status(tuple((name, str(value)) for name, value in lines.items()))
+            pictures.append(self._scene.draw(snapshot, status))
+        return tuple(pictures)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but what draws, which is made when it is used."""
+        return {**vars(self), "_scene": None}
+
+
+def _worlds(given: Any, n_worlds: int) -> list[World]:
+    """A world for each: of one name or World, or of a list of them number w modulo their number."""
+    several = [given] if isinstance(given, (str, World)) else given
+    if not isinstance(several, (list, tuple)) or not 0 < len(several) <= n_worlds:
+        raise AntsError(
+            f"world is {shown(given)}; give the name of a world, a World, or a list of them, for "
+            f"{count(n_worlds, 'world')}."
+        )
+    built = [build(one) if isinstance(one, str) else one for one in several]
+    return [built[w % len(built)] for w in range(n_worlds)]

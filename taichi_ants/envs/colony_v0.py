@@ -1,0 +1,253 @@
+"""A colony as a PettingZoo environment: agents that act at once, are born and die."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+from gymnasium import spaces
+
+from taichi_ants.engines.colony.layout import AntRow
+from taichi_ants.envs.colony import MAX_STEPS, METADATA, ColonyWorlds
+from taichi_ants.envs.formats import ObservationFormat
+from taichi_ants.errors import shown
+from taichi_ants.grid.constants import N_HEADINGS
+from taichi_ants.task import Life, Task
+from taichi_ants.task.constants import N_ACTIONS
+from taichi_ants.worlds import World
+
+try:
+    from pettingzoo import ParallelEnv
+    from pettingzoo.utils.env_logger import EnvLogger
+except ImportError as error:
+    raise ImportError(
+        'colony_v0 needs PettingZoo; install it with: pip install "taichi_ants[pettingzoo]".'
+    ) from error
+
+
+class HexColonyParallelEnv(ParallelEnv):
+    """The ants of one world, as agents of a `pettingzoo.ParallelEnv`.
+
+    ## Description
+    Ants on a hexagonal grid search food and carry it to the queen. Agent `"ant_7"` is ant number 7.
+    The ants that start an episode have the numbers 0, 1, ...; each ant that is born has the next
+    one, is in `agents` from then on, and acts from the next step on. All agents act at once.
+
+    ## Action Space
+    `Discrete(5)`: 0 left, 1 forward, 2 right are moves, relative to the heading; 3 picks up food in
+    view; 4 gives food to a queen in view. `info["action_mask"]` tells which can succeed.
+
+    ## Observation Space
+    What an ant sees is a state of the task's observation: a number, made of its load and a code for
+    each cell in view. `observation_format` shows it: "cells" as `MultiDiscrete` (load and codes,
+    int64), "index" as `Discrete` (the number), "one_hot" as `Box` (float32). `state()` is a map of
+    the whole world, for centralised critics.
+
+    ## Rewards
+    Each ant gets what its own action pays by the task's `Rewards`: by default 0 for a move onto an
+    empty cell, 1 onto one with a trail (with food: one nearer to the queen), -1 for what cannot be
+    done, 3 for a food picked up, 10 for a food given.
+
+    ## Starting State
+    The world as it is drawn. The ants that it lists come first; all others start where `start`
+    says, on cells and with headings that the seed decides.
+
+    ## Episode End
+    An ant that dies of age is terminated, and leaves `agents`; its number does not come back. After
+    `max_steps` steps all are truncated. A delivery ends nothing, whatever the task's `delivery`
+    says: its ant goes on, and `info["event"]` tells.
+
+    ## Info
+    - `state`: the state as a number.
+    - `action_mask`: int8 (5,), 1 for what can succeed if no other ant is faster; in a dead end for
+      the moves, which turn the ant.
+    - `event`: what came of the action: "moved", "blocked" (only turned), "pushed" (another ant
+      changed places with it), "picked_up", "delivered" or "failed". Not in the first step of an
+      ant.
+
+    ## Arguments
+    world: A registered name, the path of a map, or a `World`.
+    task: The rules; None: the paper's.
+    ants: How many start.
+    start: "nest", near the queen, or "spread", anywhere.
+    capacity: How many can live at once; None: `ants` if none are born, else 2 * `ants` + 64.
+    max_steps: Steps of an episode.
+    observation_format: "cells", "index" or "one_hot".
+    evaporation: Whether trails fall; None: as the task says for training.
+    render_mode: "rgb_array": `render` gives a picture. None: it is not called.
+
+    Attributes:
+    possible_agents: All that can ever live in one episode: the ants that start, and as many as
+        food can become, see `most_births`.
+    agents: Those that live now; only after the first reset.
+
+    Raises:
+        AntsError: An argument is not allowed.
+    """
+
+    metadata: ClassVar[dict] = {**METADATA, "name": "colony_v0", "is_parallelizable": True}
+
+    def __init__(
+        self,
+        world: str | World = "paper",
+        task: Task | None = None,
+        ants: int = 64,
+        start: str = "nest",
+        capacity: int | None = None,
+        max_steps: int = MAX_STEPS,
+        observation_format: ObservationFormat = "cells",
+        evaporation: bool | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        self._worlds = ColonyWorlds(
+            *(world, 1, task, ants, start, capacity, max_steps),
+            *(observation_format, evaporation, render_mode),
+        )
+        self.render_mode = render_mode
+        colony = self._worlds.colony
+        foods, life = len(colony.worlds[0].foods), colony.task.life
+        n = colony.ants + most_births(life, foods, self._worlds.max_steps)
+        self.possible_agents = [f"ant_{number}" for number in range(n)]
+        self.observation_spaces = dict.fromkeys(self.possible_agents, self._worlds.shown.space)
+        self.action_spaces = {name: spaces.Discrete(N_ACTIONS) for name in self.possible_agents}
+        form = (4, colony.grid.height, colony.grid.width)
+        self.state_space = spaces.Box(0, 2**31 - 1, form, np.int32)
+
+    def observation_space(self, agent: str) -> spaces.Space:
+        """What the agent can see; the same object for each."""
+        return self.observation_spaces[agent]
+
+    def action_space(self, agent: str) -> spaces.Space:
+        """What the agent can do; an object of its own, so that each can be seeded."""
+        return self.action_spaces[agent]
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+        """Begin an episode.
+
+        Args:
+            seed: The same seed gives the same episodes from then on. None: random numbers go on; in
+                the first reset a seed is drawn.
+            options: Not used.
+
+        Returns:
+            Observations and infos by agent.
+        """
+        if seed is None and not self._begun:
+            seed = int(np.random.default_rng().integers(2**63))
+        self._worlds.begin(np.ones(1, bool), [seed])
+        self._slots = list(range(self._worlds.colony.ants))  # of the agents
+        self.agents = self._names(self._slots)
+        return self._told(self.agents, self._slots, ())
+
+    @property
+    def _begun(self) -> bool:
+        return self._worlds.colony.episode >= 0
+
+    def step(
+        self, actions: dict[str, int]
+    ) -> tuple[
+        dict[str, Any],
+        dict[str, float],
+        dict[str, bool],
+        dict[str, bool],
+        dict[str, dict[str, Any]],
+    ]:
+        """Let all agents act at once.
+
+        Args:
+            actions: 0 to 4 for each of `agents`.
+
+        Returns:
+            Observations, rewards, terminations, truncations and infos, of those that acted, and of
+            those that were born.
+
+        Raises:
+            AssertionError: `reset` was not called before; or an action is missing, or not in its
+                space.
+        """
+        if not self._begun:
+            EnvLogger.error_step_before_reset()
+        if not self.agents:
+            EnvLogger.warn_step_after_terminated_truncated()
+            return {}, {}, {}, {}, {}
+        worlds, acting, slots = self._worlds, self.agents, self._slots
+        given = np.zeros((1, worlds.colony.capacity), np.int64)
+        given[0, slots] = [self._action(actions, name) for name in acting]
+        worlds.step(given)
+        living, ended = worlds.colony.living[0], bool(worlds.ended[0])
+        if ended:
+            worlds.stop(worlds.ended)
+        born = np.flatnonzero(living & ~worlds.acted[0] & (not ended)).tolist()
+        told, seen = acting + self._names(born), slots + born
+        observations, infos = self._told(told, seen, acting)
+        rewards = dict(zip(told, worlds.rewards[0, seen].tolist(), strict=True))
+        terminated = dict(zip(told, (~living[seen]).tolist(), strict=True))
+        truncated = dict.fromkeys(told, ended)
+        stay = [] if ended else [k for k, slot in enumerate(seen) if living[slot]]
+        self.agents, self._slots = [told[k] for k in stay], [seen[k] for k in stay]
+        return observations, rewards, terminated, truncated, infos
+
+    def _action(self, actions: dict[str, int], name: str) -> int:
+        if name not in actions or not self.action_spaces[name].contains(actions[name]):
+            said = f"{shown(actions[name])}" if name in actions else "missing"
+            raise AssertionError(
+                f"the action of {name} is {said}; give a whole number from 0 to {N_ACTIONS - 1}."
+            )
+        return int(actions[name])
+
+    def _names(self, slots: list[int]) -> list[str]:
+        numbers = self._worlds.colony.ants_by_slot(AntRow.NUMBER)[0, slots]
+        return [f"ant_{number}" for number in numbers.tolist()]
+
+    def _told(
+        self, names: list[str], slots: list[int], acted: Any
+    ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+        """Observations and infos of agents in these slots; the events of those that acted."""
+        worlds = self._worlds
+        states = worlds.colony.states[0, slots]
+        observations = dict(zip(names, worlds.shown.show(states), strict=True))
+        masks, acted = worlds.action_masks()[0, slots], set(acted)
+        infos: dict[str, dict[str, Any]] = {}
+        events = worlds.events[0, slots].tolist()
+        for name, state, mask, event in zip(names, states.tolist(), masks, events, strict=True):
+            infos[name] = {"state": state, "action_mask": mask}
+            if name in acted:
+                infos[name]["event"] = event
+        return observations, infos
+
+    def state(self) -> np.ndarray:
+        """The world from above, int32 (4, rows, columns); cells in axial coordinates.
+
+        What each cell holds (0 nothing, 5 rock or outside, 7 food, 13 the queen); its trail level,
+        rounded down; its ant (1 without food, 2 with food); the ant's heading, from 0.
+        """
+        if not self._begun:
+            EnvLogger.error_state_before_reset()
+        now = self._worlds.colony.snapshot()
+        layers = np.zeros((4, now.grid.size), np.int32)
+        layers[0], layers[1] = now.ground, now.trail
+        layers[2, now.ant_cells] = 1 + now.ant_carries
+        layers[3, now.ant_cells] = now.ant_headings
+        return layers.reshape(self.state_space.shape)
+
+    def render(self) -> np.ndarray | None:
+        """A picture, uint8 (height, width, 3); None without a render mode."""
+        if not self._begun:
+            EnvLogger.error_render_before_reset()
+        return None if self.render_mode is None else self._worlds.render()[0]
+
+
+def most_births(life: Life, foods: int, ticks: int) -> int:
+    """How many ants can be born at most in so many ticks: by her free neighbours, and by food.
+
+    Each food becomes one ant; it can be taken again `life.regrowth` + 1 ticks later.
+    """
+    if not life.births:
+        return 0
+    again = 0 if life.regrowth is None else (ticks - 1) // (life.regrowth + 1)
+    return min(N_HEADINGS * ticks, foods * (1 + again))
+
+
+parallel_env = HexColonyParallelEnv

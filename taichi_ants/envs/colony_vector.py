@@ -1,0 +1,259 @@
+"""A colony for libraries that train one agent: every ant is an environment of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.error import ResetNeeded
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from taichi_ants.envs.colony import MAX_STEPS, METADATA, ColonyWorlds
+from taichi_ants.envs.forage import (
+    checked_actions,
+    checked_autoreset,
+    checked_reset_mask,
+    seeds_of,
+)
+from taichi_ants.envs.formats import ObservationFormat
+from taichi_ants.errors import AntsError, checked_whole
+from taichi_ants.task import Task
+from taichi_ants.task.constants import N_ACTIONS
+from taichi_ants.worlds import World
+
+NOTHING = np.array(None, dtype=object)
+
+
+class HexColonyVectorEnv(VectorEnv):
+    """Ants of one or more worlds, each of them an environment of a `gymnasium.vector.VectorEnv`.
+
+    ## Description
+    Ants on a hexagonal grid search food and carry it to the queen of their world. Environment
+    number w * ants + i is ant number i of world number w. The ants of a world share its cells, its
+    food and its trails, and act at the same time. Any library that trains one agent on a vector
+    environment so trains one policy that all ants follow ("parameter sharing").
+
+    ## Action Space
+    `Discrete(5)` for each ant: 0 left, 1 forward, 2 right are moves, relative to the heading; 3
+    picks up food in view; 4 gives food to a queen in view. `info["action_mask"]` tells which can
+    succeed.
+
+    ## Observation Space
+    What an ant sees is a state of the task's observation: a number, made of its load and a code for
+    each cell in view. `observation_format` shows it: "cells" as `MultiDiscrete` (load and codes,
+    int64), "index" as `Discrete` (the number), "one_hot" as `Box` (float32).
+
+    ## Rewards
+    Each ant gets what its own action pays by the task's `Rewards`: by default 0 for a move onto an
+    empty cell, 1 onto one with a trail (with food: one nearer to the queen), -1 for what cannot be
+    done, 3 for a food picked up, 10 for a food given.
+
+    ## Starting State
+    The world as it is drawn. The ants that it lists come first; all others start where `start`
+    says, on cells and with headings that the seed of the world decides.
+
+    ## Episode End
+    After `max_steps` steps all ants of a world are truncated at once. A delivery ends nothing in
+    the world; its ant goes on from where it stands. If the task's delivery is "absorbing", the
+    default, the delivering ant is nevertheless `terminated`: what comes later is no longer credited
+    to the delivery, as for all colonies here. The ant's next observation, from where it stands,
+    begins its next episode. A single ant can begin anew only in the step in which it ends, so that
+    absorbing delivery needs the autoreset mode `SAME_STEP`; with delivery "continuing" no ant is
+    ever terminated, and all modes are possible. All three modes reset whole worlds: `SAME_STEP` in
+    the step of the truncation, with `final_obs` and `final_info`; `NEXT_STEP` in the next one,
+    which ignores the actions of these ants and pays 0; `DISABLED` when `reset` is called, with
+    `options={"reset_mask": ...}` for some worlds.
+
+    ## Info
+    Arrays with an entry for each ant, and for each key `_key`, bool, which ants have one:
+
+    - `state`: int64, the state as a number.
+    - `action_mask`: int8 (num_envs, 5), 1 for what can succeed if no other ant is faster; in a
+      dead end for the moves, which turn the ant.
+    - `event`: what came of the action: "moved", "blocked" (only turned), "pushed" (another ant
+      changed places with it), "picked_up", "delivered" or "failed".
+    - `final_obs`, `final_info`: with `SAME_STEP`, what ants saw and did in the step that ended
+      their episode; `event` is in `final_info` then.
+
+    ## Arguments
+    num_envs: How many ants there are in all worlds together, a multiple of `ants`.
+    world: A registered name, the path of a map, a `World`, or a list of these, of the same
+        ranges: world number w is number w modulo their number.
+    task: The rules; None: the paper's. Ants are neither born nor do they die here.
+    ants: How many live in each world.
+    start: "nest", near the queen, or "spread", anywhere.
+    max_steps: Steps of an episode.
+    observation_format: "cells", "index" or "one_hot".
+    evaporation: Whether trails fall; None: as the task says for training.
+    autoreset_mode: `SAME_STEP`, `NEXT_STEP` or `DISABLED` of `gymnasium.vector.AutoresetMode`.
+    render_mode: "rgb_array": `render` gives a picture of each world. None: it is not called.
+
+    Raises:
+        AntsError: An argument is not allowed.
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 64,
+        world: str | World | Sequence[str | World] = "paper",
+        task: Task | None = None,
+        ants: int = 64,
+        start: str = "nest",
+        max_steps: int = MAX_STEPS,
+        observation_format: ObservationFormat = "cells",
+        evaporation: bool | None = None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.SAME_STEP,
+        render_mode: str | None = None,
+    ) -> None:
+        self.num_envs, ants = checked_whole("num_envs", num_envs), checked_whole("ants", ants)
+        if self.num_envs % ants:
+            raise AntsError(
+                f"num_envs is {num_envs}; it counts ants, so make it a multiple of ants, {ants}."
+            )
+        self._n_worlds = self.num_envs // ants
+        self.autoreset_mode = checked_autoreset(autoreset_mode)
+        self._worlds = ColonyWorlds(
+            *(world, self._n_worlds, task, ants, start, None, max_steps),
+            *(observation_format, evaporation, render_mode),
+        )
+        rules = self._worlds.colony.task
+        if rules.life.births or rules.life.lifespan is not None:
+            raise AntsError(
+                f"life of the task is {rules.life}; a vector environment has a fixed number of "
+                "ants, so leave out births and lifespan, or take the parallel_env of colony_v0."
+            )
+        self._absorbing = rules.delivery == "absorbing"
+        if self._absorbing and self.autoreset_mode is not AutoresetMode.SAME_STEP:
+            raise AntsError(
+                f"autoreset_mode is {self.autoreset_mode.value!r}, but an ant that delivers goes "
+                'on at once; take "SameStep", or a task with delivery "continuing".'
+            )
+        self.metadata = {**METADATA, "autoreset_mode": self.autoreset_mode}
+        self.render_mode = render_mode
+        self.single_observation_space = self._worlds.shown.space
+        self.single_action_space = spaces.Discrete(N_ACTIONS)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self._begun, self._everyone = False, np.ones(self.num_envs, bool)
+        self._ended = np.zeros(self._n_worlds, bool)  # worlds that wait for their reset
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Begin an episode in all worlds, or in some.
+
+        Args:
+            seed: Of world number w, `seed + w`; or one for each world, None where it goes on. The
+                same seed gives the same episodes from then on. None: the random numbers of each
+                world go on; in the first reset seeds are drawn.
+            options: "reset_mask", bool (num_envs,): which environments to reset; a world is reset
+                as a whole.
+
+        Returns:
+            Observations and infos.
+        """
+        which = self._reset_worlds(options)
+        super().reset(seed=int(seed) if isinstance(seed, (int, np.integer)) else None)
+        seeds = seeds_of(seed, self._n_worlds)
+        if not self._begun:
+            drawn = self.np_random.integers(2**63, size=self._n_worlds).tolist()
+            seeds = [a if b is None else b for a, b in zip(drawn, seeds, strict=True)]
+        self._worlds.begin(which, seeds)
+        self._begun, self._ended = True, self._ended & ~which
+        return self._observations(), self._infos(self._by_ant(which))
+
+    def _reset_worlds(self, options: dict[str, Any] | None) -> np.ndarray:
+        """Which worlds the options of a reset name, bool (W,)."""
+        by_world = checked_reset_mask(options, self.num_envs).reshape(self._n_worlds, -1)
+        which = np.asarray(by_world.any(axis=1))
+        if (which != by_world.all(axis=1)).any():
+            raise ValueError("reset_mask names some ants of a world alone; name all or none of it.")
+        if not self._begun and not which.all():
+            raise ResetNeeded("no world has begun yet; call reset() without a reset_mask first.")
+        return which
+
+    def step(
+        self, actions: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """Let all ants act at once.
+
+        Args:
+            actions: Integers (num_envs,), 0 to 4.
+
+        Returns:
+            Observations; rewards, float64; terminated and truncated, bool (num_envs,); infos.
+
+        Raises:
+            ResetNeeded: No episode has begun; or one has ended, and the mode is `DISABLED`.
+            InvalidAction: There are not as many actions, or one of them is none.
+        """
+        if not self._begun:
+            raise ResetNeeded("no episode is under way; call reset() before step().")
+        actions, waited = checked_actions(actions, self.num_envs), self._ended
+        if self.autoreset_mode is AutoresetMode.DISABLED and waited.any():
+            raise ResetNeeded(
+                f"the episode of world {waited.argmax()} has ended; call reset() with "
+                'options={"reset_mask": ...} before step().'
+            )
+        worlds = self._worlds
+        worlds.step(actions.reshape(self._n_worlds, -1))
+        acted = worlds.acted.reshape(-1)
+        rewards, events = worlds.rewards.reshape(-1), worlds.events.reshape(-1)
+        terminated = acted & (events == "delivered") & self._absorbing
+        ended = worlds.ended & ~waited
+        truncated = self._by_ant(ended)
+        over, final = terminated | truncated, {}
+        observations = self._observations()
+        if self.autoreset_mode is AutoresetMode.SAME_STEP:
+            begins = ended
+            if over.any():
+                last = np.full(self.num_envs, None, dtype=object)
+                last[over] = np.fromiter(observations[over], dtype=object)
+                final = {"final_obs": last, "_final_obs": over}
+                final |= {"final_info": self._infos(over, events, over), "_final_info": over.copy()}
+                acted = acted & ~over
+        else:
+            worlds.stop(ended)
+            begins, self._ended = waited, ended
+        if begins.any():
+            worlds.begin(begins)
+            observations = self._observations()
+        infos = self._infos(self._everyone, events, acted)
+        return observations, rewards, terminated, truncated, {**infos, **final}
+
+    def render(self) -> tuple[np.ndarray, ...] | None:
+        """A picture of each world, uint8 (height, width, 3); None without a render mode."""
+        if self.render_mode is None:
+            return None
+        if not self._begun:
+            raise ResetNeeded("no episode is under way; call reset() before render().")
+        return self._worlds.render()
+
+    def _by_ant(self, of_worlds: np.ndarray) -> np.ndarray:
+        """What holds for worlds, for each of their ants."""
+        return np.repeat(of_worlds, self.num_envs // self._n_worlds)
+
+    def _observations(self) -> np.ndarray:
+        return self._worlds.shown.show(self._worlds.colony.states.reshape(-1))
+
+    def _infos(
+        self, have: np.ndarray, events: np.ndarray | None = None, of: np.ndarray | None = None
+    ) -> dict[str, Any]:
+        """What is said of the ants that `have` it, and events `of` those of whom there are any."""
+        worlds = self._worlds
+        masks = worlds.action_masks().reshape(self.num_envs, N_ACTIONS)
+        said = {
+            "state": worlds.colony.states.reshape(-1).astype(np.int64) * have,
+            "_state": have.copy(),
+            "action_mask": masks * have[:, None],
+            "_action_mask": have.copy(),
+        }
+        if events is not None and of is not None:
+            said |= {"event": np.where(of, events, NOTHING), "_event": of.copy()}
+        return said

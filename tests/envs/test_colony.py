@@ -1,0 +1,166 @@
+"""Ants that are given their actions do what those of the plain reference do, event by event."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from colonies import act, training
+from random_colonies import RandomColony, random_colony
+from random_rewards import random_rewards
+from same_colonies import assert_equal
+
+from taichi_ants.envs.colony import ColonyWorlds
+from taichi_ants.reference import ReferenceColony
+from taichi_ants.reference.ants import Event
+from taichi_ants.task.constants import GIVE, N_ACTIONS, PICK_UP
+from taichi_ants.worlds import World, paper
+
+N_WORLDS = 3
+SUCCESSES = (Event.MOVED, Event.PICKED_UP, Event.DELIVERED)
+
+
+def several(drawn: RandomColony) -> ColonyWorlds:
+    population = drawn.population
+    return ColonyWorlds(
+        *(drawn.world, N_WORLDS, drawn.task, population["ants"], population["start"]),
+        *(population["capacity"], 30, "index", None, None),
+    )
+
+
+def plain_one(worlds: ColonyWorlds, seed: int) -> ReferenceColony:
+    ours = worlds.colony
+    return ReferenceColony(
+        *(ours.worlds[0], ours.task, training(), seed, ours.ants, ours.capacity, ours.start),
+        sharing="fixed",
+        q_values=np.zeros((ours.task.n_states, N_ACTIONS), np.float32),
+    )
+
+
+def likely(rng: np.random.Generator, masks: np.ndarray) -> np.ndarray:
+    """Mostly actions that can succeed, pick-up and give above all; else any."""
+    worth = rng.random(masks.shape) + 2 * masks * (rng.random(masks.shape[:-1]) < 0.8)[..., None]
+    worth[..., PICK_UP:] += masks[..., PICK_UP:]
+    return worth.argmax(axis=-1)
+
+
+def compare_step(worlds: ColonyWorlds, world: int, plain: ReferenceColony, actions) -> None:
+    """Do the tick in the reference, and compare what the step has said of each ant."""
+    slots = sorted(plain.ants)
+    act(plain, *actions[world, slots].tolist())
+    assert np.flatnonzero(worlds.acted[world]).tolist() == slots
+    for step in plain.transitions:
+        assert worlds.rewards[world, step.slot] == step.reward
+        assert worlds.events[world, step.slot] == step.event.value.replace(" ", "_")
+    assert not worlds.rewards[world, ~worlds.acted[world]].any()
+
+
+@pytest.mark.parametrize(
+    "rules",
+    [
+        {},
+        {"observation": "ants", "traffic": "right_of_way", "view": "strongest"},
+        {
+            "observation": "queues",
+            "traffic": "following",
+            "view": "strongest_under_carriers",
+        },
+    ],
+    ids=["paper", "foraging", "queueing"],
+)
+def test_each_ant_of_each_world_at_every_tick(rules):
+    """Ants and food come and go; now and then a world begins anew, at times with another seed."""
+    happened = dict.fromkeys((*Event, "begun", "seeded", "born", "dead"), 0)
+    for seed in range(14):
+        rng = np.random.default_rng([seed, 11])
+        drawn = random_colony(
+            seed, rewards=random_rewards(seed), dense=False, changes=True, **rules
+        )
+        worlds = several(drawn)
+        seeds = [seed + 100 * w for w in range(N_WORLDS)]
+        plains = [plain_one(worlds, one) for one in seeds]
+        worlds.begin(np.ones(N_WORLDS, bool), seeds)
+        for plain in plains:
+            plain.begin_episode()
+        for _ in range(25):
+            for world, plain in enumerate(plains):
+                assert_equal(worlds.colony, plain, world)
+            masks = worlds.action_masks()
+            actions = likely(rng, masks)
+            worlds.step(actions)
+            for world, plain in enumerate(plains):
+                compare_step(worlds, world, plain, actions)
+                for step in plain.transitions:
+                    happened[step.event] += 1
+                    # What the mask rules out never succeeds.
+                    assert step.event not in SUCCESSES or masks[world, step.slot, step.action]
+            happened["born"] += sum(plain.record.births for plain in plains)
+            happened["dead"] += sum(plain.record.deaths for plain in plains)
+            begins = rng.random(N_WORLDS) < 0.1
+            new = [int(rng.integers(99)) if rng.random() < 0.5 else None for _ in plains]
+            if begins.any():
+                worlds.begin(begins, new)
+            for world in np.flatnonzero(begins):
+                happened["begun" if new[world] is None else "seeded"] += 1
+                if new[world] is not None:
+                    plains[world] = plain_one(worlds, new[world])
+                else:
+                    plains[world].end_episode()
+                plains[world].begin_episode()
+    rare = [Event.PUSHED] if rules else []
+    expected = [event for event in happened if event is not Event.PUSHED] + rare
+    assert all(happened[event] > 2 for event in expected), happened
+
+
+def test_what_the_mask_allows_succeeds_where_an_ant_is_alone():
+    """And what it forbids fails."""
+    worlds = ColonyWorlds(paper(), 1, None, 1, "spread", None, 100, "index", None, None)
+    seen = np.zeros((2, N_ACTIONS), int)
+    rng = np.random.default_rng(4)
+    worlds.begin(np.ones(1, bool), [0])
+    for tick in range(400):
+        if tick % 100 == 0:
+            worlds.begin(np.ones(1, bool), [tick])
+        mask = worlds.action_masks()[0, 0]
+        action = likely(rng, mask[None])[0]
+        worlds.step(np.array([[action]]))
+        succeeds = worlds.events[0, 0] in ("moved", "picked_up", "delivered")
+        if worlds.events[0, 0] != "blocked" or not mask[:PICK_UP].all():  # no dead end
+            assert succeeds == mask[action]
+            seen[mask[action], action] += 1
+    assert (seen[0] > 0).all()
+    assert (seen[1, :3] > 0).all()
+
+
+def test_worlds_that_are_stopped_stand_still_until_they_begin_again():
+    worlds = ColonyWorlds(paper(), 2, None, 5, "nest", None, 3, "index", None, None)
+    worlds.begin(np.ones(2, bool), [1, 2])
+    actions = np.ones((2, 5), int)
+    worlds.step(actions)
+    worlds.stop(np.array([True, False]))
+    before = worlds.colony.snapshot(0)
+    worlds.step(actions)
+    assert worlds.colony.snapshot(0) == before
+    assert worlds.acted.tolist() == [[False] * 5, [True] * 5]
+    assert worlds.ended.tolist() == [False, False]
+    worlds.step(actions)
+    assert worlds.ended.tolist() == [False, True]
+    worlds.begin(np.array([True, False]))
+    worlds.step(actions)
+    assert worlds.acted.all()
+
+
+def test_evaporation_is_that_of_training_unless_it_is_given():
+    """A trail of level 2 on a cell that nobody enters."""
+    world = World((4, 4, 4), (0, 0, 0), [(3, 0, 0)], trails=[((0, 3, 0), 2)])
+    for given, left in ((None, 2), (False, 2), (True, 1)):
+        worlds = ColonyWorlds(world, 1, None, 1, "nest", None, 9, "index", given, None)
+        worlds.begin(np.ones(1, bool), [0])
+        worlds.step(np.full((1, 1), GIVE))
+        assert worlds.colony.snapshot().trail.max() == left
+    falls = replace(worlds.colony.task, evaporation_in_training=True)
+    worlds = ColonyWorlds(world, 1, falls, 1, "nest", None, 9, "index", None, None)
+    worlds.begin(np.ones(1, bool), [0])
+    worlds.step(np.full((1, 1), GIVE))
+    assert worlds.colony.snapshot().trail.max() == 1

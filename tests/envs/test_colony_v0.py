@@ -1,0 +1,216 @@
+"""The colony of PettingZoo: its own conformance tests, agents that appear and die, copies."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import resource
+import subprocess
+import sys
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from colonies import act, training
+from command_lines import environment
+from pettingzoo.test import parallel_api_test, parallel_seed_test
+from same_colonies import assert_equal
+
+from taichi_ants import AntsError, Task, worlds
+from taichi_ants.envs import colony_v0
+from taichi_ants.envs.colony_v0 import most_births
+from taichi_ants.reference import ReferenceColony
+from taichi_ants.task import Life
+from taichi_ants.task.constants import FOOD, GIVE, N_ACTIONS, PICK_UP, QUEEN
+from taichi_ants.task.task import foraging, paper, queueing
+
+MEADOW = worlds.open_world(3, (8, 8, 8))
+LIVELY = replace(foraging(), life=Life(births=True, lifespan=60, regrowth=3))
+TASKS = {"paper": paper(), "foraging": foraging(), "queueing": queueing(), "births": LIVELY}
+
+
+def colony(task: Task = LIVELY, **options):
+    return colony_v0.parallel_env(
+        **{"world": MEADOW, "task": task, "ants": 5, "max_steps": 120, **options}
+    )
+
+
+def guided(infos: dict, rng: np.random.Generator) -> dict[str, int]:
+    """Actions that can succeed, giving and picking up above all."""
+    worth = np.array([0, 0, 0, 1, 1])
+    return {
+        name: int((said["action_mask"] * (rng.random(N_ACTIONS) + worth)).argmax())
+        for name, said in infos.items()
+    }
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_pettingzoo_finds_no_fault(name):
+    """With births it can only note that not all agents that were possible have lived."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", "'locale.getdefaultlocale'")
+        if name == "births":
+            warnings.filterwarnings("ignore", "No agents present but not all possible_agents")
+        parallel_api_test(colony(TASKS[name]), num_cycles=150)
+        parallel_seed_test(lambda: colony(TASKS[name]), num_cycles=30)
+
+
+def test_agents_are_the_ants_of_the_reference_by_number():
+    """Who lives, what each sees, earns and does, until the end of two episodes.
+
+    Ants die with food, and others are born into their slots, whose trails begin anew.
+    """
+    env = colony(observation_format="index", ants=16, max_steps=90)
+    rules = replace(LIVELY, evaporation_in_evaluation=LIVELY.evaporation_in_training)
+    table = np.zeros((rules.n_states, N_ACTIONS), np.float32)
+    plain = ReferenceColony(*(MEADOW, rules, training(), 6, 16), sharing="fixed", q_values=table)
+    rng = np.random.default_rng(8)
+    for seed in (6, None):
+        observations, infos = env.reset(seed=seed)
+        plain.begin_episode()
+        ever, step = set(env.agents), 0
+        while env.agents:
+            ants = {f"ant_{ant.number}": ant for ant in plain.ants.values()}
+            assert_equal(env._worlds.colony, plain)
+            assert set(env.agents) == ants.keys()
+            assert {name: observations[name] for name in ants} == {
+                name: ant.state for name, ant in ants.items()
+            }
+            assert {infos[name]["state"] for name in ants} == {ant.state for ant in ants.values()}
+            acting = list(env.agents)
+            actions = guided({name: infos[name] for name in acting}, rng)
+            in_order = sorted(ants.items(), key=lambda item: item[1].slot)
+            act(plain, *(actions[name] for name, _ in in_order))
+            observations, rewards, terminated, truncated, infos = env.step(actions)
+            step += 1
+            for name in acting:
+                assert rewards[name] == ants[name].reward
+                assert terminated[name] == (ants[name] not in plain.ants.values())
+                assert truncated[name] == (step == 90)
+            for passed in plain.transitions:
+                event = passed.event.value.replace(" ", "_")
+                assert infos[f"ant_{passed.number}"]["event"] == event
+            for name in set(observations) - set(acting):  # the newborn
+                assert name not in ever
+                assert (rewards[name], terminated[name], truncated[name]) == (0, False, False)
+                assert "event" not in infos[name]
+            ever |= set(observations)
+        plain.end_episode()
+        assert plain.record.births > 2
+        assert plain.record.deaths > 3
+        assert ever <= set(env.possible_agents)
+        assert step == 90
+
+
+def test_most_births():
+    """One food grows back at its place: as often as it can be taken and given."""
+    assert most_births(Life(), 9, 100) == 0
+    assert most_births(Life(births=True), 9, 100) == 9
+    assert most_births(Life(births=True), 9, 1) == 6
+    assert most_births(Life(births=True, regrowth=0), 1, 100) == 100
+    assert most_births(Life(births=True, regrowth=9), 1, 100) == 10
+
+
+def test_the_state_is_a_map_of_the_world():
+    env = colony(foraging(), ants=2)
+    with pytest.raises(AssertionError, match=r"^reset\(\) needs to be called before state"):
+        env.state()
+    _, infos = env.reset(seed=1)
+    rng = np.random.default_rng(0)
+    for _ in range(40):
+        *_, infos = env.step(guided({name: infos[name] for name in env.agents}, rng))
+        state = env.state()
+        assert state in env.state_space
+        ground, trail, ants, headings = state
+        assert (ground == QUEEN).sum() == 1
+        assert (ants > 0).sum() == 2
+        carried = sum(said["state"] >= 216 for said in infos.values())  # half of 432
+        assert (ants == 2).sum() == carried
+        assert not headings[ants == 0].any()
+    assert trail.max() > 0
+    assert (ground == FOOD).sum() < len(MEADOW.foods)
+
+
+def test_agents_have_action_spaces_of_their_own():
+    """So that each can be seeded; both spaces stay the same objects."""
+    env = colony()
+    assert not hasattr(env, "agents")  # before the first reset
+    first, second = (env.action_space(f"ant_{number}") for number in (0, 1))
+    assert first is not second
+    assert env.action_space("ant_0") is first
+    assert env.observation_space("ant_0") is env.observation_space("ant_0")
+
+
+def test_copies_and_pickles_go_on_alike():
+    env = colony(render_mode="rgb_array", observation_format="one_hot")
+    _, infos = env.reset(seed=3)
+    rng = np.random.default_rng(1)
+    for _ in range(50):
+        *_, infos = env.step(guided({name: infos[name] for name in env.agents}, rng))
+    assert env.render().dtype == np.uint8
+    others = [copy.deepcopy(env), pickle.loads(pickle.dumps(env))]
+    while env.agents:
+        actions = guided({name: infos[name] for name in env.agents}, rng)
+        observations, *rest, infos = env.step(actions)
+        for other in others:
+            theirs, *more, _ = other.step(actions)
+            assert {k: v.tolist() for k, v in theirs.items()} == {
+                k: v.tolist() for k, v in observations.items()
+            }
+            assert more == rest
+            assert other.agents == env.agents
+
+
+def test_steps_in_the_wrong_order_and_wrong_actions(capsys):
+    env = colony(paper(), max_steps=2)
+    assert env.render_mode is None
+    with pytest.raises(AssertionError, match=r"^reset\(\) needs to be called before step"):
+        env.step({})
+    with pytest.raises(AssertionError, match=r"^reset\(\) needs to be called before render"):
+        env.render()
+    env.reset()
+    assert env.render() is None
+    right = dict.fromkeys(env.agents, PICK_UP)
+    for wrong, said in (
+        ({**right, "ant_3": 5}, "5; give"),
+        ({**right, "ant_3": 0.5}, "0.5; give"),
+        ({name: GIVE for name in right if name != "ant_3"}, "missing; give"),
+    ):
+        with pytest.raises(AssertionError, match=rf"^the action of ant_3 is {said} .*\.$"):
+            env.step(wrong)
+    env.step(right)
+    *_, truncated, _ = env.step(right)
+    assert truncated == dict.fromkeys(right, True)
+    assert env.step({}) == ({}, {}, {}, {}, {})  # with PettingZoo's warning
+    with pytest.raises(AntsError, match=r"^world is \[.*; give the name of a world, .*1 world\.$"):
+        colony(world=[MEADOW, MEADOW])
+
+
+def test_a_missing_pettingzoo_is_named(tmp_path):
+    code = (
+        "import sys; sys.modules['pettingzoo'] = None\n"
+        "import taichi_ants.envs.colony_vector\n"
+        "from taichi_ants.envs import colony_v0"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment(tmp_path), capture_output=True, text=True
+    )
+    assert done.stderr.splitlines()[-1] == (
+        "ImportError: colony_v0 needs PettingZoo; install it with: pip install "
+        '"taichi_ants[pettingzoo]".'
+    )
+
+
+def test_memory_does_not_grow_with_environments_that_are_closed():
+    def loop(times: int) -> int:
+        for _ in range(times):
+            env = colony(paper())
+            env.reset(seed=1)
+            env.step(dict.fromkeys(env.agents, 0))
+            env.close()
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+    first = loop(60)
+    assert loop(200) - first < 4000  # kibibytes

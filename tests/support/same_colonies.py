@@ -1,0 +1,58 @@
+"""Whether a world of a colony and a plain one are the same, in all that both hold."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from taichi_ants import Colony
+from taichi_ants.engines.colony.layout import AntRow, HomeRow, Stage, WorldRow
+from taichi_ants.reference import ReferenceColony
+
+
+def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None:
+    """Compare all that both hold between two ticks; of the colony world number `world`."""
+    ours = colony.snapshot(world)
+    grid, arrays = ours.grid, colony.arrays
+    of_world = slice(world * colony.capacity, (world + 1) * colony.capacity)
+    ants, streams = arrays["ants"][:, of_world], arrays["streams"][of_world]
+    (slots,) = np.nonzero(ants[AntRow.STAGE] == Stage.LIVING)
+    assert slots.tolist() == sorted(plain.ants)
+    cells = grid.cells(ants[AntRow.CELL, slots]).tolist()
+    row_at = AntRow.PERCEPT if colony.task.observation == "paper" else AntRow.STATE
+    for slot, cell in zip(slots.tolist(), cells, strict=True):
+        ant = plain.ants[slot]
+        mine = ants[:, slot]
+        assert tuple(cell) == ant.cell
+        assert (mine[AntRow.HEADING], mine[AntRow.CARRIES]) == (ant.heading, ant.carries)
+        assert (mine[AntRow.NUMBER], mine[AntRow.AGE]) == (ant.number, ant.age)
+        assert (mine[AntRow.PERCEPT], mine[row_at]) == (ant.percept, ant.state)
+        assert int(streams[slot]) == ant.stream.state
+        assert ant.action < 0 or arrays["rewards"][mine[AntRow.EVENT]] == ant.reward
+    existing = np.array(list(plain.world.ground), dtype=np.int64).reshape(-1, 3)
+    places = grid.index(existing)
+    assert ours.ground[places].tolist() == list(plain.world.ground.values())
+    levels = np.array([plain.world.level(cell) for cell in plain.world.ground])
+    assert np.array_equal(ours.trail[places], levels.astype(ours.trail.dtype))
+    assert np.array_equal(colony.q_values[world], plain.q_values)
+    assert int(arrays["queen_streams"][world]) == plain.queen_stream.state
+    _assert_equal_records(colony, plain, world)
+
+
+def _assert_equal_records(colony: Colony, plain: ReferenceColony, world: int) -> None:
+    """Compare the counters of the episode, the store, the places of food, the size of the model."""
+    outcome, record, row = colony.outcome(), plain.record, colony.arrays["worlds"][:, world]
+    assert outcome.returns[0, world] == record.episode_return
+    for name in ("ticks", "deliveries", "first_delivery", "moves", "blocked", "births", "deaths"):
+        assert getattr(outcome, name)[0, world] == getattr(record, name), name
+    assert outcome.regrown[0, world] == record.regrown
+    assert row[WorldRow.STORE] == plain.store
+    first = world * colony.n_homes
+    homes = colony.arrays["homes"][:, first : first + row[WorldRow.HOMES]]
+    theirs = plain.homes.homes[: homes.shape[1]]
+    assert homes[HomeRow.TAKEN].tolist() == [
+        -1 if home.waiting_since is None else home.waiting_since for home in theirs
+    ]
+    cells = colony.snapshot(world).grid.cells(homes[HomeRow.CELL]).tolist()
+    assert cells == [list(home.cell) for home in theirs]
+    if colony.sharing == "shared" and colony.training.learner == "dyna_q":
+        assert colony.arrays["integers"][0] == len(plain.minds.tables[0].model)
