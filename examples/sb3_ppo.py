@@ -50,6 +50,11 @@ def deliveries(model: PPO, seed: int) -> int:
     return delivered
 
 
+def tabulated(model: PPO) -> np.ndarray:
+    """The action that the policy finds best in each state, as a table."""
+    return taichi_ants.tabulate(lambda seen: model.predict(seen, deterministic=True)[0])
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, nargs="+", default=range(5))
@@ -59,7 +64,7 @@ if __name__ == "__main__":
     torch.set_num_threads(1)  # the networks are small
     for seed in args.seeds:
         model = train(seed, args.steps)
-        table = taichi_ants.tabulate(lambda seen: model.predict(seen, deterministic=True)[0])
+        table = tabulated(model)
         greedy = taichi_ants.evaluate(taichi_ants.worlds.paper(), table, rollouts=ROLLOUTS)
         print(
             f"seed {seed}: {deliveries(model, 10_000 + seed)} of {ROLLOUTS} rollouts deliver; "
