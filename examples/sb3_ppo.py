@@ -29,7 +29,7 @@ def train(seed: int, steps: int) -> PPO:
         learning_rate=1e-3,
         n_steps=32,
         batch_size=512,
-        ent_coef=0.01,
+        ent_coef=0.1,
         seed=seed,
         device="cpu",
     )

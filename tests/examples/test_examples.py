@@ -61,7 +61,7 @@ def test_sb3_ppo_counts_the_rollouts_that_deliver(kernels: Path, tmp_path: Path)
 
 def test_shared_policy_sets_a_network_beside_a_table(kernels: Path, tmp_path: Path) -> None:
     said = run("shared_policy", ["--seeds", 0, "--episodes", 1], kernels, tmp_path)
-    assert re.search(r"^seed 0: network \d+, table \d+$", said, re.M)
+    assert re.search(r"^seed 0: network \d+, greedily \d+, table \d+$", said, re.M)
     policy = load_policy(tmp_path / "shared_policy.npz")
     assert policy.observation == "ants"
     assert policy.task.life.regrowth == 0
