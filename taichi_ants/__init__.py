@@ -11,15 +11,18 @@ from taichi_ants.environment import prepare_for_taichi
 from taichi_ants.envs.registration import register_in_time
 
 if TYPE_CHECKING:
-    from taichi_ants import analysis, learners, reference, rendering, task, worlds
+    from taichi_ants import analysis, learners, offline, reference, rendering, task, worlds
     from taichi_ants.engines.colony.colony import Colony, ColonyEpisodes
     from taichi_ants.engines.runs.results import Rollouts, TrainingResult
     from taichi_ants.engines.runs.traces import Trace, rollout, trace_training
     from taichi_ants.engines.runs.training import continue_training, evaluate, train
+    from taichi_ants.envs.minari_data import from_minari, to_minari
     from taichi_ants.envs.tabulation import tabulate
     from taichi_ants.errors import AntsError
     from taichi_ants.learners.config import TrainingConfig
     from taichi_ants.learners.policies import load_policy, save_policy
+    from taichi_ants.offline.dataset import Dataset
+    from taichi_ants.offline.recording import record, record_colony
     from taichi_ants.task import Life, Observation, Pheromone, Rewards, Task, states
     from taichi_ants.worlds import World
 
@@ -30,19 +33,25 @@ _HOMES = {
     "engines.runs.results": ("Rollouts", "TrainingResult"),
     "engines.runs.traces": ("Trace", "rollout", "trace_training"),
     "engines.runs.training": ("continue_training", "evaluate", "train"),
+    "envs.minari_data": ("from_minari", "to_minari"),
     "envs.tabulation": ("tabulate",),
     "errors": ("AntsError",),
     "learners.config": ("TrainingConfig",),
     "learners.policies": ("load_policy", "save_policy"),
+    "offline.dataset": ("Dataset",),
+    "offline.recording": ("record", "record_colony"),
     "task": ("Life", "Observation", "Pheromone", "Rewards", "Task"),
     "worlds": ("World",),
 }
-_MODULES = ("analysis", "learners", "reference", "rendering", "task", "task.states", "worlds")
+_MODULES = (
+    *("analysis", "learners", "offline", "reference", "rendering", "task", "task.states", "worlds"),
+)
 
 __all__ = [
     "AntsError",
     "Colony",
     "ColonyEpisodes",
+    "Dataset",
     "Life",
     "Observation",
     "Pheromone",
@@ -57,8 +66,12 @@ __all__ = [
     "analysis",
     "continue_training",
     "evaluate",
+    "from_minari",
     "learners",
     "load_policy",
+    "offline",
+    "record",
+    "record_colony",
     "reference",
     "rendering",
     "rollout",
@@ -66,6 +79,7 @@ __all__ = [
     "states",
     "tabulate",
     "task",
+    "to_minari",
     "trace_training",
     "train",
     "worlds",

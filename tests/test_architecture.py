@@ -25,13 +25,16 @@ LAYERS = (
     {"checks"},
     {"baselines", "engines", "reference"},
     {"analysis", "rendering"},
+    {"offline"},
     {"envs"},
     {"studies"},
     {"commands"},
     {"__main__"},
 )
 # Kernels live in these; runtime starts Taichi.
-PARTS_WITH_TAICHI = {"baselines", "task", "learners", "engines", "rendering", "envs", "runtime"}
+PARTS_WITH_TAICHI = {
+    *("baselines", "task", "learners", "engines", "rendering", "offline", "envs", "runtime")
+}
 
 FILES = sorted([*(ROOT / "taichi_ants").rglob("*.py"), *(ROOT / "experiments").rglob("*.py")])
 PACKAGE = [path for path in FILES if "taichi_ants" in path.relative_to(ROOT).parts]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cache, partial
+from functools import cache
 from typing import Any
 from weakref import WeakKeyDictionary, finalize, ref
 
@@ -62,7 +62,8 @@ class Launch:
     def __init__(self, kernel: Callable[[Any], None]) -> None:
         self._kernel, self._arguments = kernel, Arguments()
         self._taichi: Any = lambda: None  # in which the launch was prepared
-        self._launch: Any = None  # what it launches, and with what
+        # No reference to its program, which would outlive a reset of Taichi.
+        self._compiled: Any = None
         self._context: Any = None
         self._known: dict[str, Any] = {}  # the values that it has
 
@@ -71,18 +72,22 @@ class Launch:
 
         Arrays are C-contiguous, as all of the engines are.
         """
-        taichi = ti.lang.impl.get_runtime()
-        if self._taichi() is not taichi:
-            self._prepare(taichi, values)
+        if self._taichi() is not ti.lang.impl.get_runtime():
+            runtime.start()  # somebody may have reset Taichi
+            self._prepare(values)
         known = self._known
         for name, value in values.items():
             if known[name] is not value:
                 self._set(values)
                 break
-        self._launch(self._context)
+        if self._compiled is None:
+            self._kernel(self._arguments.pack(values))
+        else:
+            ti.lang.impl.get_runtime().prog.launch_kernel(self._compiled, self._context)
 
-    def _prepare(self, taichi: Any, values: Mapping[str, Any]) -> None:
-        """Compile the kernel, as Taichi would."""
+    def _prepare(self, values: Mapping[str, Any]) -> None:
+        """Compile the kernel, as Taichi would; elsewhere than on the CPU Taichi launches it."""
+        taichi = ti.lang.impl.get_runtime()
         kernel, program = self._kernel._primal, taichi.prog  # type: ignore[attr-defined]
         pack = self._arguments.pack(values)
         with runtime.quiet():
@@ -90,10 +95,9 @@ class Launch:
             compiled = program.compile_kernel(program.config(), program.get_device_caps(), one)
         self._context = one.make_launch_context()
         self._context.set_arg_argpack((0,), pack._ArgPack__argpack)
-        self._taichi, self._launch = ref(taichi), partial(program.launch_kernel, compiled)
-        self._known = dict.fromkeys(values)
-        if program.config().arch not in (ti.x64, ti.arm64):  # arrays move for each launch
-            self._launch = lambda _: self._kernel(pack)
+        on_cpu = program.config().arch in (ti.x64, ti.arm64)
+        self._compiled = compiled if on_cpu else None  # else arrays move for each launch
+        self._taichi, self._known = ref(taichi), dict.fromkeys(values)
 
     def _set(self, values: Mapping[str, Any]) -> None:
         """Tell what has changed; the arrays of a pack are arguments of their own behind it."""

@@ -10,14 +10,14 @@ import numpy as np
 
 from taichi_ants import checks
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.engines.colony.layout import PUSHES, AntRow, WorldRow
+from taichi_ants.engines.colony.layout import ANT_GROUND, PUSHES, AntRow, WorldRow
+from taichi_ants.envs.arguments import worlds_of
 from taichi_ants.envs.forage import ACTION_MASKS
 from taichi_ants.envs.formats import ObservationFormat, Shown
-from taichi_ants.errors import AntsError, check_one_of, checked_flag, count, shown
-from taichi_ants.grid.constants import N_HEADINGS
+from taichi_ants.errors import check_one_of, checked_flag
 from taichi_ants.task import Task
 from taichi_ants.task.constants import DELIVERED, FAILED, N_ACTIONS, PICKED_UP, RIGHT
-from taichi_ants.worlds import World, build
+from taichi_ants.worlds import World
 
 # The usual length of an episode of a colony, in ticks.
 MAX_STEPS = 1000
@@ -68,10 +68,13 @@ class ColonyWorlds:
             falls = checked_flag("evaporation", evaporation)
         if render_mode is not None:
             check_one_of("render_mode", render_mode, METADATA["render_modes"])
-        self.max_steps = checks.checked_max_steps(max_steps, task)
+        self.max_steps, worlds = (
+            checks.checked_max_steps(max_steps, task),
+            worlds_of(world, n_worlds),
+        )
         self.shown = Shown(task.sees, observation_format)
         self.colony = Colony(
-            _worlds(world, n_worlds),
+            [worlds[w % len(worlds)] for w in range(n_worlds)],
             replace(task, evaporation_in_evaluation=falls),
             training=None,
             seeds=range(n_worlds),
@@ -133,14 +136,11 @@ class ColonyWorlds:
         percepts = colony.ants_by_slot(AntRow.PERCEPT)
         masks = ACTION_MASKS.take(percepts, axis=0, mode="clip")
         if traffic.shared:
-            turned = colony.ants_by_slot(AntRow.HEADING)[..., None] + np.array([-1, 0, 1])
-            ahead = colony.ants_by_slot(AntRow.CELL)[..., None]
-            ahead = ahead + colony.grid.offsets[turned % N_HEADINGS]
-            standing = np.zeros((len(ahead), colony.grid.size), bool)
-            worlds, slots = np.nonzero(colony.living)
-            standing[worlds, colony.ants_by_slot(AntRow.CELL)[worlds, slots]] = True
-            enters = np.take_along_axis(standing, ahead.reshape(len(ahead), -1), axis=1)
-            enters = enters.reshape(ahead.shape)
+            base = np.arange(len(masks))[:, None] * colony.grid.size
+            here = base + colony.ants_by_slot(AntRow.CELL)
+            towards = colony.ants_by_slot(AntRow.HEADING)[..., None] + np.arange(RIGHT + 1)
+            ahead = here[..., None] + colony.arrays["compass"].take(towards)
+            enters = colony.arrays["ground"].take(ahead) >= ANT_GROUND
             if not traffic.follow:
                 enters &= (colony.ants_by_slot(AntRow.CARRIES) == 1)[..., None]
             masks[..., : RIGHT + 1] |= enters
@@ -169,15 +169,3 @@ class ColonyWorlds:
     def __getstate__(self) -> dict[str, Any]:
         """All but what draws, which is made when it is used."""
         return {**vars(self), "_scene": None}
-
-
-def _worlds(given: Any, n_worlds: int) -> list[World]:
-    """A world for each: of one name or World, or of a list of them number w modulo their number."""
-    several = [given] if isinstance(given, (str, World)) else given
-    if not isinstance(several, (list, tuple)) or not 0 < len(several) <= n_worlds:
-        raise AntsError(
-            f"world is {shown(given)}; give the name of a world, a World, or a list of them, for "
-            f"{count(n_worlds, 'world')}."
-        )
-    built = [build(one) if isinstance(one, str) else one for one in several]
-    return [built[w % len(built)] for w in range(n_worlds)]

@@ -11,13 +11,13 @@ from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from taichi_ants.envs.colony import MAX_STEPS, METADATA, ColonyWorlds
-from taichi_ants.envs.forage import (
+from taichi_ants.envs.arguments import (
     checked_actions,
     checked_autoreset,
     checked_reset_mask,
     seeds_of,
 )
+from taichi_ants.envs.colony import MAX_STEPS, METADATA, ColonyWorlds
 from taichi_ants.envs.formats import ObservationFormat
 from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.task import Task

@@ -13,11 +13,12 @@ from importlib.util import find_spec
 from types import ModuleType
 
 IDS = {
-    # id: (one environment, many at once)
+    # id: (one environment if there is such, many at once)
     "taichi_ants/HexForage-v0": (
         "taichi_ants.envs.forage:HexForageEnv",
         "taichi_ants.envs.forage:HexForageVectorEnv",
     ),
+    "taichi_ants/HexColony-v0": (None, "taichi_ants.envs.colony_vector:HexColonyVectorEnv"),
 }
 
 

@@ -76,6 +76,21 @@ def random_policy(observation: str = "paper") -> ActionValues:
     return np.zeros((observations.get(observation).n_states, N_ACTIONS), np.float32)
 
 
+def action_probabilities(q_values: np.ndarray, epsilon: float = 0.0) -> np.ndarray:
+    """With which probability an epsilon-greedy ant takes each action, to the bit as in kernels.
+
+    Args:
+        q_values: Action values (..., 5), in which the best are chosen with equal probability.
+        epsilon: Probability of any action.
+
+    Returns:
+        float64 (..., 5).
+    """
+    explores = np.floor(epsilon * 2.0**32) / 2.0**32
+    best = q_values >= q_values.max(axis=-1, keepdims=True)
+    return explores / N_ACTIONS + best * ((1.0 - explores) / best.sum(axis=-1, keepdims=True))
+
+
 # Observations whose states the trail follower reads, by their letters.
 FOLLOWED = ("paper", "ants", "queues")
 

@@ -184,7 +184,7 @@ def test_steps_in_the_wrong_order_and_wrong_actions(capsys):
     *_, truncated, _ = env.step(right)
     assert truncated == dict.fromkeys(right, True)
     assert env.step({}) == ({}, {}, {}, {}, {})  # with PettingZoo's warning
-    with pytest.raises(AntsError, match=r"^world is \[.*; give the name of a world, .*1 world\.$"):
+    with pytest.raises(AntsError, match=r"^world lists 2 worlds; there is room for 1\.$"):
         colony(world=[MEADOW, MEADOW])
 
 

@@ -15,6 +15,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+import taichi
 from command_lines import environment
 from gymnasium.error import InvalidAction, ResetNeeded
 from gymnasium.utils.env_checker import check_env
@@ -238,6 +239,19 @@ def test_copies_go_on_alike(copied):
                 np.testing.assert_array_equal(one[part], other[part])
 
 
+def test_environments_outlive_a_reset_of_taichi():
+    envs = HexForageEnv(SMALL[0]), HexForageEnv(SMALL[0])
+    for env in envs:
+        env.reset(seed=0)
+    for number, action in enumerate((0, 1, 2, 2, 1, 0)):
+        one, other = (env.step(action)[4]["state"] for env in envs)
+        assert one == other
+        if number % 2:
+            taichi.reset()
+        else:
+            envs[0].reset(seed=0), envs[1].reset(seed=0)
+
+
 def test_what_is_returned_is_not_written_again():
     env = HexForageVectorEnv(4, SMALL)
     kept = [env.reset(seed=0)[0]]
@@ -343,7 +357,8 @@ def test_wrong_steps_raise_what_gymnasium_raises():
         ({"world": "nowhere"}, "there is no world named 'nowhere'"),
         ({"world": 3}, "world is 3; give the name of a world"),
         ({"world": []}, "world is []"),
-        ({"world": [*SMALL, worlds.paper()]}, "all must have the same"),
+        ({"world": [SMALL[0], worlds.paper()], "num_envs": 2}, "all must have the same"),
+        ({"world": SMALL, "num_envs": 2}, "world lists 3 worlds; there is room for 2"),
         ({"task": "paper"}, "a Task"),
         ({"task": Task(life=Life(regrowth=0))}, "use a Colony"),
         ({"task": Task(pheromone=Pheromone(diffusion=0.5))}, "use a Colony"),

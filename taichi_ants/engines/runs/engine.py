@@ -73,9 +73,11 @@ _NO_WORK: dict[str, Any] = {
     "floats": np.zeros(1, np.float32),
     "integers": np.zeros(1, np.int32),
     "cells": np.zeros(1, np.int32),  # the packed cells of each run, see `step`
+    "keeps_tables": 0,  # 1 to write the table after each step
     # What comes out.
     "outcomes": np.zeros((1, 1, 1), np.int32),  # (3, n, n_episodes): `layout.OUTCOMES`
     "trace": np.zeros((1, 1), np.int32),  # (n * n_episodes * max_steps, columns): `layout.TRACE`
+    "trace_chances": np.zeros(1, np.float64),  # the probability with which the action was chosen
     "trace_errors": np.zeros(1, np.float32),  # the TD error of each step
     "trace_tables": np.zeros(1, np.float32),  # the table after each step
 }
@@ -183,7 +185,7 @@ class Launcher:
         self._values = _NO_WORK | laid_out([world], task, falls)
         self._values |= {"max_steps": max_steps, "continuing": int(task.delivery == "continuing")}
 
-    def launch(self, some: slice, episodes: slice, **arrays: np.ndarray) -> None:
+    def launch(self, some: slice, episodes: slice, **arrays: Any) -> None:
         """Do some episodes of some runs; what comes out is written into the arrays."""
         runs, state = self._runs, self._runs.state
         starts = np.array([self._start(seed) for seed in runs.seeds[some].tolist()])

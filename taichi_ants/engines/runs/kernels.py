@@ -29,7 +29,7 @@ from taichi_ants.learners.memory import At, LearnerArrays, Transition, read_rate
 from taichi_ants.learners.registry import Learner
 from taichi_ants.task.constants import DELIVERED, ROW
 from taichi_ants.task.observations import Observation
-from taichi_ants.task.rules.policy import choose
+from taichi_ants.task.rules.policy import chance_of, choose
 from taichi_ants.task.rules.random_bits import advance, bits_of
 
 
@@ -70,6 +70,11 @@ def run_kernel(
         return choose(values_of(a.q, begin, state), bits_of(rng), explore_below), rng
 
     @ti.func
+    def chance(a: ti.template(), begin, state, action, explore_below):
+        """The probability of an action that was chosen so."""
+        return chance_of(values_of(a.q, begin, state), action, explore_below)
+
+    @ti.func
     def record(a: ti.template(), n, episode, step, before, percept, taken, after, seen):
         """Write the integers of a step."""
         a.trace[n, 0], a.trace[n, 1] = episode, step
@@ -105,14 +110,23 @@ def run_kernel(
                 )
                 explore_below = ti.cast(exploration * 4294967296.0, ti.u64)
                 step, clock, total, next_action = 0, 0, 0, -1
+                next_chance = ti.f64(0.0)  # of the next action, where it is drawn before learning
                 percept = percept_of(half, a, base, ant, clock)
                 state = state_of(a, base, ant, clock, percept)
                 if ti.static(on_policy):
                     next_action, ant.random_state = decide(a, at.table, ant, state, explore_below)
+                    if ti.static(traced):
+                        next_chance = chance(a, at.table, state, next_action, explore_below)
                 while step < a.max_steps and ant.event != DELIVERED:
                     action = next_action
                     if ti.static(not on_policy):
                         action, ant.random_state = decide(a, at.table, ant, state, explore_below)
+                    if ti.static(traced):
+                        a.trace_chances[n_recorded] = next_chance
+                        if ti.static(not on_policy):
+                            a.trace_chances[n_recorded] = chance(
+                                a, at.table, state, action, explore_below
+                            )
                     before = ant
                     ant = act(deposit, a, base, ant, percept, action, clock)
                     clock += a.falls
@@ -128,6 +142,10 @@ def run_kernel(
                             next_action, ant.random_state = decide(
                                 a, at.table, ant, next_state, explore_below
                             )
+                            if ti.static(traced):
+                                next_chance = chance(
+                                    a, at.table, next_state, next_action, explore_below
+                                )
                     taken = Transition(
                         state=state,
                         action=action,
@@ -144,8 +162,9 @@ def run_kernel(
                         )
                         if ti.static(traced):
                             a.trace_errors[n_recorded] = error
-                            for k in range(table):
-                                a.trace_tables[n_recorded * table + k] = a.q[at.table + k]
+                            if a.keeps_tables == 1:
+                                for k in range(table):
+                                    a.trace_tables[n_recorded * table + k] = a.q[at.table + k]
                     if ti.static(traced):
                         record(a, n_recorded, episode, step, before, percept, taken, ant, seen)
                         n_recorded += 1

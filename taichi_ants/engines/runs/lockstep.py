@@ -145,8 +145,7 @@ class Lockstep:
             self._launch(self.arrays)
 
     def _compiled(self) -> Any:
-        # Taichi is imported once it is configured, see `runtime`.
-        runtime.start()
+        runtime.start()  # Taichi is imported once it is configured
         from taichi_ants.engines.arguments import Arguments, Launch
         from taichi_ants.engines.runs.lockstep_kernel import step_kernel
 

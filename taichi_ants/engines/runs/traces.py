@@ -13,7 +13,7 @@ import numpy as np
 from taichi_ants import checks, runtime
 from taichi_ants.engines.layout import OUTCOMES, STEPS, TRACE
 from taichi_ants.engines.records import Record
-from taichi_ants.engines.runs.engine import Launcher, Runs
+from taichi_ants.engines.runs.engine import Launcher, Progress, Runs, pieces
 from taichi_ants.engines.runs.results import RunState
 from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.learners.config import TrainingConfig
@@ -161,23 +161,11 @@ def _trace(world: World, task: Task, runs: Runs, max_steps: int, episodes: int =
     checks.checked_world(world)
     runtime.start()
     before = runs.state.q[:, 0, :, :N_ACTIONS].copy()
-    n_runs, learned = len(runs), capacity if learns else 0
-    integers = np.zeros((n_runs * capacity, len(TRACE)), dtype=np.int32)
-    errors = np.zeros(learned, dtype=np.float32)
-    tables = np.empty((learned, *runs.state.q.shape[2:]), dtype=np.float32)
-    outcomes = np.zeros((len(OUTCOMES), n_runs, episodes), dtype=np.int32)
-    Launcher(world, task, max_steps, runs, traced=True).launch(
-        slice(0, n_runs),
-        slice(0, episodes),
-        outcomes=outcomes,
-        trace=integers,
-        trace_errors=errors,
-        trace_tables=tables.reshape(-1),
+    tables = np.empty((capacity if learns else 0, *runs.state.q.shape[2:]), dtype=np.float32)
+    launcher, everything = Launcher(world, task, max_steps, runs, traced=True), slice(0, len(runs))
+    recorded, errors, _, run = _launch(
+        launcher, runs, everything, slice(0, episodes), max_steps, tables
     )
-    steps_of_run = outcomes[STEPS].sum(axis=1)
-    run = np.repeat(np.arange(n_runs), steps_of_run)
-    taken = np.arange(capacity) < steps_of_run[:, None]  # each run has room for `capacity` steps
-    recorded = dict(zip(TRACE, integers[taken.reshape(-1)].T, strict=True))
     recorded["episodes"] += run.astype(np.int32) * episodes
     recorded["cells"] = world.grid.cells(recorded["cells"])
     recorded["terminated"] = recorded["terminated"].astype(bool)
@@ -186,4 +174,67 @@ def _trace(world: World, task: Task, runs: Runs, max_steps: int, episodes: int =
     n = len(run)
     after = tables[:n, :, :N_ACTIONS]
     values = np.concatenate([before, after[:-1]])[np.arange(n), recorded["states"]]
-    return Trace(**recorded, q_values=values, td_errors=errors[:n], tables=after)
+    return Trace(**recorded, q_values=values, td_errors=errors, tables=after)
+
+
+def record_steps(
+    world: World,
+    task: Task,
+    max_steps: int,
+    runs: Runs,
+    episodes: int,
+    progress: Progress | None = None,
+) -> Iterator[tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]]:
+    """The steps of the next episodes of many runs, in pieces; the state of the runs is moved on.
+
+    Yields:
+        The columns of a trace, episodes numbered from 0 in each run; float64 (n,), the probability
+        with which the ant chose its action; and int64 (n,), the number of the run. Of a run, pieces
+        come in order.
+    """
+    runtime.start()
+    launcher = Launcher(world, task, max_steps, runs, traced=True)
+    runs_each = max(1, min(len(runs), MAX_ROLLOUT_STEPS // max_steps))
+    episodes_each = max(1, MAX_ROLLOUT_STEPS // (runs_each * max_steps))
+    for some, part in pieces(len(runs), episodes, runs_each, episodes_each):
+        columns, _, chances, run = _launch(launcher, runs, some, part, max_steps)
+        columns["episodes"] += part.start
+        yield columns, chances, run + some.start
+        if progress is not None:
+            done = some.start + (some.stop - some.start) * part.stop / episodes
+            progress(done / len(runs))
+
+
+def _launch(
+    launcher: Launcher,
+    runs: Runs,
+    some: slice,
+    part: slice,
+    max_steps: int,
+    tables: np.ndarray | None = None,
+) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray]:
+    """Some episodes of some runs: columns, TD errors, probabilities of actions, number of the run.
+
+    The table after each step is written into `tables`, if there are any.
+    """
+    n_runs, n_episodes = some.stop - some.start, part.stop - part.start
+    capacity = n_episodes * max_steps  # each run has room for so many steps
+    rows, learns = n_runs * capacity, runs.learner is not None
+    integers = np.empty((rows, len(TRACE)), dtype=np.int32)
+    errors, chances = np.empty(rows if learns else 0, np.float32), np.empty(rows)
+    outcomes = np.zeros((len(OUTCOMES), n_runs, n_episodes), dtype=np.int32)
+    keeps = {} if tables is None else {"keeps_tables": 1, "trace_tables": tables.reshape(-1)}
+    launcher.launch(
+        some,
+        part,
+        outcomes=outcomes,
+        trace=integers,
+        trace_errors=errors,
+        trace_chances=chances,
+        **keeps,
+    )
+    steps_of_run = outcomes[STEPS].sum(axis=1)
+    taken = (np.arange(capacity) < steps_of_run[:, None]).reshape(-1)
+    columns = dict(zip(TRACE, integers[taken].T, strict=True))
+    run = np.repeat(np.arange(n_runs), steps_of_run)
+    return columns, errors[taken] if learns else errors, chances[taken], run

@@ -61,3 +61,16 @@ def choose(values, bits, explore_below):
         else:
             action = bit_number(mask, below(low_word(bits), popcnt(mask)))
     return action
+
+
+@ti.func
+def chance_of(values, action, explore_below):
+    """The probability (f64) with which `choose` takes this action; `explore_below` as there."""
+    best = best_value(values)
+    ties, explores = 0, ti.cast(explore_below, ti.f64) / 4294967296.0
+    for a in ti.static(range(N_ACTIONS)):
+        ties += 1 - ti.cast(values[a] < best, ti.i32)
+    chance = explores / ti.cast(N_ACTIONS, ti.f64)
+    if not values[action] < best:
+        chance += (1.0 - explores) / ti.cast(ties, ti.f64)
+    return chance

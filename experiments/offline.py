@@ -1,0 +1,218 @@
+"""Learning from data alone: how many, of whom, and can a policy be judged before it is tried?
+
+Prints three tables. (a) How often policies deliver that were learned offline, by the number of
+transitions, who made them, and the learner, beside online Q-learning after as many. (b) How well
+off-policy evaluation ranks ten policies. (c) What a colony delivers with policies learned from data
+of ants that appear and die. Means with 95 % intervals over seeds. See docs/offline.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from taichi_ants import (
+    Colony,
+    Dataset,
+    Life,
+    Task,
+    TrainingConfig,
+    evaluate,
+    load_policy,
+    offline,
+    record,
+    record_colony,
+    train,
+    worlds,
+)
+from taichi_ants.analysis.statistics import bootstrap_interval
+from taichi_ants.analysis.tables import Table, interval, markdown, number, plain_text
+from taichi_ants.learners.policies import random_policy, trail_follower
+from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
+
+WORLD = worlds.paper()
+STILL = Task(evaporation_in_evaluation=False)  # trails stay, as where ants learn
+ONLINE = TrainingConfig("q_learning", 0.1, 0.9, epsilon=0.3, epsilon_decay=0.99)
+LEARNERS: dict[str, Callable[..., np.ndarray]] = {
+    "batch Q-learning": lambda data: offline.batch_q_learning(data, sweeps=20, by_run=True),
+    "fitted Q iteration": lambda data: offline.fitted_q_iteration(data, by_run=True),
+    "pessimistic": lambda data: offline.pessimistic_q_iteration(data, by_run=True),
+}
+SIZES = (1000, 3000, 10_000, 30_000, 100_000)
+
+# Off-policy evaluation: target policies explore a little, and values hardly see past 100 steps.
+HORIZON, DISCOUNT, EPSILON = 100, 0.95, 0.1
+INTERVALS = {"resamples": 40, "level": 0.9}
+JUDGES: dict[str, Callable[..., offline.PolicyValues]] = {
+    "importance sampling": lambda *given: _sampled(*given, weighted=False),
+    "weighted": lambda *given: _sampled(*given, weighted=True),
+    "model": lambda *given: offline.model_based(*given, **INTERVALS),
+}
+
+# Colonies of 64 ants, three far piles; those with a lifespan have births.
+FORAGING = load_policy(Path(__file__).parent / "policies" / "foraging.npz")
+PILES = worlds.far_piles(1, (20, 20, 20))
+LIFESPANS, TICKS, COLONY_SIZES = (None, 100, 50), 250, (3000, 15_000)
+
+
+def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
+    """The settings of the command line."""
+    parser = Parser(__doc__.split("\n", 1)[0], epilog=__doc__.split("\n", 1)[1])
+    add = parser.add_argument
+    add("--seeds", type=whole_number(2), default=10, metavar="N", help="how many, from 0 on")
+    add("--markdown", action="store_true", help="print tables for documents")
+    return parser.parse_args(arguments)
+
+
+def print_tables(settings: argparse.Namespace) -> None:
+    """The three tables, each as soon as it is done."""
+    seeds = range(settings.seeds)
+    for title, table_of in (("data", learning), ("evaluation", judging), ("colonies", dying)):
+        with progress_bar(title) as progress:
+            table = table_of(seeds, progress)
+        text = markdown([table]) if settings.markdown else plain_text([table], 120)
+        print(text, flush=True)
+
+
+def shown(values: np.ndarray, digits: int = 2) -> str:
+    """The mean over seeds with its interval."""
+    (low,), (high,) = bootstrap_interval(np.asarray(values, float)[None])
+    return f"{number(np.mean(values), digits)} {interval(low, high, digits)}"
+
+
+def learning(seeds: range, progress: Callable[[float], None]) -> Table:
+    """(a) The share of rollouts that deliver."""
+    good = train(WORLD, ONLINE, seeds).q_values[0]
+    sources: dict[str, Callable[[], Dataset]] = {
+        "random": lambda: record(WORLD, None, 250, seeds, task=STILL),
+        "epsilon 0.5": lambda: record(WORLD, good, 700, seeds, task=STILL, epsilon=0.5),
+        "epsilon 0.1": lambda: record(WORLD, good, 2800, seeds, task=STILL, epsilon=0.1),
+        "a learner's history": lambda: record(WORLD, ONLINE, 2800, seeds, task=STILL),
+    }
+
+    def delivered(q_values: np.ndarray) -> np.ndarray:
+        return evaluate(WORLD, q_values, 20, seeds, task=STILL).deliveries.mean(axis=1)
+
+    # A learner that goes over its own history once has learned what it learned online.
+    history = sources["a learner's history"]()
+    online = [
+        delivered(offline.batch_q_learning(history.first(n), sweeps=1, by_run=True)) for n in SIZES
+    ]
+    rows = []
+    for done, (name, make) in enumerate(sources.items()):
+        data = make()
+        for n, same in zip(SIZES, online, strict=True):
+            some = data.first(transitions=n)
+            assert (np.bincount(some.run) == n).all(), f"{name} has too few transitions"
+            cells = []
+            for learn in LEARNERS.values():
+                values = delivered(learn(some))
+                (low,), (high,) = bootstrap_interval((values - same)[None])
+                cells.append(shown(values) + (" -" if high < 0 else " +" if low > 0 else ""))
+            rows.append([name, f"{n}", *cells, shown(same)])
+        progress((done + 1) / len(sources))
+    notes = ("+ and -: more or less often than online Q-learning after as many transitions.",)
+    columns = ("Behaviour", "transitions", *LEARNERS, "online Q-learning")
+    return Table("(a) Share of greedy rollouts that deliver", columns, rows, notes)
+
+
+def judging(seeds: range, progress: Callable[[float], None]) -> Table:
+    """(b) Rank correlation of estimated with true values, and what goes with it."""
+    stages = [train(WORLD, ONLINE, (1000, 1001), n).q_values[0] for n in (1, 3, 10, 100)]
+    policies = np.concatenate([[random_policy(), trail_follower()], *stages])
+    true = np.array([_returns(q, 5000, 999, EPSILON).mean() for q in policies])
+    behaviours = {"random": (None, 0.0), "epsilon 0.5": (stages[-1][0], 0.5)}
+    behaviours["epsilon 0.1"] = (stages[-1][0], 0.1)
+    rows: list[list[str]] = []
+    for name, (table, epsilon) in behaviours.items():
+        for episodes in (10, 100, 1000):
+            data = record(WORLD, table, episodes, seeds, HORIZON, STILL, epsilon)
+            found: dict[str, list[tuple[float, ...]]] = {judge: [] for judge in JUDGES}
+            for run in range(len(seeds)):
+                for judge, by in JUDGES.items():
+                    found[judge].append(
+                        _scores(by(data.of_run(run), policies, DISCOUNT, EPSILON), true)
+                    )
+            for judge, scores in found.items():
+                ranks, loss, covered, size = np.array(scores).T
+                cells = shown(ranks), shown(loss), number(100 * covered.mean(), 0)
+                rows.append([name, judge, f"{episodes}", *cells, number(np.median(size))])
+            progress(len(rows) / (9 * len(JUDGES)))
+    columns = ("Behaviour", "method", "episodes", "rank correlation", "loss", "covered %", "sample")
+    notes = (
+        f"True values, of discount {DISCOUNT}: {', '.join(number(v) for v in np.sort(true))}.",
+        "Loss: how much less the policy is worth that is judged best than the best one. Covered: "
+        "true values that lie in their 90 % bootstrap interval over episodes. Sample: the median "
+        "effective sample size.",
+    )
+    return Table("(b) Ranking ten policies before they are tried", columns, rows, notes, 2)
+
+
+def _returns(table: np.ndarray, episodes: int, seed: int, epsilon: float) -> np.ndarray:
+    return record(WORLD, table, episodes, seed, 600, STILL, epsilon).returns(DISCOUNT)
+
+
+def _sampled(*given: object, weighted: bool) -> offline.PolicyValues:
+    return offline.importance_sampling(*given, weighted=weighted, **INTERVALS)
+
+
+def _scores(found: offline.PolicyValues, true: np.ndarray) -> tuple[float, ...]:
+    """Rank correlation (Spearman), loss, share of intervals that cover, effective sample size."""
+    from scipy.stats import rankdata
+
+    ranks = np.corrcoef(rankdata(found.value), rankdata(true))[0, 1] if np.ptp(found.value) else 0.0
+    covered = (found.low <= true) & (true <= found.high)
+    loss = true.max() - true[found.value.argmax()]
+    return ranks, loss, covered.mean(), np.median(found.effective_sample_size)
+
+
+def dying(seeds: range, progress: Callable[[float], None]) -> Table:
+    """(c) What 64 ants deliver by what was learned from data of ants that do not live long."""
+    rows = []
+    cases = [(epsilon, lifespan) for epsilon in (0.3, 0.7) for lifespan in LIFESPANS]
+    for done, (epsilon, lifespan) in enumerate(cases):
+        life = Life(births=lifespan is not None, lifespan=lifespan, regrowth=0)
+        data, episodes = None, 1
+        while data is None or np.bincount(data.run).min() < max(COLONY_SIZES):
+            data = record_colony(_colony(seeds, life, epsilon), episodes, TICKS)
+            episodes *= 2
+        # The mistake that is easily made: death as a state after which nothing comes.
+        dies = data.truncated & (data.step + 1 < TICKS)
+        mistaken = replace(
+            data, terminated=data.terminated | dies, truncated=data.truncated & ~dies
+        )
+        for n in COLONY_SIZES:
+            some = data.first(transitions=n)
+            tables = [learn(some) for learn in LEARNERS.values()]
+            tables.append(LEARNERS["pessimistic"](mistaken.first(transitions=n)))
+            cells = [shown(_delivered(seeds, table), 0) for table in tables]
+            lived = "for ever" if lifespan is None else f"{lifespan} ticks"
+            cells.append(shown([len(np.unique(some.of_run(run).state)) for run in seeds], 0))
+            rows.append([f"epsilon {epsilon:g}", lived, f"{n}", *cells])
+        progress((done + 1) / len(cases))
+    own = shown(_delivered(seeds, FORAGING.q_values), 0)
+    notes = (f"The behaviour policy itself, without exploring, delivers {own}.",)
+    columns = ("Behaviour", "ants live", "transitions", *LEARNERS, "death as an end", "states seen")
+    title = "(c) Foods per 1000 ticks, of 64 ants that live for ever, by data of those that do not"
+    return Table(title, columns, rows, notes, 2)
+
+
+def _colony(seeds: range, life: Life, epsilon: float, q_values: np.ndarray | None = None) -> Colony:
+    """64 ants that follow a policy, that of the foraging rules if none is given."""
+    table = FORAGING.q_values if q_values is None else q_values
+    training = TrainingConfig("sarsa", 0.1, 0.9, epsilon, 1.0)
+    task = replace(FORAGING.task, life=life)
+    return Colony(PILES, task, training, seeds, 64, 64, sharing="fixed", q_values=table)
+
+
+def _delivered(seeds: range, q_values: np.ndarray) -> np.ndarray:
+    """Foods in 1000 ticks, by colony."""
+    return _colony(seeds, Life(regrowth=0), 0.01, q_values).run(1, 1000).deliveries[0]
+
+
+if __name__ == "__main__":
+    run_command(lambda: print_tables(parse_arguments()))

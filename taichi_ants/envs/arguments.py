@@ -1,0 +1,81 @@
+"""Arguments of environments, checked: worlds, seeds, masks and actions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium.error import InvalidAction
+from gymnasium.vector import AutoresetMode
+
+from taichi_ants import checks
+from taichi_ants.errors import AntsError, count, shown
+from taichi_ants.task.constants import N_ACTIONS
+from taichi_ants.worlds import World, build
+
+
+def worlds_of(world: Any, most: int) -> tuple[World, ...]:
+    """The worlds that were asked for, at most so many, all of the same ranges."""
+    given = [world] if isinstance(world, (str, World)) else world
+    if not isinstance(given, (list, tuple)) or not given:
+        raise AntsError(
+            f"world is {shown(world)}; give the name of a world, a World, or a list of them."
+        )
+    if len(given) > most:
+        raise AntsError(f"world lists {count(len(given), 'world')}; there is room for {most}.")
+    several = tuple(
+        checks.checked_world(build(one) if isinstance(one, str) else one) for one in given
+    )
+    ranges = {one.ranges for one in several}
+    if len(ranges) > 1:
+        raise AntsError(f"the worlds have the ranges {sorted(ranges)}; all must have the same.")
+    return several
+
+
+def seeds_of(seed: Any, n: int) -> Sequence[int | None]:
+    """The seed of each of n environments, None for those that go on, as Gymnasium counts them."""
+    if seed is None:
+        return [None] * n
+    if isinstance(seed, (int, np.integer)):
+        return range(int(seed), int(seed) + n)
+    if not isinstance(seed, (list, tuple, np.ndarray)) or len(seed) != n:
+        raise ValueError(f"seed is {shown(seed)}; give a whole number, or a list of {n}.")
+    for one in seed:
+        if one is not None and not (isinstance(one, (int, np.integer)) and one >= 0):
+            raise ValueError(f"a seed is {shown(one)}; it must be a whole number from 0 on.")
+    return [None if one is None else int(one) for one in seed]
+
+
+def checked_reset_mask(options: dict[str, Any] | None, n: int) -> np.ndarray:
+    """Where to begin, bool (n,): the mask in the options of a reset, everywhere without one."""
+    mask = (options or {}).get("reset_mask")
+    if mask is None:
+        return np.ones(n, bool)
+    if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
+        raise TypeError(f"reset_mask is {shown(mask)}; it must be a NumPy array of bool.")
+    if mask.shape != (n,) or not mask.any():
+        raise ValueError(f"reset_mask is {shown(mask)}; it must have shape ({n},) and hold a True.")
+    return mask.copy()
+
+
+def checked_autoreset(mode: Any) -> AutoresetMode:
+    """The mode of a name, or itself."""
+    try:
+        return AutoresetMode(mode)
+    except ValueError:
+        allowed = ", ".join(repr(one.value) for one in AutoresetMode)
+        raise AntsError(f"autoreset_mode is {shown(mode)}; choose one of {allowed}.") from None
+
+
+def checked_actions(actions: Any, n: int) -> np.ndarray:
+    """The actions of n ants, whole numbers (n,) from 0 to 4."""
+    given = np.asarray(actions)
+    if given.shape != (n,) or given.dtype.kind not in "iu":
+        raise InvalidAction(
+            f"the actions are {shown(actions)}; they must be whole numbers, an array of ({n},)."
+        )
+    if ((given < 0) | (given >= N_ACTIONS)).any():
+        wrong = given[(given < 0) | (given >= N_ACTIONS)][0]
+        raise InvalidAction(f"an action is {wrong}; it must be 0, 1, 2, 3 or 4.")
+    return given

@@ -1,0 +1,167 @@
+"""Data sets as those of Minari, which other libraries read; needs the extra `minari`."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from gymnasium import spaces
+
+from taichi_ants.engines.stored import world_arrays, world_from
+from taichi_ants.envs.formats import ObservationFormat, Shown
+from taichi_ants.errors import AntsError, expect, shown
+from taichi_ants.files import to_json
+from taichi_ants.offline.dataset import COLUMNS, Dataset
+from taichi_ants.task import Task
+from taichi_ants.task.constants import N_ACTIONS
+from taichi_ants.worlds.world import World
+
+if TYPE_CHECKING:
+    from minari import MinariDataset
+
+_FACTS = "taichi_ants"  # the name of our description among the metadata
+_FORMATS: dict[type, ObservationFormat] = {
+    spaces.Discrete: "index",
+    spaces.MultiDiscrete: "cells",
+    spaces.Box: "one_hot",
+}
+# What each step tells besides what Minari asks for; the last observation of an episode, too.
+_INFOS = ("run", "agent", "step", "behaviour_probability")
+
+
+def to_minari(
+    data: Dataset, dataset_id: str, observation_format: ObservationFormat = "cells"
+) -> MinariDataset:
+    """Write a data set where Minari keeps its own, each episode of an ant as one of Minari's.
+
+    Args:
+        data: The data set.
+        dataset_id: Its name there, for example "ants/random-v0".
+        observation_format: How states are shown: "cells", "index" or "one_hot", as in the
+            environments. Which run and ant it was, the tick, and with which probability the action
+            was taken are infos.
+
+    Raises:
+        AntsError: There is such a data set already, the name is none, or Minari is not installed.
+    """
+    expect("data", data, Dataset)
+    minari = _minari()
+    from minari.data_collector import EpisodeBuffer
+
+    form = Shown(data.task.sees, observation_format)
+    buffers = []
+    for first, end in zip(data.begins[:-1], data.begins[1:], strict=True):
+        rows = slice(first, end)
+        infos = {name: np.append(getattr(data, name)[rows], 0) for name in _INFOS}
+        for name in ("run", "agent"):
+            infos[name][-1] = infos[name][0]
+        infos["step"][-1] = infos["step"][-2] + 1
+        infos["behaviour_probability"][-1] = np.nan
+        buffers.append(
+            EpisodeBuffer(
+                observations=form.show(np.append(data.state[rows], data.next_state[end - 1])),
+                actions=data.action[rows].astype(np.int64),
+                rewards=data.reward[rows].astype(np.float64),
+                terminations=data.terminated[rows],
+                truncations=data.truncated[rows],
+                infos=infos,
+            )
+        )
+    world = {name: array.tolist() for name, array in world_arrays(data.world, "world").items()}
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of all that could be told besides
+            written = minari.create_dataset_from_buffers(
+                dataset_id,
+                buffers,
+                observation_space=form.space,
+                action_space=spaces.Discrete(N_ACTIONS),
+                algorithm_name=str(data.behaviour.get("policy", "unknown")),
+                description=f"Ants on a hexagonal grid, recorded by taichi_ants: {data.behaviour}",
+                requirements=["taichi-ants"],
+            )
+    except (TypeError, ValueError) as error:
+        raise AntsError(
+            f"Minari cannot write {shown(dataset_id)} ({' '.join(str(error).split())}); choose "
+            'another name, such as "ants/random-v0".'
+        ) from error
+    written.storage.update_metadata({_FACTS: to_json({**data.facts(), **world})})
+    return written
+
+
+def from_minari(
+    dataset: str | MinariDataset, world: World | None = None, task: Task | None = None
+) -> Dataset:
+    """Read a data set of Minari's: one that `to_minari` wrote, or what others did as such ants.
+
+    Args:
+        dataset: The data set, or its name.
+        world: Where the ants were, if `to_minari` did not write it.
+        task: The rules that they had, likewise; None: the paper's.
+
+    Raises:
+        AntsError: There is no such data set, it is not of such ants, or Minari is not installed.
+    """
+    minari = _minari()
+    try:
+        source = minari.load_dataset(dataset) if isinstance(dataset, str) else dataset
+        facts = source.storage.metadata.get(_FACTS)
+    except (FileNotFoundError, ValueError, AttributeError) as error:
+        raise AntsError(
+            f"Minari has no data set {shown(dataset)}; see `minari list local`."
+        ) from error
+    known: dict[str, Any] = {"task": task or Task(), "seeds": (0,)}
+    if facts is not None:
+        described = json.loads(facts)
+        known = Dataset.described(described)
+        world = world_from(described, "world", described["world"])
+    elif world is None:
+        raise AntsError("the data set does not tell the world of its ants; give world and task.")
+    form = Shown(known["task"].sees, _FORMATS.get(type(source.observation_space), "cells"))
+    if (source.observation_space, source.action_space) != (form.space, spaces.Discrete(N_ACTIONS)):
+        raise AntsError(
+            f"the data set has the spaces {source.observation_space} and {source.action_space}; "
+            f"for this task they must be {form.space} and Discrete({N_ACTIONS})."
+        )
+    pieces = [_rows(episode, k, form) for k, episode in enumerate(source.iterate_episodes())]
+    rows: dict[str, Any] = {
+        name: np.concatenate([piece[name] for piece in pieces]).astype(dtype)
+        for name, dtype in COLUMNS.items()
+    }
+    return Dataset(world=world, **{"behaviour": {"policy": "unknown"}, **known}, **rows)
+
+
+def _rows(episode: Any, number: int, form: Shown) -> dict[str, np.ndarray]:
+    """The columns of one episode."""
+    states, n = form.states(episode.observations), len(episode)
+    rewards = np.rint(episode.rewards)
+    if not np.array_equal(rewards, episode.rewards):
+        raise AntsError("the data set has rewards that are not whole; those of ants are.")
+    infos = episode.infos or {}
+    usual = {"run": np.zeros(n), "agent": np.zeros(n), "step": np.arange(n)}
+    usual["behaviour_probability"] = np.full(n, np.nan)
+    truncated = np.array(episode.truncations) & ~episode.terminations
+    truncated[-1] = not episode.terminations[-1]  # a data set may end in the middle of one
+    return {
+        **{name: infos[name][:n] if name in infos else usual[name] for name in _INFOS},
+        "episode": np.full(n, number),
+        "state": states[:-1],
+        "action": episode.actions,
+        "reward": rewards,
+        "next_state": states[1:],
+        "terminated": episode.terminations,
+        "truncated": truncated,
+    }
+
+
+def _minari() -> ModuleType:
+    try:
+        import minari
+    except ImportError as error:
+        raise AntsError(
+            "minari is not installed; install it with pip install 'taichi-ants[minari]'."
+        ) from error
+    return minari

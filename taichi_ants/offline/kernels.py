@@ -1,0 +1,172 @@
+"""The kernels of offline learning and off-policy evaluation.
+
+Each parallel task does its sums alone and in order, so that threads change no bit.
+"""
+
+import taichi as ti
+
+from taichi_ants.task.constants import N_ACTIONS
+
+_i32 = ti.types.ndarray(dtype=ti.i32, ndim=1)
+_u8 = ti.types.ndarray(dtype=ti.u8, ndim=1)
+_f32 = ti.types.ndarray(dtype=ti.f32, ndim=1)
+_f64 = ti.types.ndarray(dtype=ti.f64, ndim=1)
+_f64_2 = ti.types.ndarray(dtype=ti.f64, ndim=2)
+
+
+@ti.func
+def best_of(q: ti.template(), row):
+    """The largest of the five action values from `row` on."""
+    best = q[row]
+    for a in ti.static(range(1, N_ACTIONS)):
+        best = ti.max(best, q[row + a])
+    return best
+
+
+@ti.kernel
+def replay(
+    q: _f32,
+    begins: _i32,
+    states: _i32,
+    actions: _i32,
+    rewards: _i32,
+    next_states: _i32,
+    terminated: _u8,
+    n_states: ti.i32,
+    learning_rate: ti.f32,
+    discount: ti.f32,
+):
+    """Q-learning over the rows of each group, from the first to the last.
+
+    Args:
+        q: (groups * n_states * 5,), moved on.
+        begins: (groups + 1,) rows.
+        states, actions, rewards, next_states, terminated: (rows,).
+        n_states, learning_rate, discount: Numbers.
+    """
+    ti.loop_config(block_dim=1)
+    for group in range(begins.shape[0] - 1):
+        table = group * n_states * N_ACTIONS
+        for i in range(begins[group], begins[group + 1]):
+            target = ti.cast(rewards[i], ti.f32)
+            if terminated[i] == 0:
+                target += discount * best_of(q, table + next_states[i] * N_ACTIONS)
+            pair = table + states[i] * N_ACTIONS + actions[i]
+            q[pair] += learning_rate * (target - q[pair])
+
+
+@ti.kernel
+def iterate(
+    q: _f64,
+    values: _f64,
+    policy: _f64,
+    greedy: ti.i32,
+    pairs_begin: _i32,
+    pairs: _i32,
+    rewards: _f64,
+    successors_begin: _i32,
+    successors: _i32,
+    probabilities: _f64,
+    n_states: ti.i32,
+    discount: ti.f64,
+    lowest: ti.f64,
+    tolerance: ti.f64,
+):
+    """Back up all pairs of each group at once, until no action value changes by more.
+
+    Args:
+        q: (groups * n_states * 5,), moved on; what is no pair stays.
+        values: (groups * n_states,), of states, written.
+        policy: (n_states * 5,), probabilities of actions, of the policy to evaluate.
+        greedy: 1 if the best action counts instead.
+        pairs_begin: (groups + 1,), which pairs are of a group.
+        pairs: (pairs,), state * 5 + action.
+        rewards: (pairs,), expected.
+        successors_begin: (pairs + 1,), which successors are of a pair.
+        successors: (successors,), states; those after which nothing comes are left out.
+        probabilities: (successors,).
+        n_states, discount, tolerance: Numbers.
+        lowest: No action value falls below it.
+    """
+    ti.loop_config(block_dim=1)
+    for group in range(pairs_begin.shape[0] - 1):
+        base, change = group * n_states, 2.0 * tolerance + 1.0
+        while change > tolerance:
+            change = 0.0
+            for state in range(n_states):
+                row = (base + state) * N_ACTIONS
+                value = best_of(q, row)
+                if greedy == 0:
+                    value = 0.0
+                    for a in ti.static(range(N_ACTIONS)):
+                        value += policy[state * N_ACTIONS + a] * q[row + a]
+                values[base + state] = value
+            for pair in range(pairs_begin[group], pairs_begin[group + 1]):
+                later = ti.f64(0.0)
+                for k in range(successors_begin[pair], successors_begin[pair + 1]):
+                    later += probabilities[k] * values[base + successors[k]]
+                backed_up = ti.max(rewards[pair] + discount * later, lowest)
+                place = base * N_ACTIONS + pairs[pair]
+                change = ti.max(change, ti.abs(backed_up - q[place]))
+                q[place] = backed_up
+
+
+@ti.kernel
+def weigh(weights: _f64, begins: _i32, ratios: _f64):
+    """The importance weight of each row: the product of the ratios of its episode so far."""
+    for episode in range(begins.shape[0] - 1):
+        weight = ti.f64(1.0)
+        for i in range(begins[episode], begins[episode + 1]):
+            weight *= ratios[i]
+            weights[i] = weight
+
+
+@ti.kernel
+def add_up(
+    sums: _f64_2,
+    mass: _f64_2,
+    ended: _f64_2,
+    estimates: _f64,
+    begins: _i32,
+    rewards: _i32,
+    weights: _f64,
+    counts: ti.types.ndarray(dtype=ti.u8, ndim=2),
+    weighted: ti.i32,
+    discount: ti.f64,
+):
+    """Per-decision importance sampling, of each resample of the episodes.
+
+    Args:
+        sums, mass, ended: (resamples, steps + 1), zeros; written, by the step of an episode: the
+            sum of weight * reward, that of the weights, and the last weights of the episodes that
+            have just ended.
+        estimates: (resamples,), written.
+        begins: (episodes + 1,) rows.
+        rewards, weights: (rows,).
+        counts: (resamples, episodes), how often an episode is in the resample.
+        weighted: 1 to divide by the sum of the weights, where an episode that has ended keeps its
+            last one; 0 by the number of episodes.
+        discount: A number.
+    """
+    ti.loop_config(block_dim=1)
+    for r in range(counts.shape[0]):
+        n = ti.f64(0.0)
+        for episode in range(counts.shape[1]):
+            times = ti.cast(counts[r, episode], ti.f64)
+            if times > 0:
+                first, end = begins[episode], begins[episode + 1]
+                for i in range(first, end):
+                    sums[r, i - first] += times * (weights[i] * rewards[i])
+                    mass[r, i - first] += times * weights[i]
+                ended[r, end - first] += times * weights[end - 1]
+                n += times
+        estimate, factor, gone = ti.f64(0.0), ti.f64(1.0), ti.f64(0.0)
+        for step in range(sums.shape[1]):
+            gone += ended[r, step]
+            total = n
+            if weighted == 1:
+                total = mass[r, step] + gone
+            if total > 0:
+                estimate += factor * (sums[r, step] / total)
+            factor *= discount
+        estimates[r] = estimate

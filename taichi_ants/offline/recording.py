@@ -1,0 +1,225 @@
+"""Recording: the transitions of ants that act, alone or in a colony, as a data set."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from taichi_ants import checks, runtime
+from taichi_ants.engines.colony.colony import Colony
+from taichi_ants.engines.colony.layout import AntRow, Stage, WorldRow
+from taichi_ants.engines.runs.engine import Progress, Runs
+from taichi_ants.engines.runs.results import RunState
+from taichi_ants.engines.runs.traces import record_steps
+from taichi_ants.errors import AntsError, checked_whole, expect
+from taichi_ants.grid.randomness import GAMMA, choose, mix
+from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.learners.policies import action_probabilities, random_policy
+from taichi_ants.offline.dataset import COLUMNS, Dataset
+from taichi_ants.task import Task
+from taichi_ants.task.constants import DELIVERED, EPISODE_STEPS, MAX_STEPS, N_ACTIONS
+from taichi_ants.worlds.world import World
+
+_FROM_TRACE = {"step": "steps", "state": "states", "action": "actions", "reward": "rewards"}
+_FROM_TRACE |= {"next_state": "next_states", "terminated": "terminated", "episode": "episodes"}
+
+
+def record(
+    world: World,
+    behaviour: TrainingConfig | np.ndarray | None = None,
+    episodes: int = 100,
+    seeds: int | Sequence[int] = 0,
+    max_steps: int = EPISODE_STEPS,
+    task: Task | None = None,
+    epsilon: float = 0.0,
+    threads: int | None = None,
+    *,
+    arch: str | None = None,
+    progress: Progress | None = None,
+) -> Dataset:
+    """Record what single ants do, one run for each seed, each alone in its world.
+
+    A learner's steps are those of `train` with the same arguments; those of a table are those of
+    `evaluate`, to the bit.
+
+    Args:
+        world: The world; each episode starts from exactly this.
+        behaviour: The behaviour policy. None: any action, at random. Action values (n_states, 5),
+            or (seeds, n_states, 5) for a table of each run: epsilon-greedy, ties at random. A
+            TrainingConfig: a learner, while it learns.
+        episodes: Episodes of each run, at least 1.
+        seeds: One seed or several different ones.
+        max_steps: Steps after which an episode is truncated.
+        task: The rules of the game; None is the paper's. Learners have its evaporation in training,
+            others that in evaluation.
+        epsilon: Probability of a random action, of a table; a learner has its own.
+        threads: CPU threads; None keeps what runs, or takes all.
+        arch: "cpu" or "cuda"; None keeps what runs, or takes the CPU.
+        progress: Called now and then with the share of the work that is done.
+
+    Raises:
+        AntsError: An argument is not allowed; the message names it.
+    """
+    learns = isinstance(behaviour, TrainingConfig)
+    checks.checked_world(world, learns=learns)
+    task, numbers = checks.checked_runs_task(task), checks.checked_seeds(seeds)
+    episodes, epsilon = (
+        checked_whole("episodes", episodes),
+        checks.checked_share("epsilon", epsilon),
+    )
+    max_steps = checks.checked_max_steps(max_steps, task)
+    runtime.start(threads, arch)
+    facts: dict[str, Any]
+    if isinstance(behaviour, TrainingConfig):
+        configs = checks.checked_configs(behaviour)
+        state = RunState.fresh(configs, numbers, task.n_states).take([0])
+        runs = Runs.learning(configs, numbers, state)
+        facts = {"policy": "learner", **configs[0].as_dict()}
+    else:
+        facts = {"policy": "random" if behaviour is None else "table", "epsilon": epsilon}
+        table = random_policy(task.observation) if behaviour is None else behaviour
+        tables = checks.checked_q_values(table, task)
+        if tables.shape[:-2] not in ((), (len(numbers),)):
+            raise AntsError(
+                f"behaviour has shape {tables.shape}; give one table, or one for each of the "
+                f"{len(numbers)} seeds."
+            )
+        tables = np.broadcast_to(tables, (len(numbers), *tables.shape[-2:]))
+        words = np.array(numbers, dtype=object)
+        runs = Runs.following(tables, words, np.arange(episodes), epsilon)
+    pieces = []
+    for columns, chances, run in record_steps(world, task, max_steps, runs, episodes, progress):
+        piece = {name: columns[there] for name, there in _FROM_TRACE.items()}
+        piece |= {"run": run, "behaviour_probability": chances, "agent": np.zeros_like(run)}
+        pieces.append({name: piece[name].astype(dtype) for name, dtype in _GIVEN.items()})
+    return _dataset(pieces, world=world, task=task, seeds=numbers, behaviour=facts)
+
+
+# What recorders give; where episodes end follows from it.
+_GIVEN = {name: dtype for name, dtype in COLUMNS.items() if name != "truncated"}
+
+
+def record_colony(
+    colony: Colony, episodes: int = 1, ticks: int = 1000, progress: Progress | None = None
+) -> Dataset:
+    """Record what the ants of a colony do, while it goes on for some episodes.
+
+    A run is a world of the colony. An episode of the data is what one ant does until it dies, until
+    the colony's episode ends, or, if deliveries are absorbing, until it gives its food; then
+    another one of the same ant begins. The colony acts and learns as in `Colony.run`, to the bit.
+
+    Args:
+        colony: The colony; it may learn, or follow fixed tables. All its worlds are the same one.
+        episodes: How many episodes of the colony, at least 1.
+        ticks: Ticks of each.
+        progress: Called now and then with the share of the work that is done.
+
+    Raises:
+        AntsError: An argument is not allowed, or the colony lives in different worlds.
+    """
+    expect("colony", colony, Colony)
+    episodes = checked_whole("episodes", episodes)
+    ticks = checked_whole("ticks", ticks, most=MAX_STEPS)
+    if len(dict.fromkeys(colony.worlds)) > 1:
+        raise AntsError("the colony lives in different worlds; record a colony for each world.")
+    facts = {"policy": "colony", "sharing": colony.sharing, "ants": colony.ants}
+    facts |= {"training": colony.training.as_dict()}
+    pieces = []
+    for episode in range(episodes):
+        colony.begin_episode(ticks)
+        tables = colony.q_values
+        for tick in range(ticks):
+            before, tables = tables, colony.q_values
+            piece = _tick(colony, tables, before)
+            piece["episode"] = np.full(len(piece["run"]), episode)
+            pieces.append({name: piece[name].astype(dtype) for name, dtype in _GIVEN.items()})
+            if progress is not None:
+                progress((episode + (tick + 1) / ticks) / episodes)
+            if not len(piece["run"]) and tick + 1 < ticks:  # all have died
+                colony.tick(ticks - tick - 1)
+                break
+        colony.end_episode()
+    known = {"task": colony.task, "seeds": colony.seeds, "behaviour": facts}
+    return _dataset(pieces, world=colony.worlds[0], **known)
+
+
+def _tick(colony: Colony, tables: np.ndarray, before: np.ndarray) -> dict[str, np.ndarray]:
+    """Let a tick pass; what each ant did in it.
+
+    Args:
+        colony: The colony, whose ants choose by `tables`; actions that they have drawn already, by
+            those of the tick before.
+        tables, before: As `Colony.q_values`.
+    """
+    from taichi_ants.engines.looks import is_percept  # imports Taichi
+
+    arrays, slots = colony.arrays, colony.capacity
+    row_at = AntRow.PERCEPT if is_percept(colony.task.sees) else AntRow.STATE
+    ants, streams, step = arrays["ants"].copy(), arrays["streams"].copy(), colony.ticks
+    running = np.repeat(arrays["worlds"][WorldRow.RUNNING] == 1, slots)
+    (columns,) = np.nonzero((ants[AntRow.STAGE] == Stage.LIVING) & running)
+    owner = np.unravel_index(columns, (len(colony.seeds), slots))[: tables.ndim - 2]
+    state, action = ants[row_at, columns], ants[AntRow.ACTION, columns]
+    known = action >= 0
+    values = np.where(known[:, None], before[(*owner, state)], tables[(*owner, state)])
+    action = np.where(known, action, _drawn(values, colony.epsilon, streams[columns]))
+    chances = action_probabilities(values, colony.epsilon)[np.arange(len(columns)), action]
+    colony.tick()
+    run, agent, after = columns // slots, ants[AntRow.NUMBER, columns], arrays["ants"]
+    there = columns
+    if not np.array_equal(after[AntRow.NUMBER, columns], agent):  # the colony has sorted its ants
+        keys = np.arange(ants.shape[1]) // slots * 2**32 + after[AntRow.NUMBER]
+        order = np.argsort(keys)
+        there = order[np.searchsorted(keys[order], run * 2**32 + agent)]
+    event = after[AntRow.EVENT, there]
+    return {
+        "run": run,
+        "agent": agent,
+        "step": np.full(len(run), step),
+        "state": state,
+        "action": action,
+        "reward": colony.task.rewards.by_event()[event],
+        "next_state": after[row_at, there],
+        "terminated": (event == DELIVERED) & (colony.task.delivery == "absorbing"),
+        "behaviour_probability": chances,
+    }
+
+
+def _drawn(values: np.ndarray, epsilon: float, streams: np.ndarray) -> np.ndarray:
+    """What ants with these action values (n, 5) and random streams (n,) choose next.
+
+    As `rules.policy.choose`; the colony forgets an action once it is done.
+    """
+    bits = mix(streams + np.uint64(GAMMA))
+    high, low = bits >> np.uint64(32), bits & np.uint64(0xFFFFFFFF)
+    best = values >= values.max(axis=1, keepdims=True)
+    k = (low * best.sum(axis=1).astype(np.uint64)) >> np.uint64(32)
+    greedy = (best.cumsum(axis=1) == k.astype(np.int64)[:, None] + 1).argmax(axis=1)
+    explores = high < np.uint64(epsilon * 2.0**32)
+    return np.where(explores, choose(low, N_ACTIONS), greedy)
+
+
+def _dataset(pieces: Iterable[dict[str, np.ndarray]], **known: Any) -> Dataset:
+    """The data set of rows, those of an ant in order; it finds out where episodes end."""
+    several = list(pieces)
+    rows: dict[str, Any] = {
+        name: np.concatenate([piece[name] for piece in several]) for name in _GIVEN
+    }
+    several.clear()
+    key = rows["run"].astype(np.int64)
+    for name in ("episode", "agent"):
+        key = key * (int(rows[name].max(initial=0)) + 1) + rows[name]
+    order = np.argsort(key, kind="stable")
+    last = np.append(np.diff(key[order]) != 0, True) | rows["terminated"][order]
+    number = np.cumsum(last) - last
+    # What began first comes first.
+    begins = order[np.append(0, np.flatnonzero(last)[:-1] + 1)]
+    by_age = np.lexsort([rows[name][begins] for name in ("agent", "step", "episode", "run")])
+    place = np.argsort(by_age)[number]
+    of_place = np.argsort(place, kind="stable")
+    rows = {name: array[order[of_place]] for name, array in rows.items()}
+    rows["episode"] = place[of_place].astype(np.int32)
+    last = last[of_place]
+    return Dataset(**known, **rows, truncated=last & ~rows["terminated"])

@@ -1,0 +1,15 @@
+"""The Python of docs/environments.md works, from top to bottom."""
+
+from __future__ import annotations
+
+from command_lines import ROOT
+
+
+def test_the_guides_examples_work(capsys):
+    guide = (ROOT / "docs" / "environments.md").read_text("utf-8")
+    code = "\n".join(part.split("```")[0] for part in guide.split("```python\n")[1:])
+    names: dict = {}
+    exec(compile(code, "environments.md", "exec"), names)
+    assert capsys.readouterr().out.startswith("moved [1 1 1 0 0]\n")
+    assert names["colony"].states.shape == (8, 64)
+    assert names["env"].agents == []

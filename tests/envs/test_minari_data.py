@@ -1,0 +1,105 @@
+"""Data sets as Minari's, and back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from gymnasium import spaces
+
+from taichi_ants import (
+    AntsError,
+    Colony,
+    Dataset,
+    Life,
+    Task,
+    TrainingConfig,
+    from_minari,
+    record,
+    record_colony,
+    to_minari,
+    worlds,
+)
+from taichi_ants.envs.formats import FORMATS
+from taichi_ants.learners.policies import trail_follower
+
+minari = pytest.importorskip("minari")
+pytest.importorskip("h5py")
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+
+
+def colony_data() -> Dataset:
+    task = Task(life=Life(births=True, lifespan=15, regrowth=0))
+    training = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 1.0)
+    follower = trail_follower()
+    world = worlds.open_world(5, (6, 6, 6))
+    return record_colony(Colony(world, task, training, 7, 4, q_values=follower), 1, 40)
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_written_and_read_back(form):
+    data = colony_data()
+    written = to_minari(data, "ants/colony-v0", form)
+    assert from_minari(written) == data
+    assert from_minari("ants/colony-v0") == data
+
+
+def test_an_episode_of_an_ant_is_one_of_minaris():
+    """As Minari's own readers see it."""
+    data = colony_data()
+    to_minari(data, "ants/colony-v0", "index")
+    loaded = minari.load_dataset("ants/colony-v0")
+    assert loaded.total_steps == len(data)
+    assert loaded.total_episodes == len(data.begins) - 1
+    for k, episode in enumerate(loaded.iterate_episodes()):
+        rows = slice(data.begins[k], data.begins[k + 1])
+        states = [*data.state[rows], data.next_state[rows][-1]]
+        assert episode.observations.tolist() == states
+        assert episode.actions.tolist() == data.action[rows].tolist()
+        assert episode.rewards.tolist() == data.reward[rows].tolist()
+        assert (episode.terminations | episode.truncations).tolist() == [False] * (
+            len(states) - 2
+        ) + [True]
+        assert len(episode.infos["step"]) == len(states)
+        assert loaded.action_space == spaces.Discrete(5)
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning:minari")
+def test_what_others_wrote_needs_a_world():
+    """And does not know the probabilities of actions."""
+    data = record(worlds.paper(), None, 3, 4, 20)
+    from minari.data_collector import EpisodeBuffer
+
+    buffers = [
+        EpisodeBuffer(
+            observations=np.append(data.state[a:b], data.next_state[b - 1]).astype(np.int64),
+            actions=data.action[a:b],
+            rewards=data.reward[a:b].astype(float),
+            terminations=np.zeros(b - a, bool),
+            truncations=np.zeros(b - a, bool),  # the collector was stopped
+        )
+        for a, b in zip(data.begins[:-1], data.begins[1:], strict=True)
+    ]
+    given = {"action_space": spaces.Discrete(5), "observation_space": spaces.Discrete(128)}
+    other = minari.create_dataset_from_buffers("others/ants-v0", buffers, **given)
+    with pytest.raises(AntsError, match="give world and task"):
+        from_minari(other)
+    read = from_minari(other, worlds.paper())
+    assert np.array_equal(read.state, data.state)
+    assert np.array_equal(read.truncated, data.truncated)
+    assert np.isnan(read.behaviour_probability).all()
+    with pytest.raises(AntsError, match="Discrete"):
+        from_minari(other, worlds.paper(), Task("six_cells"))
+
+
+def test_names_that_are_taken_missing_or_wrong():
+    data = record(worlds.paper(), None, 1, 4, 5)
+    to_minari(data, "ants/taken-v0")
+    for name in ("ants/taken-v0", "no name"):
+        with pytest.raises(AntsError, match="Minari cannot write"):
+            to_minari(data, name)
+    with pytest.raises(AntsError, match="Minari has no data set 'ants/missing-v0'"):
+        from_minari("ants/missing-v0")

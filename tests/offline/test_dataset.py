@@ -1,0 +1,100 @@
+"""Data sets: files, parts, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from taichi_ants import AntsError, Dataset, Task, record, worlds
+from taichi_ants.files import read_npz, write_npz
+from taichi_ants.offline.dataset import COLUMNS
+
+
+@pytest.fixture(scope="module")
+def data() -> Dataset:
+    return record(worlds.paper(), None, 4, (5, 6, 7), 20, Task(delivery="continuing"))
+
+
+def test_files_hold_everything(data, tmp_path):
+    data.save(tmp_path / "ants.npz")
+    loaded = Dataset.load(tmp_path / "ants.npz")
+    assert loaded == data
+    assert loaded.task == Task(delivery="continuing")
+    assert loaded.behaviour == {"policy": "random", "epsilon": 0.0}
+
+
+def test_other_files_are_refused_in_one_sentence(data, tmp_path):
+    path = tmp_path / "ants.npz"
+    data.save(path)
+    arrays = read_npz(path)
+    write_npz(path, {**arrays, "action": arrays["action"] + np.int8(1)})
+    with pytest.raises(AntsError, match="is damaged"):
+        Dataset.load(path)
+    write_npz(path, {"facts": np.array("{}")})
+    with pytest.raises(AntsError, match="holds no data set"):
+        Dataset.load(path)
+
+
+def test_arrays_are_read_only_and_their_owner_keeps_his(data):
+    with pytest.raises(ValueError, match="read-only"):
+        data.state[0] = 1
+    mine = data.state.copy()
+    replace(data, state=mine)
+    mine[0] = mine[0]
+
+
+def test_returns_discount_from_the_first_step_of_each_episode(data):
+    returns = data.returns(0.5)
+    for k, (first, end) in enumerate(zip(data.begins, data.begins[1:], strict=False)):
+        plain = sum(0.5**t * int(reward) for t, reward in enumerate(data.reward[first:end]))
+        assert returns[k] == pytest.approx(plain, abs=1e-12)
+
+
+def test_parts_of_a_data_set(data):
+    """An episode that is cut is truncated there."""
+    some = data.first(transitions=30)
+    assert np.bincount(some.run).tolist() == [30, 30, 30]
+    assert some.begins.tolist() == [0, 20, 30, 50, 60, 80, 90]
+    assert some.truncated[29]
+    assert not data.truncated[29]
+    assert np.bincount(data.first(episodes=2).run).tolist() == [40, 40, 40]
+    one = data.of_run(1)
+    assert set(one.run) == {1}
+    assert one.episode.tolist() == sorted([0, 1, 2, 3] * 20)
+    assert np.array_equal(one.state, data.state[data.run == 1])
+
+
+def changed(data, name, row, value):
+    array = getattr(data, name).copy()
+    array[row] = value
+    return {name: array}
+
+
+@pytest.mark.parametrize(
+    ("name", "row", "value", "says"),
+    [
+        ("state", 3, 128, "state of a data set runs from 0 to 128"),
+        ("action", 3, -1, "action of a data set runs from -1"),
+        ("run", -1, 3, "run of a data set runs from 0 to 3"),
+        ("behaviour_probability", 3, 0.0, "behaviour_probability of a data set"),
+        ("next_state", 3, 90, "do not stand one after the other"),
+        ("truncated", -1, False, "do not stand one after the other"),
+        ("agent", 3, 1, "do not stand one after the other"),
+        ("episode", 3, 1, "do not stand one after the other"),
+    ],
+)
+def test_arrays_that_do_not_belong_together_are_refused(data, name, row, value, says):
+    with pytest.raises(AntsError, match=says):
+        replace(data, **changed(data, name, row, value))
+
+
+def test_arrays_of_another_type_or_length_are_refused(data):
+    for name in COLUMNS:
+        with pytest.raises(AntsError, match=name if name != "run" else "data set"):
+            replace(data, **{name: getattr(data, name)[1:]})
+    with pytest.raises(AntsError, match="state of a data set is an array of shape"):
+        replace(data, state=data.state.astype(float))
+    with pytest.raises(AntsError, match="no transitions"):
+        replace(data, **{name: getattr(data, name)[:0] for name in COLUMNS})
