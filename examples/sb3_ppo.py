@@ -6,19 +6,20 @@ as it is, which draws its actions, and greedily, as a table. A seed takes about 
 
 import argparse
 
+import gymnasium
 import numpy as np
 import torch
 from stable_baselines3 import PPO
 
 import taichi_ants
-from taichi_ants.envs.forage import HexForageVectorEnv
 from taichi_ants.envs.sb3 import SB3VecEnv
 
 N_ENVS, ROLLOUTS = 64, 100
 
 
 def environments(n: int) -> SB3VecEnv:
-    return SB3VecEnv(HexForageVectorEnv(n, observation_format="one_hot", autoreset_mode="SameStep"))
+    how = {"observation_format": "one_hot", "autoreset_mode": "SameStep"}
+    return SB3VecEnv(gymnasium.make_vec("taichi_ants/HexForage-v0", num_envs=n, **how))
 
 
 def train(seed: int, steps: int) -> PPO:

@@ -13,12 +13,13 @@ greedily, as a table; and with the shared table.
 import argparse
 from dataclasses import replace
 
+import gymnasium
 import numpy as np
 import torch
+from gymnasium.vector import VectorEnv
 from ppo import Agent, table, train
 
 from taichi_ants import Colony, Life, TrainingConfig, save_policy, task, worlds
-from taichi_ants.envs.colony_vector import HexColonyVectorEnv
 from taichi_ants.studies.colony_study import scheduled
 
 ANTS, TICKS, WORLDS, EPISODES = 64, 1000, 4, 60
@@ -26,8 +27,9 @@ FORAGING = replace(task.foraging(), life=Life(regrowth=0))  # food grows back at
 TRIAL_SEED = 10_000
 
 
-def environments() -> HexColonyVectorEnv:
-    return HexColonyVectorEnv(
+def environments() -> VectorEnv:
+    return gymnasium.make_vec(
+        "taichi_ants/HexColony-v0",
         num_envs=WORLDS * ANTS,
         task=FORAGING,
         ants=ANTS,

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
+import gymnasium
 import numpy as np
 import pytest
 from gymnasium.vector import SyncVectorEnv
@@ -12,8 +12,6 @@ from gymnasium.vector import SyncVectorEnv
 from taichi_ants import AntsError
 from taichi_ants.envs.forage import HexForageEnv, HexForageVectorEnv
 from taichi_ants.learners.policies import trail_follower
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_without_stable_baselines3_a_sentence_names_the_extra(
@@ -63,6 +61,27 @@ def test_episodes_are_those_of_single_environments_to_the_end() -> None:
                 assert infos[i] == {}
             assert (seen[i] == one).all()
     assert {True, False} == set(ends)
+
+
+def test_ants_of_a_colony_end_together_at_the_step_limit() -> None:
+    pytest.importorskip("stable_baselines3")
+    from taichi_ants.envs.sb3 import SB3VecEnv
+
+    how = {"ants": 3, "max_steps": 5, "observation_format": "index"}
+    envs = SB3VecEnv(gymnasium.make_vec("taichi_ants/HexColony-v0", num_envs=6, **how))
+    beside = gymnasium.make_vec("taichi_ants/HexColony-v0", num_envs=6, **how)
+    assert envs.seed(7) == list(range(7, 13))
+    assert (envs.reset() == beside.reset(seed=7)[0]).all()
+    for step in range(1, 12):
+        *_, dones, infos = envs.step(np.ones(6, int))
+        *_, said = beside.step(np.ones(6, int))
+        assert dones.all() == dones.any() == (step % 5 == 0)
+        for number, info in enumerate(infos):
+            if step % 5:
+                assert info == {}
+            else:
+                assert info["terminal_observation"] == said["final_obs"][number]
+                assert info["TimeLimit.truncated"] is True
 
 
 def test_seeds_count_for_the_next_reset_only() -> None:
