@@ -127,6 +127,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     parser.add_argument("--steps", type=int, default=200_000)
+    parser.add_argument("--entropy", type=float, default=ENTROPY, help="how much it counts")
     parser.add_argument("--out", default="ppo.npz", help="the policy file of the last seed")
     args = parser.parse_args()
     torch.set_num_threads(1)  # the networks are small
@@ -137,7 +138,7 @@ if __name__ == "__main__":
         autoreset_mode="SameStep",
     )
     for seed in args.seeds:
-        logits = table(train(envs, seed, args.steps))
+        logits = table(train(envs, seed, args.steps, entropy=args.entropy))
         greedy = taichi_ants.evaluate(taichi_ants.worlds.paper(), logits, rollouts=100)
         print(
             f"seed {seed}: {greedy.deliveries.sum()} of 100 rollouts deliver, "

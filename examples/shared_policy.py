@@ -5,7 +5,7 @@ but they live in one world, see each other, and follow each other's trails. Ants
 rules learn a shared table by SARSA, as in `python experiments/colony.py study`, from as many steps
 in all. Then nobody learns any more, and all are tried in colonies of their own.
 
-Needs torch: `pip install -e ".[torch]"`. A seed takes two or three minutes on one core. Prints the
+Needs torch: `pip install -e ".[torch]"`. A seed takes about three minutes on one core. Prints the
 foods that 64 ants deliver per 1000 ticks: with the network as it was trained, which draws actions;
 greedily, as a table; and with the shared table.
 """
