@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from taichi_ants.engines.runs.traces import Trace, rollout, trace_training
     from taichi_ants.engines.runs.training import continue_training, evaluate, train
     from taichi_ants.envs.minari_data import from_minari, to_minari
+    from taichi_ants.envs.tabulation import tabulate
     from taichi_ants.errors import AntsError
     from taichi_ants.learners.config import TrainingConfig
     from taichi_ants.learners.policies import load_policy, save_policy
@@ -33,6 +34,7 @@ _HOMES = {
     "engines.runs.traces": ("Trace", "rollout", "trace_training"),
     "engines.runs.training": ("continue_training", "evaluate", "train"),
     "envs.minari_data": ("from_minari", "to_minari"),
+    "envs.tabulation": ("tabulate",),
     "errors": ("AntsError",),
     "learners.config": ("TrainingConfig",),
     "learners.policies": ("load_policy", "save_policy"),
@@ -75,6 +77,7 @@ __all__ = [
     "rollout",
     "save_policy",
     "states",
+    "tabulate",
     "task",
     "to_minari",
     "trace_training",

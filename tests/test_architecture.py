@@ -36,7 +36,8 @@ PARTS_WITH_TAICHI = {
     *("baselines", "task", "learners", "engines", "rendering", "offline", "envs", "runtime")
 }
 
-FILES = sorted([*(ROOT / "taichi_ants").rglob("*.py"), *(ROOT / "experiments").rglob("*.py")])
+FOLDERS = ("taichi_ants", "experiments", "examples")
+FILES = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py"))
 PACKAGE = [path for path in FILES if "taichi_ants" in path.relative_to(ROOT).parts]
 EXPERIMENTS = [path for path in FILES if path not in PACKAGE or "commands" in path.parts]
 

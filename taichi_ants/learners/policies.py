@@ -47,6 +47,29 @@ class Policy(NamedTuple):
         task = Task.from_dict(self.metadata.get("task", {}))
         return replace(task, observation=self.observation)
 
+    def actions(self, states: npt.ArrayLike, rng: np.random.Generator) -> npt.NDArray[np.int64]:
+        """A best action in each state, ties at random, for the environments of this package:
+
+            observations, infos = envs.reset(seed=0)
+            envs.step(policy.actions(infos["state"], rng))
+
+        Args:
+            states: Rows of the table, integers of any shape; one state gives one action.
+            rng: Decides ties.
+
+        Raises:
+            AntsError: There is no such state.
+        """
+        states = np.asarray(states)
+        if states.dtype.kind not in "iu" or ((states < 0) | (states >= len(self.q_values))).any():
+            raise AntsError(
+                f"states is {shown(states)}; they must be integers from 0 to "
+                f"{len(self.q_values) - 1}."
+            )
+        values = self.q_values[states]
+        best = values == values.max(axis=-1, keepdims=True)
+        return np.where(best, rng.random(values.shape), -1.0).argmax(axis=-1)
+
 
 def random_policy(observation: str = "paper") -> ActionValues:
     """The policy that takes each of the five actions with equal probability, in every state."""

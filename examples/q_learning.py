@@ -1,0 +1,40 @@
+"""Tabular Q-learning, in NumPy: an ant learns to fetch food. Two seconds for each seed.
+
+Prints the greedy return and steps of each seed; the best possible is 45 in 34 steps.
+"""
+
+import argparse
+
+import gymnasium
+import numpy as np
+
+import taichi_ants
+
+
+def learn(seed, steps, learning_rate=0.1, discount=0.9, epsilon=0.1):
+    env = gymnasium.make("taichi_ants/HexForage-v0", observation_format="index")
+    rng = np.random.default_rng(seed)
+    # More than anything is worth: every action looks good until it has been tried.
+    q = np.full((env.observation_space.n, env.action_space.n), 10.0)
+    state, _ = env.reset(seed=seed)
+    for _ in range(steps):
+        best = rng.choice(np.flatnonzero(q[state] == q[state].max()))
+        action = rng.integers(env.action_space.n) if rng.random() < epsilon else best
+        seen, reward, terminated, truncated, _ = env.step(action)
+        target = reward + discount * (not terminated) * q[seen].max()
+        q[state, action] += learning_rate * (target - q[state, action])
+        state = env.reset()[0] if terminated or truncated else seen
+    return q
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, nargs="+", default=range(10))
+    parser.add_argument("--steps", type=int, default=30_000)
+    args = parser.parse_args()
+    best = 0
+    for seed in args.seeds:
+        rollouts = taichi_ants.evaluate(taichi_ants.worlds.paper(), learn(seed, args.steps))
+        best += (rollouts.returns == 45).all() and (rollouts.steps == 34).all()
+        print(f"seed {seed}: {rollouts.returns.mean():.1f} in {rollouts.steps.mean():.1f} steps")
+    print(f"{best} of {len(args.seeds)} seeds reach 45 in 34 steps")

@@ -1,0 +1,77 @@
+"""PPO of Stable-Baselines3 learns to fetch food; needs `pip install "taichi_ants[sb3]"`.
+
+Prints for each seed how many of 100 rollouts in fresh environments deliver food: the trained policy
+as it is, which draws its actions, and greedily, as a table. A seed takes about 20 seconds.
+"""
+
+import argparse
+
+import gymnasium
+import numpy as np
+import torch
+from stable_baselines3 import PPO
+
+import taichi_ants
+from taichi_ants.envs.sb3 import SB3VecEnv
+
+N_ENVS, ROLLOUTS = 64, 100
+
+
+def environments(n: int) -> SB3VecEnv:
+    how = {"observation_format": "one_hot", "autoreset_mode": "SameStep"}
+    return SB3VecEnv(gymnasium.make_vec("taichi_ants/HexForage-v0", num_envs=n, **how))
+
+
+def train(seed: int, steps: int) -> PPO:
+    model = PPO(
+        "MlpPolicy",
+        environments(N_ENVS),
+        gamma=0.9,  # all else is good at SB3's defaults, but slower
+        learning_rate=1e-3,
+        n_steps=32,
+        batch_size=512,
+        ent_coef=0.1,
+        seed=seed,
+        device="cpu",
+    )
+    return model.learn(steps)
+
+
+def deliveries(model: PPO, seed: int) -> int:
+    """How many of the first episodes of fresh environments end with a delivery."""
+    envs = environments(ROLLOUTS)
+    envs.seed(seed)
+    seen, over, delivered = envs.reset(), np.zeros(ROLLOUTS, bool), 0
+    while not over.all():
+        actions, _ = model.predict(seen, deterministic=False)
+        seen, _, ends, infos = envs.step(actions)
+        for number in np.flatnonzero(ends & ~over):
+            delivered += not infos[number]["TimeLimit.truncated"]
+        over |= ends
+    return delivered
+
+
+def tabulated(model: PPO) -> np.ndarray:
+    """The action that the policy finds best in each state, as a table."""
+    return taichi_ants.tabulate(lambda seen: model.predict(seen, deterministic=True)[0])
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, nargs="+", default=range(5))
+    parser.add_argument("--steps", type=int, default=200_000, help="of all environments together")
+    parser.add_argument("--out", default="sb3_ppo.npz", help="the policy file of the last seed")
+    args = parser.parse_args()
+    torch.set_num_threads(1)  # the networks are small
+    for seed in args.seeds:
+        model = train(seed, args.steps)
+        table = tabulated(model)
+        greedy = taichi_ants.evaluate(taichi_ants.worlds.paper(), table, rollouts=ROLLOUTS)
+        print(
+            f"seed {seed}: {deliveries(model, 10_000 + seed)} of {ROLLOUTS} rollouts deliver; "
+            f"greedily {greedy.deliveries.sum()}, "
+            f"with {greedy.returns.mean():.1f} in {greedy.steps.mean():.1f} steps",
+            flush=True,
+        )
+    made_by = {"made by": "PPO of Stable-Baselines3", "seed": seed, "steps": args.steps}
+    taichi_ants.save_policy(args.out, table, made_by)

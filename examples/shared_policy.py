@@ -1,0 +1,94 @@
+"""One neural policy for all ants of a colony, beside the table that they can share.
+
+Every ant is an environment of its own for the trainer of `ppo.py`, which knows nothing of colonies;
+but they live in one world, see each other, and follow each other's trails. Ants under the same
+rules learn a shared table by SARSA, as in `python experiments/colony.py study`, from as many steps
+in all. Then nobody learns any more, and all are tried in colonies of their own.
+
+Needs torch: `pip install -e ".[torch]"`. A seed takes about three minutes on one core. Prints the
+foods that 64 ants deliver per 1000 ticks: with the network as it was trained, which draws actions;
+greedily, as a table; and with the shared table.
+"""
+
+import argparse
+from dataclasses import replace
+
+import gymnasium
+import numpy as np
+import torch
+from gymnasium.vector import VectorEnv
+from ppo import Agent, table, train
+
+from taichi_ants import Colony, Life, TrainingConfig, save_policy, task, worlds
+from taichi_ants.studies.colony_study import scheduled
+
+ANTS, TICKS, WORLDS, EPISODES = 64, 1000, 4, 60
+FORAGING = replace(task.foraging(), life=Life(regrowth=0))  # food grows back at once
+TRIAL_SEED = 10_000
+
+
+def environments() -> VectorEnv:
+    return gymnasium.make_vec(
+        "taichi_ants/HexColony-v0",
+        num_envs=WORLDS * ANTS,
+        task=FORAGING,
+        ants=ANTS,
+        max_steps=TICKS,
+        observation_format="one_hot",
+    )
+
+
+def neural(seed: int, episodes: int) -> Agent:
+    """A network that 64 ants in each of four worlds have trained together."""
+    return train(environments(), seed, episodes * TICKS * ANTS, n_steps=64, entropy=0.03)
+
+
+def foods_by_chance(agent: Agent) -> float:
+    """Foods per 1000 ticks and colony of ants that draw their actions, as in training."""
+    envs, foods = environments(), 0
+    seen, _ = envs.reset(seed=TRIAL_SEED)
+    for _ in range(TICKS):
+        with torch.no_grad():
+            actions = agent.policy(seen).sample().numpy()
+        seen, _, delivered, _, _ = envs.step(actions)
+        foods += delivered.sum()
+    return foods / WORLDS * 1000 / TICKS
+
+
+def tabular(seed: int, episodes: int) -> np.ndarray:
+    """The table that 64 ants in one world have learned together."""
+    training = scheduled(TrainingConfig("sarsa", 0.1, 0.9, 0.3, 1.0), episodes)
+    colony = Colony(worlds.paper(), FORAGING, training, seed, ANTS, sharing="shared")
+    colony.run(episodes, TICKS)
+    return colony.q_values[0]
+
+
+def foods(q_values: np.ndarray) -> float:
+    """Foods per 1000 ticks and colony of ants that follow a table, but at one tick in a hundred."""
+    follow = TrainingConfig("sarsa", 0.1, 0.9, epsilon=0.01, epsilon_decay=1.0)
+    seeds = range(TRIAL_SEED, TRIAL_SEED + WORLDS)
+    colony = Colony(
+        *(worlds.paper(), FORAGING, follow, seeds, ANTS), sharing="fixed", q_values=q_values
+    )
+    return float(colony.run(4, TICKS).deliveries.mean()) * 1000 / TICKS
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, nargs="+", default=range(3))
+    parser.add_argument("--episodes", type=int, default=EPISODES, help="of 1000 ticks")
+    parser.add_argument(
+        "--out", default="shared_policy.npz", help="the policy file of the last network"
+    )
+    args = parser.parse_args()
+    torch.set_num_threads(1)  # the networks are small
+    for seed in args.seeds:
+        agent = neural(seed, args.episodes)
+        network, learned = table(agent, FORAGING.observation), tabular(seed, args.episodes)
+        print(
+            f"seed {seed}: network {foods_by_chance(agent):.0f}, greedily {foods(network):.0f}, "
+            f"table {foods(learned):.0f}",
+            flush=True,
+        )
+    made_by = {"made by": "PPO", "seed": seed, "task": FORAGING.as_dict()}
+    save_policy(args.out, network, made_by, FORAGING.observation)

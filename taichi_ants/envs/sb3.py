@@ -1,0 +1,130 @@
+"""Vector environments as Stable-Baselines3 wants them: `VecEnv`, on which its agents train."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+
+from taichi_ants.errors import AntsError, shown
+
+try:
+    from stable_baselines3.common.vec_env import VecEnv
+except ImportError as error:
+    raise ImportError(
+        "taichi_ants.envs.sb3 needs Stable-Baselines3; install it with "
+        'pip install "taichi_ants[sb3]".'
+    ) from error
+
+
+class SB3VecEnv(VecEnv):
+    """A vector environment of this package as a `VecEnv` of Stable-Baselines3.
+
+        envs = HexForageVectorEnv(64, observation_format="one_hot", autoreset_mode="SameStep")
+        PPO("MlpPolicy", SB3VecEnv(envs)).learn(100_000)
+
+    Infos are empty but where an episode has ended: there `terminal_observation` is what was seen at
+    its end, and `TimeLimit.truncated` tells whether the step limit ended it, so that its value is
+    that of going on. All else that Gymnasium's infos tell is in `envs`, see below. Wrap it in
+    SB3's `VecMonitor` for returns and lengths of episodes.
+
+    All environments are one object: attributes are those of `envs`, the same for each, and the only
+    method of single environments is `action_masks`, which MaskablePPO of sb3-contrib calls.
+
+    Args:
+        envs: The environments, with autoreset_mode "SameStep".
+
+    Attributes:
+        envs: The same.
+        infos: What they said in the last step, or at the reset, in Gymnasium's form.
+
+    Raises:
+        AntsError: The environments begin their next episode at another time.
+    """
+
+    def __init__(self, envs: VectorEnv) -> None:
+        if not isinstance(envs, VectorEnv):
+            raise AntsError(f"envs is {shown(envs)}; it must be a gymnasium.vector.VectorEnv.")
+        mode = envs.metadata.get("autoreset_mode")
+        if mode is not AutoresetMode.SAME_STEP:
+            raise AntsError(
+                f"autoreset_mode of envs is {mode.value if mode else mode!r}; Stable-Baselines3 "
+                'needs "SameStep".'
+            )
+        self.envs, self._actions = envs, np.zeros(0, np.int64)
+        self.infos: dict[str, Any] = {}
+        super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
+
+    def reset(self) -> np.ndarray:
+        """Begin all episodes anew, with the seeds that `seed` has set."""
+        seen, self.infos = self.envs.reset(seed=self._seeds[0])  # the others are the next ones
+        self._reset_seeds()
+        return seen
+
+    def step_async(self, actions: np.ndarray) -> None:
+        self._actions = actions
+
+    def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
+        """Do the actions: what is seen, rewards float32, which episodes ended, infos."""
+        seen, rewards, terminated, truncated, self.infos = self.envs.step(self._actions)
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        ended = terminated | truncated
+        for number in np.flatnonzero(ended):
+            infos[number] = {
+                "terminal_observation": self.infos["final_obs"][number],
+                "TimeLimit.truncated": bool(truncated[number] and not terminated[number]),
+            }
+        return seen, rewards.astype(np.float32), ended, infos
+
+    def close(self) -> None:
+        self.envs.close()
+
+    def get_images(self) -> list[np.ndarray | None]:
+        """A picture of each environment."""
+        pictures: Any = self.envs.render()
+        return [None] * self.num_envs if pictures is None else list(pictures)
+
+    def action_masks(self) -> np.ndarray:
+        """Which actions can succeed now, bool (num_envs, 5)."""
+        return self.infos["action_mask"].astype(bool)
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        owner = self if attr_name == "action_masks" else self.envs
+        return [getattr(owner, attr_name)] * len(self._numbers(indices))
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Set an attribute of `envs`.
+
+        Raises:
+            AntsError: It is meant for some environments only.
+        """
+        if set(self._numbers(indices)) != set(range(self.num_envs)):
+            raise AntsError(
+                f"indices is {shown(indices)}; the environments are one object and share their "
+                "attributes, so leave it out."
+            )
+        setattr(self.envs, attr_name, value)
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """What `action_masks` gives for each environment.
+
+        Raises:
+            AntsError: It is another method.
+        """
+        if method_name != "action_masks":
+            raise AntsError(
+                f"method_name is {shown(method_name)}; the environments are one object and have "
+                "only action_masks each, so call other methods of `envs` itself."
+            )
+        return list(self.action_masks()[self._numbers(indices)])
+
+    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
+        """False for each: single environments have no wrappers."""
+        return [False] * len(self._numbers(indices))
+
+    def _numbers(self, indices: Any) -> list[int]:
+        """The environments that SB3 names: all by None, one by its number, or several."""
+        return list(self._get_indices(indices))

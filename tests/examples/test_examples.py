@@ -1,0 +1,67 @@
+"""Each example runs, in a version of a few seconds, and says what its docstring promises."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+from command_lines import ROOT, environment
+
+from taichi_ants import load_policy
+
+EXAMPLES = ROOT / "examples"
+NEEDS = {"ppo": "torch", "shared_policy": "torch", "sb3_ppo": "stable_baselines3"}
+
+
+def run(name: str, arguments: list[object], kernels: Path, folder: Path) -> str:
+    """What an example prints; skips where what it needs is missing."""
+    needed = NEEDS.get(name)
+    if needed and find_spec(needed) is None:
+        pytest.skip(f"{name}.py needs {needed}")
+    command = [sys.executable, str(EXAMPLES / f"{name}.py"), *map(str, arguments)]
+    done = subprocess.run(
+        list(map(str, command)),
+        env=environment(kernels),
+        cwd=folder,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_every_example_is_here() -> None:
+    names = {path.stem for path in EXAMPLES.glob("*.py")}
+    assert names == {"q_learning", *NEEDS}
+
+
+def test_q_learning_reaches_the_best_return_in_40_lines(kernels: Path, tmp_path: Path) -> None:
+    said = run("q_learning", ["--seeds", 3], kernels, tmp_path)
+    assert "1 of 1 seeds reach 45 in 34 steps" in said
+    assert len((EXAMPLES / "q_learning.py").read_text().splitlines()) <= 40
+
+
+def test_ppo_leaves_a_policy_file(kernels: Path, tmp_path: Path) -> None:
+    said = run("ppo", ["--seeds", 0, 1, "--steps", 4096], kernels, tmp_path)
+    assert len(re.findall(r"^seed \d: \d+ of 100 rollouts deliver, ", said, re.M)) == 2
+    policy = load_policy(tmp_path / "ppo.npz")
+    assert policy.observation == "paper"
+    assert policy.metadata["seed"] == 1
+
+
+def test_sb3_ppo_counts_the_rollouts_that_deliver(kernels: Path, tmp_path: Path) -> None:
+    said = run("sb3_ppo", ["--seeds", 0, "--steps", 2048], kernels, tmp_path)
+    assert re.search(r"^seed 0: \d+ of 100 rollouts deliver; greedily \d+, with ", said, re.M)
+    assert load_policy(tmp_path / "sb3_ppo.npz").observation == "paper"
+
+
+def test_shared_policy_sets_a_network_beside_a_table(kernels: Path, tmp_path: Path) -> None:
+    said = run("shared_policy", ["--seeds", 0, "--episodes", 1], kernels, tmp_path)
+    assert re.search(r"^seed 0: network \d+, greedily \d+, table \d+$", said, re.M)
+    policy = load_policy(tmp_path / "shared_policy.npz")
+    assert policy.observation == "ants"
+    assert policy.task.life.regrowth == 0
