@@ -72,7 +72,8 @@ def _action_masks() -> np.ndarray:
 ACTION_MASKS = _action_masks()
 
 
-HAS_EVENT, HAS_REASON = EVENTS != None, REASONS != None  # noqa: E711
+# Rows as single values, which NumPy takes twice as fast.
+_PACKED_MASKS = ACTION_MASKS.view(f"V{N_ACTIONS}")[:, 0]
 _AT_RESET = ("state", "action_mask")
 
 
@@ -379,15 +380,15 @@ def _infos(
     states: np.ndarray, percepts: np.ndarray, outcomes: np.ndarray, which: np.ndarray
 ) -> dict[str, Any]:
     """What is said of some environments, `which` bool (n,); nothing of the others."""
-    masks = ACTION_MASKS.take(percepts, axis=0, mode="clip")
+    masks = _PACKED_MASKS.take(percepts, mode="clip").view(np.int8).reshape(-1, N_ACTIONS)
     if not which.all():
         states, masks = np.where(which, states, 0), masks * which[:, None]
         outcomes = np.where(which, outcomes, Outcome.NONE)
     told = {
         "state": (states.astype(np.int64), which.copy()),
         "action_mask": (masks, which.copy()),
-        "event": (EVENTS[outcomes], HAS_EVENT[outcomes]),
-        "reason": (REASONS[outcomes], HAS_REASON[outcomes]),
+        "event": (EVENTS[outcomes], outcomes != Outcome.NONE),
+        "reason": (REASONS[outcomes], outcomes >= Outcome.ROCK_AHEAD),
     }
     infos = {name: values for name, (values, _) in told.items()}
     return infos | {f"_{name}": of for name, (_, of) in told.items()}

@@ -75,9 +75,10 @@ def step_kernel(
     @ti.func
     def put(a: ti.template(), i, ant):
         """Write down an ant."""
-        a.ant_cells[i], a.random_states[i] = ant.cell, ant.random_state
+        a.ant_cells[i] = ant.cell
         a.headings[i], a.carries[i] = ti.cast(ant.heading, ti.u8), ti.cast(ant.carries, ti.u8)
-        a.carried[i] = ant.carried
+        if ti.static(deposit == "fading"):
+            a.carried[i] = ant.carried
 
     @ti.func
     def look(a: ti.template(), i, base, ant, clock):
@@ -92,7 +93,6 @@ def step_kernel(
         if a.changed[i] == 1:
             restore(a, own, origin, a.cells[own + a.size], a.cells[own + a.size + 1])
         ant = Ant(origin=origin, cell=a.start_cells[i], heading=a.start_headings[i])
-        ant.random_state = a.random_states[i]
         a.steps[i], a.changed[i] = 0, ti.cast(0, ti.u8)
         put(a, i, ant)
         look(a, i, origin, ant, 0)
@@ -101,8 +101,11 @@ def step_kernel(
     def do(a: ti.template(), i, own, origin, action):
         """An action of an ant; returns whether the episode has ended."""
         before = Ant(origin=origin, cell=a.ant_cells[i], heading=ti.cast(a.headings[i], ti.i32))
-        before.carries, before.carried = ti.cast(a.carries[i], ti.i32), a.carried[i]
-        before.random_state = a.random_states[i]
+        before.carries = ti.cast(a.carries[i], ti.i32)
+        if ti.static(deposit == "fading"):
+            before.carried = a.carried[i]
+        if action == PICK_UP:  # only which of several foods it takes is left to chance
+            before.random_state = a.random_states[i]
         # As long as an ant has changed nothing, it sees the cells that all ants of its world share:
         # they stay in the processor's cache.
         changed = ti.cast(a.changed[i], ti.i32)
@@ -110,7 +113,8 @@ def step_kernel(
         clock, percept = a.steps[i] * a.falls, ti.cast(a.percepts[i], ti.i32)
         after = act(deposit, a, base, before, percept, action, clock)
         a.outcomes[i] = ti.cast(outcome_of(a, base, before, after, action), ti.u8)
-        changed |= ti.cast(after.event == PICKED_UP, ti.i32)
+        if after.event == PICKED_UP:
+            changed, a.random_states[i] = 1, after.random_state
         a.changed[i] = ti.cast(changed, ti.u8)
         a.steps[i] += 1
         put(a, i, after)
