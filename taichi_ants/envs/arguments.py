@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from gymnasium.error import InvalidAction
+from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
 
 from taichi_ants import checks
@@ -42,13 +43,17 @@ def seeds_of(seed: Any, n: int) -> Sequence[int | None]:
     if not isinstance(seed, (list, tuple, np.ndarray)) or len(seed) != n:
         raise ValueError(f"seed is {shown(seed)}; give a whole number, or a list of {n}.")
     for one in seed:
-        if one is not None and not (isinstance(one, (int, np.integer)) and one >= 0):
+        if one is not None and not isinstance(one, (int, np.integer)):
             raise ValueError(f"a seed is {shown(one)}; it must be a whole number from 0 on.")
+        if one is not None:
+            seeding.np_random(int(one))  # says what Gymnasium says of negative ones
     return [None if one is None else int(one) for one in seed]
 
 
 def checked_reset_mask(options: dict[str, Any] | None, n: int) -> np.ndarray:
     """Where to begin, bool (n,): the mask in the options of a reset, everywhere without one."""
+    if not isinstance(options, (dict, type(None))):
+        raise TypeError(f"options is {shown(options)}; it must be a dict or None.")
     mask = (options or {}).get("reset_mask")
     if mask is None:
         return np.ones(n, bool)
@@ -73,7 +78,8 @@ def checked_actions(actions: Any, n: int) -> np.ndarray:
     given = np.asarray(actions)
     if given.shape != (n,) or given.dtype.kind not in "iu":
         raise InvalidAction(
-            f"the actions are {shown(actions)}; they must be whole numbers, an array of ({n},)."
+            f"the actions are {shown(actions)}; they must be an array of an integer type and of "
+            f"shape ({n},)."
         )
     if ((given < 0) | (given >= N_ACTIONS)).any():
         wrong = given[(given < 0) | (given >= N_ACTIONS)][0]

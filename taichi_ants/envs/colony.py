@@ -100,8 +100,13 @@ class ColonyWorlds:
             seeds = [None] * len(which)
         new = np.array([seed is not None for seed in seeds]) & which
         if new.any():
-            given = [seed for seed, is_new in zip(seeds, new, strict=True) if is_new]
-            self.colony.begin_some(new, given)  # type: ignore[arg-type]
+            # As for one ant, only 64 bits of a seed count.
+            given = [
+                seed % 2**64
+                for seed, begins in zip(seeds, which, strict=True)
+                if begins and seed is not None
+            ]
+            self.colony.begin_some(new, given)
         if (which & ~new).any():
             self.colony.begin_some(which & ~new)
 

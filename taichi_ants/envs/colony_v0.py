@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
+from gymnasium.utils import seeding
 
 from taichi_ants.engines.colony.layout import AntRow
 from taichi_ants.envs.colony import MAX_STEPS, METADATA, ColonyWorlds
@@ -134,7 +135,9 @@ class HexColonyParallelEnv(ParallelEnv):
         Returns:
             Observations and infos by agent.
         """
-        if seed is None and not self._begun:
+        if seed is not None:
+            seeding.np_random(seed)  # says what Gymnasium says of what is no seed
+        elif not self._begun:
             seed = int(np.random.default_rng().integers(2**63))
         self._worlds.begin(np.ones(1, bool), [seed])
         self._slots = list(range(self._worlds.colony.ants))  # of the agents
@@ -173,6 +176,10 @@ class HexColonyParallelEnv(ParallelEnv):
             EnvLogger.warn_step_after_terminated_truncated()
             return {}, {}, {}, {}, {}
         worlds, acting, slots = self._worlds, self.agents, self._slots
+        if not isinstance(actions, dict) or not actions.keys() <= set(acting):
+            raise AssertionError(
+                f"the actions are {shown(actions)}; give a dict with an action for each of agents."
+            )
         given = np.zeros((1, worlds.colony.capacity), np.int64)
         given[0, slots] = [self._action(actions, name) for name in acting]
         worlds.step(given)

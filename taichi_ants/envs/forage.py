@@ -24,7 +24,7 @@ from taichi_ants.envs.arguments import (
 )
 from taichi_ants.envs.drawing import Drawing
 from taichi_ants.envs.formats import ObservationFormat, Shown
-from taichi_ants.errors import check_one_of, checked_flag, checked_whole, shown
+from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, shown
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EPISODE_STEPS, GIVE, N_ACTIONS, N_STATES, PICK_UP
 from taichi_ants.task.states import state_from_index
@@ -32,7 +32,8 @@ from taichi_ants.worlds import World
 
 DELIVERIES = ("absorbing", "continuing", "endless")
 RENDER_MODES = ("rgb_array", "ansi")
-_MOST_ENVS = 1 << 24
+# Of all environments together, with room for some more: 4 GiB.
+_MOST_CELLS = (1 << 30) - (1 << 24)
 
 _EVENTS = {
     Outcome.NONE: None,
@@ -101,7 +102,11 @@ class _Ants:
             check_one_of("render_mode", render_mode, RENDER_MODES)
         max_steps = checks.checked_max_steps(max_steps, self.task)
         self.shown = Shown(self.task.sees, observation_format)
-        self.lockstep = Lockstep(worlds_of(world, n), self.task, n, max_steps, delivery, falls)
+        worlds = worlds_of(world, n)
+        most = _MOST_CELLS // worlds[0].grid.size
+        if n > most:
+            raise AntsError(f"num_envs is {n}; of this world there can be at most {most} at once.")
+        self.lockstep = Lockstep(worlds, self.task, n, max_steps, delivery, falls)
         self._seeded = False
         self.drawing = Drawing(self.lockstep, render_mode)
 
@@ -202,7 +207,7 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
         self.render_mode = render_mode
         self.observation_space = self._ants.shown.space
         self.action_space = Discrete(N_ACTIONS)
-        self._all, self._over = np.ones(1, bool), True  # nothing has begun
+        self._all, self._over, self._begun = np.ones(1, bool), True, False
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -211,7 +216,7 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
         super().reset(seed=seed)
         self._ants.seed([seed], self._all, self.np_random)
         self._ants.lockstep.begin(self._all)
-        self._over = False
+        self._over, self._begun = False, True
         return self._ants.observations()[0], self._info()
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
@@ -243,7 +248,13 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
         return info | {name: value for name, value in more.items() if value is not None}
 
     def render(self) -> Any:
-        """A picture or a text map of the world as it is, see `render_mode`."""
+        """A picture or a text map of the world as it is, see `render_mode`; None without one.
+
+        Raises:
+            ResetNeeded: No episode has begun.
+        """
+        if not self._begun:
+            raise ResetNeeded("no episode is under way; call reset() before render().")
         return self._ants.drawing.draw(0)
 
 
@@ -254,13 +265,14 @@ class HexForageVectorEnv(VectorEnv[Any, Any, Any]):
     is told is described there; arrays have a leading axis of `num_envs`.
 
     ## Arguments
-    num_envs: How many, 1 to 2**24.
+    num_envs: How many; each takes 4 bytes for each cell of its world.
     world: As of `HexForageEnv`, or a list of worlds of the same ranges: environment i lives in
         number i modulo their number.
     autoreset_mode: What follows the end of an episode, `gymnasium.vector.AutoresetMode` or its
         name. "NextStep": the next step begins an episode, whatever the action. "SameStep": the step
         that ends one begins the next; `infos["final_obs"]` and `infos["final_info"]` tell how it
         ended. "Disabled": the caller resets with `options={"reset_mask": ended}`.
+    max_episode_steps: Another step limit, as `gymnasium.make` has; the lower one counts.
     All others: as of `HexForageEnv`; `render` draws all worlds.
 
     ## Info
@@ -284,8 +296,11 @@ class HexForageVectorEnv(VectorEnv[Any, Any, Any]):
         observation_format: ObservationFormat = "cells",
         render_mode: str | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        max_episode_steps: int | None = None,
     ) -> None:
-        self.num_envs = n = checked_whole("num_envs", num_envs, most=_MOST_ENVS)
+        if max_episode_steps is not None:
+            max_steps = min(checked_whole("max_episode_steps", max_episode_steps), max_steps)
+        self.num_envs = n = checked_whole("num_envs", num_envs)
         self.autoreset_mode = checked_autoreset(autoreset_mode)
         self._ants = _Ants(
             *(n, world, task, delivery, evaporation, max_steps, observation_format, render_mode)
@@ -370,9 +385,15 @@ class HexForageVectorEnv(VectorEnv[Any, Any, Any]):
         return ants.observations(), rewards, terminations, truncations, infos
 
     def render(self) -> tuple[Any, ...] | None:
-        """A picture or a text map of each world as it is, see `render_mode`."""
+        """A picture or a text map of each world as it is, see `render_mode`; None without one.
+
+        Raises:
+            ResetNeeded: No episode has begun.
+        """
         if self.render_mode is None:
             return None
+        if self._over is None:
+            raise ResetNeeded("no episode is under way; call reset() before render().")
         return tuple(self._ants.drawing.draw(number) for number in range(self.num_envs))
 
 

@@ -42,6 +42,8 @@ def tabulate(
     Raises:
         AntsError: There is no such observation or format, or the function returns something else.
     """
+    if not callable(function):
+        raise AntsError(f"function is {shown(function)}; it must be a function of what is seen.")
     seen = Shown(observations.get(observation), observation_format).table
     n_states, returned = len(seen), function(seen)
     try:

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from taichi_ants.errors import AntsError, check_one_of, shown
+from taichi_ants.errors import AntsError, check_one_of, expect, shown
 from taichi_ants.files import PathLike, read_npz, to_json, write_npz
 from taichi_ants.task import Task, observations
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, N_ACTIONS, PICK_UP, RIGHT
@@ -60,6 +60,7 @@ class Policy(NamedTuple):
         Raises:
             AntsError: There is no such state.
         """
+        expect("rng", rng, np.random.Generator)
         states = np.asarray(states)
         if states.dtype.kind not in "iu" or ((states < 0) | (states >= len(self.q_values))).any():
             raise AntsError(

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants.checks import checked_seeds
+from taichi_ants.checks import checked_seeds, checked_share
 from taichi_ants.engines.records import Record
 from taichi_ants.engines.stored import FileKind, world_arrays, world_facts, world_from
 from taichi_ants.errors import AntsError, checked_whole, expect, shown
@@ -137,7 +137,12 @@ class Dataset(Record):
         return np.concatenate([[0], np.flatnonzero(self.terminated | self.truncated) + 1])
 
     def returns(self, discount: float = 1.0) -> np.ndarray:
-        """The discounted return of each episode from its first step, float64 (e,)."""
+        """The discounted return of each episode from its first step, float64 (e,).
+
+        Raises:
+            AntsError: The discount is no number from 0 to 1.
+        """
+        discount = checked_share("discount", discount)
         ages = np.arange(len(self)) - self.begins[self.episode]
         return np.bincount(self.episode, weights=discount**ages * self.reward)
 

@@ -34,7 +34,8 @@ class PolicyValues(Record):
         effective_sample_size: (sum of weights)^2 / sum of squared weights, where the weights are
             those of whole episodes: how many episodes of the target policy tell as much (Kong, A
             note on importance sampling using standardized weights, 1992). nan where none is
-            weighted.
+            weighted. 0: the target policy would have done no whole episode of the data, so that
+            the value stands on the beginnings of episodes alone; do not believe it.
     """
 
     value: np.ndarray

@@ -81,6 +81,8 @@ def record(
         facts = {"policy": "random" if behaviour is None else "table", "epsilon": epsilon}
         table = random_policy(task.observation) if behaviour is None else behaviour
         tables = checks.checked_q_values(table, task)
+        if tables.ndim == 4 and len(tables) == 1:  # as `train` gives of one configuration
+            tables = tables[0]
         if tables.shape[:-2] not in ((), (len(numbers),)):
             raise AntsError(
                 f"behaviour has shape {tables.shape}; give one table, or one for each of the "

@@ -10,6 +10,7 @@ import sys
 import warnings
 from dataclasses import replace
 
+import gymnasium
 import numpy as np
 import pytest
 from colonies import act, training
@@ -180,6 +181,9 @@ def test_steps_in_the_wrong_order_and_wrong_actions(capsys):
     ):
         with pytest.raises(AssertionError, match=rf"^the action of ant_3 is {said} .*\.$"):
             env.step(wrong)
+    for wrong in (None, [1, 1, 1], {**right, "ant_99": 1}):
+        with pytest.raises(AssertionError, match="give a dict with an action for each of agents"):
+            env.step(wrong)
     env.step(right)
     *_, truncated, _ = env.step(right)
     assert truncated == dict.fromkeys(right, True)
@@ -214,3 +218,11 @@ def test_memory_does_not_grow_with_environments_that_are_closed():
 
     first = loop(60)
     assert loop(200) - first < 4000  # kibibytes
+
+
+def test_seeds_are_those_of_gymnasium():
+    env, other = colony(paper(), ants=9), colony(paper(), ants=9)
+    with pytest.raises(gymnasium.error.Error, match="greater or equal"):
+        env.reset(seed=-1)
+    # Only 64 bits count.
+    np.testing.assert_equal(env.reset(seed=2**70 + 5), other.reset(seed=5))

@@ -183,6 +183,27 @@ def test_episodes_are_truncated_at_the_step_limit():
     assert [env.step(1)[2:4] for _ in range(3)] == [(False, False)] * 2 + [(False, True)]
 
 
+def test_the_lower_step_limit_counts():
+    for limits in (
+        {"max_episode_steps": 2},
+        {"max_steps": 2},
+        {"max_steps": 2, "max_episode_steps": 9},
+    ):
+        envs = gymnasium.make_vec(ID, num_envs=2, **limits)
+        one = gymnasium.make(ID, **limits)
+        for env in (envs, one):
+            env.reset(seed=0)
+        for ended in (False, True):
+            assert envs.step(np.ones(2, int))[3].tolist() == [ended] * 2
+            assert one.step(1)[3] == ended
+
+
+def test_nothing_is_drawn_before_an_episode_begins():
+    for env in (HexForageEnv(render_mode="ansi"), HexForageVectorEnv(2, render_mode="rgb_array")):
+        with pytest.raises(ResetNeeded, match="before render"):
+            env.render()
+
+
 def test_seeds_repeat_all_chance_and_without_one_it_goes_on():
     world = World((9, 9, 9), (0, 0, 0), foods=[(4, 0, 4), (4, 0, 5), (5, 0, 4)])
     env = gymnasium.make(ID, world=world, delivery="endless", max_steps=200)
@@ -369,13 +390,15 @@ def test_wrong_steps_raise_what_gymnasium_raises():
         ({"render_mode": "human"}, "render_mode is 'human'"),
         ({"autoreset_mode": "sometimes"}, "autoreset_mode is 'sometimes'"),
         ({"num_envs": 0}, "num_envs is 0"),
+        ({"num_envs": 10**7}, "of this world there can be at most 2396"),
+        ({"max_episode_steps": 0}, "max_episode_steps is 0"),
     ],
 )
 def test_wrong_arguments_are_named(arguments, told):
     with pytest.raises(AntsError) as caught:
         HexForageVectorEnv(**arguments)
     assert told in str(caught.value)
-    if not {"num_envs", "autoreset_mode"} & arguments.keys():
+    if not {"num_envs", "autoreset_mode", "max_episode_steps"} & arguments.keys():
         with pytest.raises(AntsError) as caught:
             HexForageEnv(**arguments)
         assert told in str(caught.value)
@@ -386,7 +409,9 @@ def test_wrong_arguments_are_named(arguments, told):
     [
         ({"seed": "one"}, ValueError),
         ({"seed": [1, 2, 3]}, ValueError),
-        ({"seed": [1, -2]}, ValueError),
+        ({"seed": [1, -2]}, gymnasium.error.Error),
+        ({"seed": [1, 0.5]}, ValueError),
+        ({"options": "reset_mask"}, TypeError),
         ({"options": {"reset_mask": [True, False]}}, TypeError),
         ({"options": {"reset_mask": np.array([1, 0])}}, TypeError),
         ({"options": {"reset_mask": np.array([False, False])}}, ValueError),
@@ -396,7 +421,7 @@ def test_wrong_arguments_are_named(arguments, told):
 def test_wrong_resets_are_refused_and_change_nothing(arguments, error):
     env = HexForageVectorEnv(2)
     env.reset(seed=0)
-    with pytest.raises(error, match=r"must|give"):
+    with pytest.raises(error, match=r"must|give|greater or equal"):
         env.reset(**arguments)
     env.step(np.zeros(2, int))
 

@@ -135,6 +135,15 @@ def test_states_that_are_none(states) -> None:
         Policy(FOLLOWER, "paper", {}).actions(states, np.random.default_rng(0))
 
 
+def test_one_table_is_evaluated_with_many_seeds() -> None:
+    world = worlds.open_world(3, (8, 8, 8))
+    many = evaluate(world, FOLLOWER, rollouts=4, seeds=range(5))
+    assert many.steps.shape == (5, 4)
+    np.testing.assert_array_equal(
+        many.steps, evaluate(world, np.stack([FOLLOWER] * 5), rollouts=4, seeds=range(5)).steps
+    )
+
+
 def test_a_table_that_was_learned_outside_is_evaluated() -> None:
     """As Gymnasium's learners keep it: float64, or a dictionary of states that were seen."""
     outside = FOLLOWER.astype(np.float64)

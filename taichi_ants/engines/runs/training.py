@@ -176,7 +176,8 @@ def evaluate(
         world: The world; each rollout starts from exactly this.
         q_values: float (..., n_states, 5), action values; the best action is taken, ties at random.
         rollouts: Episodes with each table, at least 1. Rollout k of a seed has a stream of its own.
-        seeds: One seed for all tables, or as many as the tables' last leading axis is long.
+        seeds: One seed for all tables, or as many as the tables' last leading axis is long. A
+            single table takes any number of seeds; then they are the first axis of what comes out.
         max_steps: Steps after which a rollout is truncated.
         task: The rules of the game; None is the paper's.
         epsilon: Probability of a random action.
@@ -187,6 +188,8 @@ def evaluate(
     """
     task = checked_runs_task(task)
     tables = checked_q_values(q_values, task)
+    if tables.ndim == 2 and (several := len(checked_seeds(seeds))) > 1:
+        tables = np.broadcast_to(tables, (several, *tables.shape))
     shape = tables.shape[:-2]
     run_seeds = checked_seeds_for(seeds, shape)
     rollouts = checked_whole("rollouts", rollouts)

@@ -23,6 +23,7 @@ from taichi_ants import (
 )
 from taichi_ants.reference.ants import Event, starts
 from taichi_ants.task import Life, Pheromone, Task, observations
+from taichi_ants.task.constants import DEPOSIT_LEVEL
 from taichi_ants.worlds import World, paper
 
 DELIVERIES = ("absorbing", "continuing")
@@ -64,10 +65,11 @@ def random_config(seed: int, learner: str) -> TrainingConfig:
 def random_task(seed: int, observation: str = "paper", deposit: str = "set") -> Task:
     """A task that independent runs can have."""
     rng = np.random.default_rng([seed, 2])
+    evaporation, level = str(rng.choice(["linear", "none"])), int(rng.choice([1, 7, 250]))
     pheromone = Pheromone(
-        evaporation=str(rng.choice(["linear", "none"])),
+        evaporation=evaporation,
         deposit=deposit,
-        level=int(rng.choice([1, 7, 250])),
+        level=DEPOSIT_LEVEL if deposit == "none" else level,
         cap=int(rng.choice([1, 10, 1000])) if deposit == "add" else None,
         slope=int(rng.choice([1, 10, 100])) if deposit == "fading" else None,
         view="strongest" if deposit == "fading" else "half",
