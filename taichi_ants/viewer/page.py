@@ -12,6 +12,7 @@ from typing import Any
 from taichi_ants import files
 from taichi_ants.engines.runs.traces import Trace
 from taichi_ants.errors import AntsError, expect
+from taichi_ants.rendering.writers import writable, write
 from taichi_ants.viewer.recording import Recording, record_colony, record_trace
 
 # The parts of one script, in this order: what a part uses stands in those before it.
@@ -50,11 +51,10 @@ def check_page(path: files.PathLike) -> Path:
     Raises:
         AntsError: The file does not end in .html, or cannot be written.
     """
-    expect("path", path, str, Path)
-    if not is_page(path):
+    target = writable(path)
+    if not is_page(target):
         raise AntsError(f"{str(path)!r} is to hold a page; give it a name that ends in .html.")
-    files.check_writable(path)
-    return Path(path)
+    return target
 
 
 def save_page(path: files.PathLike, recording: Recording) -> None:
@@ -64,9 +64,7 @@ def save_page(path: files.PathLike, recording: Recording) -> None:
         AntsError: The file does not end in .html, or cannot be written.
     """
     target = check_page(path)
-    content = page(recording).encode()
-    target.parent.mkdir(parents=True, exist_ok=True)
-    files.write_atomically(target, lambda file: file.write(content))
+    write(target, page(recording).encode())
 
 
 def frame(recording: Recording) -> str:
