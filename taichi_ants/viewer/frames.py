@@ -1,8 +1,8 @@
 """Frames: what changed in a world from one moment to the next, as bytes.
 
-A frame is a list of arrays, its sections, in little-endian order. It begins with uint32 numbers: its
-length in bytes, and how many elements each section has. Each section begins at a multiple of eight
-bytes, so that both NumPy and JavaScript can look at it where it lies.
+A frame is a list of arrays, its sections, in little-endian order. It begins with uint32 numbers:
+its length in bytes, and how many elements each section has. Each section begins at a multiple of
+eight bytes, so that both NumPy and JavaScript can look at it where it lies.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 /* What stands beside the world: the world now, the followed ant, the chosen cell, and the legend. */
 
 const HOLDS = { [EMPTY]: "nothing", [OBSTACLE]: "a rock", [FOOD]: "food", [QUEEN]: "the queen" };
-const CAME = ["entered an empty cell", "failed", "entered a better cell", "picked up food", "gave food to the queen"];
+const CAME = ["enters an empty cell", "fails", "", "picks up food", "gives food to the queen"];
 const LETTERS = {
   E: "empty", O: "obstacle", T: "trail", S: "nearer to the queen", F: "food", Q: "queen",
 };
@@ -84,17 +84,18 @@ class Panel {
   viewOf(ant) {
     const { header, world } = this.history;
     const { task, rest, letters } = this.history.stateName(ant.state);
-    this.history.worldAt(this.history.world.moment);
     const shapes = header.view.map((turn, i) => {
       const angle = (turn * Math.PI) / 3, x = 1.732 * Math.sin(angle), y = -1.732 * Math.cos(angle);
       const cell = ant.cell + this.history.grid.offsets[(ant.heading + turn + 6) % 6];
       return `<g transform="translate(${x} ${y})"><path d="${HEXAGON}" transform="scale(.93)" fill="${this.fillOf(cell, world)}"/>`
         + `<text font-size=".95" stroke="var(--halo)" stroke-width=".2" paint-order="stroke">${safe(letters[i] ?? "")}</text></g>`;
     });
-    const known = [...new Set(letters.map((letter) => letter[0]))].filter((letter) => LETTERS[letter]);
-    const meaning = known.map((letter) => `${letter} ${LETTERS[letter]}`).join(", ") || header.letters;
+    const kinds = [...new Set(letters.map((letter) => letter[0]))], known = kinds.filter((kind) => LETTERS[kind]);
+    const meanings = known.map((kind) => `${kind} ${LETTERS[kind]}`);
+    if (known.length < kinds.length || !kinds.length) meanings.push(header.letters);
+    const meaning = meanings.filter(Boolean).join(", ");
     const around = header.view.some((turn) => Math.abs(turn) > 1);
-    const box = around ? "-2.9 -2.9 5.8 5.8" : "-2.75 -2.75 5.5 4.0";
+    const box = around ? "-2.9 -2.9 5.8 5.8" : "-2.6 -2.65 5.2 3.65";
     return `<div class="sees"><svg viewBox="${box}" role="img" aria-label="It sees, from left to right: ${safe(rest)}">`
       + `${shapes.join("")}<path d="${HEXAGON}" transform="scale(.93)" fill="none" stroke="var(--rule)" stroke-width=".07"/>`
       + `${antShape(ant.loaded)}</svg><div><span class="label">state ${ant.state}</span><b>${safe(task)} ${safe(rest)}</b>`
@@ -130,7 +131,8 @@ class Panel {
     if (!act) return '<div class="story"><span class="label">What it does next is not in the recording.</span></div>';
     const ties = act.values.filter((value) => value === Math.max(...act.values)).length;
     const why = { best: "the best", tie: `a tie of ${ties}`, explored: "explored" }[act.why];
-    const came = act.event === FAILED ? (act.action < 3 ? "is blocked" : "fails") : CAME[act.event].replace("entered", "enters").replace("picked", "picks").replace("gave", "gives");
+    const better = ant.loaded ? "comes nearer to the queen" : "enters a trail";
+    const came = act.event === FAILED && act.action < 3 ? "is blocked" : CAME[act.event] || better;
     const lines = [
       `<span>Chooses <b>${header.actions[act.action]}</b> <span class="why ${act.why}">${why}</span></span>`,
       `<span>It ${came}, reward <span class="reward ${act.reward > 0 ? "up" : act.reward < 0 ? "down" : ""}">${signed(act.reward, 0)}</span></span>`,

@@ -147,7 +147,7 @@ class Recorder:
         colony, config = self.colony, self.colony.training
         x, y, z = self.grid.ranges
         lines = [
-            ("world", f"{self.grid.count} cells, ranges {x} x {y} x {z}"),
+            ("world", f"{self.grid.count} cells, ranges {x}, {y}, {z}"),
             ("ants", str(colony.ants)),
             ("seed", str(colony.seeds[self.world])),
             ("they see", f"{self.observation.name}, {self._n_states} states"),
@@ -289,7 +289,7 @@ class Recorder:
 def fallen(
     trail: np.ndarray, ground: np.ndarray, pheromone: Pheromone, offsets: np.ndarray, ticks: int
 ) -> np.ndarray:
-    """What trails (size,) become in some ticks if nobody lays any; as the engine does, and pages do."""
+    """What trails (size,) become in some ticks if nobody lays any, as in the engine and in pages."""
     for _ in range(ticks):
         if pheromone.evaporation == "linear":
             trail = np.maximum(trail - trail.dtype.type(1), 0)

@@ -160,6 +160,7 @@ class Stage {
     this.camera = { x: 0, y: 0, scale: 10 }; // the scale is in pixels of the page
     this.fitted = true; // until somebody pans or zooms
     this.shownMoment = -1;
+    this.queens = [];
     this.gl = canvas.getContext("webgl2", { antialias: false, alpha: false, powerPreference: "low-power" });
     if (this.gl) this.prepare();
   }
@@ -286,9 +287,11 @@ class Stage {
   load(moment) {
     const { gl, grid, history, cellBytes: bytes } = this;
     const { ground, trail } = history.worldAt(moment), strongest = history.header.trail.strongest;
+    this.queens = [];
     for (let cell = 0; cell < grid.size; cell++) {
       if (!this.exists[cell]) continue;
       const held = ground[cell];
+      if (held === QUEEN) this.queens.push(cell);
       bytes[4 * cell] = held === EMPTY ? 1 : held === OBSTACLE ? 2 : held === FOOD ? 3 : 4;
       bytes[4 * cell + 1] = trail[cell] >= 1 ? Math.max(1, Math.min(trail[cell] / strongest, 1) * 255 + 0.5) : 0;
     }
@@ -386,6 +389,16 @@ class Stage {
       context.closePath();
     };
     context.lineJoin = context.lineCap = "round";
+    // Where cells are small, a ring shows where the queen is.
+    for (const queen of camera.scale < 7 ? this.queens : []) {
+      hexagon(queen, 9);
+      context.strokeStyle = colours.halo;
+      context.lineWidth = 5;
+      context.stroke();
+      context.strokeStyle = colours.queen;
+      context.lineWidth = 2.5;
+      context.stroke();
+    }
     if (cell >= 0) {
       hexagon(cell, Math.max(camera.scale, 5));
       context.strokeStyle = colours.mark;
@@ -410,7 +423,7 @@ class Stage {
       context.strokeStyle = colours.ink;
       context.lineWidth = Math.min(2, camera.scale / 8);
       context.stroke();
-      if (camera.scale >= 13 && letters[i]) {
+      if (camera.scale >= 10 && letters[i]) {
         const [x, y] = this.toPage(grid.centre(seen));
         context.font = `600 ${Math.min(0.62 * camera.scale, 30)}px ${getComputedStyle(document.body).fontFamily}`;
         context.textAlign = "center";
@@ -427,7 +440,7 @@ class Stage {
   drawPath(context, path) {
     if (!path || path.length < 2) return;
     const places = path.map((cell) => this.toPage(this.grid.centre(cell)));
-    context.lineWidth = Math.min(Math.max(0.16 * this.camera.scale, 1.5), 5);
+    const width = Math.min(Math.max(0.16 * this.camera.scale, 2), 5);
     // The older, the fainter.
     const parts = Math.min(24, places.length - 1);
     for (let part = 0; part < parts; part++) {
@@ -435,9 +448,12 @@ class Stage {
       const until = Math.floor(((part + 1) * (places.length - 1)) / parts);
       context.beginPath();
       for (let k = from; k <= until; k++) context.lineTo(...places[k]);
-      context.strokeStyle = this.colours.chosen;
-      context.globalAlpha = 0.75 * (1 - part / parts) + 0.05;
-      context.stroke();
+      context.globalAlpha = 0.85 * (1 - part / parts) + 0.05;
+      for (const [colour, more] of [["halo", 2.5], ["chosen", 0]]) { // a light edge, for dark trails
+        context.strokeStyle = this.colours[colour];
+        context.lineWidth = width + more;
+        context.stroke();
+      }
     }
     context.globalAlpha = 1;
   }

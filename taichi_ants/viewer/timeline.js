@@ -2,7 +2,7 @@
 
 const CURVES = [
   ["delivered", (frame) => frame.delivered, 0],
-  ["return of the episode", (frame) => frame.returns, 0],
+  ["return", (frame) => frame.returns, 0],
   ["epsilon", (frame) => frame.epsilon, 3],
 ];
 const MOST_POINTS = 1500;
@@ -112,11 +112,11 @@ class Timeline {
     const strokes = { [PICKED_UP]: new Set(), [DELIVERED]: new Set() };
     for (const { moment, kind } of history.events) strokes[kind].add(Math.round((2000 * moment) / last) / 2);
     const paths = Object.entries(strokes).map(([kind, places]) => {
-      const [name, y] = Number(kind) === PICKED_UP ? ["picked", 8] : ["delivered", 1];
-      return `<path class="${name}" d="${[...places].map((x) => `M${x} ${y}v5`).join("")}"/>`;
+      const [name, y] = Number(kind) === PICKED_UP ? ["picked", 9] : ["delivered", 1];
+      return `<path class="${name}" d="${[...places].map((x) => `M${x} ${y}v4`).join("")}"/>`;
     });
     const svg = byId("events");
-    svg.setAttribute("viewBox", "0 0 1000 16");
+    svg.setAttribute("viewBox", "0 0 1000 14");
     svg.innerHTML = paths.join("");
     const every = Math.ceil(history.length / MOST_POINTS), picked = [];
     for (let i = 0; i < history.length; i += every) picked.push(i);
