@@ -25,7 +25,7 @@ LAYERS = (
     {"checks"},
     {"baselines", "engines", "reference"},
     {"analysis", "rendering"},
-    {"envs"},
+    {"viewer", "envs"},
     {"studies"},
     {"commands"},
     {"__main__"},

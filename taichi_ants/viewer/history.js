@@ -303,7 +303,7 @@ class History {
   }
 
   /* The cells where an ant was, the latest first, back to the start of its episode or its birth. */
-  path(moment, number, most = 240) {
+  path(moment, number, most = 150) {
     const cells = [], episode = this.frames[moment].episode;
     for (let then = moment; then >= 0 && cells.length < most; then--) {
       const i = this.frames[then].episode === episode ? this.place(then, number) : -1;

@@ -289,7 +289,10 @@ class Recorder:
 def fallen(
     trail: np.ndarray, ground: np.ndarray, pheromone: Pheromone, offsets: np.ndarray, ticks: int
 ) -> np.ndarray:
-    """What trails (size,) become in some ticks if nobody lays any, as in the engine and in pages."""
+    """What trails (size,) become in some ticks if nobody lays any; as in the engine.
+
+    Pages expect the same, to the bit.
+    """
     for _ in range(ticks):
         if pheromone.evaporation == "linear":
             trail = np.maximum(trail - trail.dtype.type(1), 0)

@@ -410,11 +410,13 @@ class Stage {
     const small = camera.scale < 7, [x0, y0] = grid.centre(ant.cell);
     const [x1, y1] = next ? grid.centre(next.cell) : [x0, y0];
     const middle = this.toPage([x0 + share * (x1 - x0), y0 + share * (y1 - y0)]);
-    context.strokeStyle = colours.chosen;
-    context.lineWidth = 2.5;
     context.beginPath();
     context.arc(...middle, Math.max(1.02 * camera.scale, 9), 0, 2 * Math.PI);
-    context.stroke();
+    for (const [colour, width] of [["halo", 5.5], ["chosen", 2.5]]) {
+      context.strokeStyle = colours[colour];
+      context.lineWidth = width;
+      context.stroke();
+    }
     if (small || share > 0) return; // what it sees belongs to where it stands
     const view = this.history.header.view;
     view.forEach((turn, i) => {
@@ -439,19 +441,21 @@ class Stage {
 
   drawPath(context, path) {
     if (!path || path.length < 2) return;
-    const places = path.map((cell) => this.toPage(this.grid.centre(cell)));
-    const width = Math.min(Math.max(0.16 * this.camera.scale, 2), 5);
-    // The older, the fainter.
-    const parts = Math.min(24, places.length - 1);
-    for (let part = 0; part < parts; part++) {
-      const from = Math.floor((part * (places.length - 1)) / parts);
-      const until = Math.floor(((part + 1) * (places.length - 1)) / parts);
-      context.beginPath();
-      for (let k = from; k <= until; k++) context.lineTo(...places[k]);
-      context.globalAlpha = 0.85 * (1 - part / parts) + 0.05;
-      for (const [colour, more] of [["halo", 2.5], ["chosen", 0]]) { // a light edge, for dark trails
-        context.strokeStyle = this.colours[colour];
-        context.lineWidth = width + more;
+    const places = path.map((cell) => this.toPage(this.grid.centre(cell))), [[x0, y0], [x1, y1]] = places;
+    const away = Math.min(0.9 * this.camera.scale / (Math.hypot(x1 - x0, y1 - y0) || 1), 1);
+    places[0] = [x0 + away * (x1 - x0), y0 + away * (y1 - y0)]; // not over the ant itself
+    const width = Math.min(Math.max(0.16 * this.camera.scale, 2), 5), parts = Math.min(24, places.length - 1);
+    context.lineCap = "butt";
+    // A light edge, for dark trails, then the line; the older, the fainter.
+    for (const [colour, more] of [["halo", 2.5], ["chosen", 0]]) {
+      context.strokeStyle = this.colours[colour];
+      context.lineWidth = width + more;
+      for (let part = 0; part < parts; part++) {
+        const from = Math.floor((part * (places.length - 1)) / parts);
+        const until = Math.floor(((part + 1) * (places.length - 1)) / parts);
+        context.beginPath();
+        for (let k = from; k <= until; k++) context.lineTo(...places[k]);
+        context.globalAlpha = 0.85 * (1 - part / parts) + 0.05;
         context.stroke();
       }
     }

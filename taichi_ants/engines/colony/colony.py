@@ -417,7 +417,7 @@ class Colony:
         return "\n    ".join(["Colony(", *lines]) + "\n)"
 
     def _repr_html_(self) -> str | None:
-        """The first world as it is now, as notebooks show it: a page in which one can look around."""
+        """The first world as it is now, as notebooks show it: a page to look around in."""
         # The viewer stands above the engines; it is looked for only where it is needed.
         return import_module("taichi_ants.viewer").notebook(self) if self.episode >= 0 else None
 
