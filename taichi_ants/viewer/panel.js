@@ -28,8 +28,9 @@ function digitsFor(a, b) {
 }
 
 class Panel {
-  constructor(history, choose) {
+  constructor(history, stage, choose) {
     this.history = history;
+    this.stage = stage;
     this.choose = choose; // {follow(number), unfollow(), cell(cell), other(step), aim()}
     byId("about").innerHTML = history.header.about
       .map(([name, value]) => `<dt>${safe(name)}</dt><dd>${safe(value)}</dd>`).join("");
@@ -103,13 +104,12 @@ class Panel {
   }
 
   fillOf(cell, world) {
-    const held = world.ground[cell], { strongest } = this.history.header.trail;
+    const held = world.ground[cell];
     if (held === FOOD) return "var(--food-floor)";
     if (held === QUEEN) return "var(--queen-floor)";
     if (held === OBSTACLE || !this.history.grid.exists(cell)) return "var(--rock)";
     if (world.trail[cell] < 1) return "var(--empty)";
-    const at = 4 * Math.floor(Math.max(1, Math.min(world.trail[cell] / strongest, 1) * 255 + 0.5));
-    return `rgb(${this.ramp[at]} ${this.ramp[at + 1]} ${this.ramp[at + 2]})`;
+    return `rgb(${this.stage.ramp[this.stage.trailColour(world.trail[cell])].join(" ")})`;
   }
 
   barsOf(ant) {
@@ -177,27 +177,23 @@ class Panel {
     return said;
   }
 
-  /* The colours in small, with the ramp of trails as bytes. */
-  showLegend(ramp) {
-    this.ramp = ramp;
+  /* What the colours mean, in small. */
+  showLegend() {
     const cell = (fill, more = "") => `<svg viewBox="-1.1 -1 2.2 2" aria-hidden="true"><path d="${HEXAGON}" fill="${fill}"/>${more}</svg>`;
-    const crumbs = '<g fill="var(--food)"><circle cy="-.26" r=".26"/><circle cx=".29" cy=".22" r=".26"/><circle cx="-.29" cy=".22" r=".26"/></g>';
-    const crown = '<path fill="var(--queen)" d="M-.55-.24-.22-.05 0-.42.22-.05.55-.24.46.42h-.92z"/>';
-    const samples = [1, 64, 128, 192, 255].map((i) => `rgb(${ramp[4 * i]} ${ramp[4 * i + 1]} ${ramp[4 * i + 2]})`);
+    const drawing = (name, outline) => `<path transform="scale(.72)" fill="var(--${name})" d="${outline}"/>`;
+    const samples = [0, 64, 128, 192, 255].map((i) => `rgb(${this.stage.ramp[i].join(" ")})`);
     const bodies = [false, true].map((loaded) => `<svg viewBox="-1 -1 2 2" aria-hidden="true">${antShape(loaded)}</svg>`);
     byId("legend").innerHTML = [
-      `${bodies[0]}ant`, `${bodies[1]}with food`, `${cell("var(--food-floor)", crumbs)}food`,
-      `${cell("var(--queen-floor)", crown)}queen`, `${cell("var(--rock)")}rock`,
+      `${bodies[0]}ant`, `${bodies[1]}with food`, `${cell("var(--food-floor)", drawing("food", CRUMBS))}food`,
+      `${cell("var(--queen-floor)", drawing("queen", CROWN))}queen`, `${cell("var(--rock)")}rock`,
       `<span class="ramp" style="background:linear-gradient(to right,${samples.join()})"></span>trail`,
     ].map((item) => `<li>${item}</li>`).join("");
   }
 }
 
-/* An ant that looks up, as rendering/shapes.py outlines it. */
+/* An ant that looks up, as part of an SVG. */
 function antShape(loaded) {
-  const legs = "M.08-.16.42-.34.56-.66M.08-.06.48-.02.74.2M.08.04.44.26.58.7M.07-.48.17-.68.3-.86";
-  const half = `<path d="${legs}" fill="none" stroke="var(--ant)" stroke-width=".07" stroke-linecap="round"/>`;
-  return `<g fill="var(--ant)">${half}<g transform="scale(-1 1)">${half}</g><ellipse cy="-.37" rx=".19" ry=".17"/>`
-    + `<ellipse cy="-.06" rx=".13" ry=".2"/><ellipse cy=".45" rx=".27" ry=".39"/></g>`
-    + (loaded ? '<circle cy="-.7" r=".25" fill="var(--food)"/>' : "");
+  const half = `<path d="${LIMBS}" fill="none" stroke="var(--ant)" stroke-width=".07" stroke-linecap="round"/>`;
+  const crumb = loaded ? '<circle cy="-.7" r=".25" fill="var(--food)"/>' : "";
+  return `${half}<g transform="scale(-1 1)">${half}</g><path d="${BODY}" fill="var(--ant)"/>${crumb}`;
 }

@@ -1,155 +1,16 @@
-/* The picture of the world: hexagons and ants by WebGL, and over them, on a second canvas, what is
-   said of the followed ant. The outlines are those of rendering/shapes.py, the colours are those of
-   the style sheet. */
-
-const SHAPES = `
-  float disc(vec2 p, float x, float y, float radius) { return length(p - vec2(x, y)) - radius; }
-  float ellipse(vec2 p, float y, float a, float b) {
-    vec2 s = (p - vec2(0.0, y)) / vec2(a, b);
-    float level = length(s);
-    return level * (level - 1.0) / max(length(s / vec2(a, b)), 1e-6);
-  }
-  float segment(vec2 p, vec2 a, vec2 b) {
-    vec2 along = b - a, from = p - a;
-    return length(from - clamp(dot(from, along) / dot(along, along), 0.0, 1.0) * along);
-  }
-  float hexagon(vec2 p) {
-    return max(abs(p.x) * 0.8660254 + abs(p.y) * 0.5, abs(p.y)) - 0.8660254;
-  }
-  float body(vec2 p) {
-    return min(ellipse(p, -0.37, 0.19, 0.17),
-               min(ellipse(p, -0.06, 0.13, 0.20), ellipse(p, 0.45, 0.27, 0.39)));
-  }
-  float limbs(vec2 p) {
-    vec2 q = vec2(abs(p.x), p.y);
-    float front = min(segment(q, vec2(0.08, -0.16), vec2(0.42, -0.34)),
-                      segment(q, vec2(0.42, -0.34), vec2(0.56, -0.66)));
-    float middle = min(segment(q, vec2(0.08, -0.06), vec2(0.48, -0.02)),
-                       segment(q, vec2(0.48, -0.02), vec2(0.74, 0.20)));
-    float hind = min(segment(q, vec2(0.08, 0.04), vec2(0.44, 0.26)),
-                     segment(q, vec2(0.44, 0.26), vec2(0.58, 0.70)));
-    float antenna = min(segment(q, vec2(0.07, -0.48), vec2(0.17, -0.68)),
-                        segment(q, vec2(0.17, -0.68), vec2(0.30, -0.86)));
-    return min(min(front, middle), min(hind, antenna));
-  }
-  float dart(vec2 p) {
-    vec2 q = vec2(abs(p.x), p.y);
-    return max(dot(q, vec2(0.932, -0.362)) - 0.326, dot(q, vec2(-0.336, 0.942)) - 0.551);
-  }
-  float crumbs(vec2 p) {
-    return min(disc(p, 0.0, -0.36, 0.36), disc(vec2(abs(p.x), p.y), 0.40, 0.30, 0.36));
-  }
-  float crown(vec2 p) {
-    vec2 q = vec2(abs(p.x), p.y);
-    float top = min(dot(q, vec2(0.832, -0.555)) - 0.277, dot(q, vec2(-0.476, -0.879)) + 0.135);
-    float side = dot(q, vec2(0.975, 0.222)) - 0.718;
-    return min(max(max(top, side), p.y - 0.60),
-               min(disc(p, 0.0, -0.60, 0.12), disc(q, 0.84, -0.38, 0.12)));
-  }
-  // How much of a pixel a shape covers, from its signed distance in pixels.
-  float cover(float pixels) { return clamp(0.5 - pixels, 0.0, 1.0); }`;
-
-const CELLS = {
-  vertex: `#version 300 es
-  void main() {
-    gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0);
-  }`,
-  // Each pixel finds its cell, and looks it up.
-  fragment: `#version 300 es
-  precision highp float;
-  precision highp int;
-  uniform vec2 centre, size;
-  uniform float scale;         // pixels from the middle of a hexagon to its corners
-  uniform ivec3 grid;          // width, height, and where the origin lies
-  uniform sampler2D cells;     // what a cell holds, and its trail
-  uniform sampler2D ramp;      // the colours of trails
-  uniform vec3 page, empty, rock, food, queen, foodFloor, queenFloor;
-  out vec4 colour;
-  ${SHAPES}
-  void main() {
-    vec2 pixel = vec2(gl_FragCoord.x, size.y - gl_FragCoord.y);
-    vec2 p = (pixel - 0.5 * size) / scale + centre;
-    float r = p.x / 1.5, q = r * 0.5 - p.y * 0.57735027;
-    float Q = floor(q + 0.5), R = floor(r + 0.5), D = floor(q - r + 0.5);
-    float dq = abs(Q - q), dr = abs(R - r), dd = abs(D - (q - r));
-    if (dq > dr && dq > dd) Q = R + D; else if (dr > dd) R = Q - D;
-    ivec2 at = ivec2(int(Q), int(R)) + grid.z;
-    colour = vec4(page, 1.0);
-    if (at.x < 0 || at.y < 0 || at.x >= grid.x || at.y >= grid.y) return;
-    vec2 cell = floor(texelFetch(cells, at, 0).xy * 255.0 + 0.5);
-    if (cell.x == 0.0) return;
-    vec2 d = p - vec2(1.5 * R, 1.7320508 * (0.5 * R - Q));
-    bool small = scale < 6.0;
-    vec3 fill = empty;
-    if (cell.x == 2.0) fill = rock;
-    else if (cell.x == 3.0) fill = small ? food : foodFloor;
-    else if (cell.x == 4.0) fill = small ? queen : queenFloor;
-    else if (cell.y > 0.0) fill = texelFetch(ramp, ivec2(int(cell.y), 0), 0).rgb;
-    if (!small && cell.x == 3.0) {
-      fill = mix(fill, food, cover(crumbs(d / 0.72) * 0.72 * scale));
-    } else if (!small && cell.x == 4.0) {
-      fill = mix(fill, queen, cover(crown(d / 0.72) * 0.72 * scale));
-    }
-    // The lines between cells fade away where these are small, and do not grow for ever.
-    float line = clamp(0.09 * scale - 0.25, 0.0, 3.0);
-    float inside = line > 0.0 ? cover(hexagon(d) * scale + 0.5 * line) : 1.0;
-    colour = vec4(mix(page, fill, inside), 1.0);
-  }`,
-};
-
-const ANTS = {
-  vertex: `#version 300 es
-  precision highp float;
-  layout(location = 0) in vec3 from;  // where an ant is, and its heading
-  layout(location = 1) in vec4 to;    // where it is next, and whether it carries food now
-  uniform vec2 centre, size;
-  uniform float scale, radius, share; // the share of a tick that has passed
-  out vec2 place;
-  flat out float load;
-  void main() {
-    vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;
-    vec2 middle = (mix(from.xy, to.xy, share) - centre) * scale;
-    float angle = mix(from.z, to.z, share) * 1.04719755;
-    place = corner * 1.1;
-    load = to.w;
-    vec2 turned = vec2(place.x * cos(angle) - place.y * sin(angle),
-                       place.x * sin(angle) + place.y * cos(angle));
-    vec2 at = (middle + turned * radius) / size * 2.0;
-    gl_Position = vec4(at.x, -at.y, 0.0, 1.0);
-  }`,
-  fragment: `#version 300 es
-  precision highp float;
-  in vec2 place;
-  flat in float load;
-  uniform float radius;
-  uniform int detail;          // 0 a dot, 1 a dart, 2 an ant
-  uniform vec3 ant, halo, food, loadedDot;
-  uniform float opacity;
-  out vec4 colour;
-  ${SHAPES}
-  void main() {
-    float crumb = disc(place, 0.0, -0.70, detail == 2 ? 0.25 : 0.34) * radius;
-    float shape = detail == 2 ? min(body(place), limbs(place) - 0.035)
-                : detail == 1 ? dart(place) : length(place) - 0.9;
-    shape *= radius;
-    vec3 fill = detail == 0 && load > 0.5 ? loadedDot : ant;
-    float covered = cover(shape), around = 0.0;
-    // A line of the colour of the page sets ants apart from a dark trail.
-    if (detail > 0) around = 0.75 * cover(shape - min(1.6, 0.08 * radius));
-    if (detail > 0 && load > 0.5) {
-      around = max(around, cover(crumb - min(1.6, 0.08 * radius)));
-      float food_here = cover(crumb);
-      fill = mix(fill, food, food_here);
-      covered = max(covered, food_here);
-    }
-    float all = max(covered, around);
-    if (all < 0.004) discard;
-    colour = vec4(mix(halo, fill, covered / all), all * opacity);
-  }`,
-};
+/* The picture of the world. The cells are pixels: which cell a pixel belongs to is worked out once for
+   a view, so that another moment only takes new colours. Ants, and what is said of the followed one,
+   are drawn on a second canvas above. The outlines are those of rendering/shapes.py, the colours
+   are those of the style sheet. */
 
 const DOTS_BELOW = 2.5, DARTS_BELOW = 11; // pixels, as in rendering/marks.py
-const FLOATS_OF_ANT = 7;
+const DRAWINGS_FROM = 6; // smaller cells are wholly coloured by food and queen
+const MOST_PIXELS = 3e6; // of the cells; sharper screens get coarser ones
+const INSIDE = 7; // how much of a pixel its cell covers, in sevenths; the rest is a line
+const COLOURS = [
+  "page", "empty", "rock", "food", "queen", "food-floor", "queen-floor", "ant", "halo", "loaded-dot",
+  "ink", "chosen", "mark",
+];
 
 class Stage {
   constructor(canvas, overlay, history) {
@@ -159,33 +20,15 @@ class Stage {
     this.grid = history.grid;
     this.camera = { x: 0, y: 0, scale: 10 }; // the scale is in pixels of the page
     this.fitted = true; // until somebody pans or zooms
-    this.shownMoment = -1;
+    this.shown = ""; // the moment and the view whose cells are drawn
+    this.laidOut = "";
+    this.foods = [];
     this.queens = [];
-    this.gl = canvas.getContext("webgl2", { antialias: false, alpha: false, powerPreference: "low-power" });
-    if (this.gl) this.prepare();
-  }
-
-  prepare() {
-    const { gl, grid } = this;
-    this.programs = { cells: program(gl, CELLS), ants: program(gl, ANTS) };
-    this.cellTexture = texture(gl, grid.width, grid.height);
-    this.rampTexture = texture(gl, 256, 1);
-    this.cellBytes = new Uint8Array(grid.size * 4);
-    this.exists = new Uint8Array(grid.size);
-    for (let cell = 0; cell < grid.size; cell++) this.exists[cell] = grid.exists(cell) ? 1 : 0;
-    this.nothing = gl.createVertexArray();
-    this.antArray = gl.createVertexArray();
-    this.antBuffer = gl.createBuffer();
-    this.antNumbers = new Float32Array(0);
-    gl.bindVertexArray(this.antArray);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.antBuffer);
-    for (const [place, length, offset] of [[0, 3, 0], [1, 4, 12]]) {
-      gl.enableVertexAttribArray(place);
-      gl.vertexAttribPointer(place, length, gl.FLOAT, false, 4 * FLOATS_OF_ANT, offset);
-      gl.vertexAttribDivisor(place, 1);
-    }
-    gl.enable(gl.BLEND);
-    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+    this.exists = Uint8Array.from({ length: this.grid.size }, (_, cell) => (this.grid.exists(cell) ? 1 : 0));
+    this.fills = new Uint32Array(this.grid.size);
+    // It is written by this script alone, never by a graphics processor.
+    this.context = canvas.getContext("2d", { alpha: false, willReadFrequently: true });
+    this.above = overlay.getContext("2d");
     this.readColours();
   }
 
@@ -193,35 +36,36 @@ class Stage {
   readColours() {
     const style = getComputedStyle(document.documentElement);
     const read = (name) => style.getPropertyValue(`--${name}`).trim();
-    this.colours = {};
-    for (const name of ["page", "empty", "rock", "food", "queen", "food-floor", "queen-floor", "ant",
-      "halo", "loaded-dot", "ink", "chosen", "mark"]) {
-      this.colours[name] = read(name);
-    }
-    const samples = read("trail").split(/\s+/).map(rgb), bytes = new Uint8Array(256 * 4);
-    for (let i = 0; i < 256; i++) {
-      const place = (i / 255) * (samples.length - 1), k = Math.min(Math.floor(place), samples.length - 2);
-      for (let c = 0; c < 3; c++) {
-        bytes[4 * i + c] = 255 * (samples[k][c] + (place - k) * (samples[k + 1][c] - samples[k][c])) + 0.5;
-      }
-    }
-    this.ramp = bytes;
-    if (!this.gl) return;
-    const { gl } = this;
-    gl.bindTexture(gl.TEXTURE_2D, this.rampTexture);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, 256, 1, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
+    this.colours = Object.fromEntries(COLOURS.map((name) => [name, read(name)]));
+    this.words = Object.fromEntries(COLOURS.map((name) => [name, word(...bytesOf(this.colours[name]))]));
+    // The trail from just above 0 to the strongest that is shown.
+    const samples = read("trail").split(/\s+/).map(bytesOf), last = samples.length - 1;
+    this.ramp = Array.from({ length: 256 }, (_, i) => {
+      const place = (i / 255) * last, k = Math.min(Math.floor(place), last - 1);
+      return [0, 1, 2].map((c) => Math.round(samples[k][c] + (place - k) * (samples[k + 1][c] - samples[k][c])));
+    });
+    this.rampWords = Uint32Array.from(this.ramp, (colour) => word(...colour));
+    this.sprites = new Map();
+    this.shown = this.laidOut = "";
+  }
+
+  /* The colour of a trail, by its share of the strongest one. */
+  trailColour(level) {
+    return Math.round(Math.min(level / this.history.header.trail.strongest, 1) * 255);
   }
 
   resize() {
-    const ratio = Math.min(window.devicePixelRatio || 1, 2);
-    const width = Math.max(1, this.canvas.clientWidth), height = Math.max(1, this.canvas.clientHeight);
-    this.ratio = ratio;
-    this.width = width;
-    this.height = height;
-    for (const one of [this.canvas, this.overlay]) {
-      one.width = Math.round(width * ratio);
-      one.height = Math.round(height * ratio);
-    }
+    this.width = Math.max(1, this.canvas.clientWidth);
+    this.height = Math.max(1, this.canvas.clientHeight);
+    const ratio = Math.min(window.devicePixelRatio || 1, 3);
+    this.ratio = Math.min(ratio, Math.sqrt(MOST_PIXELS / (this.width * this.height)));
+    this.sharpness = Math.min(ratio, 2); // of what is drawn above the cells
+    this.canvas.width = Math.round(this.width * this.ratio);
+    this.canvas.height = Math.round(this.height * this.ratio);
+    this.overlay.width = Math.round(this.width * this.sharpness);
+    this.overlay.height = Math.round(this.height * this.sharpness);
+    this.sprites.clear();
+    this.laidOut = "";
     if (this.fitted) this.fit();
   }
 
@@ -273,169 +117,250 @@ class Stage {
     return this.grid.at((x - this.width / 2) / camera.scale + camera.x, (y - this.height / 2) / camera.scale + camera.y);
   }
 
-  /* Draw a moment, or what lies a share of the way to the next one; marks are for the overlay. */
+  /* Draw a moment, with ants a share of the way to the next one; marks are what is said of one. */
   draw(moment, share, marks) {
-    if (this.gl) {
-      if (moment !== this.shownMoment) this.load(moment);
-      this.drawCells();
-      this.drawAnts(share);
+    const { camera, above, sharpness } = this, view = `${camera.x} ${camera.y} ${camera.scale}`;
+    if (this.shown !== `${moment} ${view}`) {
+      this.layOut(view);
+      this.drawCells(moment);
+      this.shown = `${moment} ${view}`;
     }
-    this.drawMarks(moment, share, marks);
+    above.setTransform(sharpness, 0, 0, sharpness, 0, 0);
+    above.clearRect(0, 0, this.width, this.height);
+    this.drawThings();
+    if (marks.ant) this.drawPath(above, marks.path);
+    this.drawAnts(moment, share);
+    this.drawMarks(share, marks);
   }
 
-  /* Hand the cells and ants of a moment to the graphics processor. */
-  load(moment) {
-    const { gl, grid, history, cellBytes: bytes } = this;
-    const { ground, trail } = history.worldAt(moment), strongest = history.header.trail.strongest;
+  /* Find the cell of each pixel of a view, and how much of the pixel it covers. */
+  layOut(view) {
+    if (this.laidOut === view) return;
+    this.laidOut = view;
+    const { grid, camera, ratio, exists } = this, { width, height } = this.canvas, z = grid.ranges[2];
+    if (this.image?.width !== width || this.image?.height !== height) {
+      this.image = this.context.createImageData(width, height);
+      this.pixels = new Uint32Array(this.image.data.buffer);
+      this.cells = new Int32Array(width * height); // 8 * cell + cover, -1 outside of the world
+    }
+    this.pixels.fill(this.words.page);
+    const { cells } = this, scale = camera.scale * ratio, root = Math.sqrt(3);
+    // The lines between cells fade away where these are small, and do not grow for ever.
+    const line = Math.min(Math.max(0.09 * camera.scale - 0.25, 0), 3) * ratio;
+    for (let j = 0, i = 0; j < height; j++) {
+      const y = (j + 0.5 - height / 2) / scale + camera.y, up = y / root;
+      for (let column = 0; column < width; column++, i++) {
+        const x = (column + 0.5 - width / 2) / scale + camera.x, r = x / 1.5, q = r / 2 - up;
+        let a = Math.floor(q + 0.5), b = Math.floor(r + 0.5);
+        const c = Math.floor(q - r + 0.5), da = Math.abs(a - q), db = Math.abs(b - r), dc = Math.abs(c - q + r);
+        if (da > db && da > dc) a = b + c;
+        else if (db > dc) b = a - c;
+        const row = b + z, place = a + z;
+        cells[i] = -1;
+        if (row < 0 || place < 0 || row >= grid.height || place >= grid.width) continue;
+        const cell = row * grid.width + place;
+        if (!exists[cell]) continue;
+        let covered = INSIDE;
+        if (line > 0) {
+          const dx = Math.abs(x - 1.5 * b), dy = Math.abs(y - root * (0.5 * b - a));
+          const away = (Math.max(dx * 0.8660254 + dy * 0.5, dy) - 0.8660254) * scale + 0.5 * line;
+          covered = Math.round(INSIDE * Math.min(Math.max(0.5 - away, 0), 1));
+        }
+        cells[i] = 8 * cell + covered;
+      }
+    }
+  }
+
+  drawCells(moment) {
+    const { grid, history, fills, exists, words, rampWords, cells, pixels } = this;
+    const { ground, trail } = history.worldAt(moment), small = this.camera.scale < DRAWINGS_FROM;
+    const held = { [EMPTY]: words.empty, [OBSTACLE]: words.rock, [FOOD]: words[small ? "food" : "food-floor"],
+      [QUEEN]: words[small ? "queen" : "queen-floor"] };
+    const strongest = history.header.trail.strongest;
+    this.foods = [];
     this.queens = [];
     for (let cell = 0; cell < grid.size; cell++) {
-      if (!this.exists[cell]) continue;
-      const held = ground[cell];
-      if (held === QUEEN) this.queens.push(cell);
-      bytes[4 * cell] = held === EMPTY ? 1 : held === OBSTACLE ? 2 : held === FOOD ? 3 : 4;
-      bytes[4 * cell + 1] = trail[cell] >= 1 ? Math.max(1, Math.min(trail[cell] / strongest, 1) * 255 + 0.5) : 0;
+      if (!exists[cell]) continue;
+      const holds = ground[cell];
+      if (holds === FOOD) this.foods.push(cell);
+      else if (holds === QUEEN) this.queens.push(cell);
+      const marked = holds === EMPTY && trail[cell] >= 1;
+      fills[cell] = marked ? rampWords[Math.round(Math.min(trail[cell] / strongest, 1) * 255)] : held[holds];
     }
-    gl.bindTexture(gl.TEXTURE_2D, this.cellTexture);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, grid.width, grid.height, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
-    this.loadAnts(moment);
-    this.shownMoment = moment;
-  }
-
-  loadAnts(moment) {
-    const { history, grid, gl } = this, frame = history.frames[moment], next = history.frames[moment + 1];
-    const n = frame.cells.length, moves = next && next.passed === 1;
-    const same = moves && next.numbers === frame.numbers;
-    if (this.antNumbers.length < n * FLOATS_OF_ANT) this.antNumbers = new Float32Array(n * FLOATS_OF_ANT);
-    const numbers = this.antNumbers;
-    const z = grid.ranges[2], width = grid.width, height = Math.sqrt(3);
-    for (let i = 0; i < n; i++) {
-      const cell = frame.cells[i], heading = frame.poses[i] & 7;
-      const k = same ? i : moves ? history.place(moment + 1, frame.numbers[i]) : -1;
-      const to = k >= 0 ? next.cells[k] : cell, later = k >= 0 ? next.poses[k] & 7 : heading;
-      const r = Math.floor(cell / width) - z, q = (cell % width) - z;
-      const r2 = Math.floor(to / width) - z, q2 = (to % width) - z;
-      // The shorter way round.
-      const turn = ((later - heading + 9) % 6) - 3;
-      const at = i * FLOATS_OF_ANT;
-      numbers[at] = 1.5 * r;
-      numbers[at + 1] = height * (0.5 * r - q);
-      numbers[at + 2] = heading;
-      numbers[at + 3] = 1.5 * r2;
-      numbers[at + 4] = height * (0.5 * r2 - q2);
-      numbers[at + 5] = heading + turn;
-      numbers[at + 6] = frame.poses[i] >> 3;
-    }
-    this.nAnts = n;
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.antBuffer);
-    gl.bufferData(gl.ARRAY_BUFFER, numbers.subarray(0, n * FLOATS_OF_ANT), gl.DYNAMIC_DRAW);
-  }
-
-  use(name, extra) {
-    const { gl, camera, ratio, colours } = this, { handle, uniforms } = this.programs[name];
-    gl.useProgram(handle);
-    gl.uniform2f(uniforms.centre, camera.x, camera.y);
-    gl.uniform2f(uniforms.size, this.canvas.width, this.canvas.height);
-    gl.uniform1f(uniforms.scale, camera.scale * ratio);
-    for (const [uniform, colour] of Object.entries(extra)) gl.uniform3fv(uniforms[uniform], rgb(colours[colour]));
-    return uniforms;
-  }
-
-  drawCells() {
-    const { gl, grid } = this;
-    gl.viewport(0, 0, this.canvas.width, this.canvas.height);
-    gl.disable(gl.BLEND);
-    gl.bindVertexArray(this.nothing);
-    const uniforms = this.use("cells", {
-      page: "page", empty: "empty", rock: "rock", food: "food", queen: "queen",
-      foodFloor: "food-floor", queenFloor: "queen-floor",
-    });
-    gl.uniform3i(uniforms.grid, grid.width, grid.height, grid.ranges[2]);
-    gl.uniform1i(uniforms.cells, 0);
-    gl.uniform1i(uniforms.ramp, 1);
-    gl.activeTexture(gl.TEXTURE1);
-    gl.bindTexture(gl.TEXTURE_2D, this.rampTexture);
-    gl.activeTexture(gl.TEXTURE0);
-    gl.bindTexture(gl.TEXTURE_2D, this.cellTexture);
-    gl.drawArrays(gl.TRIANGLES, 0, 3);
-  }
-
-  drawAnts(share) {
-    const { gl, ratio } = this, hexagon = this.camera.scale * ratio;
-    gl.enable(gl.BLEND);
-    gl.bindVertexArray(this.antArray);
-    const uniforms = this.use("ants", { ant: "ant", halo: "halo", food: "food", loadedDot: "loaded-dot" });
-    const detail = hexagon < DOTS_BELOW ? 0 : hexagon < DARTS_BELOW ? 1 : 2;
-    const dot = 1.3 * ratio;
-    // Dots that would hide the world and each other become a shade.
-    const covered = (this.nAnts * Math.PI * dot ** 2) / (this.grid.size * 2.6 * hexagon ** 2);
-    gl.uniform1f(uniforms.radius, detail === 0 ? Math.max(0.83 * hexagon, dot) : 0.83 * hexagon);
-    gl.uniform1f(uniforms.opacity, detail === 0 ? Math.min(1, 0.5 * Math.max(covered, 1e-9) ** -0.6) : 1);
-    gl.uniform1f(uniforms.share, share);
-    gl.uniform1i(uniforms.detail, detail);
-    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.nAnts);
-  }
-
-  /* The path, the view and the ring of the followed ant; the chosen cell. */
-  drawMarks(moment, share, { ant, next, path, letters, cell, cursor }) {
-    const context = this.overlay.getContext("2d"), { grid, colours, camera, ratio } = this;
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    context.clearRect(0, 0, this.width, this.height);
-    const hexagon = (which, radius) => {
-      const [x, y] = this.toPage(grid.centre(which));
-      context.beginPath();
-      for (let k = 0; k < 6; k++) {
-        context.lineTo(x + radius * Math.cos((k * Math.PI) / 3), y + radius * Math.sin((k * Math.PI) / 3));
+    const page = words.page, even = page & 0xff00ff, odd = (page >>> 8) & 0xff00ff;
+    for (let i = 0; i < cells.length; i++) {
+      const at = cells[i];
+      if (at < 0) continue;
+      const fill = fills[at >> 3], covered = at & 7;
+      if (covered === INSIDE) pixels[i] = fill;
+      else {
+        // Two of the four bytes at a time, in eighths.
+        const k = covered + (covered >> 2), rest = 8 - k;
+        pixels[i] = ((((fill & 0xff00ff) * k + even * rest) >>> 3) & 0xff00ff)
+          | ((((((fill >>> 8) & 0xff00ff) * k + odd * rest) >>> 3) & 0xff00ff) << 8);
       }
-      context.closePath();
-    };
-    context.lineJoin = context.lineCap = "round";
-    // Where cells are small, a ring shows where the queen is.
-    for (const queen of camera.scale < 7 ? this.queens : []) {
-      hexagon(queen, 9);
-      context.strokeStyle = colours.halo;
-      context.lineWidth = 5;
-      context.stroke();
-      context.strokeStyle = colours.queen;
-      context.lineWidth = 2.5;
-      context.stroke();
     }
+    this.context.putImageData(this.image, 0, 0);
+  }
+
+  /* A drawing of a radius in pixels, made once; the same as a picture to copy. */
+  sprite(name, radius, paint) {
+    const key = `${name} ${radius.toFixed(2)}`;
+    if (!this.sprites.has(key)) {
+      if (this.sprites.size > 60) this.sprites.clear();
+      const canvas = document.createElement("canvas"), side = 2 * Math.ceil(1.15 * radius * this.sharpness + 2);
+      canvas.width = canvas.height = side;
+      const context = canvas.getContext("2d");
+      context.translate(side / 2, side / 2);
+      context.scale(radius * this.sharpness, radius * this.sharpness);
+      context.lineJoin = context.lineCap = "round";
+      paint(context);
+      this.sprites.set(key, { canvas, half: side / 2 / this.sharpness });
+    }
+    return this.sprites.get(key);
+  }
+
+  /* Whether a place on the page is in sight. */
+  sees([x, y]) {
+    const { scale } = this.camera;
+    return x > -scale && y > -scale && x < this.width + scale && y < this.height + scale;
+  }
+
+  /* Food and queens. */
+  drawThings() {
+    const { above, camera, colours, grid } = this;
+    if (camera.scale >= DRAWINGS_FROM) {
+      for (const [name, cells, outline] of [["food", this.foods, CRUMBS], ["queen", this.queens, CROWN]]) {
+        const { canvas, half } = this.sprite(name, 0.72 * camera.scale, (context) => {
+          context.fillStyle = colours[name];
+          context.fill(new Path2D(outline));
+        });
+        for (const cell of cells) {
+          const place = this.toPage(grid.centre(cell));
+          if (this.sees(place)) above.drawImage(canvas, place[0] - half, place[1] - half, 2 * half, 2 * half);
+        }
+      }
+      return;
+    }
+    // Where cells are small, a ring shows where the queen is.
+    for (const queen of this.queens) {
+      this.outline(queen, 9);
+      this.stroke("halo", 5);
+      this.stroke("queen", 2.5);
+    }
+  }
+
+  drawAnts(moment, share) {
+    const { history, grid, above, sharpness, camera } = this, frame = history.frames[moment];
+    const next = history.frames[moment + 1], moves = share > 0 && next && next.passed === 1;
+    const same = moves && next.numbers === frame.numbers, z = grid.ranges[2], root = Math.sqrt(3);
+    const dots = camera.scale < DOTS_BELOW, looks = dots ? [] : [0, 1].map((loaded) => this.antSprite(loaded));
+    const squares = [new Path2D(), new Path2D()], side = Math.max(1.5 * camera.scale, 2 * DOT);
+    for (let i = 0; i < frame.cells.length; i++) {
+      const cell = frame.cells[i];
+      let heading = frame.poses[i] & 7, r = Math.floor(cell / grid.width) - z, q = (cell % grid.width) - z;
+      const k = same ? i : moves ? history.place(moment + 1, frame.numbers[i]) : -1;
+      if (k >= 0) {
+        const to = next.cells[k], turn = (((next.poses[k] & 7) - heading + 9) % 6) - 3; // the shorter way
+        heading += share * turn;
+        r += share * (Math.floor(to / grid.width) - z - r);
+        q += share * ((to % grid.width) - z - q);
+      }
+      const x = (1.5 * r - camera.x) * camera.scale + this.width / 2;
+      const y = (root * (0.5 * r - q) - camera.y) * camera.scale + this.height / 2;
+      if (!this.sees([x, y])) continue;
+      if (dots) {
+        squares[frame.poses[i] >> 3].rect(x - side / 2, y - side / 2, side, side);
+        continue;
+      }
+      const { canvas, half } = looks[frame.poses[i] >> 3], angle = (heading * Math.PI) / 3;
+      const cos = sharpness * Math.cos(angle), sin = sharpness * Math.sin(angle);
+      above.setTransform(cos, sin, -sin, cos, x * sharpness, y * sharpness);
+      above.drawImage(canvas, -half, -half, 2 * half, 2 * half);
+    }
+    above.setTransform(sharpness, 0, 0, sharpness, 0, 0);
+    if (!dots) return;
+    // Dots that would hide the world and each other become a shade.
+    const covered = (frame.cells.length * side ** 2) / (grid.size * 2.6 * camera.scale ** 2);
+    above.globalAlpha = Math.min(1, 0.6 * Math.max(covered, 1e-9) ** -0.5);
+    ["ant", "loaded-dot"].forEach((colour, loaded) => {
+      above.fillStyle = this.colours[colour];
+      above.fill(squares[loaded]);
+    });
+    above.globalAlpha = 1;
+  }
+
+  antSprite(loaded) {
+    const { colours, camera } = this, { scale } = camera;
+    // A line of the colour of the page sets ants apart from a dark trail.
+    const edge = Math.min(0.16, 3.2 / scale), large = scale >= DARTS_BELOW;
+    const crumb = circle(0, -0.7, large ? 0.25 : 0.34), body = new Path2D(large ? BODY : DART);
+    return this.sprite(`ant ${loaded}`, 0.83 * scale, (context) => {
+      const legs = new Path2D(LIMBS), sides = large ? [1, -1] : [];
+      for (const [colour, food, more] of [[colours.halo, colours.halo, edge], [colours.ant, colours.food, 0]]) {
+        context.fillStyle = context.strokeStyle = colour;
+        for (const side of sides) {
+          context.save();
+          context.scale(side, 1);
+          context.lineWidth = 0.07 + more;
+          context.stroke(legs);
+          context.restore();
+        }
+        context.lineWidth = more;
+        if (more) context.stroke(body);
+        context.fill(body);
+        if (!loaded) continue;
+        context.fillStyle = context.strokeStyle = food;
+        if (more) context.stroke(crumb);
+        context.fill(crumb);
+      }
+    });
+  }
+
+  /* Begin the outline of a cell, with a radius in pixels. */
+  outline(cell, radius) {
+    const [x, y] = this.toPage(this.grid.centre(cell)), { above } = this;
+    above.beginPath();
+    for (let k = 0; k < 6; k++) above.lineTo(x + radius * Math.cos((k * Math.PI) / 3), y + radius * Math.sin((k * Math.PI) / 3));
+    above.closePath();
+  }
+
+  stroke(colour, width) {
+    this.above.strokeStyle = this.colours[colour];
+    this.above.lineWidth = width;
+    this.above.stroke();
+  }
+
+  /* The ring and the view of the followed ant; the chosen cell. */
+  drawMarks(share, { ant, next, letters, cell, cursor }) {
+    const { above, grid, colours, camera } = this;
+    above.lineJoin = "round";
     if (cell >= 0) {
-      hexagon(cell, Math.max(camera.scale, 5));
-      context.strokeStyle = colours.mark;
-      context.lineWidth = cursor ? 3 : 2;
-      context.stroke();
+      this.outline(cell, Math.max(camera.scale, 5));
+      this.stroke("halo", cursor ? 6 : 5);
+      this.stroke("mark", cursor ? 3 : 2);
     }
     if (!ant) return;
-    this.drawPath(context, path);
-    const small = camera.scale < 7, [x0, y0] = grid.centre(ant.cell);
-    const [x1, y1] = next ? grid.centre(next.cell) : [x0, y0];
-    const middle = this.toPage([x0 + share * (x1 - x0), y0 + share * (y1 - y0)]);
-    context.beginPath();
-    context.arc(...middle, Math.max(1.02 * camera.scale, 9), 0, 2 * Math.PI);
-    for (const [colour, width] of [["halo", 5.5], ["chosen", 2.5]]) {
-      context.strokeStyle = colours[colour];
-      context.lineWidth = width;
-      context.stroke();
-    }
-    if (small || share > 0) return; // what it sees belongs to where it stands
-    const view = this.history.header.view;
-    view.forEach((turn, i) => {
+    const [x0, y0] = grid.centre(ant.cell), [x1, y1] = next ? grid.centre(next.cell) : [x0, y0];
+    above.beginPath();
+    above.arc(...this.toPage([x0 + share * (x1 - x0), y0 + share * (y1 - y0)]), Math.max(1.02 * camera.scale, 9), 0, 2 * Math.PI);
+    this.stroke("halo", 5.5);
+    this.stroke("chosen", 2.5);
+    if (camera.scale < 7 || share > 0) return; // what it sees belongs to where it stands
+    this.history.header.view.forEach((turn, i) => {
       const seen = ant.cell + grid.offsets[(ant.heading + turn + 6) % 6];
-      hexagon(seen, 0.93 * camera.scale);
-      context.strokeStyle = colours.ink;
-      context.lineWidth = Math.min(2, camera.scale / 8);
-      context.stroke();
-      if (camera.scale >= 10 && letters[i]) {
-        const [x, y] = this.toPage(grid.centre(seen));
-        context.font = `600 ${Math.min(0.62 * camera.scale, 30)}px ${getComputedStyle(document.body).fontFamily}`;
-        context.textAlign = "center";
-        context.textBaseline = "middle";
-        context.lineWidth = 4;
-        context.strokeStyle = colours.halo;
-        context.strokeText(letters[i], x, y);
-        context.fillStyle = colours.ink;
-        context.fillText(letters[i], x, y);
-      }
+      this.outline(seen, 0.93 * camera.scale);
+      this.stroke("ink", Math.min(2, camera.scale / 8));
+      if (camera.scale < 10 || !letters[i]) return;
+      const place = this.toPage(grid.centre(seen));
+      above.font = `600 ${Math.min(0.62 * camera.scale, 30)}px ${getComputedStyle(document.body).fontFamily}`;
+      above.textAlign = "center";
+      above.textBaseline = "middle";
+      above.lineWidth = 4;
+      above.strokeStyle = colours.halo;
+      above.strokeText(letters[i], ...place);
+      above.fillStyle = colours.ink;
+      above.fillText(letters[i], ...place);
     });
   }
 
@@ -463,34 +388,29 @@ class Stage {
   }
 }
 
-function rgb(hex) {
-  const word = parseInt(hex.replace("#", ""), 16);
-  return [(word >> 16) / 255, ((word >> 8) & 255) / 255, (word & 255) / 255];
+// The outlines within the unit circle; ants look up. Legs and antennae are those of the right side.
+const DOT = 1.3; // pixels, the radius of an ant in cells that are too small for it
+const LIMBS = "M.08-.16.42-.34.56-.66M.08-.06.48-.02.74.2M.08.04.44.26.58.7M.07-.48.17-.68.3-.86";
+const oval = (y, a, b) => `M${-a} ${y}a${a} ${b} 0 1 0 ${2 * a} 0a${a} ${b} 0 1 0 ${-2 * a} 0z`;
+const BODY = oval(-0.37, 0.19, 0.17) + oval(-0.06, 0.13, 0.2) + oval(0.45, 0.27, 0.39);
+const DART = "M0-.9.67.824 0 .585-.67.824z";
+const disc = (x, y, radius) => `M${x - radius} ${y}a${radius} ${radius} 0 1 0 ${2 * radius} 0a${radius} ${radius} 0 1 0 ${-2 * radius} 0z`;
+const CRUMBS = disc(0, -0.36, 0.36) + disc(0.4, 0.3, 0.36) + disc(-0.4, 0.3, 0.36);
+const CROWN = "M-.8-.28-.32-.02 0-.5.32-.02.8-.28.6.6h-1.2z" + disc(0, -0.6, 0.12) + disc(0.84, -0.38, 0.12) + disc(-0.84, -0.38, 0.12);
+
+function circle(x, y, radius) {
+  const path = new Path2D();
+  path.arc(x, y, radius, 0, 2 * Math.PI);
+  return path;
 }
 
-function texture(gl, width, height) {
-  const made = gl.createTexture();
-  gl.bindTexture(gl.TEXTURE_2D, made);
-  gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA8, width, height);
-  for (const name of ["TEXTURE_MIN_FILTER", "TEXTURE_MAG_FILTER"]) gl.texParameteri(gl.TEXTURE_2D, gl[name], gl.NEAREST);
-  return made;
+/* Red, green and blue, 0 to 255, of "#rrggbb". */
+function bytesOf(hex) {
+  const number = parseInt(hex.slice(1), 16);
+  return [number >> 16, (number >> 8) & 255, number & 255];
 }
 
-function program(gl, { vertex, fragment }) {
-  const handle = gl.createProgram();
-  for (const [kind, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
-    const shader = gl.createShader(kind);
-    gl.shaderSource(shader, source.trim());
-    gl.compileShader(shader);
-    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
-    gl.attachShader(handle, shader);
-  }
-  gl.linkProgram(handle);
-  if (!gl.getProgramParameter(handle, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(handle));
-  const uniforms = {};
-  for (let i = 0; i < gl.getProgramParameter(handle, gl.ACTIVE_UNIFORMS); i++) {
-    const { name } = gl.getActiveUniform(handle, i);
-    uniforms[name] = gl.getUniformLocation(handle, name);
-  }
-  return { handle, uniforms };
+/* A colour as it lies in the pixels of an image. */
+function word(red, green, blue) {
+  return ((255 << 24) | (blue << 16) | (green << 8) | red) >>> 0;
 }

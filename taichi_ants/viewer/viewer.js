@@ -38,7 +38,6 @@ class Viewer {
 
   receive(bytes) {
     this.history.add(bytes);
-    if (this.player && this.player.moment >= this.history.length - 3) this.stage.shownMoment = -1; // its next step is known now
     this.dirty = true;
   }
 
@@ -50,8 +49,7 @@ class Viewer {
     document.body.classList.toggle("single", this.history.length === 1 && !this.source.live);
     this.player = new Player(this.history, () => (this.dirty = true));
     this.stage = new Stage(byId("world"), byId("marks"), this.history);
-    byId("no-graphics").hidden = Boolean(this.stage.gl);
-    this.panel = new Panel(this.history, {
+    this.panel = new Panel(this.history, this.stage, {
       follow: (number) => this.follow(number), unfollow: () => this.follow(-1),
       cell: (cell) => this.chooseCell(cell), other: (step) => this.followOther(step), aim: () => this.toggleAim(),
     });
@@ -186,7 +184,7 @@ class Viewer {
     document.documentElement.dataset.theme = dark ? "dark" : "light";
     byId("theme").setAttribute("aria-label", `Theme: ${theme || "as the system's"}`);
     this.stage.readColours();
-    this.panel.showLegend(this.stage.ramp);
+    this.panel.showLegend();
     this.dirty = true;
   }
 
@@ -215,11 +213,6 @@ class Viewer {
     byId("help-button").addEventListener("click", () => help.showModal());
     help.addEventListener("click", (event) => event.target === help && help.close());
     document.addEventListener("keydown", (event) => this.key(event));
-    world.addEventListener("webglcontextlost", (event) => event.preventDefault());
-    world.addEventListener("webglcontextrestored", change(() => {
-      stage.prepare();
-      stage.shownMoment = -1;
-    }));
     this.listenToPointers(world);
   }
 
