@@ -54,10 +54,12 @@ class Stage {
     return Math.round(Math.min(level / this.history.header.trail.strongest, 1) * 255);
   }
 
+  /* Take the size from the page; whether it has changed. */
   resize() {
-    this.width = Math.max(1, this.canvas.clientWidth);
-    this.height = Math.max(1, this.canvas.clientHeight);
-    const ratio = Math.min(window.devicePixelRatio || 1, 3);
+    const width = Math.max(1, this.canvas.clientWidth), height = Math.max(1, this.canvas.clientHeight);
+    const ratio = Math.min(window.devicePixelRatio || 1, 3), size = `${width} ${height} ${ratio}`;
+    if (size === this.size) return false;
+    Object.assign(this, { width, height, size });
     this.ratio = Math.min(ratio, Math.sqrt(MOST_PIXELS / (this.width * this.height)));
     this.sharpness = Math.min(ratio, 2); // of what is drawn above the cells
     this.canvas.width = Math.round(this.width * this.ratio);
@@ -65,8 +67,9 @@ class Stage {
     this.overlay.width = Math.round(this.width * this.sharpness);
     this.overlay.height = Math.round(this.height * this.sharpness);
     this.sprites.clear();
-    this.laidOut = "";
+    this.shown = this.laidOut = "";
     if (this.fitted) this.fit();
+    return true;
   }
 
   /* Show the whole world, as large as possible. */
@@ -176,7 +179,6 @@ class Stage {
     const { ground, trail } = history.worldAt(moment), small = this.camera.scale < DRAWINGS_FROM;
     const held = { [EMPTY]: words.empty, [OBSTACLE]: words.rock, [FOOD]: words[small ? "food" : "food-floor"],
       [QUEEN]: words[small ? "queen" : "queen-floor"] };
-    const strongest = history.header.trail.strongest;
     this.foods = [];
     this.queens = [];
     for (let cell = 0; cell < grid.size; cell++) {
@@ -185,7 +187,7 @@ class Stage {
       if (holds === FOOD) this.foods.push(cell);
       else if (holds === QUEEN) this.queens.push(cell);
       const marked = holds === EMPTY && trail[cell] >= 1;
-      fills[cell] = marked ? rampWords[Math.round(Math.min(trail[cell] / strongest, 1) * 255)] : held[holds];
+      fills[cell] = marked ? rampWords[this.trailColour(trail[cell])] : held[holds];
     }
     const page = words.page, even = page & 0xff00ff, odd = (page >>> 8) & 0xff00ff;
     for (let i = 0; i < cells.length; i++) {
@@ -229,24 +231,16 @@ class Stage {
   /* Food and queens. */
   drawThings() {
     const { above, camera, colours, grid } = this;
-    if (camera.scale >= DRAWINGS_FROM) {
-      for (const [name, cells, outline] of [["food", this.foods, CRUMBS], ["queen", this.queens, CROWN]]) {
-        const { canvas, half } = this.sprite(name, 0.72 * camera.scale, (context) => {
-          context.fillStyle = colours[name];
-          context.fill(new Path2D(outline));
-        });
-        for (const cell of cells) {
-          const place = this.toPage(grid.centre(cell));
-          if (this.sees(place)) above.drawImage(canvas, place[0] - half, place[1] - half, 2 * half, 2 * half);
-        }
+    if (camera.scale < DRAWINGS_FROM) return;
+    for (const [name, cells, outline] of [["food", this.foods, CRUMBS], ["queen", this.queens, CROWN]]) {
+      const { canvas, half } = this.sprite(name, 0.72 * camera.scale, (context) => {
+        context.fillStyle = colours[name];
+        context.fill(new Path2D(outline));
+      });
+      for (const cell of cells) {
+        const place = this.toPage(grid.centre(cell));
+        if (this.sees(place)) above.drawImage(canvas, place[0] - half, place[1] - half, 2 * half, 2 * half);
       }
-      return;
-    }
-    // Where cells are small, a ring shows where the queen is.
-    for (const queen of this.queens) {
-      this.outline(queen, 9);
-      this.stroke("halo", 5);
-      this.stroke("queen", 2.5);
     }
   }
 
@@ -335,6 +329,12 @@ class Stage {
   drawMarks(share, { ant, next, letters, cell, cursor }) {
     const { above, grid, colours, camera } = this;
     above.lineJoin = "round";
+    // Where cells are small, a ring shows where the queen is.
+    for (const queen of camera.scale < DRAWINGS_FROM ? this.queens : []) {
+      this.outline(queen, 9);
+      this.stroke("halo", 5);
+      this.stroke("queen", 2.5);
+    }
     if (cell >= 0) {
       this.outline(cell, Math.max(camera.scale, 5));
       this.stroke("halo", cursor ? 6 : 5);

@@ -204,7 +204,8 @@ class Viewer {
       act();
       this.dirty = true;
     };
-    new ResizeObserver(change(() => stage.resize())).observe(world);
+    // Drawn at once: a canvas is empty after its size has changed.
+    new ResizeObserver(() => stage.resize() && this.draw(performance.now(), false)).observe(world);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.setTheme(this.theme));
     byId("zoom-in").addEventListener("click", change(() => stage.zoom(1.4)));
     byId("zoom-out").addEventListener("click", change(() => stage.zoom(1 / 1.4)));
