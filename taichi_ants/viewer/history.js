@@ -248,7 +248,10 @@ class History {
   /* An ant at a moment, with what it does next: null if it does not live then.
 
      {number, cell, heading, loaded, state, values, act}; act is null if it is not known, else
-     {action, event, reward, why, ties, tdError, sharers, before, after, valuesThen}. */
+     {action, event, reward, why, ties, ahead, tdError, sharers, before, after, values}: why is
+     "best", "tie" (of so many) or "explored", by the values at the time of the choice, which is a
+     tick ago if it was made ahead; the TD error is the mean of so many sharers; before and after
+     are what the entry of the table was and is. */
   ant(moment, number) {
     const i = this.place(moment, number);
     if (i < 0) return null;
@@ -281,7 +284,7 @@ class History {
     }
     const tdError = next.td_errors.length ? next.td_errors[i] : NaN;
     const reward = header.rewards[event];
-    return { action, event, reward, why, ties, tdError, sharers, before, after, values };
+    return { action, event, reward, why, ties, ahead, tdError, sharers, before, after, values };
   }
 
   /* The five action values of a state as they stood at a moment. */

@@ -18,6 +18,8 @@ from taichi_ants.viewer.recording import Recording, record_colony, record_trace
 # The parts of one script, in this order: what a part uses stands in those before it.
 SCRIPTS = ("history.js", "stage.js", "panel.js", "timeline.js", "viewer.js")
 _NOTEBOOK_HEIGHT = 720  # pixels
+# Notebooks show what is larger as text: a page inside of them would be too slow, or too large.
+_MOST_CELLS, _MOST_ANTS, _MOST_STEPS = 200_000, 20_000, 10_000
 
 
 @cache
@@ -77,7 +79,9 @@ def frame(recording: Recording) -> str:
 
 
 def notebook(shown: Any) -> str | None:
-    """A trace or a colony as notebooks show it; None for a trace that cannot be played again."""
-    if not isinstance(shown, Trace):
-        return frame(record_colony(shown))
-    return None if shown.made is None else frame(record_trace(shown))
+    """A trace or a colony as notebooks show it; None, which is text, if there is no page of it."""
+    if isinstance(shown, Trace):
+        small = shown.made is not None and len(shown) <= _MOST_STEPS
+        return frame(record_trace(shown)) if small else None
+    small = shown.grid.size <= _MOST_CELLS and shown.ants <= _MOST_ANTS
+    return frame(record_colony(shown)) if small else None

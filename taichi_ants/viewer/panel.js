@@ -63,7 +63,7 @@ class Panel {
     const episodes = this.history.frames[this.history.length - 1].episode > this.history.frames[0].episode;
     const facts = [
       ...(episodes ? [["episode", frame.episode]] : []),
-      ["tick", frame.tick], ["ants", frame.ants], ["with food", loaded],
+      ["tick", frame.tick], ...(episodes && frame.ants === 1 ? [] : [["ants", frame.ants]]), ["with food", loaded],
       ["delivered", frame.deliveries], ["return", plain(frame.returns, 0)],
       ["epsilon", plain(frame.epsilon, frame.epsilon < 0.01 && frame.epsilon ? 4 : 2)],
     ];
@@ -77,7 +77,7 @@ class Panel {
     const ant = this.history.ant(moment, followed);
     const buttons = button("ant-before", "The ant before (P)", "before") + button("ant-after", "The next ant (N)", "after")
       + button("ant-aim", "Keep it in the middle (F)", "aim", `aria-pressed="${aims}"`) + button("ant-close", "Stop following (Esc)", "close");
-    const badge = ant ? `<span class="badge ${ant.loaded ? "loaded" : ""}">${ant.loaded ? "with food" : "without food"}</span>` : "";
+    const badge = ant ? ` <span class="badge ${ant.loaded ? "loaded" : ""}">${ant.loaded ? "with food" : "no food"}</span>` : "";
     const head = `<div class="head"><h2>Ant ${followed}${badge}</h2>${buttons}</div>`;
     card.innerHTML = head + (ant ? this.viewOf(ant) + this.barsOf(ant) + this.storyOf(ant) : "<p>It does not live now.</p>");
   }
@@ -123,14 +123,14 @@ class Panel {
         + `style="left:${from}%;width:${Math.max(to - from, 0)}%"></span><span class="zero" style="left:${share(0)}%"></span></span>`
         + `<span class="value ${chosen}">${plain(value)}</span>`;
     });
-    return `<span class="label">action values</span><div class="bars">${rows.join("")}</div>`;
+    const when = ant.act?.ahead ? "action values when it chose, a tick ago" : "action values";
+    return `<span class="label">${when}</span><div class="bars">${rows.join("")}</div>`;
   }
 
   storyOf(ant) {
     const { header } = this.history, act = ant.act;
     if (!act) return '<div class="story"><span class="label">What it does next is not in the recording.</span></div>';
-    const ties = act.values.filter((value) => value === Math.max(...act.values)).length;
-    const why = { best: "the best", tie: `a tie of ${ties}`, explored: "explored" }[act.why];
+    const why = { best: "the best", tie: `a tie of ${act.ties}`, explored: "explored" }[act.why];
     const better = ant.loaded ? "comes nearer to the queen" : "enters a trail";
     const came = act.event === FAILED && act.action < 3 ? "is blocked" : CAME[act.event] || better;
     const lines = [

@@ -287,7 +287,7 @@ class Stage {
   antSprite(loaded) {
     const { colours, camera } = this, { scale } = camera;
     // A line of the colour of the page sets ants apart from a dark trail.
-    const edge = Math.min(0.16, 3.2 / scale), large = scale >= DARTS_BELOW;
+    const edge = Math.min(0.11, 2.4 / scale), large = scale >= DARTS_BELOW;
     const crumb = circle(0, -0.7, large ? 0.25 : 0.34), body = new Path2D(large ? BODY : DART);
     return this.sprite(`ant ${loaded}`, 0.83 * scale, (context) => {
       const legs = new Path2D(LIMBS), sides = large ? [1, -1] : [];

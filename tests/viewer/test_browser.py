@@ -142,7 +142,7 @@ def test_a_followed_ant_is_explained(ant, episode):
         assert f"state {trace.states[moment]} " in said
         assert f"Chooses {action} the best" in said
         assert f"reward {reward}" in said
-        assert "with food" in said if moment > 16 else "without food" in said
+        assert "with food" in said if moment > 16 else "no food" in said
         values = ant.tab.locator(".bars .value").all_inner_texts()
         assert [float(text.replace(MINUS, "-")) for text in values] == [
             round(float(value), 2) for value in trace.q_values[moment]
