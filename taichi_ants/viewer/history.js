@@ -63,7 +63,7 @@ class Grid {
   /* The normal form of the cube coordinates. */
   cube(cell) {
     const [q, r] = this.axial(cell), low = Math.min(q, r, 0);
-    return [q - low, r - low, -low];
+    return [q - low, r - low, 0 - low];
   }
   exists(cell) {
     if (cell < 0 || cell >= this.size) return false;
