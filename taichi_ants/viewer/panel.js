@@ -16,7 +16,6 @@ const byId = (id) => document.getElementById(id);
 const safe = (text) => String(text).replace(/[&<>"]/g, (letter) => `&#${letter.charCodeAt(0)};`);
 const signed = (number, digits) => (number > 0 ? "+" : "") + plain(number, digits);
 const plain = (number, digits = 2) => (Number(number.toFixed(digits)) + 0).toFixed(digits).replace("-", "−");
-const many = (n, noun) => `${n} ${n === 1 ? noun : noun + "s"}`;
 const icon = (name) => `<svg viewBox="0 0 20 20" aria-hidden="true">${ICONS[name]}</svg>`;
 const button = (id, label, name, more = "") =>
   `<button type="button" class="icon" id="${id}" aria-label="${label}" title="${label}" ${more}>${icon(name)}</button>`;

@@ -470,7 +470,7 @@ def test_a_source_can_be_live(browser, folder, colony):
     empty = re.sub(r'(id="recording">)[^<]*', r"\1", path.read_text(encoding="utf-8"))
     live = folder / "live.html"
     live.write_text(empty, encoding="utf-8")
-    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    context = browser.new_context(viewport={"width": 1280, "height": 720}, bypass_csp=True)
     tab = context.new_page()
     faults: list[str] = []
     tab.on("pageerror", lambda error: faults.append(str(error)))
@@ -495,6 +495,24 @@ def test_a_source_can_be_live(browser, folder, colony):
     assert tab.evaluate("document.querySelector('#time').max") == "90"
     context.close()
     assert not faults
+
+
+def test_the_page_asks_for_nothing_and_runs_no_text(browser, episode):
+    """Its policy forbids the network and all scripts but its own; it plays all the same."""
+    context = browser.new_context()
+    tab = context.new_page()
+    faults, asked = [], []
+    tab.on("console", lambda message: faults.append(message.text))
+    tab.on("request", lambda request: asked.append(request.url))
+    tab.goto(episode[0].as_uri())
+    tab.locator("#place b").wait_for()
+    tab.keyboard.press("End")
+    tab.locator("#place b", has_text="34").wait_for()
+    assert asked == [episode[0].as_uri()]
+    assert not faults
+    tab.evaluate("fetch('https://example.org').catch(() => 0)")
+    assert any("Content Security Policy" in fault for fault in faults)
+    context.close()
 
 
 def test_one_moment_has_no_time_line(browser, folder):
