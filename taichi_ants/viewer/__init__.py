@@ -6,8 +6,8 @@
 """
 
 from taichi_ants.viewer.page import check_page, frame, is_page, notebook, page, save_page
+from taichi_ants.viewer.recorder import Recorder
 from taichi_ants.viewer.recording import (
-    Recorder,
     Recording,
     record_colony,
     record_episode,

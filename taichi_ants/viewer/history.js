@@ -190,7 +190,7 @@ class History {
     }
   }
 
-  /* Let trails fall for some ticks, to the same bits as `fallen` in recording.py. */
+  /* Let trails fall for some ticks, to the same bits as `fallen` in recorder.py. */
   fall(ticks) {
     const { evaporation, decay, share } = this.header.trail;
     const trail = this.world.trail, n = trail.length;

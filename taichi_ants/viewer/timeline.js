@@ -73,9 +73,12 @@ class Timeline {
       first: () => player.step(-Infinity), back: () => player.step(-1), forward: () => player.step(1),
       last: () => player.step(Infinity), play: () => (player.playing ? player.pause() : player.play()),
     })) byId(id).addEventListener("click", act);
-    byId("curves").innerHTML = CURVES.map(([name]) => `<div class="curve"><div class="label"><span>${name}</span><b></b></div>`
-      + '<svg viewBox="0 0 100 100" preserveAspectRatio="none" aria-hidden="true"><path class="base" d="M0 100H100"/><path class="area"/><path class="line"/>'
-      + '<line class="cursor" y1="0" y2="100"/></svg></div>').join("");
+    byId("curves").innerHTML = CURVES.map(([name]) => `
+      <div class="curve"><div class="label"><span>${name}</span><b></b></div>
+        <svg viewBox="0 0 100 100" preserveAspectRatio="none" aria-hidden="true">
+          <path class="base"/><path class="area"/><path class="line"/>
+          <line class="cursor" y1="0" y2="100"/>
+        </svg></div>`).join("");
     this.curves = [...document.querySelectorAll(".curve")];
     for (const curve of this.curves) {
       const svg = curve.querySelector("svg");

@@ -11,7 +11,7 @@ from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.task import Pheromone
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.viewer import Recording
-from taichi_ants.viewer.recording import fallen
+from taichi_ants.viewer.recorder import fallen
 
 
 @dataclass
