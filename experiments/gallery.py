@@ -111,9 +111,9 @@ def make_viewer(folder: Path) -> None:
         width, height = _WINDOW
         page = chromium.new_page(viewport={"width": width, "height": height})
         page.goto(path.as_uri())
-        page.wait_for_function("window.viewer")
+        page.locator("#place b").wait_for()
         page.evaluate("tick => { viewer.player.go(tick); }", _TICK)
-        page.wait_for_function("!viewer.dirty")
+        page.locator("#place b", has_text=str(_TICK)).wait_for()
         picture = page.screenshot()
         chromium.close()
     folder.mkdir(parents=True, exist_ok=True)

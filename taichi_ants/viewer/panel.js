@@ -75,7 +75,8 @@ class Panel {
     if (followed < 0) return;
     const ant = this.history.ant(moment, followed);
     const buttons = button("ant-before", "The ant before (P)", "before") + button("ant-after", "The next ant (N)", "after")
-      + button("ant-aim", "Keep it in the middle (F)", "aim", `aria-pressed="${aims}"`) + button("ant-close", "Stop following (Esc)", "close");
+      + button("ant-aim", "Keep it in the middle (F)", "aim", `aria-pressed="${aims}"`)
+      + button("ant-close", "Stop following (Esc)", "close");
     const badge = ant ? ` <span class="badge ${ant.loaded ? "loaded" : ""}">${ant.loaded ? "with food" : "no food"}</span>` : "";
     const head = `<div class="head"><h2>Ant ${followed}${badge}</h2>${buttons}</div>`;
     card.innerHTML = head + (ant ? this.viewOf(ant) + this.barsOf(ant) + this.storyOf(ant) : "<p>It does not live now.</p>");
@@ -87,8 +88,9 @@ class Panel {
     const shapes = header.view.map((turn, i) => {
       const angle = (turn * Math.PI) / 3, x = 1.732 * Math.sin(angle), y = -1.732 * Math.cos(angle);
       const cell = ant.cell + this.history.grid.offsets[(ant.heading + turn + 6) % 6];
-      return `<g transform="translate(${x} ${y})"><path d="${HEXAGON}" transform="scale(.93)" fill="${this.fillOf(cell, world)}"/>`
-        + `<text font-size=".95" stroke="var(--halo)" stroke-width=".2" paint-order="stroke">${safe(letters[i] ?? "")}</text></g>`;
+      return `<g transform="translate(${x} ${y})">
+        <path d="${HEXAGON}" transform="scale(.93)" fill="${this.fillOf(cell, world)}"/>
+        <text font-size=".95" stroke="var(--halo)" stroke-width=".2" paint-order="stroke">${safe(letters[i] ?? "")}</text></g>`;
     });
     const kinds = [...new Set(letters.map((letter) => letter[0]))], known = kinds.filter((kind) => LETTERS[kind]);
     const meanings = known.map((kind) => `${kind} ${LETTERS[kind]}`);
@@ -118,9 +120,12 @@ class Panel {
     const rows = this.history.header.actions.map((name, action) => {
       const chosen = ant.act?.action === action ? "is-chosen" : "", value = values[action];
       const [from, to] = [Math.min(0, value), Math.max(0, value)].map(share);
-      return `<span class="name ${chosen}">${chosen ? "▸ " : ""}${name}</span><span class="bar-of"><span class="fill ${chosen}" `
-        + `style="left:${from}%;width:${Math.max(to - from, 0)}%"></span><span class="zero" style="left:${share(0)}%"></span></span>`
-        + `<span class="value ${chosen}">${plain(value)}</span>`;
+      return `<span class="name ${chosen}">${chosen ? "▸ " : ""}${name}</span>
+        <span class="bar-of">
+          <span class="fill ${chosen}" style="left:${from}%;width:${Math.max(to - from, 0)}%"></span>
+          <span class="zero" style="left:${share(0)}%"></span>
+        </span>
+        <span class="value ${chosen}">${plain(value)}</span>`;
     });
     const when = ant.act?.ahead ? "action values when it chose, a tick ago" : "action values";
     return `<span class="label">${when}</span><div class="bars">${rows.join("")}</div>`;
@@ -132,18 +137,21 @@ class Panel {
     const why = { best: "the best", tie: `a tie of ${act.ties}`, explored: "explored" }[act.why];
     const better = ant.loaded ? "comes nearer to the queen" : "enters a trail";
     const came = act.event === FAILED && act.action < 3 ? "is blocked" : CAME[act.event] || better;
+    const action = header.actions[act.action], worth = { 1: "up", "-1": "down" }[Math.sign(act.reward)] ?? "";
     const lines = [
-      `<span>Chooses <b>${header.actions[act.action]}</b> <span class="why ${act.why}">${why}</span></span>`,
-      `<span>It ${came}, reward <span class="reward ${act.reward > 0 ? "up" : act.reward < 0 ? "down" : ""}">${signed(act.reward, 0)}</span></span>`,
+      `Chooses <b>${action}</b> <span class="why ${act.why}">${why}</span>`,
+      `It ${came}, reward <span class="reward ${worth}">${signed(act.reward, 0)}</span>`,
     ];
     if (header.learns) {
       const digits = digitsFor(act.before, act.after), { task, rest } = this.history.stateName(ant.state);
       if (!Number.isNaN(act.tdError)) {
-        lines.push(`<span>TD error <code>${signed(act.tdError)}</code>${act.sharers > 1 ? `, the mean of ${act.sharers} ants` : ""}</span>`);
+        const mean = act.sharers > 1 ? `, the mean of ${act.sharers} ants` : "";
+        lines.push(`TD error <code>${signed(act.tdError)}</code>${mean}`);
       }
-      lines.push(`<span>Q(${safe(`${task} ${rest}`.trim())}, ${header.actions[act.action]}) <code>${plain(act.before, digits)} → ${plain(act.after, digits)}</code></span>`);
+      const [before, after] = [act.before, act.after].map((value) => plain(value, digits));
+      lines.push(`Q(${safe(`${task} ${rest}`.trim())}, ${action}) <code>${before} → ${after}</code>`);
     }
-    return `<div class="story">${lines.join("")}</div>`;
+    return `<div class="story">${lines.map((line) => `<span>${line}</span>`).join("")}</div>`;
   }
 
   showCell(moment, cell) {
@@ -151,7 +159,8 @@ class Panel {
     card.hidden = cell < 0;
     if (cell < 0) return;
     const { ground, trail } = history.worldAt(moment), ants = history.antsOn(moment, cell);
-    const level = trail[cell], link = (number) => `<button type="button" class="link" data-follow="${number}">ant ${number}</button>`;
+    const level = trail[cell];
+    const link = (number) => `<button type="button" class="link" data-follow="${number}">ant ${number}</button>`;
     const wanting = history.wanting(moment, cell).map(({ number, action, event }) =>
       `${link(number)} (${history.header.actions[action]}${event === FAILED ? ", in vain" : ""})`);
     const lines = [
@@ -178,7 +187,8 @@ class Panel {
 
   /* What the colours mean, in small. */
   showLegend() {
-    const cell = (fill, more = "") => `<svg viewBox="-1.1 -1 2.2 2" aria-hidden="true"><path d="${HEXAGON}" fill="${fill}"/>${more}</svg>`;
+    const cell = (fill, more = "") =>
+      `<svg viewBox="-1.1 -1 2.2 2" aria-hidden="true"><path d="${HEXAGON}" fill="${fill}"/>${more}</svg>`;
     const drawing = (name, outline) => `<path transform="scale(.72)" fill="var(--${name})" d="${outline}"/>`;
     const samples = [0, 64, 128, 192, 255].map((i) => `rgb(${this.stage.ramp[i].join(" ")})`);
     const bodies = [false, true].map((loaded) => `<svg viewBox="-1 -1 2 2" aria-hidden="true">${antShape(loaded)}</svg>`);

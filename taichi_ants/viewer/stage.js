@@ -394,9 +394,10 @@ const LIMBS = "M.08-.16.42-.34.56-.66M.08-.06.48-.02.74.2M.08.04.44.26.58.7M.07-
 const oval = (y, a, b) => `M${-a} ${y}a${a} ${b} 0 1 0 ${2 * a} 0a${a} ${b} 0 1 0 ${-2 * a} 0z`;
 const BODY = oval(-0.37, 0.19, 0.17) + oval(-0.06, 0.13, 0.2) + oval(0.45, 0.27, 0.39);
 const DART = "M0-.9.67.824 0 .585-.67.824z";
-const disc = (x, y, radius) => `M${x - radius} ${y}a${radius} ${radius} 0 1 0 ${2 * radius} 0a${radius} ${radius} 0 1 0 ${-2 * radius} 0z`;
+const disc = (x, y, r) => `M${x - r} ${y}a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0 1 0 ${-2 * r} 0z`;
 const CRUMBS = disc(0, -0.36, 0.36) + disc(0.4, 0.3, 0.36) + disc(-0.4, 0.3, 0.36);
-const CROWN = "M-.8-.28-.32-.02 0-.5.32-.02.8-.28.6.6h-1.2z" + disc(0, -0.6, 0.12) + disc(0.84, -0.38, 0.12) + disc(-0.84, -0.38, 0.12);
+const CROWN = "M-.8-.28-.32-.02 0-.5.32-.02.8-.28.6.6h-1.2z"
+  + disc(0, -0.6, 0.12) + disc(0.84, -0.38, 0.12) + disc(-0.84, -0.38, 0.12);
 
 function circle(x, y, radius) {
   const path = new Path2D();
