@@ -9,6 +9,9 @@ comparison, six for the colony and five for the bridge on two cores. A million a
 from __future__ import annotations
 
 import argparse
+import io
+import shutil
+import tempfile
 from pathlib import Path
 
 from taichi_ants.commands import render
@@ -47,6 +50,10 @@ GALLERY: dict[str, list[str]] = {
 }
 
 
+# The page of the same colony, while an ant of it is followed; it needs Chromium and Playwright.
+VIEWER = "viewer.png"
+_FOLLOWED, _TICK, _WINDOW = 12, 330, (1280, 760)
+
 # Tracked figure -> the figure of a study that it is.
 FIGURES = {
     "learning_curves.png": "compare/figures/learning_curves.png",
@@ -79,8 +86,40 @@ def make_gallery(settings: argparse.Namespace) -> None:
     for name, arguments in GALLERY.items():
         path = settings.folder / "renders" / name
         render.show(render.parse_arguments([*arguments, "--out", str(path)]))
+    make_viewer(settings.folder / "docs" / "figures")
     if not settings.no_figures:
         make_figures(settings.folder / "docs" / "figures")
+
+
+def make_viewer(folder: Path) -> None:
+    """Take a picture of the page that plays a colony, where there is a browser."""
+    from PIL import Image
+
+    browser = shutil.which("chromium") or shutil.which("google-chrome")
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError:
+        browser = None
+    if browser is None:
+        print(f"{VIEWER} is left out: it needs Chromium and Playwright")
+        return
+    with tempfile.TemporaryDirectory() as place, sync_playwright() as playwright:
+        path = Path(place, "colony.html")
+        follow = ["--ticks", "400", "--follow", str(_FOLLOWED), "--out", str(path)]
+        render.show(render.parse_arguments([*_COLONY, *follow]))
+        chromium = playwright.chromium.launch(executable_path=browser, args=["--no-sandbox"])
+        width, height = _WINDOW
+        page = chromium.new_page(viewport={"width": width, "height": height})
+        page.goto(path.as_uri())
+        page.locator("#place b").wait_for()
+        page.evaluate("tick => { viewer.player.go(tick); }", _TICK)
+        page.locator("#place b", has_text=str(_TICK)).wait_for()
+        picture = page.screenshot()
+        chromium.close()
+    folder.mkdir(parents=True, exist_ok=True)
+    with Image.open(io.BytesIO(picture)) as image:
+        image.convert("RGB").quantize(256).save(folder / VIEWER, optimize=True)
+    print(f"{folder / VIEWER}: {(folder / VIEWER).stat().st_size // 1000} kB")
 
 
 def make_figures(folder: Path) -> None:

@@ -26,7 +26,7 @@ LAYERS = (
     {"baselines", "engines", "reference"},
     {"analysis", "rendering"},
     {"offline"},
-    {"envs"},
+    {"viewer", "envs"},
     {"studies"},
     {"commands"},
     {"__main__"},

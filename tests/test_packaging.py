@@ -13,6 +13,7 @@ import pytest
 from command_lines import ROOT, assert_one_sentence, environment
 
 from taichi_ants.commands import COMMANDS
+from taichi_ants.viewer.page import SCRIPTS
 
 BUILD = """
 import sys
@@ -48,7 +49,8 @@ def test_the_wheel_holds_the_package_and_nothing_else(built):
         names = [name for name in wheel.namelist() if ".dist-info/" not in name]
         (entries,) = [name for name in wheel.namelist() if name.endswith("entry_points.txt")]
         assert "taichi-ants = taichi_ants.commands:main" in wheel.read(entries).decode()
-    assert set(names) == sources("taichi_ants") | {"taichi_ants/py.typed"}
+    page = {f"taichi_ants/viewer/{name}" for name in ("page.html", "viewer.css", *SCRIPTS)}
+    assert set(names) == sources("taichi_ants") | {"taichi_ants/py.typed"} | page
 
 
 def test_the_source_distribution_can_run_the_tests(built):

@@ -1,8 +1,8 @@
 """Pictures of ants: an episode, a colony, learning made visible, or a policy sheet.
 
 All but learning follow a policy from a file, or one that is trained on the spot. The ending of
---out chooses the kind of file: .gif, .mp4, .png for a picture of the end, and without an ending a
-folder of PNG pictures.
+--out chooses the kind of file: .gif, .mp4, .png for a picture of the end, .html for a page that
+plays an episode or a colony, and without an ending a folder of PNG pictures.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ _OPTIONS = {
     **_TRAINING,
     "--size": ("ecl", "in pixels", {"type": _size, "metavar": "WxH"}),
     "--fps": ("ecl", "pictures a second", {**_NUMBER, "default": 8.0}),
-    "--every": ("c", "ticks from one picture to the next", {**_COUNT, "default": 4}),
+    "--every": ("c", "ticks from one picture to the next", {**_COUNT, "default": None}),
     "--plain": ("ec", "the world alone, without text and marks", {"action": "store_true"}),
 }
 # Where a kind has defaults of its own.
@@ -118,7 +118,16 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
             parser.error(f"{flag} is of training, but --policy is trained already, leave one out")
         if flag in ("--follow", "--title") and getattr(settings, "plain", False):
             parser.error(f"--plain leaves out what {flag} shows, leave out one of them")
+        if flag in ("--size", "--fps", "--plain") and is_page(settings):
+            parser.error(f"{flag} is of pictures, but --out names a page, leave {flag} out")
+    if settings.kind == "colony" and settings.every is None:
+        settings.every = 1 if is_page(settings) else 4  # a page tells what each ant does in a tick
     return settings
+
+
+def is_page(settings: argparse.Namespace) -> bool:
+    """Whether a page is asked for, of a kind that there is one of."""
+    return settings.kind in ("episode", "colony") and Path(settings.out).suffix.lower() == ".html"
 
 
 def show(settings: argparse.Namespace) -> None:
@@ -127,8 +136,11 @@ def show(settings: argparse.Namespace) -> None:
     from taichi_ants.rendering import check_animation, check_picture
     from taichi_ants.rendering.scene import check_size
     from taichi_ants.rendering.writers import is_picture
+    from taichi_ants.viewer import check_page
 
-    if settings.kind == "sheet" or (settings.kind != "learning" and is_picture(settings.out)):
+    if is_page(settings):
+        check_page(settings.out)
+    elif settings.kind == "sheet" or (settings.kind != "learning" and is_picture(settings.out)):
         check_picture(settings.out)
     else:
         check_animation(settings.out, settings.fps)
@@ -144,14 +156,18 @@ def show(settings: argparse.Namespace) -> None:
 
 
 def show_episode(settings: argparse.Namespace, world: World) -> None:
-    """Write an episode as an animation, or its end as a picture."""
+    """Write an episode as a page or an animation, or its end as a picture."""
     from taichi_ants.errors import count
     from taichi_ants.rendering import Episode
+    from taichi_ants.viewer import record_episode, save_page
 
     q_values, task, title = find_policy(settings, world)
     rules = {"seed": settings.seed, "max_steps": settings.max_steps, "epsilon": settings.epsilon}
     episode = Episode.play(world, q_values, task=task, **rules)
-    _save_moments(settings, episode.moments(), len(episode), title, task)
+    if is_page(settings):
+        save_page(settings.out, record_episode(episode, title))
+    else:
+        _save_moments(settings, episode.moments(), len(episode), title, task)
     outcome = "delivered" if episode.delivered else "not delivered"
     rewards = int(episode.trace.rewards.sum())
     print(f"{settings.out}: {count(len(episode.trace), 'step')}, return {rewards}, {outcome}")
@@ -165,14 +181,22 @@ def show_colony(settings: argparse.Namespace, world: World) -> None:
     from taichi_ants import Colony
     from taichi_ants.errors import count
     from taichi_ants.rendering import colony_moments
+    from taichi_ants.viewer import record_colony, save_page
 
     q_values, task, title = find_policy(settings, world)
     config = replace(training_config(settings), epsilon=settings.epsilon, min_epsilon=0.0)
     who = (config, settings.seed, settings.ants)
     colony = Colony(world, task, *who, sharing="fixed", q_values=q_values)
     colony.begin_episode()
-    moments = colony_moments(colony, settings.ticks, settings.every, settings.follow)
-    _save_moments(settings, moments, 1 + -(-settings.ticks // settings.every), title, task)
+    times = settings.ticks, settings.every
+    if is_page(settings):
+        with progress_bar("Recording") as progress:
+            more: dict[str, Any] = {"follow": settings.follow, "progress": progress}
+            recording = record_colony(colony, *times, title=title, **more)
+        save_page(settings.out, recording)
+    else:
+        moments = colony_moments(colony, *times, settings.follow)
+        _save_moments(settings, moments, 1 + -(-settings.ticks // settings.every), title, task)
     delivered = count(int(colony.outcome().deliveries.sum()), "delivery")
     ants, ticks = count(settings.ants, "ant"), count(colony.ticks, "tick")
     print(f"{settings.out}: {ants}, {ticks}, {delivered}")

@@ -44,7 +44,7 @@ def check_animation(path: files.PathLike, fps: float = DEFAULT_FPS) -> Path:
         AntsError: The ending or the speed is not allowed, PyAV is missing for an .mp4, the folder
             holds something, or the place cannot be written to.
     """
-    target = _writable(path)
+    target = writable(path)
     if target.suffix.lower() not in (".gif", ".mp4", ""):
         raise AntsError(
             f"{str(path)!r} ends in {target.suffix!r}; an animation ends in .gif, .mp4, or in "
@@ -70,7 +70,7 @@ def is_picture(path: files.PathLike) -> bool:
 
 def check_picture(path: files.PathLike) -> Path:
     """Make sure that a picture can be written; raises as `save_picture` does."""
-    target = _writable(path)
+    target = writable(path)
     if not is_picture(target):
         raise AntsError(f"{str(path)!r} is to hold one picture; give it a name that ends in .png.")
     return target
@@ -96,7 +96,7 @@ def save_animation(
     checked = _checked(frames, round(pause * fps) - 1)
     if target.suffix:
         encoded = _mp4 if target.suffix.lower() == ".mp4" else _gif
-        _write(target, encoded(checked, fps))
+        write(target, encoded(checked, fps))
     else:
         _write_folder(target, checked)
 
@@ -109,10 +109,10 @@ def save_picture(path: files.PathLike, frame: np.ndarray) -> None:
     """
     target = check_picture(path)
     _check_frame(frame)
-    _write(target, _png(frame, optimize=True))
+    write(target, _png(frame, optimize=True))
 
 
-def _writable(path: files.PathLike) -> Path:
+def writable(path: files.PathLike) -> Path:
     """The path, if files can be written to the folder that holds it, or is to hold it."""
     expect("path", path, str, os.PathLike)
     target = Path(path)
@@ -124,7 +124,8 @@ def _existing_folder(target: Path) -> Path:
     return next(folder for folder in target.absolute().parents if folder.exists())
 
 
-def _write(target: Path, content: bytes) -> None:
+def write(target: Path, content: bytes) -> None:
+    """Write a file into a folder that is made if it is missing."""
     files.check_writable_folder(target.parent)
     files.write_bytes(target, content)
 

@@ -10,7 +10,7 @@ from PIL import Image
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "rendering.md"
 EXAMPLES = re.findall(r"```python\n(.*?)```", DOCUMENT.read_text(encoding="utf-8"), re.DOTALL)
-WRITTEN = ["ant.gif", "start.png", "colony.gif"]
+WRITTEN = ["learns.html", "crowd.html", "ant.gif", "start.png", "colony.gif"]
 
 
 def test_there_is_an_example_for_each_file() -> None:
@@ -22,5 +22,8 @@ def test_examples_run_on_their_own(example, name, tmp_path, monkeypatch) -> None
     monkeypatch.chdir(tmp_path)
     exec(compile(example, str(DOCUMENT), "exec"), {})
     assert [path.name for path in tmp_path.iterdir()] == [name]
+    if name.endswith(".html"):
+        assert (tmp_path / name).read_text(encoding="utf-8").startswith("<!doctype html>")
+        return
     with Image.open(tmp_path / name) as image:
         assert (getattr(image, "n_frames", 1) > 1) == name.endswith(".gif")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
+from importlib import import_module
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -532,6 +533,11 @@ class Colony:
                 f"deliveries: {now[WorldRow.DELIVERIES]}"
             )
         return "\n    ".join(["Colony(", *lines]) + "\n)"
+
+    def _repr_html_(self) -> str | None:
+        """The first world as it is now, as notebooks show it: a page to look around in."""
+        # The viewer stands above the engines; it is looked for only where it is needed.
+        return import_module("taichi_ants.viewer").notebook(self) if self.episode >= 0 else None
 
     def _check_begun(self) -> None:
         if self.episode < 0:

@@ -6,7 +6,9 @@ The kernel is the one that trains and evaluates, compiled once more so that it r
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from importlib import import_module
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +25,28 @@ from taichi_ants.worlds.world import World
 
 MAX_ROLLOUT_STEPS = 1_000_000
 MAX_TABLE_ROWS = 12_800_000  # of 32 bytes; each step of training keeps its table
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """How a trace was made, so that it can be played again; see `rollout`, `trace_training`.
+
+    Attributes:
+        world, task, seed, max_steps: Of the run.
+        number: Of the rollout.
+        q_values: float (n_states, 5), the table that the ant followed; None if it learned.
+        epsilon: With which it followed the table.
+        config: How it learned; None if it did not.
+    """
+
+    world: World
+    task: Task
+    seed: int
+    max_steps: int
+    number: int = 0
+    q_values: np.ndarray | None = None
+    epsilon: float = 0.0
+    config: TrainingConfig | None = None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -46,6 +70,7 @@ class Trace(Record):
         q_values: float32 (n, 5), the action values of the state when the action was chosen.
         td_errors: float32 (n,), of the update after the step; None without learning.
         tables: float32 (n, n_states, 5), the Q-table after the step; None without learning.
+        made: How it was made; None if it is of several policies, or was made by hand.
     """
 
     episodes: np.ndarray
@@ -63,6 +88,7 @@ class Trace(Record):
     q_values: np.ndarray
     td_errors: np.ndarray | None = None
     tables: np.ndarray | None = None
+    made: Made | None = field(default=None, compare=False, repr=False)
 
     def __len__(self) -> int:
         return len(self.steps)
@@ -71,6 +97,11 @@ class Trace(Record):
     def delivered(self) -> np.ndarray:
         """Whether the food was given to the queen, bool (n,)."""
         return self.events == DELIVERED
+
+    def _repr_html_(self) -> str | None:
+        """The trace as notebooks show it: a page that plays it."""
+        # The viewer stands above the engines; it is looked for only where it is needed.
+        return import_module("taichi_ants.viewer").notebook(self)
 
 
 def rollout(
@@ -93,7 +124,9 @@ def rollout(
     seeds = checks.checked_seeds_for(seed, ())
     numbers = np.array([checked_whole("number", number, least=0)])
     epsilon = checks.checked_share("epsilon", epsilon)
-    return _trace(world, task, Runs.following(tables[None], seeds, numbers, epsilon), max_steps)
+    trace = _trace(world, task, Runs.following(tables[None], seeds, numbers, epsilon), max_steps)
+    made = Made(world, task, int(seeds[0]), max_steps, int(numbers[0]), tables.copy(), epsilon)
+    return replace(trace, made=made)
 
 
 def trace_policies(
@@ -146,7 +179,8 @@ def trace_training(
     seeds = checks.checked_seeds_for(seed, ())
     state = RunState.fresh(several, seeds.tolist(), task.n_states).take([0])
     runs = Runs.learning(several, seeds.tolist(), state)
-    return _trace(world, task, runs, max_steps, checked_whole("episodes", episodes))
+    trace = _trace(world, task, runs, max_steps, checked_whole("episodes", episodes))
+    return replace(trace, made=Made(world, task, int(seeds[0]), max_steps, config=several[0]))
 
 
 def _trace(world: World, task: Task, runs: Runs, max_steps: int, episodes: int = 1) -> Trace:
@@ -212,7 +246,7 @@ def _launch(
     part: slice,
     max_steps: int,
     tables: np.ndarray | None = None,
-) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[dict[str, Any], np.ndarray, np.ndarray, np.ndarray]:
     """Some episodes of some runs: columns, TD errors, probabilities of actions, number of the run.
 
     The table after each step is written into `tables`, if there are any.

@@ -1,0 +1,80 @@
+"""Frames: what changed in a world from one moment to the next, as bytes.
+
+A frame is a list of arrays, its sections, in little-endian order. It begins with uint32 numbers:
+its length in bytes, and how many elements each section has. Each section begins at a multiple of
+eight bytes, so that both NumPy and JavaScript can look at it where it lies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+# In `clock`, in this order. Deliveries and returns are of the episode.
+CLOCK = ("episode", "tick", "deliveries", "returns", "epsilon", "learning_rate", "ants")
+
+# The sections, in order, and their types; "cell", "state" and "level" depend on the world.
+SECTIONS = {
+    "clock": "f8",
+    # The ants, in ascending order of their numbers. `numbers` is empty if they are those of the
+    # frame before.
+    "numbers": "i4",
+    "cells": "cell",
+    "poses": "u1",  # the heading, plus 8 with food
+    "states": "state",
+    # What the ants of the frame before have done since; empty if that was not one tick.
+    "acts": "u1",  # the action, plus 16 times the event
+    "td_errors": "f4",  # NaN where it is not known; empty if nobody learns
+    # Where the world is not what the frame before lets expect, and what it is there.
+    "ground_at": "cell",
+    "ground": "u1",
+    "trail_at": "cell",
+    "trail": "level",
+    "table_at": "f8",  # (owner * n_states + state) * 5 + action; the owner is 0, or an ant
+    "table": "f4",
+}
+_HEAD = 8 * -(-(1 + len(SECTIONS)) // 2)  # bytes
+
+
+def types_of(size: int, n_states: int, dense: bool) -> dict[str, str]:
+    """The type of each section in a world of so many cells, states, and kind of trail."""
+    of_world = {
+        "cell": "u2" if size < 2**16 else "u4",
+        "state": "u2" if n_states < 2**16 else "u4",
+        "level": "f4" if dense else "i4",
+    }
+    return {name: of_world.get(kind, kind) for name, kind in SECTIONS.items()}
+
+
+def pack(types: Mapping[str, str], sections: Mapping[str, Any]) -> bytes:
+    """A frame; sections that are not given are empty."""
+    head, parts = [], []
+    for name, kind in types.items():
+        array = np.ascontiguousarray(sections.get(name, ()), dtype=f"<{kind}")
+        head.append(array.size)
+        parts.append(array.tobytes() + bytes(-array.nbytes % 8))
+    body = b"".join(parts)
+    numbers = np.array([_HEAD + len(body), *head], dtype="<u4").tobytes()
+    return numbers.ljust(_HEAD, b"\0") + body
+
+
+def unpack(types: Mapping[str, str], frame: bytes) -> dict[str, np.ndarray]:
+    """The sections of a frame."""
+    lengths = np.frombuffer(frame, "<u4", 1 + len(types)).tolist()[1:]
+    sections, at = {}, _HEAD
+    for (name, kind), length in zip(types.items(), lengths, strict=True):
+        sections[name] = np.frombuffer(frame, f"<{kind}", length, at)
+        at += 8 * -(-sections[name].nbytes // 8)
+    return sections
+
+
+def split(data: bytes) -> list[bytes]:
+    """The frames that stand one after the other in some bytes."""
+    frames, at = [], 0
+    while at < len(data):
+        length = int(np.frombuffer(data, "<u4", 1, at)[0])
+        frames.append(data[at : at + length])
+        at += length
+    return frames

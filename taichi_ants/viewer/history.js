@@ -1,0 +1,356 @@
+"use strict";
+
+/* What happened, moment by moment.
+
+   A source gives the page its header and its frames (see frames.py for their form):
+
+     source.header          what all frames are about, as `Recorder.header` in Python gives it
+     source.live            true if more frames may come
+     source.start(receive)  calls receive(bytes) with each frame, in order: those of a recording at
+                            once, those of a simulation that runs as they arrive
+
+   A frame is an ArrayBuffer, or a view of one. */
+
+const EMPTY = 0, OBSTACLE = 5, FOOD = 7, QUEEN = 13; // what a cell holds, as in task/constants.py
+const FAILED = 1, PICKED_UP = 3, DELIVERED = 4; // events
+const N_ACTIONS = 5;
+const CLOCK = ["episode", "tick", "deliveries", "returns", "epsilon", "learningRate", "ants"];
+const ARRAYS = {
+  u1: Uint8Array, u2: Uint16Array, u4: Uint32Array, i4: Int32Array, f4: Float32Array, f8: Float64Array,
+};
+
+/* A recording that lies in the page as compressed bytes in base64. */
+async function recordingIn(text) {
+  const packed = Uint8Array.from(atob(text.trim()), (letter) => letter.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const whole = await new Response(stream).arrayBuffer();
+  const end = 4 + new DataView(whole).getUint32(0, true);
+  return {
+    header: JSON.parse(new TextDecoder().decode(new Uint8Array(whole, 4, end - 4))),
+    live: false,
+    start(receive) {
+      for (let at = end; at < whole.byteLength; ) {
+        const length = new DataView(whole).getUint32(at, true);
+        receive(new Uint8Array(whole, at, length));
+        at += length;
+      }
+    },
+  };
+}
+
+/* Where the cells of a world lie: the same as grid/hexgrid.py. Lengths are in sizes of a hexagon. */
+class Grid {
+  constructor([x, y, z]) {
+    this.ranges = [x, y, z];
+    this.width = x + z + 1;
+    this.height = y + z + 1;
+    this.size = this.width * this.height;
+    // Headings run clockwise from up; a step adds one of these to an index.
+    this.offsets = [1, 1 + this.width, this.width, -1, -1 - this.width, -this.width];
+    this.left = -1.5 * (z - 1) - 1;
+    this.right = 1.5 * (y - 1) + 1;
+    this.top = -Math.sqrt(3) * (x - 0.5);
+    this.bottom = (Math.sqrt(3) * (y + z - 1)) / 2;
+  }
+  axial(cell) {
+    const z = this.ranges[2];
+    return [(cell % this.width) - z, Math.floor(cell / this.width) - z];
+  }
+  centre(cell) {
+    const [q, r] = this.axial(cell);
+    return [1.5 * r, Math.sqrt(3) * (0.5 * r - q)];
+  }
+  /* The normal form of the cube coordinates. */
+  cube(cell) {
+    const [q, r] = this.axial(cell), low = Math.min(q, r, 0);
+    return [q - low, r - low, 0 - low];
+  }
+  exists(cell) {
+    if (cell < 0 || cell >= this.size) return false;
+    const [x, y, z] = this.ranges, [i, j, k] = this.cube(cell);
+    return i < x && j < y && k < z;
+  }
+  /* The cell at a point, -1 outside of the world. */
+  at(x, y) {
+    const r = x / 1.5, q = r / 2 - y / Math.sqrt(3);
+    let a = Math.round(q), b = Math.round(r);
+    const c = Math.round(q - r), da = Math.abs(a - q), db = Math.abs(b - r), dc = Math.abs(c - (q - r));
+    if (da > db && da > dc) a = b + c;
+    else if (db > dc) b = a - c;
+    const [, , z] = this.ranges;
+    if (a < -z || b < -z || a >= this.width - z || b >= this.height - z) return -1;
+    const cell = (b + z) * this.width + a + z;
+    return this.exists(cell) ? cell : -1;
+  }
+}
+
+/* All frames so far, and the world as it was at any of them. */
+class History {
+  constructor(header) {
+    this.header = header;
+    this.grid = new Grid(header.ranges);
+    this.names = Object.keys(header.types);
+    this.kinds = this.names.map((name) => ARRAYS[header.types[name]]);
+    this.headBytes = 8 * Math.ceil((1 + this.names.length) / 2);
+    this.dense = header.types.trail === "f4";
+    this.frames = [];
+    this.events = []; // pick-ups and deliveries: {moment, kind, ant, cell}, in order
+    this.values = new Map(); // entry of a table -> [moments, values] of its changes
+    this.totals = [0]; // deliveries before each episode
+    this.world = { moment: -1, ground: new Uint8Array(this.grid.size), trail: this.emptyTrail() };
+    this.kept = []; // copies of the world now and then, so that seeking is quick
+    this.lastKept = -Infinity;
+    // At most 64 MiB of copies: large worlds are kept more rarely.
+    this.keepEvery = 32;
+    this.mostKept = Math.max(8, Math.floor(2 ** 26 / (5 * this.grid.size)));
+  }
+
+  get length() {
+    return this.frames.length;
+  }
+
+  emptyTrail() {
+    return this.dense ? new Float32Array(this.grid.size) : new Int32Array(this.grid.size);
+  }
+
+  /* Append a frame; views into its bytes are kept. */
+  add(bytes) {
+    const frame = this.read(bytes), moment = this.length, before = this.frames[moment - 1];
+    if (!frame.numbers.length && frame.ants) frame.numbers = before.numbers;
+    frame.number = moment;
+    frame.passed = before && before.episode === frame.episode ? frame.tick - before.tick : 0;
+    if (before && before.episode !== frame.episode) {
+      this.totals[frame.episode] = this.totals[before.episode] + before.deliveries;
+    } else this.totals[frame.episode] ??= 0;
+    frame.delivered = this.totals[frame.episode] + frame.deliveries; // in all episodes
+    this.frames.push(frame);
+    for (let i = 0; i < frame.table.length; i++) {
+      const entry = frame.table_at[i];
+      if (!this.values.has(entry)) this.values.set(entry, [[], []]);
+      const [moments, values] = this.values.get(entry);
+      moments.push(moment);
+      values.push(frame.table[i]);
+    }
+    for (let i = 0; i < frame.acts.length; i++) {
+      const event = frame.acts[i] >> 4;
+      if (event !== PICKED_UP && event !== DELIVERED) continue;
+      this.events.push({
+        moment, kind: event, ant: before.numbers[i], cell: before.cells[i],
+      });
+    }
+    return frame;
+  }
+
+  read(bytes) {
+    const view = ArrayBuffer.isView(bytes) ? bytes : new Uint8Array(bytes);
+    const lengths = new Uint32Array(view.buffer, view.byteOffset, 1 + this.names.length);
+    const frame = {};
+    let at = view.byteOffset + this.headBytes;
+    this.names.forEach((name, i) => {
+      frame[name] = new this.kinds[i](view.buffer, at, lengths[i + 1]);
+      at += 8 * Math.ceil(frame[name].byteLength / 8);
+    });
+    CLOCK.forEach((name, i) => (frame[name] = frame.clock[i]));
+    return frame;
+  }
+
+  /* The world at a moment: {ground, trail}, levels of the trail. Good until the next call. */
+  worldAt(moment) {
+    const world = this.world;
+    if (moment < world.moment || moment > world.moment + this.keepEvery) {
+      let from = null;
+      for (const copy of this.kept) if (copy.moment <= moment) from = copy;
+      if (from && (moment < world.moment || from.moment > world.moment)) {
+        world.moment = from.moment;
+        world.ground.set(from.ground);
+        world.trail.set(from.trail);
+      } else if (moment < world.moment) {
+        world.moment = -1;
+        world.ground.fill(0);
+        world.trail.fill(0);
+      }
+    }
+    while (world.moment < moment) this.step();
+    return world;
+  }
+
+  step() {
+    const world = this.world, frame = this.frames[world.moment + 1];
+    this.fall(frame.passed);
+    frame.ground_at.forEach((cell, i) => (world.ground[cell] = frame.ground[i]));
+    frame.trail_at.forEach((cell, i) => (world.trail[cell] = frame.trail[i]));
+    world.moment++;
+    const last = this.kept[this.kept.length - 1];
+    if (world.moment >= (last ? last.moment + this.keepEvery : 0)) {
+      this.kept.push({ moment: world.moment, ground: world.ground.slice(), trail: world.trail.slice() });
+      if (this.kept.length > this.mostKept) {
+        this.kept = this.kept.filter((_, i) => i % 2 === 0);
+        this.keepEvery *= 2;
+      }
+    }
+  }
+
+  /* Let trails fall for some ticks, to the same bits as `fallen` in recorder.py. */
+  fall(ticks) {
+    const { evaporation, decay, share } = this.header.trail;
+    const trail = this.world.trail, n = trail.length;
+    if (evaporation === "linear" && share === 0) {
+      for (let i = 0; i < n && ticks > 0; i++) if (trail[i] > 0) trail[i] = Math.max(trail[i] - ticks, 0);
+      return;
+    }
+    for (let tick = 0; tick < ticks; tick++) {
+      if (evaporation === "linear") {
+        for (let i = 0; i < n; i++) if (trail[i] > 0) trail[i] = Math.max(Math.fround(trail[i] - 1), 0);
+      } else if (evaporation === "exponential") {
+        for (let i = 0; i < n; i++) {
+          if (trail[i] === 0) continue;
+          trail[i] *= decay;
+          if (trail[i] < 1) trail[i] = 0;
+        }
+      }
+      if (share > 0) this.diffuse(share);
+    }
+  }
+
+  diffuse(share) {
+    const { ground, trail } = this.world, round = Math.fround, offsets = this.grid.offsets;
+    const given = trail.map((level) => level * share);
+    const after = trail.slice();
+    for (let cell = 0; cell < trail.length; cell++) {
+      if (ground[cell] === OBSTACLE) continue;
+      let open = 0, received = 0;
+      for (const offset of offsets) {
+        if (ground[cell + offset] === OBSTACLE) continue;
+        open++;
+        received = round(received + given[cell + offset]);
+      }
+      if (trail[cell] === 0 && received === 0) continue;
+      const left = round(trail[cell] - round(given[cell] * open));
+      after[cell] = Math.max(round(left + received), 0);
+    }
+    trail.set(after);
+  }
+
+  /* Where an ant of a number stands in the lists of a frame, -1 if it does not live then. */
+  place(moment, number) {
+    const numbers = this.frames[moment]?.numbers ?? [];
+    if (numbers[number] === number) return number; // nobody has died yet
+    let low = 0, high = numbers.length - 1;
+    while (low <= high) {
+      const middle = (low + high) >> 1;
+      if (numbers[middle] === number) return middle;
+      if (numbers[middle] < number) low = middle + 1;
+      else high = middle - 1;
+    }
+    return -1;
+  }
+
+  /* An ant at a moment, with what it does next: null if it does not live then.
+
+     {number, cell, heading, loaded, state, values, act}; act is null if it is not known, else
+     {action, event, reward, why, ties, ahead, tdError, sharers, before, after, values}: why is
+     "best", "tie" (of so many) or "explored", by the values at the time of the choice, which is a
+     tick ago if it was made ahead; the TD error is the mean of so many sharers; before and after
+     are what the entry of the table was and is. */
+  ant(moment, number) {
+    const i = this.place(moment, number);
+    if (i < 0) return null;
+    const frame = this.frames[moment];
+    const ant = {
+      number, cell: frame.cells[i], heading: frame.poses[i] & 7, loaded: frame.poses[i] >> 3 === 1,
+      state: frame.states[i], values: this.row(moment, number, frame.states[i]), act: null,
+    };
+    const next = this.frames[moment + 1];
+    if (next && next.acts.length) ant.act = this.act(moment, i, ant);
+    return ant;
+  }
+
+  act(moment, i, ant) {
+    const { header } = this, frame = this.frames[moment], next = this.frames[moment + 1];
+    const action = next.acts[i] & 15, event = next.acts[i] >> 4;
+    // Some learners draw an action one tick ahead, by the values of that time.
+    const ahead = header.draws_ahead && frame.tick > 0 && frame.passed === 1;
+    const values = ahead ? this.row(moment - 1, ant.number, ant.state) : ant.values;
+    const best = Math.max(...values), ties = values.filter((value) => value === best).length;
+    const why = values[action] < best ? "explored" : ties > 1 ? "tie" : "best";
+    const after = this.row(moment + 1, ant.number, ant.state)[action];
+    const before = ant.values[action];
+    let sharers = 1;
+    if (header.learns && !header.own_tables) {
+      sharers = 0;
+      for (let k = 0; k < next.acts.length; k++) {
+        if (frame.states[k] === ant.state && (next.acts[k] & 15) === action) sharers++;
+      }
+    }
+    const tdError = next.td_errors.length ? next.td_errors[i] : NaN;
+    const reward = header.rewards[event];
+    return { action, event, reward, why, ties, ahead, tdError, sharers, before, after, values };
+  }
+
+  /* The five action values of a state as they stood at a moment. */
+  row(moment, number, state) {
+    const owner = this.header.own_tables ? number : 0;
+    const first = (owner * this.header.n_states + state) * N_ACTIONS;
+    return Array.from({ length: N_ACTIONS }, (_, action) => this.entry(moment, first + action));
+  }
+
+  entry(moment, entry) {
+    const [moments, values] = this.values.get(entry) ?? [[], []];
+    let low = 0, high = moments.length;
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (moments[middle] <= moment) low = middle + 1;
+      else high = middle;
+    }
+    return values[Math.max(low - 1, 0)] ?? 0;
+  }
+
+  /* The cells where an ant was, the latest first, back to the start of its episode or its birth. */
+  path(moment, number, most = 150) {
+    const cells = [], episode = this.frames[moment].episode;
+    for (let then = moment; then >= 0 && cells.length < most; then--) {
+      const i = this.frames[then].episode === episode ? this.place(then, number) : -1;
+      if (i < 0) break;
+      if (cells[cells.length - 1] !== this.frames[then].cells[i]) cells.push(this.frames[then].cells[i]);
+    }
+    return cells;
+  }
+
+  /* The task in a state's name, the rest of it, and the letters of the cells in view. */
+  stateName(state) {
+    const [task, rest, letters] = this.header.names[state] ?? ["", `state ${state}`, []];
+    return { task, rest, letters };
+  }
+
+  /* The cell that an ant turns to with a move, or where it takes or gives. */
+  target(ant, action) {
+    const { offsets } = this.grid;
+    const towards = (turn) => ant.cell + offsets[(ant.heading + turn + 6) % 6];
+    if (action < 3) return towards(action - 1);
+    const ground = this.world.ground, wanted = action === 3 ? FOOD : QUEEN;
+    const seen = [-1, 0, 1].map(towards).filter((cell) => ground[cell] === wanted);
+    return seen.length ? seen[0] : -1;
+  }
+
+  /* The ants that want to enter a cell, or what lies in it: [{number, action, event}]. */
+  wanting(moment, cell) {
+    const frame = this.frames[moment], next = this.frames[moment + 1], found = [];
+    if (!next || !next.acts.length) return found;
+    this.worldAt(moment);
+    for (const offset of this.grid.offsets) {
+      for (let i = 0; i < frame.cells.length; i++) {
+        if (frame.cells[i] !== cell + offset) continue;
+        const ant = { cell: frame.cells[i], heading: frame.poses[i] & 7 };
+        const action = next.acts[i] & 15, event = next.acts[i] >> 4;
+        if (this.target(ant, action) === cell) found.push({ number: frame.numbers[i], action, event });
+      }
+    }
+    return found;
+  }
+
+  /* The ants on a cell. */
+  antsOn(moment, cell) {
+    const { cells, numbers } = this.frames[moment];
+    return Array.from(numbers).filter((_, i) => cells[i] === cell);
+  }
+}

@@ -1,0 +1,87 @@
+"""The page: markup, style, script and a recording, put together into one file."""
+
+from __future__ import annotations
+
+import base64
+import html
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from taichi_ants import files
+from taichi_ants.engines.runs.traces import Trace
+from taichi_ants.errors import AntsError, expect
+from taichi_ants.rendering.writers import writable, write
+from taichi_ants.viewer.recording import Recording, record_colony, record_trace
+
+# The parts of one script, in this order: what a part uses stands in those before it.
+SCRIPTS = ("history.js", "stage.js", "panel.js", "timeline.js", "viewer.js")
+_NOTEBOOK_HEIGHT = 720  # pixels
+# Notebooks show what is larger as text: a page inside of them would be too slow, or too large.
+_MOST_CELLS, _MOST_ANTS, _MOST_STEPS = 200_000, 20_000, 10_000
+
+
+@cache
+def _text(name: str) -> str:
+    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
+
+
+def page(recording: Recording) -> str:
+    """The page that plays a recording, with all that it needs, as HTML."""
+    expect("recording", recording, Recording)
+    parts = {
+        "TITLE": html.escape(recording.header["title"]),
+        "STYLE": _text("viewer.css"),
+        "RECORDING": base64.b64encode(recording.to_bytes()).decode(),
+        "SCRIPT": "\n".join(map(_text, SCRIPTS)),
+    }
+    whole = _text("page.html")
+    for name, part in parts.items():
+        whole = whole.replace(f"<!-- {name} -->", part)
+    return whole
+
+
+def is_page(path: files.PathLike) -> bool:
+    """Whether a path is one of a page."""
+    return Path(path).suffix.lower() in (".html", ".htm")
+
+
+def check_page(path: files.PathLike) -> Path:
+    """Make sure, before the work begins, that a page can be written there.
+
+    Raises:
+        AntsError: The file does not end in .html, or cannot be written.
+    """
+    target = writable(path)
+    if not is_page(target):
+        raise AntsError(f"{str(path)!r} is to hold a page; give it a name that ends in .html.")
+    return target
+
+
+def save_page(path: files.PathLike, recording: Recording) -> None:
+    """Write the page that plays a recording; a file that exists is replaced.
+
+    Raises:
+        AntsError: The file does not end in .html, or cannot be written.
+    """
+    target = check_page(path)
+    write(target, page(recording).encode())
+
+
+def frame(recording: Recording) -> str:
+    """The page inside a frame, for notebooks."""
+    return (
+        f'<iframe title="{html.escape(recording.header["title"])}" width="100%" '
+        f'height="{_NOTEBOOK_HEIGHT}" style="border: 0" '
+        f'srcdoc="{html.escape(page(recording))}"></iframe>'
+    )
+
+
+def notebook(shown: Any) -> str | None:
+    """A trace or a colony as notebooks show it; None, which is text, if there is no page of it."""
+    if isinstance(shown, Trace):
+        small = shown.made is not None and len(shown) <= _MOST_STEPS
+        return frame(record_trace(shown)) if small else None
+    small = shown.grid.size <= _MOST_CELLS and shown.ants <= _MOST_ANTS
+    return frame(record_colony(shown)) if small else None

@@ -1,0 +1,208 @@
+/* What stands beside the world: the world now, the followed ant, the chosen cell, and the legend. */
+
+const HOLDS = { [EMPTY]: "nothing", [OBSTACLE]: "a rock", [FOOD]: "food", [QUEEN]: "the queen" };
+const CAME = ["enters an empty cell", "fails", "", "picks up food", "gives food to the queen"];
+const LETTERS = {
+  E: "empty", O: "obstacle", T: "trail", S: "nearer to the queen", F: "food", Q: "queen",
+};
+const HEXAGON = "M1 0 .5 .866-.5 .866-1 0-.5-.866 .5-.866z";
+const ICONS = {
+  before: '<path d="M12.5 4.5 7 10l5.5 5.5"/>', after: '<path d="M7.5 4.5 13 10l-5.5 5.5"/>',
+  close: '<path d="m5 5 10 10M15 5 5 15"/>',
+  aim: '<circle cx="10" cy="10" r="5"/><path d="M10 2v4M10 14v4M2 10h4M14 10h4"/>',
+};
+
+const byId = (id) => document.getElementById(id);
+const safe = (text) => String(text).replace(/[&<>"]/g, (letter) => `&#${letter.charCodeAt(0)};`);
+const signed = (number, digits) => (number > 0 ? "+" : "") + plain(number, digits);
+const plain = (number, digits = 2) => (Number(number.toFixed(digits)) + 0).toFixed(digits).replace("-", "−");
+const icon = (name) => `<svg viewBox="0 0 20 20" aria-hidden="true">${ICONS[name]}</svg>`;
+const button = (id, label, name, more = "") =>
+  `<button type="button" class="icon" id="${id}" aria-label="${label}" title="${label}" ${more}>${icon(name)}</button>`;
+
+/* Small changes in what a number is worth are told with more digits. */
+function digitsFor(a, b) {
+  const gap = Math.abs(a - b);
+  return gap === 0 || gap >= 0.01 ? 2 : Math.min(6, 1 - Math.floor(Math.log10(gap)));
+}
+
+class Panel {
+  constructor(history, stage, choose) {
+    this.history = history;
+    this.stage = stage;
+    this.choose = choose; // {follow(number), unfollow(), cell(cell), other(step), aim()}
+    byId("about").innerHTML = history.header.about
+      .map(([name, value]) => `<dt>${safe(name)}</dt><dd>${safe(value)}</dd>`).join("");
+    document.querySelector(".panel").addEventListener("click", (event) => {
+      const link = event.target.closest("[data-follow]");
+      if (link) choose.follow(Number(link.dataset.follow));
+      const pressed = event.target.closest("button")?.id;
+      if (pressed === "ant-before") choose.other(-1);
+      if (pressed === "ant-after") choose.other(1);
+      if (pressed === "ant-aim") choose.aim();
+      if (pressed === "ant-close") choose.unfollow();
+      if (pressed === "cell-close") choose.cell(-1);
+    });
+  }
+
+  show(moment, followed, cell, aims) {
+    // What had the focus before keeps it.
+    const focused = document.activeElement?.closest?.(".panel") ? document.activeElement.id : "";
+    this.showWorld(moment);
+    this.showAnt(moment, followed, aims);
+    this.showCell(moment, cell);
+    byId("hint").hidden = followed >= 0 || cell >= 0;
+    if (focused && document.activeElement?.id !== focused) byId(focused)?.focus();
+  }
+
+  showWorld(moment) {
+    const frame = this.history.frames[moment];
+    let loaded = 0;
+    for (const pose of frame.poses) loaded += pose >> 3;
+    const episodes = this.history.frames[this.history.length - 1].episode > this.history.frames[0].episode;
+    const facts = [
+      ...(episodes ? [["episode", frame.episode]] : []),
+      ["tick", frame.tick], ...(episodes && frame.ants === 1 ? [] : [["ants", frame.ants]]), ["with food", loaded],
+      ["delivered", frame.deliveries], ["return", plain(frame.returns, 0)],
+      ["epsilon", plain(frame.epsilon, frame.epsilon < 0.01 && frame.epsilon ? 4 : 2)],
+    ];
+    byId("now").innerHTML = facts.map(([name, value]) => `<div><dt>${name}</dt><dd>${value}</dd></div>`).join("");
+  }
+
+  showAnt(moment, followed, aims) {
+    const card = byId("ant");
+    card.hidden = followed < 0;
+    if (followed < 0) return;
+    const ant = this.history.ant(moment, followed);
+    const buttons = button("ant-before", "The ant before (P)", "before") + button("ant-after", "The next ant (N)", "after")
+      + button("ant-aim", "Keep it in the middle (F)", "aim", `aria-pressed="${aims}"`)
+      + button("ant-close", "Stop following (Esc)", "close");
+    const badge = ant ? ` <span class="badge ${ant.loaded ? "loaded" : ""}">${ant.loaded ? "with food" : "no food"}</span>` : "";
+    const head = `<div class="head"><h2>Ant ${followed}${badge}</h2>${buttons}</div>`;
+    card.innerHTML = head + (ant ? this.viewOf(ant) + this.barsOf(ant) + this.storyOf(ant) : "<p>It does not live now.</p>");
+  }
+
+  viewOf(ant) {
+    const { header, world } = this.history;
+    const { task, rest, letters } = this.history.stateName(ant.state);
+    const shapes = header.view.map((turn, i) => {
+      const angle = (turn * Math.PI) / 3, x = 1.732 * Math.sin(angle), y = -1.732 * Math.cos(angle);
+      const cell = ant.cell + this.history.grid.offsets[(ant.heading + turn + 6) % 6];
+      return `<g transform="translate(${x} ${y})">
+        <path d="${HEXAGON}" transform="scale(.93)" fill="${this.fillOf(cell, world)}"/>
+        <text font-size=".95" stroke="var(--halo)" stroke-width=".2" paint-order="stroke">${safe(letters[i] ?? "")}</text></g>`;
+    });
+    const kinds = [...new Set(letters.map((letter) => letter[0]))], known = kinds.filter((kind) => LETTERS[kind]);
+    const meanings = known.map((kind) => `${kind} ${LETTERS[kind]}`);
+    if (known.length < kinds.length || !kinds.length) meanings.push(header.letters);
+    const meaning = meanings.filter(Boolean).join(", ");
+    const around = header.view.some((turn) => Math.abs(turn) > 1);
+    const box = around ? "-2.9 -2.9 5.8 5.8" : "-2.6 -2.65 5.2 3.65";
+    return `<div class="sees"><svg viewBox="${box}" role="img" aria-label="It sees, from left to right: ${safe(rest)}">`
+      + `${shapes.join("")}<path d="${HEXAGON}" transform="scale(.93)" fill="none" stroke="var(--rule)" stroke-width=".07"/>`
+      + `${antShape(ant.loaded)}</svg><div><span class="label">state ${ant.state}</span><b>${safe(task)} ${safe(rest)}</b>`
+      + `<small>${safe(meaning)}</small></div></div>`;
+  }
+
+  fillOf(cell, world) {
+    const held = world.ground[cell];
+    if (held === FOOD) return "var(--food-floor)";
+    if (held === QUEEN) return "var(--queen-floor)";
+    if (held === OBSTACLE || !this.history.grid.exists(cell)) return "var(--rock)";
+    if (world.trail[cell] < 1) return "var(--empty)";
+    return `rgb(${this.stage.ramp[this.stage.trailColour(world.trail[cell])].join(" ")})`;
+  }
+
+  barsOf(ant) {
+    const values = ant.act?.values ?? ant.values;
+    const low = Math.min(0, ...values), high = Math.max(0, ...values), span = high - low || 1;
+    const share = (value) => (100 * (value - low)) / span;
+    const rows = this.history.header.actions.map((name, action) => {
+      const chosen = ant.act?.action === action ? "is-chosen" : "", value = values[action];
+      const [from, to] = [Math.min(0, value), Math.max(0, value)].map(share);
+      return `<span class="name ${chosen}">${chosen ? "▸ " : ""}${name}</span>
+        <span class="bar-of">
+          <span class="fill ${chosen}" style="left:${from}%;width:${Math.max(to - from, 0)}%"></span>
+          <span class="zero" style="left:${share(0)}%"></span>
+        </span>
+        <span class="value ${chosen}">${plain(value)}</span>`;
+    });
+    const when = ant.act?.ahead ? "action values when it chose, a tick ago" : "action values";
+    return `<span class="label">${when}</span><div class="bars">${rows.join("")}</div>`;
+  }
+
+  storyOf(ant) {
+    const { header } = this.history, act = ant.act;
+    if (!act) return '<div class="story"><span class="label">What it does next is not in the recording.</span></div>';
+    const why = { best: "the best", tie: `a tie of ${act.ties}`, explored: "explored" }[act.why];
+    const better = ant.loaded ? "comes nearer to the queen" : "enters a trail";
+    const came = act.event === FAILED && act.action < 3 ? "is blocked" : CAME[act.event] || better;
+    const action = header.actions[act.action], worth = { 1: "up", "-1": "down" }[Math.sign(act.reward)] ?? "";
+    const lines = [
+      `Chooses <b>${action}</b> <span class="why ${act.why}">${why}</span>`,
+      `It ${came}, reward <span class="reward ${worth}">${signed(act.reward, 0)}</span>`,
+    ];
+    if (header.learns) {
+      const digits = digitsFor(act.before, act.after), { task, rest } = this.history.stateName(ant.state);
+      if (!Number.isNaN(act.tdError)) {
+        const mean = act.sharers > 1 ? `, the mean of ${act.sharers} ants` : "";
+        lines.push(`TD error <code>${signed(act.tdError)}</code>${mean}`);
+      }
+      const [before, after] = [act.before, act.after].map((value) => plain(value, digits));
+      lines.push(`Q(${safe(`${task} ${rest}`.trim())}, ${action}) <code>${before} → ${after}</code>`);
+    }
+    return `<div class="story">${lines.map((line) => `<span>${line}</span>`).join("")}</div>`;
+  }
+
+  showCell(moment, cell) {
+    const card = byId("cell"), { history } = this;
+    card.hidden = cell < 0;
+    if (cell < 0) return;
+    const { ground, trail } = history.worldAt(moment), ants = history.antsOn(moment, cell);
+    const level = trail[cell];
+    const link = (number) => `<button type="button" class="link" data-follow="${number}">ant ${number}</button>`;
+    const wanting = history.wanting(moment, cell).map(({ number, action, event }) =>
+      `${link(number)} (${history.header.actions[action]}${event === FAILED ? ", in vain" : ""})`);
+    const lines = [
+      ["holds", ants.length ? ants.map(link).join(", ") : HOLDS[ground[cell]] ?? "?"],
+      ["trail", `${plain(level, Number.isInteger(level) ? 0 : 2)} of ${history.header.trail.strongest}`],
+      ["wanted by", wanting.join(", ") || "nobody"],
+    ];
+    card.innerHTML = `<div class="head"><h2>Cell (${history.grid.cube(cell).join(", ")})</h2>`
+      + `${button("cell-close", "Close", "close")}</div><dl class="list">`
+      + lines.map(([name, value]) => `<dt>${name}</dt><dd>${value}</dd>`).join("") + "</dl>";
+  }
+
+  /* One sentence for those who hear the page. */
+  sentence(moment, followed) {
+    const frame = this.history.frames[moment];
+    let said = `Tick ${frame.tick}, ${frame.deliveries} delivered.`;
+    const ant = followed >= 0 ? this.history.ant(moment, followed) : null;
+    if (!ant) return said;
+    const { task, rest } = this.history.stateName(ant.state);
+    said += ` Ant ${followed}: ${task} ${rest}.`;
+    if (ant.act) said += ` Chooses ${this.history.header.actions[ant.act.action]}, ${ant.act.why}, reward ${ant.act.reward}.`;
+    return said;
+  }
+
+  /* What the colours mean, in small. */
+  showLegend() {
+    const cell = (fill, more = "") =>
+      `<svg viewBox="-1.1 -1 2.2 2" aria-hidden="true"><path d="${HEXAGON}" fill="${fill}"/>${more}</svg>`;
+    const drawing = (name, outline) => `<path transform="scale(.72)" fill="var(--${name})" d="${outline}"/>`;
+    const samples = [0, 64, 128, 192, 255].map((i) => `rgb(${this.stage.ramp[i].join(" ")})`);
+    const bodies = [false, true].map((loaded) => `<svg viewBox="-1 -1 2 2" aria-hidden="true">${antShape(loaded)}</svg>`);
+    byId("legend").innerHTML = [
+      `${bodies[0]}ant`, `${bodies[1]}with food`, `${cell("var(--food-floor)", drawing("food", CRUMBS))}food`,
+      `${cell("var(--queen-floor)", drawing("queen", CROWN))}queen`, `${cell("var(--rock)")}rock`,
+      `<span class="ramp" style="background:linear-gradient(to right,${samples.join()})"></span>trail`,
+    ].map((item) => `<li>${item}</li>`).join("");
+  }
+}
+
+/* An ant that looks up, as part of an SVG. */
+function antShape(loaded) {
+  const half = `<path d="${LIMBS}" fill="none" stroke="var(--ant)" stroke-width=".07" stroke-linecap="round"/>`;
+  const crumb = loaded ? '<circle cy="-.7" r=".25" fill="var(--food)"/>' : "";
+  return `${half}<g transform="scale(-1 1)">${half}</g><path d="${BODY}" fill="var(--ant)"/>${crumb}`;
+}

@@ -1,0 +1,274 @@
+"""Records a colony while it runs: a frame for each moment, of what has changed since the last."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from taichi_ants import learners
+from taichi_ants.engines.colony.colony import Colony
+from taichi_ants.engines.colony.layout import AntRow, Stage
+from taichi_ants.engines.looks import is_percept
+from taichi_ants.errors import count, expect
+from taichi_ants.grid.constants import N_HEADINGS
+from taichi_ants.grid.randomness import GAMMA, choose, mix
+from taichi_ants.rendering.observed import name_parts
+from taichi_ants.task import Pheromone
+from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS, OBSTACLE
+from taichi_ants.viewer.frames import pack, types_of
+
+_MOST_NAMES = 4096  # of states that a header holds, seen or not
+
+
+class Recorder:
+    """Makes frames of one world of a colony: `moment` of how it is, `tick` while time passes.
+
+    Args:
+        colony: In an episode.
+        world: Which of its worlds.
+        title: What the page is called; "" for a name of the colony.
+        follow: The number of the ant that the page follows at first.
+
+    Raises:
+        AntsError: No episode has begun, or there is no such world.
+    """
+
+    def __init__(
+        self, colony: Colony, world: int = 0, title: str = "", follow: int | None = None
+    ) -> None:
+        expect("colony", colony, Colony)
+        expect("title", title, str)
+        self.colony, self.world, self._title, self._follow = colony, world, title, follow
+        start = colony.snapshot(world)
+        self.grid, self.observation = start.grid, colony.task.sees
+        self._size, self._n_states = self.grid.size, colony.task.n_states
+        self.types = types_of(self._size, self._n_states, colony.pheromone.dense)
+        self._state_row = AntRow.PERCEPT if is_percept(self.observation) else AntRow.STATE
+        self._learns = colony.sharing != "fixed"
+        learner = learners.get(colony.training.learner)
+        self._has_td_errors = learner.td_error is not None and not learner.plans
+        self._draws_ahead = self._learns and learner.draws_next_action
+        # What a page that has read all frames so far knows.
+        self._numbers = np.zeros(0, np.int32)
+        self._ground = np.zeros(self._size, np.uint8)
+        self._trail = np.zeros(self._size, start.trail.dtype)
+        owners = colony.capacity if colony.one_a_slot else 1
+        self._known = np.zeros(owners * self._n_states, bool)  # rows of tables
+        self._table = np.full((owners * self._n_states, N_ACTIONS), np.nan, np.float32)
+        self._owners = np.full(owners, -1 if colony.one_a_slot else 0)
+        self._fixed: np.ndarray | None = None  # the tables where nobody learns
+        if not self._learns:
+            self._fixed = self._tables()
+        self._clock = (-1, 0)
+
+    def header(self) -> dict[str, Any]:
+        """What all frames are about.
+
+        States have names as far as they have been seen, all of them if they are few: a task or "",
+        the rest of the name, and a letter or two for each cell in view where the name has them.
+        """
+        colony, task, pheromone = self.colony, self.colony.task, self.colony.pheromone
+        few = self._n_states <= _MOST_NAMES
+        seen = np.unique(np.flatnonzero(self._known) % self._n_states).tolist()
+        named = range(self._n_states) if few else seen
+        return {
+            "format": 1,
+            "title": self._title or f"{count(colony.ants, 'ant')} in a world of {self.grid.count}",
+            "ranges": list(self.grid.ranges),
+            "types": self.types,
+            "trail": {
+                "evaporation": pheromone.evaporation,
+                "decay": float(pheromone.decay),
+                "share": float(pheromone.share),
+                "strongest": int(task.pheromone.level),
+            },
+            "n_states": self._n_states,
+            "names": {state: name_parts(self.observation, state) for state in named},
+            "view": list(self.observation.cells),
+            "letters": self.observation.letters,
+            "actions": ACTION_NAMES,
+            "rewards": task.rewards.by_event().tolist(),
+            "learns": self._learns,
+            "own_tables": colony.one_a_slot,
+            "draws_ahead": self._draws_ahead,
+            "follow": self._follow,
+            "about": self._about(),
+        }
+
+    def _about(self) -> list[tuple[str, str]]:
+        """Lines about the colony, names and values."""
+        colony, config = self.colony, self.colony.training
+        x, y, z = self.grid.ranges
+        lines = [
+            ("world", f"{self.grid.count} cells, ranges {x}, {y}, {z}"),
+            ("ants", str(colony.ants)),
+            ("seed", str(colony.seeds[self.world])),
+            ("they see", f"{self.observation.name}, {self._n_states} states"),
+        ]
+        if not self._learns:
+            return [*lines, ("policy", "fixed"), ("epsilon", f"{colony.epsilon:g}")]
+        tables = "each has its own" if colony.one_a_slot else "one for all"
+        return [
+            *lines,
+            ("learner", config.learner),
+            ("table", tables),
+            ("learning rate", f"{config.learning_rate:g}"),
+            ("discount", f"{config.discount:g}"),
+        ]
+
+    def moment(self) -> bytes:
+        """A frame of the colony as it is now: the first one, or after it was changed by hand."""
+        return self._frame({})
+
+    def tick(self, n: int = 1, td_errors: np.ndarray | None = None) -> bytes:
+        """Let n ticks pass and return a frame; what ants did is in it only where n is 1.
+
+        Args:
+            n: At least 1.
+            td_errors: Of each ant, in the order of their numbers, if they are known.
+        """
+        if n > 1:
+            self.colony.tick(n)
+            return self._frame({})
+        ants, slots = self._living()
+        states, actions = ants[self._state_row, slots], self._choices(ants, slots)
+        numbers, before = ants[AntRow.NUMBER, slots], self._tables()
+        self.colony.tick()
+        # The dead have left their slots, but all is still written there.
+        columns = self._ants()
+        order = np.argsort(columns[AntRow.NUMBER], kind="stable")
+        places = order[np.searchsorted(columns[AntRow.NUMBER], numbers, sorter=order)]
+        acts = {"acts": actions + 16 * columns[AntRow.EVENT, places]}
+        if td_errors is None and self._learns:
+            td_errors = self._td_errors(before, slots, states, actions)
+        return self._frame(acts if td_errors is None else {**acts, "td_errors": td_errors})
+
+    def _ants(self) -> np.ndarray:
+        """The rows of `AntRow` of this world, (rows, slots)."""
+        slots = self.colony.capacity
+        return self.colony.arrays["ants"][:, self.world * slots : (self.world + 1) * slots]
+
+    def _living(self) -> tuple[np.ndarray, np.ndarray]:
+        """A copy of the rows, and the slots of the living ants in the order of their numbers."""
+        ants = self._ants().copy()
+        (slots,) = np.nonzero(ants[AntRow.STAGE] == Stage.LIVING)
+        return ants, slots[np.argsort(ants[AntRow.NUMBER, slots], kind="stable")]
+
+    def _tables(self) -> np.ndarray:
+        """The rows of all tables, float32 (owners * n_states, 5)."""
+        if self._fixed is not None:
+            return self._fixed
+        return self.colony.q_values[self.world].reshape(-1, N_ACTIONS)
+
+    def _rows(self, slots: np.ndarray, states: np.ndarray) -> np.ndarray:
+        """Where the states of ants stand in `_tables`."""
+        return slots * self._n_states + states if self.colony.one_a_slot else states
+
+    def _choices(self, ants: np.ndarray, slots: np.ndarray) -> np.ndarray:
+        """What the ants will do in the next tick: what is drawn already, or what they will draw.
+
+        Drawing is what `rules.policy.choose` does; their streams stay as they are.
+        """
+        streams = self.colony.arrays["streams"][self.world * self.colony.capacity + slots]
+        bits = mix(streams + np.uint64(GAMMA))
+        high, low = bits >> np.uint64(32), bits & np.uint64(0xFFFFFFFF)
+        values = self._tables()[self._rows(slots, ants[self._state_row, slots])]
+        best = values >= values.max(axis=1, initial=-np.inf, keepdims=True)
+        k = ((low * best.sum(axis=1).astype(np.uint64)) >> np.uint64(32)).astype(np.int64)
+        greedy = np.argsort(~best, axis=1, kind="stable")[np.arange(len(slots)), k]
+        explores = high < np.uint64(self.colony.epsilon * 2.0**32)
+        drawn = np.where(explores, choose(low, N_ACTIONS), greedy)
+        ready = ants[AntRow.ACTION, slots]
+        return np.where(ready >= 0, ready, drawn)
+
+    def _td_errors(
+        self, before: np.ndarray, slots: np.ndarray, states: np.ndarray, actions: np.ndarray
+    ) -> np.ndarray:
+        """The TD errors by which the values of the pairs moved, the mean of all ants of a pair.
+
+        NaN for learners that do more than one update a step.
+        """
+        if not self._has_td_errors:
+            return np.full(len(slots), np.nan)
+        pairs = self._rows(slots, states) * N_ACTIONS + actions
+        moved = self._tables().astype(np.float64).ravel()[pairs] - before.ravel()[pairs]
+        _, place, ants = np.unique(pairs, return_inverse=True, return_counts=True)
+        return moved / self.colony.arrays["weights"][ants[place]]
+
+    def _frame(self, sections: dict[str, Any]) -> bytes:
+        """What has changed since the last frame, with what the ants did."""
+        colony, snapshot = self.colony, self.colony.snapshot(self.world)
+        outcome, (ants, slots) = colony.outcome(), self._living()
+        numbers = ants[AntRow.NUMBER, slots]
+        if not np.array_equal(numbers, self._numbers):
+            sections["numbers"] = self._numbers = numbers
+        sections["cells"] = ants[AntRow.CELL, slots]
+        sections["poses"] = ants[AntRow.HEADING, slots] + 8 * ants[AntRow.CARRIES, slots]
+        sections["states"] = ants[self._state_row, slots]
+        tick = int(outcome.ticks[0, self.world])
+        totals = (outcome.deliveries[0, self.world], outcome.returns[0, self.world])
+        rates = (colony.epsilon, colony.learning_rate)
+        sections["clock"] = (colony.episode, tick, *totals, *rates, len(numbers))
+        # Trails fall by themselves; all else is told.
+        episode, last = self._clock
+        passed = tick - last if episode == colony.episode else 0
+        expected = fallen(self._trail, self._ground, colony.pheromone, self.grid.offsets, passed)
+        sections |= _changes("ground", self._ground, snapshot.ground)
+        sections |= _changes("trail", expected, snapshot.trail)
+        sections |= self._table_changes(slots, numbers, sections["states"])
+        self._ground, self._trail = snapshot.ground, snapshot.trail
+        self._clock = (colony.episode, tick)
+        return pack(self.types, sections)
+
+    def _table_changes(
+        self, slots: np.ndarray, numbers: np.ndarray, states: np.ndarray
+    ) -> dict[str, np.ndarray]:
+        """The action values of states that ants came into so far, where they have changed."""
+        if self.colony.one_a_slot:  # of the ant that lives there now
+            new = slots[self._owners[slots] != numbers]
+            self._owners[slots] = numbers
+            self._known.reshape(-1, self._n_states)[new] = False
+            self._table.reshape(len(self._owners), -1)[new] = np.nan
+        self._known[self._rows(slots, states)] = True
+        rows = np.flatnonzero(self._known)
+        values = self._tables()[rows]
+        row, action = np.nonzero(values != self._table[rows])
+        self._table[rows] = values
+        owner, state = np.divmod(rows[row], self._n_states)
+        places = (self._owners[owner] * self._n_states + state) * N_ACTIONS + action
+        return {"table_at": places, "table": values[row, action]}
+
+
+def fallen(
+    trail: np.ndarray, ground: np.ndarray, pheromone: Pheromone, offsets: np.ndarray, ticks: int
+) -> np.ndarray:
+    """What trails (size,) become in some ticks if nobody lays any; as in the engine.
+
+    Pages expect the same, to the bit.
+    """
+    for _ in range(ticks):
+        if pheromone.evaporation == "linear":
+            trail = np.maximum(trail - trail.dtype.type(1), 0)
+        elif pheromone.evaporation == "exponential":
+            trail = trail * pheromone.decay
+            trail[trail < 1] = 0
+        if pheromone.share > 0:
+            around = np.zeros_like(trail)
+            n_open = np.zeros_like(trail)
+            walls = ground == OBSTACLE
+            for heading in range(N_HEADINGS):
+                # The border of the array is void, so it does not matter that rolling wraps.
+                open_there = np.roll(~walls, -int(offsets[heading]))
+                n_open += open_there
+                there = np.roll(trail, -int(offsets[heading])) * pheromone.share
+                around += np.where(open_there, there, np.float32(0))
+            spread = np.maximum(trail - trail * pheromone.share * n_open + around, 0)
+            trail = np.where(walls, trail, spread)
+    return trail
+
+
+def _changes(name: str, old: np.ndarray, new: np.ndarray) -> dict[str, np.ndarray]:
+    """Where an array differs from what was expected, and what it holds there."""
+    places = np.flatnonzero(old != new)
+    return {f"{name}_at": places, name: new[places]}

@@ -1,0 +1,162 @@
+"""Recordings: what happened in a world, moment by moment, small enough for a page.
+
+All are made from a colony while it runs; an episode of one ant is played once more by a colony of
+one. A recording is a header, which says what it is about, and `frames`.
+"""
+
+from __future__ import annotations
+
+import json
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from taichi_ants.engines.colony.colony import Colony
+from taichi_ants.engines.runs.traces import Trace
+from taichi_ants.errors import AntsError, checked_whole, expect
+from taichi_ants.grid.constants import STREAM_ROLLOUT
+from taichi_ants.grid.randomness import stream_state
+from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.rendering.moments import Episode
+from taichi_ants.task import Task
+from taichi_ants.viewer.frames import split, unpack
+from taichi_ants.viewer.recorder import Recorder
+from taichi_ants.worlds.world import World
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What happened, as a page plays it.
+
+    Attributes:
+        header: What it is about, as JSON can hold it, see `Recorder.header`.
+        frames: The first moment, then what changed until each later one, see `frames`.
+    """
+
+    header: dict[str, Any]
+    frames: list[bytes]
+
+    def __len__(self) -> int:
+        """The number of moments."""
+        return len(self.frames)
+
+    def to_bytes(self) -> bytes:
+        """The recording, compressed; `from_bytes` reads it."""
+        header = json.dumps(self.header, separators=(",", ":")).encode()
+        header += b" " * (-(len(header) + 4) % 8)  # frames begin at a multiple of eight
+        length = np.array([len(header)], dtype="<u4").tobytes()
+        return zlib.compress(b"".join([length, header, *self.frames]), 9)
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> Recording:
+        """What `to_bytes` wrote."""
+        whole = zlib.decompress(data)
+        end = 4 + int(np.frombuffer(whole, "<u4", 1)[0])
+        return cls(json.loads(whole[4:end]), split(whole[end:]))
+
+    def sections(self, moment: int) -> dict[str, np.ndarray]:
+        """The sections of the frame of a moment."""
+        return unpack(self.header["types"], self.frames[moment])
+
+
+def record_colony(
+    colony: Colony,
+    ticks: int = 0,
+    every: int = 1,
+    *,
+    world: int = 0,
+    title: str = "",
+    follow: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Recording:
+    """What a colony does from now on; it is moved on by `ticks`.
+
+    Args:
+        colony: In an episode.
+        ticks: How many; 0 gives the moment as it is.
+        every: Ticks from one moment to the next; what each ant did is known only if it is 1.
+        world: Which of its worlds.
+        title: What the page is called.
+        follow: The number of the ant that the page follows at first.
+        progress: Called after each moment with the share of the work that is done.
+
+    Raises:
+        AntsError: A number is not allowed, or no episode has begun.
+    """
+    ticks = checked_whole("ticks", ticks, least=0)
+    every = checked_whole("every", every)
+    recorder = Recorder(colony, world, title, follow)
+    if follow is not None and not 0 <= follow < colony.ants and not colony.task.life.births:
+        raise AntsError(f"follow is {follow}; the {colony.ants} ants have numbers from 0.")
+    frames = [recorder.moment()]
+    for done in range(0, ticks, every):
+        frames.append(recorder.tick(min(every, ticks - done)))
+        if progress is not None:
+            progress(min(done + every, ticks) / ticks)
+    return Recording(recorder.header(), frames)
+
+
+def record_episode(episode: Episode, title: str = "") -> Recording:
+    """An episode in which one ant follows a policy."""
+    expect("episode", episode, Episode)
+    return _record_rollout(
+        *(episode.world, episode.task, episode.q_values, episode.epsilon),
+        *(episode.seed, 0, len(episode.trace), title),
+    )
+
+
+def record_trace(trace: Trace, title: str = "") -> Recording:
+    """A trace of `rollout` or `trace_training`, with its TD errors.
+
+    Raises:
+        AntsError: It is none of one policy, so nobody knows how to play it again.
+    """
+    expect("trace", trace, Trace)
+    made = trace.made
+    if made is None:
+        raise AntsError(
+            "the trace does not say how it was made, so it cannot be played again; take one of "
+            "rollout or trace_training."
+        )
+    if made.config is None:
+        return _record_rollout(
+            *(made.world, made.task, made.q_values, made.epsilon),
+            *(made.seed, made.number, len(trace), title),
+        )
+    # A colony of one ant with a table of its own learns as it did.
+    options: dict[str, Any] = {"sharing": "own", "ends_at_delivery": True}
+    colony = Colony(made.world, made.task, made.config, made.seed, 1, **options)
+    recorder, frames = None, []
+    errors = np.zeros(len(trace)) if trace.td_errors is None else trace.td_errors
+    for step, error in zip(trace.steps.tolist(), errors.tolist(), strict=True):
+        if step == 0:
+            if recorder is not None:
+                colony.end_episode()
+            colony.begin_episode(made.max_steps)
+            recorder = recorder or Recorder(colony, 0, title, 0)
+            frames.append(recorder.moment())
+        assert recorder is not None  # the first step is number 0
+        frames.append(recorder.tick(td_errors=np.array([error])))
+    assert recorder is not None
+    return Recording(recorder.header(), frames)
+
+
+def _record_rollout(
+    world: World,
+    task: Task,
+    q_values: np.ndarray | None,
+    epsilon: float,
+    seed: int,
+    number: int,
+    n: int,
+    title: str,
+) -> Recording:
+    """n ticks of one ant, played again by a colony of one, which has the same random stream."""
+    steady = TrainingConfig("q_learning", 1.0, 0.0, epsilon, 1.0, min_epsilon=0.0)
+    colony = Colony(world, task, steady, seed, sharing="fixed", q_values=q_values)
+    colony.begin_episode()
+    colony.arrays["streams"][0] = stream_state(seed, STREAM_ROLLOUT, number)
+    return record_colony(colony, n, title=title or "One ant that follows a policy", follow=0)

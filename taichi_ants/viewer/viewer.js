@@ -1,0 +1,307 @@
+/* The page: a source of frames, and what people do with mouse, fingers and keys. */
+
+const KEYS = [
+  ["Space", "play or pause"],
+  ["← →", "a tick back or on; ten with Shift"],
+  ["Home End", "to the start, to the end"],
+  ["↑ ↓", "faster, slower"],
+  ["E", "to the next pick-up or delivery; with Shift to the one before"],
+  ["N P", "follow the next ant, the one before"],
+  ["F", "keep the followed ant in the middle"],
+  ["+ −", "zoom in, zoom out"],
+  ["W A S D", "move the view"],
+  ["0", "the whole world"],
+  ["U I O J K L", "move the cell cursor to one of its six neighbours"],
+  ["Enter", "follow the ant at the cursor (when the world has the focus)"],
+  ["T", "light or dark"],
+  ["Esc", "stop following, close"],
+  ["?", "this help"],
+];
+const CURSOR = { u: 5, i: 0, o: 1, j: 4, k: 3, l: 2 }; // headings, as the keys lie
+const PANEL_EVERY = 80; // milliseconds, while playing
+
+class Viewer {
+  constructor(source) {
+    this.source = source;
+    this.history = new History(source.header);
+    this.history.live = source.live;
+    this.followed = -1;
+    this.cell = -1;
+    this.cursor = false; // whether the chosen cell is the one of the keyboard
+    this.aims = false;
+    this.dirty = true;
+    this.frames = 0; // drawn so far, for measurements
+    this.lastPanel = -Infinity;
+    this.still = matchMedia("(prefers-reduced-motion: reduce)");
+    source.start((bytes) => this.receive(bytes));
+  }
+
+  receive(bytes) {
+    this.history.add(bytes);
+    this.dirty = true;
+  }
+
+  /* Build the page around the frames that are there; at least one is. */
+  open() {
+    const { header } = this.history;
+    document.title = byId("title").textContent = header.title;
+    byId("subtitle").textContent = header.about.map(([name, value]) => `${name}: ${value}`).slice(0, 3).join(" · ");
+    document.body.classList.toggle("single", this.history.length === 1 && !this.source.live);
+    this.player = new Player(this.history, () => (this.dirty = true));
+    this.stage = new Stage(byId("world"), byId("marks"), this.history);
+    this.panel = new Panel(this.history, this.stage, {
+      follow: (number) => this.follow(number), unfollow: () => this.follow(-1),
+      cell: (cell) => this.chooseCell(cell), other: (step) => this.followOther(step), aim: () => this.toggleAim(),
+    });
+    this.timeline = new Timeline(this.history, this.player);
+    byId("hint").textContent = "Click an ant to follow it, or a cell to look at it. Press ? for all keys.";
+    byId("keys").innerHTML = KEYS.map(([keys, does]) =>
+      `<dt>${keys.split(" ").map((key) => `<kbd>${key}</kbd>`).join(" ")}</dt><dd>${does}</dd>`).join("");
+    this.listen();
+    this.setTheme(this.storedTheme());
+    this.stage.resize();
+    if (header.follow !== null) this.follow(header.follow);
+    requestAnimationFrame((now) => this.tick(now));
+  }
+
+  tick(now) {
+    const passed = (now - (this.before ?? now)) / 1000;
+    this.before = now;
+    const moved = this.player.pass(passed);
+    if (moved || this.dirty) this.draw(now, moved);
+    requestAnimationFrame((later) => this.tick(later));
+  }
+
+  draw(now, moved) {
+    this.dirty = false;
+    const { player, history, stage, followed } = this, moment = player.moment;
+    const smooth = player.playing && player.speed <= SMOOTH_BELOW && !this.still.matches;
+    const share = smooth ? player.share : 0;
+    const ant = followed >= 0 ? history.ant(moment, followed) : null;
+    const next = ant && moment < player.last && history.frames[moment + 1].passed === 1 ? history.ant(moment + 1, followed) : null;
+    if (ant && this.aims) this.aimAt(ant, next, share);
+    stage.draw(moment, share, {
+      ant, next, cell: this.cell, cursor: this.cursor,
+      path: ant ? history.path(moment, followed) : [],
+      letters: ant ? history.stateName(ant.state).letters : [],
+    });
+    this.frames++;
+    // The text need not change sixty times a second.
+    if (moved && player.playing && now - this.lastPanel < PANEL_EVERY) {
+      this.dirty = true;
+      return;
+    }
+    this.lastPanel = now;
+    history.worldAt(moment);
+    this.panel.show(moment, followed, this.cell, this.aims);
+    this.timeline.show();
+    if (!player.playing) {
+      const said = this.panel.sentence(moment, followed);
+      if (byId("spoken").textContent !== said) byId("spoken").textContent = said;
+    }
+  }
+
+  aimAt(ant, next, share) {
+    const [x0, y0] = this.history.grid.centre(ant.cell), [x1, y1] = this.history.grid.centre((next ?? ant).cell);
+    this.stage.camera.x = x0 + share * (x1 - x0);
+    this.stage.camera.y = y0 + share * (y1 - y0);
+    this.stage.fitted = false;
+  }
+
+  follow(number) {
+    this.followed = number;
+    if (number >= 0) this.cell = -1;
+    else this.aims = false;
+    this.dirty = true;
+  }
+
+  followOther(step) {
+    const { numbers } = this.history.frames[this.player.moment];
+    if (!numbers.length) return;
+    const at = this.history.place(this.player.moment, this.followed);
+    const from = at < 0 && step < 0 ? 0 : at;
+    this.follow(numbers[(from + step + numbers.length) % numbers.length]);
+  }
+
+  toggleAim() {
+    this.aims = !this.aims && this.followed >= 0;
+    if (this.aims && this.stage.camera.scale < 16) this.stage.camera.scale = 16;
+    this.dirty = true;
+  }
+
+  chooseCell(cell, cursor = false) {
+    this.cell = cell;
+    this.cursor = cursor;
+    this.dirty = true;
+  }
+
+  /* The ant nearest to a point of the page, if it is near enough for a finger; else the cell. */
+  chooseAt(x, y) {
+    const { numbers, cells } = this.history.frames[this.player.moment], { stage, history } = this;
+    let nearest = -1, least = Math.max(0.85 * stage.camera.scale, 9);
+    for (let i = 0; i < cells.length; i++) {
+      const [ax, ay] = stage.toPage(history.grid.centre(cells[i])), away = Math.hypot(ax - x, ay - y);
+      if (away < least) [nearest, least] = [numbers[i], away];
+    }
+    if (nearest >= 0) this.follow(nearest);
+    else this.chooseCell(stage.cellAt(x, y));
+  }
+
+  moveCursor(heading) {
+    const { history, stage } = this, { grid } = history;
+    const followed = this.followed >= 0 ? history.ant(this.player.moment, this.followed) : null;
+    const middle = stage.cellAt(stage.width / 2, stage.height / 2);
+    const from = this.cell >= 0 ? this.cell : followed ? followed.cell : middle;
+    if (from < 0) return;
+    const to = this.cell >= 0 ? from + grid.offsets[heading] : from;
+    if (grid.exists(to)) this.chooseCell(to, true);
+    const [x, y] = stage.toPage(grid.centre(this.cell));
+    const out = (place, size) => Math.min(place - 40, 0) + Math.max(place - size + 40, 0);
+    stage.pan(-out(x, stage.width), -out(y, stage.height));
+  }
+
+  nextEvent(step) {
+    const { events } = this.history, moment = this.player.moment;
+    const found = step > 0 ? events.find((one) => one.moment - 1 > moment) : events.findLast((one) => one.moment - 1 < moment);
+    if (!found) return;
+    this.player.pause();
+    this.player.go(found.moment - 1); // before it happens, so that one sees why
+    if (this.history.frames[moment].ants > 1 || this.followed < 0) this.follow(found.ant);
+  }
+
+  storedTheme() {
+    try {
+      return localStorage.getItem("taichi-ants-theme") ?? "";
+    } catch {
+      return ""; // no storage in a frame of a notebook, or from a file
+    }
+  }
+
+  /* "light", "dark", or "" for what the system wants. */
+  setTheme(theme) {
+    this.theme = theme;
+    const dark = theme ? theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
+    document.documentElement.dataset.theme = dark ? "dark" : "light";
+    byId("theme").setAttribute("aria-label", `Theme: ${theme || "as the system's"}`);
+    this.stage.readColours();
+    this.panel.showLegend();
+    this.dirty = true;
+  }
+
+  switchTheme() {
+    const dark = document.documentElement.dataset.theme === "dark";
+    this.setTheme(dark ? "light" : "dark");
+    try {
+      localStorage.setItem("taichi-ants-theme", this.theme);
+    } catch {
+      // It lasts as long as the page.
+    }
+  }
+
+  listen() {
+    const { stage } = this, world = byId("world"), help = byId("help");
+    const change = (act) => () => {
+      act();
+      this.dirty = true;
+    };
+    // Drawn at once: a canvas is empty after its size has changed.
+    new ResizeObserver(() => stage.resize() && this.draw(performance.now(), false)).observe(world);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.setTheme(this.theme));
+    byId("zoom-in").addEventListener("click", change(() => stage.zoom(1.4)));
+    byId("zoom-out").addEventListener("click", change(() => stage.zoom(1 / 1.4)));
+    byId("fit").addEventListener("click", change(() => stage.fit()));
+    byId("theme").addEventListener("click", () => this.switchTheme());
+    byId("help-button").addEventListener("click", () => help.showModal());
+    help.addEventListener("click", (event) => event.target === help && help.close());
+    document.addEventListener("keydown", (event) => this.key(event));
+    this.listenToPointers(world);
+  }
+
+  listenToPointers(world) {
+    const held = new Map(); // the fingers, or the mouse, that are down
+    let moved = 0;
+    const place = (event) => {
+      const box = world.getBoundingClientRect();
+      return [event.clientX - box.left, event.clientY - box.top];
+    };
+    world.addEventListener("pointerdown", (event) => {
+      world.setPointerCapture(event.pointerId);
+      held.set(event.pointerId, place(event));
+      if (held.size === 1) moved = 0;
+    });
+    world.addEventListener("pointermove", (event) => {
+      if (!held.has(event.pointerId)) return;
+      const [x, y] = place(event), [x0, y0] = held.get(event.pointerId);
+      moved += Math.hypot(x - x0, y - y0);
+      if (moved < 5 && held.size === 1) return;
+      if (held.size === 2) {
+        moved = Infinity;
+        const [, other] = [...held].find(([id]) => id !== event.pointerId);
+        const apart = Math.hypot(x - other[0], y - other[1]), before = Math.hypot(x0 - other[0], y0 - other[1]);
+        this.stage.pan((x - x0) / 2, (y - y0) / 2);
+        this.stage.zoom(apart / Math.max(before, 1), (x + other[0]) / 2, (y + other[1]) / 2);
+      } else if (held.size === 1) {
+        this.aims = false;
+        this.stage.pan(x - x0, y - y0);
+      }
+      held.set(event.pointerId, [x, y]);
+      this.dirty = true;
+    });
+    world.addEventListener("pointerup", (event) => {
+      if (held.delete(event.pointerId) && moved < 5 && held.size === 0) this.chooseAt(...place(event));
+    });
+    world.addEventListener("pointercancel", (event) => held.delete(event.pointerId));
+    world.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      const turned = event.deltaY * (event.deltaMode === 1 ? 16 : 1);
+      this.stage.zoom(Math.exp(-Math.min(Math.max(turned, -200), 200) / 400), ...place(event));
+      this.dirty = true;
+    }, { passive: false });
+  }
+
+  key(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey || byId("help").open) return;
+    const { player, timeline, stage } = this, inside = event.target;
+    const slider = inside.type === "range", pressable = inside.closest?.("button, summary, a");
+    const times = event.shiftKey ? 10 : 1, key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+    const acts = {
+      " ": () => (player.playing ? player.pause() : player.play()),
+      ArrowLeft: () => player.step(-times), ArrowRight: () => player.step(times),
+      ArrowUp: () => timeline.setSpeed(player.speed * 1.25), ArrowDown: () => timeline.setSpeed(player.speed / 1.25),
+      Home: () => player.step(-Infinity), End: () => player.step(Infinity),
+      e: () => this.nextEvent(event.shiftKey ? -1 : 1),
+      n: () => this.followOther(1), p: () => this.followOther(-1), f: () => this.toggleAim(),
+      "+": () => stage.zoom(1.25), "=": () => stage.zoom(1.25), "-": () => stage.zoom(0.8), 0: () => stage.fit(),
+      w: () => stage.pan(0, 60), a: () => stage.pan(60, 0), s: () => stage.pan(0, -60), d: () => stage.pan(-60, 0),
+      Enter: () => this.enter(), t: () => this.switchTheme(), "?": () => byId("help").showModal(),
+      Escape: () => (this.cell >= 0 ? this.chooseCell(-1) : this.follow(-1)),
+    };
+    for (const [letter, heading] of Object.entries(CURSOR)) acts[letter] = () => this.moveCursor(heading);
+    // Sliders keep the keys that move them, buttons the keys that press them.
+    if (slider && /^(Arrow|Home|End|Page)/.test(event.key)) return;
+    if (pressable && (event.key === "Enter" || event.key === " ")) return;
+    if (event.key === "Enter" && inside.id !== "world") return;
+    if (!acts[key]) return;
+    event.preventDefault();
+    acts[key]();
+    this.dirty = true;
+  }
+
+  enter() {
+    if (this.cell < 0) return;
+    const [number] = this.history.antsOn(this.player.moment, this.cell);
+    if (number !== undefined) this.follow(number);
+  }
+}
+
+/* Show a source; the page's own recording if it holds one. For tests and for those who look inside,
+   the viewer is `window.viewer`, once it is ready. */
+function show(source) {
+  const viewer = new Viewer(source);
+  viewer.open();
+  window.viewer = viewer;
+}
+
+if (byId("recording").textContent.trim()) {
+  recordingIn(byId("recording").textContent).then(show);
+}

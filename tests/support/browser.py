@@ -1,0 +1,89 @@
+"""A real Chromium without a display, for tests of pages."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
+
+
+def chromium() -> str | None:
+    """Where the browser is: that of the variable CHROMIUM, or one on the path."""
+    return os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, _NAMES)), None)
+
+
+@contextmanager
+def started() -> Iterator[Any]:
+    """A browser of Playwright's; the test is skipped where there is none."""
+    path = chromium()
+    if path is None:
+        pytest.skip("there is no Chromium here; install the package chromium")
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    with playwright.sync_playwright() as driver:
+        # As root it has no sandbox; and no machine of a test has a graphics processor.
+        browser = driver.chromium.launch(
+            executable_path=path, args=["--no-sandbox", "--disable-gpu"]
+        )
+        yield browser
+        browser.close()
+
+
+class Page:
+    """A page that was opened from a file, and what went wrong on it."""
+
+    def __init__(self, browser: Any, path: Path, size: tuple[int, int] = (1280, 720), **options):
+        width, height = size
+        # The page allows no evaluation of text, which is how Playwright waits.
+        usual = {"viewport": {"width": width, "height": height}, "offline": True}
+        self.context = browser.new_context(**usual, bypass_csp=True, **options)
+        self.tab = self.context.new_page()
+        self.faults: list[str] = []
+        self.tab.on("console", lambda message: self.faults.append(message.text))
+        self.tab.on("pageerror", lambda error: self.faults.append(str(error)))
+        self.tab.goto(path.as_uri())
+        self.tab.wait_for_function("window.viewer")
+        self.settle()
+
+    def settle(self) -> None:
+        """Wait until all is drawn."""
+        self.tab.wait_for_function("!viewer.dirty && !viewer.player.playing")
+
+    def read(self, script: str, argument: Any = None) -> Any:
+        """What a script gives."""
+        return self.tab.evaluate(script, argument)
+
+    def text(self, selector: str) -> str:
+        """The text that one sees, in one line."""
+        self.settle()
+        return " ".join(self.tab.inner_text(selector).split())
+
+    def press(self, *keys: str) -> None:
+        for key in keys:
+            self.tab.keyboard.press(key)
+        self.settle()
+
+    def click(self, selector: str) -> None:
+        self.tab.click(selector)
+        self.settle()
+
+    def click_cell(self, cell: int) -> None:
+        """Click the middle of a cell."""
+        x, y = self.read("cell => viewer.stage.toPage(viewer.history.grid.centre(cell))", cell)
+        box = self.tab.locator("#world").bounding_box()
+        self.tab.mouse.click(box["x"] + x, box["y"] + y)
+        self.settle()
+
+    @property
+    def moment(self) -> int:
+        return self.read("viewer.player.moment")
+
+    def close(self) -> None:
+        self.context.close()
+        assert not self.faults

@@ -1,0 +1,82 @@
+"""Plays recordings in Python: the world at each moment, from the frames alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from taichi_ants.grid.hexgrid import AxialGrid
+from taichi_ants.task import Pheromone
+from taichi_ants.task.constants import N_ACTIONS
+from taichi_ants.viewer import Recording
+from taichi_ants.viewer.recorder import fallen
+
+
+@dataclass
+class Played:
+    """The world at a moment, and what the ants of the moment before have done since.
+
+    Attributes:
+        clock: Episode, tick, deliveries, return, epsilon, learning rate, number of ants.
+        numbers, cells, headings, loaded, states: Of the living ants, by ascending number.
+        actions, events, td_errors: Of the ants of the moment before.
+        ground, trail: Of all cells.
+        values: Changed action values, by entry.
+    """
+
+    clock: list[float]
+    numbers: np.ndarray
+    cells: np.ndarray
+    headings: np.ndarray
+    loaded: np.ndarray
+    states: np.ndarray
+    actions: np.ndarray
+    events: np.ndarray
+    td_errors: np.ndarray
+    ground: np.ndarray
+    trail: np.ndarray
+    values: dict[int, float] = field(default_factory=dict)
+
+    def row(self, state: int, n_states: int, owner: int = 0) -> np.ndarray:
+        """The action values of a state, float32 (5,)."""
+        first = (owner * n_states + state) * N_ACTIONS
+        return np.array([self.values[first + a] for a in range(N_ACTIONS)], np.float32)
+
+
+def played(recording: Recording, pheromone: Pheromone) -> Iterator[Played]:
+    """Every moment of a recording of a world with that pheromone."""
+    grid = AxialGrid(tuple(recording.header["ranges"]))
+    ground = np.zeros(grid.size, np.uint8)
+    trail = np.zeros(grid.size, recording.sections(0)["trail"].dtype)
+    values: dict[int, float] = {}
+    numbers, last = np.zeros(0, np.int32), (-1.0, 0.0)
+    for moment in range(len(recording)):
+        frame = recording.sections(moment)
+        clock = frame["clock"].tolist()
+        passed = clock[1] - last[1] if clock[0] == last[0] else 0
+        last = (clock[0], clock[1])
+        trail = fallen(trail, ground, pheromone, grid.offsets, int(passed)).copy()
+        ground[frame["ground_at"]] = frame["ground"]
+        trail[frame["trail_at"]] = frame["trail"]
+        entries = frame["table_at"].astype(np.int64).tolist()
+        values |= dict(zip(entries, frame["table"].tolist(), strict=True))
+        if len(frame["numbers"]):
+            numbers = frame["numbers"]
+        if not clock[6]:
+            numbers = numbers[:0]
+        yield Played(
+            clock,
+            numbers,
+            frame["cells"],
+            frame["poses"] & 7,
+            frame["poses"] >> 3 == 1,
+            frame["states"],
+            frame["acts"] & 15,
+            frame["acts"] >> 4,
+            frame["td_errors"],
+            ground.copy(),
+            trail,
+            dict(values),
+        )

@@ -1,0 +1,146 @@
+"""Pages as files: their size, that they need nothing else, and where they come from."""
+
+from __future__ import annotations
+
+import html
+import re
+
+import numpy as np
+import pytest
+
+from taichi_ants import AntsError, Colony, TrainingConfig, rollout, task, worlds
+from taichi_ants.commands import render
+from taichi_ants.learners.policies import save_policy, trail_follower
+from taichi_ants.rendering import Episode, colours
+from taichi_ants.viewer import page, record_colony, record_episode, save_page
+from taichi_ants.viewer.page import _text
+
+TITLE = 'An <ant> & its "trail"'
+
+
+@pytest.fixture(scope="module")
+def episode():
+    return record_episode(Episode.play(worlds.paper(), trail_follower()), TITLE)
+
+
+def test_the_papers_episode_takes_less_than_300_kilobytes(episode):
+    assert len(page(episode).encode()) < 150_000
+
+
+def test_eighty_ants_that_learn_for_400_ticks_take_less_than_3_megabytes():
+    config = TrainingConfig("q_learning", 0.1, 0.9, 0.2, 1.0)
+    rules = task.Task(evaporation_in_training=True)
+    colony = Colony(worlds.open_world(1), rules, config, ants=80)
+    colony.begin_episode()
+    content = page(record_colony(colony, 400)).encode()
+    assert len(content) < 1_000_000
+
+
+def test_a_page_asks_for_nothing_else(episode):
+    content = page(episode)
+    assert "<!-- " not in content
+    assert not re.findall(
+        r"https?://|@import|url\(|<link(?! rel=\"icon\" href=\"data:,\")", content
+    )
+    assert re.findall(r'\b(?:src|href)="([^"]*)"', content) == ["data:,"]
+    assert "<title>An &lt;ant&gt; &amp; its &quot;trail&quot;</title>" in content
+
+
+def test_light_colours_are_those_of_the_pictures():
+    light = dict(re.findall(r"--([a-z-]+): ([^;]+);", _text("viewer.css").split("}")[0]))
+    named = {
+        "page": colours.PAGE,
+        "empty": colours.CELL_EMPTY,
+        "rock": colours.CELL_OBSTACLE,
+        "food": colours.CELL_FOOD,
+        "queen": colours.CELL_QUEEN,
+        "food-floor": colours.FLOOR_FOOD,
+        "queen-floor": colours.FLOOR_QUEEN,
+        "ant": colours.ANT,
+        "ink": colours.INK,
+        "rule": colours.RULE,
+        "chosen": colours.CHOSEN,
+    }
+    assert {name: light[name] for name in named} == {k: f"#{v:06x}" for k, v in named.items()}
+    ends = [int(colour[1:], 16) for colour in light["trail"].split()]
+    assert [ends[0], ends[-1]] == colours.TRAIL_RAMP[[0, -1]].tolist()
+
+
+def luminance(colour: str) -> float:
+    """As the contrast of WCAG 2 has it."""
+    parts = np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)]) / 255
+    linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
+    return float(linear @ (0.2126, 0.7152, 0.0722))
+
+
+@pytest.mark.parametrize("theme", [0, 1])
+def test_text_can_be_read_and_ants_stand_out(theme):
+    values = dict(re.findall(r"--([a-z-]+): ([^;]+);", _text("viewer.css").split("}")[theme]))
+
+    def contrast(one: str, other: str) -> float:
+        high, low = sorted([luminance(one), luminance(other)], reverse=True)
+        return (high + 0.05) / (low + 0.05)
+
+    for ink in ("ink", "faint", "chosen", "good", "bad"):
+        assert contrast(values[ink], values["card"]) > 4.5, ink
+    for cell in (values["empty"], *values["trail"].split()):
+        # Where the trail comes near the colour of ants, the edge around them sets them apart.
+        assert max(contrast(values[name], cell) for name in ("ant", "halo")) > 3
+    levels = [luminance(colour) for colour in values["trail"].split()]
+    assert levels == sorted(levels, reverse=theme == 0)
+
+
+def test_notebooks_show_traces_and_colonies():
+    trace = rollout(worlds.paper(), trail_follower())
+    shown = trace._repr_html_()
+    assert shown.startswith("<iframe ")
+    inner = html.unescape(re.search(r'srcdoc="([^"]*)"', shown)[1])
+    assert inner.startswith("<!doctype html>")
+    assert inner.endswith("</html>\n")
+    object.__setattr__(trace, "made", None)
+    assert trace._repr_html_() is None
+    config = TrainingConfig("q_learning", 0.1, 0.9, 0.2, 1.0)
+    colony = Colony(worlds.paper(), None, config, ants=3)
+    assert colony._repr_html_() is None
+    colony.begin_episode()
+    assert "<iframe " in colony._repr_html_()
+    assert colony.ticks == 0
+
+
+def test_the_command_writes_pages(tmp_path, capsys):
+    policy = tmp_path / "policy.npz"
+    save_policy(policy, trail_follower(), {})
+    ant, ants = tmp_path / "new" / "ant.html", tmp_path / "ants.HTML"
+    given = ["--policy", str(policy), "--out"]
+    for arguments in (
+        ["episode", *given, str(ant), "--title", "walks"],
+        ["colony", *given, str(ants), "--ants", "3", "--ticks", "9", "--follow", "2"],
+    ):
+        with pytest.raises(SystemExit) as done:
+            render.main(arguments)
+        assert done.value.code == 0
+    assert capsys.readouterr().out.startswith(f"{ant}: 34 steps, return 45, delivered\n")
+    assert "<title>walks</title>" in ant.read_text(encoding="utf-8")
+    assert ants.read_text(encoding="utf-8").endswith("</html>\n")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["episode", "--size", "300x300"], "--size is of pictures"),
+        (["colony", "--fps", "9"], "--fps is of pictures"),
+        (["episode", "--plain"], "--plain is of pictures"),
+    ],
+)
+def test_options_of_pictures_are_refused(arguments, message, capsys):
+    with pytest.raises(SystemExit):
+        render.parse_arguments([*arguments, "--out", "a.html"])
+    assert message in capsys.readouterr().err
+
+
+def test_pages_have_a_name_of_their_own(tmp_path, episode):
+    with pytest.raises(AntsError, match=r"ends in \.html"):
+        save_page(tmp_path / "a.txt", episode)
+    with pytest.raises(AntsError, match="cannot write"):
+        save_page("/proc/nope/a.html", episode)
+    assert list(tmp_path.iterdir()) == []

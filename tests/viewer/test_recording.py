@@ -1,0 +1,212 @@
+"""Recordings hold what the engine and the reference have, at every tick."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from playback import played
+from random_colonies import random_colony
+
+from taichi_ants import (
+    AntsError,
+    Colony,
+    Task,
+    TrainingConfig,
+    rollout,
+    trace_training,
+    worlds,
+)
+from taichi_ants.engines.colony.layout import AntRow, Stage
+from taichi_ants.learners.policies import trail_follower
+from taichi_ants.reference import ReferenceColony
+from taichi_ants.rendering import Episode
+from taichi_ants.task.constants import DELIVERED
+from taichi_ants.viewer import (
+    Recorder,
+    Recording,
+    record_colony,
+    record_episode,
+    record_trace,
+)
+
+# Each entry takes kernels of its own: learner, sharing, observation, dense, traffic.
+KERNELS = [
+    ("q_learning", "shared", "paper", False, "blocking"),
+    ("sarsa", "shared", "ants_seen", True, "blocking"),
+    ("sarsa", "own", "paper", False, "blocking"),
+    ("q_learning", "fixed", "queues", True, "following"),
+]
+TICKS = 40
+
+
+@pytest.mark.parametrize(("learner", "sharing", "sees", "dense", "traffic"), KERNELS)
+def test_a_recording_is_what_engine_and_reference_do(learner, sharing, sees, dense, traffic):
+    """While ants are born and die, food comes and goes, and trails fall and spread."""
+    for seed in range(4):
+        drawn = random_colony(
+            seed,
+            sharing=sharing,
+            learner=learner,
+            observation=sees,
+            dense=dense,
+            traffic=traffic,
+            changes=True,
+        )
+        rules = {**drawn.population, "sharing": drawn.sharing, "q_values": drawn.q_values}
+        given = (drawn.world, drawn.task, drawn.training, drawn.seed)
+        colony, plain = Colony(*given, **rules), ReferenceColony(*given, **rules)
+        snapshots, tables, ants = [], [], []
+        colony.begin_episode(TICKS)
+        plain.begin_episode()
+        recorder = Recorder(colony)
+        frames = [recorder.moment()]
+        transitions = [[]]
+        for tick in range(TICKS + 1):
+            snapshots.append(colony.snapshot())
+            tables.append(colony.q_values[0])
+            ants.append(colony.arrays["ants"].copy())
+            if tick < TICKS and not plain.over:
+                frames.append(recorder.tick())
+                plain.tick(last=tick == TICKS - 1)
+                transitions.append(sorted(plain.transitions, key=lambda one: one.number))
+        recording = Recording.from_bytes(Recording(recorder.header(), frames).to_bytes())
+        moments = list(played(recording, colony.pheromone))
+        rewards = np.array(recording.header["rewards"])
+        before = None
+        assert len(moments) == len(transitions)
+        for moment, snapshot, table, rows, did in zip(
+            moments, snapshots, tables, ants, transitions, strict=False
+        ):
+            assert np.array_equal(moment.ground, snapshot.ground)
+            assert moment.trail.dtype == snapshot.trail.dtype
+            assert np.array_equal(moment.trail, snapshot.trail)
+            (slots,) = np.nonzero(rows[AntRow.STAGE] == Stage.LIVING)
+            slots = slots[np.argsort(rows[AntRow.NUMBER, slots])]
+            row_at = AntRow.PERCEPT if sees == "paper" else AntRow.STATE
+            for name, row in (
+                ("numbers", AntRow.NUMBER),
+                ("cells", AntRow.CELL),
+                ("headings", AntRow.HEADING),
+                ("loaded", AntRow.CARRIES),
+                ("states", row_at),
+            ):
+                assert getattr(moment, name).tolist() == rows[row, slots].tolist(), name
+            assert moment.clock[6] == len(slots)
+            for place, slot in enumerate(slots.tolist()):
+                own = table[slot] if colony.one_a_slot else table
+                owner = int(moment.numbers[place]) if colony.one_a_slot else 0
+                state = int(moment.states[place])
+                held = moment.row(state, drawn.task.n_states, owner)
+                assert np.array_equal(held, own[state])
+            if before is not None:
+                assert before.numbers.tolist() == [one.number for one in did]
+                assert moment.actions.tolist() == [one.action for one in did]
+                assert rewards[moment.events].tolist() == [one.reward for one in did]
+                assert len(moment.td_errors) == (len(did) if sharing != "fixed" else 0)
+            before = moment
+
+
+@pytest.mark.parametrize("epsilon", [0.0, 0.4])
+def test_an_episode_is_its_trace(epsilon):
+    episode = Episode.play(worlds.paper(), trail_follower(), seed=5, max_steps=60, epsilon=epsilon)
+    trace, recording = episode.trace, record_episode(episode)
+    moments = list(played(recording, episode.task.pheromone))
+    assert len(moments) == len(trace) + 1
+    assert recording.header["follow"] == 0
+    for step, (moment, after) in enumerate(pairwise(moments)):
+        assert episode.world.grid.cells(moment.cells).tolist() == [trace.cells[step].tolist()]
+        assert moment.headings == trace.headings[step]
+        assert moment.states == trace.states[step]
+        assert after.actions == trace.actions[step]
+        assert after.events == trace.events[step]
+        assert np.array_equal(moment.row(trace.states[step], 128), trace.q_values[step])
+    assert moments[-1].clock[3] == trace.rewards.sum()
+
+
+@pytest.mark.parametrize("learner", ["sarsa", "double_q"])
+def test_a_trace_of_training_holds_tables_and_td_errors(learner):
+    config = TrainingConfig(learner, 0.1, 0.9, 0.3, 0.99)
+    trace = trace_training(worlds.paper(), config, seed=7, episodes=3, max_steps=80)
+    recording = record_trace(trace, title="learns")
+    task = Task()
+    moments = list(played(recording, task.pheromone.lasting))
+    assert len(moments) == len(trace) + 3  # each episode begins with a moment of its own
+    acting = [moment for moment in moments if len(moment.actions)]
+    for step, moment in enumerate(acting):
+        assert moment.actions == trace.actions[step]
+        assert moment.events == trace.events[step]
+        assert moment.td_errors == trace.td_errors[step]
+        assert moment.clock[:2] == [trace.episodes[step], trace.steps[step] + 1]
+        state = int(trace.states[step])
+        assert np.array_equal(moment.row(state, 128), trace.tables[step, state])
+    assert record_trace(rollout(worlds.paper(), trail_follower())).header["learns"] is False
+
+
+def test_td_errors_of_a_shared_table_are_the_mean_of_its_ants():
+    """Two ants in one state that do the same: the value moves by 1 - (1 - alpha)^2 of the mean."""
+    task = Task(evaporation_in_training=True)
+    world, config = worlds.open_world(2, (9, 9, 9)), TrainingConfig("q_learning", 0.5, 0, 0, 1)
+    colony = Colony(world, task, config, 1, 12)
+    colony.begin_episode()
+    moments = list(played(record_colony(colony, 60), colony.pheromone))
+    shared = 0
+    for before, after in pairwise(moments):
+        pairs = list(zip(before.states.tolist(), after.actions.tolist(), strict=True))
+        rewards = np.array(task.rewards.by_event())[after.events]
+        for place, pair in enumerate(pairs):
+            same = [k for k, other in enumerate(pairs) if other == pair]
+            value = before.row(pair[0], 128)[pair[1]]
+            # Without a discount the target is the reward.
+            assert after.td_errors[place] == pytest.approx(rewards[same].mean() - value, abs=1e-4)
+            shared += len(same) > 1
+    assert shared > 50
+
+
+def test_what_is_skipped_and_what_is_changed_by_hand():
+    """Several ticks a frame leave out what ants did; an edit is told without a tick."""
+    colony = Colony(
+        worlds.paper(),
+        None,
+        TrainingConfig("sarsa", 1.0, 0.0, 0.0, 1.0, min_epsilon=0),
+        sharing="fixed",
+        q_values=trail_follower(),
+    )
+    colony.begin_episode()
+    recorder = Recorder(colony)
+    frames = [recorder.moment(), recorder.tick(5)]
+    colony.arrays["ground"][colony.grid.index((3, 0, 1))] = 5
+    frames += [recorder.moment(), recorder.tick()]
+    moments = list(played(Recording(recorder.header(), frames), colony.pheromone))
+    assert [moment.clock[1] for moment in moments] == [0, 5, 5, 6]
+    assert [len(moment.actions) for moment in moments] == [0, 0, 0, 1]
+    assert np.array_equal(moments[-1].ground, colony.snapshot().ground)
+    assert np.array_equal(moments[-1].trail, colony.snapshot().trail)
+    every = record_colony(colony, 7, every=3)
+    assert [every.sections(k)["clock"][1] for k in range(4)] == [6, 9, 12, 13]
+
+
+def test_a_delivery_is_in_the_totals_and_the_events():
+    moments = list(
+        played(record_episode(Episode.play(worlds.paper(), trail_follower())), Task().pheromone)
+    )
+    assert [moment.clock[2] for moment in moments[-2:]] == [0, 1]
+    assert moments[-1].events.tolist() == [DELIVERED]
+
+
+def test_what_cannot_be_recorded_says_why():
+    colony = Colony(worlds.paper(), None, TrainingConfig("sarsa", 0.1, 0.9, 0.3, 1.0))
+    with pytest.raises(AntsError, match="no episode has begun"):
+        record_colony(colony, 3)
+    colony.begin_episode()
+    with pytest.raises(AntsError, match="ticks is -1"):
+        record_colony(colony, -1)
+    with pytest.raises(AntsError, match="follow is 3; the 1 ants have numbers from 0"):
+        record_colony(colony, 1, follow=3)
+    with pytest.raises(AntsError, match="episode is None"):
+        record_episode(None)
+    trace = rollout(worlds.paper(), trail_follower())
+    object.__setattr__(trace, "made", None)
+    with pytest.raises(AntsError, match="does not say how it was made"):
+        record_trace(trace)
