@@ -32,6 +32,7 @@ def made(n: int = 4, **settings):
     return SB3VecEnv(HexForageVectorEnv(n, autoreset_mode="SameStep", **settings))
 
 
+@pytest.mark.slow
 def test_episodes_are_those_of_single_environments_to_the_end() -> None:
     """With what was seen last, and whether the step limit ended it: both ways occur."""
     n, table, rng = 6, trail_follower(), np.random.default_rng(0)
@@ -131,6 +132,7 @@ def test_sb3_accepts_the_spaces_of_single_environments(form: str) -> None:
     check_env(HexForageEnv(observation_format=form, max_steps=50))  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_agents_of_sb3_train_on_it() -> None:
     """On-policy and off-policy, with SB3's monitor of episodes around it."""
     envs = made(4)

@@ -34,9 +34,9 @@ from taichi_ants.viewer import (
 # Each entry takes kernels of its own: learner, sharing, observation, dense, traffic.
 KERNELS = [
     ("q_learning", "shared", "paper", False, "blocking"),
-    ("sarsa", "shared", "ants_seen", True, "blocking"),
+    pytest.param("sarsa", "shared", "ants_seen", True, "blocking", marks=pytest.mark.slow),
     ("sarsa", "own", "paper", False, "blocking"),
-    ("q_learning", "fixed", "queues", True, "following"),
+    pytest.param("q_learning", "fixed", "queues", True, "following", marks=pytest.mark.slow),
 ]
 TICKS = 40
 

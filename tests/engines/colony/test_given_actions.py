@@ -53,7 +53,9 @@ def assert_same(one: Colony, other: Colony) -> None:
         assert np.array_equal(one.arrays[name], other.arrays[name]), name
 
 
-@pytest.mark.parametrize("task", [LIVELY, Task()], ids=["births", "paper"])
+@pytest.mark.parametrize(
+    "task", [pytest.param(LIVELY, marks=pytest.mark.slow), Task()], ids=["births", "paper"]
+)
 def test_threads_and_schedules_give_the_same(task, monkeypatch):
     """Chunks of 7 ants; without births the ants of a chunk would be sorted."""
     monkeypatch.setattr(colony_module, "_ANTS_PER_CHUNK", 7)
@@ -100,6 +102,7 @@ def test_colonies_that_learn_can_be_copied_too():
     assert other == colony
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sharing", ["own", "shared"])
 def test_worlds_in_which_ants_learn_begin_anew_as_well(sharing):
     """As the reference; epsilon and the learning rate stay, so that it must not decay there."""
