@@ -119,7 +119,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
         if flag in ("--follow", "--title") and getattr(settings, "plain", False):
             parser.error(f"--plain leaves out what {flag} shows, leave out one of them")
         if flag in ("--size", "--fps", "--plain") and is_page(settings):
-            parser.error(f"{flag} is of pictures, but --out names a page, leave {flag} out")
+            parser.error(f"{flag} is of pictures, but --out names a page, so leave {flag} out")
     if settings.kind == "colony" and settings.every is None:
         settings.every = 1 if is_page(settings) else 4  # a page tells what each ant does in a tick
     return settings
