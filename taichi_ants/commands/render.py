@@ -115,9 +115,9 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     settings, given = parser.parse_given(arguments)
     for flag in given.values():
         if flag in _TRAINING and getattr(settings, "policy", None):
-            parser.error(f"{flag} is of training, but --policy is trained already, leave one out")
+            parser.error(f"{flag} is of training, but --policy is trained already, so leave one out")
         if flag in ("--follow", "--title") and getattr(settings, "plain", False):
-            parser.error(f"--plain leaves out what {flag} shows, leave out one of them")
+            parser.error(f"--plain leaves out what {flag} shows, so leave out one of them")
         if flag in ("--size", "--fps", "--plain") and is_page(settings):
             parser.error(f"{flag} is of pictures, but --out names a page, so leave {flag} out")
     if settings.kind == "colony" and settings.every is None:
