@@ -95,7 +95,9 @@ def _check_live(
         if settings.resume and name not in _OF_RESUMED:
             error(f"{flag} cannot change a colony that is resumed, leave it out")
         if settings.sharing == "fixed" and name in _OF_LEARNING:
-            error(f"{flag} is of learning, but with --sharing fixed nobody learns, leave one out")
+            error(
+                f"{flag} is of learning, but with --sharing fixed nobody learns, so leave one out"
+            )
     if settings.policy and settings.observation:
         error("--observation is that of the policy, leave it out")
     if "every" in given and (not settings.render or settings.render.lower().endswith(".png")):

@@ -115,7 +115,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     settings, given = parser.parse_given(arguments)
     for flag in given.values():
         if flag in _TRAINING and getattr(settings, "policy", None):
-            parser.error(f"{flag} is of training, but --policy is trained already, so leave one out")
+            parser.error(f"{flag} is of training, but --policy is trained, so leave one out")
         if flag in ("--follow", "--title") and getattr(settings, "plain", False):
             parser.error(f"--plain leaves out what {flag} shows, so leave out one of them")
         if flag in ("--size", "--fps", "--plain") and is_page(settings):
