@@ -81,7 +81,7 @@ def checked_actions(actions: Any, n: int) -> np.ndarray:
             f"the actions are {shown(actions)}; they must be an array of an integer type and of "
             f"shape ({n},)."
         )
-    if ((given < 0) | (given >= N_ACTIONS)).any():
+    if given.min() < 0 or given.max() >= N_ACTIONS:
         wrong = given[(given < 0) | (given >= N_ACTIONS)][0]
         raise InvalidAction(f"an action is {wrong}; it must be 0, 1, 2, 3 or 4.")
     return given

@@ -53,9 +53,11 @@ _REASONS = {
     Outcome.HAS_NO_FOOD: "carries_no_food",
     Outcome.SEES_NO_QUEEN: "no_queen_in_view",
 }
-# By outcome.
-EVENTS = np.array([_EVENTS.get(outcome, "failed") for outcome in Outcome], dtype=object)
-REASONS = np.array([_REASONS.get(outcome) for outcome in Outcome], dtype=object)
+# The event and the reason by outcome, (outcomes, 2): NumPy takes rows three times as fast as it
+# takes from two arrays.
+_WORDS = np.array(
+    [(_EVENTS.get(outcome, "failed"), _REASONS.get(outcome)) for outcome in Outcome], dtype=object
+)
 
 
 def _action_masks() -> np.ndarray:
@@ -71,10 +73,8 @@ def _action_masks() -> np.ndarray:
 
 
 ACTION_MASKS = _action_masks()
-
-
-# Rows as single values, which NumPy takes twice as fast.
-_PACKED_MASKS = ACTION_MASKS.view(f"V{N_ACTIONS}")[:, 0]
+# Rows as single numbers of 8 bytes, which NumPy takes three times as fast.
+_PACKED_MASKS = np.pad(ACTION_MASKS, ((0, 0), (0, 8 - N_ACTIONS))).view(np.int64)[:, 0]
 _AT_RESET = ("state", "action_mask")
 
 
@@ -243,9 +243,8 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
             "state": np.int64(arrays["states"][0]),
             "action_mask": ACTION_MASKS[arrays["percepts"][0]].copy(),
         }
-        outcome = arrays["outcomes"][0]
-        more = {"event": EVENTS[outcome], "reason": REASONS[outcome]}
-        return info | {name: value for name, value in more.items() if value is not None}
+        more = zip(("event", "reason"), _WORDS[arrays["outcomes"][0]], strict=True)
+        return info | {name: value for name, value in more if value is not None}
 
     def render(self) -> Any:
         """A picture or a text map of the world as it is, see `render_mode`; None without one.
@@ -401,15 +400,17 @@ def _infos(
     states: np.ndarray, percepts: np.ndarray, outcomes: np.ndarray, which: np.ndarray
 ) -> dict[str, Any]:
     """What is said of some environments, `which` bool (n,); nothing of the others."""
-    masks = _PACKED_MASKS.take(percepts, mode="clip").view(np.int8).reshape(-1, N_ACTIONS)
+    packed = _PACKED_MASKS.take(percepts, mode="clip")
+    masks = packed.view(np.int8).reshape(-1, 8)[:, :N_ACTIONS]
     if not which.all():
         states, masks = np.where(which, states, 0), masks * which[:, None]
         outcomes = np.where(which, outcomes, Outcome.NONE)
+    words = _WORDS.take(outcomes, axis=0, mode="clip")
     told = {
         "state": (states.astype(np.int64), which.copy()),
         "action_mask": (masks, which.copy()),
-        "event": (EVENTS[outcomes], outcomes != Outcome.NONE),
-        "reason": (REASONS[outcomes], outcomes >= Outcome.ROCK_AHEAD),
+        "event": (words[:, 0], outcomes != Outcome.NONE),
+        "reason": (words[:, 1], outcomes >= Outcome.ROCK_AHEAD),
     }
     infos = {name: values for name, (values, _) in told.items()}
     return infos | {f"_{name}": of for name, (_, of) in told.items()}
