@@ -26,7 +26,7 @@ def history(seeds=(3, 4, 5), threads=2, schedule="by_world", world=None, **optio
     """All arrays after two episodes."""
     where = {"threads": threads, "schedule": schedule}
     ants = Colony(world or meadow(), LIVELY, TRAINING, seeds, ants=30, **where, **options)
-    outcome = ants.run(2, 80)
+    outcome = ants.run(2, 50)
     assert outcome.deliveries.sum() > 0
     assert outcome.blocked.sum() > 0
     return {name: ants.arrays[name] for name in ants.stored}
