@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,8 +12,9 @@ from gymnasium.vector import AutoresetMode
 
 from taichi_ants import checks
 from taichi_ants.errors import AntsError, count, shown
+from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS
-from taichi_ants.worlds import World, build
+from taichi_ants.worlds import World, build, from_text
 
 
 def worlds_of(world: Any, most: int) -> tuple[World, ...]:
@@ -25,13 +26,23 @@ def worlds_of(world: Any, most: int) -> tuple[World, ...]:
         )
     if len(given) > most:
         raise AntsError(f"world lists {count(len(given), 'world')}; there is room for {most}.")
-    several = tuple(
-        checks.checked_world(build(one) if isinstance(one, str) else one) for one in given
-    )
+    several = tuple(checks.checked_world(_built(one)) for one in given)
     ranges = {one.ranges for one in several}
     if len(ranges) > 1:
         raise AntsError(f"the worlds have the ranges {sorted(ranges)}; all must have the same.")
     return several
+
+
+def _built(world: Any) -> Any:
+    """The world of a name, a path or the text of a map; others as they are."""
+    if not isinstance(world, str):
+        return world
+    return from_text(world) if "\n" in world else build(world)
+
+
+def task_of(task: Any) -> Any:
+    """The task of a mapping, which JSON can hold; others as they are."""
+    return Task.from_dict(task) if isinstance(task, Mapping) else task
 
 
 def seeds_of(seed: Any, n: int) -> Sequence[int | None]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import gymnasium
@@ -20,6 +20,7 @@ from taichi_ants.envs.arguments import (
     checked_autoreset,
     checked_reset_mask,
     seeds_of,
+    task_of,
     worlds_of,
 )
 from taichi_ants.envs.drawing import Drawing
@@ -85,14 +86,14 @@ class _Ants:
         self,
         n: int,
         world: str | World | Sequence[World],
-        task: Task | None,
+        task: Task | Mapping[str, Any] | None,
         delivery: str | None,
         evaporation: bool | None,
         max_steps: int,
         observation_format: ObservationFormat,
         render_mode: str | None,
     ) -> None:
-        self.task = checks.checked_runs_task(task)
+        self.task = checks.checked_runs_task(task_of(task))
         delivery = self.task.delivery if delivery is None else delivery
         check_one_of("delivery", delivery, DELIVERIES)
         falls = self.task.evaporation_in_training
@@ -176,8 +177,8 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
     `reset` gives `state` and `action_mask`; `reason` is there when there is one.
 
     ## Arguments
-    world: Name of a registered world, path of a text map, or a World.
-    task: The rules, a `taichi_ants.Task`; None is the paper's.
+    world: Name of a registered world, path of a text map, its text, or a World.
+    task: The rules, a `taichi_ants.Task`, or its `as_dict()`; None is the paper's.
     delivery: "absorbing", "continuing" or "endless"; None is the task's, by default "absorbing".
     evaporation: Whether trails evaporate; None is as the task says of training, by default not.
     max_steps: Steps after which an episode is truncated.
@@ -194,7 +195,7 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
     def __init__(
         self,
         world: str | World = "paper",
-        task: Task | None = None,
+        task: Task | Mapping[str, Any] | None = None,
         delivery: str | None = None,
         evaporation: bool | None = None,
         max_steps: int = EPISODE_STEPS,
@@ -288,7 +289,7 @@ class HexForageVectorEnv(VectorEnv[Any, Any, Any]):
         self,
         num_envs: int = 1,
         world: str | World | Sequence[World] = "paper",
-        task: Task | None = None,
+        task: Task | Mapping[str, Any] | None = None,
         delivery: str | None = None,
         evaporation: bool | None = None,
         max_steps: int = EPISODE_STEPS,

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 import warnings
+from dataclasses import replace
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+import gymnasium
 import numpy as np
 from gymnasium import spaces
+from gymnasium.envs.registration import EnvSpec
 
 from taichi_ants.engines.stored import world_arrays, world_from
 from taichi_ants.envs.formats import ObservationFormat, Shown
@@ -17,6 +20,7 @@ from taichi_ants.files import to_json
 from taichi_ants.offline.dataset import COLUMNS, Dataset
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS
+from taichi_ants.worlds.text_map import to_text
 from taichi_ants.worlds.world import World
 
 if TYPE_CHECKING:
@@ -82,6 +86,7 @@ def to_minari(
                 algorithm_name=str(data.behaviour.get("policy", "unknown")),
                 description=f"Ants on a hexagonal grid, recorded by taichi_ants: {data.behaviour}",
                 requirements=["taichi-ants"],
+                env=_spec(data, observation_format),
             )
     except (TypeError, ValueError) as error:
         raise AntsError(
@@ -90,6 +95,20 @@ def to_minari(
         ) from error
     written.storage.update_metadata({_FACTS: to_json({**data.facts(), **world})})
     return written
+
+
+def _spec(data: Dataset, observation_format: ObservationFormat) -> EnvSpec | None:
+    """The environment that the ants were in, if each was alone: `recover_environment` makes it."""
+    if data.agent.any():
+        return None
+    task, learned = data.task, data.behaviour.get("policy") == "learner"
+    settings = {
+        "world": to_text(data.world),
+        "task": task.as_dict(),
+        "evaporation": task.evaporation_in_training if learned else task.evaporation_in_evaluation,
+        "observation_format": observation_format,
+    }
+    return replace(gymnasium.spec("taichi_ants/HexForage-v0"), kwargs=settings)
 
 
 def from_minari(

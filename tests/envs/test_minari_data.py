@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gymnasium
 import numpy as np
 import pytest
 from gymnasium import spaces
@@ -21,6 +22,8 @@ from taichi_ants import (
 )
 from taichi_ants.envs.formats import FORMATS
 from taichi_ants.learners.policies import trail_follower
+
+ID = "taichi_ants/HexForage-v0"
 
 minari = pytest.importorskip("minari")
 pytest.importorskip("h5py")
@@ -65,6 +68,32 @@ def test_an_episode_of_an_ant_is_one_of_minaris():
         ) + [True]
         assert len(episode.infos["step"]) == len(states)
         assert loaded.action_space == spaces.Discrete(5)
+
+
+def test_the_environment_of_single_ants_is_recovered():
+    """With its world, rules and format: the same actions give the same episode."""
+    world, task = worlds.open_world(5, (6, 6, 6)), Task(delivery="continuing", observation="ants")
+    to_minari(record(world, task=task, seeds=3, episodes=2), "ants/alone-v0", "one_hot")
+    loaded = minari.load_dataset("ants/alone-v0")
+    recovered = loaded.recover_environment()
+    assert recovered.observation_space == loaded.observation_space
+    assert recovered.spec.kwargs["evaporation"] is True  # as in evaluation: nobody learned
+    rules = {"world": world, "task": task, "evaporation": True}
+    ours = gymnasium.make(ID, **rules, observation_format="one_hot")
+    seen, _ = ours.reset(seed=1)
+    assert np.array_equal(seen, recovered.reset(seed=1)[0])
+    for action in np.random.default_rng(0).integers(0, 5, 300).tolist():
+        one, other = ours.step(action), recovered.step(action)
+        assert np.array_equal(one[0], other[0])
+        assert one[1:4] == other[1:4]
+        if one[2] or one[3]:
+            break
+    learned = record(world, TrainingConfig("q_learning", 0.1, 0.9, 0.3, 1.0), 1, task=task)
+    again = to_minari(learned, "ants/learner-v0").recover_environment()
+    assert again.spec.kwargs["evaporation"] is task.evaporation_in_training
+    to_minari(colony_data(), "ants/colony-v0")
+    with pytest.raises(ValueError, match="env"):
+        minari.load_dataset("ants/colony-v0").recover_environment()
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning:minari")
