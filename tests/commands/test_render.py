@@ -244,7 +244,10 @@ def test_stopped_midway_it_leaves_nothing_behind(tmp_path, policy, name, sent, s
                 break
             time.sleep(0.1)
         process.send_signal(sent)
-        _, errors = process.communicate(timeout=30)
+        try:
+            _, errors = process.communicate(timeout=30)
+        finally:
+            process.kill()
     assert process.returncode == status
     assert errors == "Stopped; nothing was left behind.\n"
     assert files_in(tmp_path) == []
