@@ -79,9 +79,9 @@ class Setup:
     def __post_init__(self) -> None:
         expect("world", self.world, str)
         expect("task", self.task, Task)
-        if self.learns:
+        if isinstance(self.policy, TrainingConfig):
             check_one_of("sharing", self.sharing, ("shared", "own"))
-            learners.get(self.policy.learner)  # type: ignore[union-attr]
+            learners.get(self.policy.learner)
         else:
             object.__setattr__(self, "policy", checked_q_values(self.policy, self.task))
         checked_whole("ants", self.ants, 1, MOST_ANTS)
@@ -139,8 +139,7 @@ class Setup:
             training = self.policy
         else:
             options |= {"sharing": "fixed", "q_values": self.policy}
-            steady = {"epsilon_decay": 1.0, "min_epsilon": 0.0}
-            training = TrainingConfig("q_learning", 1.0, 0.0, self.epsilon, **steady)
+            training = TrainingConfig("q_learning", 1.0, 0.0, self.epsilon, 1.0, min_epsilon=0.0)
         return Colony(self.build_world(), self.task, training, self.seed, **options)
 
     def to_json(self) -> dict[str, Any]:

@@ -299,7 +299,7 @@ def test_edits_without_room_change_nothing():
     # What has been eaten is at the start of the next episode, so that only this takes all.
     assert "the last food" in refused(session, {"kind": "ground", "what": "empty", "cells": cells})
     session = Session(SETUPS["queueing"])  # nobody learns
-    session.apply({"kind": "ground", "what": "empty", "cells": cells})
+    session.apply({"kind": "remove_ants", "cells": cells})
     assert "would leave" in refused(session, {"kind": "ground", "what": "rock", "cells": cells})
 
 
