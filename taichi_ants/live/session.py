@@ -83,7 +83,10 @@ class Setup:
             check_one_of("sharing", self.sharing, ("shared", "own"))
             learners.get(self.policy.learner)
         else:
-            object.__setattr__(self, "policy", checked_q_values(self.policy, self.task))
+            table = checked_q_values(self.policy, self.task)
+            if table.ndim != 2:
+                raise AntsError(f"policy has shape {table.shape}; give one table for all ants.")
+            object.__setattr__(self, "policy", table)
         checked_whole("ants", self.ants, 1, MOST_ANTS)
         if self.capacity is None:
             object.__setattr__(self, "capacity", min(2 * self.ants + 64, MOST_ANTS))
@@ -257,13 +260,17 @@ class Session:
         n = min(n, self._length - self.colony.ticks if self._length else n)
         if self.ticks + n > MOST_TICKS:
             raise AntsError(f"a session has at most {MOST_TICKS} ticks; begin another one.")
-        given = tick(n)
-        self.ticks += n
-        self.steps += n
-        return given
+        before = self.colony.ticks
+        try:
+            return tick(n)
+        finally:  # even if somebody interrupts it
+            self.ticks += self.colony.ticks - before
+            self.steps += self.colony.ticks - before
 
     def apply(self, edit: object) -> bytes:
         """Do an edit now, see `edits`, and record it; a frame of what has changed.
+
+        If the episode has ended, what is of this episode alone goes with it.
 
         Raises:
             AntsError: It is none, or there is no room for it; nothing has changed.
