@@ -1,0 +1,132 @@
+"""Edits: colony and reference stay equal to the bit, whatever a hand does; what is wrong changes
+nothing."""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from random_colonies import random_colony
+from random_edits import apply_to_both, random_edit
+from same_colonies import assert_equal
+
+from taichi_ants import AntsError, Colony, TrainingConfig, worlds
+from taichi_ants.engines.colony import colony as colony_module
+from taichi_ants.engines.colony.hand import Hand
+from taichi_ants.engines.colony.layout import AntRow, Stage, WorldRow
+from taichi_ants.live import edits
+from taichi_ants.reference import ReferenceColony
+from taichi_ants.reference.hand import Hand as PlainHand
+from taichi_ants.task import foraging
+from taichi_ants.task.constants import EMPTY, OBSTACLE, QUEEN
+
+# Each entry takes kernels of its own, see tests/engines/colony/test_against_reference.py.
+KERNELS = [
+    ("q_learning", "shared", "paper", False, "blocking", "half"),
+    ("sarsa", "shared", "ants", False, "right_of_way", "strongest"),
+    ("q_learning", "fixed", "queues", False, "following", "strongest_under_carriers"),
+    ("double_q", "own", "ants_seen", True, "blocking", "half"),
+    ("dyna_q", "shared", "trail_levels", True, "blocking", "half"),
+    ("n_step_sarsa", "own", "paper", False, "blocking", "half"),
+]
+MARKED = [*KERNELS[:4], *(pytest.param(one, marks=pytest.mark.slow) for one in KERNELS[4:])]
+
+
+def assert_sound(hand: Hand) -> None:
+    """What holds in every colony at the end of a tick."""
+    colony = hand.colony
+    arrays, world = colony.arrays, colony.arrays["worlds"][:, 0]
+    ants = arrays["ants"][:, arrays["ants"][AntRow.STAGE] != Stage.VACANT]
+    cells, numbers = ants[AntRow.CELL], ants[AntRow.NUMBER]
+    assert (ants[AntRow.STAGE] == Stage.LIVING).all()
+    assert len(set(cells.tolist())) == len(set(numbers.tolist())) == world[WorldRow.LIVING]
+    assert numbers.max(initial=-1) < world[WorldRow.NEXT_NUMBER]
+    assert (np.flatnonzero(arrays["ground"] > 15) == np.sort(cells)).all()
+    bare = colony.snapshot().ground
+    assert (arrays["walls"] == (bare == OBSTACLE)).all()
+    assert np.flatnonzero(bare == QUEEN).tolist() == [world[WorldRow.QUEEN_CELL]]
+    assert colony.snapshot().trail[bare == OBSTACLE].sum() == 0
+    later = hand.world()
+    assert (later.closer() == arrays["closer"]).all()
+    assert np.count_nonzero(later.ground() == EMPTY) >= hand.ants
+
+
+@pytest.mark.parametrize("kernel", MARKED, ids=lambda kernel: "-".join(map(str, kernel[:4])))
+def test_edits_keep_colony_and_reference_equal(kernel):
+    learner, sharing, observation, dense, traffic, view = kernel
+    done, refused = {}, 0
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        drawn = random_colony(
+            *(seed, 12, sharing, 5, None, learner, observation, dense),
+            traffic=traffic,
+            view=view,
+            changes=kernel is not KERNELS[0],
+        )
+        population = {**drawn.population, "ends_at_delivery": False}
+        population["capacity"] = population["ants"] + int(rng.integers(0, 9))
+        rules = {**population, "sharing": sharing, "q_values": drawn.q_values}
+        task = replace(drawn.task, **{f"evaporation_in_{one}": bool(rng.random() < 0.7)
+                                      for one in ("training", "evaluation")})  # fmt: skip
+        given = (drawn.world, task, drawn.training, drawn.seed)
+        try:
+            colony = Colony(*given, **rules)
+        except AntsError:
+            continue
+        plain = ReferenceColony(*given, **rules)
+        colony.begin_episode()
+        plain.begin_episode()
+        hand, plain_hand = Hand(colony), PlainHand(plain)
+        for _ in range(40):
+            edit = random_edit(rng, hand)
+            before = hand.state()
+            try:
+                apply_to_both(edit, hand, plain_hand)
+                done[edit["kind"]] = done.get(edit["kind"], 0) + 1
+            except AntsError as error:
+                refused += 1
+                assert (hand.state(), str(error)[-1]) == (before, "."), edit  # noqa: PT017
+            assert_equal(colony, plain)
+            assert_sound(hand)
+            for _ in range(int(rng.integers(0, 3))):
+                colony.tick()
+                plain.tick()
+                assert_equal(colony, plain)
+    assert len(done) == 7
+    assert min(done.values()) > 5, done
+    assert refused > 5
+
+
+def test_schedules_do_not_matter_to_edits(monkeypatch):
+    """Chunks of 7 ants; where no slot is vacant, these are sorted now and then."""
+    monkeypatch.setattr(colony_module, "_ANTS_PER_CHUNK", 7)
+    monkeypatch.setattr(colony_module, "_TICKS_BETWEEN_SORTS", 2)
+    world, training = worlds.open_world(5, (9, 8, 7)), TrainingConfig("sarsa", 0.2, 0.9, 0.4, 0.9)
+    hands = []
+    for schedule in ("by_world", "by_chunk"):
+        options = {"ants": 40, "capacity": 40, "schedule": schedule}
+        colony = Colony(world, foraging(), training, 3, **options)
+        colony.begin_episode()
+        hands.append(Hand(colony))
+    rng, full = np.random.default_rng(1), 0
+    for _ in range(60):
+        edit = random_edit(rng, hands[0])
+        for hand in hands:
+            with contextlib.suppress(AntsError):
+                edits.apply(edits.checked(edit, hand), hand, None)
+            hand.colony.tick(3)
+            assert_sound(hand)
+        one, other = (hand.colony for hand in hands)
+        full += int(one.living.all())
+        assert np.array_equal(one.q_values, other.q_values)
+        for name in ("ground", "trail", "first_streams", "worlds"):
+            known = slice(None) if name != "worlds" else [WorldRow.LIVING, WorldRow.NEXT_NUMBER]
+            assert np.array_equal(one.arrays[name][known], other.arrays[name][known]), name
+        rows = []
+        for colony in (one, other):
+            ants = colony.arrays["ants"][:, colony.living[0]]
+            rows.append(ants[: AntRow.WANT, np.argsort(ants[AntRow.NUMBER])])
+        assert np.array_equal(*rows)
+    assert 0 < full < 60
