@@ -65,7 +65,8 @@ def styled() -> AbstractContextManager:
 
 def use() -> None:
     """Let all figures of a session look like the project's; for notebooks."""
-    from matplotlib import cycler, rcParams
+    from matplotlib import rcParams
+    from matplotlib.rcsetup import cycler
 
     rcParams.update(_SETTINGS)
     colours = cycler(color=COLOURS)
