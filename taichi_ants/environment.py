@@ -12,8 +12,10 @@ def prepare_for_taichi() -> None:
     """Set what Taichi reads from the environment when it is imported, unless the user has set it.
 
     No banner on standard output, no thread that asks a server for newer versions, no warning about
-    an old function that Taichi calls. Without a HOME Taichi aborts, with one that cannot be written
-    it crashes at exit: then HOME becomes a temporary folder for this process.
+    an old function that Taichi calls, no message that this is a notebook (what kernels print is
+    shown there all the same: Jupyter reads the process's own output). Without a HOME Taichi aborts,
+    with one that cannot be written it crashes at exit: then HOME becomes a temporary folder for
+    this process.
     """
     warnings.filterwarnings(
         "ignore",
@@ -25,6 +27,7 @@ def prepare_for_taichi() -> None:
         os.register_at_fork(after_in_child=_mark_forked_taichi)
     os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
     os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")
+    os.environ.setdefault("TI_ENABLE_PYBUF", "0")
     if not is_writable_folder(os.environ.get("HOME", "")):
         os.environ["HOME"] = fallback_folder()
 

@@ -332,6 +332,8 @@ def test_the_import_of_taichi_warns_of_nothing(tmp_path):
     for first in (
         "from taichi_ants import learners",
         "from taichi_ants import runtime as r; r.start()",
+        # As in a notebook, of which Taichi would tell.
+        "import io, sys; sys.stdout = io.StringIO(); from taichi_ants import learners",
     ):
         python(first, tmp_path, PYTHONWARNINGS="default")
 

@@ -63,6 +63,16 @@ def styled() -> AbstractContextManager:
     return rc_context(_SETTINGS)
 
 
+def use() -> None:
+    """Let all figures of a session look like the project's; for notebooks."""
+    from matplotlib import rcParams
+    from matplotlib.rcsetup import cycler
+
+    rcParams.update(_SETTINGS)
+    colours = cycler(color=COLOURS)
+    rcParams.update({"axes.prop_cycle": colours, "figure.figsize": (8.0, 3.0), "figure.dpi": 110})
+
+
 def new_figure(height: float) -> Figure:
     """An empty figure of full width and the height in inches, outside of any global state."""
     from matplotlib.figure import Figure

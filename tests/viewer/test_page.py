@@ -105,6 +105,7 @@ def test_notebooks_show_traces_and_colonies():
     colony.begin_episode()
     assert "<iframe " in colony._repr_html_()
     assert colony.ticks == 0
+    assert "<iframe " in record_colony(colony, ticks=2)._repr_html_()
 
 
 def test_the_command_writes_pages(tmp_path, capsys):
