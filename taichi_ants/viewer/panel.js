@@ -27,7 +27,7 @@ function digitsFor(a, b) {
 }
 
 class Panel {
-  constructor(history, stage, choose) {
+  constructor(history, stage, choose, signal) {
     this.history = history;
     this.stage = stage;
     this.choose = choose; // {follow(number), unfollow(), cell(cell), other(step), aim()}
@@ -42,7 +42,7 @@ class Panel {
       if (pressed === "ant-aim") choose.aim();
       if (pressed === "ant-close") choose.unfollow();
       if (pressed === "cell-close") choose.cell(-1);
-    });
+    }, { signal });
   }
 
   show(moment, followed, cell, aims) {
@@ -132,8 +132,11 @@ class Panel {
   }
 
   storyOf(ant) {
-    const { header } = this.history, act = ant.act;
-    if (!act) return '<div class="story"><span class="label">What it does next is not in the recording.</span></div>';
+    const { header, live } = this.history, act = ant.act;
+    if (!act) {
+      const words = live ? "It has not chosen yet." : "What it does next is not in the recording.";
+      return `<div class="story"><span class="label">${words}</span></div>`;
+    }
     const why = { best: "the best", tie: `a tie of ${act.ties}`, explored: "explored" }[act.why];
     const better = ant.loaded ? "comes nearer to the queen" : "enters a trail";
     const came = act.event === FAILED && act.action < 3 ? "is blocked" : CAME[act.event] || better;

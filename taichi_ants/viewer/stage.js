@@ -326,7 +326,7 @@ class Stage {
   }
 
   /* The ring and the view of the followed ant; the chosen cell. */
-  drawMarks(share, { ant, next, letters, cell, cursor }) {
+  drawMarks(share, { ant, next, letters, cell, cursor, tool }) {
     const { above, grid, colours, camera } = this;
     above.lineJoin = "round";
     // Where cells are small, a ring shows where the queen is.
@@ -339,6 +339,11 @@ class Stage {
       this.outline(cell, Math.max(camera.scale, 5));
       this.stroke("halo", cursor ? 6 : 5);
       this.stroke("mark", cursor ? 3 : 2);
+    }
+    for (const one of tool) {
+      this.outline(one, 0.9 * Math.max(camera.scale, 4));
+      this.stroke("halo", 4);
+      this.stroke("chosen", 1.8);
     }
     if (!ant) return;
     const [x0, y0] = grid.centre(ant.cell), [x1, y1] = next ? grid.centre(next.cell) : [x0, y0];
