@@ -1,0 +1,1 @@
+"""A colony that people watch and change while it runs, in a browser."""

@@ -1,0 +1,432 @@
+"""The room in which people watch a session: its pages, and the thread in which time passes.
+
+The room serves one page, and a socket for each page that is open. It listens on this machine alone,
+and answers only who knows its token and comes from its own page. A page asks for things in JSON,
+see `REQUESTS`; it is told what happens in JSON and in frames, see `taichi_ants.viewer.frames`.
+
+Two threads: sockets live in one, the session in the other, the one that calls `Room.run`. What a
+page asks for is put into a queue; what it is told is handed back to the thread of the sockets.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import hmac
+import json
+import logging
+import math
+import queue
+import secrets
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
+from urllib.parse import parse_qs, urlsplit
+
+from taichi_ants.errors import AntsError
+from taichi_ants.live.choices import Choices
+from taichi_ants.live.page import live_page
+from taichi_ants.live.session import Session
+
+if TYPE_CHECKING:
+    from websockets.asyncio.server import ServerConnection
+    from websockets.http11 import Request, Response
+
+HOST = "127.0.0.1"
+FRAMES_A_SECOND = 30
+FASTEST = 1000.0  # ticks a second; a page that asks for these gets as many as there can be
+
+_MOST_PAGES = 24
+_MOST_TEXT = 2**18  # bytes of a request
+_MOST_UPLOAD = 2**24  # bytes of a session
+_MOST_UNSEEN = 12  # frames that a page is sent before it has drawn the first of them
+_MOST_WAITING = 2**27  # bytes that wait for a page that does not read
+_STATE_EVERY = 0.5  # seconds
+_QUIET = logging.getLogger("taichi_ants.live")  # what strangers send is no news for the terminal
+_QUIET.addHandler(logging.NullHandler())
+_QUIET.propagate = False
+
+
+class Closed(Exception):  # noqa: N818
+    """A page has sent what no page of ours sends; its socket is closed."""
+
+
+class Page:
+    """One page that is open, in the thread of the sockets."""
+
+    def __init__(self, connection: ServerConnection) -> None:
+        self.connection = connection
+        self.unseen = 0  # frames that it was sent, but has not drawn
+        self.behind = False  # it gets no more frames until it is told how all is
+
+    def tell(self, *messages: str | bytes) -> None:
+        """Send messages without waiting; who never reads is cut off."""
+        from websockets.asyncio.server import broadcast
+
+        for message in messages:
+            broadcast([self.connection], message)
+        transport = self.connection.transport
+        if transport.get_write_buffer_size() > _MOST_WAITING:
+            transport.abort()
+
+    def show(self, *messages: str | bytes) -> None:
+        """Send a frame, and what belongs to it."""
+        self.unseen += 1
+        self.tell(*messages)
+
+
+class Room:
+    """A session that people watch and change together.
+
+    Args:
+        session: That begins.
+        choices: What pages can choose from.
+        port: On which it listens; 0 for one that is free.
+
+    Raises:
+        AntsError: The library `websockets` is not installed, or the port cannot be used.
+    """
+
+    def __init__(self, session: Session, choices: Choices, port: int = 0) -> None:
+        try:
+            import websockets  # noqa: F401
+        except ImportError:
+            raise AntsError(
+                'the library websockets is not installed; run pip install "taichi_ants[watch]".'
+            ) from None
+        try:
+            self._socket = socket.create_server((HOST, port))
+        except OSError as error:
+            raise AntsError(
+                f"port {port} of {HOST} cannot be used: {error.strerror}; choose another --port."
+            ) from None
+        self.session, self.choices = session, choices
+        self.port = self._socket.getsockname()[1]
+        self.token = secrets.token_urlsafe(24)
+        self.playing, self.speed = False, 12.0
+        self._pages: set[Page] = set()
+        self._joined = 0  # sockets, a page or not yet
+        self._requests: queue.Queue[tuple[Page, Any, Callable[[], None]]] = queue.Queue()
+        self._loop = asyncio.new_event_loop()
+        self._over = threading.Event()
+        self._pace, self._piece, self._due = 0.0, 1.0, 0.0  # see _pass
+        self._told = -math.inf  # when pages were last told the state
+
+    @property
+    def url(self) -> str:
+        """Where the page is, with the token."""
+        return f"http://{HOST}:{self.port}/?token={self.token}"
+
+    def end(self) -> None:
+        """Let `run` return soon; for any thread."""
+        self._over.set()
+
+    # In the thread that calls `run`: time, and what pages ask for.
+
+    def run(self, seconds: float | None = None) -> None:
+        """Serve pages and let time pass, until somebody ends it, or for some seconds."""
+        sockets = threading.Thread(target=self._serve, name="sockets", daemon=True)
+        sockets.start()
+        end = math.inf if seconds is None else time.monotonic() + seconds
+        try:
+            while not self._over.is_set() and time.monotonic() < end:
+                self._turn()
+        finally:
+            self._over.set()
+            with contextlib.suppress(RuntimeError):  # it has ended by itself
+                self._loop.call_soon_threadsafe(self._leave.set)
+            sockets.join(2)
+
+    def _turn(self) -> None:
+        """Do what a page asks for, or let a frame's time pass."""
+        runs = self.playing and bool(self._pages)  # time stands still while nobody looks on
+        wait = max(0.0, min(self._due - time.monotonic(), 0.2)) if runs else 0.2
+        try:
+            page, request, done = self._requests.get(timeout=wait) if wait else self._next()
+        except queue.Empty:
+            if runs and time.monotonic() >= self._due:
+                self._pass()
+            return
+        try:
+            self._answer(page, request)
+        finally:
+            self._post(done)
+
+    def _next(self) -> tuple[Page, Any, Callable[[], None]]:
+        return self._requests.get_nowait()
+
+    def _pass(self) -> None:
+        """Let the ticks of one frame pass, and show it."""
+        began = time.monotonic()
+        if self.speed >= FASTEST:
+            ticks = max(1, int(self._piece))
+        else:
+            self._pace += max(1.0, self.speed / FRAMES_A_SECOND)
+            ticks = int(self._pace)
+            self._pace -= ticks
+        self._show(self.session.advance(ticks))
+        took = time.monotonic() - began
+        # As many ticks as fill the time of a frame, if it is to be as fast as it can.
+        self._piece = min(2 * ticks, max(1.0, ticks / (took * FRAMES_A_SECOND + 1e-9)))
+        usual = 1 / min(self.speed, FRAMES_A_SECOND)
+        self._due = max(self._due + usual, began + took)  # lost time is not made up
+        if began - self._told >= _STATE_EVERY:
+            self._tell_state()
+
+    def _answer(self, page: Page, request: Any) -> None:
+        """Do what a page asks for, or tell it why not; all are told how things stand now."""
+        try:
+            if isinstance(request, bytes):
+                self._begin(Session.from_bytes(request))
+            else:
+                REQUESTS[request["do"]](self, page, request)
+        except Closed:
+            self._post(page.connection.transport.abort)
+            return
+        except AntsError as error:
+            self._tell(page, _say("error", words=str(error)))
+        except MemoryError:
+            self._tell(page, _say("error", words="this needs more memory than there is."))
+        self._tell_state()
+
+    def _begin(self, session: Session) -> None:
+        """Go on with another session; all pages are shown it from its beginning."""
+        self.session, self.playing = session, False
+        self._piece = 1.0
+        for page in list(self._pages):
+            self._welcome(page, {})
+
+    def _welcome(self, page: Page, request: dict[str, Any]) -> None:
+        """Tell a page all: what the session is about, and how it is now."""
+        header = _say("begin", header=self.session.header(), choices=self.choices.as_dict())
+        state, moment = self._state(), self.session.moment()
+
+        def welcome() -> None:
+            self._pages.add(page)
+            page.behind, page.unseen = False, 0
+            page.show(header, state, _say("moment"), moment)
+
+        self._post(welcome)
+
+    def _catch_up(self, page: Page, request: dict[str, Any]) -> None:
+        """Tell a page that was slow how all is now."""
+        moment = self.session.moment()
+
+        def show() -> None:
+            page.behind, page.unseen = False, 0
+            page.show(_say("moment"), moment)
+
+        self._post(show)
+
+    def _play(self, page: Page, request: dict[str, Any]) -> None:
+        self.playing, self._due = True, time.monotonic()
+
+    def _pause(self, page: Page, request: dict[str, Any]) -> None:
+        self.playing = False
+
+    def _step(self, page: Page, request: dict[str, Any]) -> None:
+        self.playing = False
+        for _ in range(int(_number(request, "ticks", 1, 100))):
+            self._show(self.session.advance(1))
+
+    def _set_speed(self, page: Page, request: dict[str, Any]) -> None:
+        self.speed, self._due = _number(request, "value", 1, FASTEST), time.monotonic()
+
+    def _edit(self, page: Page, request: dict[str, Any]) -> None:
+        edit = request.get("edit")
+        if not isinstance(edit, dict):
+            raise Closed
+        self._show(self.session.apply(edit))
+
+    def _begin_chosen(self, page: Page, request: dict[str, Any]) -> None:
+        self._begin(Session(self.choices.setup(request.get("chosen"))))
+
+    def _restart(self, page: Page, request: dict[str, Any]) -> None:
+        self._begin(Session(self.session.setup))
+
+    def _export(self, page: Page, request: dict[str, Any]) -> None:
+        from taichi_ants.live.exports import EXPORTS
+
+        kind = request.get("kind")
+        if not isinstance(kind, str) or kind not in EXPORTS:
+            raise Closed
+        name, make = EXPORTS[kind]
+        data = make(self.session)
+        self._post(lambda: page.tell(_say("file", name=name), data))
+
+    def _quit(self, page: Page, request: dict[str, Any]) -> None:
+        self.end()
+
+    def _show(self, frame: bytes) -> None:
+        """Send a frame to all pages but those that are behind."""
+        news = {}
+
+        def show() -> None:
+            for page in self._pages:
+                page.behind = page.behind or page.unseen >= _MOST_UNSEEN
+                if not page.behind:
+                    page.show(*([_say("names", names=news)] if news else []), frame)
+
+        self._post(show)
+
+    def _state(self) -> str:
+        session = self.session
+        return _say(
+            "state",
+            playing=self.playing,
+            speed=self.speed,
+            pages=len(self._pages),
+            ticks=session.ticks,
+            values=session.values(),
+            chosen=self.choices.chosen(session.setup),
+        )
+
+    def _tell_state(self) -> None:
+        self._told = time.monotonic()
+        state = self._state()
+        self._post(lambda: [page.tell(state) for page in self._pages])
+
+    def _tell(self, page: Page, message: str) -> None:
+        self._post(lambda: page.tell(message))
+
+    def _post(self, act: Callable[[], Any]) -> None:
+        """Let the thread of the sockets do something, in the order of these calls."""
+        with contextlib.suppress(RuntimeError):  # it has ended
+            self._loop.call_soon_threadsafe(act)
+
+    # In the thread of the sockets.
+
+    def _serve(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        self._leave = asyncio.Event()
+        with contextlib.suppress(asyncio.CancelledError):
+            self._loop.run_until_complete(self._listen())
+        self._loop.close()
+
+    async def _listen(self) -> None:
+        from websockets.asyncio.server import serve
+
+        limits: dict[str, Any] = {"max_size": _MOST_UPLOAD, "max_queue": 4, "compression": None}
+        times = {"open_timeout": 10, "ping_interval": 20, "ping_timeout": 20, "close_timeout": 0.3}
+        hooks: dict[str, Any] = {"process_request": self._open, "logger": _QUIET}
+        async with serve(self._hear, sock=self._socket, **limits, **times, **hooks):
+            await self._leave.wait()
+            for page in self._pages:
+                page.tell(_say("over"))
+
+    def _open(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Answer a request: with the page, with a refusal, or None, which opens a socket."""
+        from http import HTTPStatus
+
+        asked = urlsplit(request.path)
+        hosts = {f"{name}:{self.port}" for name in (HOST, "localhost")}
+        host, origins = request.headers.get_all("Host"), request.headers.get_all("Origin")
+        opens = asked.path == "/socket"
+        mine = len(host) == 1 and host[0] in hosts
+        # A page of ours has the origin that it was asked for at; the page itself is asked for by
+        # nobody's page.
+        mine = mine and (origins == [f"http://{host[0]}"] or (not origins and not opens))
+        given = parse_qs(asked.query).get("token", [""])[0]
+        if not mine or not hmac.compare_digest(given.encode(), self.token.encode()):
+            return connection.respond(HTTPStatus.FORBIDDEN, "Open the address that was printed.\n")
+        if opens and self._joined >= _MOST_PAGES:
+            return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "Too many pages are open.\n")
+        if opens:
+            return None
+        if asked.path != "/":
+            return connection.respond(HTTPStatus.NOT_FOUND, "There is nothing here.\n")
+        response = connection.respond(HTTPStatus.OK, live_page(f"ws://{host[0]}"))
+        for name, value in _HEADERS.items():
+            with contextlib.suppress(KeyError):
+                del response.headers[name]
+            response.headers[name] = value
+        return response
+
+    async def _hear(self, connection: ServerConnection) -> None:
+        """All that one page says; what it asks for is done before it is heard further."""
+        from websockets.exceptions import ConnectionClosed
+
+        page = Page(connection)
+        self._joined += 1
+        try:
+            await self._ask(page, {"do": "join"})
+            async for message in connection:
+                for request in self._read(page, message):
+                    await self._ask(page, request)
+        except Closed:
+            await connection.close(1008, "this is no request of a page")
+        except ConnectionClosed:
+            pass
+        finally:
+            self._joined -= 1
+            self._pages.discard(page)
+
+    def _read(self, page: Page, message: str | bytes) -> Iterator[Any]:
+        """The request in a message, if the session has to do with it."""
+        if isinstance(message, bytes):
+            yield message
+            return
+        if len(message) > _MOST_TEXT:
+            raise Closed
+        try:
+            request = json.loads(message, parse_constant=_refuse)
+        except (ValueError, RecursionError):
+            raise Closed from None
+        if not isinstance(request, dict) or not isinstance(request.get("do"), str):
+            raise Closed
+        if request["do"] == "seen":
+            page.unseen = max(0, page.unseen - int(_number(request, "frames", 0, 1000)))
+            if page.behind and page.unseen == 0:
+                yield {"do": "catch up"}
+        elif request["do"] in REQUESTS:
+            yield request
+        else:
+            raise Closed
+
+    async def _ask(self, page: Page, request: Any) -> None:
+        done = asyncio.Event()
+        self._requests.put((page, request, done.set))
+        await done.wait()
+
+
+REQUESTS: dict[str, Callable[[Room, Page, dict[str, Any]], None]] = {
+    "join": Room._welcome,  # what a socket says by being opened
+    "catch up": Room._catch_up,  # what a page says by having seen all that it was sent
+    "play": Room._play,
+    "pause": Room._pause,
+    "step": Room._step,  # {"ticks": 1 to 100}
+    "speed": Room._set_speed,  # {"value": ticks a second, 1 to FASTEST}
+    "edit": Room._edit,  # {"edit": see taichi_ants.live.edits}
+    "begin": Room._begin_chosen,  # {"chosen": see taichi_ants.live.choices}
+    "restart": Room._restart,
+    "export": Room._export,  # {"kind": see taichi_ants.live.exports}
+    "quit": Room._quit,
+}
+
+_HEADERS = {
+    "Content-Type": "text/html; charset=utf-8",
+    "Cache-Control": "no-store",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+
+
+def _say(kind: str, **facts: Any) -> str:
+    """A message to a page."""
+    return json.dumps({"say": kind, **facts}, separators=(",", ":"))
+
+
+def _refuse(name: str) -> None:
+    raise ValueError(f"{name} is no number")
+
+
+def _number(request: dict[str, Any], name: str, least: float, most: float) -> float:
+    """A number of a request; no page of ours sends one that is not allowed."""
+    value = request.get(name)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value <= most:
+        raise Closed
+    return value
