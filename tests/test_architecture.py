@@ -27,7 +27,7 @@ LAYERS = (
     {"analysis", "rendering"},
     {"offline"},
     {"viewer", "envs"},
-    {"studies"},
+    {"live", "studies"},
     {"commands"},
     {"__main__"},
 )

@@ -42,7 +42,11 @@ class FileKind:
     ) -> None:
         """Write a file; raises as `files.write_npz` does."""
         sees = observations.get(facts["task"]["observation"])
-        known = {"format": self.mark, "digest": _digest(arrays), "rows": {sees.name: sees.n_states}}
+        known = {
+            "format": self.mark,
+            "digest": digest_of(arrays),
+            "rows": {sees.name: sees.n_states},
+        }
         text = files.to_json({**known, **facts})
         files.write_npz(path, {**arrays, "facts": np.array(text)}, compress=compress)
 
@@ -63,7 +67,7 @@ class FileKind:
                 f"{self.writer} wrote."
             ) from error
         with self.rebuilding(path):
-            if _digest(stored) != facts["digest"]:
+            if digest_of(stored) != facts["digest"]:
                 raise ValueError("its arrays are not those that were written")
             ((name, rows),) = facts["rows"].items()
         if name not in observations.names() or observations.get(name).n_states != rows:
@@ -87,7 +91,7 @@ class FileKind:
             ) from error
 
 
-def _digest(arrays: Mapping[str, np.ndarray]) -> str:
+def digest_of(arrays: Mapping[str, np.ndarray]) -> str:
     """What tells whether arrays are those that were written.
 
     Kernels write wherever the numbers of an ant, or in the memory of a learner, point.

@@ -83,6 +83,11 @@ class Task:
         """The rows of a table of action values."""
         return self.sees.n_states
 
+    def pheromone_while(self, learning: bool) -> Pheromone:
+        """The pheromone while ants learn, or while nobody does: with evaporation or without."""
+        falls = self.evaporation_in_training if learning else self.evaporation_in_evaluation
+        return self.pheromone if falls else self.pheromone.lasting
+
     def as_dict(self) -> dict[str, Any]:
         """The task as names and numbers, for files; `from_dict` reads it."""
         return asdict(self)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,7 @@ class Recorder:
         expect("title", title, str)
         self.colony, self.world, self._title, self._follow = colony, world, title, follow
         start = colony.snapshot(world)
+        self._pheromone = colony.pheromone  # by which pages expect trails to fall
         self.grid, self.observation = start.grid, colony.task.sees
         self._size, self._n_states = self.grid.size, colony.task.n_states
         self.types = types_of(self._size, self._n_states, colony.pheromone.dense)
@@ -68,10 +70,7 @@ class Recorder:
         States have names as far as they have been seen, all of them if they are few: a task or "",
         the rest of the name, and a letter or two for each cell in view where the name has them.
         """
-        colony, task, pheromone = self.colony, self.colony.task, self.colony.pheromone
-        few = self._n_states <= _MOST_NAMES
-        seen = np.unique(np.flatnonzero(self._known) % self._n_states).tolist()
-        named = range(self._n_states) if few else seen
+        colony, task, pheromone = self.colony, self.colony.task, self._pheromone
         return {
             "format": 1,
             "title": self._title or f"{count(colony.ants, 'ant')} in a world of {self.grid.count}",
@@ -84,7 +83,7 @@ class Recorder:
                 "strongest": int(task.pheromone.level),
             },
             "n_states": self._n_states,
-            "names": {state: name_parts(self.observation, state) for state in named},
+            "names": self.names(),
             "view": list(self.observation.cells),
             "letters": self.observation.letters,
             "actions": ACTION_NAMES,
@@ -95,6 +94,13 @@ class Recorder:
             "follow": self._follow,
             "about": self._about(),
         }
+
+    def names(self) -> dict[int, tuple[str, str, list[str]]]:
+        """The names of the states that have been seen, of all states if they are few."""
+        few = self._n_states <= _MOST_NAMES
+        seen = np.unique(np.flatnonzero(self._known) % self._n_states).tolist()
+        named = range(self._n_states) if few else seen
+        return {state: name_parts(self.observation, state) for state in named}
 
     def _about(self) -> list[tuple[str, str]]:
         """Lines about the colony, names and values."""
@@ -120,6 +126,15 @@ class Recorder:
     def moment(self) -> bytes:
         """A frame of the colony as it is now: the first one, or after it was changed by hand."""
         return self._frame({})
+
+    def whole(self) -> bytes:
+        """A frame of the colony as it was in the last one, for a page that has read none."""
+        late = copy.copy(self)
+        late._numbers = self._numbers[:0]
+        late._ground, late._trail = np.zeros_like(self._ground), np.zeros_like(self._trail)
+        late._known, late._owners = self._known.copy(), self._owners.copy()
+        late._table = np.full_like(self._table, np.nan)
+        return late._frame({})
 
     def tick(self, n: int = 1, td_errors: np.ndarray | None = None) -> bytes:
         """Let n ticks pass and return a frame; what ants did is in it only where n is 1.
@@ -213,7 +228,7 @@ class Recorder:
         # Trails fall by themselves; all else is told.
         episode, last = self._clock
         passed = tick - last if episode == colony.episode else 0
-        expected = fallen(self._trail, self._ground, colony.pheromone, self.grid.offsets, passed)
+        expected = fallen(self._trail, self._ground, self._pheromone, self.grid.offsets, passed)
         sections |= _changes("ground", self._ground, snapshot.ground)
         sections |= _changes("trail", expected, snapshot.trail)
         sections |= self._table_changes(slots, numbers, sections["states"])

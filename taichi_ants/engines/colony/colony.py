@@ -176,14 +176,13 @@ class Colony:
             self._plans_together = sharing == "shared" and self._learner.plans
             if sharing == "own" or self._plans_together:
                 self.memory = padded(self._learner.memory_for(self.training, self.task.n_states))
-        falls = self.task.evaporation_in_training if learns else self.task.evaporation_in_evaluation
-        self.pheromone = self.task.pheromone if falls else self.task.pheromone.lasting
+        self.pheromone = self.task.pheromone_while(learns)
         self.seeds = checks.checked_seeds(seeds)
         self.seed_words = np.array([seed % 2**64 for seed in self.seeds], dtype=np.uint64)
         runtime.start(threads, arch)
         life = self.task.life
         self._ants_change = life.births or life.lifespan is not None
-        self._food_changes = life.regrowth is not None or life.wander is not None
+        self.food_changes = life.regrowth is not None or life.wander is not None
         usual = "by_chunk" if self.capacity >= _LARGE_COLONY else "by_world"
         self.schedule = usual if schedule is None else schedule
         check_one_of("schedule", self.schedule, ("by_world", "by_chunk"))
@@ -208,10 +207,14 @@ class Colony:
         """Make the arrays that depend on the worlds."""
         self.worlds, self.grid = worlds, worlds[0].grid
         most = max(len(world.foods) for world in worlds)
-        self.n_homes = most if self._food_changes else 0
+        self.make_room_for_homes(most if self.food_changes else 0)
+        self.arrays |= memory.constants(self)
+
+    def make_room_for_homes(self, n: int) -> None:
+        """Begin anew, with room for n homes of food in each world, at least as many as foods."""
+        self.n_homes = n
         self.at_start = memory.start_of_episode(self)
         self.arrays |= {name: array.copy() for name, array in self.at_start.items()}
-        self.arrays |= memory.constants(self)
 
     def begin_episode(
         self, length: int | None = None, world: World | Sequence[World] | None = None
@@ -257,6 +260,15 @@ class Colony:
             self._reseed(which, [seed for one in seeds for seed in checks.checked_seeds(one)])
         memory.begin_episode(self, which)
         self._launch("begin_phases")
+
+    def look(self) -> None:
+        """Let the ants see what was changed in the arrays since the last tick, see `hand`.
+
+        Raises:
+            AntsError: No episode has begun.
+        """
+        self._check_begun()
+        self._launch("look_phases")
 
     def _reseed(self, which: np.ndarray, seeds: list[int]) -> None:
         """Take other seeds for some worlds, as if nothing had happened in them yet."""
@@ -555,7 +567,7 @@ class Colony:
         there the order stays.
         """
         slots_matter = self._ants_change or self.one_a_slot or self.is_given_actions
-        if slots_matter or self.capacity > self.ants:
+        if slots_matter or self.arrays["worlds"][WorldRow.LIVING].min() < self.capacity:
             return
         ants = self.arrays["ants"]
         cells = ants[AntRow.CELL].reshape(len(self.seeds), -1)
@@ -581,7 +593,7 @@ class Colony:
             self.pheromone.view,
             self.task.traffic,
             self._ants_change,
-            self._food_changes,
+            self.food_changes,
         )
         values = {**self._numbers(), **self.arrays}
         kind = self._arguments.type_of(values)

@@ -51,6 +51,7 @@ def _contents(colony: Colony) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
         "worlds": [world_facts(world) for world in numbers],
         "world_of": [numbers[world] for world in colony.worlds],
         "one_a_slot": colony.one_a_slot,
+        "homes": colony.n_homes,  # more than there are foods at the start, if a hand put food there
         **{name: getattr(colony, name) for name in (*_OPTIONS, *_MOMENT)},
     }
     return facts, arrays
@@ -88,6 +89,8 @@ def load_colony(
         set_learning_rate(colony)
         colony.length = checked_whole("length", facts["length"], least=0)
         colony.ticks = checked_whole("ticks", facts["ticks"], least=0)
+        if facts.get("homes", colony.n_homes) != colony.n_homes:
+            colony.make_room_for_homes(facts["homes"])
         for name in colony.stored:
             array, kept = colony.arrays[name], stored[f"array_{name}"]
             if kept.shape != array.shape or kept.dtype != array.dtype:

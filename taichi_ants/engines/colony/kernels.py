@@ -102,6 +102,11 @@ def begin_phases(v: Variant) -> Iterator[Phase]:
     yield Phase(ANTS, learning.begin)
 
 
+def look_phases(v: Variant) -> Iterator[Phase]:
+    """What follows a change by hand, between two ticks."""
+    yield Phase(ANTS, learning.look)
+
+
 def tick_phases(v: Variant) -> Iterator[Phase]:
     """A tick; rounds of `planning_phases` and the `last_phases` follow."""
     yield Phase(ANTS, steps.want)

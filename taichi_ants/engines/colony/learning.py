@@ -35,6 +35,16 @@ def begin(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 
 
 @ti.func
+def look(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
+    """Between two ticks an ant sees what a hand has changed; one that it has put there begins."""
+    if c.ants[AntRow.STAGE, ant] == Stage.NEWBORN:
+        c.ants[AntRow.STAGE, ant] = Stage.LIVING
+        if ti.static(v.alone):
+            forget(c, v, ant)
+    c.ants[AntRow.PERCEPT, ant], c.ants[v.row_at, ant] = observe(c, v, w, ant, tick * c.evaporates)
+
+
+@ti.func
 def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Observe, choose the next action where the learner asks for it, and learn."""
     percept, row = observe(c, v, w, ant, (tick + 1) * c.evaporates)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -60,7 +60,6 @@ def start_of_episode(colony: Colony) -> dict[str, np.ndarray]:
         rows[row] = n
     rows[WorldRow.FIRST_DELIVERY] = -1
     rows[WorldRow.QUEEN_CELL] = [int(colony.grid.index(world.queen)) for world in worlds]
-    homes, piles, home_of = _homes(colony, rows)
     return {
         # What a cell holds, and a mark of the ant on it, see `layout`.
         "ground": ground.reshape(-1),
@@ -72,32 +71,48 @@ def start_of_episode(colony: Colony) -> dict[str, np.ndarray]:
         "worlds": rows,
         # Rewards of all ants in this episode.
         "returns": np.zeros(len(worlds), np.int64),
-        "homes": homes,
-        # By world: where each pile begins in the row HomeRow.LISTED.
-        "piles": piles,
-        # The column in `homes` whose food lies in a cell, -1.
-        "home_of": home_of,
+        **homes_arrays(colony, rows, _homes_at_start(colony) if colony.n_homes else ()),
     }
 
 
-def _homes(colony: Colony, rows: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Homes, piles and `home_of` of all worlds; their numbers are put into the rows of worlds."""
+def _homes_at_start(colony: Colony) -> Iterator[np.ndarray]:
+    """What `homes_arrays` needs of each world: a home for each of its foods."""
+    for world in colony.worlds:
+        cells = colony.grid.index(world.foods)
+        yield np.stack([cells, np.full(len(cells), -1), _piles(colony.grid, cells)])
+
+
+def homes_arrays(
+    colony: Colony, rows: np.ndarray, homes_of: Iterable[np.ndarray]
+) -> dict[str, np.ndarray]:
+    """The homes of all foods and their piles.
+
+    Args:
+        colony: Its `n_homes` is the room for homes in each world.
+        rows: By `WorldRow`; the numbers of homes and piles are put into it.
+        homes_of: Of each world its homes (3, n): HomeRow.CELL, TAKEN and PILE.
+    """
     most, n_worlds, size = colony.n_homes, len(colony.worlds), colony.grid.size
     homes = np.zeros((len(HomeRow), max(1, n_worlds * most)), np.int32)
     begins = np.zeros((n_worlds, most + 1), np.int32)
     homes[HomeRow.TAKEN] = -1
     home_of = np.full(n_worlds * size if most else 1, -1, np.int32)
-    for w, world in enumerate(colony.worlds if most else ()):
-        cells = colony.grid.index(world.foods)
-        piles = _piles(colony.grid, cells)
+    for w, (cells, taken, piles) in enumerate(homes_of):
         n_piles = int(piles.max(initial=-1)) + 1
         of_world = homes[:, w * most : w * most + len(cells)]
-        of_world[HomeRow.CELL], of_world[HomeRow.PILE] = cells, piles
-        of_world[HomeRow.LISTED] = np.argsort(piles, kind="stable")
+        of_world[HomeRow.CELL], of_world[HomeRow.TAKEN] = cells, taken
+        of_world[HomeRow.PILE], of_world[HomeRow.LISTED] = piles, np.argsort(piles, kind="stable")
         begins[w, 1 : n_piles + 1] = np.cumsum(np.bincount(piles, minlength=n_piles))
         rows[WorldRow.HOMES, w], rows[WorldRow.PILES, w] = len(cells), n_piles
-        home_of[w * size + cells] = np.arange(w * most, w * most + len(cells))
-    return homes, begins.reshape(-1), home_of
+        (full,) = np.nonzero(taken < 0)
+        home_of[w * size + cells[full]] = w * most + full
+    return {
+        "homes": homes,
+        # By world: where each pile begins in the row HomeRow.LISTED.
+        "piles": begins.reshape(-1),
+        # The column in `homes` whose food lies in a cell, -1.
+        "home_of": home_of,
+    }
 
 
 def _piles(grid: AxialGrid, cells: np.ndarray) -> np.ndarray:
@@ -144,9 +159,8 @@ def lasting(colony: Colony, q_values: np.ndarray | None) -> dict[str, np.ndarray
 def seeded(colony: Colony) -> dict[str, np.ndarray]:
     """What a life begins with, by the seeds of the worlds, and goes on through its episodes."""
     seeds, n_worlds = colony.seed_words, len(colony.seeds)
-    first_streams = np.zeros((n_worlds, colony.capacity), np.uint64)
-    numbers = np.arange(colony.ants, dtype=np.uint64)
-    first_streams[:, : colony.ants] = stream_state(seeds[:, None], STREAM_ANT, numbers[None, :])
+    numbers = np.arange(colony.capacity, dtype=np.uint64)  # more ants may start later episodes
+    first_streams = stream_state(seeds[:, None], STREAM_ANT, numbers[None, :])
     return {
         # By world and ant number: where the streams of the ants that start an episode stopped.
         "first_streams": first_streams.reshape(-1),

@@ -1,0 +1,279 @@
+"""What a hand changes in a colony of one world, between two ticks.
+
+Rocks, food and the queen stay for the episodes that follow; trails, and ants that are added or
+removed one by one, are of this one. After each change the ants look around again. What an ant has
+drawn to do already, it still does.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from taichi_ants.engines.colony.layout import ANT_GROUND, AntRow, HomeRow, Stage, WorldRow
+from taichi_ants.engines.colony.memory import homes_arrays, set_learning_rate
+from taichi_ants.errors import AntsError, count
+from taichi_ants.grid.constants import N_HEADINGS, STREAM_BORN, STREAM_HAND, STREAM_START_CELL
+from taichi_ants.grid.randomness import Stream, choose, stream_state
+from taichi_ants.task import Task
+from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
+from taichi_ants.worlds import geometry
+from taichi_ants.worlds.world import World
+
+if TYPE_CHECKING:
+    from taichi_ants.engines.colony.colony import Colony
+
+
+class Hand:
+    """Changes a colony, and knows how its later episodes begin.
+
+    Cells are flat indices of cells of the world, int (n,), each once. Where a cell cannot take what
+    is put there, since an ant, a rock or the queen is on it, it is left as it is. Whatever raises
+    an error has changed nothing.
+
+    Args:
+        colony: Of one world; in an episode for everything but `begin_episode`.
+
+    Attributes:
+        ants: How many start each later episode.
+    """
+
+    def __init__(self, colony: Colony) -> None:
+        self.colony, self.ants = colony, colony.ants
+        (self._first,) = colony.worlds
+        self._start = self._first.ground()
+        self._stream = Stream(colony.seeds[0], STREAM_HAND)
+        self._changed = False  # whether the next episode begins otherwise than the present one
+
+    def put(self, cells: np.ndarray, what: int) -> None:
+        """Make cells EMPTY, OBSTACLE or FOOD, but none on which an ant or the queen stands.
+
+        A food that is put somewhere has its home there: it grows back and wanders with the foods
+        beside it. Rocks hold no trail.
+
+        Raises:
+            AntsError: Later episodes would have no room for the ants, or no food to learn from.
+        """
+        arrays = self.colony.arrays
+        held = arrays["ground"][cells]
+        cells = cells[(held >> 4 == 0) & (held != QUEEN)]  # no ant, see `layout`
+        start = self._start.copy()
+        start[cells] = what
+        self._begin_with(start)
+        arrays["ground"][cells] = what
+        arrays["walls"][cells] = what == OBSTACLE
+        if what == OBSTACLE:
+            self._lay(cells, 0)
+        self._change_homes(cells, what)
+        self.colony.look()
+
+    def move_queen(self, cell: int) -> None:
+        """Let the queen stand on an empty cell.
+
+        Raises:
+            AntsError: Something is on that cell, or it held the last food.
+        """
+        arrays, grid = self.colony.arrays, self.colony.grid
+        if arrays["ground"][cell] != EMPTY:
+            raise AntsError(
+                f"cell {cell} is not empty, so the queen cannot stand there; choose an empty cell."
+            )
+        old = arrays["worlds"][WorldRow.QUEEN_CELL, 0]
+        start = self._start.copy()
+        start[old], start[cell] = EMPTY, QUEEN
+        self._begin_with(start)
+        arrays["ground"][old], arrays["ground"][cell] = EMPTY, QUEEN
+        arrays["worlds"][WorldRow.QUEEN_CELL, 0] = cell
+        arrays["closer"][:] = World(grid.ranges, grid.cells(cell)).closer()
+        self._change_homes(np.array([cell]), QUEEN)
+        self.colony.look()
+
+    def lay_trail(self, cells: np.ndarray, level: int) -> None:
+        """Set the trail of cells that are no rocks."""
+        self._lay(cells[self.colony.arrays["walls"][cells] == 0], level)
+        self.colony.look()
+
+    def _lay(self, cells: np.ndarray, level: int) -> None:
+        arrays = self.colony.arrays
+        if self.colony.pheromone.dense:
+            arrays["level"][cells] = level
+        else:
+            arrays["trail"][cells] = level + self._clock() if level else 0
+
+    def _clock(self) -> int:
+        """How far integer trails have fallen since the episode began."""
+        falls = self.colony.pheromone.evaporation == "linear"
+        return int(self.colony.arrays["worlds"][WorldRow.TICKS, 0]) * falls
+
+    def add_ants(self, cells: np.ndarray, heading: int | None = None) -> None:
+        """Put ants on those cells that are empty; headings are drawn if none is given.
+
+        An ant begins as if it were born, in the lowest slots that are vacant.
+
+        Raises:
+            AntsError: The colony has no room for so many.
+        """
+        colony, arrays = self.colony, self.colony.arrays
+        ants, world = arrays["ants"], arrays["worlds"][:, 0]
+        cells = cells[arrays["ground"][cells] == EMPTY]
+        n, living = len(cells), int(world[WorldRow.LIVING])
+        if living + n > colony.capacity:
+            raise AntsError(
+                f"{count(n, 'ant')} cannot join {count(living, 'ant')}; the capacity of this "
+                f"colony is {colony.capacity}, so remove ants, or begin with a larger one."
+            )
+        slots = np.flatnonzero(ants[AntRow.STAGE] == Stage.VACANT)[:n]
+        numbers = world[WorldRow.NEXT_NUMBER] + np.arange(n)
+        drawn = heading is None and n > 0
+        headings = choose(self._stream.bits(n) >> np.uint64(32), N_HEADINGS) if drawn else heading
+        ants[:, slots] = 0
+        ants[AntRow.CELL, slots], ants[AntRow.HEADING, slots] = cells, headings
+        ants[AntRow.NUMBER, slots], ants[AntRow.ACTION, slots] = numbers, -1
+        ants[AntRow.STAGE, slots] = Stage.NEWBORN
+        born = (colony.episode << 32) + numbers.astype(np.int64)
+        arrays["streams"][slots] = stream_state(colony.seeds[0], STREAM_BORN, born)
+        arrays["ground"][cells] = ANT_GROUND
+        world[WorldRow.NEXT_NUMBER] += n
+        self._count_ants()
+        colony.look()
+
+    def remove_ants(self, cells: np.ndarray) -> None:
+        """Take the ants on these cells away, with the food that they carry."""
+        ants = self.colony.arrays["ants"]
+        found = (ants[AntRow.STAGE] == Stage.LIVING) & np.isin(ants[AntRow.CELL], cells)
+        self._remove(np.flatnonzero(found))
+
+    def _remove(self, slots: np.ndarray) -> None:
+        arrays = self.colony.arrays
+        ants = arrays["ants"]
+        numbers = ants[AntRow.NUMBER, slots]
+        first = numbers < self.colony.ants  # their streams go on in the next episode
+        arrays["first_streams"][numbers[first]] = arrays["streams"][slots[first]]
+        arrays["ground"][ants[AntRow.CELL, slots]] = EMPTY
+        ants[AntRow.STAGE, slots] = Stage.VACANT
+        self._count_ants()
+        self.colony.look()
+
+    def _count_ants(self) -> None:
+        world, stages = self.colony.arrays["worlds"][:, 0], self.colony.arrays["ants"][AntRow.STAGE]
+        taken = stages != Stage.VACANT
+        world[WorldRow.LIVING] = np.count_nonzero(taken)
+        world[WorldRow.TOP] = np.max(np.flatnonzero(taken), initial=-1) + 1
+        world[WorldRow.FIRST_VACANT] = np.argmin(taken) if not taken.all() else len(taken)
+
+    def set_ants(self, n: int) -> None:
+        """Let n ants live now, and n start each later episode.
+
+        New ones stand on the free cells where ants of a World start, see `World.start`; those of
+        the highest numbers are removed.
+
+        Raises:
+            AntsError: The colony, or the world, has no room for so many.
+        """
+        colony, ants = self.colony, self.colony.arrays["ants"]
+        (slots,) = np.nonzero(ants[AntRow.STAGE] == Stage.LIVING)
+        missing, free = n - len(slots), np.flatnonzero(colony.arrays["ground"] == EMPTY)
+        room = min(colony.capacity, len(free) + len(slots), np.count_nonzero(self._start == EMPTY))
+        if n > room:
+            raise AntsError(f"ants is {n}; there is room for {room}, so take fewer.")
+        self._changed |= n != self.ants
+        self.ants = n
+        if missing > 0:
+            self.add_ants(self._nearest(free)[:missing])
+        elif missing < 0:
+            self._remove(slots[np.argsort(ants[AntRow.NUMBER, slots])[missing:]])
+
+    def _nearest(self, cells: np.ndarray) -> np.ndarray:
+        """Cells in the order in which ants would start there."""
+        colony, grid = self.colony, self.colony.grid
+        words = stream_state(colony.seeds[0], STREAM_START_CELL, grid.number(grid.cells(cells)))
+        queen = grid.cells(colony.arrays["worlds"][WorldRow.QUEEN_CELL, 0])
+        far = geometry.distances(grid, tuple(queen.tolist()))[cells]
+        return cells[np.lexsort((words, far * (colony.start == "nest")))]
+
+    def set_task(self, task: Task) -> None:
+        """Another task, which differs in numbers of its pheromone and in whether that evaporates.
+
+        Trails stay as they are, and as dense as they are.
+        """
+        colony, arrays = self.colony, self.colony.arrays
+        levels = np.maximum(arrays["trail"] - self._clock(), 0)
+        colony.task, colony.pheromone = task, task.pheromone_while(colony.sharing != "fixed")
+        arrays["trail"][:] = np.where(levels > 0, levels + self._clock(), 0)
+
+    def set_epsilon(self, epsilon: float) -> None:
+        """The epsilon of this episode, from which it decays."""
+        self.colony.epsilon = epsilon
+
+    def set_learning_rate(self, learning_rate: float) -> None:
+        """The learning rate of this episode, from which it decays."""
+        self.colony.learning_rate = learning_rate
+        set_learning_rate(self.colony)
+
+    def world(self) -> World:
+        """How later episodes begin."""
+        first, grid, start = self._first, self.colony.grid, self._start
+        trails, ants = grid.index(first.trails[:, :3]), grid.index(first.ants[:, :3])
+        return World(
+            first.ranges,
+            grid.cells(int(np.argmax(start == QUEEN))),
+            grid.cells(np.flatnonzero(start == FOOD)),
+            grid.cells(np.flatnonzero((start == OBSTACLE) & grid.exists)),
+            first.trails[start[trails] != OBSTACLE],
+            first.ants[start[ants] == EMPTY],
+        )
+
+    def begin_episode(self, length: int | None) -> None:
+        """End the episode that there is, and begin the next one, see `Colony.begin_episode`."""
+        colony = self.colony
+        if colony.episode >= 0:
+            colony.end_episode()
+        colony.ants = self.ants
+        colony.begin_episode(length, self.world() if self._changed else None)
+        self._changed = False
+
+    def _begin_with(self, start: np.ndarray) -> None:
+        """Let later episodes begin with this ground, if they can."""
+        ants, room = max(self.ants, self.colony.ants), np.count_nonzero(start == EMPTY)
+        if ants > room:
+            raise AntsError(
+                f"{count(ants, 'ant')} start each episode, but this would leave {room} free cells; "
+                "leave more cells free."
+            )
+        if self.colony.sharing != "fixed" and not (start == FOOD).any():
+            raise AntsError("this would take the last food, but ants learn from it; leave some.")
+        self._start, self._changed = start, True
+
+    def _change_homes(self, cells: np.ndarray, what: int) -> None:
+        """Give foods that were put on cells a home there; where anything else is put, none is left.
+
+        A home that waits there has its food again. A new one belongs to the pile of the first home
+        beside it; if there is none, it is a pile of its own.
+        """
+        colony, arrays = self.colony, self.colony.arrays
+        if not colony.food_changes:
+            return
+        homes = arrays["homes"][:, : arrays["worlds"][WorldRow.HOMES, 0]]
+        if what != FOOD:
+            homes = homes[:, ~np.isin(homes[HomeRow.CELL], cells)]
+        at, taken, pile = homes[[HomeRow.CELL, HomeRow.TAKEN, HomeRow.PILE]].tolist()
+        on: dict[int, list[int]] = {}
+        for home, cell in enumerate(at):
+            on.setdefault(cell, []).append(home)
+        for cell in cells.tolist() if what == FOOD else ():
+            here = on.setdefault(cell, [])
+            if not here:
+                around = [on.get(cell + step, ()) for step in colony.grid.offsets.tolist()]
+                first = min((home for there in around for home in there), default=None)
+                here.append(len(at))
+                at.append(cell)
+                taken.append(0)
+                pile.append(max(pile, default=-1) + 1 if first is None else pile[first])
+            if all(taken[home] >= 0 for home in here):
+                taken[here[0]] = -1
+        _, pile = np.unique(np.array(pile, int), return_inverse=True)  # without those that are gone
+        colony.n_homes = max(len(at), int(np.count_nonzero(self._start == FOOD)))
+        arrays |= homes_arrays(
+            colony, arrays["worlds"], [np.array([at, taken, pile], int).reshape(3, -1)]
+        )

@@ -1,0 +1,236 @@
+"""What a hand can change in a colony that runs: each edit is a small dictionary, as JSON holds it.
+
+    {"kind": "ground", "what": "empty", "rock" or "food", "cells": [...]}
+    {"kind": "trail", "level": number, "cells": [...]}
+    {"kind": "add_ants", "cells": [...], "heading": 0 to 5, or None to draw one for each}
+    {"kind": "remove_ants", "cells": [...]}
+    {"kind": "queen", "cell": cell}
+    {"kind": "set", "name": one of `values`, "value": number}
+    {"kind": "episode"}: the episode ends, the next one begins
+
+Cells are flat indices of cells of the world. Cells that cannot take what is put there are left as
+they are: the ground under ants and queen, trails on rocks, ants on anything but empty cells. What
+stays for later episodes, and what not, says `taichi_ants.engines.colony.hand`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from taichi_ants.engines.colony.hand import Hand
+from taichi_ants.errors import AntsError, check_one_of, expect, shown
+from taichi_ants.grid.constants import N_HEADINGS
+from taichi_ants.task import Pheromone
+from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
+from taichi_ants.task.pheromone import MAX_DEPOSIT
+
+Edit = dict[str, Any]
+
+_GROUNDS = {"empty": EMPTY, "rock": OBSTACLE, "food": FOOD}
+_FIELDS = {
+    "ground": ("what", "cells"),
+    "trail": ("level", "cells"),
+    "add_ants": ("cells", "heading"),
+    "remove_ants": ("cells",),
+    "queen": ("cell",),
+    "set": ("name", "value"),
+    "episode": (),
+}
+
+
+class Value(NamedTuple):
+    """A number that "set" changes.
+
+    Attributes:
+        value: What it is now.
+        least, most: What it may be.
+        step: By which a slider moves it; only whole numbers are allowed if this is one.
+    """
+
+    value: float
+    least: float
+    most: float
+    step: float
+
+
+def values(hand: Hand) -> dict[str, Value]:
+    """What "set" changes in a colony, by name; only what makes a difference there.
+
+    - ants: how many live now, and start each later episode.
+    - epsilon, learning_rate: of this episode, from which they decay.
+    - deposit, slope, cap: as `Pheromone` has them; the deposit is its level.
+    - evaporation: 1 if trails fall, else 0. half_life, diffusion: as `Pheromone` has them.
+    """
+    colony, pheromone = hand.colony, hand.colony.pheromone
+    found = {
+        "ants": Value(hand.ants, 1, colony.capacity, 1),
+        "epsilon": Value(colony.epsilon, 0.0, 1.0, 0.01),
+    }
+    if colony.sharing != "fixed":
+        found["learning_rate"] = Value(colony.learning_rate, 0.0, 1.0, 0.001)
+    if pheromone.deposit != "none":
+        found["deposit"] = Value(int(pheromone.level), 1, max(1000, int(pheromone.level)), 1)
+    for name, usual in (("slope", 100), ("cap", 10_000)):
+        if (number := getattr(pheromone, name)) is not None:
+            found[name] = Value(int(number), 1, max(usual, int(number)), 1)
+    falls = pheromone.evaporation != "none"
+    if _with_evaporation(hand, not falls)[0].dense == pheromone.dense:
+        found["evaporation"] = Value(int(falls), 0, 1, 1)
+    if pheromone.half_life is not None:
+        half_life = float(pheromone.half_life)
+        found["half_life"] = Value(half_life, min(1.0, half_life), max(1000.0, half_life), 0.5)
+    if pheromone.dense:  # integer trails cannot spread, nor dense ones become integers
+        least = 0.0 if pheromone.evaporation == "exponential" else min(0.01, pheromone.diffusion)
+        found["diffusion"] = Value(float(pheromone.diffusion), float(least), 1.0, 0.01)
+    return found
+
+
+def _with_evaporation(hand: Hand, falls: bool) -> tuple[Pheromone, Pheromone]:
+    """The pheromone that a colony has if its trails fall, or do not, and that of its task then."""
+    pheromone = hand.colony.task.pheromone
+    if falls and pheromone.evaporation == "none":
+        pheromone = replace(pheromone, evaporation="linear")
+    return (pheromone if falls else pheromone.lasting), pheromone
+
+
+def checked(edit: object, hand: Hand) -> Edit:
+    """A copy of an edit, if it is one; whether there is room for it tells `apply`.
+
+    Raises:
+        AntsError: It is none; the message says why.
+    """
+    expect("an edit", edit, Mapping)
+    assert isinstance(edit, Mapping)
+    kind = edit.get("kind")
+    check_one_of("the kind of an edit", kind, tuple(_FIELDS))
+    wanted, given = {"kind", *_FIELDS[kind]}, set(edit)
+    if given != wanted:
+        raise AntsError(
+            f"an edit of kind {kind!r} has {shown(sorted(map(str, given)))}; it must have "
+            f"{', '.join(sorted(wanted))}."
+        )
+    plain: Edit = {"kind": kind}
+    for name in _FIELDS[kind]:
+        plain[name] = _CHECKS[name](edit[name], edit, hand)
+    return plain
+
+
+def apply(edit: Edit, hand: Hand, length: int | None) -> None:
+    """Do an edit that `checked` gave.
+
+    Args:
+        edit: What to do.
+        hand: Whose colony is in an episode.
+        length: Of an episode that begins.
+
+    Raises:
+        AntsError: There is no room for it; nothing has changed.
+    """
+    kind = edit["kind"]
+    if kind == "ground":
+        hand.put(np.array(edit["cells"]), _GROUNDS[edit["what"]])
+    elif kind == "trail":
+        hand.lay_trail(np.array(edit["cells"]), edit["level"])
+    elif kind == "add_ants":
+        hand.add_ants(np.array(edit["cells"]), edit["heading"])
+    elif kind == "remove_ants":
+        hand.remove_ants(np.array(edit["cells"]))
+    elif kind == "queen":
+        hand.move_queen(edit["cell"])
+    elif kind == "set":
+        _set(edit["name"], edit["value"], hand)
+    else:
+        hand.begin_episode(length)
+
+
+def _set(name: str, value: float, hand: Hand) -> None:
+    if name in _SETS:
+        _SETS[name](hand, value)
+        return
+    task = hand.colony.task
+    pheromone = task.pheromone
+    if name == "evaporation":
+        _, pheromone = _with_evaporation(hand, value == 1)
+        learns = hand.colony.sharing != "fixed"
+        flag = "evaporation_in_training" if learns else "evaporation_in_evaluation"
+        task = replace(task, **{flag: value == 1})
+    else:
+        pheromone = replace(pheromone, **{"level" if name == "deposit" else name: value})
+    hand.set_task(replace(task, pheromone=pheromone))
+
+
+_SETS: dict[str, Callable[[Hand, Any], None]] = {
+    "ants": Hand.set_ants,
+    "epsilon": Hand.set_epsilon,
+    "learning_rate": Hand.set_learning_rate,
+}
+
+
+def _checked_what(what: Any, edit: Mapping, hand: Hand) -> str:
+    check_one_of("what", what, tuple(_GROUNDS))
+    return what
+
+
+def _checked_cells(cells: Any, edit: Mapping, hand: Hand) -> list[int]:
+    """Cells of the world, in the order given, each once."""
+    most = hand.colony.grid.count
+    if not isinstance(cells, list) or not 1 <= len(cells) <= most:
+        raise AntsError(f"cells is {shown(cells)}; it must be a list of 1 to {most} cells.")
+    exists = hand.colony.grid.exists
+    for cell in cells:
+        if type(cell) is not int or not 0 <= cell < len(exists) or not exists[cell]:
+            raise AntsError(
+                f"cells holds {shown(cell)}; each must be the flat index of a cell of this world."
+            )
+    return list(dict.fromkeys(cells))
+
+
+def _checked_cell(cell: Any, edit: Mapping, hand: Hand) -> int:
+    return _checked_cells([cell], edit, hand)[0]
+
+
+def _checked_level(level: Any, edit: Mapping, hand: Hand) -> int:
+    return int(_number("level", level, Value(0, 0, MAX_DEPOSIT, 1)))
+
+
+def _checked_heading(heading: Any, edit: Mapping, hand: Hand) -> int | None:
+    if heading is None:
+        return None
+    return int(_number("heading", heading, Value(0, 0, N_HEADINGS - 1, 1), ", or None"))
+
+
+def _checked_name(name: Any, edit: Mapping, hand: Hand) -> str:
+    check_one_of("the name of a value", name, tuple(values(hand)))
+    return name
+
+
+def _checked_value(value: Any, edit: Mapping, hand: Hand) -> float:
+    return _number(edit["name"], value, values(hand)[edit["name"]])
+
+
+def _number(name: str, value: Any, allowed: Value, otherwise: str = "") -> float:
+    whole = isinstance(allowed.step, int)
+    if type(value) not in ((int,) if whole else (int, float)) or not (
+        allowed.least <= value <= allowed.most and math.isfinite(value)
+    ):
+        raise AntsError(
+            f"{name} is {shown(value)}; it must be a {'whole ' * whole}number from "
+            f"{allowed.least:g} to {allowed.most:g}{otherwise}."
+        )
+    return value if whole else float(value)
+
+
+_CHECKS: dict[str, Callable[[Any, Mapping, Hand], Any]] = {
+    "what": _checked_what,
+    "cells": _checked_cells,
+    "cell": _checked_cell,
+    "level": _checked_level,
+    "heading": _checked_heading,
+    "name": _checked_name,
+    "value": _checked_value,
+}
