@@ -20,7 +20,7 @@ from taichi_ants.grid.constants import (
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.reference.actions import carry_out, choose_action, intend
 from taichi_ants.reference.ants import Ant, Event, Transition, starts
-from taichi_ants.reference.geometry import neighbour
+from taichi_ants.reference.geometry import Cell, neighbour
 from taichi_ants.reference.homes import Homes
 from taichi_ants.reference.learners import LEARNERS
 from taichi_ants.reference.observations import OBSERVATIONS
@@ -64,9 +64,15 @@ class ReferenceColony:
 
     Attributes:
         world: The present state of the world.
+        start_world: The world in which each episode begins.
+        n_ants: How many ants start an episode.
+        task: The rules of the game.
+        pheromone: How trails are laid, fall and spread; where the task says so, they do not fall.
+        seed, sharing, slots, start: As given; there are so many slots for ants.
         ants: The living ants by slot.
         streams: Of the initial ants; they run on through all episodes.
         homes: The places of the foods of the start.
+        next_number: Of the next ant that comes to those that started.
         store: Foods that wait with the queen to become ants.
         queen_stream: Her random stream, which runs on; food that wanders draws from it as well.
         minds: The tables; see `sharing`.
@@ -109,23 +115,23 @@ class ReferenceColony:
                 unknown, the learner cannot share a table, or the world has too few cells for the
                 ants.
         """
-        self._task = task = task or Task()
+        self.task = task = task or Task()
         check_one_of("sharing", sharing, tuple(SHARING))
         check_one_of("learner", training.learner, tuple(LEARNERS))
         check_one_of("observation", task.observation, tuple(OBSERVATIONS))
         falls = (
             task.evaporation_in_evaluation if sharing == "fixed" else task.evaporation_in_training
         )
-        self._pheromone = task.pheromone if falls else task.pheromone.lasting
+        self.pheromone = task.pheromone if falls else task.pheromone.lasting
         self._row = OBSERVATIONS[task.observation]
-        self._start_world, self._training = world, training
-        self._n_ants, self._ends_at_delivery = ants, ends_at_delivery
-        self._slots = capacity or (2 * ants + 64 if task.life.births else ants)
-        self._seed, self._sharing, self._start = seed, sharing, start
+        self.start_world, self._training = world, training
+        self.n_ants, self._ends_at_delivery = ants, ends_at_delivery
+        self.slots = capacity or (2 * ants + 64 if task.life.births else ants)
+        self.seed, self.sharing, self.start = seed, sharing, start
         self.streams = [RandomStream(stream_state(seed, STREAM_ANT, n)) for n in range(ants)]
         self.queen_stream = RandomStream(stream_state(seed, STREAM_QUEEN, 0))
         make = partial(LEARNERS[training.learner], training, task.n_states)
-        self.minds = SHARING[sharing](make, self._slots, q_values)
+        self.minds = SHARING[sharing](make, self.slots, q_values)
         self.epsilon, self.learning_rate = training.epsilon, training.learning_rate
         self.episode = -1
         self.records: list[EpisodeRecord] = []
@@ -133,20 +139,22 @@ class ReferenceColony:
 
     def _set_up(self) -> None:
         """Put everything that does not outlive an episode where it starts."""
-        self.world = WorldState(self._start_world, self._pheromone)
-        self.homes = Homes(self._start_world)
+        self.world = WorldState(self.start_world, self.pheromone)
+        self.homes = Homes(self.start_world)
         self.store = 0
+        self.next_number = self.n_ants
         self.record = EpisodeRecord()
         self.over = False
         self.transitions: list[Transition] = []
         self.ants: dict[int, Ant] = {}
-        begin = starts(self._start_world, self._seed, self._n_ants, self._start)
+        begin = starts(self.start_world, self.seed, self.n_ants, self.start)
         for number, (cell, heading) in enumerate(begin):
-            self._add(Ant(cell, heading, slot=number, number=number, stream=self.streams[number]))
+            self.add(Ant(cell, heading, slot=number, number=number, stream=self.streams[number]))
         for ant in self.ants.values():
             self.look(ant)
 
-    def _add(self, ant: Ant) -> None:
+    def add(self, ant: Ant) -> None:
+        """Put an ant into its slot and onto its cell."""
         self.ants[ant.slot] = ant
         self.world.ants[ant.cell] = ant
 
@@ -154,7 +162,7 @@ class ReferenceColony:
     def q_values(self) -> np.ndarray:
         """A copy of the table, float32 (n_states, 5), or of all, (slots, n_states, 5)."""
         tables = np.array([learner.table() for learner in self.minds.tables])
-        return tables if self._sharing == "own" else tables[0]
+        return tables if self.sharing == "own" else tables[0]
 
     def look(self, ant: Ant) -> None:
         """Let an ant see what is around it now."""
@@ -163,7 +171,7 @@ class ReferenceColony:
 
     def begin_episode(self, world: World | None = None) -> None:
         """Start an episode, in another world if one is given; all else that was learned goes on."""
-        self._start_world = world or self._start_world
+        self.start_world = world or self.start_world
         self.episode += 1
         self._set_up()
         for learner in self.minds.tables:
@@ -203,15 +211,15 @@ class ReferenceColony:
         tick = self.record.ticks
         acting = [self.ants[slot] for slot in sorted(self.ants)]
         before = [copy.copy(ant) for ant in acting]
-        traffic = self._task.traffic
+        traffic = self.task.traffic
         intents = [intend(self.world, ant, self._choose(ant), traffic) for ant in acting]
-        events = carry_out(self.world, intents, tick, self._task)
+        events = carry_out(self.world, intents, tick, self.task)
         for intent, event in zip(intents, events, strict=True):
             if event is Event.PICKED_UP and intent.target is not None:
                 self.homes.taken(intent.target, tick)
         self.world.trail.tick()
         self._count(acting, events)
-        if self._task.life.births:
+        if self.task.life.births:
             self.store += events.count(Event.DELIVERED)
             self._births()
         dying = self._deaths(acting)
@@ -244,7 +252,7 @@ class ReferenceColony:
 
     def _births(self) -> None:
         """Let the queen turn food into ants that face away from her, while slots and cells last."""
-        free_slots = (slot for slot in range(self._slots) if slot not in self.ants)
+        free_slots = (slot for slot in range(self.slots) if slot not in self.ants)
         while self.store > 0:
             around = [neighbour(self.world.queen, heading) for heading in range(N_HEADINGS)]
             free = [h for h in range(N_HEADINGS) if self.world.content(around[h]) == EMPTY]
@@ -253,20 +261,24 @@ class ReferenceColony:
                 return
             high, _ = self.queen_stream.draw()
             heading = free[pick(high, len(free))]
-            number = self._n_ants + self.record.births
-            state = stream_state(self._seed, STREAM_BORN, (self.episode << 32) + number)
-            stream = RandomStream(state)
-            self._add(Ant(around[heading], heading, slot=slot, number=number, stream=stream))
-            self.minds.born(slot)
+            self.new_ant(around[heading], heading, slot)
             self.store -= 1
             self.record.births += 1
+
+    def new_ant(self, cell: Cell, heading: int, slot: int) -> None:
+        """Put an ant that there was not yet into a slot."""
+        number = self.next_number
+        state = stream_state(self.seed, STREAM_BORN, (self.episode << 32) + number)
+        self.add(Ant(cell, heading, slot=slot, number=number, stream=RandomStream(state)))
+        self.minds.born(slot)
+        self.next_number += 1
 
     def _deaths(self, acting: Sequence[Ant]) -> list[Ant]:
         """Take out the ants that die of age; they observe and learn once more.
 
         A dying ant leaves the food that it carries on its cell.
         """
-        lifespan = self._task.life.lifespan
+        lifespan = self.task.life.lifespan
         if lifespan is None:
             return []
         for ant in acting:
@@ -281,7 +293,7 @@ class ReferenceColony:
         return dying
 
     def _food(self, tick: int) -> None:
-        life = self._task.life
+        life = self.task.life
         if life.regrowth is not None:
             self.record.regrown += self.homes.regrow(self.world, life.regrowth, tick)
         if life.wander is not None and (tick + 1) % life.wander == 0:
@@ -293,7 +305,7 @@ class ReferenceColony:
         """Draw a' where the learner wants it, by the tables as they stand; then learn."""
         self.transitions = []
         for was, ant, event in zip(before, after, events, strict=True):
-            terminated = event is Event.DELIVERED and self._task.delivery == "absorbing"
+            terminated = event is Event.DELIVERED and self.task.delivery == "absorbing"
             # After an absorbing delivery the ant goes on with a choice of its own.
             if self.minds.draws_next_action and not terminated:
                 ant.chosen = self._draw_action(ant)

@@ -42,6 +42,32 @@ class Homes:
         self.homes = [Home(cell) for cell in sorted(listed_cells(world.foods))]
         self._piles = _connected(self.homes)
 
+    def give(self, cell: Cell) -> None:
+        """Note that a hand has put food on a cell.
+
+        The first home that waits there has its food again. Where there is none, a new home comes
+        last; it joins the pile of the first home beside it, else it is a pile of its own.
+        """
+        here = [home for home in self.homes if home.cell == cell]
+        if not here:
+            around = [neighbour(cell, heading) for heading in range(N_HEADINGS)]
+            beside = next((home for home in self.homes if home.cell in around), None)
+            here = [Home(cell, waiting_since=0)]
+            self.homes += here
+            for pile in self._piles:
+                if any(home is beside for home in pile):
+                    pile += here
+            if beside is None:
+                self._piles.append(list(here))
+        if all(home.waiting_since is not None for home in here):
+            here[0].waiting_since = None
+
+    def end(self, cell: Cell) -> None:
+        """Note that a hand has put something else on a cell: nothing grows back there."""
+        self.homes = [home for home in self.homes if home.cell != cell]
+        piles = [[home for home in pile if home.cell != cell] for pile in self._piles]
+        self._piles = [pile for pile in piles if pile]
+
     def taken(self, cell: Cell, tick: int) -> None:
         """Note that food was taken from a cell: a full home there waits from now on."""
         for home in self.homes:

@@ -386,8 +386,8 @@ class Colony:
         Raises:
             AntsError: The learner has made action values that are not finite.
         """
-        memory.keep_streams(self)
         self._check_finite()
+        memory.keep_streams(self)
         self.epsilon = self.training.next_epsilon(self.epsilon)
         self.learning_rate = self.training.next_learning_rate(self.learning_rate)
 

@@ -125,8 +125,11 @@ class Hand:
             )
         slots = np.flatnonzero(ants[AntRow.STAGE] == Stage.VACANT)[:n]
         numbers = world[WorldRow.NEXT_NUMBER] + np.arange(n)
-        drawn = heading is None and n > 0
-        headings = choose(self._stream.bits(n) >> np.uint64(32), N_HEADINGS) if drawn else heading
+        headings: int | np.ndarray
+        if heading is None:
+            headings = choose(self._stream.bits(n) >> np.uint64(32), N_HEADINGS)
+        else:
+            headings = heading
         ants[:, slots] = 0
         ants[AntRow.CELL, slots], ants[AntRow.HEADING, slots] = cells, headings
         ants[AntRow.NUMBER, slots], ants[AntRow.ACTION, slots] = numbers, -1

@@ -1,0 +1,178 @@
+"""What a hand changes in a world between two ticks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from taichi_ants.grid.constants import N_HEADINGS, STREAM_ANT, STREAM_HAND, STREAM_START_CELL
+from taichi_ants.reference.colony import ReferenceColony
+from taichi_ants.reference.geometry import Cell, distance, existing_cells, listed_cells
+from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
+from taichi_ants.reference.trail import Trail
+from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
+from taichi_ants.worlds.world import World
+
+
+class Hand:
+    """Changes a colony that is in an episode; ants look around again after each change.
+
+    A cell that cannot take what is put there is left as it is. What an ant has drawn to do already
+    it still does.
+
+    Attributes:
+        colony: That is changed.
+        ants: How many start each later episode.
+    """
+
+    def __init__(self, colony: ReferenceColony) -> None:
+        self.colony, self.ants = colony, colony.n_ants
+        self._stream = RandomStream(stream_state(colony.seed, STREAM_HAND, 0))
+        self._first = colony.start_world
+        self._pheromone = colony.task.pheromone
+        self._falls = colony.pheromone.evaporation == self._pheromone.evaporation
+        world = colony.start_world
+        # What stands on the cells that are not empty when later episodes begin.
+        self._start: dict[Cell, int] = {world.queen: QUEEN}
+        self._start |= dict.fromkeys(listed_cells(world.foods), FOOD)
+        self._start |= dict.fromkeys(listed_cells(world.obstacles), OBSTACLE)
+
+    def _look(self) -> None:
+        for ant in self.colony.ants.values():
+            self.colony.look(ant)
+
+    def put(self, cells: Sequence[Cell], what: int) -> None:
+        """Make cells EMPTY, OBSTACLE or FOOD, now and later, but none with an ant or the queen."""
+        world = self.colony.world
+        for cell in cells:
+            if cell in world.ants or cell == world.queen:
+                continue
+            world.ground[cell] = self._start[cell] = what
+            if what == FOOD:
+                self.colony.homes.give(cell)
+            else:
+                self.colony.homes.end(cell)
+        self._new_trail()
+        self._look()
+
+    def move_queen(self, cell: Cell) -> None:
+        """Let the queen stand on an empty cell, now and later."""
+        world = self.colony.world
+        assert world.content(cell) == EMPTY
+        for ground in (world.ground, self._start):
+            ground[world.queen], ground[cell] = EMPTY, QUEEN
+        world.queen = cell
+        self.colony.homes.end(cell)
+        self._look()
+
+    def _new_trail(self) -> None:
+        """The same levels, where the rocks are now."""
+        world = self.colony.world
+        rocks = [cell for cell, held in world.ground.items() if held == OBSTACLE]
+        bare = World(self._first.ranges, world.queen, obstacles=rocks)
+        trail = Trail(bare, world.pheromone)
+        for cell, held in world.ground.items():
+            if held != OBSTACLE:
+                trail.lay(cell, world.trail.level(cell))
+        world.trail = trail
+
+    def lay_trail(self, cells: Sequence[Cell], level: int) -> None:
+        """Set the trail of cells that are no rocks."""
+        world = self.colony.world
+        for cell in cells:
+            if world.ground[cell] != OBSTACLE:
+                world.trail.lay(cell, level)
+        self._look()
+
+    def add_ants(self, cells: Sequence[Cell], heading: int | None = None) -> None:
+        """Put ants on those cells that are empty; a heading that is not given is drawn."""
+        colony = self.colony
+        for cell in cells:
+            if colony.world.content(cell) != EMPTY:
+                continue
+            towards = heading
+            if towards is None:
+                high, _ = self._stream.draw()
+                towards = pick(high, N_HEADINGS)
+            slot = next(slot for slot in range(colony.slots) if slot not in colony.ants)
+            colony.new_ant(cell, towards, slot)
+        self._look()
+
+    def remove_ants(self, cells: Sequence[Cell]) -> None:
+        """Take the ants on these cells away, with their food."""
+        for cell in cells:
+            ant = self.colony.world.ants.pop(cell, None)
+            if ant is not None:
+                del self.colony.ants[ant.slot]
+        self._look()
+
+    def set_ants(self, n: int) -> None:
+        """Let n ants live now, and start each later episode.
+
+        New ones stand on free cells near the queen, as in `ants.starts`; the latest ones go.
+        """
+        colony, world = self.colony, self.colony.world
+        self.ants = n
+        by_number = sorted(colony.ants.values(), key=lambda ant: ant.number)
+        self.remove_ants([ant.cell for ant in by_number[n:]])
+        free = sorted(
+            (
+                distance(cell, world.queen) if colony.start == "nest" else 0,
+                stream_state(colony.seed, STREAM_START_CELL, number),
+                cell,
+            )
+            for number, cell in enumerate(existing_cells(self._first.ranges))
+            if world.content(cell) == EMPTY
+        )
+        self.add_ants([cell for _, _, cell in free[: max(0, n - len(by_number))]])
+
+    def set_evaporation(self, falls: bool) -> None:
+        """Whether trails evaporate: as the task says, by 1 a tick if it says nothing."""
+        self._falls = falls
+        if falls and self._pheromone.evaporation == "none":
+            self.set_pheromone(evaporation="linear")
+        self.set_pheromone()
+
+    def set_pheromone(self, **numbers: Any) -> None:
+        """Other numbers of the pheromone; trails stay as dense as before."""
+        self._pheromone = replace(self._pheromone, **numbers)
+        still = {} if self._falls else {"evaporation": "none", "half_life": None}
+        now = replace(self._pheromone, **still)
+        self.colony.pheromone = self.colony.world.pheromone = now
+        self.colony.world.trail.change(now)
+
+    def set_epsilon(self, epsilon: float) -> None:
+        """The epsilon of this episode."""
+        self.colony.epsilon = epsilon
+
+    def set_learning_rate(self, learning_rate: float) -> None:
+        """The learning rate of this episode."""
+        self.colony.learning_rate = learning_rate
+        self.colony.minds.pace(learning_rate)
+
+    def begin_episode(self) -> None:
+        """End the episode, and begin the next one as the hand has left the world."""
+        colony, first = self.colony, self._first
+        colony.end_episode()
+        colony.n_ants = self.ants
+        for number in range(len(colony.streams), self.ants):
+            state = stream_state(colony.seed, STREAM_ANT, number)
+            colony.streams.append(RandomStream(state))
+        held = {kind: [cell for cell, on in self._start.items() if on == kind]
+                for kind in (QUEEN, FOOD, OBSTACLE)}  # fmt: skip
+        trails, ants = first.trails.tolist(), first.ants.tolist()
+        colony.begin_episode(
+            World(
+                first.ranges,
+                held[QUEEN][0],
+                held[FOOD],
+                held[OBSTACLE],
+                [(row[:3], row[3]) for row in trails if tuple(row[:3]) not in held[OBSTACLE]],
+                [
+                    (row[:3], row[3])
+                    for row in ants
+                    if self._start.get(tuple(row[:3]), EMPTY) == EMPTY
+                ],
+            )
+        )

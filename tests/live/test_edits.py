@@ -1,0 +1,104 @@
+"""Edits: colony and reference stay equal to the bit, whatever a hand does; what is wrong changes
+nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from random_colonies import random_colony
+from random_edits import apply_to_both, random_edit
+from same_colonies import assert_equal
+
+from taichi_ants import AntsError, Colony
+from taichi_ants.engines.colony.hand import Hand
+from taichi_ants.engines.colony.layout import AntRow, Stage, WorldRow
+from taichi_ants.engines.stored import digest_of
+from taichi_ants.reference import ReferenceColony
+from taichi_ants.reference.hand import Hand as PlainHand
+from taichi_ants.task.constants import EMPTY, OBSTACLE, QUEEN
+
+# Each entry takes kernels of its own, see tests/engines/colony/test_against_reference.py.
+KERNELS = [
+    ("q_learning", "shared", "paper", False, "blocking", "half"),
+    ("sarsa", "shared", "ants", False, "right_of_way", "strongest"),
+    ("q_learning", "fixed", "queues", False, "following", "strongest_under_carriers"),
+    ("dyna_q", "shared", "trail_levels", True, "blocking", "half"),
+    ("n_step_sarsa", "own", "paper", False, "blocking", "half"),
+    ("double_q", "own", "ants_seen", True, "blocking", "half"),
+]
+
+
+def state_of(hand: Hand) -> str:
+    """All that goes on."""
+    colony = hand.colony
+    rates = (colony.epsilon, colony.learning_rate, hand.ants, hand._stream.state)
+    arrays = {name: colony.arrays[name] for name in (*colony.stored, "walls", "closer", "weights")}
+    return digest_of(arrays) + repr((rates, colony.task, colony.pheromone, hand.world()._key))
+
+
+def assert_sound(hand: Hand) -> None:
+    """What holds in every colony at the end of a tick."""
+    colony = hand.colony
+    arrays, world = colony.arrays, colony.arrays["worlds"][:, 0]
+    ants = arrays["ants"][:, arrays["ants"][AntRow.STAGE] != Stage.VACANT]
+    cells, numbers = ants[AntRow.CELL], ants[AntRow.NUMBER]
+    assert (ants[AntRow.STAGE] == Stage.LIVING).all()
+    assert len(set(cells.tolist())) == len(set(numbers.tolist())) == world[WorldRow.LIVING]
+    assert numbers.max(initial=-1) < world[WorldRow.NEXT_NUMBER]
+    assert (np.flatnonzero(arrays["ground"] > 15) == np.sort(cells)).all()
+    bare = colony.snapshot().ground
+    assert (arrays["walls"] == (bare == OBSTACLE)).all()
+    assert np.flatnonzero(bare == QUEEN).tolist() == [world[WorldRow.QUEEN_CELL]]
+    assert colony.snapshot().trail[bare == OBSTACLE].sum() == 0
+    later = hand.world()
+    assert (later.closer() == arrays["closer"]).all()
+    assert np.count_nonzero(later.ground() == EMPTY) >= hand.ants
+
+
+@pytest.mark.parametrize("kernel", KERNELS, ids=lambda kernel: "-".join(map(str, kernel[:4])))
+def test_edits_keep_colony_and_reference_equal(kernel):
+    learner, sharing, observation, dense, traffic, view = kernel
+    done, refused = {}, 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        drawn = random_colony(
+            *(seed, 12, sharing, 5, None, learner, observation, dense),
+            traffic=traffic,
+            view=view,
+            changes=kernel is not KERNELS[0],
+        )
+        population = {**drawn.population, "ends_at_delivery": False}
+        population["capacity"] = population["ants"] + int(rng.integers(0, 9))
+        rules = {**population, "sharing": sharing, "q_values": drawn.q_values}
+        task = replace(drawn.task, **{f"evaporation_in_{one}": bool(rng.random() < 0.7)
+                                      for one in ("training", "evaluation")})  # fmt: skip
+        given = (drawn.world, task, drawn.training, drawn.seed)
+        try:
+            colony = Colony(*given, **rules)
+        except AntsError:
+            continue
+        plain = ReferenceColony(*given, **rules)
+        colony.begin_episode()
+        plain.begin_episode()
+        hand, plain_hand = Hand(colony), PlainHand(plain)
+        for _ in range(40):
+            edit = random_edit(rng, hand)
+            before = state_of(hand)
+            try:
+                apply_to_both(edit, hand, plain_hand)
+                done[edit["kind"]] = done.get(edit["kind"], 0) + 1
+            except AntsError as error:
+                refused += 1
+                assert str(error).endswith(".")
+                assert state_of(hand) == before, edit
+            assert_equal(colony, plain)
+            assert_sound(hand)
+            for _ in range(int(rng.integers(0, 3))):
+                colony.tick()
+                plain.tick()
+                assert_equal(colony, plain)
+    assert len(done) == 7
+    assert min(done.values()) > 10, done
+    assert refused > 10
