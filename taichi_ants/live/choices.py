@@ -22,6 +22,8 @@ from taichi_ants.live.session import Setup
 from taichi_ants.task import Life, Pheromone, Task, observations
 from taichi_ants.task.traffic import Traffic
 
+# Rules of what comes and goes, which stand beside those of any task.
+LIFE = ("births", "deaths", "regrowth", "wanders")
 MOST_ANTS, MOST_TEXT = 5000, 50_000
 WORLDS = {
     "paper": "the paper's world",
@@ -88,12 +90,12 @@ def task_of(rules: Iterable[str], sees: str) -> Task:
 
 
 @cache
-def rules_of(rules: Task) -> list[str] | None:
+def rules_of(rules: Task) -> tuple[str, ...] | None:
     """The `RULES` that make a task, as few as possible; None if it has others."""
     for n in range(len(RULES) + 1):
         for chosen in combinations(RULES, n):
             if task_of(chosen, rules.observation) == rules:
-                return list(chosen)
+                return chosen
     return None
 
 
@@ -116,6 +118,7 @@ class Choices:
                 for name, (words, rules) in TASKS.items()
             },
             "rules": RULES,
+            "life": LIFE,
             "sees": {name: observations.get(name).summary for name in observations.names()},
             "learners": {name: learners.get(name).summary for name in learners.names()},
             "by_hand": list(FOLLOWED),

@@ -1,9 +1,8 @@
 /* What stands beside the live world: a new session, sliders, files. */
 
 const SLIDERS = {
-  ants: "Ants", evaporation: "Evaporation", half_life: "Half-life of trails", diffusion: "Diffusion",
-  deposit: "Deposit", level: "Deposit", slope: "Slope of trails", epsilon: "Epsilon", learning_rate: "Learning rate",
-  discount: "Discount",
+  ants: "Ants", evaporation: "Trails evaporate", half_life: "Half-life of trails", diffusion: "Diffusion",
+  deposit: "Deposit", cap: "Most of a trail", slope: "Slope of trails", epsilon: "Epsilon", learning_rate: "Learning rate",
 };
 const FILE_TYPES = { html: "text/html", gif: "image/gif" };
 const MOST_UPLOAD = 2 ** 24;
@@ -20,6 +19,9 @@ const MAP = `; lines are offset by two columns
         .   .
           .
 `;
+
+/* Whether a value is either 0 or 1. */
+const isSwitch = ({ least, most, step }) => least === 0 && most === 1 && step === 1;
 
 class Controls {
   constructor(live) {
@@ -118,14 +120,14 @@ class Controls {
   showTask() {
     const task = this.live.choices.tasks[byId("task").value];
     this.keepsRules = false;
-    if (task) this.setRules(task.rules, task.sees);
+    if (task) this.setRules([...task.rules, ...this.rules().filter((rule) => this.live.choices.life.includes(rule))], task.sees);
     else byId("rules-box").open = true;
     this.showPolicy(false);
   }
 
   /* Name the rules by the task that they make. */
   nameTask() {
-    const rules = this.rules().join(), sees = byId("sees").value;
+    const rules = this.rules().filter((rule) => !this.live.choices.life.includes(rule)).join(), sees = byId("sees").value;
     const [name] = Object.entries(this.live.choices.tasks).find(([, task]) => task.rules.join() === rules && task.sees === sees) ?? [""];
     byId("task").value = name;
     this.keepsRules = false;
@@ -152,15 +154,20 @@ class Controls {
     const box = byId("sliders"), names = Object.keys(values).join();
     if (box.dataset.names !== names) {
       box.dataset.names = names;
-      box.innerHTML = Object.entries(values).map(([name, { least, most, step }]) => `<label class="slider">
-        <span>${SLIDERS[name] ?? name.replaceAll("_", " ")}</span><output for="set-${name}"></output>
-        <input type="range" id="set-${name}" data-name="${name}" min="${least}" max="${most}" step="${step}"></label>`).join("");
+      box.innerHTML = Object.entries(values).map(([name, one]) => {
+        const words = SLIDERS[name] ?? name.replaceAll("_", " "), about = `id="set-${name}" data-name="${name}"`;
+        if (isSwitch(one)) return `<label class="rule"><input type="checkbox" ${about}> ${words}</label>`;
+        return `<label class="slider"><span>${words}</span><output for="set-${name}"></output><input type="range" ${about}></label>`;
+      }).join("");
     }
-    for (const [name, { value, least, most, step }] of Object.entries(values)) {
+    for (const [name, one] of Object.entries(values)) {
       const slider = byId(`set-${name}`);
       if ((this.held.get(name) ?? 0) > performance.now()) continue;
-      Object.assign(slider, { min: least, max: most, step, value });
-      this.showSlider(slider, value);
+      if (isSwitch(one)) slider.checked = one.value === 1;
+      else {
+        Object.assign(slider, { min: one.least, max: one.most, step: one.step, value: one.value });
+        this.showSlider(slider, one.value);
+      }
     }
     if ((this.held.get("speed") ?? 0) < performance.now()) this.live.viewer?.timeline.showSpeed();
     byId("watchers").textContent = pages > 1 ? `${pages} pages look on` : "";
@@ -175,12 +182,13 @@ class Controls {
   slide(slider) {
     const { name } = slider.dataset, waits = this.held.get(name) > performance.now() && this.sliding === name;
     this.held.set(name, performance.now() + 500);
-    this.showSlider(slider, slider.valueAsNumber);
+    if (slider.type === "range") this.showSlider(slider, slider.valueAsNumber);
     this.sliding = name;
     if (waits && this.timer) return; // the last of several values is sent
     this.timer = setTimeout(() => {
       this.timer = null;
-      this.live.ask("edit", { edit: { kind: "set", name, value: slider.valueAsNumber } });
+      const value = slider.type === "range" ? slider.valueAsNumber : Number(slider.checked);
+      this.live.ask("edit", { edit: { kind: "set", name, value } });
     }, 40);
   }
 

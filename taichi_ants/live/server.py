@@ -44,6 +44,8 @@ _MOST_UPLOAD = 2**24  # bytes of a session
 _MOST_UNSEEN = 12  # frames that a page is sent before it has drawn the first of them
 _MOST_WAITING = 2**27  # bytes that wait for a page that does not read
 _STATE_EVERY = 0.5  # seconds
+_BREATH = 0.004  # seconds after each frame, in which the thread of the sockets gets its turn
+_LONGEST_WAIT = 0.2  # seconds, for a request, before it looks whether it is to end
 _QUIET = logging.getLogger("taichi_ants.live")  # what strangers send is no news for the terminal
 _QUIET.addHandler(logging.NullHandler())
 _QUIET.propagate = False
@@ -140,37 +142,37 @@ class Room:
             sockets.join(2)
 
     def _turn(self) -> None:
-        """Do what a page asks for, or let a frame's time pass."""
+        """Let a frame's time pass if it is due, and do what a page asks for."""
         runs = self.playing and bool(self._pages)  # time stands still while nobody looks on
-        wait = max(0.0, min(self._due - time.monotonic(), 0.2)) if runs else 0.2
-        try:
-            page, request, done = self._requests.get(timeout=wait) if wait else self._next()
-        except queue.Empty:
-            if runs and time.monotonic() >= self._due:
-                self._pass()
-            return
-        try:
-            self._answer(page, request)
-        finally:
-            self._post(done)
-
-    def _next(self) -> tuple[Page, Any, Callable[[], None]]:
-        return self._requests.get_nowait()
+        if runs and time.monotonic() >= self._due:
+            self._pass()
+        wait = min(self._due - time.monotonic(), _LONGEST_WAIT) if runs else _LONGEST_WAIT
+        with contextlib.suppress(queue.Empty):
+            for _ in range(1 + len(self._pages)):  # all have their turn
+                page, request, done = self._requests.get(timeout=max(wait, _BREATH))
+                self._answer(page, request)
+                self._post(done)
+                wait = 0.0
 
     def _pass(self) -> None:
         """Let the ticks of one frame pass, and show it."""
-        began = time.monotonic()
+        began, before = time.monotonic(), self.session.ticks
         if self.speed >= FASTEST:
-            ticks = max(1, int(self._piece))
+            ticks = int(self._piece)  # that fill the time of a frame, as far as is known
         else:
             self._pace += max(1.0, self.speed / FRAMES_A_SECOND)
             ticks = int(self._pace)
             self._pace -= ticks
-        self._show(self.session.advance(ticks))
-        took = time.monotonic() - began
-        # As many ticks as fill the time of a frame, if it is to be as fast as it can.
-        self._piece = min(2 * ticks, max(1.0, ticks / (took * FRAMES_A_SECOND + 1e-9)))
-        usual = 1 / min(self.speed, FRAMES_A_SECOND)
+        try:
+            self._show(self.session.advance(ticks))
+        except AntsError as error:  # as of a learner whose values are no longer finite
+            self.playing = False
+            words = _say("error", words=str(error))
+            self._post(lambda: [page.tell(words) for page in self._pages])
+        took, passed = time.monotonic() - began, self.session.ticks - before
+        if passed == ticks:  # and no episode has ended before
+            self._piece = min(2.0 * passed, max(1.0, passed / (took * FRAMES_A_SECOND)))
+        usual = 0.0 if self.speed >= FASTEST else 1 / min(self.speed, FRAMES_A_SECOND)
         self._due = max(self._due + usual, began + took)  # lost time is not made up
         if began - self._told >= _STATE_EVERY:
             self._tell_state()
@@ -261,13 +263,15 @@ class Room:
 
     def _show(self, frame: bytes) -> None:
         """Send a frame to all pages but those that are behind."""
-        news = {}
+        news = self.session.news()
 
         def show() -> None:
             for page in self._pages:
+                if news:
+                    page.tell(_say("names", names=news))
                 page.behind = page.behind or page.unseen >= _MOST_UNSEEN
                 if not page.behind:
-                    page.show(*([_say("names", names=news)] if news else []), frame)
+                    page.show(frame)
 
         self._post(show)
 

@@ -30,11 +30,8 @@ class Live {
     if (message.say === "begin") {
       this.begins = message.header;
       this.choices = message.choices;
-    } else if (message.say === "news") {
-      const { names, ...rest } = message.header;
-      Object.assign(this.viewer.history.header, rest);
-      Object.assign(this.viewer.history.header.names, names);
-    } else if (message.say === "moment" || message.say === "file") this.waiting = message;
+    } else if (message.say === "names") Object.assign(this.viewer.history.header.names, message.names);
+    else if (message.say === "moment" || message.say === "file") this.waiting = message;
     else {
       if (message.say === "state") {
         this.running = message.playing;

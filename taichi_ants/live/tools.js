@@ -48,6 +48,8 @@ class Tools {
     byId("world").style.cursor = name === "look" ? "" : "crosshair";
     const { viewer } = this.live;
     if (!viewer) return;
+    viewer.stage.covered = 62;
+    if (viewer.stage.fitted) viewer.stage.fit();
     viewer.tool = name === "look" ? null : this;
     viewer.dirty = true;
   }

@@ -341,7 +341,7 @@ class History {
     const cells = [], episode = this.frames[moment].episode;
     for (let then = moment; then >= 0 && cells.length < most; then--) {
       const i = this.frames[then].episode === episode ? this.place(then, number) : -1;
-      if (i < 0) break;
+      if (i < 0 || (this.live && then < moment && this.frames[then + 1].passed > 1)) break;
       if (cells[cells.length - 1] !== this.frames[then].cells[i]) cells.push(this.frames[then].cells[i]);
     }
     return cells;

@@ -62,6 +62,7 @@ class Viewer {
       cell: (cell) => this.chooseCell(cell), other: (step) => this.followOther(step), aim: () => this.toggleAim(),
     }, signal);
     this.timeline = new Timeline(this.history, this.player, signal);
+    if (this.source.live) document.querySelector(".about summary").textContent = "About this session";
     byId("hint").textContent = "Click an ant to follow it, or a cell to look at it. Press ? for all keys.";
     byId("keys").innerHTML = [...(this.source.keys ?? []), ...KEYS].map(([keys, does]) =>
       `<dt>${keys.split(" ").map((key) => `<kbd>${key}</kbd>`).join(" ")}</dt><dd>${does}</dd>`).join("");
