@@ -119,15 +119,19 @@ def smallest(array: np.ndarray) -> np.ndarray:
     return array.astype(np.promote_types(np.min_scalar_type(low), np.min_scalar_type(high)))
 
 
-def read_npz(path: PathLike) -> dict[str, np.ndarray]:
+def read_npz(path: PathLike, content: bytes | None = None) -> dict[str, np.ndarray]:
     """Read all arrays of an .npz file into memory, without executing anything that it holds.
+
+    Args:
+        path: The file.
+        content: What it holds, if that is known already; `path` is then what messages call it.
 
     Raises:
         AntsError: The file is missing, unreadable, damaged, or no .npz of plain arrays.
     """
     expect("path", path, str, os.PathLike)
     try:
-        with open(path, "rb") as file:
+        with open(path, "rb") if content is None else io.BytesIO(content) as file:
             archive = np.load(file, allow_pickle=False)
             if not isinstance(archive, np.lib.npyio.NpzFile):
                 raise ValueError("it holds a single array")

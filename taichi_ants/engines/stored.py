@@ -50,13 +50,15 @@ class FileKind:
         text = files.to_json({**known, **facts})
         files.write_npz(path, {**arrays, "facts": np.array(text)}, compress=compress)
 
-    def read(self, path: files.PathLike) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-        """The arrays and the facts of a file.
+    def read(
+        self, path: files.PathLike, content: bytes | None = None
+    ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+        """The arrays and the facts of a file; arguments as of `files.read_npz`.
 
         Raises:
             AntsError: The file is missing, damaged, of another kind, or its observation is unknown.
         """
-        stored = files.read_npz(path)
+        stored = files.read_npz(path, content)
         try:
             facts = json.loads(str(stored["facts"][()]))
             if facts["format"] != self.mark:

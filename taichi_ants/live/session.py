@@ -3,27 +3,41 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+import io
+import json
+import tempfile
+import zipfile
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields
+from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from taichi_ants import learners, worlds
-from taichi_ants.checks import MAX_ANTS, checked_q_values, checked_seeds, checked_share
+from taichi_ants import files, learners, worlds
+from taichi_ants.checks import checked_q_values, checked_seeds, checked_share
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.colony.hand import Hand
 from taichi_ants.engines.stored import FileKind
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
+from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.learners.policies import save_policy
 from taichi_ants.live import edits
 from taichi_ants.task import Task
-from taichi_ants.task.constants import MAX_STEPS
-from taichi_ants.viewer import Recorder
+from taichi_ants.task.constants import MAX_STEPS, N_ACTIONS, ROW
+from taichi_ants.viewer import Recorder, Recording
+from taichi_ants.worlds.validation import parse_ranges
 from taichi_ants.worlds.world import World
 
+# What pages may ask for is small enough for any machine.
 MOST_CELLS = 1_000_000
+MOST_ANTS = 100_000
 MOST_TICKS = 1_000_000_000
+_MOST_LINES = 4000  # of a map, and characters of each
+_MOST_NUMBERS = 1 << 27  # of tables of ants' own
+_MOST_BYTES = 1 << 28  # of a session, unpacked
 
 _KIND = FileKind("taichi-ants session 1", "session", "Session.save")
 
@@ -70,15 +84,22 @@ class Setup:
             learners.get(self.policy.learner)  # type: ignore[union-attr]
         else:
             object.__setattr__(self, "policy", checked_q_values(self.policy, self.task))
-        checked_whole("ants", self.ants, 1, MAX_ANTS)
+        checked_whole("ants", self.ants, 1, MOST_ANTS)
         if self.capacity is None:
-            object.__setattr__(self, "capacity", min(2 * self.ants + 64, MAX_ANTS))
-        checked_whole("capacity", self.capacity, 1, MAX_ANTS)
+            object.__setattr__(self, "capacity", min(2 * self.ants + 64, MOST_ANTS))
+        checked_whole("capacity", self.capacity, 1, MOST_ANTS)
         for seed in (self.seed, self.world_seed):
             checked_seeds([seed])
         checked_whole("ticks_per_episode", self.ticks_per_episode, 0, MAX_STEPS)
         checked_share("epsilon", self.epsilon)
         expect("world_settings", self.world_settings, Mapping)
+        try:
+            settings = json.loads(files.to_json(dict(self.world_settings)))
+        except (TypeError, ValueError, RecursionError):
+            raise AntsError(
+                f"world_settings is {shown(self.world_settings)}; it must be names and numbers."
+            ) from None
+        object.__setattr__(self, "world_settings", settings)
 
     @property
     def learns(self) -> bool:
@@ -87,24 +108,32 @@ class Setup:
 
     def build_world(self) -> World:
         """The world; raises AntsError if there is none of that name, or the map is damaged."""
-        if "\n" in self.world:
-            built = worlds.from_text(self.world)
-        elif self.world not in worlds.names():  # never a path
+        lines = self.world.split("\n")
+        if len(lines) > 1:
+            if max(len(lines), *map(len, lines)) > _MOST_LINES:
+                raise AntsError(
+                    f"the map has more than {_MOST_LINES} lines, or characters in one; draw a "
+                    "smaller one."
+                )
+            return _small_enough(worlds.from_text(self.world))
+        if self.world not in worlds.names():  # never a path
             raise AntsError(
                 f"there is no world named {shown(self.world)}; choose one of "
                 f"{', '.join(worlds.names())}, or give the text of a map."
             )
-        else:
-            built = worlds.build(self.world, self.world_seed, **self.world_settings)
-        if built.grid.count > MOST_CELLS:
-            raise AntsError(
-                f"the world has {built.grid.count} cells; take one of at most {MOST_CELLS}."
-            )
-        return built
+        if self.world_settings.get("ranges") is not None:  # before it takes memory
+            _small_enough(AxialGrid(parse_ranges(self.world_settings["ranges"])))
+        return _small_enough(worlds.build(self.world, self.world_seed, **self.world_settings))
 
     def build_colony(self) -> Colony:
         """The colony, before its first episode; raises AntsError if it cannot be."""
         options: dict[str, Any] = {"ants": self.ants, "capacity": self.capacity}
+        numbers = self.capacity * self.task.n_states * ROW  # type: ignore[operator]
+        if self.learns and self.sharing == "own" and numbers > _MOST_NUMBERS:
+            raise AntsError(
+                f"capacity is {self.capacity}, but tables of {self.task.n_states} states for so "
+                'many ants take too much memory; take a smaller one, or sharing "shared".'
+            )
         if isinstance(self.policy, TrainingConfig):
             options |= {"sharing": self.sharing}
             training = self.policy
@@ -164,7 +193,8 @@ class Session:
     Attributes:
         colony: As it is now; nobody else may move it on.
         ticks: How many have passed in all episodes.
-        edits: (ticks, edit) of each edit, in order.
+        steps: How many steps time has made: ticks, and episodes that began since one had ended.
+        edits: (steps, edit) of each edit, in order.
 
     Raises:
         AntsError: The world or the colony cannot be built.
@@ -174,7 +204,7 @@ class Session:
         expect("setup", setup, Setup)
         self.setup, self.colony = setup, setup.build_colony()
         self.hand = Hand(self.colony)
-        self.ticks = 0
+        self.ticks = self.steps = 0
         self.edits: list[tuple[int, edits.Edit]] = []
         self.hand.begin_episode(self._length)
         self.colony.look()  # changes nothing, but compiles what the first edit needs
@@ -188,7 +218,7 @@ class Session:
 
     @property
     def ended(self) -> bool:
-        """Whether the episode has ended; the next step of time, or edit, begins another one."""
+        """Whether the episode has ended; the next step of time begins another one."""
         return self.colony.ticks == self._length
 
     def header(self) -> dict[str, Any]:
@@ -217,30 +247,177 @@ class Session:
         Raises:
             AntsError: n is not allowed.
         """
-        n = checked_whole("n", n)
+        return self._pass(checked_whole("n", n), self._recorder.tick) or self._recorder.moment()
+
+    def _pass(self, n: int, tick: Callable[[int], Any]) -> Any:
+        """As `advance`, by a function that lets ticks pass; what it gives, None without ticks."""
         if self.ended:
             self.hand.begin_episode(self._length)
-            return self._recorder.moment()
-        n = min(n, self._length - self.colony.ticks if self._length else MOST_TICKS - self.ticks)
-        if n < 1:
-            raise AntsError(f"{self.ticks} ticks have passed, the most of a session; begin anew.")
-        frame = self._recorder.tick(n)
+            self.steps += 1
+            return None
+        n = min(n, self._length - self.colony.ticks if self._length else n)
+        if self.ticks + n > MOST_TICKS:
+            raise AntsError(f"a session has at most {MOST_TICKS} ticks; begin another one.")
+        given = tick(n)
         self.ticks += n
-        return frame
+        self.steps += n
+        return given
 
     def apply(self, edit: object) -> bytes:
         """Do an edit now, see `edits`, and record it; a frame of what has changed.
 
-        If the episode has ended, the next one begins before.
-
         Raises:
             AntsError: It is none, or there is no room for it; nothing has changed.
         """
+        self._do(edit)
+        return self._recorder.moment()
+
+    def _do(self, edit: object) -> None:
         plain = edits.checked(edit, self.hand)
         edits.apply(plain, self.hand, self._length)
-        self.edits.append((self.ticks, plain))
-        return self._recorder.moment()
+        self.edits.append((self.steps, plain))
 
     def values(self) -> dict[str, dict[str, float]]:
         """What the edit "set" can change, by name: value, least, most and step."""
         return {name: value._asdict() for name, value in edits.values(self.hand).items()}
+
+    def to_bytes(self) -> bytes:
+        """The session as a file holds it: how it began, the edits, and what its end is like."""
+        return _bytes_of("session.npz", self.save)
+
+    def save(self, path: files.PathLike) -> None:
+        """Write the session; raises as `files.write_npz` does."""
+        table = np.zeros((0, N_ACTIONS)) if self.setup.learns else self.setup.policy
+        facts = {
+            "task": self.setup.task.as_dict(),
+            "setup": self.setup.to_json(),
+            "edits": self.edits,
+            "steps": self.steps,
+            "state": self.hand.state(),
+        }
+        _KIND.write(path, facts, {"table": np.asarray(table, np.float32)}, compress=True)
+
+    @classmethod
+    def load(cls, path: files.PathLike) -> Session:
+        """Replay a session that `save` wrote, up to its end.
+
+        Raises:
+            AntsError: The file is missing, damaged or altered, or its end is another one here.
+        """
+        return cls._replayed(path, None)
+
+    @classmethod
+    def from_bytes(cls, content: bytes) -> Session:
+        """As `load`, of what a file holds."""
+        try:
+            with zipfile.ZipFile(io.BytesIO(content)) as archive:
+                size = sum(one.file_size for one in archive.infolist())
+        except Exception:
+            size = 0  # no archive at all, which `_replayed` says
+        if size > _MOST_BYTES:
+            raise AntsError("what was given takes too much memory; give a file of Session.save.")
+        return cls._replayed("session", content)
+
+    @classmethod
+    def _replayed(cls, path: files.PathLike, content: bytes | None) -> Session:
+        stored, facts = _KIND.read(path, content)
+        with _KIND.rebuilding(path):
+            session = cls(Setup.from_json(facts["setup"], stored["table"]))
+            end = checked_whole("steps", facts["steps"], 0, MOST_TICKS)
+            for steps, edit in facts["edits"]:
+                session._go(checked_whole("steps", steps, session.steps, end))
+                session._do(edit)
+            session._go(end)
+            if session.hand.state() != facts["state"]:
+                raise ValueError("replayed, it does not end as it did")
+            session._recorder.moment()
+        return session
+
+    def _go(self, steps: int) -> None:
+        """Let time pass until it has made so many steps."""
+        while self.steps < steps:
+            self._pass(steps - self.steps, self.colony.tick)
+
+    def moments(self, most: int = 1000) -> Iterator[tuple[Session, bytes]]:
+        """The session once more from its beginning, moment by moment; this one stays as it is.
+
+        Args:
+            most: About how many moments there are at most. If there are fewer steps and edits, each
+                step has a moment, and what a hand has changed before it as well.
+
+        Yields:
+            The session at that moment, and a frame of what has changed since the last one.
+        """
+        changes = len({steps for steps, _ in self.edits})
+        every = max(1, -(-(self.steps + changes) // checked_whole("most", most)))
+        session = Session(self.setup)
+        yield session, session.moment()
+        for steps, edits_then in groupby([*self.edits, (self.steps, None)], lambda one: one[0]):
+            while session.steps < steps:
+                if every == 1:
+                    yield session, session.advance()
+                    continue
+                session._go(min(steps, session.steps + every - session.steps % every))
+                if session.steps % every == 0:
+                    yield session, session._recorder.moment()
+            wanted = [edit for _, edit in edits_then if edit is not None]
+            for edit in wanted:
+                session._do(edit)
+            if wanted if every == 1 else steps == self.steps:
+                yield session, session._recorder.moment()
+
+    def recording(self, most_frames: int = 1000) -> Recording:
+        """The session as a page plays it without a server, see `moments`."""
+        passed = list(self.moments(most_frames))
+        return Recording(passed[-1][0].header(), [frame for _, frame in passed])
+
+    def gif_bytes(self, most_frames: int = 300, fps: float = 12.0) -> bytes:
+        """An animation of the session, see `moments`."""
+        from taichi_ants.rendering import colony_moments, frames, save_animation
+
+        passed = self.moments(most_frames)
+        shown = (moment for session, _ in passed for moment in colony_moments(session.colony))
+        pictures = frames(shown, strongest=self.setup.task.pheromone.level)
+        return _bytes_of("session.gif", lambda path: save_animation(path, pictures, fps))
+
+    def policy_bytes(self) -> bytes:
+        """The action values as they are now, as a policy file holds them.
+
+        Raises:
+            AntsError: Each ant has a table of its own.
+        """
+        colony = self.colony
+        if colony.one_a_slot:
+            raise AntsError(
+                "each ant has a table of its own, and a policy file holds one; begin a session in "
+                "which they share one."
+            )
+        told = {"seed": self.setup.seed, "task": colony.task.as_dict(), "ticks": self.ticks}
+        if self.setup.learns:
+            told["training"] = colony.training.as_dict()
+        values, sees = colony.q_values[0], colony.task.observation
+        return _bytes_of("policy.npz", lambda path: save_policy(path, values, told, sees))
+
+    def colony_bytes(self) -> bytes:
+        """The colony as it is now, as `Colony.save` writes it; `Colony.load` goes on from it.
+
+        Its later episodes begin as those of the session would, with as many ants as this one.
+        """
+        self.colony.worlds = (self.hand.world(),)
+        return _bytes_of("colony.npz", self.colony.save)
+
+
+def _small_enough(world: Any) -> Any:
+    """A world or a grid, if it has few enough cells."""
+    cells = world.count if isinstance(world, AxialGrid) else world.grid.count
+    if cells > MOST_CELLS:
+        raise AntsError(f"the world has {cells} cells; take one of at most {MOST_CELLS}.")
+    return world
+
+
+def _bytes_of(name: str, write: Callable[[Path], None]) -> bytes:
+    """What a function writes into a file of that name."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / name
+        write(path)
+        return path.read_bytes()

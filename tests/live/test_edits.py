@@ -14,7 +14,6 @@ from same_colonies import assert_equal
 from taichi_ants import AntsError, Colony
 from taichi_ants.engines.colony.hand import Hand
 from taichi_ants.engines.colony.layout import AntRow, Stage, WorldRow
-from taichi_ants.engines.stored import digest_of
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.reference.hand import Hand as PlainHand
 from taichi_ants.task.constants import EMPTY, OBSTACLE, QUEEN
@@ -28,14 +27,6 @@ KERNELS = [
     ("n_step_sarsa", "own", "paper", False, "blocking", "half"),
     ("double_q", "own", "ants_seen", True, "blocking", "half"),
 ]
-
-
-def state_of(hand: Hand) -> str:
-    """All that goes on."""
-    colony = hand.colony
-    rates = (colony.epsilon, colony.learning_rate, hand.ants, hand._stream.state)
-    arrays = {name: colony.arrays[name] for name in (*colony.stored, "walls", "closer", "weights")}
-    return digest_of(arrays) + repr((rates, colony.task, colony.pheromone, hand.world()._key))
 
 
 def assert_sound(hand: Hand) -> None:
@@ -85,14 +76,13 @@ def test_edits_keep_colony_and_reference_equal(kernel):
         hand, plain_hand = Hand(colony), PlainHand(plain)
         for _ in range(40):
             edit = random_edit(rng, hand)
-            before = state_of(hand)
+            before = hand.state()
             try:
                 apply_to_both(edit, hand, plain_hand)
                 done[edit["kind"]] = done.get(edit["kind"], 0) + 1
             except AntsError as error:
                 refused += 1
-                assert str(error).endswith(".")
-                assert state_of(hand) == before, edit
+                assert (hand.state(), str(error)[-1]) == (before, "."), edit  # noqa: PT017
             assert_equal(colony, plain)
             assert_sound(hand)
             for _ in range(int(rng.integers(0, 3))):

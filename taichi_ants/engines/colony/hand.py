@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from taichi_ants import files
 from taichi_ants.engines.colony.layout import ANT_GROUND, AntRow, HomeRow, Stage, WorldRow
 from taichi_ants.engines.colony.memory import homes_arrays, set_learning_rate
+from taichi_ants.engines.stored import digest_of
 from taichi_ants.errors import AntsError, count
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_BORN, STREAM_HAND, STREAM_START_CELL
 from taichi_ants.grid.randomness import Stream, choose, stream_state
@@ -213,6 +215,15 @@ class Hand:
         """The learning rate of this episode, from which it decays."""
         self.colony.learning_rate = learning_rate
         set_learning_rate(self.colony)
+
+    def state(self) -> str:
+        """A hash of all that goes on: where it is equal, all that follows is equal."""
+        colony = self.colony
+        moment = (colony.epsilon, colony.learning_rate, colony.length, colony.ticks, colony.ants)
+        rest = (self.ants, self._stream.state, colony.task.as_dict())
+        arrays = {name: colony.arrays[name] for name in (*colony.stored, "walls", "closer")}
+        text = files.to_json([*moment, *rest])
+        return digest_of({**arrays, "start": self._start, "moment": np.array(text)})
 
     def world(self) -> World:
         """How later episodes begin."""

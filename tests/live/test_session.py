@@ -1,0 +1,388 @@
+"""Sessions: replayed to the bit, seen alike by all who look on, and nothing wrong changes them."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from command_lines import ROOT, environment
+from playback import played
+from random_edits import random_edit
+
+from taichi_ants import AntsError, Colony, Life, Pheromone, Task, TrainingConfig, load_policy
+from taichi_ants import task as tasks
+from taichi_ants.learners.policies import trail_follower
+from taichi_ants.live.session import Session, Setup
+from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
+from taichi_ants.viewer import Recording
+
+LEARNS = TrainingConfig("sarsa", 0.2, 0.9, 0.3, 0.9, learning_rate_decay=0.8)
+LIVELY = Task(
+    pheromone=Pheromone("exponential", half_life=20, diffusion=0.2, deposit="add"),
+    evaporation_in_training=True,
+    life=Life(births=True, lifespan=60, regrowth=2, wander=9),
+)
+SMALL = {"ranges": (9, 8, 7)}
+SETUPS = {
+    "foraging": Setup("open", tasks.foraging(), LEARNS, 20, 40, 3, 25, world_settings=SMALL),
+    "queueing": Setup(
+        *("open", tasks.queueing(), trail_follower("queues"), 20, 30),
+        world_settings=SMALL,
+    ),
+    "lively": Setup(
+        *("open", LIVELY, TrainingConfig("dyna_q", 0.2, 0.9, 0.4, 0.9, planning_steps=2)),
+        *(12, 30, 5, 40),
+        world_settings=SMALL,
+    ),
+    "paper": Setup("paper", Task(), LEARNS, 5, ticks_per_episode=30, sharing="own"),
+}
+
+
+def with_edits(setup: Setup, n: int, seed: int = 0) -> Session:
+    """A session after n edits drawn at random, and some ticks between them."""
+    session, rng = Session(setup), np.random.default_rng(seed)
+    while len(session.edits) < n:
+        try:
+            session.apply(random_edit(rng, session.hand))
+        except AntsError:
+            continue
+        for _ in range(int(rng.integers(0, 3))):
+            session.advance(int(rng.choice([1, 1, 9])))
+    return session
+
+
+@pytest.fixture(scope="module")
+def edited() -> dict[str, Session]:
+    return {name: with_edits(setup, 200) for name, setup in SETUPS.items()}
+
+
+@pytest.mark.parametrize("name", SETUPS)
+def test_two_hundred_edits_are_replayed_to_the_bit(edited, name, tmp_path):
+    session = edited[name]
+    assert session.colony.episode > 3 or not session.setup.ticks_per_episode
+    assert {edit["kind"] for _, edit in session.edits} == {
+        *("ground", "trail", "add_ants", "remove_ants", "queen", "set", "episode")
+    }
+    session.save(tmp_path / "session.npz")
+    again = Session.load(tmp_path / "session.npz")
+    assert again.hand.state() == session.hand.state()
+    assert (again.ticks, again.steps, again.edits) == (session.ticks, session.steps, session.edits)
+    assert again.to_bytes() == session.to_bytes()
+    assert Session.from_bytes(again.to_bytes()).hand.state() == session.hand.state()
+
+
+def test_threads_and_processes_do_not_matter(edited, tmp_path):
+    script = (
+        "import sys; from taichi_ants import runtime; from taichi_ants.live.session import Session;"
+        "runtime.start(int(sys.argv[1]));"
+        "print(*(Session.load(path).hand.state() for path in sys.argv[2:]))"
+    )
+    names = ("foraging", "lively")
+    paths = [str(tmp_path / f"{name}.npz") for name in names]
+    for name, path in zip(names, paths, strict=True):
+        edited[name].save(path)
+    for threads in ("1", "2"):
+        done = subprocess.run(
+            [sys.executable, "-c", script, threads, *paths],
+            env=environment(tmp_path),
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 0, done.stderr
+        assert done.stdout.split() == [edited[name].hand.state() for name in names]
+
+
+def test_pieces_of_time_do_not_matter():
+    one, other = Session(SETUPS["foraging"]), Session(SETUPS["foraging"])
+    while one.steps < 60:
+        one.advance(100)  # not beyond the end of an episode
+    while other.steps < one.steps:
+        other.advance()
+    assert one.ticks == other.ticks == 3 * 25
+    assert one.colony.episode == 2
+    assert one.hand.state() == other.hand.state()
+
+
+@pytest.mark.parametrize("name", SETUPS)
+def test_a_page_that_joins_late_sees_what_the_others_see(name):
+    session, rng = Session(SETUPS[name]), np.random.default_rng(4)
+    first, late, header = [session.moment()], [], session.header()
+    for step in range(90):
+        if step == 45:
+            late = [session.moment()]
+            header["names"] |= session.news()
+        frame = session.advance()
+        if step % 3 == 0:
+            first.append(frame)
+            late += [frame] if late else []
+            try:
+                frame = session.apply(random_edit(rng, session.hand))
+            except AntsError:
+                continue
+        first.append(frame)
+        late += [frame] if late else []
+    pheromone = session.setup.task.pheromone_while(session.setup.learns)
+    early = list(played(Recording(header, first), pheromone))
+    joined = list(played(Recording(session.header(), late), pheromone))
+    for a, b in zip(early[-len(joined) :], joined, strict=True):
+        assert a.clock == b.clock
+        for field in ("numbers", "cells", "headings", "loaded", "states", "ground", "trail"):
+            assert np.array_equal(getattr(a, field), getattr(b, field)), field
+        assert b.values.keys() <= a.values.keys()
+        assert all(a.values[entry] == value for entry, value in b.values.items())
+        known = {entry // 5 for entry in b.values}
+        n_states = session.colony.task.n_states
+        owners = b.numbers if session.colony.one_a_slot else np.zeros(len(b.states), int)
+        assert set((owners * n_states + b.states).tolist()) <= known
+    snapshot = session.colony.snapshot()
+    assert np.array_equal(joined[-1].ground, snapshot.ground)
+    assert np.array_equal(joined[-1].trail, snapshot.trail)
+
+
+def test_states_have_names_before_they_are_seen_on_pages():
+    setup = replace(SETUPS["foraging"], task=Task(observation="six_cells"))
+    session = Session(setup)
+    names = dict(session.header()["names"])
+    assert 0 < len(names) < session.colony.task.n_states
+    session.news()
+    for _ in range(20):
+        session.advance()
+        names |= session.news()
+        assert set(session.colony.states[session.colony.living].tolist()) <= names.keys()
+    assert session.news() == {}
+    assert session.header()["names"] == names
+
+
+def test_a_recording_holds_what_happened(edited):
+    session = edited["foraging"]
+    before = session.hand.state()
+    whole = session.recording(most_frames=10_000)
+    few = session.recording(most_frames=50)
+    pheromone = session.setup.task.pheromone
+    for recording in (whole, few):
+        last = list(played(Recording.from_bytes(recording.to_bytes()), pheromone))[-1]
+        snapshot = session.colony.snapshot()
+        assert np.array_equal(last.ground, snapshot.ground)
+        assert np.array_equal(last.trail, snapshot.trail)
+        assert np.array_equal(np.sort(last.cells), np.sort(snapshot.ant_cells))
+    assert session.steps < len(whole) < session.steps + 200
+    assert 20 < len(few) <= 52
+    acting = [moment for moment in played(whole, pheromone) if len(moment.actions)]
+    assert len(acting) > 0.9 * session.ticks
+    assert session.hand.state() == before
+
+
+def test_exports_are_files_of_the_project(edited, tmp_path):
+    session = edited["foraging"]
+    (tmp_path / "x").write_bytes(session.policy_bytes())
+    policy = load_policy(tmp_path / "x")
+    assert np.array_equal(policy.q_values, session.colony.q_values[0])
+    assert policy.task == session.colony.task
+    with pytest.raises(AntsError, match="a table of its own"):
+        edited["paper"].policy_bytes()
+    for name, one in edited.items():
+        (tmp_path / name).write_bytes(one.colony_bytes())
+        colony = Colony.load(tmp_path / name)
+        assert colony == one.colony
+        again = Session.from_bytes(one.to_bytes())
+        again.colony_bytes()
+        colony.tick(9)
+        again.colony.tick(9)
+        assert colony == again.colony, name
+    assert session.gif_bytes(most_frames=4).startswith(b"GIF89a")
+
+
+def test_what_a_hand_has_put_stays_and_what_is_of_an_episode_goes():
+    session = Session(replace(SETUPS["foraging"], ticks_per_episode=0))
+    ground = session.colony.arrays["ground"]
+    a, b, c, d, e = np.flatnonzero(ground == EMPTY)[:5].tolist()
+    session.apply({"kind": "ground", "what": "rock", "cells": [a]})
+    session.apply({"kind": "ground", "what": "food", "cells": [b]})
+    session.apply({"kind": "queen", "cell": c})
+    session.apply({"kind": "trail", "level": 77, "cells": [d]})
+    session.apply({"kind": "add_ants", "cells": [e], "heading": 2})
+    session.apply({"kind": "set", "name": "ants", "value": 25})
+    snapshot = session.colony.snapshot()
+    assert (snapshot.trail[d], len(snapshot.ant_cells)) == (77, 25)
+    session.apply({"kind": "episode"})
+    snapshot = session.colony.snapshot()
+    assert snapshot.ground[[a, b]].tolist() == [OBSTACLE, FOOD]
+    assert session.colony.worlds[0].grid.index(session.colony.worlds[0].queen) == c
+    assert (snapshot.trail[d], len(snapshot.ant_cells)) == (0, 25)
+
+
+WRONG = [
+    (None, "an edit is None"),
+    ([], "an edit is"),
+    ({}, "kind"),
+    ({"kind": "explode"}, "kind of an edit is 'explode'"),
+    ({"kind": ["ground"]}, "kind of an edit"),
+    ({"kind": "ground"}, "it must have cells, kind, what"),
+    ({"kind": "episode", "now": 1}, "it must have kind"),
+    ({"kind": "ground", "what": "lava", "cells": [60]}, "what is 'lava'"),
+    ({"kind": "ground", "what": "queen", "cells": [60]}, "what is 'queen'"),
+    ({"kind": "ground", "what": 5, "cells": [60]}, "what is 5"),
+    ({"kind": "ground", "what": "rock", "cells": []}, "cells is []"),
+    ({"kind": "ground", "what": "rock", "cells": "60"}, "cells is '60'"),
+    ({"kind": "ground", "what": "rock", "cells": {"60": 1}}, "cells is"),
+    ({"kind": "ground", "what": "rock", "cells": [60] * 10**6}, "a list of 1 to"),
+    ({"kind": "ground", "what": "rock", "cells": [60, True]}, "cells holds True"),
+    ({"kind": "ground", "what": "rock", "cells": [60.0]}, "cells holds 60.0"),
+    ({"kind": "ground", "what": "rock", "cells": [math.nan]}, "cells holds nan"),
+    ({"kind": "ground", "what": "rock", "cells": [-1]}, "cells holds -1"),
+    ({"kind": "ground", "what": "rock", "cells": [0]}, "cells holds 0"),  # of the border
+    ({"kind": "ground", "what": "rock", "cells": [10**30]}, "cells holds 10000"),
+    ({"kind": "ground", "what": "rock", "cells": "all"}, "cells is 'all'"),
+    ({"kind": "trail", "level": -1, "cells": [60]}, "level is -1"),
+    ({"kind": "trail", "level": True, "cells": [60]}, "level is True"),
+    ({"kind": "trail", "level": 1.5, "cells": [60]}, "level is 1.5"),
+    ({"kind": "trail", "level": 10**7, "cells": [60]}, "level is 10000000"),
+    ({"kind": "add_ants", "cells": [60], "heading": 6}, "heading is 6"),
+    ({"kind": "add_ants", "cells": [60], "heading": "up"}, "heading is 'up'"),
+    ({"kind": "queen", "cell": None}, "cells holds None"),
+    ({"kind": "queen", "cell": [60]}, "cells holds"),
+    ({"kind": "set", "name": "gravity", "value": 1}, "'gravity'"),
+    ({"kind": "set", "name": "half_life", "value": 9}, "'half_life'"),  # trails fall by 1
+    ({"kind": "set", "name": ["epsilon"], "value": 1}, "name of a value"),
+    ({"kind": "set", "name": "epsilon", "value": math.nan}, "epsilon is nan"),
+    ({"kind": "set", "name": "epsilon", "value": math.inf}, "epsilon is inf"),
+    ({"kind": "set", "name": "epsilon", "value": 1.01}, "epsilon is 1.01"),
+    ({"kind": "set", "name": "epsilon", "value": True}, "epsilon is True"),
+    ({"kind": "set", "name": "epsilon", "value": "0.1"}, "epsilon is '0.1'"),
+    ({"kind": "set", "name": "epsilon", "value": 10**400}, "epsilon is 1000"),
+    ({"kind": "set", "name": "ants", "value": 0}, "ants is 0"),
+    ({"kind": "set", "name": "ants", "value": 2.0}, "ants is 2.0"),
+    ({"kind": "set", "name": "ants", "value": 41}, "ants is 41"),
+    ({"kind": "set", "name": "evaporation", "value": 2}, "evaporation is 2"),
+    ({"kind": "set", "name": "slope", "value": 0}, "slope is 0"),
+]
+
+
+def refused(session: Session, edit: object) -> str:
+    before, edits = session.hand.state(), list(session.edits)
+    with pytest.raises(AntsError) as caught:
+        session.apply(edit)
+    assert session.hand.state() == before
+    assert session.edits == edits
+    text = str(caught.value)
+    assert text.endswith(".")
+    assert "\n" not in text
+    assert len(text) < 300
+    return text
+
+
+def test_wrong_edits_change_nothing():
+    session = Session(SETUPS["foraging"])
+    session.advance(7)
+    for edit, said in WRONG:
+        assert said in refused(session, edit), edit
+
+
+def test_edits_without_room_change_nothing():
+    session = Session(SETUPS["foraging"])
+    session.advance(7)
+    snapshot = session.colony.snapshot()
+    free = np.flatnonzero(session.colony.arrays["ground"] == EMPTY).tolist()
+    foods = np.flatnonzero(snapshot.ground == FOOD).tolist()
+    cells = np.flatnonzero(session.colony.grid.exists).tolist()
+    said = refused(session, {"kind": "add_ants", "cells": free, "heading": None})
+    assert "the capacity of this colony is 40" in said
+    queen = int(np.flatnonzero(snapshot.ground == 13)[0])
+    for cell in (queen, foods[0], int(snapshot.ant_cells[0])):
+        assert "the queen cannot stand there" in refused(session, {"kind": "queen", "cell": cell})
+    # What has been eaten is at the start of the next episode, so that only this takes all.
+    assert "the last food" in refused(session, {"kind": "ground", "what": "empty", "cells": cells})
+    session = Session(SETUPS["queueing"])  # nobody learns
+    session.apply({"kind": "ground", "what": "empty", "cells": cells})
+    assert "would leave" in refused(session, {"kind": "ground", "what": "rock", "cells": cells})
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"steps": 10}, "steps is"),
+        ({"steps": 10**12}, "steps is"),
+        ({"steps": None}, "steps is None"),
+        ({"edits": []}, "does not end as it did"),
+        ({"edits": [[0, {"kind": "explode"}]]}, "explode"),
+        ({"edits": [[5, {"kind": "episode"}], [4, {"kind": "episode"}]]}, "steps is 4"),
+        ({"edits": 7}, "damaged"),
+        ({"setup": {"world": "/etc/passwd"}}, "damaged"),
+        ({"state": "0"}, "does not end as it did"),
+        ({"setup": None}, "damaged"),
+    ],
+)
+def test_files_that_were_altered_are_refused(edited, changes, said, tmp_path):
+    path = tmp_path / "x.npz"
+    edited["foraging"].save(path)
+    with np.load(path) as archive:
+        arrays = dict(archive)
+    facts = {**json.loads(str(arrays["facts"][()])), **changes}
+    np.savez(path, **{**arrays, "facts": np.array(json.dumps(facts))})
+    with pytest.raises(
+        AntsError, match=r"^the session in .* is damaged .*Session.save wrote.$"
+    ) as e:
+        Session.load(path)
+    assert said in str(e.value)
+
+
+@pytest.mark.parametrize("content", [b"", b"nothing", b"PK\3\4" + bytes(100)])
+def test_no_session_at_all(content):
+    with pytest.raises(AntsError, match=r"'session' .*\.$"):
+        Session.from_bytes(content)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"world": "nowhere"}, "no world named 'nowhere'"),
+        ({"world": "pyproject.toml"}, "no world named 'pyproject.toml'"),
+        ({"world": 3}, "world is 3"),
+        ({"world": "Q ?\n"}, "'?'"),
+        ({"world": "Q" + " " * 5000 + "F\n"}, "the map has more than"),
+        ({"world": "open", "world_settings": {"ranges": [9000, 9000, 1]}}, "81000000 cells"),
+        ({"world": "open", "world_settings": {"size": 3}}, "size is no setting"),
+        ({"world": "open", "world_settings": {"ranges": "abc"}}, "ranges are 'abc'"),
+        ({"task": {"observation": "none"}}, "none"),
+        ({"task": {"gravity": 1}}, "gravity"),
+        ({"task": 4}, "a task is 4"),
+        ({"policy": "table"}, "policy is 'table'"),
+        ({"policy": {"learner": "sarsa"}}, "policy is"),
+        ({"policy": {**LEARNS.as_dict(), "epsilon": 3}}, "epsilon is 3"),
+        ({"policy": {**LEARNS.as_dict(), "learner": "mine"}}, "no learner 'mine'"),
+        ({"policy": "file.npz"}, "policy is 'file.npz'"),
+        ({"ants": 0}, "ants is 0"),
+        ({"ants": True}, "ants is True"),
+        ({"ants": 10**9}, "ants is"),
+        ({"ants": 9, "capacity": 8}, "capacity is 8"),
+        ({"ants": 9999}, "9999 ants"),
+        ({"capacity": 100_000, "sharing": "own", "task": {"observation": "six_cells"}}, "memory"),
+        ({"seed": 2**70}, "a seed"),
+        ({"seed": 1.5}, "a seed"),
+        ({"ticks_per_episode": -1}, "ticks_per_episode is -1"),
+        ({"sharing": "fixed"}, "sharing is 'fixed'"),
+        ({"colour": "red"}, "no 'colour'"),
+        ({"epsilon": math.nan}, "epsilon is nan"),
+    ],
+)
+def test_wrong_setups_say_why(changes, said):
+    facts = {**SETUPS["paper"].to_json(), **changes}
+    with pytest.raises(AntsError) as caught:
+        Session(Setup.from_json(facts))
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", SETUPS)
+def test_setups_are_json(name):
+    setup = SETUPS[name]
+    facts = json.loads(json.dumps(setup.to_json()))
+    again = Setup.from_json(facts, None if setup.learns else setup.policy)
+    assert again.to_json() == setup.to_json()
+    assert Session(again).hand.state() == Session(setup).hand.state()
