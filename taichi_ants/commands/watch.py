@@ -18,7 +18,6 @@ from taichi_ants.studies.command_line import Parser, load_plugin, run_command, w
 
 if TYPE_CHECKING:
     from taichi_ants.learners.policies import Policy
-    from taichi_ants.live.session import Session
 
 _POLICIES = Path(__file__).parents[2] / "experiments" / "policies"  # of a clone
 START: dict[str, Any] = {
@@ -33,7 +32,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     summary, more = __doc__.split("\n", 1)
     parser = Parser(summary, epilog=more)
     add = parser.add_argument
-    files = {"action": "extend", "nargs": "+", "default": [], "metavar": "FILE"}
+    files: dict[str, Any] = {"action": "extend", "nargs": "+", "default": [], "metavar": "FILE"}
     add("--policy", **files, help="policies that the page offers besides those of a clone")
     add("--session", metavar="FILE", help="a saved session to go on with")
     add("--port", type=whole_number(0, 65535), default=0, metavar="N", help="0: one that is free")
@@ -55,11 +54,8 @@ def watch(settings: argparse.Namespace) -> None:
         load_plugin(settings.plugin)
     choices = Choices(policies(settings.policy))
     runtime.start(settings.threads)
-    session: Session
-    if settings.session:
-        session = Session.load(settings.session)
-    else:
-        session = Session(choices.setup(START))
+    saved = settings.session
+    session = Session.load(saved) if saved else Session(choices.setup(START))
     room = Room(session, choices, settings.port)
     print(f"{room.url}\nOpen this address; Ctrl-C ends.", flush=True)
     if not settings.no_browser and sys.stdout.isatty():

@@ -52,11 +52,10 @@ LEARNS, FOLLOWS = "learn ", "file "  # how the names of policies begin
 BY_HAND = "by hand"
 
 # What 64 ants need to learn to forage together in 60 episodes; see docs/foraging.md.
-_LEARNING: dict[str, float] = {
+_LEARNING: dict[str, Any] = {
     **{"learning_rate": 0.1, "discount": 0.9, "epsilon": 0.3, "epsilon_decay": 0.92},
     **{"learning_rate_decay": 0.95, "min_learning_rate": 0.01, "initial_value": 10.0},
 }
-_FOLLOWING = TrainingConfig("q_learning", 1.0, 0.0, 0.01, 1.0, min_epsilon=0.0)
 
 
 def task_of(rules: Iterable[str], sees: str) -> Task:
@@ -157,12 +156,11 @@ class Choices:
             table = self._file(policy).q_values
         world = chosen["world"]
         check_one_of("the world", world, tuple(WORLDS))
-        learns = TrainingConfig(name, **_LEARNING) if table is None else None
-        shares = learns is None or learners.get(learns.learner).td_error is not None
+        shares = table is not None or learners.get(name).td_error is not None
         return Setup(
             world=_map(chosen["map"]) if world == "map" else world,
             task=rules,
-            policy=table if learns is None else learns,
+            policy=TrainingConfig(name, **_LEARNING) if table is None else table,
             ants=checked_whole("ants", chosen["ants"], 1, MOST_ANTS),
             seed=checked_whole("seed", chosen["seed"], 0),
             ticks_per_episode=checked_whole("ticks", chosen["ticks"], 0, 1_000_000),

@@ -29,6 +29,7 @@ from taichi_ants.errors import AntsError
 from taichi_ants.live.choices import Choices
 from taichi_ants.live.page import live_page
 from taichi_ants.live.session import Session
+from taichi_ants.viewer import page as html_page
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -167,8 +168,7 @@ class Room:
             self._show(self.session.advance(ticks))
         except AntsError as error:  # as of a learner whose values are no longer finite
             self.playing = False
-            words = _say("error", words=str(error))
-            self._post(lambda: [page.tell(words) for page in self._pages])
+            self._tell_all(_say("error", words=str(error)))
         took, passed = time.monotonic() - began, self.session.ticks - before
         if passed == ticks:  # and no episode has ended before
             self._piece = min(2.0 * passed, max(1.0, passed / (took * FRAMES_A_SECOND)))
@@ -249,14 +249,12 @@ class Room:
         self._begin(Session(self.session.setup))
 
     def _export(self, page: Page, request: dict[str, Any]) -> None:
-        from taichi_ants.live.exports import EXPORTS
-
         kind = request.get("kind")
         if not isinstance(kind, str) or kind not in EXPORTS:
             raise Closed
         name, make = EXPORTS[kind]
-        data = make(self.session)
-        self._post(lambda: page.tell(_say("file", name=name), data))
+        content = make(self.session)
+        self._post(lambda: page.tell(_say("file", name=name), content))
 
     def _quit(self, page: Page, request: dict[str, Any]) -> None:
         self.end()
@@ -289,8 +287,14 @@ class Room:
 
     def _tell_state(self) -> None:
         self._told = time.monotonic()
-        state = self._state()
-        self._post(lambda: [page.tell(state) for page in self._pages])
+        self._tell_all(self._state())
+
+    def _tell_all(self, message: str) -> None:
+        def tell() -> None:
+            for page in self._pages:
+                page.tell(message)
+
+        self._post(tell)
 
     def _tell(self, page: Page, message: str) -> None:
         self._post(lambda: page.tell(message))
@@ -312,10 +316,12 @@ class Room:
     async def _listen(self) -> None:
         from websockets.asyncio.server import serve
 
-        limits: dict[str, Any] = {"max_size": _MOST_UPLOAD, "max_queue": 4, "compression": None}
-        times = {"open_timeout": 10, "ping_interval": 20, "ping_timeout": 20, "close_timeout": 0.3}
-        hooks: dict[str, Any] = {"process_request": self._open, "logger": _QUIET}
-        async with serve(self._hear, sock=self._socket, **limits, **times, **hooks):
+        settings: dict[str, Any] = {
+            **{"max_size": _MOST_UPLOAD, "max_queue": 4, "compression": None},
+            **{"open_timeout": 10, "ping_interval": 20, "ping_timeout": 20, "close_timeout": 0.3},
+            **{"process_request": self._open, "logger": _QUIET},
+        }
+        async with serve(self._hear, sock=self._socket, **settings):
             await self._leave.wait()
             for page in self._pages:
                 page.tell(_say("over"))
@@ -405,8 +411,17 @@ REQUESTS: dict[str, Callable[[Room, Page, dict[str, Any]], None]] = {
     "edit": Room._edit,  # {"edit": see taichi_ants.live.edits}
     "begin": Room._begin_chosen,  # {"chosen": see taichi_ants.live.choices}
     "restart": Room._restart,
-    "export": Room._export,  # {"kind": see taichi_ants.live.exports}
+    "export": Room._export,  # {"kind": of `EXPORTS`}
     "quit": Room._quit,
+}
+
+# What pages call it, the name of the file, and what makes it.
+EXPORTS: dict[str, tuple[str, Callable[[Session], bytes]]] = {
+    "session": ("session.npz", Session.to_bytes),
+    "page": ("session.html", lambda session: html_page(session.recording()).encode()),
+    "gif": ("session.gif", Session.gif_bytes),
+    "policy": ("policy.npz", Session.policy_bytes),
+    "colony": ("colony.npz", Session.colony_bytes),
 }
 
 _HEADERS = {
