@@ -43,6 +43,7 @@ RULES = {  # what each adds to the paper's rules, in words
     "right_of_way": "Ants with food have right of way",
     "queues": "Queues move as one",
     "falls": "Trails evaporate while ants learn",
+    "spreads": "Trails halve and spread instead",
     "births": "Each delivery brings an ant",
     "deaths": "Ants die after 3000 ticks",
     "regrowth": "Food grows back at once",
@@ -68,14 +69,16 @@ def task_of(rules: Iterable[str], sees: str) -> Task:
     for rule in chosen:
         check_one_of("a rule", rule, tuple(RULES))
     queues = "queues" in chosen
-    pheromone = Pheromone()
+    how: dict[str, Any] = {}
     if "rising" in chosen:
         view = "strongest_under_carriers" if queues else "strongest"
-        pheromone = Pheromone(deposit="fading", level=500, view=view)  # type: ignore[arg-type]
+        how = {"deposit": "fading", "level": 500, "view": view}
+    if "spreads" in chosen:
+        how |= {"evaporation": "exponential", "half_life": 100, "diffusion": 0.05}
     traffic = "following" if queues else "right_of_way" if "right_of_way" in chosen else "blocking"
     return Task(
         observation=sees,
-        pheromone=pheromone,
+        pheromone=Pheromone(**how),
         traffic=Traffic.named(traffic),
         turns_at_queen=queues,
         evaporation_in_training="falls" in chosen,

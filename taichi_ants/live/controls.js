@@ -157,7 +157,7 @@ class Controls {
       box.innerHTML = Object.entries(values).map(([name, one]) => {
         const words = SLIDERS[name] ?? name.replaceAll("_", " "), about = `id="set-${name}" data-name="${name}"`;
         if (isSwitch(one)) return `<label class="rule"><input type="checkbox" ${about}> ${words}</label>`;
-        return `<label class="slider"><span>${words}</span><output for="set-${name}"></output><input type="range" ${about}></label>`;
+        return `<label class="slider" for="set-${name}"><span>${words}</span><output for="set-${name}"></output><input type="range" ${about}></label>`;
       }).join("");
     }
     for (const [name, one] of Object.entries(values)) {
@@ -169,7 +169,7 @@ class Controls {
         this.showSlider(slider, one.value);
       }
     }
-    if ((this.held.get("speed") ?? 0) < performance.now()) this.live.viewer?.timeline.showSpeed();
+    this.live.viewer?.timeline.showSpeed();
     byId("watchers").textContent = pages > 1 ? `${pages} pages look on` : "";
   }
 

@@ -10,6 +10,7 @@ class Live {
     this.arrived = 0; // frames since the server was told
     this.running = false;
     this.speed = 12;
+    this.speedUntil = 0;
     this.viewer = null;
     const { host, search } = location;
     this.socket = new WebSocket(`ws://${host}/socket${search}`);
@@ -35,7 +36,7 @@ class Live {
     else {
       if (message.say === "state") {
         this.running = message.playing;
-        this.speed = message.speed;
+        if (performance.now() > this.speedUntil) this.speed = message.speed; // not while somebody moves it
         this.state = message;
       }
       this.tell(message.say, message);
@@ -100,6 +101,7 @@ class LivePlayer extends Player {
   }
   setSpeed(speed) {
     this.speed = this.live.speed = speed;
+    this.live.speedUntil = performance.now() + 500;
     this.live.ask("speed", { value: speed });
   }
   play() {
