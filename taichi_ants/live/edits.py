@@ -106,7 +106,7 @@ def checked(edit: object, hand: Hand) -> Edit:
     """
     expect("an edit", edit, Mapping)
     assert isinstance(edit, Mapping)
-    kind = edit.get("kind")
+    kind: Any = edit.get("kind")
     check_one_of("the kind of an edit", kind, tuple(_FIELDS))
     wanted, given = {"kind", *_FIELDS[kind]}, set(edit)
     if given != wanted:
@@ -158,9 +158,11 @@ def _set(name: str, value: float, hand: Hand) -> None:
         _, pheromone = _with_evaporation(hand, value == 1)
         learns = hand.colony.sharing != "fixed"
         flag = "evaporation_in_training" if learns else "evaporation_in_evaluation"
-        task = replace(task, **{flag: value == 1})
+        flags: dict[str, Any] = {flag: value == 1}
+        task = replace(task, **flags)
     else:
-        pheromone = replace(pheromone, **{"level" if name == "deposit" else name: value})
+        numbers: dict[str, Any] = {"level" if name == "deposit" else name: value}
+        pheromone = replace(pheromone, **numbers)
     hand.set_task(replace(task, pheromone=pheromone))
 
 

@@ -79,11 +79,14 @@ class Setup:
     def __post_init__(self) -> None:
         expect("world", self.world, str)
         expect("task", self.task, Task)
-        if self.learns:
+        if isinstance(self.policy, TrainingConfig):
             check_one_of("sharing", self.sharing, ("shared", "own"))
-            learners.get(self.policy.learner)  # type: ignore[union-attr]
+            learners.get(self.policy.learner)
         else:
-            object.__setattr__(self, "policy", checked_q_values(self.policy, self.task))
+            table = checked_q_values(self.policy, self.task)
+            if table.ndim != 2:
+                raise AntsError(f"policy has shape {table.shape}; give one table for all ants.")
+            object.__setattr__(self, "policy", table)
         checked_whole("ants", self.ants, 1, MOST_ANTS)
         if self.capacity is None:
             object.__setattr__(self, "capacity", min(2 * self.ants + 64, MOST_ANTS))
@@ -139,8 +142,7 @@ class Setup:
             training = self.policy
         else:
             options |= {"sharing": "fixed", "q_values": self.policy}
-            steady = {"epsilon_decay": 1.0, "min_epsilon": 0.0}
-            training = TrainingConfig("q_learning", 1.0, 0.0, self.epsilon, **steady)
+            training = TrainingConfig("q_learning", 1.0, 0.0, self.epsilon, 1.0, min_epsilon=0.0)
         return Colony(self.build_world(), self.task, training, self.seed, **options)
 
     def to_json(self) -> dict[str, Any]:
@@ -258,13 +260,17 @@ class Session:
         n = min(n, self._length - self.colony.ticks if self._length else n)
         if self.ticks + n > MOST_TICKS:
             raise AntsError(f"a session has at most {MOST_TICKS} ticks; begin another one.")
-        given = tick(n)
-        self.ticks += n
-        self.steps += n
-        return given
+        before = self.colony.ticks
+        try:
+            return tick(n)
+        finally:  # even if somebody interrupts it
+            self.ticks += self.colony.ticks - before
+            self.steps += self.colony.ticks - before
 
     def apply(self, edit: object) -> bytes:
         """Do an edit now, see `edits`, and record it; a frame of what has changed.
+
+        If the episode has ended, what is of this episode alone goes with it.
 
         Raises:
             AntsError: It is none, or there is no room for it; nothing has changed.

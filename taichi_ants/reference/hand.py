@@ -137,7 +137,7 @@ class Hand:
     def set_pheromone(self, **numbers: Any) -> None:
         """Other numbers of the pheromone; trails stay as dense as before."""
         self._pheromone = replace(self._pheromone, **numbers)
-        still = {} if self._falls else {"evaporation": "none", "half_life": None}
+        still: dict[str, Any] = {} if self._falls else {"evaporation": "none", "half_life": None}
         now = replace(self._pheromone, **still)
         self.colony.pheromone = self.colony.world.pheromone = now
         self.colony.world.trail.change(now)

@@ -3,6 +3,7 @@ nothing."""
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
 
 import numpy as np
@@ -11,11 +12,14 @@ from random_colonies import random_colony
 from random_edits import apply_to_both, random_edit
 from same_colonies import assert_equal
 
-from taichi_ants import AntsError, Colony
+from taichi_ants import AntsError, Colony, TrainingConfig, worlds
+from taichi_ants.engines.colony import colony as colony_module
 from taichi_ants.engines.colony.hand import Hand
 from taichi_ants.engines.colony.layout import AntRow, Stage, WorldRow
+from taichi_ants.live import edits
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.reference.hand import Hand as PlainHand
+from taichi_ants.task import foraging
 from taichi_ants.task.constants import EMPTY, OBSTACLE, QUEEN
 
 # Each entry takes kernels of its own, see tests/engines/colony/test_against_reference.py.
@@ -92,3 +96,36 @@ def test_edits_keep_colony_and_reference_equal(kernel):
     assert len(done) == 7
     assert min(done.values()) > 10, done
     assert refused > 10
+
+
+def test_schedules_do_not_matter_to_edits(monkeypatch):
+    """Chunks of 7 ants; where no slot is vacant, these are sorted now and then."""
+    monkeypatch.setattr(colony_module, "_ANTS_PER_CHUNK", 7)
+    monkeypatch.setattr(colony_module, "_TICKS_BETWEEN_SORTS", 2)
+    world, training = worlds.open_world(5, (9, 8, 7)), TrainingConfig("sarsa", 0.2, 0.9, 0.4, 0.9)
+    hands = []
+    for schedule in ("by_world", "by_chunk"):
+        options = {"ants": 40, "capacity": 40, "schedule": schedule}
+        colony = Colony(world, foraging(), training, 3, **options)
+        colony.begin_episode()
+        hands.append(Hand(colony))
+    rng, full = np.random.default_rng(1), 0
+    for _ in range(60):
+        edit = random_edit(rng, hands[0])
+        for hand in hands:
+            with contextlib.suppress(AntsError):
+                edits.apply(edits.checked(edit, hand), hand, None)
+            hand.colony.tick(3)
+            assert_sound(hand)
+        one, other = (hand.colony for hand in hands)
+        full += int(one.living.all())
+        assert np.array_equal(one.q_values, other.q_values)
+        for name in ("ground", "trail", "first_streams", "worlds"):
+            known = slice(None) if name != "worlds" else [WorldRow.LIVING, WorldRow.NEXT_NUMBER]
+            assert np.array_equal(one.arrays[name][known], other.arrays[name][known]), name
+        rows = []
+        for colony in (one, other):
+            ants = colony.arrays["ants"][:, colony.living[0]]
+            rows.append(ants[: AntRow.WANT, np.argsort(ants[AntRow.NUMBER])])
+        assert np.array_equal(*rows)
+    assert 0 < full < 60

@@ -282,6 +282,24 @@ def test_wrong_edits_change_nothing():
     session.advance(7)
     for edit, said in WRONG:
         assert said in refused(session, edit), edit
+    follows = Session(SETUPS["queueing"])
+    assert follows.values().keys() == {"ants", "epsilon", "deposit", "slope", "evaporation"}
+    edit = {"kind": "set", "name": "learning_rate", "value": 0.5}
+    assert "'learning_rate'" in refused(follows, edit)
+
+
+def test_what_was_interrupted_is_counted(monkeypatch):
+    session = Session(SETUPS["foraging"])
+
+    def interrupted(n, tick=session.colony.tick):
+        tick(n)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(session.colony, "tick", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        session.advance(7)
+    assert (session.ticks, session.colony.ticks) == (7, 7)
+    assert Session.from_bytes(session.to_bytes()).hand.state() == session.hand.state()
 
 
 def test_edits_without_room_change_nothing():
@@ -299,7 +317,7 @@ def test_edits_without_room_change_nothing():
     # What has been eaten is at the start of the next episode, so that only this takes all.
     assert "the last food" in refused(session, {"kind": "ground", "what": "empty", "cells": cells})
     session = Session(SETUPS["queueing"])  # nobody learns
-    session.apply({"kind": "ground", "what": "empty", "cells": cells})
+    session.apply({"kind": "remove_ants", "cells": cells})
     assert "would leave" in refused(session, {"kind": "ground", "what": "rock", "cells": cells})
 
 
@@ -386,3 +404,9 @@ def test_setups_are_json(name):
     again = Setup.from_json(facts, None if setup.learns else setup.policy)
     assert again.to_json() == setup.to_json()
     assert Session(again).hand.state() == Session(setup).hand.state()
+
+
+@pytest.mark.parametrize("table", [np.zeros((3, 5)), np.zeros((1, 128, 5)), "paper", None, [[1j]]])
+def test_a_policy_is_a_training_or_one_table(table):
+    with pytest.raises(AntsError, match=r"^(policy|q_values) .*\.$"):
+        Setup("paper", Task(), table)

@@ -87,7 +87,7 @@ class Hand:
         self._begin_with(start)
         arrays["ground"][old], arrays["ground"][cell] = EMPTY, QUEEN
         arrays["worlds"][WorldRow.QUEEN_CELL, 0] = cell
-        arrays["closer"][:] = World(grid.ranges, grid.cells(cell)).closer()
+        arrays["closer"][:] = World(grid.ranges, grid.cells(cell).tolist()).closer()
         self._change_homes(np.array([cell]), QUEEN)
         self.colony.look()
 
@@ -179,7 +179,8 @@ class Hand:
         colony, ants = self.colony, self.colony.arrays["ants"]
         (slots,) = np.nonzero(ants[AntRow.STAGE] == Stage.LIVING)
         missing, free = n - len(slots), np.flatnonzero(colony.arrays["ground"] == EMPTY)
-        room = min(colony.capacity, len(free) + len(slots), np.count_nonzero(self._start == EMPTY))
+        later = int(np.count_nonzero(self._start == EMPTY))
+        room = min(colony.capacity, len(free) + len(slots), later)
         if n > room:
             raise AntsError(f"ants is {n}; there is room for {room}, so take fewer.")
         self._changed |= n != self.ants
@@ -231,7 +232,7 @@ class Hand:
         trails, ants = grid.index(first.trails[:, :3]), grid.index(first.ants[:, :3])
         return World(
             first.ranges,
-            grid.cells(int(np.argmax(start == QUEEN))),
+            grid.cells(int(np.argmax(start == QUEEN))).tolist(),
             grid.cells(np.flatnonzero(start == FOOD)),
             grid.cells(np.flatnonzero((start == OBSTACLE) & grid.exists)),
             first.trails[start[trails] != OBSTACLE],
