@@ -202,14 +202,15 @@ class Recorder:
     ) -> np.ndarray:
         """The TD errors by which the values of the pairs moved, the mean of all ants of a pair.
 
-        NaN for learners that do more than one update a step.
+        NaN for learners that do more than one update a step, and where the learning rate is 0.
         """
         if not self._has_td_errors:
             return np.full(len(slots), np.nan)
         pairs = self._rows(slots, states) * N_ACTIONS + actions
         moved = self._tables().astype(np.float64).ravel()[pairs] - before.ravel()[pairs]
         _, place, ants = np.unique(pairs, return_inverse=True, return_counts=True)
-        return moved / self.colony.arrays["weights"][ants[place]]
+        weights = self.colony.arrays["weights"][ants[place]]
+        return np.divide(moved, weights, out=np.full(len(moved), np.nan), where=weights > 0)
 
     def _frame(self, sections: dict[str, Any]) -> bytes:
         """What has changed since the last frame, with what the ants did."""

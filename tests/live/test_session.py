@@ -17,6 +17,7 @@ from random_edits import random_edit
 from taichi_ants import AntsError, Colony, Life, Pheromone, Task, TrainingConfig, load_policy
 from taichi_ants import task as tasks
 from taichi_ants.learners.policies import trail_follower
+from taichi_ants.live import session as session_module
 from taichi_ants.live.session import Session, Setup
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
 from taichi_ants.viewer import Recording
@@ -76,7 +77,7 @@ def test_two_hundred_edits_are_replayed_to_the_bit(edited, name, tmp_path):
     assert Session.from_bytes(again.to_bytes()).hand.state() == session.hand.state()
 
 
-def test_threads_and_processes_do_not_matter(edited, tmp_path):
+def test_threads_and_processes_do_not_matter(edited, tmp_path, kernels):
     script = (
         "import sys; from taichi_ants import runtime; from taichi_ants.live.session import Session;"
         "runtime.start(int(sys.argv[1]));"
@@ -89,7 +90,7 @@ def test_threads_and_processes_do_not_matter(edited, tmp_path):
     for threads in ("1", "2"):
         done = subprocess.run(
             [sys.executable, "-c", script, threads, *paths],
-            env=environment(tmp_path),
+            env=environment(kernels),
             cwd=ROOT,
             capture_output=True,
             text=True,
@@ -348,6 +349,12 @@ def test_files_that_were_altered_are_refused(edited, changes, said, tmp_path):
     ) as e:
         Session.load(path)
     assert said in str(e.value)
+
+
+def test_a_file_that_unpacks_to_much_more_is_refused(edited, monkeypatch):
+    monkeypatch.setattr(session_module, "_MOST_BYTES", 1000)
+    with pytest.raises(AntsError, match="too much memory"):
+        Session.from_bytes(edited["foraging"].to_bytes())
 
 
 @pytest.mark.parametrize("content", [b"", b"nothing", b"PK\3\4" + bytes(100)])
