@@ -7,6 +7,9 @@ from importlib import resources
 
 from taichi_ants.viewer.page import assemble
 
+SCRIPTS = ("source.js", "tools.js", "controls.js")  # what a part uses stands in those before it
+PARTS = ("controls.html", "live.css", *SCRIPTS)
+
 
 @cache
 def _text(name: str) -> str:
@@ -20,11 +23,10 @@ def live_page(server: str) -> str:
     Args:
         server: The only address to which it connects, as "ws://127.0.0.1:8000".
     """
-    scripts = "\n".join(map(_text, ("source.js", "tools.js", "controls.js")))
     return assemble(
         "Taichi Ants, live",
         controls=_text("controls.html"),
         style=_text("live.css"),
-        script=scripts,
+        script="\n".join(map(_text, SCRIPTS)),
         connect=server,
     )

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from itertools import combinations
 
 import pytest
+from command_lines import ROOT
 
 from taichi_ants import task
 from taichi_ants.commands import watch
@@ -36,3 +38,11 @@ def test_what_the_command_begins_with_can_be_chosen():
     setup = Choices({}).setup(watch.START)
     assert Choices({}).chosen(setup) == {**watch.START, "rules": rules_of(setup.task)}
     assert setup.learns
+
+
+def test_the_python_of_the_guide_works(tmp_path, monkeypatch):
+    text = (ROOT / "docs" / "watching.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    exec(code, {})
+    assert (tmp_path / "mine.npz").exists()
