@@ -74,9 +74,16 @@ class Page:
         if transport.get_write_buffer_size() > _MOST_WAITING:
             transport.abort()
 
-    def show(self, *messages: str | bytes) -> None:
-        """Send a frame, and what belongs to it."""
-        self.unseen += 1
+    def show(self, frame: bytes) -> None:
+        """Send a frame of what has changed; a page with too many unseen ones falls behind."""
+        self.behind = self.behind or self.unseen >= _MOST_UNSEEN
+        if not self.behind:
+            self.unseen += 1
+            self.tell(frame)
+
+    def begin(self, *messages: str | bytes) -> None:
+        """Send a frame that holds all, and what stands before it."""
+        self.unseen, self.behind = 1, False
         self.tell(*messages)
 
 
@@ -113,9 +120,9 @@ class Room:
         self._joined = 0  # sockets, a page or not yet
         self._requests: queue.Queue[tuple[Page, Any, Callable[[], None]]] = queue.Queue()
         self._loop = asyncio.new_event_loop()
-        self._over = threading.Event()
+        self._over, self._leave = threading.Event(), asyncio.Event()
         self._pace, self._piece, self._due = 0.0, 1.0, 0.0  # see _pass
-        self._told = -math.inf  # when pages were last told the state
+        self._tells = 0.0  # when pages are told next how things stand
 
     @property
     def url(self) -> str:
@@ -147,7 +154,11 @@ class Room:
         runs = self.playing and bool(self._pages)  # time stands still while nobody looks on
         if runs and time.monotonic() >= self._due:
             self._pass()
-        wait = min(self._due - time.monotonic(), _LONGEST_WAIT) if runs else _LONGEST_WAIT
+        now = time.monotonic()
+        if now >= self._tells:
+            self._tells = now + _STATE_EVERY if runs else math.inf
+            self._tell_all(self._state())
+        wait = min((self._due if runs else math.inf) - now, self._tells - now, _LONGEST_WAIT)
         with contextlib.suppress(queue.Empty):
             for _ in range(1 + len(self._pages)):  # all have their turn
                 page, request, done = self._requests.get(timeout=max(wait, _BREATH))
@@ -174,11 +185,9 @@ class Room:
             self._piece = min(2.0 * passed, max(1.0, passed / (took * FRAMES_A_SECOND)))
         usual = 0.0 if self.speed >= FASTEST else 1 / min(self.speed, FRAMES_A_SECOND)
         self._due = max(self._due + usual, began + took)  # lost time is not made up
-        if began - self._told >= _STATE_EVERY:
-            self._tell_state()
 
     def _answer(self, page: Page, request: Any) -> None:
-        """Do what a page asks for, or tell it why not; all are told how things stand now."""
+        """Do what a page asks for, or tell it why not; all are told soon how things stand then."""
         try:
             if isinstance(request, bytes):
                 self._begin(Session.from_bytes(request))
@@ -186,41 +195,46 @@ class Room:
                 REQUESTS[request["do"]](self, page, request)
         except Closed:
             self._post(page.connection.transport.abort)
-            return
         except AntsError as error:
             self._tell(page, _say("error", words=str(error)))
         except MemoryError:
             self._tell(page, _say("error", words="this needs more memory than there is."))
-        self._tell_state()
+        self._tells = min(self._tells, time.monotonic() + 1 / FRAMES_A_SECOND)
 
     def _begin(self, session: Session) -> None:
         """Go on with another session; all pages are shown it from its beginning."""
-        self.session, self.playing = session, False
-        self._piece = 1.0
-        for page in list(self._pages):
-            self._welcome(page, {})
+        self.session, self.playing, self._piece = session, False, 1.0
+        messages = [*self._about(), *self._moment()]
+
+        def show() -> None:
+            for page in self._pages:
+                page.begin(*messages)
+
+        self._post(show)
 
     def _welcome(self, page: Page, request: dict[str, Any]) -> None:
-        """Tell a page all: what the session is about, and how it is now."""
-        header = _say("begin", header=self.session.header(), choices=self.choices.as_dict())
-        state, moment = self._state(), self.session.moment()
+        """Tell a new page what the session is about, and how it is now."""
+        messages = [*self._about(), *self._moment()]
 
-        def welcome() -> None:
+        def show() -> None:
             self._pages.add(page)
-            page.behind, page.unseen = False, 0
-            page.show(header, state, _say("moment"), moment)
+            page.begin(*messages)
 
-        self._post(welcome)
+        self._post(show)
 
     def _catch_up(self, page: Page, request: dict[str, Any]) -> None:
         """Tell a page that was slow how all is now."""
-        moment = self.session.moment()
+        messages = self._moment()
+        self._post(lambda: page.begin(*messages))
 
-        def show() -> None:
-            page.behind, page.unseen = False, 0
-            page.show(_say("moment"), moment)
+    def _about(self) -> list[str | bytes]:
+        """What a page needs to know before the first frame of a session."""
+        header, choices = self.session.header(), self.choices.as_dict()
+        return [_say("begin", header=header, choices=choices), self._state()]
 
-        self._post(show)
+    def _moment(self) -> list[str | bytes]:
+        """All as it is now, for a page that knows nothing of it."""
+        return [_say("moment"), self.session.moment()]
 
     def _play(self, page: Page, request: dict[str, Any]) -> None:
         self.playing, self._due = True, time.monotonic()
@@ -267,9 +281,7 @@ class Room:
             for page in self._pages:
                 if news:
                     page.tell(_say("names", names=news))
-                page.behind = page.behind or page.unseen >= _MOST_UNSEEN
-                if not page.behind:
-                    page.show(frame)
+                page.show(frame)
 
         self._post(show)
 
@@ -284,10 +296,6 @@ class Room:
             values=session.values(),
             chosen=self.choices.chosen(session.setup),
         )
-
-    def _tell_state(self) -> None:
-        self._told = time.monotonic()
-        self._tell_all(self._state())
 
     def _tell_all(self, message: str) -> None:
         def tell() -> None:
@@ -308,10 +316,11 @@ class Room:
 
     def _serve(self) -> None:
         asyncio.set_event_loop(self._loop)
-        self._leave = asyncio.Event()
-        with contextlib.suppress(asyncio.CancelledError):
+        try:
             self._loop.run_until_complete(self._listen())
-        self._loop.close()
+        finally:
+            self._over.set()  # nobody can be served any more
+            self._loop.close()
 
     async def _listen(self) -> None:
         from websockets.asyncio.server import serve
