@@ -2,186 +2,30 @@
 
 from __future__ import annotations
 
-import dataclasses
 import io
-import json
 import tempfile
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Iterator
 from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from taichi_ants import files, learners, worlds
-from taichi_ants.checks import checked_q_values, checked_seeds, checked_share
-from taichi_ants.engines.colony.colony import Colony
+from taichi_ants import files
 from taichi_ants.engines.colony.hand import Hand
 from taichi_ants.engines.stored import FileKind
-from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
-from taichi_ants.grid.hexgrid import AxialGrid
-from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.learners.policies import save_policy
 from taichi_ants.live import edits
-from taichi_ants.task import Task
-from taichi_ants.task.constants import MAX_STEPS, N_ACTIONS, ROW
+from taichi_ants.live.setup import Setup
+from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.viewer import Recorder, Recording
-from taichi_ants.worlds.validation import parse_ranges
-from taichi_ants.worlds.world import World
 
-# What pages may ask for is small enough for any machine.
-MOST_CELLS = 1_000_000
-MOST_ANTS = 100_000
 MOST_TICKS = 1_000_000_000
-_MOST_LINES = 4000  # of a map, and characters of each
-_MOST_NUMBERS = 1 << 27  # of tables of ants' own
 _MOST_BYTES = 1 << 28  # of a session, unpacked
 
 _KIND = FileKind("taichi-ants session 1", "session", "Session.save")
-
-
-@dataclass(frozen=True, eq=False)
-class Setup:
-    """How a session begins.
-
-    Attributes:
-        world: The name of a registered world, or the text of a map.
-        task: The rules of the game.
-        policy: How ants learn; or the action values that they follow, float (n_states, 5).
-        ants: How many start each episode.
-        capacity: How many ants can live at once; None: 2 * `ants` + 64.
-        seed: Of the colony.
-        ticks_per_episode: 0 for one episode without an end.
-        sharing: Of ants that learn: "shared" or "own", see `Colony`.
-        epsilon: With which ants follow action values.
-        world_seed: Of a world that is drawn.
-        world_settings: Of a registered world, see `worlds.build`.
-
-    Raises:
-        AntsError: A value is not allowed. Whether the world, and a colony in it, can be built tells
-            `Session`.
-    """
-
-    world: str
-    task: Task
-    policy: TrainingConfig | np.ndarray
-    ants: int = 64
-    capacity: int | None = None
-    seed: int = 0
-    ticks_per_episode: int = 0
-    sharing: str = "shared"
-    epsilon: float = 0.01
-    world_seed: int = 0
-    world_settings: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        expect("world", self.world, str)
-        expect("task", self.task, Task)
-        if isinstance(self.policy, TrainingConfig):
-            check_one_of("sharing", self.sharing, ("shared", "own"))
-            learners.get(self.policy.learner)
-        else:
-            table = checked_q_values(self.policy, self.task)
-            if table.ndim != 2:
-                raise AntsError(f"policy has shape {table.shape}; give one table for all ants.")
-            object.__setattr__(self, "policy", table)
-        checked_whole("ants", self.ants, 1, MOST_ANTS)
-        if self.capacity is None:
-            object.__setattr__(self, "capacity", min(2 * self.ants + 64, MOST_ANTS))
-        checked_whole("capacity", self.capacity, 1, MOST_ANTS)
-        for seed in (self.seed, self.world_seed):
-            checked_seeds([seed])
-        checked_whole("ticks_per_episode", self.ticks_per_episode, 0, MAX_STEPS)
-        checked_share("epsilon", self.epsilon)
-        expect("world_settings", self.world_settings, Mapping)
-        try:
-            settings = json.loads(files.to_json(dict(self.world_settings)))
-        except (TypeError, ValueError, RecursionError):
-            raise AntsError(
-                f"world_settings is {shown(self.world_settings)}; it must be names and numbers."
-            ) from None
-        object.__setattr__(self, "world_settings", settings)
-
-    @property
-    def learns(self) -> bool:
-        """Whether ants learn, not follow action values."""
-        return isinstance(self.policy, TrainingConfig)
-
-    def build_world(self) -> World:
-        """The world; raises AntsError if there is none of that name, or the map is damaged."""
-        lines = self.world.split("\n")
-        if len(lines) > 1:
-            if max(len(lines), *map(len, lines)) > _MOST_LINES:
-                raise AntsError(
-                    f"the map has more than {_MOST_LINES} lines, or characters in one; draw a "
-                    "smaller one."
-                )
-            return _small_enough(worlds.from_text(self.world))
-        if self.world not in worlds.names():  # never a path
-            raise AntsError(
-                f"there is no world named {shown(self.world)}; choose one of "
-                f"{', '.join(worlds.names())}, or give the text of a map."
-            )
-        if self.world_settings.get("ranges") is not None:  # before it takes memory
-            _small_enough(AxialGrid(parse_ranges(self.world_settings["ranges"])))
-        return _small_enough(worlds.build(self.world, self.world_seed, **self.world_settings))
-
-    def build_colony(self) -> Colony:
-        """The colony, before its first episode; raises AntsError if it cannot be."""
-        options: dict[str, Any] = {"ants": self.ants, "capacity": self.capacity}
-        numbers = self.capacity * self.task.n_states * ROW  # type: ignore[operator]
-        if self.learns and self.sharing == "own" and numbers > _MOST_NUMBERS:
-            raise AntsError(
-                f"capacity is {self.capacity}, but tables of {self.task.n_states} states for so "
-                'many ants take too much memory; take a smaller one, or sharing "shared".'
-            )
-        if isinstance(self.policy, TrainingConfig):
-            options |= {"sharing": self.sharing}
-            training = self.policy
-        else:
-            options |= {"sharing": "fixed", "q_values": self.policy}
-            training = TrainingConfig("q_learning", 1.0, 0.0, self.epsilon, 1.0, min_epsilon=0.0)
-        return Colony(self.build_world(), self.task, training, self.seed, **options)
-
-    def to_json(self) -> dict[str, Any]:
-        """The setup as JSON holds it, but for action values, of which it says "table" only."""
-        facts = {field.name: getattr(self, field.name) for field in fields(self)}
-        policy = self.policy.as_dict() if isinstance(self.policy, TrainingConfig) else "table"
-        settings = dict(self.world_settings)
-        return {**facts, "task": self.task.as_dict(), "policy": policy, "world_settings": settings}
-
-    @classmethod
-    def from_json(cls, facts: object, table: np.ndarray | None = None) -> Setup:
-        """The setup of `to_json`.
-
-        Args:
-            facts: What `to_json` gave; what is left out is as usual.
-            table: The action values, if the policy is "table".
-
-        Raises:
-            AntsError: A value is not allowed.
-        """
-        expect("a setup", facts, Mapping)
-        assert isinstance(facts, Mapping)
-        known = [field.name for field in fields(cls)]
-        for name in facts:
-            if name not in known:
-                raise AntsError(f"a setup has no {shown(name)}; choose among {', '.join(known)}.")
-        policy = facts.get("policy")
-        if policy == "table" and table is not None:
-            policy = table
-        elif isinstance(policy, Mapping):
-            try:
-                policy = TrainingConfig(**policy)
-            except TypeError:  # other names than it has
-                raise AntsError(f"policy is {shown(policy)}; it must be a training.") from None
-        else:
-            raise AntsError(f"policy is {shown(policy)}; it must be a training.")
-        task = Task.from_dict(facts.get("task", {}))
-        given = {"world": "paper", **facts, "task": task, "policy": policy}
-        return cls(**given)
 
 
 class Session:
@@ -231,8 +75,7 @@ class Session:
         """The names of states that have been seen since this was asked last."""
         if len(self._named) == self.colony.task.n_states:
             return {}
-        names = self._recorder.names()
-        new = {state: name for state, name in names.items() if state not in self._named}
+        new = self._recorder.names(self._named)
         self._named |= new.keys()
         return new
 
@@ -411,14 +254,6 @@ class Session:
         """
         self.colony.worlds = (self.hand.world(),)
         return _bytes_of("colony.npz", self.colony.save)
-
-
-def _small_enough(world: Any) -> Any:
-    """A world or a grid, if it has few enough cells."""
-    cells = world.count if isinstance(world, AxialGrid) else world.grid.count
-    if cells > MOST_CELLS:
-        raise AntsError(f"the world has {cells} cells; take one of at most {MOST_CELLS}.")
-    return world
 
 
 def _bytes_of(name: str, write: Callable[[Path], None]) -> bytes:

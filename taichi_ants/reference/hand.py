@@ -67,7 +67,7 @@ class Hand:
         self._look()
 
     def _new_trail(self) -> None:
-        """The same levels, where the rocks are now."""
+        """The same levels, where the rocks are now, under the pheromone that there is now."""
         world = self.colony.world
         rocks = [cell for cell, held in world.ground.items() if held == OBSTACLE]
         bare = World(self._first.ranges, world.queen, obstacles=rocks)
@@ -140,7 +140,7 @@ class Hand:
         still: dict[str, Any] = {} if self._falls else {"evaporation": "none", "half_life": None}
         now = replace(self._pheromone, **still)
         self.colony.pheromone = self.colony.world.pheromone = now
-        self.colony.world.trail.change(now)
+        self._new_trail()
 
     def set_epsilon(self, epsilon: float) -> None:
         """The epsilon of this episode."""

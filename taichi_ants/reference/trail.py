@@ -51,10 +51,6 @@ class Trail:
         """Set the level of a cell that is no rock."""
         self._levels[self._place[cell]] = level
 
-    def change(self, pheromone: Pheromone) -> None:
-        """Other numbers from now on; levels stay as they are."""
-        self._pheromone = pheromone
-
     def deposit(self, cell: Cell, carried: int) -> None:
         """Lay the trail of an ant that has carried its food for so many ticks."""
         place, rule = self._place[cell], self._pheromone

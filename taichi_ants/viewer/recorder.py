@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -95,12 +96,16 @@ class Recorder:
             "about": self._about(),
         }
 
-    def names(self) -> dict[int, tuple[str, str, list[str]]]:
-        """The names of the states that have been seen, of all states if they are few."""
+    def names(self, known: Collection[int] = ()) -> dict[int, tuple[str, str, list[str]]]:
+        """The names of the states that have been seen, of all states if they are few.
+
+        Args:
+            known: States whose names are left out.
+        """
         few = self._n_states <= _MOST_NAMES
         seen = np.unique(np.flatnonzero(self._known) % self._n_states).tolist()
         named = range(self._n_states) if few else seen
-        return {state: name_parts(self.observation, state) for state in named}
+        return {s: name_parts(self.observation, s) for s in named if s not in known}
 
     def _about(self) -> list[tuple[str, str]]:
         """Lines about the colony, names and values."""
