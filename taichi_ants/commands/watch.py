@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 _POLICIES = Path(__file__).parents[2] / "experiments" / "policies"  # of a clone
 START: dict[str, Any] = {
-    **{"world": "far_piles", "map": "", "world_seed": 3, "sees": "queues"},
+    **{"world": "far_piles", "map": "", "world_seed": 3, "size": 30, "sees": "queues"},
     **{"rules": ["rising", "queues", "falls", "regrowth"], "policy": "learn sarsa"},
     **{"ants": 64, "seed": 0, "ticks": 1000},
 }

@@ -32,7 +32,8 @@ WORLDS = {
     "double_bridge": "a double bridge",
     "map": "a map of your own",
 }
-RANGES = (30, 30, 30)  # of worlds that are drawn at random
+DRAWN = ("open", "far_piles")  # at random, with equal ranges of any size
+SIZE, SIZES = 30, (10, 180)  # the usual one; the least and the largest
 TASKS = {
     "paper": ("the paper's", task.paper()),
     "foraging": ("foraging", task.foraging()),
@@ -128,6 +129,8 @@ class Choices:
                 name: {"sees": policy.observation, "rules": rules_of(policy.task)}
                 for name, policy in self.policies.items()
             },
+            "drawn": DRAWN,
+            "sizes": SIZES,
             "most": {"ants": MOST_ANTS, "text": MOST_TEXT},
         }
 
@@ -135,17 +138,17 @@ class Choices:
         """The session that a page has chosen.
 
         Args:
-            chosen: {"world": of `WORLDS`, "map": text, "world_seed", "rules": list of `RULES`, or
-                None for those of a policy, "sees": an observation, "policy": "learn sarsa",
-                "file NAME" or "by hand", "ants", "seed", "ticks": of an episode, 0 for one
-                without end}.
+            chosen: {"world": of `WORLDS`, "map": text, "world_seed", "size": of a world that is
+                drawn, "rules": list of `RULES`, or None for those of a policy, "sees": an
+                observation, "policy": "learn sarsa", "file NAME" or "by hand", "ants", "seed",
+                "ticks": of an episode, 0 for one without end}.
 
         Raises:
             AntsError: Something is not allowed, or is not there.
         """
         expect("what was chosen", chosen, dict)
-        known = {"world", "map", "world_seed", "rules", "sees", "policy", "ants", "seed", "ticks"}
-        for name in known - chosen.keys():
+        known = ("world", "map", "world_seed", "size", "rules", "sees", "policy")
+        for name in {*known, "ants", "seed", "ticks"} - chosen.keys():
             raise AntsError(f"{name} is not chosen; choose it.")
         policy, table, name = chosen["policy"], None, ""
         expect("policy", policy, str)
@@ -159,6 +162,7 @@ class Choices:
             table = self._file(policy).q_values
         world = chosen["world"]
         check_one_of("the world", world, tuple(WORLDS))
+        size = checked_whole("size", chosen["size"], *SIZES)
         shares = table is not None or learners.get(name).td_error is not None
         return Setup(
             world=_map(chosen["map"]) if world == "map" else world,
@@ -169,7 +173,7 @@ class Choices:
             ticks_per_episode=checked_whole("ticks", chosen["ticks"], 0, 1_000_000),
             sharing="shared" if shares else "own",
             world_seed=checked_whole("world_seed", chosen["world_seed"], 0),
-            world_settings={"ranges": RANGES} if world == "open" else {},
+            world_settings={"ranges": [size] * 3} if world in DRAWN else {},
         )
 
     def chosen(self, setup: Setup) -> dict[str, Any]:
@@ -185,6 +189,7 @@ class Choices:
             "world": "map" if is_map else setup.world,
             "map": setup.world if is_map else "",
             "world_seed": setup.world_seed,
+            "size": setup.world_settings.get("ranges", [SIZE])[0],
             "rules": rules_of(setup.task),
             "sees": setup.task.observation,
             "policy": policy,

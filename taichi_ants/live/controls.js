@@ -73,6 +73,7 @@ class Controls {
       byId("policy").innerHTML = `<optgroup label="Learn now">${options(Object.keys(choices.learners).map((name) => [`learn ${name}`, `learn now: ${name.replaceAll("_", " ")}`]))}</optgroup>
         <optgroup label="Follow a policy">${options([["by hand", "follow the trail, by hand"], ...Object.keys(choices.policies).map((name) => [`file ${name}`, `follow ${name}`])])}</optgroup>`;
       byId("ants").max = choices.most.ants;
+      [byId("size").min, byId("size").max] = choices.sizes;
       byId("map").value = MAP;
       byId("map").maxLength = choices.most.text;
     }
@@ -84,6 +85,7 @@ class Controls {
     byId("world-name").value = chosen.world;
     if (chosen.map) byId("map").value = chosen.map;
     byId("world-seed").value = chosen.world_seed;
+    byId("size").value = chosen.size;
     byId("policy").value = chosen.policy;
     byId("ants").value = chosen.ants;
     byId("episode").value = chosen.ticks;
@@ -97,7 +99,7 @@ class Controls {
   chosen() {
     const value = (id) => byId(id).value, number = (id) => byId(id).valueAsNumber;
     return {
-      world: value("world-name"), map: value("map"), world_seed: number("world-seed"), sees: value("sees"), policy: value("policy"),
+      world: value("world-name"), map: value("map"), world_seed: number("world-seed"), size: number("size"), sees: value("sees"), policy: value("policy"),
       rules: this.keepsRules ? null : this.rules(), ants: number("ants"), ticks: number("episode"), seed: number("seed"),
     };
   }
@@ -114,7 +116,7 @@ class Controls {
   showWorld() {
     const world = byId("world-name").value;
     byId("map-label").hidden = world !== "map";
-    byId("world-seed-label").hidden = world !== "open" && world !== "far_piles";
+    byId("drawn").hidden = !this.live.choices.drawn.includes(world);
   }
 
   showTask() {

@@ -240,6 +240,7 @@ def test_sliders_change_the_colony(page, room):
 def test_a_new_session_is_what_was_chosen(page, room):
     page.tab.select_option("#world-name", "far_piles")
     page.tab.fill("#world-seed", "4")
+    page.tab.fill("#size", "25")
     page.tab.select_option("#task", "foraging")
     page.tab.click("#rules-box summary")
     page.tab.check('#rules [value="births"]')
@@ -248,7 +249,7 @@ def test_a_new_session_is_what_was_chosen(page, room):
     page.tab.fill("#seed", "9")
     page.tab.select_option("#policy", "learn expected_sarsa")
     page.click("#begin")
-    wait(page, "viewer.history.grid.ranges[0] === 30")
+    wait(page, "viewer.history.grid.ranges[0] === 25")
     setup = room.session.setup
     assert (setup.world, setup.world_seed, setup.ants, setup.seed) == ("far_piles", 4, 30, 9)
     assert (setup.ticks_per_episode, setup.policy.learner) == (0, "expected_sarsa")
@@ -262,7 +263,7 @@ def test_a_new_session_is_what_was_chosen(page, room):
     page.tab.select_option("#world-name", "map")
     page.tab.fill("#ants", "3")
     page.click("#begin")
-    wait(page, "viewer.history.grid.ranges[0] < 30")
+    wait(page, "viewer.history.grid.ranges[0] < 25")
     assert np.array_equal(room.session.setup.policy, trail_follower("ants"))
     assert not room.session.setup.learns
     assert_same(page, room)

@@ -271,6 +271,8 @@ def test_an_edit_that_is_not_allowed_is_refused_in_one_sentence(room, edit):
         {"rules": None},
         {"sees": "everything"},
         {"sees": {}},
+        {"size": 10**6},
+        {"size": [30, 30, 30]},
         {"ants": 10**6},
         {"ants": 0},
         {"ants": "12"},
@@ -422,7 +424,7 @@ def test_what_the_page_would_choose_is_the_session(room):
     with Guest(room) as guest:
         for chosen in [
             {**CHOSEN, "policy": "file mine", "rules": None, "world": "double_bridge"},
-            {**CHOSEN, "policy": "by hand", "world": "far_piles", "world_seed": 4},
+            {**CHOSEN, "policy": "by hand", "world": "far_piles", "world_seed": 4, "size": 20},
             {**CHOSEN, "world": "map", "map": "  .\n0   F\n  .\n    Q\n", "ants": 1},
             {**CHOSEN, "policy": "learn double_q", "ticks": 0},
         ]:

@@ -20,8 +20,15 @@ SECONDS = 60.0  # until a page that hears nothing gives up
 
 # A small session: ants that learn in a paper's world.
 CHOSEN: dict[str, Any] = {
-    **{"world": "paper", "map": "", "world_seed": 0, "rules": ["rising", "falls"]},
-    **{"sees": "ants", "policy": "learn sarsa", "ants": 12, "seed": 5, "ticks": 50},
+    **{"world": "paper", "map": "", "world_seed": 0, "size": 30},
+    **{
+        "rules": ["rising", "falls"],
+        "sees": "ants",
+        "policy": "learn sarsa",
+        "ants": 12,
+        "seed": 5,
+        "ticks": 50,
+    },
 }
 
 
