@@ -11,6 +11,7 @@ import argparse
 import os
 import sys
 import webbrowser
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -56,7 +57,8 @@ def watch(settings: argparse.Namespace) -> None:
     runtime.start(settings.threads)
     saved = settings.session
     session = Session.load(saved) if saved else Session(choices.setup(START))
-    room = Room(session, choices, settings.port)
+    prepare = partial(load_plugin, settings.plugin) if settings.plugin else None
+    room = Room(session, choices, settings.port, prepare)
     print(f"{room.url}\nOpen this address; Ctrl-C ends.", flush=True)
     if not settings.no_browser and sys.stdout.isatty():
         _open(room.url)

@@ -16,12 +16,15 @@ import hmac
 import json
 import logging
 import math
+import multiprocessing
 import queue
 import secrets
+import signal
 import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
+from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -94,12 +97,19 @@ class Room:
         session: That begins.
         choices: What pages can choose from.
         port: On which it listens; 0 for one that is free.
+        prepare: Called first in processes that replay the session, as to load a plugin.
 
     Raises:
         AntsError: The library `websockets` is not installed, or the port cannot be used.
     """
 
-    def __init__(self, session: Session, choices: Choices, port: int = 0) -> None:
+    def __init__(
+        self,
+        session: Session,
+        choices: Choices,
+        port: int = 0,
+        prepare: Callable[[], None] | None = None,
+    ) -> None:
         try:
             import websockets  # noqa: F401
         except ImportError:
@@ -122,6 +132,7 @@ class Room:
         self._loop = asyncio.new_event_loop()
         self._over, self._leave = threading.Event(), asyncio.Event()
         self._pace, self._piece, self._due = 0.0, 1.0, 0.0  # see _pass
+        self._prepare, self._making = prepare, threading.Lock()  # see _make
         self._tells = 0.0  # when pages are told next how things stand
 
     @property
@@ -267,8 +278,30 @@ class Room:
         if not isinstance(kind, str) or kind not in EXPORTS:
             raise Closed
         name, make = EXPORTS[kind]
-        content = make(self.session)
-        self._post(lambda: page.tell(_say("file", name=name), content))
+        if kind in _SLOW:
+            self._make(page, kind)
+        else:
+            content = make(self.session)
+            self._post(lambda: page.tell(_say("file", name=name), content))
+
+    def _make(self, page: Page, kind: str) -> None:
+        """Make a file in a process of its own, which replays the session; time goes on here."""
+        if not self._making.acquire(blocking=False):
+            raise AntsError("another file is being made; ask again when it is there.")
+        content, context = self.session.to_bytes(), multiprocessing.get_context("spawn")
+
+        def make() -> None:
+            ours, theirs = context.Pipe(duplex=False)
+            given = (kind, content, self._prepare, theirs)
+            messages: list[str | bytes] = [_say("error", words="the file could not be made.")]
+            with ours, contextlib.suppress(EOFError, OSError):  # as where there is no memory
+                context.Process(target=_make_file, args=given, daemon=True).start()
+                theirs.close()
+                messages = ours.recv()
+            self._making.release()
+            self._post(lambda: page.tell(*messages))
+
+        threading.Thread(target=make, daemon=True).start()
 
     def _quit(self, page: Page, request: dict[str, Any]) -> None:
         self.end()
@@ -432,6 +465,22 @@ EXPORTS: dict[str, tuple[str, Callable[[Session], bytes]]] = {
     "policy": ("policy.npz", Session.policy_bytes),
     "colony": ("colony.npz", Session.colony_bytes),
 }
+_SLOW = ("page", "gif")
+
+
+def _make_file(
+    kind: str, content: bytes, prepare: Callable[[], None] | None, answer: Connection
+) -> None:
+    """Answer with what a page is told that has asked for a file; in a process of its own."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends this one
+    try:
+        if prepare is not None:
+            prepare()
+        name, make = EXPORTS[kind]
+        answer.send([_say("file", name=name), make(Session.from_bytes(content))])
+    except AntsError as error:
+        answer.send([_say("error", words=str(error))])
+
 
 _HEADERS = {
     "Content-Type": "text/html; charset=utf-8",

@@ -420,6 +420,21 @@ def test_a_session_can_be_taken_away_in_every_form(room, tmp_path):
     assert state_of(room) == before
 
 
+def test_time_goes_on_while_a_file_is_made(room):
+    with Guest(room) as guest:
+        guest.ask("export", kind="gif")
+        guest.ask("step", ticks=1)
+        kind = ""
+        while kind != "frame":
+            kind, _ = guest.hear()
+            assert kind != "session.gif"
+        guest.ask("export", kind="page")
+        assert "another file is being made" in guest.until("error")["words"]
+        guest.until("session.gif")
+        guest.ask("export", kind="page")
+        guest.until("session.html")
+
+
 def test_what_the_page_would_choose_is_the_session(room):
     with Guest(room) as guest:
         for chosen in [
