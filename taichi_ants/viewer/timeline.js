@@ -140,7 +140,7 @@ class Timeline {
     if (picked[picked.length - 1] !== history.length - 1) picked.push(history.length - 1);
     this.curves.forEach((curve, number) => {
       const values = picked.map((i) => CURVES[number][1](history.frames[i]));
-      const low = Math.min(0, ...values), high = Math.max(...values, low + 1e-9);
+      const low = Math.min(0, ...values), high = Math.max(0, ...values, low + 1e-9);
       const at = (value) => 100 - (94 * (value - low)) / (high - low);
       const points = values.map((value, i) => `${((100 * picked[i]) / last).toFixed(2)} ${at(value).toFixed(2)}`);
       curve.querySelector(".line").setAttribute("d", `M${points.join("L")}`);
