@@ -18,7 +18,7 @@ from taichi_ants import learners, task
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import FOLLOWED, Policy, trail_follower
-from taichi_ants.live.session import Setup
+from taichi_ants.live.setup import Setup
 from taichi_ants.task import Life, Pheromone, Task, observations
 from taichi_ants.task.traffic import Traffic
 
