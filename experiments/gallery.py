@@ -12,9 +12,13 @@ import argparse
 import io
 import shutil
 import tempfile
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
-from taichi_ants.commands import render
+from taichi_ants.commands import render, watch
 from taichi_ants.studies.command_line import Parser, run_command
 
 ROOT = Path(__file__).parents[1]
@@ -50,9 +54,12 @@ GALLERY: dict[str, list[str]] = {
 }
 
 
-# The page of the same colony, while an ant of it is followed; it needs Chromium and Playwright.
-VIEWER = "viewer.png"
+# The page of the same colony, while an ant of it is followed, and the live page after some episodes
+# of learning; they need Chromium and Playwright.
+VIEWER, LIVE = "viewer.png", "live.png"
 _FOLLOWED, _TICK, _WINDOW = 12, 330, (1280, 760)
+_LEARNED, _LIVE_WINDOW = 25_000, (1440, 860)
+_WALL = (3, 12, 0), (0, 11, 4)  # cells between which a wall of rock is drawn
 
 # Tracked figure -> the figure of a study that it is.
 FIGURES = {
@@ -86,40 +93,100 @@ def make_gallery(settings: argparse.Namespace) -> None:
     for name, arguments in GALLERY.items():
         path = settings.folder / "renders" / name
         render.show(render.parse_arguments([*arguments, "--out", str(path)]))
-    make_viewer(settings.folder / "docs" / "figures")
+    with chromium() as browser:
+        if browser is not None:
+            make_viewer(settings.folder / "docs" / "figures", browser)
+            make_live(settings.folder / "docs" / "figures", browser)
     if not settings.no_figures:
         make_figures(settings.folder / "docs" / "figures")
 
 
-def make_viewer(folder: Path) -> None:
-    """Take a picture of the page that plays a colony, where there is a browser."""
-    from PIL import Image
-
-    browser = shutil.which("chromium") or shutil.which("google-chrome")
+@contextmanager
+def chromium() -> Iterator[Any]:
+    """A browser, if there is one; else None."""
+    path = shutil.which("chromium") or shutil.which("google-chrome")
     try:
         from playwright.sync_api import sync_playwright
     except ImportError:
-        browser = None
-    if browser is None:
-        print(f"{VIEWER} is left out: it needs Chromium and Playwright")
+        path = None
+    if path is None:
+        print(f"{VIEWER} and {LIVE} are left out: they need Chromium and Playwright")
+        yield None
         return
-    with tempfile.TemporaryDirectory() as place, sync_playwright() as playwright:
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+def opened(browser: Any, url: str, window: tuple[int, int]) -> Any:
+    """A page in a window of that size, with the world drawn."""
+    width, height = window
+    page = browser.new_page(viewport={"width": width, "height": height}, bypass_csp=True)
+    page.goto(url)
+    page.locator("#place b").wait_for()
+    return page
+
+
+def make_viewer(folder: Path, browser: Any) -> None:
+    """Take a picture of the page that plays a colony."""
+    with tempfile.TemporaryDirectory() as place:
         path = Path(place, "colony.html")
         follow = ["--ticks", "400", "--follow", str(_FOLLOWED), "--out", str(path)]
         render.show(render.parse_arguments([*_COLONY, *follow]))
-        chromium = playwright.chromium.launch(executable_path=browser, args=["--no-sandbox"])
-        width, height = _WINDOW
-        page = chromium.new_page(viewport={"width": width, "height": height})
-        page.goto(path.as_uri())
-        page.locator("#place b").wait_for()
+        page = opened(browser, path.as_uri(), _WINDOW)
         page.evaluate("tick => { viewer.player.go(tick); }", _TICK)
         page.locator("#place b", has_text=str(_TICK)).wait_for()
-        picture = page.screenshot()
-        chromium.close()
-    folder.mkdir(parents=True, exist_ok=True)
+        _keep(page.screenshot(), folder / VIEWER)
+
+
+def make_live(folder: Path, browser: Any) -> None:
+    """Take a picture of the live page, where ants have learned and a wall has just been drawn."""
+    from taichi_ants.live.choices import Choices
+    from taichi_ants.live.server import Room
+    from taichi_ants.live.session import Session
+
+    choices = Choices(watch.policies([]))
+    session = Session(choices.setup(watch.START))
+    room = Room(session, choices)
+    thread = threading.Thread(target=room.run, daemon=True)
+    thread.start()
+    page = opened(browser, room.url, _LIVE_WINDOW)
+    page.fill("#speed", "100")  # as fast as it can
+    page.click("#play")
+    page.wait_for_function(f"live.state.ticks >= {_LEARNED}")
+    page.fill("#speed", "90")
+    page.wait_for_function("viewer.history.frames.at(-1).tick % 1000 > 500")
+    page.click("#play")
+    page.wait_for_function("!live.running")
+    page.keyboard.press("2")  # rock, with a brush of seven cells
+    page.keyboard.press("]")
+    box = page.locator("#world").bounding_box()
+    places = "cells => cells.map((c) => viewer.stage.toPage(viewer.history.grid.centre(c)))"
+    wall = [int(session.colony.grid.index(cell)) for cell in _WALL]
+    (x0, y0), (x1, y1) = page.evaluate(places, wall)
+    page.mouse.move(box["x"] + x0, box["y"] + y0)
+    page.mouse.down()
+    page.mouse.move(box["x"] + x1, box["y"] + y1)
+    page.mouse.up()
+    page.keyboard.press("n")
+    page.keyboard.press("ArrowRight")
+    page.locator("#ant .reward").wait_for()
+    page.evaluate("document.activeElement.blur()")
+    page.wait_for_timeout(500)
+    _keep(page.screenshot(), folder / LIVE)
+    room.end()
+    thread.join()
+
+
+def _keep(picture: bytes, path: Path) -> None:
+    """Write a picture in 256 colours."""
+    from PIL import Image
+
+    path.parent.mkdir(parents=True, exist_ok=True)
     with Image.open(io.BytesIO(picture)) as image:
-        image.convert("RGB").quantize(256).save(folder / VIEWER, optimize=True)
-    print(f"{folder / VIEWER}: {(folder / VIEWER).stat().st_size // 1000} kB")
+        image.convert("RGB").quantize(256).save(path, optimize=True)
+    print(f"{path}: {path.stat().st_size // 1000} kB")
 
 
 def make_figures(folder: Path) -> None:

@@ -13,6 +13,7 @@ import pytest
 from command_lines import ROOT, assert_one_sentence, environment
 
 from taichi_ants.commands import COMMANDS
+from taichi_ants.live.page import PARTS
 from taichi_ants.viewer.page import SCRIPTS
 
 BUILD = """
@@ -50,6 +51,7 @@ def test_the_wheel_holds_the_package_and_nothing_else(built):
         (entries,) = [name for name in wheel.namelist() if name.endswith("entry_points.txt")]
         assert "taichi-ants = taichi_ants.commands:main" in wheel.read(entries).decode()
     page = {f"taichi_ants/viewer/{name}" for name in ("page.html", "viewer.css", *SCRIPTS)}
+    page |= {f"taichi_ants/live/{name}" for name in PARTS}
     assert set(names) == sources("taichi_ants") | {"taichi_ants/py.typed"} | page
 
 

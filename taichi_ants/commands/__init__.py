@@ -15,6 +15,7 @@ COMMANDS = {  # modules beside this one, and what they do
     "bridge": "colonies on a double bridge, where the shorter branch wins",
     "sweep": "any settings against any measure, from a file",
     "render": "pictures of ants: an episode, a colony, learning, a policy",
+    "watch": "ants that one watches and changes while they run, in a browser",
 }
 
 

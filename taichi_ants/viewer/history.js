@@ -6,14 +6,19 @@
 
      source.header          what all frames are about, as `Recorder.header` in Python gives it
      source.live            true if more frames may come
-     source.start(receive)  calls receive(bytes) with each frame, in order: those of a recording at
-                            once, those of a simulation that runs as they arrive
+     source.start(receive)  calls receive(bytes, whole) with each frame, in order: those of a recording
+                            at once, those of a simulation that runs as they arrive; whole is true
+                            if a frame holds all, not only what has changed
+
+   A simulation that runs may also give `player(history, changed)`, `stand(viewer)`, called once all
+   stands, `seen()`, called when what has arrived is drawn, and `keys`, more lines for the help.
 
    A frame is an ArrayBuffer, or a view of one. */
 
 const EMPTY = 0, OBSTACLE = 5, FOOD = 7, QUEEN = 13; // what a cell holds, as in task/constants.py
 const FAILED = 1, PICKED_UP = 3, DELIVERED = 4; // events
 const N_ACTIONS = 5;
+const MOST_BYTES = 2 ** 27; // of frames; a simulation that runs for hours has more
 const CLOCK = ["episode", "tick", "deliveries", "returns", "epsilon", "learningRate", "ants"];
 const ARRAYS = {
   u1: Uint8Array, u2: Uint16Array, u4: Uint32Array, i4: Int32Array, f4: Float32Array, f8: Float64Array,
@@ -94,6 +99,8 @@ class History {
     this.headBytes = 8 * Math.ceil((1 + this.names.length) / 2);
     this.dense = header.types.trail === "f4";
     this.frames = [];
+    this.first = 0; // the earliest moment that is still known
+    this.bytes = 0;
     this.events = []; // pick-ups and deliveries: {moment, kind, ant, cell}, in order
     this.values = new Map(); // entry of a table -> [moments, values] of its changes
     this.totals = [0]; // deliveries before each episode
@@ -113,17 +120,19 @@ class History {
     return this.dense ? new Float32Array(this.grid.size) : new Int32Array(this.grid.size);
   }
 
-  /* Append a frame; views into its bytes are kept. */
-  add(bytes) {
+  /* Append a frame; views into its bytes are kept. One that is whole needs none before it. */
+  add(bytes, whole = false) {
     const frame = this.read(bytes), moment = this.length, before = this.frames[moment - 1];
     if (!frame.numbers.length && frame.ants) frame.numbers = before.numbers;
     frame.number = moment;
+    frame.whole = whole;
     frame.passed = before && before.episode === frame.episode ? frame.tick - before.tick : 0;
     if (before && before.episode !== frame.episode) {
       this.totals[frame.episode] = this.totals[before.episode] + before.deliveries;
     } else this.totals[frame.episode] ??= 0;
     frame.delivered = this.totals[frame.episode] + frame.deliveries; // in all episodes
     this.frames.push(frame);
+    this.bytes += frame.size;
     for (let i = 0; i < frame.table.length; i++) {
       const entry = frame.table_at[i];
       if (!this.values.has(entry)) this.values.set(entry, [[], []]);
@@ -138,13 +147,32 @@ class History {
         moment, kind: event, ant: before.numbers[i], cell: before.cells[i],
       });
     }
+    if (this.bytes > MOST_BYTES) this.forget();
     return frame;
+  }
+
+  /* Forget about half of what happened, from its beginning: of that only the numbers of its curves stay. */
+  forget() {
+    this.worldAt(this.length - 1); // so that there are copies from which to go on
+    const { moment: first } = this.kept[this.kept.length >> 1];
+    this.kept = this.kept.filter((copy) => copy.moment >= first);
+    for (; this.first < first; this.first++) {
+      const { number, episode, tick, deliveries, returns, epsilon, learningRate, ants, delivered, size } = this.frames[this.first];
+      const nothing = { numbers: [], cells: [], poses: [], states: [], acts: [], td_errors: [], passed: 0 };
+      this.frames[this.first] = { number, episode, tick, deliveries, returns, epsilon, learningRate, ants, delivered, ...nothing };
+      this.bytes -= size;
+    }
+    this.events = this.events.filter(({ moment }) => moment > first);
+    for (const changes of this.values.values()) {
+      const old = Math.max(0, changes[0].findLastIndex((moment) => moment <= first));
+      changes.forEach((list) => list.splice(0, old));
+    }
   }
 
   read(bytes) {
     const view = ArrayBuffer.isView(bytes) ? bytes : new Uint8Array(bytes);
     const lengths = new Uint32Array(view.buffer, view.byteOffset, 1 + this.names.length);
-    const frame = {};
+    const frame = { size: view.byteLength };
     let at = view.byteOffset + this.headBytes;
     this.names.forEach((name, i) => {
       frame[name] = new this.kinds[i](view.buffer, at, lengths[i + 1]);
@@ -176,7 +204,10 @@ class History {
 
   step() {
     const world = this.world, frame = this.frames[world.moment + 1];
-    this.fall(frame.passed);
+    if (frame.whole) {
+      world.ground.fill(0);
+      world.trail.fill(0);
+    } else this.fall(frame.passed);
     frame.ground_at.forEach((cell, i) => (world.ground[cell] = frame.ground[i]));
     frame.trail_at.forEach((cell, i) => (world.trail[cell] = frame.trail[i]));
     world.moment++;
@@ -310,7 +341,7 @@ class History {
     const cells = [], episode = this.frames[moment].episode;
     for (let then = moment; then >= 0 && cells.length < most; then--) {
       const i = this.frames[then].episode === episode ? this.place(then, number) : -1;
-      if (i < 0) break;
+      if (i < 0 || (this.live && then < moment && this.frames[then + 1].passed > 1)) break;
       if (cells[cells.length - 1] !== this.frames[then].cells[i]) cells.push(this.frames[then].cells[i]);
     }
     return cells;

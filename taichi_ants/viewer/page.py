@@ -30,11 +30,36 @@ def _text(name: str) -> str:
 def page(recording: Recording) -> str:
     """The page that plays a recording, with all that it needs, as HTML."""
     expect("recording", recording, Recording)
+    return assemble(
+        recording.header["title"], recording=base64.b64encode(recording.to_bytes()).decode()
+    )
+
+
+def assemble(
+    title: str,
+    *,
+    recording: str = "",
+    controls: str = "",
+    style: str = "",
+    script: str = "",
+    connect: str = "",
+) -> str:
+    """The page with a recording, or with what is needed besides to show what runs now.
+
+    Args:
+        title: Plain text.
+        recording: In base64.
+        controls: Markup at the side of the world.
+        style, script: Behind those of the viewer.
+        connect: The one address to which the page may connect; "" for none.
+    """
     parts = {
-        "TITLE": html.escape(recording.header["title"]),
-        "STYLE": _text("viewer.css"),
-        "RECORDING": base64.b64encode(recording.to_bytes()).decode(),
-        "SCRIPT": "\n".join(map(_text, SCRIPTS)),
+        "CONNECT": f"; connect-src {connect}" if connect else "",
+        "TITLE": html.escape(title),
+        "STYLE": _text("viewer.css") + style,
+        "CONTROLS": controls,
+        "RECORDING": recording,
+        "SCRIPT": "\n".join([*map(_text, SCRIPTS), script]),
     }
     whole = _text("page.html")
     for name, part in parts.items():

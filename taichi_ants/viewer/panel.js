@@ -27,7 +27,7 @@ function digitsFor(a, b) {
 }
 
 class Panel {
-  constructor(history, stage, choose) {
+  constructor(history, stage, choose, signal) {
     this.history = history;
     this.stage = stage;
     this.choose = choose; // {follow(number), unfollow(), cell(cell), other(step), aim()}
@@ -42,7 +42,7 @@ class Panel {
       if (pressed === "ant-aim") choose.aim();
       if (pressed === "ant-close") choose.unfollow();
       if (pressed === "cell-close") choose.cell(-1);
-    });
+    }, { signal });
   }
 
   show(moment, followed, cell, aims) {
@@ -66,6 +66,7 @@ class Panel {
       ["delivered", frame.deliveries], ["return", plain(frame.returns, 0)],
       ["epsilon", plain(frame.epsilon, frame.epsilon < 0.01 && frame.epsilon ? 4 : 2)],
     ];
+    byId("now").classList.toggle("many", facts.length > 6);
     byId("now").innerHTML = facts.map(([name, value]) => `<div><dt>${name}</dt><dd>${value}</dd></div>`).join("");
   }
 
@@ -79,7 +80,17 @@ class Panel {
       + button("ant-close", "Stop following (Esc)", "close");
     const badge = ant ? ` <span class="badge ${ant.loaded ? "loaded" : ""}">${ant.loaded ? "with food" : "no food"}</span>` : "";
     const head = `<div class="head"><h2>Ant ${followed}${badge}</h2>${buttons}</div>`;
+    if (ant && !ant.act && this.history.live) ant.past = this.lastAct(moment, followed);
     card.innerHTML = head + (ant ? this.viewOf(ant) + this.barsOf(ant) + this.storyOf(ant) : "<p>It does not live now.</p>");
+  }
+
+  /* An ant as it was when it did what it did last, a few moments ago at most. */
+  lastAct(moment, number) {
+    for (let then = moment - 1; then >= Math.max(moment - 5, this.history.first); then--) {
+      const ant = this.history.ant(then, number);
+      if (ant?.act) return ant;
+    }
+    return null;
   }
 
   viewOf(ant) {
@@ -131,9 +142,13 @@ class Panel {
     return `<span class="label">${when}</span><div class="bars">${rows.join("")}</div>`;
   }
 
-  storyOf(ant) {
-    const { header } = this.history, act = ant.act;
-    if (!act) return '<div class="story"><span class="label">What it does next is not in the recording.</span></div>';
+  storyOf(ant, before = "") {
+    const { header, live } = this.history, act = ant.act;
+    if (ant.past) return this.storyOf(ant.past, '<span class="label">In the last tick, before what it sees now:</span>');
+    if (!act) {
+      const words = live ? "It has not chosen yet." : "What it does next is not in the recording.";
+      return `<div class="story"><span class="label">${words}</span></div>`;
+    }
     const why = { best: "the best", tie: `a tie of ${act.ties}`, explored: "explored" }[act.why];
     const better = ant.loaded ? "comes nearer to the queen" : "enters a trail";
     const came = act.event === FAILED && act.action < 3 ? "is blocked" : CAME[act.event] || better;
@@ -151,7 +166,7 @@ class Panel {
       const [before, after] = [act.before, act.after].map((value) => plain(value, digits));
       lines.push(`Q(${safe(`${task} ${rest}`.trim())}, ${action}) <code>${before} → ${after}</code>`);
     }
-    return `<div class="story">${lines.map((line) => `<span>${line}</span>`).join("")}</div>`;
+    return `<div class="story">${before}${lines.map((line) => `<span>${line}</span>`).join("")}</div>`;
   }
 
   showCell(moment, cell) {

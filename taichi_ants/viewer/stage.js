@@ -20,6 +20,7 @@ class Stage {
     this.grid = history.grid;
     this.camera = { x: 0, y: 0, scale: 10 }; // the scale is in pixels of the page
     this.fitted = true; // until somebody pans or zooms
+    this.covered = 0; // pixels at the top, by tools
     this.shown = ""; // the moment and the view whose cells are drawn
     this.laidOut = "";
     this.foods = [];
@@ -76,11 +77,11 @@ class Stage {
   fit() {
     const { grid } = this, margin = 16;
     this.camera.x = (grid.left + grid.right) / 2;
-    this.camera.y = (grid.top + grid.bottom) / 2;
     this.camera.scale = Math.min(
       Math.max(this.width - 2 * margin, 40) / (grid.right - grid.left + 1.5),
-      Math.max(this.height - 2 * margin, 40) / (grid.bottom - grid.top + 1.7),
+      Math.max(this.height - 2 * margin - this.covered, 40) / (grid.bottom - grid.top + 1.7),
     );
+    this.camera.y = (grid.top + grid.bottom) / 2 - this.covered / 2 / this.camera.scale;
     this.fitted = true;
   }
 
@@ -326,7 +327,7 @@ class Stage {
   }
 
   /* The ring and the view of the followed ant; the chosen cell. */
-  drawMarks(share, { ant, next, letters, cell, cursor }) {
+  drawMarks(share, { ant, next, letters, cell, cursor, tool }) {
     const { above, grid, colours, camera } = this;
     above.lineJoin = "round";
     // Where cells are small, a ring shows where the queen is.
@@ -339,6 +340,11 @@ class Stage {
       this.outline(cell, Math.max(camera.scale, 5));
       this.stroke("halo", cursor ? 6 : 5);
       this.stroke("mark", cursor ? 3 : 2);
+    }
+    for (const one of tool) {
+      this.outline(one, 0.9 * Math.max(camera.scale, 4));
+      this.stroke("halo", 4);
+      this.stroke("chosen", 1.8);
     }
     if (!ant) return;
     const [x0, y0] = grid.centre(ant.cell), [x1, y1] = next ? grid.centre(next.cell) : [x0, y0];

@@ -11,6 +11,8 @@ const SMOOTH_BELOW = 24; // ticks a second: ants glide from cell to cell
 
 class Player {
   constructor(history, changed) {
+    this.slowest = SLOWEST;
+    this.fastest = FASTEST;
     this.history = history;
     this.changed = changed;
     this.moment = 0;
@@ -22,9 +24,16 @@ class Player {
     return Math.max(this.history.length - 1, 0);
   }
   go(moment) {
-    this.moment = Math.min(Math.max(Math.round(moment), 0), this.last);
+    this.moment = Math.min(Math.max(Math.round(moment), this.history.first), this.last);
     this.share = 0;
     this.changed();
+  }
+  setSpeed(speed) {
+    this.speed = speed;
+  }
+  seek(moment) {
+    this.pause();
+    this.go(moment);
   }
   step(n) {
     this.pause();
@@ -59,20 +68,18 @@ class Player {
 }
 
 class Timeline {
-  constructor(history, player) {
+  constructor(history, player, signal) {
     this.history = history;
     this.player = player;
     this.time = byId("time");
     this.speed = byId("speed");
-    this.time.addEventListener("input", () => {
-      player.pause();
-      player.go(Number(this.time.value));
-    });
-    this.speed.addEventListener("input", () => this.setSpeed(SLOWEST * (FASTEST / SLOWEST) ** (this.speed.value / 100)));
+    this.time.addEventListener("input", () => player.seek(Number(this.time.value)), { signal });
+    this.speed.addEventListener("input",
+      () => this.setSpeed(player.slowest * (player.fastest / player.slowest) ** (this.speed.value / 100)), { signal });
     for (const [id, act] of Object.entries({
       first: () => player.step(-Infinity), back: () => player.step(-1), forward: () => player.step(1),
       last: () => player.step(Infinity), play: () => (player.playing ? player.pause() : player.play()),
-    })) byId(id).addEventListener("click", act);
+    })) byId(id).addEventListener("click", act, { signal });
     byId("curves").innerHTML = CURVES.map(([name]) => `
       <div class="curve"><div class="label"><span>${name}</span><b></b></div>
         <svg viewBox="0 0 100 100" preserveAspectRatio="none" aria-hidden="true">
@@ -84,8 +91,7 @@ class Timeline {
       const svg = curve.querySelector("svg");
       const seek = (event) => {
         const box = svg.getBoundingClientRect();
-        player.pause();
-        player.go(((event.clientX - box.left) / box.width) * player.last);
+        player.seek(((event.clientX - box.left) / box.width) * player.last);
       };
       svg.addEventListener("pointerdown", (event) => {
         svg.setPointerCapture(event.pointerId);
@@ -93,18 +99,26 @@ class Timeline {
       });
       svg.addEventListener("pointermove", (event) => event.buttons && seek(event));
     }
-    this.setSpeed(history.length > 120 ? 12 : 6);
+    if (history.live) this.showSpeed();
+    else this.setSpeed(history.length > 120 ? 12 : 6);
     this.drawn = 0;
     this.draw();
   }
 
   setSpeed(speed) {
-    this.player.speed = Math.min(Math.max(speed, SLOWEST), FASTEST);
-    this.speed.value = Math.round((100 * Math.log(this.player.speed / SLOWEST)) / Math.log(FASTEST / SLOWEST));
+    const { player } = this;
+    player.setSpeed(Math.min(Math.max(speed, player.slowest), player.fastest));
+    this.showSpeed();
+  }
+
+  showSpeed() {
+    const { speed, slowest, fastest } = this.player, share = Math.log(speed / slowest) / Math.log(fastest / slowest);
+    this.speed.value = Math.round(100 * share);
     this.speed.style.setProperty("--filled", `${this.speed.value}%`);
-    const shown = `${this.player.speed < 3 ? this.player.speed.toFixed(1) : Math.round(this.player.speed)} / s`;
+    const unlimited = this.history.live && speed >= fastest;
+    const shown = unlimited ? "fastest" : `${speed < 3 ? speed.toFixed(1) : Math.round(speed)} / s`;
     byId("speed-value").textContent = shown;
-    this.speed.setAttribute("aria-valuetext", `${shown.split(" ")[0]} ticks a second`);
+    this.speed.setAttribute("aria-valuetext", unlimited ? "as fast as it can" : `${shown.split(" ")[0]} ticks a second`);
   }
 
   /* Draw the events and the curves, as far as the history goes. */
@@ -126,7 +140,7 @@ class Timeline {
     if (picked[picked.length - 1] !== history.length - 1) picked.push(history.length - 1);
     this.curves.forEach((curve, number) => {
       const values = picked.map((i) => CURVES[number][1](history.frames[i]));
-      const low = Math.min(0, ...values), high = Math.max(...values, low + 1e-9);
+      const low = Math.min(0, ...values), high = Math.max(0, ...values, low + 1e-9);
       const at = (value) => 100 - (94 * (value - low)) / (high - low);
       const points = values.map((value, i) => `${((100 * picked[i]) / last).toFixed(2)} ${at(value).toFixed(2)}`);
       curve.querySelector(".line").setAttribute("d", `M${points.join("L")}`);
@@ -143,13 +157,14 @@ class Timeline {
     const end = history.frames[player.last];
     const episode = end.episode > history.frames[0].episode ? `, episode ${frame.episode}` : "";
     this.time.setAttribute("aria-valuetext", `tick ${frame.tick}${episode}`);
-    const of = episode ? `<span>${episode}</span>` : ` <span>of ${end.tick}</span>`;
+    const of = episode || history.live ? `<span>${episode}</span>` : ` <span>of ${end.tick}</span>`;
     byId("place").innerHTML = `<span>tick</span> <b>${frame.tick}</b>${of}`;
     const main = byId("play");
     main.classList.toggle("playing", player.playing);
     main.setAttribute("aria-label", player.playing ? "Pause" : "Play");
-    byId("first").disabled = byId("back").disabled = player.moment === 0;
-    byId("last").disabled = byId("forward").disabled = player.moment === player.last;
+    byId("first").disabled = byId("back").disabled = player.moment <= history.first;
+    byId("last").disabled = player.moment === player.last;
+    byId("forward").disabled = player.moment === player.last && !history.live;
     this.curves.forEach((curve, number) => {
       const [, value, digits] = CURVES[number];
       curve.querySelector("b").textContent = plain(value(frame), digits);

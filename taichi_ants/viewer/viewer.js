@@ -25,6 +25,8 @@ class Viewer {
     this.source = source;
     this.history = new History(source.header);
     this.history.live = source.live;
+    this.closing = new AbortController(); // takes all listeners away
+    this.tool = null; // {down(cell), move(cell), up()}: what the mouse does besides looking
     this.followed = -1;
     this.cell = -1;
     this.cursor = false; // whether the chosen cell is the one of the keyboard
@@ -33,12 +35,17 @@ class Viewer {
     this.frames = 0; // drawn so far, for measurements
     this.lastPanel = -Infinity;
     this.still = matchMedia("(prefers-reduced-motion: reduce)");
-    source.start((bytes) => this.receive(bytes));
+    source.start((bytes, whole) => this.receive(bytes, whole));
   }
 
-  receive(bytes) {
-    this.history.add(bytes);
+  receive(bytes, whole) {
+    this.history.add(bytes, whole);
     this.dirty = true;
+  }
+
+  /* Leave the page to another one. */
+  close() {
+    this.closing.abort();
   }
 
   /* Build the page around the frames that are there; at least one is. */
@@ -47,24 +54,28 @@ class Viewer {
     document.title = byId("title").textContent = header.title;
     byId("subtitle").textContent = header.about.map(([name, value]) => `${name}: ${value}`).slice(0, 3).join(" · ");
     document.body.classList.toggle("single", this.history.length === 1 && !this.source.live);
-    this.player = new Player(this.history, () => (this.dirty = true));
+    const { signal } = this.closing, changed = () => (this.dirty = true);
+    this.player = this.source.player?.(this.history, changed) ?? new Player(this.history, changed);
     this.stage = new Stage(byId("world"), byId("marks"), this.history);
     this.panel = new Panel(this.history, this.stage, {
       follow: (number) => this.follow(number), unfollow: () => this.follow(-1),
       cell: (cell) => this.chooseCell(cell), other: (step) => this.followOther(step), aim: () => this.toggleAim(),
-    });
-    this.timeline = new Timeline(this.history, this.player);
+    }, signal);
+    this.timeline = new Timeline(this.history, this.player, signal);
+    if (this.source.live) document.querySelector(".about summary").textContent = "About this session";
     byId("hint").textContent = "Click an ant to follow it, or a cell to look at it. Press ? for all keys.";
-    byId("keys").innerHTML = KEYS.map(([keys, does]) =>
+    byId("keys").innerHTML = [...(this.source.keys ?? []), ...KEYS].map(([keys, does]) =>
       `<dt>${keys.split(" ").map((key) => `<kbd>${key}</kbd>`).join(" ")}</dt><dd>${does}</dd>`).join("");
     this.listen();
     this.setTheme(this.storedTheme());
     this.stage.resize();
     if (header.follow !== null) this.follow(header.follow);
+    this.source.stand?.(this);
     requestAnimationFrame((now) => this.tick(now));
   }
 
   tick(now) {
+    if (this.closing.signal.aborted) return;
     const passed = (now - (this.before ?? now)) / 1000;
     this.before = now;
     const moved = this.player.pass(passed);
@@ -81,11 +92,12 @@ class Viewer {
     const next = ant && moment < player.last && history.frames[moment + 1].passed === 1 ? history.ant(moment + 1, followed) : null;
     if (ant && this.aims) this.aimAt(ant, next, share);
     stage.draw(moment, share, {
-      ant, next, cell: this.cell, cursor: this.cursor,
+      ant, next, cell: this.cell, cursor: this.cursor, tool: this.tool?.cells() ?? [],
       path: ant ? history.path(moment, followed) : [],
       letters: ant ? history.stateName(ant.state).letters : [],
     });
     this.frames++;
+    this.source.seen?.();
     // The text need not change sixty times a second.
     if (moved && player.playing && now - this.lastPanel < PANEL_EVERY) {
       this.dirty = true;
@@ -199,38 +211,54 @@ class Viewer {
   }
 
   listen() {
-    const { stage } = this, world = byId("world"), help = byId("help");
+    const { stage } = this, { signal } = this.closing, world = byId("world"), help = byId("help");
+    const on = (target, kind, act) => target.addEventListener(kind, act, { signal, passive: false });
     const change = (act) => () => {
       act();
       this.dirty = true;
     };
     // Drawn at once: a canvas is empty after its size has changed.
-    new ResizeObserver(() => stage.resize() && this.draw(performance.now(), false)).observe(world);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.setTheme(this.theme));
-    byId("zoom-in").addEventListener("click", change(() => stage.zoom(1.4)));
-    byId("zoom-out").addEventListener("click", change(() => stage.zoom(1 / 1.4)));
-    byId("fit").addEventListener("click", change(() => stage.fit()));
-    byId("theme").addEventListener("click", () => this.switchTheme());
-    byId("help-button").addEventListener("click", () => help.showModal());
-    help.addEventListener("click", (event) => event.target === help && help.close());
-    document.addEventListener("keydown", (event) => this.key(event));
-    this.listenToPointers(world);
+    const observer = new ResizeObserver(() => stage.resize() && this.draw(performance.now(), false));
+    observer.observe(world);
+    on(signal, "abort", () => observer.disconnect());
+    on(matchMedia("(prefers-color-scheme: dark)"), "change", () => this.setTheme(this.theme));
+    on(byId("zoom-in"), "click", change(() => stage.zoom(1.4)));
+    on(byId("zoom-out"), "click", change(() => stage.zoom(1 / 1.4)));
+    on(byId("fit"), "click", change(() => stage.fit()));
+    on(byId("theme"), "click", () => this.switchTheme());
+    on(byId("help-button"), "click", () => help.showModal());
+    on(help, "click", (event) => event.target === help && help.close());
+    on(document, "keydown", (event) => this.key(event));
+    this.listenToPointers(world, on);
   }
 
-  listenToPointers(world) {
+  listenToPointers(world, on) {
     const held = new Map(); // the fingers, or the mouse, that are down
-    let moved = 0;
+    let moved = 0, works = false; // whether the tool is at work
     const place = (event) => {
       const box = world.getBoundingClientRect();
       return [event.clientX - box.left, event.clientY - box.top];
     };
-    world.addEventListener("pointerdown", (event) => {
+    const stop = () => {
+      if (works) this.tool?.up();
+      works = false;
+    };
+    on(world, "pointerdown", (event) => {
       world.setPointerCapture(event.pointerId);
       held.set(event.pointerId, place(event));
       if (held.size === 1) moved = 0;
+      else stop();
+      if (!this.tool || held.size > 1 || event.button !== 0) return;
+      works = true;
+      this.tool.down(this.stage.cellAt(...place(event)));
     });
-    world.addEventListener("pointermove", (event) => {
-      if (!held.has(event.pointerId)) return;
+    on(world, "pointermove", (event) => {
+      if (this.tool && (works || !held.size)) {
+        // All cells on the way, also where the mouse is quick.
+        for (const one of event.getCoalescedEvents?.() ?? [event]) this.tool.move(this.stage.cellAt(...place(one)), works);
+        this.dirty = true;
+      }
+      if (works || !held.has(event.pointerId)) return;
       const [x, y] = place(event), [x0, y0] = held.get(event.pointerId);
       moved += Math.hypot(x - x0, y - y0);
       if (moved < 5 && held.size === 1) return;
@@ -247,16 +275,25 @@ class Viewer {
       held.set(event.pointerId, [x, y]);
       this.dirty = true;
     });
-    world.addEventListener("pointerup", (event) => {
-      if (held.delete(event.pointerId) && moved < 5 && held.size === 0) this.chooseAt(...place(event));
+    on(world, "pointerup", (event) => {
+      const clicked = held.delete(event.pointerId) && moved < 5 && held.size === 0 && !works;
+      stop();
+      if (clicked && !this.tool) this.chooseAt(...place(event));
     });
-    world.addEventListener("pointercancel", (event) => held.delete(event.pointerId));
-    world.addEventListener("wheel", (event) => {
+    on(world, "pointerleave", () => {
+      this.tool?.move(-1, works);
+      this.dirty = true;
+    });
+    on(world, "pointercancel", (event) => {
+      held.delete(event.pointerId);
+      stop();
+    });
+    on(world, "wheel", (event) => {
       event.preventDefault();
       const turned = event.deltaY * (event.deltaMode === 1 ? 16 : 1);
       this.stage.zoom(Math.exp(-Math.min(Math.max(turned, -200), 200) / 400), ...place(event));
       this.dirty = true;
-    }, { passive: false });
+    });
   }
 
   key(event) {
@@ -276,8 +313,10 @@ class Viewer {
       Enter: () => this.enter(), t: () => this.switchTheme(), "?": () => byId("help").showModal(),
       Escape: () => (this.cell >= 0 ? this.chooseCell(-1) : this.follow(-1)),
     };
+    Object.assign(acts, this.source.acts);
     for (const [letter, heading] of Object.entries(CURSOR)) acts[letter] = () => this.moveCursor(heading);
-    // Sliders keep the keys that move them, buttons the keys that press them.
+    // Sliders keep the keys that move them, buttons the keys that press them, fields all.
+    if (inside.closest?.("textarea, select, input:not([type=range])")) return;
     if (slider && /^(Arrow|Home|End|Page)/.test(event.key)) return;
     if (pressable && (event.key === "Enter" || event.key === " ")) return;
     if (event.key === "Enter" && inside.id !== "world") return;
@@ -289,6 +328,11 @@ class Viewer {
 
   enter() {
     if (this.cell < 0) return;
+    if (this.tool) {
+      this.tool.down(this.cell);
+      this.tool.up();
+      return;
+    }
     const [number] = this.history.antsOn(this.player.moment, this.cell);
     if (number !== undefined) this.follow(number);
   }

@@ -36,18 +36,21 @@ def started() -> Iterator[Any]:
 
 
 class Page:
-    """A page that was opened from a file, and what went wrong on it."""
+    """A page that was opened from a file, or from a server, and what went wrong on it."""
 
-    def __init__(self, browser: Any, path: Path, size: tuple[int, int] = (1280, 720), **options):
+    def __init__(
+        self, browser: Any, path: Path | str, size: tuple[int, int] = (1280, 720), **options: Any
+    ):
         width, height = size
+        url = path if isinstance(path, str) else path.as_uri()
         # The page allows no evaluation of text, which is how Playwright waits.
-        usual = {"viewport": {"width": width, "height": height}, "offline": True}
+        usual = {"viewport": {"width": width, "height": height}, "offline": url.startswith("file")}
         self.context = browser.new_context(**usual, bypass_csp=True, **options)
         self.tab = self.context.new_page()
         self.faults: list[str] = []
         self.tab.on("console", lambda message: self.faults.append(message.text))
         self.tab.on("pageerror", lambda error: self.faults.append(str(error)))
-        self.tab.goto(path.as_uri())
+        self.tab.goto(url)
         self.tab.wait_for_function("window.viewer")
         self.settle()
 

@@ -568,5 +568,5 @@ def test_the_script_is_whole():
         assert f"class {name} " in whole or name in (
             *("Path2D", "Map", "Set", "Blob", "Response", "DataView", "TextDecoder"),
             *("DecompressionStream", "Uint8Array", "Uint32Array", "Int32Array", "Float32Array"),
-            *("ResizeObserver", "Promise", "Error"),
+            *("ResizeObserver", "AbortController", "Promise", "Error"),
         )

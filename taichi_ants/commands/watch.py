@@ -1,0 +1,88 @@
+"""Ants that one watches and changes while they run, in a browser.
+
+Prints the address of a page that this machine alone can open. The page chooses world, rules and
+policy, lets time pass, draws rock, food, trails and ants, and saves the session, which replays to
+the same bits. Ends with Ctrl-C, and when the page says so. See docs/watching.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import webbrowser
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from taichi_ants.studies.command_line import Parser, load_plugin, run_command, whole_number
+
+if TYPE_CHECKING:
+    from taichi_ants.learners.policies import Policy
+
+_POLICIES = Path(__file__).parents[2] / "experiments" / "policies"  # of a clone
+START: dict[str, Any] = {
+    **{"world": "far_piles", "map": "", "world_seed": 3, "size": 30, "sees": "queues"},
+    **{"rules": ["rising", "queues", "falls", "regrowth"], "policy": "learn sarsa"},
+    **{"ants": 64, "seed": 0, "ticks": 1000},
+}
+
+
+def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
+    """The settings of the command line."""
+    summary, more = __doc__.split("\n", 1)
+    parser = Parser(summary, epilog=more)
+    add = parser.add_argument
+    files: dict[str, Any] = {"action": "extend", "nargs": "+", "default": [], "metavar": "FILE"}
+    add("--policy", **files, help="policies that the page offers besides those of a clone")
+    add("--session", metavar="FILE", help="a saved session to go on with")
+    add("--port", type=whole_number(0, 65535), default=0, metavar="N", help="0: one that is free")
+    add("--no-browser", action="store_true", help="open none; none is opened without a terminal")
+    add("--for", type=whole_number(1), metavar="N", dest="seconds", help="end after N seconds")
+    add("--plugin", metavar="FILE", help="a Python file with learners, worlds, observations")
+    add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
+    return parser.parse_args(arguments)
+
+
+def watch(settings: argparse.Namespace) -> None:
+    """Serve the page until it is time to end."""
+    from taichi_ants import runtime
+    from taichi_ants.live.choices import Choices
+    from taichi_ants.live.server import Room
+    from taichi_ants.live.session import Session
+
+    if settings.plugin:
+        load_plugin(settings.plugin)
+    choices = Choices(policies(settings.policy))
+    runtime.start(settings.threads)
+    saved = settings.session
+    session = Session.load(saved) if saved else Session(choices.setup(START))
+    prepare = partial(load_plugin, settings.plugin) if settings.plugin else None
+    room = Room(session, choices, settings.port, prepare)
+    print(f"{room.url}\nOpen this address; Ctrl-C ends.", flush=True)
+    if not settings.no_browser and sys.stdout.isatty():
+        _open(room.url)
+    room.run(settings.seconds)
+    print("Ended.")
+
+
+def policies(given: list[str]) -> dict[str, Policy]:
+    """Those that were given and those of a clone, by the names of their files."""
+    from taichi_ants import load_policy
+
+    paths = [*sorted(_POLICIES.glob("*.npz")), *map(Path, given)]
+    return {path.stem: load_policy(path) for path in paths}
+
+
+def _open(url: str) -> None:
+    """Open a browser, if there is one; what it has to say is not for this terminal."""
+    if sys.platform.startswith("linux") and not (
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    ):
+        return
+    webbrowser.open(url)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """The command line."""
+    run_command(lambda: watch(parse_arguments(arguments)))

@@ -1,0 +1,509 @@
+"""The room in which people watch a session: its pages, and the thread in which time passes.
+
+The room serves one page, and a socket for each page that is open. It listens on this machine alone,
+and answers only who knows its token and comes from its own page. A page asks for things in JSON,
+see `REQUESTS`; it is told what happens in JSON and in frames, see `taichi_ants.viewer.frames`.
+
+Two threads: sockets live in one, the session in the other, the one that calls `Room.run`. What a
+page asks for is put into a queue; what it is told is handed back to the thread of the sockets.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import hmac
+import json
+import logging
+import math
+import multiprocessing
+import queue
+import secrets
+import signal
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from multiprocessing.connection import Connection
+from typing import TYPE_CHECKING, Any
+from urllib.parse import parse_qs, urlsplit
+
+from taichi_ants.errors import AntsError
+from taichi_ants.live.choices import Choices
+from taichi_ants.live.page import live_page
+from taichi_ants.live.session import Session
+from taichi_ants.viewer import page as html_page
+
+if TYPE_CHECKING:
+    from websockets.asyncio.server import ServerConnection
+    from websockets.http11 import Request, Response
+
+HOST = "127.0.0.1"
+FRAMES_A_SECOND = 30
+FASTEST = 1000.0  # ticks a second; a page that asks for these gets as many as there can be
+
+_MOST_PAGES = 24
+_MOST_TEXT = 2**18  # bytes of a request
+_MOST_UPLOAD = 2**24  # bytes of a session
+_MOST_UNSEEN = 12  # frames that a page is sent before it has drawn the first of them
+_MOST_WAITING = 2**27  # bytes that wait for a page that does not read
+_STATE_EVERY = 0.5  # seconds
+_BREATH = 0.004  # seconds after each frame, in which the thread of the sockets gets its turn
+_LONGEST_WAIT = 0.2  # seconds, for a request, before it looks whether it is to end
+_QUIET = logging.getLogger("taichi_ants.live")  # what strangers send is no news for the terminal
+_QUIET.addHandler(logging.NullHandler())
+_QUIET.propagate = False
+
+
+class Closed(Exception):  # noqa: N818
+    """A page has sent what no page of ours sends; its socket is closed."""
+
+
+class Page:
+    """One page that is open, in the thread of the sockets."""
+
+    def __init__(self, connection: ServerConnection) -> None:
+        self.connection = connection
+        self.unseen = 0  # frames that it was sent, but has not drawn
+        self.behind = False  # it gets no more frames until it is told how all is
+
+    def tell(self, *messages: str | bytes) -> None:
+        """Send messages without waiting; who never reads is cut off."""
+        from websockets.asyncio.server import broadcast
+
+        for message in messages:
+            broadcast([self.connection], message)
+        transport = self.connection.transport
+        if transport.get_write_buffer_size() > _MOST_WAITING:
+            transport.abort()
+
+    def show(self, frame: bytes) -> None:
+        """Send a frame of what has changed; a page with too many unseen ones falls behind."""
+        self.behind = self.behind or self.unseen >= _MOST_UNSEEN
+        if not self.behind:
+            self.unseen += 1
+            self.tell(frame)
+
+    def begin(self, *messages: str | bytes) -> None:
+        """Send a frame that holds all, and what stands before it."""
+        self.unseen, self.behind = 1, False
+        self.tell(*messages)
+
+
+class Room:
+    """A session that people watch and change together.
+
+    Args:
+        session: That begins.
+        choices: What pages can choose from.
+        port: On which it listens; 0 for one that is free.
+        prepare: Called first in processes that replay the session, as to load a plugin.
+
+    Raises:
+        AntsError: The library `websockets` is not installed, or the port cannot be used.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        choices: Choices,
+        port: int = 0,
+        prepare: Callable[[], None] | None = None,
+    ) -> None:
+        try:
+            import websockets  # noqa: F401
+        except ImportError:
+            raise AntsError(
+                'the library websockets is not installed; run pip install "taichi_ants[watch]".'
+            ) from None
+        try:
+            self._socket = socket.create_server((HOST, port))
+        except OSError as error:
+            raise AntsError(
+                f"port {port} of {HOST} cannot be used: {error.strerror}; choose another --port."
+            ) from None
+        self.session, self.choices = session, choices
+        self.port = self._socket.getsockname()[1]
+        self.token = secrets.token_urlsafe(24)
+        self.playing, self.speed = False, 12.0
+        self._pages: set[Page] = set()
+        self._joined = 0  # sockets, a page or not yet
+        self._requests: queue.Queue[tuple[Page, Any, Callable[[], None]]] = queue.Queue()
+        self._loop = asyncio.new_event_loop()
+        self._over, self._leave = threading.Event(), asyncio.Event()
+        self._pace, self._piece, self._due = 0.0, 1.0, 0.0  # see _pass
+        self._prepare, self._making = prepare, threading.Lock()  # see _make
+        self._tells = 0.0  # when pages are told next how things stand
+
+    @property
+    def url(self) -> str:
+        """Where the page is, with the token."""
+        return f"http://{HOST}:{self.port}/?token={self.token}"
+
+    def end(self) -> None:
+        """Let `run` return soon; for any thread."""
+        self._over.set()
+
+    # In the thread that calls `run`: time, and what pages ask for.
+
+    def run(self, seconds: float | None = None) -> None:
+        """Serve pages and let time pass, until somebody ends it, or for some seconds."""
+        sockets = threading.Thread(target=self._serve, name="sockets", daemon=True)
+        sockets.start()
+        end = math.inf if seconds is None else time.monotonic() + seconds
+        try:
+            while not self._over.is_set() and time.monotonic() < end:
+                self._turn()
+        finally:
+            self._over.set()
+            with contextlib.suppress(RuntimeError):  # it has ended by itself
+                self._loop.call_soon_threadsafe(self._leave.set)
+            sockets.join(2)
+
+    def _turn(self) -> None:
+        """Let a frame's time pass if it is due, and do what a page asks for."""
+        runs = self.playing and bool(self._pages)  # time stands still while nobody looks on
+        if runs and time.monotonic() >= self._due:
+            self._pass()
+        now = time.monotonic()
+        if now >= self._tells:
+            self._tells = now + _STATE_EVERY if runs else math.inf
+            self._tell_all(self._state())
+        wait = min((self._due if runs else math.inf) - now, self._tells - now, _LONGEST_WAIT)
+        with contextlib.suppress(queue.Empty):
+            for _ in range(1 + len(self._pages)):  # all have their turn
+                page, request, done = self._requests.get(timeout=max(wait, _BREATH))
+                self._answer(page, request)
+                self._post(done)
+                wait = 0.0
+
+    def _pass(self) -> None:
+        """Let the ticks of one frame pass, and show it."""
+        began, before = time.monotonic(), self.session.ticks
+        if self.speed >= FASTEST:
+            ticks = int(self._piece)  # that fill the time of a frame, as far as is known
+        else:
+            self._pace += max(1.0, self.speed / FRAMES_A_SECOND)
+            ticks = int(self._pace)
+            self._pace -= ticks
+        try:
+            self._show(self.session.advance(ticks))
+        except AntsError as error:  # as of a learner whose values are no longer finite
+            self.playing = False
+            self._tell_all(_say("error", words=str(error)))
+        took, passed = time.monotonic() - began, self.session.ticks - before
+        if passed == ticks:  # and no episode has ended before
+            self._piece = min(2.0 * passed, max(1.0, passed / (took * FRAMES_A_SECOND)))
+        usual = 0.0 if self.speed >= FASTEST else 1 / min(self.speed, FRAMES_A_SECOND)
+        self._due = max(self._due + usual, began + took)  # lost time is not made up
+
+    def _answer(self, page: Page, request: Any) -> None:
+        """Do what a page asks for, or tell it why not; all are told soon how things stand then."""
+        try:
+            if isinstance(request, bytes):
+                self._begin(Session.from_bytes(request))
+            else:
+                REQUESTS[request["do"]](self, page, request)
+        except Closed:
+            self._post(page.connection.transport.abort)
+        except AntsError as error:
+            self._tell(page, _say("error", words=str(error)))
+        except MemoryError:
+            self._tell(page, _say("error", words="this needs more memory than there is."))
+        self._tells = min(self._tells, time.monotonic() + 1 / FRAMES_A_SECOND)
+
+    def _begin(self, session: Session) -> None:
+        """Go on with another session; all pages are shown it from its beginning."""
+        self.session, self.playing, self._piece = session, False, 1.0
+        messages = [*self._about(), *self._moment()]
+
+        def show() -> None:
+            for page in self._pages:
+                page.begin(*messages)
+
+        self._post(show)
+
+    def _welcome(self, page: Page, request: dict[str, Any]) -> None:
+        """Tell a new page what the session is about, and how it is now."""
+        messages = [*self._about(), *self._moment()]
+
+        def show() -> None:
+            self._pages.add(page)
+            page.begin(*messages)
+
+        self._post(show)
+
+    def _catch_up(self, page: Page, request: dict[str, Any]) -> None:
+        """Tell a page that was slow how all is now."""
+        messages = self._moment()
+        self._post(lambda: page.begin(*messages))
+
+    def _about(self) -> list[str | bytes]:
+        """What a page needs to know before the first frame of a session."""
+        header, choices = self.session.header(), self.choices.as_dict()
+        return [_say("begin", header=header, choices=choices), self._state()]
+
+    def _moment(self) -> list[str | bytes]:
+        """All as it is now, for a page that knows nothing of it."""
+        return [_say("moment"), self.session.moment()]
+
+    def _play(self, page: Page, request: dict[str, Any]) -> None:
+        self.playing, self._due = True, time.monotonic()
+
+    def _pause(self, page: Page, request: dict[str, Any]) -> None:
+        self.playing = False
+
+    def _step(self, page: Page, request: dict[str, Any]) -> None:
+        self.playing = False
+        for _ in range(int(_number(request, "ticks", 1, 100))):
+            self._show(self.session.advance(1))
+
+    def _set_speed(self, page: Page, request: dict[str, Any]) -> None:
+        self.speed, self._due = _number(request, "value", 1, FASTEST), time.monotonic()
+
+    def _edit(self, page: Page, request: dict[str, Any]) -> None:
+        edit = request.get("edit")
+        if not isinstance(edit, dict):
+            raise Closed
+        self._show(self.session.apply(edit))
+
+    def _begin_chosen(self, page: Page, request: dict[str, Any]) -> None:
+        self._begin(Session(self.choices.setup(request.get("chosen"))))
+
+    def _restart(self, page: Page, request: dict[str, Any]) -> None:
+        self._begin(Session(self.session.setup))
+
+    def _export(self, page: Page, request: dict[str, Any]) -> None:
+        kind = request.get("kind")
+        if not isinstance(kind, str) or kind not in EXPORTS:
+            raise Closed
+        name, make = EXPORTS[kind]
+        if kind in _SLOW:
+            self._make(page, kind)
+        else:
+            content = make(self.session)
+            self._post(lambda: page.tell(_say("file", name=name), content))
+
+    def _make(self, page: Page, kind: str) -> None:
+        """Make a file in a process of its own, which replays the session; time goes on here."""
+        if not self._making.acquire(blocking=False):
+            raise AntsError("another file is being made; ask again when it is there.")
+        content, context = self.session.to_bytes(), multiprocessing.get_context("spawn")
+
+        def make() -> None:
+            ours, theirs = context.Pipe(duplex=False)
+            given = (kind, content, self._prepare, theirs)
+            messages: list[str | bytes] = [_say("error", words="the file could not be made.")]
+            with ours, contextlib.suppress(EOFError, OSError):  # as where there is no memory
+                context.Process(target=_make_file, args=given, daemon=True).start()
+                theirs.close()
+                messages = ours.recv()
+            self._making.release()
+            self._post(lambda: page.tell(*messages))
+
+        threading.Thread(target=make, daemon=True).start()
+
+    def _quit(self, page: Page, request: dict[str, Any]) -> None:
+        self.end()
+
+    def _show(self, frame: bytes) -> None:
+        """Send a frame to all pages but those that are behind."""
+        news = self.session.news()
+
+        def show() -> None:
+            for page in self._pages:
+                if news:
+                    page.tell(_say("names", names=news))
+                page.show(frame)
+
+        self._post(show)
+
+    def _state(self) -> str:
+        session = self.session
+        return _say(
+            "state",
+            playing=self.playing,
+            speed=self.speed,
+            pages=len(self._pages),
+            ticks=session.ticks,
+            values=session.values(),
+            chosen=self.choices.chosen(session.setup),
+        )
+
+    def _tell_all(self, message: str) -> None:
+        def tell() -> None:
+            for page in self._pages:
+                page.tell(message)
+
+        self._post(tell)
+
+    def _tell(self, page: Page, message: str) -> None:
+        self._post(lambda: page.tell(message))
+
+    def _post(self, act: Callable[[], Any]) -> None:
+        """Let the thread of the sockets do something, in the order of these calls."""
+        with contextlib.suppress(RuntimeError):  # it has ended
+            self._loop.call_soon_threadsafe(act)
+
+    # In the thread of the sockets.
+
+    def _serve(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        try:
+            self._loop.run_until_complete(self._listen())
+        finally:
+            self._over.set()  # nobody can be served any more
+            self._loop.close()
+
+    async def _listen(self) -> None:
+        from websockets.asyncio.server import serve
+
+        settings: dict[str, Any] = {
+            **{"max_size": _MOST_UPLOAD, "max_queue": 4, "compression": None},
+            **{"open_timeout": 10, "ping_interval": 20, "ping_timeout": 20, "close_timeout": 0.3},
+            **{"process_request": self._open, "logger": _QUIET},
+        }
+        async with serve(self._hear, sock=self._socket, **settings):
+            await self._leave.wait()
+            for page in self._pages:
+                page.tell(_say("over"))
+
+    def _open(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Answer a request: with the page, with a refusal, or None, which opens a socket."""
+        from http import HTTPStatus
+
+        asked = urlsplit(request.path)
+        hosts = {f"{name}:{self.port}" for name in (HOST, "localhost")}
+        host, origins = request.headers.get_all("Host"), request.headers.get_all("Origin")
+        opens = asked.path == "/socket"
+        mine = len(host) == 1 and host[0] in hosts
+        # A page of ours has the origin that it was asked for at; the page itself is asked for by
+        # nobody's page.
+        mine = mine and (origins == [f"http://{host[0]}"] or (not origins and not opens))
+        given = parse_qs(asked.query).get("token", [""])[0]
+        if not mine or not hmac.compare_digest(given.encode(), self.token.encode()):
+            return connection.respond(HTTPStatus.FORBIDDEN, "Open the address that was printed.\n")
+        if opens and self._joined >= _MOST_PAGES:
+            return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "Too many pages are open.\n")
+        if opens:
+            return None
+        if asked.path != "/":
+            return connection.respond(HTTPStatus.NOT_FOUND, "There is nothing here.\n")
+        response = connection.respond(HTTPStatus.OK, live_page(f"ws://{host[0]}"))
+        for name, value in _HEADERS.items():
+            with contextlib.suppress(KeyError):
+                del response.headers[name]
+            response.headers[name] = value
+        return response
+
+    async def _hear(self, connection: ServerConnection) -> None:
+        """All that one page says; what it asks for is done before it is heard further."""
+        from websockets.exceptions import ConnectionClosed
+
+        page = Page(connection)
+        self._joined += 1
+        try:
+            await self._ask(page, {"do": "join"})
+            async for message in connection:
+                for request in self._read(page, message):
+                    await self._ask(page, request)
+        except Closed:
+            await connection.close(1008, "this is no request of a page")
+        except ConnectionClosed:
+            pass
+        finally:
+            self._joined -= 1
+            self._pages.discard(page)
+
+    def _read(self, page: Page, message: str | bytes) -> Iterator[Any]:
+        """The request in a message, if the session has to do with it."""
+        if isinstance(message, bytes):
+            yield message
+            return
+        if len(message) > _MOST_TEXT:
+            raise Closed
+        try:
+            request = json.loads(message, parse_constant=_refuse)
+        except (ValueError, RecursionError):
+            raise Closed from None
+        if not isinstance(request, dict) or not isinstance(request.get("do"), str):
+            raise Closed
+        if request["do"] == "seen":
+            page.unseen = max(0, page.unseen - int(_number(request, "frames", 0, 1000)))
+            if page.behind and page.unseen == 0:
+                yield {"do": "catch up"}
+        elif request["do"] in REQUESTS:
+            yield request
+        else:
+            raise Closed
+
+    async def _ask(self, page: Page, request: Any) -> None:
+        done = asyncio.Event()
+        self._requests.put((page, request, done.set))
+        await done.wait()
+
+
+REQUESTS: dict[str, Callable[[Room, Page, dict[str, Any]], None]] = {
+    "join": Room._welcome,  # what a socket says by being opened
+    "catch up": Room._catch_up,  # what a page says by having seen all that it was sent
+    "play": Room._play,
+    "pause": Room._pause,
+    "step": Room._step,  # {"ticks": 1 to 100}
+    "speed": Room._set_speed,  # {"value": ticks a second, 1 to FASTEST}
+    "edit": Room._edit,  # {"edit": see taichi_ants.live.edits}
+    "begin": Room._begin_chosen,  # {"chosen": see taichi_ants.live.choices}
+    "restart": Room._restart,
+    "export": Room._export,  # {"kind": of `EXPORTS`}
+    "quit": Room._quit,
+}
+
+# What pages call it, the name of the file, and what makes it.
+EXPORTS: dict[str, tuple[str, Callable[[Session], bytes]]] = {
+    "session": ("session.npz", Session.to_bytes),
+    "page": ("session.html", lambda session: html_page(session.recording()).encode()),
+    "gif": ("session.gif", Session.gif_bytes),
+    "policy": ("policy.npz", Session.policy_bytes),
+    "colony": ("colony.npz", Session.colony_bytes),
+}
+_SLOW = ("page", "gif")
+
+
+def _make_file(
+    kind: str, content: bytes, prepare: Callable[[], None] | None, answer: Connection
+) -> None:
+    """Answer with what a page is told that has asked for a file; in a process of its own."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends this one
+    try:
+        if prepare is not None:
+            prepare()
+        name, make = EXPORTS[kind]
+        answer.send([_say("file", name=name), make(Session.from_bytes(content))])
+    except AntsError as error:
+        answer.send([_say("error", words=str(error))])
+
+
+_HEADERS = {
+    "Content-Type": "text/html; charset=utf-8",
+    "Cache-Control": "no-store",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+
+
+def _say(kind: str, **facts: Any) -> str:
+    """A message to a page."""
+    return json.dumps({"say": kind, **facts}, separators=(",", ":"))
+
+
+def _refuse(name: str) -> None:
+    raise ValueError(f"{name} is no number")
+
+
+def _number(request: dict[str, Any], name: str, least: float, most: float) -> float:
+    """A number of a request; no page of ours sends one that is not allowed."""
+    value = request.get(name)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value <= most:
+        raise Closed
+    return value

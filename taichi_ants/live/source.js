@@ -1,0 +1,146 @@
+/* The simulation that runs now, as a source of the viewer: one socket, see live/server.py.
+
+   What has arrived is drawn before the server is told that it was seen; a page that is slow, or that
+   nobody looks at, is then sent less, and later a whole frame from which to go on. */
+
+class Live {
+  constructor() {
+    this.news = new EventTarget(); // "state", "error", "file", "over"
+    this.waiting = null; // what the next bytes are, if no frame
+    this.arrived = 0; // frames since the server was told
+    this.running = false;
+    this.speed = 12;
+    this.speedUntil = 0;
+    this.viewer = null;
+    const { host, search } = location;
+    this.socket = new WebSocket(`ws://${host}/socket${search}`);
+    this.socket.binaryType = "arraybuffer";
+    this.socket.addEventListener("message", ({ data }) => (typeof data === "string" ? this.hear(JSON.parse(data)) : this.take(data)));
+    this.socket.addEventListener("close", () => this.tell("over", {}));
+  }
+
+  ask(what, more = {}) {
+    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify({ do: what, ...more }));
+  }
+
+  tell(kind, detail) {
+    this.news.dispatchEvent(new CustomEvent(kind, { detail }));
+  }
+
+  hear(message) {
+    if (message.say === "begin") {
+      this.begins = message.header;
+      this.choices = message.choices;
+    } else if (message.say === "names") Object.assign(this.viewer.history.header.names, message.names);
+    else if (message.say === "moment" || message.say === "file") this.waiting = message;
+    else {
+      if (message.say === "state") {
+        this.running = message.playing;
+        if (performance.now() > this.speedUntil) this.speed = message.speed; // not while somebody moves it
+        this.state = message;
+      }
+      this.tell(message.say, message);
+    }
+  }
+
+  take(bytes) {
+    const { waiting } = this;
+    this.waiting = null;
+    if (waiting?.say === "file") {
+      this.tell("file", { ...waiting, bytes });
+      return;
+    }
+    this.arrived++;
+    if (waiting && this.begins) this.begin(this.begins, bytes);
+    else this.receive(bytes, Boolean(waiting));
+  }
+
+  /* A session begins: the viewer starts anew, and looks as it did where it can. */
+  begin(header, bytes) {
+    const before = this.viewer, source = {
+      header, live: true, acts: this.acts, keys: this.keys,
+      start: (receive) => {
+        this.receive = receive;
+        receive(bytes, true);
+      },
+      player: (history, changed) => new LivePlayer(history, changed, this),
+      stand: (viewer) => (this.viewer = viewer),
+      seen: () => this.seen(),
+    };
+    this.begins = null;
+    before?.close();
+    show(source);
+    this.tell("begin", { header });
+  }
+
+  seen() {
+    if (this.arrived) this.ask("seen", { frames: this.arrived });
+    this.arrived = 0;
+  }
+}
+
+/* Time, which passes on the server. Who looks back still gets what happens meanwhile. */
+class LivePlayer extends Player {
+  constructor(history, changed, live) {
+    super(history, changed);
+    this.live = live;
+    this.slowest = 1;
+    this.fastest = 1000;
+    this.speed = live.speed;
+    this.still = matchMedia("(prefers-reduced-motion: reduce)");
+    this.newest = 0; // the last moment that was there before
+    this.back = false; // whether it looks back
+    live.news.addEventListener("state", () => this.take());
+    this.take();
+  }
+
+  take() {
+    this.playing = this.live.running && !this.back;
+    this.speed = this.live.speed;
+    this.changed();
+  }
+  setSpeed(speed) {
+    this.speed = this.live.speed = speed;
+    this.live.speedUntil = performance.now() + 500;
+    this.live.ask("speed", { value: speed });
+  }
+  play() {
+    this.back = false;
+    this.live.ask("play");
+  }
+  pause() {
+    this.live.ask("pause");
+  }
+  go(moment) {
+    super.go(moment);
+    this.back = this.moment < this.last;
+    this.take();
+  }
+  seek(moment) {
+    this.go(moment);
+  }
+  step(n) {
+    if (n === 1 && !this.back) this.live.ask("step", { ticks: 1 });
+    else if (Number.isFinite(n) && n > 1 && !this.back) this.live.ask("step", { ticks: n });
+    else this.go(this.moment + n);
+  }
+  /* Between two ticks ants glide, so the picture is up to a tick behind. */
+  pass(seconds) {
+    if (this.back) return false;
+    const { last, history } = this, moment = this.moment, share = this.share;
+    if (last !== this.newest) {
+      const glides = last === this.newest + 1 && history.frames[last].passed === 1 && this.playing
+        && this.speed <= SMOOTH_BELOW && !this.still.matches;
+      this.newest = last;
+      this.moment = glides ? last - 1 : last;
+      this.share = 0;
+    } else if (this.moment < last) {
+      this.share += seconds * this.speed;
+      if (this.share >= 1 || !this.playing) {
+        this.moment = last;
+        this.share = 0;
+      }
+    }
+    return this.moment !== moment || this.share !== share;
+  }
+}

@@ -1,0 +1,77 @@
+"""The command that serves the live page: how it begins and ends, and what it needs."""
+
+from __future__ import annotations
+
+import re
+import signal
+import sys
+import time
+import urllib.request
+from pathlib import Path
+
+import pytest
+from command_lines import PROMPTLY, call, load, start
+
+from taichi_ants import AntsError, save_policy
+from taichi_ants.learners.policies import trail_follower
+from taichi_ants.live.choices import Choices
+from taichi_ants.live.server import Room
+from taichi_ants.live.session import Session
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_ends_it_promptly_in_one_line(number: int, kernels: Path, tmp_path: Path) -> None:
+    process = start("watch", ["--no-browser"], kernels, tmp_path)
+    assert process.stdout is not None
+    url = process.stdout.readline().strip()
+    assert re.fullmatch(r"http://127\.0\.0\.1:\d+/\?token=[\w-]{32}", url)
+    with urllib.request.urlopen(url, timeout=30) as page:
+        assert b"viewer" in page.read()
+    began = time.monotonic()
+    process.send_signal(number)
+    _, said = process.communicate(timeout=30)
+    assert time.monotonic() - began < PROMPTLY
+    assert process.returncode == 128 + number
+    assert said == "Stopped.\n"
+    assert not list(tmp_path.iterdir())
+
+
+def test_it_ends_after_some_seconds(capsys: pytest.CaptureFixture[str]) -> None:
+    began = time.monotonic()
+    status, said, err = call("watch", ["--for", 1], capsys)
+    assert (status, err) == (0, "")
+    assert said.endswith("Ended.\n")
+    assert time.monotonic() - began >= 1
+
+
+def test_a_saved_session_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    session = Session(Choices({}).setup(load("watch").START))
+    session.advance(3)
+    session.save(tmp_path / "mine.npz")
+    arguments = ["--for", 1, "--session", tmp_path / "mine.npz"]
+    assert call("watch", arguments, capsys)[0] == 0
+    status, _, said = call("watch", ["--session", tmp_path / "none.npz"], capsys)
+    assert status == 2
+    assert "none.npz" in said
+
+
+def test_policies_have_the_names_of_their_files(tmp_path: Path) -> None:
+    save_policy(tmp_path / "mine.npz", trail_follower(), {})
+    named = load("watch").policies([str(tmp_path / "mine.npz")])
+    assert {"mine", "foraging", "queueing", "far_piles"} <= named.keys()
+    with pytest.raises(AntsError, match="nothing"):
+        load("watch").policies([str(tmp_path / "nothing.npz")])
+
+
+def test_without_the_library_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "websockets", None)
+    session = Session(Choices({}).setup(load("watch").START))
+    with pytest.raises(AntsError, match=r'pip install "taichi_ants\[watch\]"\.$'):
+        Room(session, Choices({}))
+
+
+def test_a_port_that_is_taken_is_named() -> None:
+    session = Session(Choices({}).setup(load("watch").START))
+    room = Room(session, Choices({}))
+    with pytest.raises(AntsError, match=f"port {room.port} .* choose another --port"):
+        Room(session, Choices({}), room.port)

@@ -1,0 +1,421 @@
+"""The live page in a real browser: each control, and worlds that equal the engine's."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+from browser import Page, started
+from rooms import CHOSEN, Guest, running
+
+from taichi_ants import Colony, load_policy
+from taichi_ants.learners.policies import Policy, trail_follower
+from taichi_ants.live.choices import Choices
+from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
+
+pytestmark = pytest.mark.browser
+
+WORLD = """() => {
+  const { history } = viewer, moment = history.length - 1, frame = history.frames[moment];
+  const { ground, trail } = history.worldAt(moment);
+  return { ground: [...ground], trail: [...trail], cells: [...frame.cells],
+           poses: [...frame.poses], tick: frame.tick, deliveries: frame.deliveries };
+}"""
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with started() as one:
+        yield one
+
+
+@pytest.fixture(scope="module")
+def shared(browser):
+    policies = {"mine": Policy(trail_follower("ants"), "ants", {})}
+    with running(Choices(policies)) as one:
+        yield one
+
+
+@pytest.fixture
+def room(shared):
+    with Guest(shared) as guest:
+        guest.ask("begin", chosen=CHOSEN)
+        guest.until("whole")
+    shared.speed = 12.0
+    return shared
+
+
+@pytest.fixture
+def page(browser, room):
+    opened = Page(browser, room.url, accept_downloads=True)
+    yield opened
+    opened.close()
+
+
+def wait(page: Page, script: str) -> None:
+    page.tab.wait_for_function(script)
+
+
+def assert_same(page: Page, room) -> None:
+    """What the page has is what the engine has."""
+    wait(page, f"viewer.history.frames.at(-1).tick === {room.session.colony.ticks}")
+    shown, snapshot = page.read(WORLD), room.session.colony.snapshot()
+    assert shown["ground"] == snapshot.ground.tolist()
+    assert shown["trail"] == snapshot.trail.tolist()
+    assert sorted(shown["cells"]) == sorted(snapshot.ant_cells.tolist())
+    assert shown["deliveries"] == room.session.colony.outcome().deliveries[0, 0]
+    loaded = sum(pose >> 3 for pose in shown["poses"])
+    assert loaded == snapshot.ant_carries.sum()
+
+
+def edits(room, n: int) -> list[dict]:
+    """The edits of a session, as soon as there are n."""
+    for _ in range(500):
+        if len(room.session.edits) >= n:
+            break
+        time.sleep(0.02)
+    time.sleep(0.1)
+    return [edit for _, edit in room.session.edits]
+
+
+def place(page: Page, cell: int) -> tuple[float, float]:
+    """Where the middle of a cell lies on the page."""
+    x, y = page.read("cell => viewer.stage.toPage(viewer.history.grid.centre(cell))", cell)
+    box = page.tab.locator("#world").bounding_box()
+    return box["x"] + x, box["y"] + y
+
+
+def cell_of(room, *cube: int) -> int:
+    return int(room.session.colony.grid.index(cube))
+
+
+def test_steps_and_play_show_the_world_of_the_engine(page, room):
+    for _ in range(3):
+        page.click("#forward")
+        assert_same(page, room)
+    assert room.session.ticks == 3
+    page.tab.focus("#world")
+    page.press("Shift+ArrowRight")
+    wait(page, "viewer.history.frames.at(-1).tick === 13")
+    assert_same(page, room)
+    page.tab.keyboard.press("Space")
+    wait(page, "live.running && viewer.history.frames.at(-1).tick >= 18")
+    assert page.tab.get_attribute("#play", "aria-label") == "Pause"
+    page.tab.keyboard.press("Space")
+    wait(page, "!live.running")
+    assert_same(page, room)
+    ticks = room.session.ticks
+    page.click("#back")
+    page.click("#back")  # to look back stops nothing and asks for nothing
+    assert page.read("viewer.history.frames[viewer.player.moment].tick") == ticks - 2
+    page.click("#forward")
+    assert room.session.ticks == ticks
+    page.press("End")
+    assert page.read("viewer.player.moment === viewer.player.last")
+    page.click("#forward")
+    wait(page, f"viewer.history.frames.at(-1).tick === {ticks + 1}")
+    assert_same(page, room)
+
+
+def test_episodes_go_by_as_fast_as_they_can(page, room):
+    page.tab.fill("#speed", "100")
+    assert page.text("#speed-value") == "fastest"
+    page.tab.click("#play")
+    wait(page, "viewer.history.frames.at(-1).episode >= 3")
+    page.tab.click("#play")
+    wait(page, "!live.running")
+    assert_same(page, room)
+    assert page.read("viewer.history.frames.at(-1).episode") == room.session.colony.episode
+    assert room.speed == 1000
+    page.tab.keyboard.press("ArrowDown")
+    wait(page, "live.speed < 1000")
+
+
+def test_an_ant_is_followed_and_explained(page, room):
+    page.tab.focus("#world")
+    page.press("n")
+    assert "It has not chosen yet." in page.text("#ant")
+    page.click("#forward")
+    wait(page, "document.querySelector('#ant').innerText.includes('In the last tick')")
+    said = page.text("#ant")
+    assert "Chooses" in said
+    assert "TD error" in said
+
+
+@pytest.mark.parametrize("how", ["mouse", "keyboard"])
+def test_each_tool_changes_the_world_of_the_engine(page, room, how):
+    here, ground = cell_of(room, 5, 5, 0), lambda: room.session.colony.snapshot().ground
+    number = 0
+
+    def use(tool: str, key: str, cell: int, does: int = 1) -> list[dict]:
+        nonlocal number
+        if how == "keyboard":
+            page.press(key)
+            page.read("cell => viewer.chooseCell(cell, true)", cell)
+            page.tab.focus("#world")
+            page.tab.keyboard.press("Enter")
+        else:
+            page.tab.click(f'[data-tool="{tool}"]')
+            page.tab.mouse.click(*place(page, cell))
+        assert page.tab.get_attribute(f'[data-tool="{tool}"]', "aria-pressed") == "true"
+        number += does
+        done = edits(room, number)
+        assert len(done) == number, done
+        assert_same(page, room)
+        return done[-does:]
+
+    (edit,) = use("rock", "2", here)
+    assert edit == {"kind": "ground", "what": "rock", "cells": [here]}
+    assert ground()[here] == OBSTACLE
+    use("erase", "6", here)
+    assert ground()[here] == EMPTY
+    use("food", "3", here)
+    assert ground()[here] == FOOD
+    there = cell_of(room, 5, 4, 0)
+    (edit,) = use("trail", "4", there)
+    assert edit == {"kind": "trail", "level": 500, "cells": [there]}
+    ants = len(room.session.colony.snapshot().ant_cells)
+    (edit,) = use("ants", "5", there)
+    assert edit == {"kind": "add_ants", "heading": None, "cells": [there]}
+    assert len(room.session.colony.snapshot().ant_cells) == ants + 1
+    done = use("erase", "6", there, 2)
+    assert [edit["kind"] for edit in done] == ["remove_ants", "trail"]
+    free = cell_of(room, 3, 3, 0)
+    (edit,) = use("queen", "7", free)
+    assert edit == {"kind": "queen", "cell": free}
+    assert ground()[free] == QUEEN
+    page.press("1")
+    page.click_cell(here)
+    assert "holds food" in page.text("#cell")
+
+
+def test_a_stroke_of_a_large_brush_is_drawn_without_holes(page, room):
+    page.press("2", "]", "]", "[")
+    page.tab.mouse.move(*place(page, cell_of(room, 6, 1, 0)))
+    assert page.read("viewer.tool.cells().length") == 7
+    page.tab.mouse.down()
+    page.tab.mouse.move(*place(page, cell_of(room, 1, 6, 0)))  # in one leap
+    page.tab.mouse.up()
+    wait(page, "live.tools.fresh.size === 0")
+    edits(room, 1)
+    ground = room.session.colony.snapshot().ground
+    line = [cell_of(room, 6 - k, 1 + k, 0) for k in range(6)]
+    around = [cell + o for cell in line for o in (0, *page.read("viewer.history.grid.offsets"))]
+    taken = set(room.session.colony.snapshot().ant_cells.tolist())
+    assert all(ground[cell] == OBSTACLE for cell in around if cell not in taken)
+    assert_same(page, room)
+    camera = page.read("viewer.stage.camera")
+    page.press("1")
+    x, y = place(page, line[2])
+    page.tab.mouse.move(x, y)
+    page.tab.mouse.down()
+    page.tab.mouse.move(x + 60, y, steps=3)
+    page.tab.mouse.up()
+    assert page.read("viewer.stage.camera") != camera  # who only looks moves the view
+
+
+def test_sliders_change_the_colony(page, room):
+    shown = page.read("Object.keys(live.state.values)")
+    assert set(shown) == set(room.session.values())
+    for name, value in [("epsilon", 0.5), ("learning_rate", 0.25), ("ants", 20), ("slope", 30)]:
+        page.tab.fill(f"#set-{name}", str(value))
+        edits(room, 1)
+        wait(page, f"live.state.values['{name}'].value === {value}")
+        assert room.session.edits[-1][1] == {"kind": "set", "name": name, "value": value}
+    assert room.session.colony.epsilon == 0.5
+    page.tab.uncheck("#set-evaporation")
+    wait(page, "live.state.values.evaporation.value === 0")
+    page.click("#forward")
+    wait(page, "viewer.history.frames.at(-1).tick === 1")
+    assert_same(page, room)
+    page.click("#next-episode")
+    wait(page, "viewer.history.frames.at(-1).episode === 1")
+    page.click("#restart")
+    wait(page, "viewer.history.length === 1")
+    assert room.session.ticks == 0
+    assert room.session.edits == []
+
+
+def test_a_new_session_is_what_was_chosen(page, room):
+    page.tab.select_option("#world-name", "far_piles")
+    page.tab.fill("#world-seed", "4")
+    page.tab.fill("#size", "25")
+    page.tab.select_option("#task", "foraging")
+    page.tab.click("#rules-box summary")
+    page.tab.check('#rules [value="births"]')
+    page.tab.fill("#ants", "30")
+    page.tab.fill("#episode", "0")
+    page.tab.fill("#seed", "9")
+    page.tab.select_option("#policy", "learn expected_sarsa")
+    page.click("#begin")
+    wait(page, "viewer.history.grid.ranges[0] === 25")
+    setup = room.session.setup
+    assert (setup.world, setup.world_seed, setup.ants, setup.seed) == ("far_piles", 4, 30, 9)
+    assert (setup.ticks_per_episode, setup.policy.learner) == (0, "expected_sarsa")
+    assert (setup.task.observation, setup.task.life.births) == ("ants", True)
+    assert page.tab.input_value("#task") == "foraging"
+    assert_same(page, room)
+    page.tab.uncheck('#rules [value="right_of_way"]')
+    assert page.tab.input_value("#task") == ""  # single rules
+    page.tab.select_option("#policy", "file mine")
+    assert page.tab.is_disabled("#sees")
+    page.tab.select_option("#world-name", "map")
+    page.tab.fill("#ants", "3")
+    page.click("#begin")
+    wait(page, "viewer.history.grid.ranges[0] < 25")
+    assert np.array_equal(room.session.setup.policy, trail_follower("ants"))
+    assert not room.session.setup.learns
+    assert_same(page, room)
+    page.tab.fill("#map", "nothing\nat all")
+    page.click("#begin")
+    page.tab.wait_for_selector("#toast.bad:not([hidden])")
+    assert page.text("#toast").endswith(".")
+
+
+def test_files_are_saved_and_loaded(page, room, tmp_path):
+    page.press("Shift+ArrowRight")
+    wait(page, "viewer.history.frames.at(-1).tick === 10")
+    for kind in ("session", "page", "gif", "policy", "colony"):
+        with page.tab.expect_download() as got:
+            page.tab.click(f'[data-export="{kind}"]')
+        got.value.save_as(tmp_path / got.value.suggested_filename)
+    state = room.session.hand.state()
+    assert np.array_equal(
+        load_policy(tmp_path / "policy.npz").q_values, room.session.colony.q_values[0]
+    )
+    assert Colony.load(tmp_path / "colony.npz").ticks == 10
+    page.click("#restart")
+    wait(page, "viewer.history.length === 1")
+    page.tab.set_input_files("#upload", tmp_path / "session.npz")
+    wait(page, "viewer.history.frames.at(-1).tick === 10")
+    assert room.session.hand.state() == state
+    assert_same(page, room)
+    page.tab.set_input_files("#upload", tmp_path / "session.gif")
+    page.tab.wait_for_selector("#toast.bad:not([hidden])")
+    assert room.session.hand.state() == state
+
+
+def test_pages_look_on_together(page, browser, room):
+    page.click("#forward")
+    late = Page(browser, room.url, color_scheme="dark")
+    assert_same(late, room)
+    late.click_cell(cell_of(room, 5, 5, 0))
+    late.press("2", "Enter")
+    edits(room, 1)
+    assert_same(late, room)
+    assert_same(page, room)
+    wait(page, "document.querySelector('#watchers').innerText === '2 pages look on'")
+    page.tab.click("#play")
+    wait(late, "live.running && viewer.player.playing")
+    late.tab.click("#play")
+    wait(page, "!live.running")
+    late.close()
+
+
+def test_a_page_that_was_slow_sees_all_again(page, room):
+    page.read("() => { live.seen = () => {}; }")  # as if it drew nothing
+    for _ in range(4):
+        page.tab.keyboard.press("Shift+ArrowRight")
+    wait(page, "live.state.ticks >= 40")
+    assert page.read("viewer.history.frames.at(-1).tick") < 40
+    page.read("() => { delete live.seen; viewer.dirty = true; }")
+    wait(page, "viewer.history.frames.at(-1).whole")
+    assert_same(page, room)
+    back = page.read("viewer.history.length") - 3
+    page.read("moment => viewer.player.go(moment)", back)
+    page.read("viewer.history.worldAt(0)")
+    page.press("End")
+    assert_same(page, room)
+
+
+def test_a_long_history_forgets_its_beginning(page, room):
+    page.read("() => { viewer.history.bytes += 2 ** 27 - 8000; }")
+    for ticks in range(10, 50, 10):
+        page.tab.keyboard.press("Shift+ArrowRight")
+        wait(page, f"viewer.history.frames.at(-1).tick === {ticks}")
+    wait(page, "viewer.history.first > 0")
+    page.press("Home")
+    first = page.read("viewer.history.first")
+    assert page.moment == first > 0
+    page.press("End")
+    assert_same(page, room)
+
+
+def test_fingers_draw_and_two_of_them_move_the_view(browser, room):
+    phone = Page(browser, room.url, (390, 844), has_touch=True, device_scale_factor=2)
+    phone.tab.click('[data-tool="rock"]')
+    session = phone.context.new_cdp_session(phone.tab)
+
+    def touch(kind: str, *places: tuple[float, float]) -> None:
+        points = [{"x": x, "y": y, "id": i} for i, (x, y) in enumerate(places)]
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    one, other = (place(phone, cell_of(room, *cube)) for cube in ((5, 2, 0), (2, 5, 0)))
+    touch("touchStart", one)
+    touch("touchMove", other)
+    touch("touchEnd")
+    edits(room, 1)
+    wait(phone, "live.tools.fresh.size === 0")
+    rocks = int((room.session.colony.snapshot().ground == OBSTACLE).sum())
+    assert room.session.colony.snapshot().ground[cell_of(room, 3, 4, 0)] == OBSTACLE
+    scale = phone.read("viewer.stage.camera.scale")
+    middle = (one[0] + other[0]) / 2, (one[1] + other[1]) / 2
+    touch("touchStart", (middle[0] - 30, middle[1]))
+    touch("touchStart", (middle[0] - 30, middle[1]), (middle[0] + 30, middle[1]))
+    for apart in (40, 60):
+        touch("touchMove", (middle[0] - apart, middle[1]), (middle[0] + apart, middle[1]))
+    touch("touchEnd")
+    assert phone.read("viewer.stage.camera.scale") > 1.3 * scale
+    time.sleep(0.2)
+    assert abs(int((room.session.colony.snapshot().ground == OBSTACLE).sum()) - rocks) <= 1
+    assert phone.read("document.documentElement.scrollWidth") == 390
+    phone.close()
+
+
+def test_every_control_is_reached_by_keyboard_and_has_a_name(page):
+    reached = {}
+    page.tab.focus("#theme")
+    for _ in range(90):
+        page.tab.keyboard.press("Tab")
+        name, label, outlined = page.read(
+            """() => { const it = document.activeElement, line = getComputedStyle(it);
+              const tool = it.dataset.tool ?? it.dataset.export;
+              const words = it.getAttribute("aria-label") || it.labels?.[0]?.innerText;
+              return [it.id || tool || it.tagName, words || it.innerText,
+                      line.outlineStyle !== "none" && parseFloat(line.outlineWidth) >= 1]; }"""
+        )
+        reached[name] = label and outlined
+    for control in (
+        *("world-name", "task", "policy", "ants", "episode", "seed", "begin", "restart"),
+        *("set-epsilon", "set-ants", "next-episode", "session", "load", "page", "gif", "policy"),
+        *("colony", "quit", "look", "rock", "queen", "play", "speed"),
+    ):
+        assert control in reached
+    del reached["BODY"]
+    assert [name for name, good in reached.items() if not good] == []
+
+
+def test_the_page_ends_with_the_server(browser, shared):
+    with running(shared.choices) as one:
+        page = Page(browser, one.url)
+        page.tab.click("#quit")
+        page.tab.click("#quit")
+        wait(page, "document.querySelector('#toast').innerText.startsWith('The server has ended')")
+        assert page.tab.is_disabled("#play")
+        page.close()
+
+
+def test_it_stays_at_thirty_frames_a_second(page, room, record_property):
+    page.tab.fill("#speed", "60")
+    page.tab.click("#play")
+    wait(page, "viewer.history.length > 30")
+    frames, began = page.read("[viewer.history.length, performance.now()]")
+    time.sleep(3)
+    later, ended = page.read("[viewer.history.length, performance.now()]")
+    rate = 1000 * (later - frames) / (ended - began)
+    record_property("frames_a_second", rate)
+    print(f"{rate:.0f} frames a second")
+    page.tab.click("#play")
+    wait(page, "!live.running")
+    assert rate > 20  # of 30, on a machine that others share

@@ -1,0 +1,462 @@
+"""The room: who gets in, what pages are told, and that nobody can do harm."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import socket
+import time
+from contextlib import closing, suppress
+
+import numpy as np
+import pytest
+from playback import played
+from rooms import CHOSEN, Guest, running
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+
+from taichi_ants import Colony
+from taichi_ants.learners.policies import Policy, trail_follower
+from taichi_ants.live import server
+from taichi_ants.live.choices import Choices
+from taichi_ants.viewer import Recording
+
+
+@pytest.fixture(scope="module")
+def shared():
+    with running(Choices({"mine": Policy(trail_follower("ants"), "ants", {})})) as one:
+        yield one
+
+
+@pytest.fixture
+def room(shared):
+    """The room, whose session stands as it stood when the test ends."""
+    with Guest(shared) as guest:
+        guest.ask("begin", chosen=CHOSEN)
+        guest.until("whole")
+    while shared._pages:
+        time.sleep(0.01)
+    return shared
+
+
+def state_of(room) -> object:
+    session = room.session
+    return session.hand.state(), session.ticks, list(session.edits)
+
+
+def get(room, path: str, **headers: str) -> tuple[int, dict[str, str], str]:
+    with closing(http.client.HTTPConnection("127.0.0.1", room.port, timeout=30)) as line:
+        line.request("GET", path, headers=headers)
+        answer = line.getresponse()
+        return answer.status, dict(answer.headers), answer.read().decode()
+
+
+def test_the_page_is_for_those_who_know_the_token(room):
+    here = f"127.0.0.1:{room.port}"
+    good = f"/?token={room.token}"
+    status, headers, text = get(room, good)
+    assert status == 200
+    assert f"connect-src ws://{here}" in text
+    assert headers["Content-Type"] == "text/html; charset=utf-8"
+    assert headers["Referrer-Policy"] == "no-referrer"
+    assert room.token not in text
+    first, more = room.token[:-1], f"{room.token}x"
+    for query in ("", "token=", f"token={first}", f"token={more}", f"token=x&token={room.token}"):
+        assert get(room, f"/?{query}")[0] == 403, query
+    for query in ("token=%ff%00", f"Token={room.token}", room.token, "&" * 5000):
+        assert get(room, f"/?{query}")[0] == 403, query
+    assert get(room, good, Host=f"localhost:{room.port}")[0] == 200
+    for host in ("evil.example", f"evil.example:{room.port}", "127.0.0.1", "", f"{here}, {here}"):
+        assert get(room, good, Host=host)[0] == 403, host
+    assert get(room, good, Origin="http://evil.example")[0] == 403
+    for path in ("/etc/passwd", "/../../etc/passwd", "//", "/viewer.js", "/Socket"):
+        assert get(room, f"{path}?token={room.token}")[0] in (403, 404), path
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "OPTIONS", "TRACE", "CONNECT"])
+def test_nothing_can_be_sent_but_over_the_socket(room, method):
+    before = state_of(room)
+    line = http.client.HTTPConnection("127.0.0.1", room.port, timeout=30)
+    with closing(line), suppress(http.client.HTTPException, OSError):  # or it is cut off
+        line.request(method, f"/?token={room.token}", body="x" * 1000)
+        assert line.getresponse().status >= 400
+    assert state_of(room) == before
+
+
+def test_sockets_are_for_pages_of_its_own(room):
+    before = state_of(room)
+    good = f"http://127.0.0.1:{room.port}"
+    address = f"ws://127.0.0.1:{room.port}/socket?token="
+    for token, origin in [
+        *((room.token, one) for one in (None, "null", "http://evil.example", good + "0")),
+        *((room.token, one) for one in (good.replace("http", "https"), "http://127.0.0.1")),
+        *((one, good) for one in ("", room.token[1:], "x" * 5000)),
+    ]:
+        with pytest.raises(InvalidStatus) as refused:
+            connect(address + token, origin=origin, proxy=None).__enter__()
+        assert refused.value.response.status_code == 403
+    assert state_of(room) == before
+
+
+def test_it_listens_on_this_machine_alone(room):
+    assert room._socket.getsockname()[0] == "127.0.0.1"
+
+
+def shown(guest: Guest, session):
+    """The world that a page has after all that it was sent."""
+    recording = Recording(guest.header, guest.frames)
+    return list(played(recording, session._recorder._pheromone))[-1]
+
+
+def assert_same(guest: Guest, session) -> None:
+    one, snapshot = shown(guest, session), session.colony.snapshot()
+    assert one.clock[1] == session.colony.ticks
+    assert np.array_equal(one.ground, snapshot.ground)
+    assert np.array_equal(one.trail, snapshot.trail)
+    assert sorted(one.cells.tolist()) == sorted(snapshot.ant_cells.tolist())
+
+
+def both(one: Guest, other: Guest, kind: str = "frame") -> None:
+    one.until(kind)
+    other.until(kind)
+
+
+def test_all_pages_see_the_world_of_the_engine(room):
+    free = int(room.session.colony.grid.index((5, 5, 0)))
+    with Guest(room) as first, Guest(room) as second:
+        for ticks in (1, 7):
+            first.ask("step", ticks=ticks)
+            for _ in range(ticks):
+                both(first, second)
+        first.ask("edit", edit={"kind": "ground", "what": "food", "cells": [free]})
+        both(first, second)
+        with Guest(room) as late:
+            for guest in (first, second, late):
+                assert_same(guest, room.session)
+            second.ask("step", ticks=1)
+            for guest in (first, second, late):
+                guest.until("frame")
+                assert_same(guest, room.session)
+        assert room.session.colony.snapshot().ground[free] == 7
+        assert room.session.edits[0][1]["what"] == "food"
+
+
+def test_a_page_that_is_slow_is_told_less_and_then_all(room):
+    with Guest(room) as slow, Guest(room) as quick:
+        for _ in range(3 * server._MOST_UNSEEN):
+            quick.seen(1)
+            quick.ask("step", ticks=1)
+            quick.until("frame")
+        assert_same(quick, room.session)
+        slow.ask("step", ticks=1)  # so that it hears of a state after all frames
+        quick.until("frame")
+        slow.until("state")
+        while slow.state["ticks"] < room.session.ticks:
+            slow.until("state")
+        assert len(slow.frames) == server._MOST_UNSEEN
+        slow.seen(server._MOST_UNSEEN)
+        slow.until("whole")
+        assert_same(slow, room.session)
+        slow.ask("step", ticks=1)
+        slow.until("frame")
+        assert_same(slow, room.session)
+
+
+def test_time_passes_while_somebody_looks_on(room):
+    with Guest(room) as guest:
+        guest.ask("speed", value=1000)
+        guest.ask("play")
+        for _ in range(3):
+            guest.until("frame")
+            guest.seen(1)
+        while not guest.state["playing"]:
+            guest.hear()
+        guest.ask("pause")
+        while guest.state["playing"]:
+            guest.hear()
+        stands = room.session.ticks
+        time.sleep(0.3)
+        assert room.session.ticks == stands > 1
+        guest.ask("speed", value=1)
+        guest.ask("play")
+        guest.until("frame")
+        began = time.monotonic()
+        guest.until("frame")
+        assert time.monotonic() - began > 0.5
+    while room._pages:
+        time.sleep(0.01)
+    time.sleep(0.1)
+    stands = room.session.ticks
+    time.sleep(1.3)
+    assert room.session.ticks == stands
+
+
+def deep(n: int) -> str:
+    return '{"do":"edit","edit":' + "[" * n + "]" * n + "}"
+
+
+CLOSED = [
+    *("", "null", "[]", "7", "{}", "nonsense", '"play"', '{"do":7}', '{"do":null}'),
+    *('{"do":"explode"}', '{"do":"__init__"}', '{"do":["play"]}', '{"do":{}}'),
+    *('{"do":"speed"}', '{"do":"speed","value":"12"}', '{"do":"speed","value":true}'),
+    *('{"do":"speed","value":NaN}', '{"do":"speed","value":1e999}', '{"do":"speed","value":-1}'),
+    *('{"do":"speed","value":' + "9" * 5000 + "}", '{"do":"step","ticks":1000000}'),
+    *('{"do":"seen","frames":-5}', '{"do":"seen","frames":1e400}', '{"do":"seen"}'),
+    *('{"do":"edit"}', '{"do":"edit","edit":7}', deep(3), deep(100_000)),
+    *('{"do":"export"}', '{"do":"export","kind":"/etc/passwd"}', '{"do":"export","kind":[]}'),
+    *("\0", "\ufeff{}", "x" * (server._MOST_TEXT + 1), '{"do":"play"' + " " * 2**18 + "}"),
+]
+
+
+@pytest.mark.parametrize("message", CLOSED, ids=lambda text: text[:30])
+def test_who_sends_what_no_page_sends_is_cut_off(room, message):
+    before = state_of(room)
+    with Guest(room) as guest:
+        guest.socket.send(message)
+        guest.until_cut_off()
+    with Guest(room):  # it goes on for others
+        assert state_of(room) == before
+        assert not room.playing
+
+
+REFUSED = [
+    *({}, {"kind": "explode"}, {"kind": None}, {"kind": ["ground"]}, {"kind": "ground"}),
+    {"kind": "ground", "what": "lava", "cells": [1]},
+    {"kind": "ground", "what": "rock", "cells": [-1]},
+    {"kind": "ground", "what": "rock", "cells": [10**9]},
+    {"kind": "ground", "what": "rock", "cells": [1.5]},
+    {"kind": "ground", "what": "rock", "cells": "all"},
+    {"kind": "ground", "what": "rock", "cells": [[1]]},
+    {"kind": "ground", "what": "rock", "cells": list(range(30_000))},
+    {"kind": "trail", "level": 1e308, "cells": [200]},
+    {"kind": "queen", "cell": None},
+    {"kind": "set", "name": "__class__", "value": 1},
+    {"kind": "set", "name": "epsilon", "value": 7},
+    {"kind": "set", "name": "ants", "value": 10**7},
+    {"kind": "add_ants", "cells": [200], "heading": 9},
+]
+
+
+@pytest.mark.parametrize("edit", REFUSED, ids=lambda edit: json.dumps(edit)[:50])
+def test_an_edit_that_is_not_allowed_is_refused_in_one_sentence(room, edit):
+    before = state_of(room)
+    with Guest(room) as guest:
+        guest.ask("edit", edit=edit)
+        words = guest.until("error")["words"]
+        assert words.endswith(".")
+        assert "\n" not in words
+        guest.ask("step", ticks=1)  # the page stays
+        guest.until("frame")
+        assert before != state_of(room)
+    assert room.session.edits == before[2]
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"world": "/etc/passwd"},
+        {"world": "map", "map": "/etc/passwd"},
+        {"world": "map", "map": "paper"},
+        {"world": "map", "map": "\n" * 60_000},
+        {"world": "map", "map": "x\ny"},
+        {"world": "map", "map": 7},
+        {"world": ["paper"]},
+        {"policy": "file ../../policy"},
+        {"policy": "file /etc/passwd"},
+        {"policy": "learn nothing"},
+        {"policy": 7},
+        {"rules": "rising"},
+        {"rules": ["explode"]},
+        {"rules": [[]]},
+        {"rules": None},
+        {"sees": "everything"},
+        {"sees": {}},
+        {"size": 10**6},
+        {"size": [30, 30, 30]},
+        {"ants": 10**6},
+        {"ants": 0},
+        {"ants": "12"},
+        {"ants": None},
+        {"seed": -1},
+        {"ticks": 1e9},
+        {"world_seed": {}},
+    ],
+    ids=str,
+)
+def test_a_session_that_cannot_be_is_refused(room, wrong):
+    before = state_of(room)
+    with Guest(room) as guest:
+        guest.ask("begin", chosen={**CHOSEN, **wrong})
+        assert guest.until("error")["words"].endswith(".")
+        guest.ask("begin", chosen=None)
+        assert guest.until("error")["words"].endswith(".")
+        guest.ask("begin", chosen={name: CHOSEN[name] for name in list(CHOSEN)[1:]})
+        assert guest.until("error")["words"].endswith(".")
+    assert state_of(room) == before
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"\0" * 100, b"PK\x03\x04" + b"x" * 1000, b"\xff" * 2**20], ids=len
+)
+def test_a_file_that_is_no_session_is_refused(room, content):
+    before = state_of(room)
+    with Guest(room) as guest:
+        guest.socket.send(content)
+        assert guest.until("error")["words"].endswith(".")
+    assert state_of(room) == before
+
+
+def test_a_file_that_is_too_large_is_not_even_read(room):
+    before = state_of(room)
+    with Guest(room) as guest:
+        with suppress(ConnectionClosed):
+            guest.socket.send(b"x" * (server._MOST_UPLOAD + 1))
+        guest.until_cut_off()
+    with Guest(room):
+        assert state_of(room) == before
+
+
+def test_bytes_that_are_no_websocket_harm_nobody(room):
+    before = state_of(room)
+    with Guest(room) as guest:
+        for noise in (
+            b"\xff" * 10_000,
+            b"GET / HTTP/1.1\r\n" + b"a: b\r\n" * 10_000,
+            b"\r\n" * 999,
+        ):
+            with socket.create_connection(("127.0.0.1", room.port)) as line, suppress(OSError):
+                line.sendall(noise)  # until it is cut off
+        guest.socket.socket.sendall(b"\xff\xff\xff\xff\xff")  # no frame of a socket
+        guest.until_cut_off()
+    with Guest(room):
+        assert state_of(room) == before
+
+
+def test_sockets_that_say_nothing_keep_nobody_out(room):
+    before = state_of(room)
+    lines = [socket.create_connection(("127.0.0.1", room.port)) for _ in range(60)]
+    for number, line in enumerate(lines):
+        line.sendall(b"GET /socket HTTP/1.1\r\nHost: "[: number % 30])
+    with Guest(room) as guest:
+        assert state_of(room) == before
+        guest.ask("step", ticks=1)
+        guest.until("frame")
+    for line in lines:
+        line.close()
+
+
+def test_fifty_pages_are_too_many_but_harm_nobody(room):
+    before, guests = state_of(room), [Guest(room) for _ in range(server._MOST_PAGES)]
+    for _ in range(50 - server._MOST_PAGES):
+        with pytest.raises(InvalidStatus) as refused:
+            Guest(room)
+        assert refused.value.response.status_code == 503
+    assert state_of(room) == before
+    guests[0].until("whole")
+    guests[0].ask("step", ticks=1)
+    for guest in guests:
+        guest.until("frame")
+    assert_same(guests[0], room.session)
+    for guest in guests:
+        guest.close()
+    while room._joined:
+        time.sleep(0.01)
+    with Guest(room):
+        pass
+
+
+def test_who_asks_without_end_waits_its_turn(room):
+    """One page floods the room while another one works."""
+    with Guest(room) as flood, Guest(room) as guest:
+        for _ in range(3000):
+            flood.ask("pause")
+        for _ in range(5):
+            guest.ask("step", ticks=1)
+            guest.until("frame")
+            guest.seen(1)
+        assert room.session.ticks == 5
+
+
+def test_a_session_is_saved_and_loaded(room):
+    with Guest(room) as guest, Guest(room) as other:
+        guest.ask("step", ticks=20)
+        free = int(room.session.colony.grid.index((5, 5, 0)))
+        guest.ask("edit", edit={"kind": "ground", "what": "rock", "cells": [free]})
+        guest.ask("step", ticks=20)
+        guest.ask("export", kind="session")
+        saved = guest.until("session.npz")
+        before = state_of(room)
+        guest.ask("restart")
+        both(guest, other, "whole")
+        assert room.session.ticks == 0
+        guest.socket.send(saved)
+        both(guest, other, "whole")
+        assert state_of(room) == before
+        assert_same(guest, room.session)
+        assert_same(other, room.session)
+        guest.socket.send(saved[:-200] + b"\0" * 200)
+        assert "session" in guest.until("error")["words"]
+        assert state_of(room) == before
+
+
+def test_a_session_can_be_taken_away_in_every_form(room, tmp_path):
+    from PIL import Image
+
+    from taichi_ants import load_policy
+
+    with Guest(room) as guest:
+        guest.ask("step", ticks=12)
+        for kind, (name, _) in server.EXPORTS.items():
+            guest.ask("export", kind=kind)
+            (tmp_path / name).write_bytes(guest.until(name))
+    before = state_of(room)
+    assert (tmp_path / "session.html").read_text().startswith("<!doctype html>")
+    with Image.open(tmp_path / "session.gif") as animation:
+        assert animation.n_frames > 1
+    policy = load_policy(tmp_path / "policy.npz")
+    assert np.array_equal(policy.q_values, room.session.colony.q_values[0])
+    colony = Colony.load(tmp_path / "colony.npz")
+    assert colony.ticks == room.session.colony.ticks
+    assert state_of(room) == before
+
+
+def test_time_goes_on_while_a_file_is_made(room):
+    with Guest(room) as guest:
+        guest.ask("export", kind="gif")
+        guest.ask("step", ticks=1)
+        kind = ""
+        while kind != "frame":
+            kind, _ = guest.hear()
+            assert kind != "session.gif"
+        guest.ask("export", kind="page")
+        assert "another file is being made" in guest.until("error")["words"]
+        guest.until("session.gif")
+        guest.ask("export", kind="page")
+        guest.until("session.html")
+
+
+def test_what_the_page_would_choose_is_the_session(room):
+    with Guest(room) as guest:
+        for chosen in [
+            {**CHOSEN, "policy": "file mine", "rules": None, "world": "double_bridge"},
+            {**CHOSEN, "policy": "by hand", "world": "far_piles", "world_seed": 4, "size": 20},
+            {**CHOSEN, "world": "map", "map": "  .\n0   F\n  .\n    Q\n", "ants": 1},
+            {**CHOSEN, "policy": "learn double_q", "ticks": 0},
+        ]:
+            guest.ask("begin", chosen=chosen)
+            guest.until("begin")
+            guest.until("whole")
+            back = guest.state["chosen"]
+            wanted = {**chosen, "rules": [] if chosen["rules"] is None else chosen["rules"]}
+            if chosen["policy"] == "by hand":
+                wanted["policy"] = "file mine"  # the same values
+            assert back == wanted
+            guest.ask("step", ticks=1)
+            guest.until("frame")
+
+
+def test_it_ends_when_a_page_asks(shared):
+    with running(shared.choices) as one, Guest(one) as guest:
+        guest.ask("quit")
+        guest.until("over")
+        guest.until_cut_off()

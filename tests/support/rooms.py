@@ -1,0 +1,108 @@
+"""A room that runs while tests are its pages."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection, connect
+
+from taichi_ants.live.choices import Choices
+from taichi_ants.live.server import Room
+from taichi_ants.live.session import Session
+
+SECONDS = 60.0  # until a page that hears nothing gives up
+
+# A small session: ants that learn in a paper's world.
+CHOSEN: dict[str, Any] = {
+    **{"world": "paper", "map": "", "world_seed": 0, "size": 30},
+    **{
+        "rules": ["rising", "falls"],
+        "sees": "ants",
+        "policy": "learn sarsa",
+        "ants": 12,
+        "seed": 5,
+        "ticks": 50,
+    },
+}
+
+
+@contextmanager
+def running(choices: Choices, chosen: dict[str, Any] | None = None) -> Iterator[Room]:
+    """A room with a session, whose time passes in another thread."""
+    session = Session(choices.setup(chosen or CHOSEN))  # starts Taichi, in this thread
+    session.advance()
+    room = Room(session, choices)
+    thread = threading.Thread(target=room.run, daemon=True)
+    thread.start()
+    yield room
+    room.end()
+    thread.join(10)
+    assert not thread.is_alive()
+
+
+class Guest:
+    """A page that a test plays: it asks, and hears what it is told."""
+
+    def __init__(self, room: Room, **given: Any) -> None:
+        self.room = room
+        address = room.url.replace("http", "ws").replace("/?", "/socket?")
+        usual = {"origin": f"http://127.0.0.1:{room.port}", "max_size": None, "proxy": None}
+        self.socket: ClientConnection = connect(address, **{**usual, **given}).__enter__()
+        self.header: dict[str, Any] = {}
+        self.frames: list[bytes] = []  # since the last one that was whole, with that
+        self.state: dict[str, Any] = {}
+        self.errors: list[str] = []
+
+    def ask(self, what: str, **more: Any) -> None:
+        self.socket.send(json.dumps({"do": what, **more}))
+
+    def hear(self) -> tuple[str, Any]:
+        """The next that it is told: its kind, and a message or bytes."""
+        message = self.socket.recv(SECONDS)
+        if isinstance(message, bytes):
+            self.frames.append(message)
+            return "frame", message
+        said = json.loads(message)
+        if said["say"] == "begin":
+            self.header = said["header"]
+        elif said["say"] == "state":
+            self.state = said
+        elif said["say"] == "error":
+            self.errors.append(said["words"])
+        elif said["say"] == "moment":
+            self.frames = [self.socket.recv(SECONDS)]  # type: ignore[list-item]
+            return "whole", self.frames[0]
+        elif said["say"] == "file":
+            return said["name"], self.socket.recv(SECONDS)
+        return said["say"], said
+
+    def until(self, kind: str) -> Any:
+        """What it is told of a kind next."""
+        while True:
+            heard, message = self.hear()
+            if heard == kind:
+                return message
+
+    def until_cut_off(self) -> None:
+        """Hear all until the room closes the socket."""
+        with pytest.raises(ConnectionClosed):
+            self.until("the end")
+
+    def seen(self, frames: int) -> None:
+        self.ask("seen", frames=frames)
+
+    def close(self) -> None:
+        self.socket.close()
+
+    def __enter__(self) -> Guest:
+        self.until("whole")
+        return self
+
+    def __exit__(self, *failure: object) -> None:
+        self.close()
