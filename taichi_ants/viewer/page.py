@@ -17,13 +17,15 @@ from taichi_ants.viewer.recording import Recording, record_colony, record_trace
 
 # The parts of one script, in this order: what a part uses stands in those before it.
 SCRIPTS = ("history.js", "stage.js", "panel.js", "timeline.js", "viewer.js")
+STYLES = ("colours.css", "viewer.css")
 _NOTEBOOK_HEIGHT = 720  # pixels
 # Notebooks show what is larger as text: a page inside of them would be too slow, or too large.
 _MOST_CELLS, _MOST_ANTS, _MOST_STEPS = 200_000, 20_000, 10_000
 
 
 @cache
-def _text(name: str) -> str:
+def part(name: str) -> str:
+    """The text of a part of the page, also for other pages that play a recording."""
     return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
 
 
@@ -32,13 +34,13 @@ def page(recording: Recording) -> str:
     expect("recording", recording, Recording)
     parts = {
         "TITLE": html.escape(recording.header["title"]),
-        "STYLE": _text("viewer.css"),
+        "STYLE": "\n".join(map(part, STYLES)),
         "RECORDING": base64.b64encode(recording.to_bytes()).decode(),
-        "SCRIPT": "\n".join(map(_text, SCRIPTS)),
+        "SCRIPT": "\n".join(map(part, SCRIPTS)),
     }
-    whole = _text("page.html")
-    for name, part in parts.items():
-        whole = whole.replace(f"<!-- {name} -->", part)
+    whole = part("page.html")
+    for name, text in parts.items():
+        whole = whole.replace(f"<!-- {name} -->", text)
     return whole
 
 
