@@ -28,6 +28,7 @@ LAYERS = (
     {"offline"},
     {"viewer", "envs"},
     {"studies"},
+    {"report"},
     {"commands"},
     {"__main__"},
 )

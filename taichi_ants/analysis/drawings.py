@@ -66,7 +66,7 @@ def _for_page(svg: str, title: str) -> str:
     svg = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>", "", svg, flags=re.S)
     svg = re.sub(r' font-family: [^;"]*;', "", svg)
     svg = re.sub(r'<g id="[^"]*">', "<g>", svg)
-    svg = re.sub(r"-?\d+\.\d{2,}", lambda found: f"{float(found[0]):.1f}", svg)
+    svg = re.sub(r' (?:d|x|y|transform)="[^"]*"', _short, svg)
     svg = re.sub(r"(?:<use [^>]*/>\s*){2,}", _marks, svg)
     svg = re.sub(r"\s*\n\s*", "\n", svg)
     for colour, name in COLOURS.items():
@@ -75,6 +75,11 @@ def _for_page(svg: str, title: str) -> str:
     assert box is not None
     head = f'<svg viewBox="{box[1]}" role="img" aria-label="{html.escape(title)}"'
     return re.sub(r"<svg[^>]*", lambda _: head, svg, count=1)
+
+
+def _short(found: re.Match) -> str:
+    """A place or a path in tenths of a point."""
+    return re.sub(r"-?\d+\.\d{2,}", lambda number: f"{float(number[0]):.1f}", found[0])
 
 
 _USE = re.compile(r'href="([^"]*)" x="([^"]*)" y="([^"]*)"(?: style="([^"]*)")?')

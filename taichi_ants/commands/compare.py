@@ -33,10 +33,7 @@ if TYPE_CHECKING:
     from taichi_ants import World
     from taichi_ants.analysis.paper.comparison import Comparison
     from taichi_ants.analysis.paper.results import Results
-    from taichi_ants.rendering import Episode
-    from taichi_ants.report.page import Picture, Player
     from taichi_ants.studies.runner import RunPoint, Study
-    from taichi_ants.task import Task
 
 DELIVERIES = ("continuing", "absorbing")
 ROLLOUTS = 50
@@ -44,7 +41,6 @@ QUICK_SEEDS = 10
 MOST_SEEDS = 10_000
 EPISODES, BASELINES = "episodes.npz", "baselines.csv"
 FIGURES, POLICIES, RENDERS = "figures", "policies", "renders"
-RENDERED_STEPS = 80  # at most; a delivery takes 34, to and fro on the trail 38
 _DEPTH = "planning_steps"  # the one hyperparameter that the paper varies
 _ARRAYS = ("returns", "steps", "deliveries", "greedy_returns", "greedy_steps", "greedy_deliveries")
 
@@ -160,19 +156,13 @@ def world_name(settings: argparse.Namespace, study: Study[RunPoint]) -> str:
     return Path(settings.world).name
 
 
-def as_in_training(task: Task) -> Task:
-    """The task with the evaporation of training in rollouts too."""
-    from dataclasses import replace
-
-    return replace(task, evaporation_in_evaluation=task.evaporation_in_training)
-
-
 def what_policies_do(study: Study[RunPoint], q_values: np.ndarray) -> dict[str, np.ndarray]:
     """What an ant does that follows each final policy, and what it earns; integer (C, S) both."""
     import numpy as np
 
     from taichi_ants.analysis.behaviour import classify
     from taichi_ants.engines.runs.traces import MAX_ROLLOUT_STEPS, trace_policies
+    from taichi_ants.report.players import as_in_training
 
     first, (n, seeds) = study.points[0], q_values.shape[:2]
     tables = q_values.reshape(-1, *q_values.shape[2:])
@@ -200,16 +190,6 @@ def write_tables(folder: Path, results: Results) -> None:
     files.write_text(folder / REPORT, report(comparison, lines, results.answer, audit))
 
 
-def policy_path(folder: Path, comparison: Comparison, row: int, run: int) -> Path:
-    """The file of a run that is an example."""
-    from taichi_ants.analysis.behaviour import NAMES
-
-    delivery, variant, _ = comparison.rows[row]
-    own = "".join(f"_{part}" for part in variant.short)
-    behaviour = NAMES[comparison.behaviours[row, run]]
-    return folder / POLICIES / f"{delivery}_{variant.learner}{own}_{behaviour}.npz"
-
-
 def write_policies(
     settings: argparse.Namespace,
     folder: Path,
@@ -220,7 +200,7 @@ def write_policies(
     """Write the final Q-tables of some runs, with what an ant that follows them does."""
     from taichi_ants import files, save_policy
     from taichi_ants.analysis.behaviour import BEHAVIOURS
-    from taichi_ants.analysis.paper.best_of import examples
+    from taichi_ants.analysis.paper.best_of import example_name, examples
 
     for place in (POLICIES, RENDERS):
         files.check_writable_folder(folder / place)
@@ -238,24 +218,13 @@ def write_policies(
                 "return_last50": comparison.measure("return_last50")[row, run],
                 "behaviour": BEHAVIOURS[behaviour],
             }
-            path = policy_path(folder, comparison, row, run)
+            path = folder / POLICIES / f"{example_name(comparison, row, run)}.npz"
             save_policy(path, tables[row, run], metadata)
             if not settings.no_figures:
                 title = f"{variant.label}, {point.task.delivery}"
                 shown = folder / RENDERS / f"{path.stem}.gif"
                 render_policy(shown, point, tables[row, run], metadata, title)
             report_progress(done / len(chosen))
-
-
-def played(point: RunPoint, q_values: np.ndarray, seed: int) -> Episode:
-    """The beginning of the episode that told the behaviour of a policy.
-
-    It has evaporation as in training, not as in the greedy evaluation.
-    """
-    from taichi_ants.rendering import Episode
-
-    steps, task = min(point.max_steps, RENDERED_STEPS), as_in_training(point.task)
-    return Episode.play(point.world, q_values, seed=seed, max_steps=steps, task=task)
 
 
 def render_policy(
@@ -265,6 +234,7 @@ def render_policy(
     from dataclasses import replace
 
     from taichi_ants.rendering import PAUSE, frames, save_animation
+    from taichi_ants.report.players import played
 
     episode = played(point, q_values, metadata["seed"])
     episode = replace(episode, name=metadata["behaviour"])
@@ -337,39 +307,6 @@ def do_comparison(
     return results
 
 
-def what_is_seen(
-    folder: Path, study: Study[RunPoint], comparison: Comparison
-) -> tuple[list[Player], Picture | None]:
-    """A recording of each behaviour, and the sheet of a policy that delivers, if one does."""
-    from taichi_ants import load_policy
-    from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS, DELIVERS, counts
-    from taichi_ants.analysis.paper.best_of import examples
-    from taichi_ants.analysis.tables import sentence
-    from taichi_ants.rendering import policy_sheet
-    from taichi_ants.report.page import Picture, Player
-    from taichi_ants.viewer import record_episode
-
-    first: dict[int, tuple[int, int]] = {}
-    for row, run in examples(comparison):
-        if policy_path(folder, comparison, row, run).exists():  # an older version kept fewer
-            first.setdefault(int(comparison.behaviours[row, run]), (row, run))
-    players, sheet, done = [], None, counts(comparison.behaviours)
-    for code, (row, run) in sorted(first.items()):
-        point, variant = study.points[row], comparison.rows[row].variant
-        policy = load_policy(policy_path(folder, comparison, row, run))
-        whose = f"{variant.label}, {point.task.delivery} delivery, seed {study.seeds[run]}"
-        episode, name = played(point, policy.q_values, study.seeds[run]), BEHAVIOURS[code]
-        words = (
-            f"{sentence(DEFINITIONS[code])}. So do {done[code]} of {comparison.behaviours.size} "
-        )
-        words += f"final policies. Here: {whose}."
-        players.append(Player(sentence(name), words, record_episode(episode, name)))
-        if code == DELIVERS:
-            image = policy_sheet(policy.q_values, f"{variant.label}: what it does", task=point.task)
-            sheet = Picture(f"What an ant has learned: {whose}", image)
-    return players, sheet
-
-
 def facts(settings: argparse.Namespace, study: Study[RunPoint]) -> dict[str, str]:
     """How it was done, in words."""
     from taichi_ants.errors import count
@@ -414,6 +351,7 @@ def make_page(
     from taichi_ants.analysis.paper.figures import draw_all
     from taichi_ants.report.comparison import comparison_page
     from taichi_ants.report.page import made_facts
+    from taichi_ants.report.players import what_is_seen
     from taichi_ants.studies.result_folder import MANIFEST
 
     if results is None:
@@ -421,7 +359,7 @@ def make_page(
         results = results_of(settings, study, arrays, files.read_csv(folder / BASELINES))
     comparison, shown = results.comparison, not settings.no_figures
     drawn = draw_all(comparison, results.baselines) if shown else {}
-    players, sheet = what_is_seen(folder, study, comparison) if shown else ([], None)
+    players, sheet = what_is_seen(folder / POLICIES, study, comparison) if shown else ([], None)
     return comparison_page(
         results,
         drawings=drawings(drawn),

@@ -5,6 +5,7 @@
   (`report.js`); what moves on them is played by the viewer's script.
 """
 
+from taichi_ants.report.colony import colony_page
 from taichi_ants.report.comparison import comparison_page
 
-__all__ = ["comparison_page"]
+__all__ = ["colony_page", "comparison_page"]

@@ -74,7 +74,7 @@ def comparison_page(
         "comparison.html",
         title="Which learner makes the better ant?",
         byline=f"{seeds}, {count(len(comparison.rows), 'configuration')}, "
-        f"{count(comparison.returns.size, 'episode')} of training, world: {comparison.world}",
+        f"{comparison.returns.size:,} episodes of training, world: {comparison.world}",
         seeds=f"{len(comparison.seeds)} runs" if len(comparison.seeds) > 1 else "a run",
         configurations=len(GRID),
         best=("Q-learning", TABLE_2[Q_LEARNING].reward),

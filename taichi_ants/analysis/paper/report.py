@@ -151,7 +151,9 @@ def behaviour_table(lines: Sequence[Mapping], behaviours: Sequence[Mapping]) -> 
         "Return: mean of the last 50 training episodes, of the episode that tells the",
         "behaviour, of the greedy evaluation. summary.csv counts all configurations.",
     )
-    return Table("What the ants do", headers, rows, notes, text_columns=3)
+    return Table(
+        "What they do in the configurations of table 2", headers, rows, notes, text_columns=3
+    )
 
 
 def _baselines(baselines: Sequence[Mapping]) -> Table:
