@@ -44,6 +44,11 @@ def percent(share: float) -> str:
     return f"{100 * share:.{0 if share >= 0.0995 or share == 0 else 1}f} %"
 
 
+def thousands(number_of: int) -> str:
+    """A large count as "12 800"."""
+    return f"{number_of:,}".replace(",", " ")
+
+
 def joined(words: Sequence[str]) -> str:
     """Words as "one, two and three"."""
     *first, last = words

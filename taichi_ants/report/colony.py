@@ -73,10 +73,10 @@ def _statements(findings: Judged) -> Statements:
     for (arena, series), by_sizes in findings.items():
         unit = MEASURES[series.measure]
         told = [
-            judged(str(n) if n == less else f"{n} against {less}", finding, "")
+            judged(f"{n} ants" if n == less else f"{n} against {less}", finding, "difference")
             for (n, less), finding in by_sizes.items()
         ]
-        facts = {"Question": series.question, "Difference in": unit, "By numbers of ants": "below"}
+        facts = {"Question": series.question, "Difference in": unit}
         verdicts = [of_largest(by_sizes).verdict]
         statement = f"{sentence(series.statement)}."
         lines.append(Statement(statement, sentence(WORLDS[arena]), verdicts, facts, told))

@@ -15,6 +15,7 @@ from taichi_ants.analysis.paper.published import (
 )
 from taichi_ants.analysis.paper.report import all_tables, behaviour_table
 from taichi_ants.analysis.paper.results import Results
+from taichi_ants.analysis.tables import sentence, thousands
 from taichi_ants.errors import count
 from taichi_ants.report.page import (
     KINDS,
@@ -74,7 +75,7 @@ def comparison_page(
         "comparison.html",
         title="Which learner makes the better ant?",
         byline=f"{seeds}, {count(len(comparison.rows), 'configuration')}, "
-        f"{comparison.returns.size:,} episodes of training, world: {comparison.world}",
+        f"{thousands(comparison.returns.size)} episodes of training, world: {comparison.world}",
         seeds=f"{len(comparison.seeds)} runs" if len(comparison.seeds) > 1 else "a run",
         configurations=len(GRID),
         best=("Q-learning", TABLE_2[Q_LEARNING].reward),
@@ -104,9 +105,12 @@ def _claims(results: Results) -> Statements:
     lines = []
     for claim, findings in results.audit.items():
         unit, centre = claim.quantity.unit, claim.centre
-        told = [judged(f"{setting} delivery", one, unit) for setting, one in findings.items()]
+        told = [
+            judged(f"{setting} delivery", one, one.contrast.label, unit)
+            for setting, one in findings.items()
+        ]
         facts = {"Tested on": claim.tested_on, "Asked": f"{centre} {claim.criterion.words} {unit}"}
         verdicts = [one.verdict for one in findings.values()]
         lines.append(Statement(claim.statement, claim.section, verdicts, facts, told))
-    settings = [f"{setting} delivery" for setting in results.comparison.delivery_settings]
+    settings = map(sentence, results.comparison.delivery_settings)
     return Statements(("The paper, in our words", "Section", *settings), lines, "claims")

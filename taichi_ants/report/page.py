@@ -110,13 +110,13 @@ class Judged(NamedTuple):
     drawing: str
 
 
-def judged(setting: str, finding: Finding, unit: str) -> Judged:
-    """A finding as a page shows it."""
-    words = finding.contrast.label
+def judged(setting: str, finding: Finding, label: str, unit: str = "") -> Judged:
+    """A finding as a page shows it: a label of its effect, the effect, and in what unit it is."""
+    words = label
     if finding.verdict is not Verdict.NOT_TESTED:
         digits = 1 if finding.contrast.typical or abs(finding.effect) >= 10 else 2
         effect, low, high = (number(x, digits) for x in (finding.effect, finding.low, finding.high))
-        words += f": {effect} {unit}"
+        words += f": {effect} {unit}".rstrip()
         words += f", between {low} and {high}" if finding.contrast.seeds > 1 else ""
     by_mean = finding.by_mean
     if by_mean and by_mean.verdict is not finding.verdict:

@@ -12,7 +12,7 @@ from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS, DELIVERS, co
 from taichi_ants.analysis.colony.study import ARENAS, JOINT, RULES
 from taichi_ants.analysis.paper.best_of import example_name, examples
 from taichi_ants.analysis.paper.comparison import Comparison
-from taichi_ants.analysis.tables import sentence
+from taichi_ants.analysis.tables import sentence, thousands
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.errors import count
 from taichi_ants.learners.policies import load_policy
@@ -57,8 +57,8 @@ def what_is_seen(
         point, seed, variant = study.points[row], study.seeds[run], comparison.rows[row].variant
         policy = load_policy(policies / f"{example_name(comparison, row, run)}.npz")
         whose = f"{variant.label}, {point.task.delivery} delivery, seed {seed}"
-        words = f"{sentence(DEFINITIONS[code])}: {done[code]:,} of {comparison.behaviours.size:,} "
-        words += f"final policies. Here: {whose}."
+        share = f"{thousands(done[code])} of {thousands(comparison.behaviours.size)}"
+        words = f"{sentence(DEFINITIONS[code])}: {share} final policies. Here: {whose}."
         recording = record_episode(played(point, policy.q_values, seed), BEHAVIOURS[code])
         players.append(Player(sentence(BEHAVIOURS[code]), words, recording))
         if code == DELIVERS:

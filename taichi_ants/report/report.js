@@ -5,8 +5,9 @@ const still = matchMedia("(prefers-reduced-motion: reduce)");
 const players = [];
 let chosenTheme = "";
 
-/* Paper is light. */
+/* Paper is light, and cannot open what is closed. */
 function showTheme() {
+  if (printing.matches) document.querySelectorAll(".more").forEach((one) => (one.open = true));
   const wanted = chosenTheme || (dark.matches ? "dark" : "light");
   document.documentElement.dataset.theme = printing.matches ? "light" : wanted;
   for (const player of players) player.readColours();

@@ -72,7 +72,7 @@ POLICY = f"policies/{SHOWN[0]}.npz"
 RENDERS = {f"renders/{name}.gif" for name in SHOWN}
 FILES = {
     *("baselines.csv", "behaviours.csv", "claims.csv", "claims.md", "episodes.npz"),
-    *("manifest.json", "report.txt", "summary.csv", "table2.csv", "table2.md"),
+    *("manifest.json", "report.html", "report.txt", "summary.csv", "table2.csv", "table2.md"),
     *(f"policies/{name}.npz" for name in SHOWN),
     *FIGURES,
     *RENDERS,
@@ -90,7 +90,8 @@ def finished(tmp_path_factory, kernels):
     report = (folder / "report.txt").read_text("utf-8")
     assert done.stdout.startswith(report)
     assert re.fullmatch(
-        r"\n\d+\.\d s; everything is in deep/out/\n", done.stdout.removeprefix(report)
+        r"\n\d+\.\d s; everything is in deep/out/\ndeep/out/report.html\n",
+        done.stdout.removeprefix(report),
     )
     return folder
 
@@ -341,7 +342,8 @@ def test_the_same_command_shows_the_finished_comparison(copy, compare):
     status, out, err = compare(*SMALL, "--out", copy)
     report = before["report.txt"].decode("utf-8")
     assert (status, err) == (0, "")
-    assert out == f"{report}\n{copy}/ holds these results already; --force makes them again.\n"
+    already = f"{copy}/ holds these results already; --force makes them again."
+    assert out == f"{report}\n{already}\n{copy}/report.html\n"
     assert contents(copy) == before
 
 

@@ -10,8 +10,15 @@ from taichi_ants.analysis.findings import Finding, Verdict
 from taichi_ants.analysis.paper.audit import Audit
 from taichi_ants.analysis.paper.claims import Claim
 from taichi_ants.analysis.paper.comparison import Comparison, Variant
-from taichi_ants.analysis.tables import figure, interval, joined, number, percent, sentence
-from taichi_ants.errors import count
+from taichi_ants.analysis.tables import (
+    figure,
+    interval,
+    joined,
+    number,
+    percent,
+    sentence,
+    thousands,
+)
 
 # The claims that answer the question, each as said where it holds and where it does not.
 _CLAIMS = {
@@ -84,12 +91,12 @@ def _extremes(lines: Sequence[Mapping]) -> str:
 def _doings(comparison: Comparison) -> str:
     """What the final policies do, and whose they mostly are that do not deliver."""
     codes = comparison.behaviours
-    done, all_of_them = counts(codes), count(codes.size, "final policy")
+    done, all_of_them = counts(codes), f"{thousands(codes.size)} final policies"
     delivers = done.pop(DELIVERS, 0)
     if not done:
         return f"All of {all_of_them} deliver." if codes.size > 1 else "The final policy delivers."
-    rest = joined([f"{n} {_DOING[code]}" for code, n in done.items()])
-    text = f"Of {all_of_them}, {delivers or 'none'} deliver; {rest}"
+    rest = joined([f"{thousands(n)} {_DOING[code]}" for code, n in done.items()])
+    text = f"Of {all_of_them}, {thousands(delivers) if delivers else 'none'} deliver; {rest}"
     idle: Counter = Counter()
     for row, runs in zip(comparison.rows, codes, strict=True):
         idle[row.variant, row.delivery] += int((runs != DELIVERS).sum())
