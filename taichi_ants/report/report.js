@@ -27,8 +27,9 @@ class SmallPlayer {
     this.slider.max = this.player.last;
     this.button.addEventListener("click", () => this.press());
     this.slider.addEventListener("input", () => {
+      const moment = Number(this.slider.value); // drawing moves the slider
       this.player.pause();
-      this.player.go(Number(this.slider.value));
+      this.player.go(moment);
     });
     new ResizeObserver(() => this.stage.resize() && this.draw()).observe(canvas);
     this.stage.resize();
@@ -40,14 +41,19 @@ class SmallPlayer {
     if (player.playing) return player.pause();
     for (const other of players) if (other !== this) other.player.pause();
     player.play();
-    let before = performance.now();
-    const on = (now) => {
-      const moved = player.pass((now - before) / 1000);
-      before = now;
+    this.before = null;
+    if (!this.runs) this.run();
+  }
+
+  run() {
+    this.runs = true;
+    requestAnimationFrame((now) => {
+      const moved = this.player.pass((now - (this.before ?? now)) / 1000);
+      this.before = now;
       if (moved) this.draw();
-      if (player.playing) requestAnimationFrame(on);
-    };
-    requestAnimationFrame(on);
+      this.runs = this.player.playing;
+      if (this.runs) this.run();
+    });
   }
 
   readColours() {

@@ -79,8 +79,8 @@ def test_who_does_not_deliver_is_told(paper: Comparison) -> None:
     codes[0, 0] = OTHER
     mixed = replace(paper, behaviours=codes)
     assert told(mixed)[2] == (
-        f"Of {codes.size} final policies, {codes.size - 5} deliver; 3 walk the trail, 1 circle with "
-        "food and 1 do something else, 80 % of them Dyna-Q (p5) with continuing delivery."
+        f"Of {codes.size} final policies, {codes.size - 5} deliver; 3 walk the trail, 1 circle "
+        "with food and 1 do something else, 80 % of them Dyna-Q (p5) with continuing delivery."
     )
     none = replace(paper, behaviours=np.full_like(codes, WALKS))
     assert f"Of {codes.size} final policies, none deliver; {codes.size} walk" in told(none)[2]
