@@ -347,6 +347,20 @@ def test_the_same_command_shows_the_finished_comparison(copy, compare):
     assert contents(copy) == before
 
 
+def test_a_page_that_is_gone_is_made_again_from_the_other_files(copy, compare):
+    """To the same bytes: numbers, figures and players."""
+    before = contents(copy)
+    page = before["report.html"].decode("utf-8")
+    assert page.count('class="player"') == 2  # delivers, circles with food
+    assert page.count('class="plot wide"') == 2
+    assert "SARSA" in page
+    (copy / "report.html").unlink()
+    status, out, err = compare(*SMALL, "--out", copy)
+    assert (status, err) == (0, "")
+    assert out.endswith(f"\n{copy}/report.html\n")
+    assert contents(copy) == before
+
+
 def test_force_runs_again_and_leaves_no_old_pictures(copy, compare):
     before = contents(copy)
     (copy / "notes.txt").write_text("mine")
@@ -355,6 +369,7 @@ def test_force_runs_again_and_leaves_no_old_pictures(copy, compare):
     assert status == 0
     assert "already" not in out
     assert set(after) == FILES - FIGURES - RENDERS | {"notes.txt"}
+    assert b'class="player"' not in after["report.html"]
     for name in (
         "summary.csv",
         "episodes.npz",
