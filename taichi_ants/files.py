@@ -99,6 +99,20 @@ def write_csv(path: PathLike, rows: Iterable[Mapping[str, Any]], columns: Sequen
     write_text(path, text.getvalue())
 
 
+def read_csv(path: PathLike) -> list[dict[str, Any]]:
+    """The rows of a file of `write_csv`: what is a number as a float, an empty field as None.
+
+    Raises:
+        AntsError: The file cannot be read.
+    """
+    try:
+        with open(path, newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+    except (OSError, UnicodeError, csv.Error) as error:
+        raise AntsError(f"cannot read {_named(path)}: {_reason(error)}.") from error
+    return [{name: _number_in(text) for name, text in row.items()} for row in rows]
+
+
 def write_npz(path: PathLike, arrays: Mapping[str, npt.ArrayLike], compress: bool = True) -> None:
     """Write named arrays as an .npz; raises as `write_atomically` does.
 
@@ -179,6 +193,13 @@ def _reason(error: Exception) -> str:
     """A short reason in lower case, without the path and the number that OSError adds."""
     text = getattr(error, "strerror", None) or str(error) or type(error).__name__
     return text[:1].lower() + text[1:]
+
+
+def _number_in(text: str) -> float | str | None:
+    try:
+        return float(text)
+    except ValueError:
+        return text or None
 
 
 def _plain_scalar(value: Any) -> Any:

@@ -28,6 +28,7 @@ LAYERS = (
     {"offline"},
     {"viewer", "envs"},
     {"live", "studies"},
+    {"report"},
     {"commands"},
     {"__main__"},
 )

@@ -232,6 +232,16 @@ def test_csv_reads_back(tmp_path: Path) -> None:
     assert [float(row["b"]) for row in read] == [0.1 + 0.2, 1e-300, float(np.float32(0.1)), 2]
 
 
+def test_what_csv_holds_is_read_as_numbers_and_text(tmp_path: Path) -> None:
+    rows = [{"a": 0.1 + 0.2, "b": "x, y"}, {"a": 3, "b": None}, {"a": float("nan"), "b": "-"}]
+    files.write_csv(tmp_path / "a.csv", rows, ["a", "b"])
+    read = files.read_csv(tmp_path / "a.csv")
+    expected = [{"a": 0.1 + 0.2, "b": "x, y"}, {"a": 3.0, "b": None}, {"a": None, "b": "-"}]
+    assert read == expected
+    with pytest.raises(AntsError, match=r"cannot read '.*none\.csv'"):
+        files.read_csv(tmp_path / "none.csv")
+
+
 def test_csv_without_rows_is_a_header(tmp_path: Path) -> None:
     files.write_csv(tmp_path / "a.csv", [], ("a", "b"))
     assert (tmp_path / "a.csv").read_text() == "a,b\n"

@@ -14,7 +14,7 @@ from command_lines import ROOT, assert_one_sentence, environment
 
 from taichi_ants.commands import COMMANDS
 from taichi_ants.live.page import PARTS
-from taichi_ants.viewer.page import SCRIPTS
+from taichi_ants.viewer.page import SCRIPTS, STYLES
 
 BUILD = """
 import sys
@@ -50,7 +50,9 @@ def test_the_wheel_holds_the_package_and_nothing_else(built):
         names = [name for name in wheel.namelist() if ".dist-info/" not in name]
         (entries,) = [name for name in wheel.namelist() if name.endswith("entry_points.txt")]
         assert "taichi-ants = taichi_ants.commands:main" in wheel.read(entries).decode()
-    page = {f"taichi_ants/viewer/{name}" for name in ("page.html", "viewer.css", *SCRIPTS)}
+    page = {f"taichi_ants/viewer/{name}" for name in ("page.html", *STYLES, *SCRIPTS)}
+    templates = ("base.html", "parts.html", "comparison.html", "colony.html")
+    page |= {f"taichi_ants/report/{name}" for name in (*templates, "report.css", "report.js")}
     page |= {f"taichi_ants/live/{name}" for name in PARTS}
     assert set(names) == sources("taichi_ants") | {"taichi_ants/py.typed"} | page
 

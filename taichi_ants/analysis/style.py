@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from taichi_ants.files import write_atomically
+from taichi_ants.files import check_writable_folder, write_atomically
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -118,6 +118,17 @@ def legend_entries(axes: Iterable[Axes]) -> dict[str, Artist]:
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
     return entries
+
+
+def save_all(figures: Mapping[str, Figure], folder: str | Path) -> None:
+    """Write figures as PNG files with their names into a folder, which is made if needed.
+
+    Raises:
+        AntsError: The folder or a file in it cannot be written.
+    """
+    folder = check_writable_folder(folder)
+    for name, figure in figures.items():
+        save(figure, folder / f"{name}.png")
 
 
 def save(figure: Figure, path: Path) -> None:

@@ -44,6 +44,17 @@ def percent(share: float) -> str:
     return f"{100 * share:.{0 if share >= 0.0995 or share == 0 else 1}f} %"
 
 
+def thousands(number_of: int) -> str:
+    """A large count as "12 800"."""
+    return f"{number_of:,}".replace(",", " ")
+
+
+def joined(words: Sequence[str]) -> str:
+    """Words as "one, two and three"."""
+    *first, last = words
+    return f"{', '.join(first)} and {last}" if first else last
+
+
 def sentence(words: str) -> str:
     """Words with a capital in front; the others keep theirs."""
     return words[:1].upper() + words[1:]

@@ -31,6 +31,7 @@ from taichi_ants.studies.interruption import held
 
 if TYPE_CHECKING:
     from taichi_ants import Colony, Task
+    from taichi_ants.analysis.colony.results import Results
     from taichi_ants.learners.config import TrainingConfig
     from taichi_ants.learners.policies import Policy
     from taichi_ants.studies.colony_study import Plan
@@ -53,9 +54,10 @@ QUICK = {
     "rollouts": 2,
 }
 EVALUATION_EPSILON = 0.01
-WIDTH = 100  # of the report, in columns
+WIDTH = 79  # of the report, in columns
 COUNT: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
-CONDITIONS, FIGURES = "conditions.csv", "figures"
+SEEDS, CONDITIONS = "seeds.csv", "conditions.csv"
+FIGURES, POLICIES = "figures", "policies"
 _OF_RESUMED = ("resume", "ticks", "save", "render", "every", "figure", "plugin", "threads", "arch")
 _OF_LEARNING = ("learner", "learning_rate", "discount", "hyperparameter")
 _OF_LIFE = ("births", "lifespan", "regrowth", "wander")
@@ -214,17 +216,20 @@ def study(settings: argparse.Namespace) -> None:
     asked = Study(tuple(conditions.values()), seeds)
     words = {name: getattr(settings, name) for name in ("arenas", "sizes")}
     facts = {**words, **asked.settings()}
-    work_or_show(settings, facts, partial(do_study, settings, conditions, asked), tuple(words))
+    work = partial(do_study, settings, conditions, asked)
+    page = partial(make_page, settings, conditions, asked)
+    work_or_show(settings, facts, work, tuple(words), page)
 
 
 def do_study(
     settings: argparse.Namespace, conditions: Plan, asked: Study, blocks: Path, ready: Path
-) -> None:
+) -> Results:
     """Do what is not done yet, and write all results."""
     from taichi_ants import files, save_policy
+    from taichi_ants.analysis import style
     from taichi_ants.analysis.colony import tables
-    from taichi_ants.analysis.colony.contrasts import judge_all
-    from taichi_ants.analysis.colony.figures import save_all
+    from taichi_ants.analysis.colony.figures import draw_all
+    from taichi_ants.analysis.colony.results import Results
     from taichi_ants.analysis.tables import markdown, plain_text
     from taichi_ants.studies.colony_study import measured, median_policies, most_deliveries
     from taichi_ants.studies.result_folder import REPORT
@@ -232,23 +237,73 @@ def do_study(
     with progress_bar("study") as progress:
         outcomes = asked.run(blocks, settings.threads, settings.arch, progress)
     values = measured(conditions, outcomes)
-    judged = judge_all(values)
-    rows = tables.condition_rows(values, most_deliveries(conditions))
-    findings = tables.found(values, judged)
+    results = Results.of(values, most_deliveries(conditions))
     for name, table in (
-        ("seeds.csv", tables.rows_of_seeds(values, asked.seeds)),
-        (CONDITIONS, rows),
-        ("differences.csv", tables.difference_rows(judged)),
+        (SEEDS, tables.rows_of_seeds(values, asked.seeds)),
+        (CONDITIONS, results.rows),
+        ("differences.csv", tables.difference_rows(results.judged)),
     ):
         files.write_csv(ready / name, table, list(table[0]))
+    findings = tables.found(values, results.judged)
     files.write_text(ready / "findings.md", markdown(findings))
-    report = plain_text([*tables.means(rows), *findings], WIDTH)
-    files.write_text(ready / REPORT, report)
-    policies = files.check_writable_folder(ready / "policies")
+    screen = tables.on_one_screen(results.rows, results.judged, results.answer)
+    files.write_text(ready / REPORT, plain_text(screen, WIDTH))
+    policies = files.check_writable_folder(ready / POLICIES)
     for name, q, facts, seen in median_policies(conditions, asked.seeds, values, outcomes):
         save_policy(policies / f"{name}.npz", q, facts, seen)
     if not settings.no_figures:
-        save_all(rows, ready / FIGURES)
+        style.save_all(draw_all(results.rows), ready / FIGURES)
+    return results
+
+
+def make_page(
+    settings: argparse.Namespace,
+    conditions: Plan,
+    asked: Study,
+    folder: Path,
+    results: Results | None,
+    made: Mapping[str, Any],
+) -> str:
+    """The page of the results in a folder, which are read from there if they are not given."""
+    from taichi_ants import files
+    from taichi_ants.analysis.colony.figures import draw_all
+    from taichi_ants.analysis.colony.results import Results
+    from taichi_ants.analysis.drawings import drawings
+    from taichi_ants.report.colony import colony_page
+    from taichi_ants.report.page import made_facts
+    from taichi_ants.report.players import at_work
+    from taichi_ants.studies.result_folder import MANIFEST
+
+    results = results or Results.read(
+        files.read_csv(folder / SEEDS), files.read_csv(folder / CONDITIONS)
+    )
+    shown = not settings.no_figures
+    return colony_page(
+        results.rows,
+        results.judged,
+        results.answer,
+        drawings=drawings(draw_all(results.rows)) if shown else [],
+        players=at_work(folder / POLICIES, conditions, asked.seeds, settings.arch) if shown else [],
+        facts={**study_facts(settings), **made_facts(made)},
+        files=[path.name for path in folder.iterdir()] + [MANIFEST],
+    )
+
+
+def study_facts(settings: argparse.Namespace) -> dict[str, str]:
+    """How it was done, in words."""
+    from taichi_ants.analysis.colony.study import WORLDS
+
+    last = settings.seed + settings.seeds - 1
+    return {
+        "Worlds": "; ".join(WORLDS[arena] for arena in settings.arenas),
+        "Ants": ", ".join(map(str, settings.sizes)),
+        "Learner": f"{settings.learner}, learning rate {settings.learning_rate:g}, "
+        f"discount {settings.discount:g}, epsilon {settings.epsilon:g} at first, "
+        f"{EVALUATION_EPSILON:g} at last and in the evaluation",
+        "Seeds": f"{settings.seed} to {last}",
+        "Training": f"{settings.episodes} episodes of {settings.ticks} ticks",
+        "Evaluation": f"{settings.rollouts} episodes of {settings.ticks} ticks",
+    }
 
 
 def live(settings: argparse.Namespace) -> None:

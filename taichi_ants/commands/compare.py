@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import itertools
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
@@ -31,8 +32,8 @@ if TYPE_CHECKING:
 
     from taichi_ants import World
     from taichi_ants.analysis.paper.comparison import Comparison
+    from taichi_ants.analysis.paper.results import Results
     from taichi_ants.studies.runner import RunPoint, Study
-    from taichi_ants.task import Task
 
 DELIVERIES = ("continuing", "absorbing")
 ROLLOUTS = 50
@@ -40,7 +41,6 @@ QUICK_SEEDS = 10
 MOST_SEEDS = 10_000
 EPISODES, BASELINES = "episodes.npz", "baselines.csv"
 FIGURES, POLICIES, RENDERS = "figures", "policies", "renders"
-RENDERED_STEPS = 80  # at most; a delivery takes 34, to and fro on the trail 38
 _DEPTH = "planning_steps"  # the one hyperparameter that the paper varies
 _ARRAYS = ("returns", "steps", "deliveries", "greedy_returns", "greedy_steps", "greedy_deliveries")
 
@@ -156,19 +156,13 @@ def world_name(settings: argparse.Namespace, study: Study[RunPoint]) -> str:
     return Path(settings.world).name
 
 
-def as_in_training(task: Task) -> Task:
-    """The task with the evaporation of training in rollouts too."""
-    from dataclasses import replace
-
-    return replace(task, evaporation_in_evaluation=task.evaporation_in_training)
-
-
 def what_policies_do(study: Study[RunPoint], q_values: np.ndarray) -> dict[str, np.ndarray]:
     """What an ant does that follows each final policy, and what it earns; integer (C, S) both."""
     import numpy as np
 
     from taichi_ants.analysis.behaviour import classify
     from taichi_ants.engines.runs.traces import MAX_ROLLOUT_STEPS, trace_policies
+    from taichi_ants.report.players import as_in_training
 
     first, (n, seeds) = study.points[0], q_values.shape[:2]
     tables = q_values.reshape(-1, *q_values.shape[2:])
@@ -180,24 +174,20 @@ def what_policies_do(study: Study[RunPoint], q_values: np.ndarray) -> dict[str, 
     return {name: np.concatenate(parts).reshape(n, seeds) for name, parts in arrays.items()}
 
 
-def write_tables(folder: Path, comparison: Comparison, baselines: list[dict[str, Any]]) -> None:
+def write_tables(folder: Path, results: Results) -> None:
     """Write all tables and the report."""
     from taichi_ants import files
-    from taichi_ants.analysis.paper.audit import assess, claims_markdown, claims_rows
+    from taichi_ants.analysis.paper.audit import claims_markdown, claims_rows
     from taichi_ants.analysis.paper.report import report, table2_markdown
-    from taichi_ants.analysis.paper.summary import summarise, summarise_behaviours
-    from taichi_ants.analysis.paper.table2 import table2
     from taichi_ants.studies.result_folder import REPORT
 
-    summary, behaviours = summarise(comparison), summarise_behaviours(comparison)
-    lines, audit = table2(comparison, summary), assess(comparison)
-    tables = {"summary": summary, "behaviours": behaviours, "table2": lines}
+    comparison, lines, audit = results.comparison, results.lines, results.audit
+    tables = {"summary": results.summary, "behaviours": results.behaviours, "table2": lines}
     for name, rows in {**tables, "claims": claims_rows(audit)}.items():
         files.write_csv(folder / f"{name}.csv", rows, list(rows[0]))
     files.write_text(folder / "table2.md", table2_markdown(comparison, lines))
     files.write_text(folder / "claims.md", claims_markdown(audit, comparison.world))
-    text = report(comparison, lines, behaviours, audit, baselines)
-    files.write_text(folder / REPORT, text)
+    files.write_text(folder / REPORT, report(comparison, lines, results.answer, audit))
 
 
 def write_policies(
@@ -209,8 +199,8 @@ def write_policies(
 ) -> None:
     """Write the final Q-tables of some runs, with what an ant that follows them does."""
     from taichi_ants import files, save_policy
-    from taichi_ants.analysis.behaviour import BEHAVIOURS, NAMES
-    from taichi_ants.analysis.paper.best_of import examples
+    from taichi_ants.analysis.behaviour import BEHAVIOURS
+    from taichi_ants.analysis.paper.best_of import example_name, examples
 
     for place in (POLICIES, RENDERS):
         files.check_writable_folder(folder / place)
@@ -219,7 +209,6 @@ def write_policies(
         for done, (row, run) in enumerate(chosen, start=1):
             point, variant = study.points[row], comparison.rows[row].variant
             behaviour = comparison.behaviours[row, run]
-            own = "".join(f"_{part}" for part in variant.short)
             metadata = {
                 "task": point.task.as_dict(),
                 "config": point.training.as_dict(),
@@ -229,11 +218,11 @@ def write_policies(
                 "return_last50": comparison.measure("return_last50")[row, run],
                 "behaviour": BEHAVIOURS[behaviour],
             }
-            name = f"{point.task.delivery}_{variant.learner}{own}_{NAMES[behaviour]}"
-            save_policy(folder / POLICIES / f"{name}.npz", tables[row, run], metadata)
+            path = folder / POLICIES / f"{example_name(comparison, row, run)}.npz"
+            save_policy(path, tables[row, run], metadata)
             if not settings.no_figures:
                 title = f"{variant.label}, {point.task.delivery}"
-                shown = folder / RENDERS / f"{name}.gif"
+                shown = folder / RENDERS / f"{path.stem}.gif"
                 render_policy(shown, point, tables[row, run], metadata, title)
             report_progress(done / len(chosen))
 
@@ -241,17 +230,13 @@ def write_policies(
 def render_policy(
     path: Path, point: RunPoint, q_values: np.ndarray, metadata: dict[str, Any], title: str
 ) -> None:
-    """Show the beginning of the episode that told the behaviour of a policy.
-
-    It has evaporation as in training, not as in the greedy evaluation. The first of the lines
-    beside the world says what the ant does.
-    """
+    """Show what a policy does; the first of the lines beside the world says it in words."""
     from dataclasses import replace
 
-    from taichi_ants.rendering import PAUSE, Episode, frames, save_animation
+    from taichi_ants.rendering import PAUSE, frames, save_animation
+    from taichi_ants.report.players import played
 
-    steps, task = min(point.max_steps, RENDERED_STEPS), as_in_training(point.task)
-    episode = Episode.play(point.world, q_values, seed=metadata["seed"], max_steps=steps, task=task)
+    episode = played(point, q_values, metadata["seed"])
     episode = replace(episode, name=metadata["behaviour"])
     save_animation(path, frames(episode.moments(), (720, 480), title=title), pause=PAUSE)
 
@@ -261,19 +246,42 @@ def compare(settings: argparse.Namespace) -> None:
     from taichi_ants.studies.result_folder import work_or_show
 
     study = build_study(settings)
-    work_or_show(settings, study.settings(), partial(do_comparison, settings, study))
+    work, page = partial(do_comparison, settings, study), partial(make_page, settings, study)
+    work_or_show(settings, study.settings(), work, page=page)
+
+
+def results_of(
+    settings: argparse.Namespace,
+    study: Study[RunPoint],
+    arrays: dict[str, np.ndarray],
+    baselines: Sequence[Mapping],
+) -> Results:
+    """All that follows from what the episodes gave."""
+    from taichi_ants.analysis.paper.comparison import Comparison, Row
+    from taichi_ants.analysis.paper.results import Results
+
+    first = study.points[0]
+    comparison = Comparison(
+        rows=tuple(Row.of(point.task, point.training) for point in study.points),
+        seeds=study.seeds,
+        **arrays,
+        max_steps=first.max_steps,
+        task=first.task,
+        world=world_name(settings, study),
+    )
+    return Results.of(comparison, baselines)
 
 
 def do_comparison(
     settings: argparse.Namespace, study: Study[RunPoint], blocks: Path, ready: Path
-) -> None:
+) -> Results:
     """Do what is not done yet, and write all results."""
     import numpy as np
 
     from taichi_ants import files
+    from taichi_ants.analysis import style
     from taichi_ants.analysis.bounds.baselines import BASELINE_COLUMNS, baseline_rows
-    from taichi_ants.analysis.paper.comparison import Comparison, Row
-    from taichi_ants.analysis.paper.figures import save_all
+    from taichi_ants.analysis.paper.figures import draw_all
     from taichi_ants.engines.runs.training import evaluate
 
     where = {"threads": settings.threads, "arch": settings.arch}
@@ -286,23 +294,81 @@ def do_comparison(
     small = {name: files.smallest(array) for name, array in arrays.items()}
     files.write_npz(ready / EPISODES, small)
     first = study.points[0]
-    comparison = Comparison(
-        rows=tuple(Row.of(point.task, point.training) for point in study.points),
-        seeds=study.seeds,
-        **arrays,
-        max_steps=first.max_steps,
-        task=first.task,
-        world=world_name(settings, study),
-    )
     baselines = baseline_rows(
         *(first.world, first.task, partial(evaluate, **where), study.seeds),
         *(ROLLOUTS, tuple(dict.fromkeys(settings.discounts)), first.max_steps),
     )
     files.write_csv(ready / BASELINES, baselines, BASELINE_COLUMNS)
-    write_tables(ready, comparison, baselines)
-    write_policies(settings, ready, study, comparison, q_values)
+    results = results_of(settings, study, arrays, baselines)
+    write_tables(ready, results)
+    write_policies(settings, ready, study, results.comparison, q_values)
     if not settings.no_figures:
-        save_all(comparison, baselines, ready / FIGURES)
+        style.save_all(draw_all(results.comparison, baselines), ready / FIGURES)
+    return results
+
+
+def facts(settings: argparse.Namespace, study: Study[RunPoint]) -> dict[str, str]:
+    """How it was done, in words."""
+    from taichi_ants.errors import count
+
+    first, task = study.points[0], study.points[0].task
+    numbers = {
+        "learning rate": settings.learning_rates,
+        "discount": settings.discounts,
+        "epsilon": settings.epsilons,
+        "decay of epsilon": settings.epsilon_decays,
+    }
+    learners = ", ".join(" ".join([name, *_own(more)]) for name, more in variants(settings))
+    grid = [f"{name} {' or '.join(f'{x:g}' for x in few)}" for name, few in numbers.items()]
+    falls = {True: "evaporate", False: "do not evaporate"}
+    return {
+        "World": world_name(settings, study),
+        "Learners": learners,
+        "Configurations": "; ".join(grid),
+        "Delivery": " and ".join(dict.fromkeys(point.task.delivery for point in study.points)),
+        "Seeds": f"{study.seeds[0]} to {study.seeds[-1]}",
+        "Episodes": f"{first.episodes} of at most {first.max_steps} steps, "
+        f"then {count(first.rollouts, 'greedy rollout')}",
+        "Trails": f"{falls[task.evaporation_in_training]} in training, "
+        f"{falls[task.evaporation_in_evaluation]} in the greedy evaluation",
+    }
+
+
+def _own(hyperparameters: Mapping[str, Any]) -> list[str]:
+    return [f"{name}={value:g}" for name, value in hyperparameters.items()]
+
+
+def make_page(
+    settings: argparse.Namespace,
+    study: Study[RunPoint],
+    folder: Path,
+    results: Results | None,
+    made: Mapping[str, Any],
+) -> str:
+    """The page of the results in a folder, which are read from there if they are not given."""
+    from taichi_ants import files
+    from taichi_ants.analysis.drawings import drawings
+    from taichi_ants.analysis.paper.figures import draw_all
+    from taichi_ants.report.comparison import comparison_page
+    from taichi_ants.report.page import made_facts
+    from taichi_ants.report.players import what_is_seen
+    from taichi_ants.studies.result_folder import MANIFEST
+
+    if results is None:
+        arrays = files.read_npz(folder / EPISODES)
+        results = results_of(settings, study, arrays, files.read_csv(folder / BASELINES))
+    comparison, shown = results.comparison, not settings.no_figures
+    # Drawn anew, not those of the files: a figure that has been saved is laid out a little otherwise.
+    drawn = draw_all(comparison, results.baselines) if shown else {}
+    players, sheet = what_is_seen(folder / POLICIES, study, comparison) if shown else ([], None)
+    return comparison_page(
+        results,
+        drawings=drawings(drawn),
+        players=players,
+        sheet=sheet,
+        facts={**facts(settings, study), **made_facts(made)},
+        files=[path.name for path in folder.iterdir()] + [MANIFEST],
+    )
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -17,7 +17,7 @@ from argparse import Namespace
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from taichi_ants import files
 from taichi_ants.errors import AntsError
@@ -26,21 +26,32 @@ from taichi_ants.studies.provenance import provenance
 MANIFEST = "manifest.json"
 UNFINISHED, BLOCKS, READY = "unfinished", "blocks", "ready"
 REPORT = "report.txt"  # what commands print
+PAGE = "report.html"  # what tells the whole result
+
+
+Results = TypeVar("Results")
+# Makes the page, as HTML, from a folder of results, from what the work gave, if that was done just
+# now, and from the manifest.
+Pages = Callable[[Path, Results | None, Mapping[str, Any]], str]
 
 
 def work_or_show(
     settings: Namespace,
     determines: Mapping[str, Any],
-    work: Callable[[Path, Path], None],
+    work: Callable[[Path, Path], Results],
     leading: Sequence[str] = (),
+    page: Pages[Results] | None = None,
 ) -> None:
     """Do the work of a command, or show what its folder holds already; print the report.
+
+    A page that is gone from finished results is made again from the rest of them.
 
     Args:
         settings: The command's `out`, `force`, `plugin` and `arch`.
         determines: What determines the results besides these.
         work: Called with a folder for blocks and one for the results, among them the report.
         leading: Settings from which others follow, see `ResultFolder`.
+        page: Makes the page of the results, if they have one.
 
     Raises:
         AntsError: The folder holds something else, cannot be written, or was altered.
@@ -49,17 +60,24 @@ def work_or_show(
     facts = {**determines, "arch": settings.arch, "plugin": plugin}
     folder = ResultFolder(settings.out, facts, leading)
     if not settings.force and folder.is_finished():
-        folder.check_whole()
+        folder.check_whole(but=PAGE if page else None)
+        if page and not (settings.out / PAGE).exists():
+            folder.add(PAGE, page(settings.out, None, _manifest_in(settings.out)))
         print((settings.out / REPORT).read_text("utf-8"))
         print(f"{settings.out}/ holds these results already; --force makes them again.")
-        return
-    began = time.perf_counter()
-    with folder.work(settings.force) as (blocks, ready):
-        work(blocks, ready)
-        report = (ready / REPORT).read_text("utf-8")
-        seconds = folder.seconds_before + time.perf_counter() - began
-        folder.publish(ready, {**provenance(sys.argv), "seconds": seconds})
-    print(f"{report}\n{seconds:.1f} s; everything is in {settings.out}/")
+    else:
+        began = time.perf_counter()
+        with folder.work(settings.force) as (blocks, ready):
+            results = work(blocks, ready)
+            report = (ready / REPORT).read_text("utf-8")
+            seconds = folder.seconds_before + time.perf_counter() - began
+            made = {**provenance(sys.argv), "seconds": seconds}
+            if page:
+                files.write_text(ready / PAGE, page(ready, results, made))
+            folder.publish(ready, made)
+        print(f"{report}\n{seconds:.1f} s; everything is in {settings.out}/")
+    if page:
+        print(settings.out / PAGE)
 
 
 class ResultFolder:
@@ -109,10 +127,12 @@ class ResultFolder:
             )
         return False
 
-    def check_whole(self) -> None:
-        """Raises AntsError if a file of finished results is gone or was altered."""
+    def check_whole(self, but: str | None = None) -> None:
+        """Raises AntsError if a file of finished results is gone, all but one, or was altered."""
         for name, digest in self._listed().items():
             path = self.path / name
+            if name == but and not path.exists():
+                continue
             if not path.is_file() or _hash(path) != digest:
                 raise AntsError(
                     f"{str(path)!r}, a part of the results, is gone or was altered since they were "
@@ -167,6 +187,13 @@ class ResultFolder:
         contents = {**manifest, "files": hashes, "settings": self._settings}
         files.write_json(self.path / MANIFEST, contents)
         self._clear()  # now it is finished
+
+    def add(self, name: str, text: str) -> None:
+        """Write one more file of finished results, or one again, and list it among them."""
+        files.write_text(self.path / name, text)
+        manifest = _manifest_in(self.path)
+        manifest["files"][name] = _hash(self.path / name)
+        files.write_json(self.path / MANIFEST, manifest)
 
     def _seconds_so_far(self) -> float:
         """The seconds of the processes that have worked in `unfinished`, even if they were killed.

@@ -17,13 +17,15 @@ from taichi_ants.viewer.recording import Recording, record_colony, record_trace
 
 # The parts of one script, in this order: what a part uses stands in those before it.
 SCRIPTS = ("history.js", "stage.js", "panel.js", "timeline.js", "viewer.js")
+STYLES = ("colours.css", "viewer.css")
 _NOTEBOOK_HEIGHT = 720  # pixels
 # Notebooks show what is larger as text: a page inside of them would be too slow, or too large.
 _MOST_CELLS, _MOST_ANTS, _MOST_STEPS = 200_000, 20_000, 10_000
 
 
 @cache
-def _text(name: str) -> str:
+def part(name: str) -> str:
+    """The text of a part of the page, also for other pages that play a recording."""
     return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
 
 
@@ -56,14 +58,14 @@ def assemble(
     parts = {
         "CONNECT": f"; connect-src {connect}" if connect else "",
         "TITLE": html.escape(title),
-        "STYLE": _text("viewer.css") + style,
+        "STYLE": "\n".join([*map(part, STYLES), style]),
         "CONTROLS": controls,
         "RECORDING": recording,
-        "SCRIPT": "\n".join([*map(_text, SCRIPTS), script]),
+        "SCRIPT": "\n".join([*map(part, SCRIPTS), script]),
     }
-    whole = _text("page.html")
-    for name, part in parts.items():
-        whole = whole.replace(f"<!-- {name} -->", part)
+    whole = part("page.html")
+    for name, text in parts.items():
+        whole = whole.replace(f"<!-- {name} -->", text)
     return whole
 
 

@@ -40,7 +40,7 @@ SMALL = [
 ]
 FILES = {
     *("conditions.csv", "differences.csv", "seeds.csv", "findings.md", "manifest.json"),
-    "report.txt",
+    *("report.html", "report.txt"),
     *(f"figures/{name}.png" for name in ("elsewhere", "rules", "scaling", "training")),
     *(
         f"policies/paper_{rules}_{ants}.npz"
@@ -65,9 +65,14 @@ def test_all_files_are_there(finished):
     assert set(contents(folder)) == FILES
     report = (folder / "report.txt").read_text("utf-8")
     assert out.startswith(report)
-    assert "The paper's world, 2 seeds: deliveries" in report
-    assert "Trained in open worlds, 3 ants, 2 seeds" in report
+    assert len(out.splitlines()) <= 40
+    assert out.splitlines()[-1] == "out/report.html"
+    assert "Deliveries per 1000 ticks of 3 ants" in report
     assert "What does each rule add?" in report
+    page = (folder / "report.html").read_text("utf-8")
+    assert "The paper&#39;s world, 2 seeds: deliveries" in page
+    assert "Trained in open worlds, 3 ants, 2 seeds" in page
+    assert page.count('class="player"') == 3
     with open(folder / "conditions.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     # In the paper's world seven rules for one and three ants, and of three rules those that were

@@ -72,7 +72,7 @@ POLICY = f"policies/{SHOWN[0]}.npz"
 RENDERS = {f"renders/{name}.gif" for name in SHOWN}
 FILES = {
     *("baselines.csv", "behaviours.csv", "claims.csv", "claims.md", "episodes.npz"),
-    *("manifest.json", "report.txt", "summary.csv", "table2.csv", "table2.md"),
+    *("manifest.json", "report.html", "report.txt", "summary.csv", "table2.csv", "table2.md"),
     *(f"policies/{name}.npz" for name in SHOWN),
     *FIGURES,
     *RENDERS,
@@ -90,7 +90,8 @@ def finished(tmp_path_factory, kernels):
     report = (folder / "report.txt").read_text("utf-8")
     assert done.stdout.startswith(report)
     assert re.fullmatch(
-        r"\n\d+\.\d s; everything is in deep/out/\n", done.stdout.removeprefix(report)
+        r"\n\d+\.\d s; everything is in deep/out/\ndeep/out/report.html\n",
+        done.stdout.removeprefix(report),
     )
     return folder
 
@@ -341,7 +342,22 @@ def test_the_same_command_shows_the_finished_comparison(copy, compare):
     status, out, err = compare(*SMALL, "--out", copy)
     report = before["report.txt"].decode("utf-8")
     assert (status, err) == (0, "")
-    assert out == f"{report}\n{copy}/ holds these results already; --force makes them again.\n"
+    already = f"{copy}/ holds these results already; --force makes them again."
+    assert out == f"{report}\n{already}\n{copy}/report.html\n"
+    assert contents(copy) == before
+
+
+def test_a_page_that_is_gone_is_made_again_from_the_other_files(copy, compare):
+    """To the same bytes: numbers, figures and players."""
+    before = contents(copy)
+    page = before["report.html"].decode("utf-8")
+    assert page.count('class="player"') == 2  # delivers, circles with food
+    assert page.count('class="plot wide"') == 2
+    assert "SARSA" in page
+    (copy / "report.html").unlink()
+    status, out, err = compare(*SMALL, "--out", copy)
+    assert (status, err) == (0, "")
+    assert out.endswith(f"\n{copy}/report.html\n")
     assert contents(copy) == before
 
 
@@ -353,6 +369,7 @@ def test_force_runs_again_and_leaves_no_old_pictures(copy, compare):
     assert status == 0
     assert "already" not in out
     assert set(after) == FILES - FIGURES - RENDERS | {"notes.txt"}
+    assert b'class="player"' not in after["report.html"]
     for name in (
         "summary.csv",
         "episodes.npz",
@@ -467,13 +484,15 @@ def test_a_learner_of_ones_own_and_a_discount_of_one_are_reported(tmp_path, comp
         best = int(returns.argmax())
         greedy = archive["greedy_returns"][best].mean()
     cells = [line.split() for line in out.splitlines() if line.startswith("hysteretic *")]
-    # Tables of four figures, then the greedy evaluation.
     assert cells[0][3] == f"{returns[best]:.1f}"
-    assert "Paper" not in out  # it does not have such a learner
-    assert cells[4][3] == f"{greedy:.1f}"
-    assert f"hysteretic *, absorbing: 0.1 / {best} / 0.3 / 0.9" in out
-    assert "the discount is 1.0, so there is no optimal policy" in " ".join(out.split())
-    assert max(len(line) for line in out.splitlines()[:-1]) < 80
+    assert " paper " not in out.split("Learner")[1]  # it does not have such a learner
+    tables = (tmp_path / "out" / "table2.md").read_text("utf-8")
+    lines = [line.split(" | ") for line in tables.splitlines() if line.startswith("| hysteretic *")]
+    assert lines[4][2] == f"{greedy:.1f}"
+    assert f"hysteretic *, absorbing: 0.1 / {best} / 0.3 / 0.9" in tables
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert "the discount is 1.0, so there is no optimal policy" in page
+    assert max(len(line) for line in out.splitlines()[:-2]) < 80
 
 
 def test_all_learners_of_the_library_can_be_compared(tmp_path, compare):

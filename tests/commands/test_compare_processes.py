@@ -101,7 +101,7 @@ def test_stopped_and_killed_it_goes_on_to_the_same_results(uninterrupted, kernel
     assert (done.returncode, done.stderr) == (0, "")
     after = contents(folder)
     assert set(after) == set(uninterrupted)
-    for name in set(after) - {"manifest.json", "report.txt"}:  # these two tell times
+    for name in set(after) - {"manifest.json", "report.html"}:  # these two tell times
         assert after[name] == uninterrupted[name], name
 
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+from argparse import Namespace
 
 import numpy as np
 import pytest
 
 from taichi_ants.errors import AntsError
-from taichi_ants.studies.result_folder import ResultFolder
+from taichi_ants.studies.result_folder import ResultFolder, work_or_show
 
 SETTINGS = {"seeds": (0, 1), "rate": np.float32(0.5), "world": {"ranges": [3, 3, 3]}}
 OTHER = {**SETTINGS, "rate": 0.25}
@@ -280,6 +281,44 @@ def test_what_was_altered_is_noticed(change, tmp_path):
     said = r"policy\.npz', a part of the results, is gone or was altered .* give --force"
     with pytest.raises(AntsError, match=said):
         folder.check_whole()
+
+
+def test_a_page_that_is_gone_is_made_again(tmp_path, capsys):
+    """And listed among the files; what is altered is not passed over."""
+    settings = Namespace(out=tmp_path / "out", force=False, plugin=None, arch="cpu")
+    made = []
+
+    def work(blocks, ready):
+        (ready / "report.txt").write_text("result")
+        return "new"
+
+    def page(folder, results, manifest):
+        assert (folder / "report.txt").read_text() == "result"
+        made.append(results)
+        return f"page in {manifest['seconds']:.0f} s"
+
+    def run():
+        work_or_show(settings, SETTINGS, work, page=page)
+        out = capsys.readouterr().out
+        assert out.splitlines()[-1] == str(settings.out / "report.html")
+        return json.loads((settings.out / "manifest.json").read_text())
+
+    first = run()
+    whole = (settings.out / "report.html").read_bytes()
+    assert first["files"]["report.html"] == hashlib.sha256(whole).hexdigest()
+    assert run() == first
+    assert made == ["new"]
+    (settings.out / "report.html").unlink()
+    assert run() == first
+    assert (settings.out / "report.html").read_bytes() == whole
+    assert made == ["new", None]
+    del first["files"]["report.html"]  # as a version without pages has left it
+    (settings.out / "report.html").unlink()
+    (settings.out / "manifest.json").write_text(json.dumps(first))
+    assert "report.html" in run()["files"]
+    (settings.out / "report.html").write_text("mine")
+    with pytest.raises(AntsError, match=r"report\.html', a part of the results, is gone or was al"):
+        run()
 
 
 @pytest.mark.parametrize("place", ["file", "file/below", "/proc/nothing", "a\0b"])

@@ -18,7 +18,7 @@ from taichi_ants.rendering import Episode
 from taichi_ants.task import Life, Pheromone
 from taichi_ants.task.constants import ACTION_NAMES, DELIVERED, PICKED_UP
 from taichi_ants.viewer import Recording, page, record_colony, record_episode, record_trace
-from taichi_ants.viewer.page import SCRIPTS, _text
+from taichi_ants.viewer.page import SCRIPTS, part
 
 pytestmark = pytest.mark.browser
 
@@ -563,7 +563,7 @@ def test_frames_per_second(browser, folder):
 
 def test_the_script_is_whole():
     """Each part is in the page once, in an order in which classes stand before their use."""
-    whole = "".join(map(_text, SCRIPTS))
+    whole = "".join(map(part, SCRIPTS))
     for name in re.findall(r"new ([A-Z]\w+)\(", whole):
         assert f"class {name} " in whole or name in (
             *("Path2D", "Map", "Set", "Blob", "Response", "DataView", "TextDecoder"),

@@ -13,7 +13,7 @@ from taichi_ants.commands import render
 from taichi_ants.learners.policies import save_policy, trail_follower
 from taichi_ants.rendering import Episode, colours
 from taichi_ants.viewer import page, record_colony, record_episode, save_page
-from taichi_ants.viewer.page import _text
+from taichi_ants.viewer.page import part
 
 TITLE = 'An <ant> & its "trail"'
 
@@ -47,7 +47,7 @@ def test_a_page_asks_for_nothing_else(episode):
 
 
 def test_light_colours_are_those_of_the_pictures():
-    light = dict(re.findall(r"--([a-z-]+): ([^;]+);", _text("viewer.css").split("}")[0]))
+    light = dict(re.findall(r"--([a-z-]+): ([^;]+);", part("colours.css").split("}")[0]))
     named = {
         "page": colours.PAGE,
         "empty": colours.CELL_EMPTY,
@@ -75,7 +75,7 @@ def luminance(colour: str) -> float:
 
 @pytest.mark.parametrize("theme", [0, 1])
 def test_text_can_be_read_and_ants_stand_out(theme):
-    values = dict(re.findall(r"--([a-z-]+): ([^;]+);", _text("viewer.css").split("}")[theme]))
+    values = dict(re.findall(r"--([a-z-]+): ([^;]+);", part("colours.css").split("}")[theme]))
 
     def contrast(one: str, other: str) -> float:
         high, low = sorted([luminance(one), luminance(other)], reverse=True)

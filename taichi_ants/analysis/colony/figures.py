@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from taichi_ants.analysis import style
@@ -27,7 +26,6 @@ from taichi_ants.analysis.colony.study import (
 )
 from taichi_ants.analysis.sweeps import draw_lines
 from taichi_ants.analysis.tables import sentence
-from taichi_ants.files import check_writable_folder
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,17 +34,10 @@ if TYPE_CHECKING:
 Rows = Sequence[Mapping[str, Any]]
 
 
-def save_all(rows: Rows, folder: str | Path) -> None:
-    """Write all figures for which there are rows as PNG files into a folder, made if needed.
-
-    Raises:
-        AntsError: The folder or a file in it cannot be written.
-    """
-    folder = check_writable_folder(folder)
-    for name, draw in FIGURES.items():
-        figure = draw(rows)
-        if figure is not None:
-            style.save(figure, folder / f"{name}.png")
+def draw_all(rows: Rows) -> dict[str, Figure]:
+    """All figures for which there are rows, by their names."""
+    drawn = {name: draw(rows) for name, draw in FIGURES.items()}
+    return {name: figure for name, figure in drawn.items() if figure is not None}
 
 
 def rules(rows: Rows) -> Figure | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -9,9 +10,12 @@ import numpy as np
 
 from taichi_ants.analysis.colony.contrasts import QUESTIONS, Judged, Series, Sizes
 from taichi_ants.analysis.colony.study import (
+    ABC,
     ABROAD,
+    ALONE,
     ARENAS,
     MEASURES,
+    PAPER,
     RULES,
     WAYS,
     WORLDS,
@@ -94,6 +98,71 @@ def means(rows: Sequence[Mapping[str, Any]]) -> list[Table]:
         title = f"{sentence(WAYS[ABROAD])}, {abroad[0]['ants']} ants, {seeds}"
         tables.append(Table(title, headers, cells))
     return tables
+
+
+def glance(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """What the largest colonies deliver, from `condition_rows`: designs down, arenas across.
+
+    It has no rows where none are trained.
+    """
+    largest = max((row["ants"] for row in rows if row["way"] != ABROAD), default=0)
+    shown = [row for row in rows if row["ants"] == largest and row["arena"] in ARENAS]
+    designs = [Design(PAPER, ALONE), *(Design(rules) for rules in RULES), Design(ABC, ALONE)]
+    arenas = [arena for arena in ARENAS if any(row["arena"] == arena for row in shown)]
+    by_place = {(row["arena"], Design(row["rules"], row["way"])): row for row in shown}
+    cells = [
+        [sentence(one.words), *(_delivered(by_place.get((arena, one))) for arena in arenas)]
+        for one in designs
+        if any((arena, one) in by_place for arena in arenas)
+    ]
+    most = [
+        max(row["deliveries_limit"] for row in shown if row["arena"] == arena) for arena in arenas
+    ]
+    if cells:
+        cells.append(["No colony can deliver more than", *map(figure, most)])
+    headers = ("", *(sentence(ARENAS[arena]).replace(" (", "\n(") for arena in arenas))
+    title = f"{sentence(MEASURES['deliveries'])} of {count(largest, 'ant')}"
+    return Table(title, headers, cells)
+
+
+def _delivered(row: Mapping[str, Any] | None) -> str:
+    return MISSING if row is None else figure(row["deliveries_mean"])
+
+
+def on_one_screen(
+    rows: Sequence[Mapping[str, Any]], judged: Judged, answer: Sequence[str]
+) -> list[Block]:
+    """The answer, deliveries at a glance, and how many statements hold."""
+    seen = glance(rows)
+    tables = [seen] if seen.rows else means(rows)
+    return [_sizes(rows), "\n".join(answer), *tables, tallies(judged)]
+
+
+def _sizes(rows: Sequence[Mapping[str, Any]]) -> str:
+    arenas = dict.fromkeys(row["arena"] for row in rows)
+    conditions = f"{count(len(rows), 'condition')} in {count(len(arenas), 'kind')} of world"
+    return f"{conditions}, {count(rows[0]['seeds'], 'seed')}."
+
+
+def tallies(judged: Judged) -> str:
+    """How many statements hold of the largest colonies, a line for each question."""
+    lines = []
+    for question in QUESTIONS:
+        verdicts = Counter(
+            of_largest(findings).verdict.value
+            for (_, series), findings in judged.items()
+            if series.question == question
+        )
+        if verdicts:
+            words = ", ".join(f"{n} {verdict}" for verdict, n in verdicts.most_common())
+            lines.append(f"  {question} {words}")
+    return "\n".join(["Statements about the largest colonies", *lines])
+
+
+def of_largest(findings: Mapping[Sizes, Finding]) -> Finding:
+    """What is found of the largest colony; compared with several, the strongest objection."""
+    n = max(ants for ants, _ in findings)
+    return weakest([one for (ants, _), one in findings.items() if ants == n])
 
 
 _SHOWN = (Verdict.SUPPORTED, Verdict.CONTRADICTED, Verdict.UNDECIDED)

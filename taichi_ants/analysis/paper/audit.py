@@ -84,20 +84,10 @@ def _tallies(audit: Audit) -> list[str]:
     return lines
 
 
-def claims_table(audit: Audit) -> Table:
-    """How many verdicts of each kind there are, and the claims that are contradicted."""
-    rows = [
-        [claim.section, claim.statement, *(one.verdict.value for one in findings.values())]
-        for claim, findings in audit.items()
-        if any(one.verdict is Verdict.CONTRADICTED for one in findings.values())
-    ]
-    notes = [
-        *_tallies(audit),
-        "not tested: this needs the paper's world, its configurations, and 100 episodes",
-        "claims.md holds all claims, their effects, intervals and what each was tested on.",
-    ]
-    headers = ("Section", "In our words", *next(iter(audit.values())))
-    return Table("The paper's claims that are contradicted", headers, rows, notes, len(headers))
+def claims_tallies(audit: Audit) -> str:
+    """How many claims of the paper hold, in lines for a terminal."""
+    lines = [f"The paper's {len(audit)} claims", *(f"  {line}" for line in _tallies(audit))]
+    return "\n".join(lines)
 
 
 def claims_markdown(audit: Audit, world: str) -> str:

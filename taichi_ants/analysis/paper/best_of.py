@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from taichi_ants.analysis.behaviour import counts
+from taichi_ants.analysis.behaviour import NAMES, counts
 from taichi_ants.analysis.paper.comparison import Comparison, Variant
 from taichi_ants.analysis.paper.published import TABLE_2, PaperRow
 from taichi_ants.analysis.statistics import RANDOM_SEED, interquartile_mean
@@ -59,15 +59,23 @@ def shown_position(comparison: Comparison, delivery: str, variant: Variant) -> i
 def examples(comparison: Comparison) -> list[tuple[int, int]]:
     """Runs to look at: for each delivery setting and learner one of each behaviour.
 
-    They are of the configuration that stands for the learner. Of the runs that behave alike, the
+    They are of the configuration that stands for the learner. A behaviour that none of these shows
+    is shown by the configuration in which it is most frequent. Of the runs that behave alike, the
     one of median return is taken. Each is told by its row and the position of its seed.
     """
-    rows = [shown_position(comparison, *learner) for learner in comparison.learners]
-    return [
-        (row, _median_run(comparison, row, code))
-        for row in rows
-        for code in counts(comparison.behaviours[row])
-    ]
+    codes = comparison.behaviours
+    shown = [shown_position(comparison, *learner) for learner in comparison.learners]
+    kinds = [(row, code) for row in shown for code in counts(codes[row])]
+    others = counts(codes).keys() - {code for _, code in kinds}
+    kinds += [(int((codes == code).sum(axis=1).argmax()), code) for code in sorted(others)]
+    return [(row, _median_run(comparison, row, code)) for row, code in kinds]
+
+
+def example_name(comparison: Comparison, row: int, run: int) -> str:
+    """The name of the files of an example: its delivery setting, learner and behaviour."""
+    delivery, variant, _ = comparison.rows[row]
+    own = "".join(f"_{part}" for part in variant.short)
+    return f"{delivery}_{variant.learner}{own}_{NAMES[comparison.behaviours[row, run]]}"
 
 
 def _median_run(comparison: Comparison, row: int, behaviour: int) -> int:

@@ -1,14 +1,14 @@
 """The figures of a comparison.
 
-Each function takes data and returns a matplotlib Figure; `save_all` writes all of them. Figures
-are made without pyplot, so nothing global changes and no window system is needed.
+Each function takes data and returns a matplotlib Figure; `style` writes them as files, and as
+markup for pages. Figures are made without pyplot, so nothing global changes and no window system is
+needed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import cycle
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,12 +28,10 @@ from taichi_ants.analysis.style import (
     legend_entries,
     logarithmic,
     new_figure,
-    save,
     styled,
 )
 from taichi_ants.analysis.tables import baseline_name
 from taichi_ants.errors import count
-from taichi_ants.files import check_writable_folder
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -119,15 +117,12 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Mappin
     return figure
 
 
-def save_all(comparison: Comparison, baselines: Sequence[Mapping], folder: str | Path) -> None:
-    """Writes all figures as PNG files into a folder, which is made if needed.
+def draw_all(comparison: Comparison, baselines: Sequence[Mapping]) -> dict[str, Figure]:
+    """All figures, by their names."""
+    return {draw.__name__: draw(comparison, baselines) for draw in FIGURES}
 
-    Raises:
-        AntsError: The folder or a file in it cannot be written.
-    """
-    folder = check_writable_folder(folder)
-    save(learning_curves(comparison, baselines), folder / "learning_curves.png")
-    save(return_against_deliveries(comparison, baselines), folder / "return_against_deliveries.png")
+
+FIGURES = (learning_curves, return_against_deliveries)
 
 
 def _curve(axis: Axes, runs: np.ndarray, share: bool, colour: str, label: str) -> None:

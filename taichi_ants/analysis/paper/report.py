@@ -1,17 +1,18 @@
-"""The comparison as text: the paper's table 2 beside ours, and what became of its claims.
+"""The comparison as text: on one screen, and all of its tables.
 
 It shows what the other tables hold, and computes nothing.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS
-from taichi_ants.analysis.paper.audit import Audit, claims_table
+from taichi_ants.analysis.paper.audit import Audit, claims_tallies
 from taichi_ants.analysis.paper.comparison import Comparison, GridPoint
 from taichi_ants.analysis.paper.published import GREEDY_RETURN, GREEDY_STEPS
-from taichi_ants.analysis.paper.table2 import APART, apart, figure_tables, label
+from taichi_ants.analysis.paper.table2 import APART, apart, figure_tables, label, mixed
 from taichi_ants.analysis.tables import (
     Block,
     Table,
@@ -23,37 +24,83 @@ from taichi_ants.analysis.tables import (
 from taichi_ants.errors import count
 
 WIDTH = 79  # columns: what the narrowest common terminal shows
+MOST_LINES = 12  # of the table on one screen
 
 
 def table2_markdown(comparison: Comparison, lines: Sequence[Mapping]) -> str:
     """The paper's table 2 beside ours, as Markdown."""
-    return markdown([*_heading(comparison), *figure_tables(lines, comparison), _greedy(lines)])
+    return markdown([*heading(comparison), *figure_tables(lines, comparison), _greedy(lines)])
 
 
 def report(
+    comparison: Comparison, lines: Sequence[Mapping], answer: Sequence[str], audit: Audit
+) -> str:
+    """What fits on one screen, as plain text of at most `WIDTH` columns.
+
+    Its lines are from `table2.table2`, the rest from `answer.answer` and `audit.assess`.
+    """
+    return plain_text(
+        [*heading(comparison), "\n".join(answer), _glance(lines), claims_tallies(audit)], WIDTH
+    )
+
+
+def all_tables(
     comparison: Comparison,
     lines: Sequence[Mapping],
     behaviours: Sequence[Mapping],
-    audit: Audit,
     baselines: Sequence[Mapping] = (),
-) -> str:
-    """The report as plain text of at most `WIDTH` columns.
+) -> list[Block]:
+    """All tables, but those of the claims, each with its notes.
 
-    Its lines are from `table2.table2`, the rest from `summary.summarise_behaviours`, `audit.assess`
-    and `baselines.baseline_rows`.
+    What is given is from `table2.table2`, `summary.summarise_behaviours` and
+    `baselines.baseline_rows`.
     """
-    blocks = [
-        *_heading(comparison),
+    return [
         *figure_tables(lines, comparison),
         _greedy(lines),
-        _behaviours(lines, behaviours),
-        claims_table(audit),
+        behaviour_table(lines, behaviours),
         _baselines(baselines),
     ]
-    return plain_text(blocks, WIDTH)
 
 
-def _heading(comparison: Comparison) -> list[Block]:
+def _glance(lines: Sequence[Mapping]) -> Table:
+    """Return and steps of the learners beside the paper's."""
+    shown = lines[:MOST_LINES]
+    columns = {
+        "return_last50_mean": "Return\nmean",
+        "return_last50_iqm": "IQM",
+        "best_run_return_last50_median": "best\nrun",
+        "paper_return": "paper",
+        "steps_all_mean": "Steps\nmean",
+        "best_run_steps_all_median": "best\nrun",
+        "paper_steps": "paper",
+    }
+    if all(math.isnan(line["paper_return"]) for line in lines):
+        del columns["paper_return"], columns["paper_steps"]
+    rows = []
+    for line in shown:
+        cells = [number(line[name]) for name in columns]
+        cells[0] += f" {APART}" if apart(line, "return_last50") else ""
+        deliveries = number(line["deliveries_last50_mean"], 2)
+        rows.append([label(line), line["delivery"], *cells, deliveries])
+    headers = ("Learner", "Delivery", *columns.values(), "Food\nmean")
+    notes = [
+        "Return and food of the last 50 episodes, steps of all. IQM: interquartile mean,",
+        "the typical run. Best run: best by return of all configurations, one run each.",
+    ]
+    if any(apart(line, "return_last50") for line in shown):
+        notes.append(f"{APART} a few far runs have moved the mean away from the typical run.")
+    if any(map(mixed, shown)):
+        notes.append("+ the runs do different things, and no run has their mean.")
+    if any(not line["paper_configuration"] for line in shown):
+        notes.append("* its best configuration by the IQM of the return, which flatters it.")
+    if len(lines) > len(shown):
+        notes.append(f"table2.csv has {len(lines) - len(shown)} more.")
+    return Table("", headers, rows, notes, text_columns=2)
+
+
+def heading(comparison: Comparison) -> list[Block]:
+    """The world, the sizes, and whether trails evaporate."""
     sizes = (
         f"{count(len(comparison.rows), 'configuration')}, {count(len(comparison.seeds), 'seed')}, "
         f"{count(comparison.episodes, 'episode')} of at most {comparison.max_steps} steps, "
@@ -83,7 +130,7 @@ def _greedy(lines: Sequence[Mapping]) -> Table:
     return Table("Greedy evaluation, configurations as above", headers, rows, [note], 2)
 
 
-def _behaviours(lines: Sequence[Mapping], behaviours: Sequence[Mapping]) -> Table:
+def behaviour_table(lines: Sequence[Mapping], behaviours: Sequence[Mapping]) -> Table:
     """What the final policies do, in the configurations that the tables above show."""
     headers = ("Learner", "Delivery", "Behaviour", "Runs", "Return\ntraining", "followed", "greedy")
     configuration = ("learner", "hyperparameters", "delivery", *GridPoint._fields)
@@ -104,7 +151,9 @@ def _behaviours(lines: Sequence[Mapping], behaviours: Sequence[Mapping]) -> Tabl
         "Return: mean of the last 50 training episodes, of the episode that tells the",
         "behaviour, of the greedy evaluation. summary.csv counts all configurations.",
     )
-    return Table("What the ants do", headers, rows, notes, text_columns=3)
+    return Table(
+        "What they do in the configurations of table 2", headers, rows, notes, text_columns=3
+    )
 
 
 def _baselines(baselines: Sequence[Mapping]) -> Table:

@@ -23,6 +23,7 @@ from taichi_ants.analysis.colony.study import (
     Design,
 )
 from taichi_ants.analysis.colony.tables import condition_rows
+from taichi_ants.analysis.style import save_all
 
 ARENAS = ("paper", "open")
 
@@ -83,7 +84,7 @@ def test_deliveries_against_the_number_of_ants(rows) -> None:
 
 
 def test_files_are_wide_enough_to_read_and_little_data_can_be_drawn(rows, tmp_path: Path) -> None:
-    figures.save_all(rows, tmp_path / "new")
+    save_all(figures.draw_all(rows), tmp_path / "new")
     for name in ("rules", "scaling", "training", "elsewhere"):
         assert Image.open(tmp_path / "new" / f"{name}.png").width == 1620
     lonely = build(seeds=1, sizes=(1,), ways=(JOINT,), rules=(ABC,))
@@ -91,5 +92,5 @@ def test_files_are_wide_enough_to_read_and_little_data_can_be_drawn(rows, tmp_pa
     elsewhere = build(seeds=2, ways=(ABROAD,), arenas=("rocks",))
     for study, number in ((lonely, 3), (nothing, 3), (elsewhere, 1)):
         folder = tmp_path / str(len(study))
-        figures.save_all(condition_rows(study, limits(study)), folder)
+        save_all(figures.draw_all(condition_rows(study, limits(study))), folder)
         assert len(list(folder.iterdir())) == number

@@ -26,13 +26,13 @@ from taichi_ants.analysis.paper.best_of import shown_position
 from taichi_ants.analysis.paper.comparison import Comparison, Variant
 from taichi_ants.analysis.paper.figures import (
     BEHAVIOUR_LOOKS,
+    draw_all,
     learning_curves,
     return_against_deliveries,
-    save_all,
 )
 from taichi_ants.analysis.paper.published import DYNA_P5, FIGURE_1, SARSA, VARIANTS
 from taichi_ants.analysis.statistics import interquartile_mean
-from taichi_ants.analysis.style import COLOURS
+from taichi_ants.analysis.style import COLOURS, save_all
 
 SETTINGS = ("continuing", "absorbing")
 SARSA_AT = (SARSA, FIGURE_1)
@@ -168,7 +168,7 @@ def test_behaviours_and_lines_look_different() -> None:
 
 def test_all_figures_are_files(comparison: Comparison, tmp_path: Path) -> None:
     small = subset(comparison, range(64, 128, 8), 3, 60)
-    save_all(small, BASELINES, tmp_path / "new" / "folder")
+    save_all(draw_all(small, BASELINES), tmp_path / "new" / "folder")
     paths = sorted((tmp_path / "new" / "folder").iterdir())
     assert [path.stem for path in paths] == ["learning_curves", "return_against_deliveries"]
     for path in paths:
@@ -228,5 +228,6 @@ def test_subsets_and_unknown_learners_are_drawn(rows: list[int], tmp_path: Path)
         truth=level_truth,
     )
     strange.returns[...] -= 75  # no logarithmic axis for negative returns
-    save_all(subset(strange, rows, 1 + len(rows) % 2, 4), [], tmp_path)
+    few = subset(strange, rows, 1 + len(rows) % 2, 4)
+    save_all(draw_all(few, []), tmp_path)
     assert all(path.stat().st_size > 1000 for path in tmp_path.iterdir())

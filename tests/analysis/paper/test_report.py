@@ -8,12 +8,12 @@ import pytest
 from synthetic_comparison import build, change, subset, unchanged
 
 from taichi_ants.analysis.behaviour import CIRCLES, OTHER, WALKS
-from taichi_ants.analysis.paper.audit import assess, claims_table
+from taichi_ants.analysis.paper.audit import assess
 from taichi_ants.analysis.paper.best_of import shown_position
 from taichi_ants.analysis.paper.claims import CLAIMS
 from taichi_ants.analysis.paper.comparison import Comparison, Variant
 from taichi_ants.analysis.paper.published import DYNA_P5, FIGURE_1, SARSA
-from taichi_ants.analysis.paper.report import WIDTH, report
+from taichi_ants.analysis.paper.report import MOST_LINES, WIDTH, all_tables, heading, report
 from taichi_ants.analysis.paper.summary import summarise, summarise_behaviours
 from taichi_ants.analysis.paper.table2 import table2
 from taichi_ants.analysis.tables import plain_text
@@ -37,9 +37,18 @@ BASELINES = [
 
 
 def render(comparison: Comparison) -> str:
+    """All tables as text."""
     lines = table2(comparison, summarise(comparison), 50)
-    behaviours, audit = summarise_behaviours(comparison), assess(comparison, CLAIMS[:3])
-    return report(comparison, lines, behaviours, audit, BASELINES)
+    behaviours = summarise_behaviours(comparison)
+    tables = all_tables(comparison, lines, behaviours, BASELINES)
+    return plain_text([*heading(comparison), *tables], WIDTH)
+
+
+def screen(comparison: Comparison) -> str:
+    """What the terminal shows."""
+    lines = table2(comparison, summarise(comparison), 50)
+    audit = assess(comparison, CLAIMS[:3])
+    return report(comparison, lines, ["One.", "Two.", "Three."], audit)
 
 
 @pytest.fixture(scope="module")
@@ -132,7 +141,7 @@ def test_it_counts_what_the_ants_do(comparison: Comparison) -> None:
     behaviours[shown, 4:], policy_returns[shown, 4:] = CIRCLES, 220
     behaviours[shown - 1, :3] = WALKS  # in another configuration, not shown
     mixed = replace(comparison, behaviours=behaviours, policy_returns=policy_returns)
-    table = section(render(mixed), "What the ants do")
+    table = section(render(mixed), "What they do")
     absorbing = table[table.index("absorbing") :]
     trained = mixed.measure("return_last50")[shown]
     lines = absorbing[absorbing.index("Dyna-Q (p5)") :].splitlines()
@@ -150,7 +159,7 @@ def test_means_that_no_run_has_are_marked(comparison: Comparison, text: str) -> 
     behaviours = comparison.behaviours.copy()
     behaviours[shown_position(comparison, "absorbing", DYNA_P5), 0] = OTHER
     marked = render(replace(comparison, behaviours=behaviours))
-    for start in ("Return, last 50", "Greedy evaluation", "What the ants do"):
+    for start in ("Return, last 50", "Greedy evaluation", "What they do"):
         rows = [line for line in section(marked, start).splitlines() if "Dyna-Q (p5)" in line]
         marks = {(line.startswith("Dyna-Q (p5) +"), "absorbing" in line) for line in rows}
         assert marks == {(False, False), (True, True)}, start
@@ -161,8 +170,6 @@ def test_a_small_comparison_is_shown_too() -> None:
     one = subset(build({"absorbing": unchanged}, variants=[SARSA]), [3], 1, 7)
     text = render(one)
     assert "\n1 configuration, 1 seed, 7 episodes of at most 600 steps, 3 greedy ro" in text
-    assert "absorbing: 3 not tested" in text
-    assert "In our words" not in text
     mean = float(one.returns.mean())
     assert row(text, "SARSA *", after="Return, all 7")[3] == f"{mean:.1f}"
     assert "nan" not in text
@@ -184,16 +191,31 @@ def test_another_world_is_not_held_against_the_paper(comparison: Comparison) -> 
     assert text.splitlines()[0] == "World: garden.txt."
     assert "47.3" not in text
     assert "Below" not in text
-    assert "continuing: 3 not tested" in text
+    small = screen(replace(comparison, world="garden.txt"))
+    assert "continuing: 3 not tested" in small
+    assert "paper mean" not in " ".join(small.split())
 
 
-def test_claims_that_are_contradicted_are_shown(comparison: Comparison) -> None:
-    audit = assess(comparison, CLAIMS[:2])
-    text = plain_text([claims_table(audit)], WIDTH)
-    assert row(text, "3.2", after="In our words")[-2:] == ["supported", "contradicted"]
-    assert "continuing: 2 supported" in text
-    finding = audit[CLAIMS[0]]["continuing"]
-    audit[CLAIMS[0]] = {"continuing": finding, "absorbing": finding}
-    text = plain_text([claims_table(audit)], WIDTH)
-    assert "In our words" not in text
-    assert "absorbing: 2 supported" in text
+def test_the_terminal_shows_what_fits_on_one_screen(comparison: Comparison) -> None:
+    text = screen(comparison)
+    lines = text.splitlines()
+    assert len(lines) <= 32
+    assert max(map(len, lines)) <= WIDTH
+    assert lines[lines.index("One.") : lines.index("One.") + 3] == ["One.", "Two.", "Three."]
+    line = table2(comparison, summarise(comparison), 50)[1]
+    columns = (
+        *("return_last50_mean", "return_last50_iqm", "best_run_return_last50_median"),
+        *("paper_return", "steps_all_mean", "best_run_steps_all_median", "paper_steps"),
+    )
+    cells = [cell for cell in row(text, "SARSA") if cell != "!"]
+    assert cells[2:] == [*(f"{line[name]:.1f}" for name in columns), "1.00"]
+    assert "The paper's 3 claims" in lines
+    assert any(line.startswith("  absorbing: ") and "contradicted" in line for line in lines)
+
+
+def test_more_lines_than_fit_are_named() -> None:
+    many = [Variant(f"learner_{number}") for number in range(MOST_LINES + 2)]
+    text = screen(build({"absorbing": unchanged}, variants=many, seeds=2))
+    assert f"learner_{MOST_LINES - 1} *" in text
+    assert f"learner_{MOST_LINES} *" not in text
+    assert "table2.csv has 2 more." in text

@@ -9,8 +9,14 @@ import numpy as np
 import pytest
 from synthetic_comparison import build, subset, unchanged
 
-from taichi_ants.analysis.behaviour import CIRCLES, DELIVERS
-from taichi_ants.analysis.paper.best_of import best_of, examples, percentile_of, shown_position
+from taichi_ants.analysis.behaviour import CIRCLES, DELIVERS, OTHER
+from taichi_ants.analysis.paper.best_of import (
+    best_of,
+    example_name,
+    examples,
+    percentile_of,
+    shown_position,
+)
 from taichi_ants.analysis.paper.comparison import Comparison, Variant
 from taichi_ants.analysis.paper.published import (
     DYNA_P3,
@@ -215,6 +221,23 @@ def test_examples_show_each_behaviour_by_its_median_run(comparison: Comparison) 
         alike = changed.behaviours[row] == changed.behaviours[row, run]
         below = (returns[row, alike] < returns[row, run]).sum()
         assert below == (alike.sum() - 1) // 2
+
+
+def test_a_behaviour_that_no_shown_configuration_has_gets_an_example(
+    comparison: Comparison,
+) -> None:
+    """Of the configuration in which it is most frequent."""
+    shown = {shown_position(comparison, *learner) for learner in comparison.learners}
+    few, many = [row for row in range(len(comparison.rows)) if row not in shown][:2]
+    codes = comparison.behaviours.copy()
+    codes[few, 0], codes[many, 1:4] = OTHER, OTHER
+    changed = replace(comparison, behaviours=codes)
+    usual = examples(comparison)
+    *same, (row, run) = examples(changed)
+    assert same == usual
+    assert row == many
+    assert codes[row, run] == OTHER
+    assert example_name(changed, row, run).endswith("_other")
 
 
 def test_examples_of_learners_outside_of_the_paper(comparison: Comparison) -> None:

@@ -1,0 +1,53 @@
+"""All that is computed of the study, once, for the tables, the terminal and the page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from taichi_ants.analysis.colony.answer import answer
+from taichi_ants.analysis.colony.contrasts import Judged, judge_all
+from taichi_ants.analysis.colony.study import MEASURES, Condition, Measured
+from taichi_ants.analysis.colony.tables import condition_rows
+
+
+class Results(NamedTuple):
+    """What follows from what was measured.
+
+    Attributes:
+        rows: See `tables.condition_rows`.
+        judged: See `contrasts.judge_all`.
+        answer: Three sentences.
+    """
+
+    rows: Sequence[Mapping[str, Any]]
+    judged: Judged
+    answer: Sequence[str]
+
+    @classmethod
+    def of(cls, measured: Measured, most: Mapping[Condition, float]) -> Results:
+        """The results of all measures, and of the most that colonies can deliver."""
+        judged = judge_all(measured)
+        return cls(condition_rows(measured, most), judged, answer(measured, judged))
+
+    @classmethod
+    def read(cls, seeds: Sequence[Mapping], conditions: Sequence[Mapping]) -> Results:
+        """The same from the rows of seeds.csv and of conditions.csv."""
+        values: dict[Condition, dict[str, list[float]]] = {}
+        for row in seeds:
+            of_seeds = values.setdefault(_condition(row), {name: [] for name in MEASURES})
+            for name in MEASURES:
+                of_seeds[name].append(row[name])
+        limits = {_condition(row): row["deliveries_limit"] for row in conditions}
+        most = {one: np.nan if limit is None else limit for one, limit in limits.items()}
+        measured = {
+            one: {name: np.array(numbers) for name, numbers in of_seeds.items()}
+            for one, of_seeds in values.items()
+        }
+        return cls.of(measured, most)
+
+
+def _condition(row: Mapping) -> Condition:
+    return Condition(row["arena"], row["rules"], row["way"], int(row["ants"]))

@@ -1,0 +1,83 @@
+"""The page that tells the study of the colony."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from taichi_ants.analysis.colony.contrasts import Judged
+from taichi_ants.analysis.colony.study import ARENAS, MEASURES, WORLDS
+from taichi_ants.analysis.colony.tables import glance, means, of_largest
+from taichi_ants.analysis.drawings import Drawing
+from taichi_ants.analysis.tables import sentence
+from taichi_ants.errors import count
+from taichi_ants.report.page import KINDS, Player, Statement, Statements, fill, judged
+
+FILES = {
+    "report.txt": "what the command prints",
+    "conditions.csv": "every measure of every condition, with intervals",
+    "seeds.csv": "every measure of every seed",
+    "differences.csv": "the differences behind the findings, with intervals and verdicts",
+    "findings.md": "the findings to read",
+    "manifest.json": "settings, versions, and what each file holds to the bit",
+    "policies": "policies of median seeds",
+    "figures": "the figures as pictures",
+}
+
+
+def colony_page(
+    rows: Sequence[Mapping[str, Any]],
+    findings: Judged,
+    answer: Sequence[str],
+    *,
+    drawings: Sequence[Drawing],
+    players: Sequence[Player],
+    facts: Mapping[str, str],
+    files: Sequence[str],
+) -> str:
+    """The page as HTML.
+
+    Args:
+        rows: From `tables.condition_rows`.
+        findings: From `contrasts.judge_all`.
+        answer: Three sentences.
+        drawings: The figures.
+        players: Colonies at work.
+        facts: How it was done, names and words.
+        files: The names of the files and folders beside the page.
+    """
+    arenas = list(dict.fromkeys(row["arena"] for row in rows))
+    trained = [arena for arena in ARENAS if arena in arenas]
+    seeds = count(rows[0]["seeds"], "seed")
+    return fill(
+        "colony.html",
+        title="When does a colony do more than its ants?",
+        byline=f"{seeds}, {count(len(rows), 'condition')}, {count(len(arenas), 'kind')} of world",
+        seeds=seeds,
+        worlds=[ARENAS[arena] for arena in trained],
+        answer=answer,
+        findings=_statements(findings),
+        kinds=KINDS,
+        glance=glance(rows),
+        tables=means(rows),
+        drawings=drawings,
+        players=players,
+        facts=facts,
+        files={name: words for name, words in FILES.items() if name in files},
+    )
+
+
+def _statements(findings: Judged) -> Statements:
+    """The findings, with the verdict on the largest colony."""
+    lines = []
+    for (arena, series), by_sizes in findings.items():
+        unit = MEASURES[series.measure]
+        told = [
+            judged(f"{n} ants" if n == less else f"{n} against {less}", finding, "difference")
+            for (n, less), finding in by_sizes.items()
+        ]
+        facts = {"Question": series.question, "Difference in": unit}
+        verdicts = [of_largest(by_sizes).verdict]
+        statement = f"{sentence(series.statement)}."
+        lines.append(Statement(statement, sentence(WORLDS[arena]), verdicts, facts, told))
+    return Statements(("Statement", "World", "Largest colony"), lines, "statements")

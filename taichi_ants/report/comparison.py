@@ -1,0 +1,116 @@
+"""The page that tells the paper's comparison."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from taichi_ants.analysis.drawings import Drawing
+from taichi_ants.analysis.paper.answer import temptation
+from taichi_ants.analysis.paper.published import (
+    GREEDY_RETURN,
+    GREEDY_STEPS,
+    GRID,
+    Q_LEARNING,
+    TABLE_2,
+)
+from taichi_ants.analysis.paper.report import all_tables, behaviour_table
+from taichi_ants.analysis.paper.results import Results
+from taichi_ants.analysis.tables import sentence, thousands
+from taichi_ants.errors import count
+from taichi_ants.report.page import (
+    KINDS,
+    Picture,
+    Player,
+    Statement,
+    Statements,
+    fill,
+    judged,
+)
+
+FILES = {
+    "report.txt": "what the command prints",
+    "table2.csv": "the paper's table 2 beside ours, with all intervals",
+    "table2.md": "the same to read",
+    "claims.csv": "all claims with effects, intervals and verdicts",
+    "claims.md": "the same to read",
+    "summary.csv": "every configuration, over all seeds",
+    "behaviours.csv": "every configuration, over the runs that do the same",
+    "baselines.csv": "exact bounds and simple policies",
+    "episodes.npz": "what every episode of every run gave",
+    "manifest.json": "settings, versions, and what each file holds to the bit",
+    "policies": "a policy of each behaviour",
+    "renders": "the same policies as animations",
+    "figures": "the figures as pictures",
+}
+
+
+def comparison_page(
+    results: Results,
+    *,
+    drawings: Sequence[Drawing],
+    players: Sequence[Player],
+    sheet: Picture | None,
+    facts: Mapping[str, str],
+    files: Sequence[str],
+) -> str:
+    """The page as HTML.
+
+    Args:
+        results: What was found.
+        drawings: The figures.
+        players: What the ants do, a recording of each behaviour.
+        sheet: A policy.
+        facts: How it was done, names and words.
+        files: The names of the files and folders beside the page.
+    """
+    comparison = results.comparison
+    first, *others = all_tables(comparison, results.lines, results.behaviours, results.baselines)
+    # The notes explain the first four tables, of which one is shown at once.
+    notes = next(one for one in others if isinstance(one, str))
+    behaviours = behaviour_table(results.lines, results.behaviours)
+    more = [one for one in others if one not in (notes, behaviours)]
+    returns = sorted((row.reward for one, row in TABLE_2.items() if one != Q_LEARNING))
+    seeds = count(len(comparison.seeds), "seed")
+    return fill(
+        "comparison.html",
+        title="Which learner makes the better ant?",
+        byline=f"{seeds}, {count(len(comparison.rows), 'configuration')}, "
+        f"{thousands(comparison.returns.size)} episodes of training, world: {comparison.world}",
+        seeds=f"{len(comparison.seeds)} runs" if len(comparison.seeds) > 1 else "a run",
+        configurations=len(GRID),
+        best=("Q-learning", TABLE_2[Q_LEARNING].reward),
+        others=(returns[0], returns[-1]),
+        greedy_return=f"{GREEDY_RETURN:g}",
+        greedy_steps=[f"{one:g}" for one in GREEDY_STEPS],
+        in_paper_world=comparison.in_paper_world,
+        answer=results.answer,
+        claims=_claims(results),
+        kinds=KINDS,
+        first_table=first,
+        table_notes=notes,
+        more_tables=more,
+        behaviours=behaviours,
+        temptation=temptation(results.baselines),
+        drawings=drawings,
+        players=players,
+        sheet=sheet,
+        sheet_words=sheet.words if sheet else "",
+        facts=facts,
+        files={name: words for name, words in FILES.items() if name in files},
+    )
+
+
+def _claims(results: Results) -> Statements:
+    """The claims, with a column of verdicts for each delivery setting."""
+    lines = []
+    for claim, findings in results.audit.items():
+        unit, centre = claim.quantity.unit, claim.centre
+        told = [
+            judged(f"{setting} delivery", one, one.contrast.label, unit)
+            for setting, one in findings.items()
+        ]
+        facts = {"Tested on": claim.tested_on, "Asked": f"{centre} {claim.criterion.words} {unit}"}
+        verdicts = [one.verdict for one in findings.values()]
+        lines.append(Statement(claim.statement, claim.section, verdicts, facts, told))
+    settings = map(sentence, results.comparison.delivery_settings)
+    return Statements(("The paper, in our words", "Section", *settings), lines, "claims")

@@ -1,0 +1,186 @@
+"""What the pages have in common: how a template is filled, and the parts that stand on both."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import resources
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from taichi_ants.analysis.findings import Finding, Verdict
+from taichi_ants.analysis.tables import number
+from taichi_ants.report.intervals import interval_drawing
+from taichi_ants.viewer.page import part
+from taichi_ants.viewer.recording import Recording
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+# Of the viewer: what a recording holds, the picture of the world, and what plays it.
+_PLAYING = ("history.js", "stage.js", "timeline.js")
+
+
+@cache
+def _text(name: str) -> str:
+    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
+
+
+@cache
+def _templates() -> Environment:
+    from jinja2 import Environment, FunctionLoader, StrictUndefined
+
+    return Environment(
+        loader=FunctionLoader(_text),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+
+def fill(template: str, **parts: Any) -> str:
+    """A page as HTML; all text in the parts is escaped."""
+    from markupsafe import Markup
+
+    shared = {
+        "style": part("colours.css") + _text("report.css"),
+        "script": "\n".join([*map(part, _PLAYING), _text("report.js")]),
+    }
+    marked = {name: Markup(text) for name, text in shared.items()}
+    return _templates().get_template(template).render(**marked, **parts)
+
+
+class Player(NamedTuple):
+    """A recording that plays on the page.
+
+    Attributes:
+        title, words: What stands below it.
+        recording: The recording.
+    """
+
+    title: str
+    words: str
+    recording: Recording
+
+    @property
+    def data(self) -> str:
+        """The recording as text."""
+        return base64.b64encode(self.recording.to_bytes()).decode()
+
+
+class Picture(NamedTuple):
+    """An image, uint8 (height, width, 3), with words for those who do not see it."""
+
+    words: str
+    image: np.ndarray
+
+    @property
+    def data(self) -> str:
+        """A PNG in few colours, as text."""
+        from PIL import Image
+
+        file = io.BytesIO()
+        Image.fromarray(self.image).quantize(64).save(file, "png")
+        return base64.b64encode(file.getvalue()).decode()
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        return self.image.shape[1], self.image.shape[0]
+
+
+class Judged(NamedTuple):
+    """What became of a statement in one setting.
+
+    Attributes:
+        setting: Which one.
+        verdict: The verdict.
+        words: Effect, interval, and on what it rests.
+        drawing: The same as a picture, SVG.
+    """
+
+    setting: str
+    verdict: Verdict
+    words: str
+    drawing: str
+
+
+def judged(setting: str, finding: Finding, label: str, unit: str = "") -> Judged:
+    """A finding as a page shows it: a label of its effect, the effect, and in what unit it is."""
+    words = label
+    if finding.verdict is not Verdict.NOT_TESTED:
+        digits = 1 if finding.contrast.typical or abs(finding.effect) >= 10 else 2
+        effect, low, high = (number(x, digits) for x in (finding.effect, finding.low, finding.high))
+        words += f": {effect} {unit}".rstrip()
+        words += f", between {low} and {high}" if finding.contrast.seeds > 1 else ""
+    by_mean = finding.by_mean
+    if by_mean and by_mean.verdict is not finding.verdict:
+        words += f"; by the mean {by_mean.verdict.value}, {number(by_mean.effect)}"
+    return Judged(setting, finding.verdict, words, interval_drawing(finding))
+
+
+@dataclass(frozen=True)
+class Statement:
+    """A line of the table that can be sorted and filtered.
+
+    Attributes:
+        text: What is claimed.
+        place: Of the paper, or of the world: what the second column says.
+        verdicts: One for each column of verdicts.
+        facts: Names and words that are told on demand.
+        judged: The findings that are told on demand.
+    """
+
+    text: str
+    place: str
+    verdicts: Sequence[Verdict]
+    facts: Mapping[str, str] = field(default_factory=dict)
+    judged: Sequence[Judged] = ()
+
+
+class Statements(NamedTuple):
+    """A table of statements.
+
+    Attributes:
+        headers: Of the statement, of its place, and of each column of verdicts.
+        lines: The statements.
+        noun: What they are called.
+    """
+
+    headers: Sequence[str]
+    lines: Sequence[Statement]
+    noun: str
+
+    @property
+    def tallies(self) -> list[tuple[str, list[tuple[Verdict, int]]]]:
+        """How many verdicts of each kind there are, for each column of verdicts."""
+        columns = zip(*(line.verdicts for line in self.lines), strict=True)
+        return [
+            (header, [(one, column.count(one)) for one in KINDS if one in column])
+            for header, column in zip(self.headers[2:], columns, strict=True)
+        ]
+
+
+# In the order in which a reader wants them.
+KINDS = (
+    *(Verdict.SUPPORTED, Verdict.EQUIVALENT, Verdict.UNDECIDED),
+    *(Verdict.CONTRADICTED, Verdict.NOT_TESTED),
+)
+
+
+def made_facts(made: Mapping[str, Any]) -> dict[str, str]:
+    """What made the results, from a manifest, in words."""
+    facts = {"Command": made["command"], "Finished": made["finished"].replace("T", " ")}
+    if made.get("commit"):
+        facts["Commit"] = made["commit"]
+    packages = ", ".join(f"{name} {version}" for name, version in made["packages"].items())
+    facts["Versions"] = f"Python {made['python']}, {packages}"
+    cpus = f"{made['cpus']} processors" if made["cpus"] != 1 else "one processor"
+    facts["Machine"] = f"{made['platform']}, {cpus}"
+    facts["Time"] = f"{made['seconds']:.0f} seconds"
+    return facts

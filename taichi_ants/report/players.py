@@ -1,0 +1,96 @@
+"""What moves on the pages: what each behaviour looks like, and colonies at work."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS, DELIVERS, counts
+from taichi_ants.analysis.colony.study import ARENAS, JOINT, RULES
+from taichi_ants.analysis.paper.best_of import example_name, examples
+from taichi_ants.analysis.paper.comparison import Comparison
+from taichi_ants.analysis.tables import sentence, thousands
+from taichi_ants.engines.colony.colony import Colony
+from taichi_ants.errors import count
+from taichi_ants.learners.policies import load_policy
+from taichi_ants.rendering import Episode, policy_sheet
+from taichi_ants.report.page import Picture, Player
+from taichi_ants.studies.colony_study import COMPARED, Plan
+from taichi_ants.studies.runner import RunPoint, Study
+from taichi_ants.task import Task
+from taichi_ants.viewer import record_colony, record_episode
+
+STEPS = 80  # of an episode, at most; a delivery takes 34, to and fro on the trail 38
+TICKS, MOST_ANTS = 240, 1000  # of a colony: how long, and how many ants are shown at most
+
+
+def as_in_training(task: Task) -> Task:
+    """The task with the evaporation of training in rollouts too."""
+    return replace(task, evaporation_in_evaluation=task.evaporation_in_training)
+
+
+def played(point: RunPoint, q_values: np.ndarray, seed: int) -> Episode:
+    """The beginning of the episode that told the behaviour of a policy.
+
+    It has evaporation as in training, not as in the greedy evaluation.
+    """
+    steps, task = min(point.max_steps, STEPS), as_in_training(point.task)
+    return Episode.play(point.world, q_values, seed=seed, max_steps=steps, task=task)
+
+
+def what_is_seen(
+    policies: Path, study: Study[RunPoint], comparison: Comparison
+) -> tuple[list[Player], Picture | None]:
+    """A recording of each behaviour, and the sheet of a policy that delivers, if one does.
+
+    `policies` is the folder of the examples' policies; those that it lacks are left out.
+    """
+    first: dict[int, tuple[int, int]] = {}
+    for row, run in examples(comparison):
+        if (policies / f"{example_name(comparison, row, run)}.npz").exists():
+            first.setdefault(int(comparison.behaviours[row, run]), (row, run))
+    players, sheet, done = [], None, counts(comparison.behaviours)
+    for code, (row, run) in sorted(first.items()):
+        point, seed, variant = study.points[row], study.seeds[run], comparison.rows[row].variant
+        policy = load_policy(policies / f"{example_name(comparison, row, run)}.npz")
+        whose = f"{variant.label}, {point.task.delivery} delivery, seed {seed}"
+        share = f"{thousands(done[code])} of {thousands(comparison.behaviours.size)}"
+        words = f"{sentence(DEFINITIONS[code])}: {share} final policies. Here: {whose}."
+        recording = record_episode(played(point, policy.q_values, seed), BEHAVIOURS[code])
+        players.append(Player(sentence(BEHAVIOURS[code]), words, recording))
+        if code == DELIVERS:
+            image = policy_sheet(policy.q_values, f"{variant.label}: what it does", task=point.task)
+            sheet = Picture(f"What an ant has learned: {whose}", image)
+    return players, sheet
+
+
+def at_work(policies: Path, conditions: Plan, seeds: Sequence[int], arch: str) -> list[Player]:
+    """Recordings of the largest colony under each of the compared rules, all in one world."""
+    trained = [one for one in conditions if one.way == JOINT and one.ants <= MOST_ANTS]
+    if not trained:
+        return []
+    arena = max((one.arena for one in trained), key=list(ARENAS).index)
+    ants = max(one.ants for one in trained)
+    players = []
+    for condition in trained:
+        _, rules, _, n = condition
+        if condition.arena != arena or rules not in COMPARED or n != ants:
+            continue
+        point = conditions[condition]
+        colony = Colony(
+            *(point.world[0] if isinstance(point.world, tuple) else point.world, point.task),
+            replace(point.training, epsilon=point.training.min_epsilon),
+            *(seeds[0], ants),
+            sharing="fixed",
+            q_values=load_policy(policies / f"{arena}_{rules}_{ants}.npz").q_values,
+            arch=arch,
+        )
+        colony.begin_episode()
+        recording = record_colony(colony, TICKS, title=RULES[rules])
+        done = count(int(colony.outcome().deliveries.sum()), "delivery")
+        words = f"{count(ants, 'ant')} in {ARENAS[arena]}: {done} in {TICKS} ticks."
+        players.append(Player(sentence(RULES[rules]), words, recording))
+    return players

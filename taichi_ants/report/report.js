@@ -1,0 +1,134 @@
+/* The report: light or dark, tables that sort and filter, and small players. */
+
+const dark = matchMedia("(prefers-color-scheme: dark)"), printing = matchMedia("print");
+const still = matchMedia("(prefers-reduced-motion: reduce)");
+const players = [];
+let chosenTheme = "";
+
+/* Paper is light, and cannot open what is closed. */
+function showTheme() {
+  if (printing.matches) document.querySelectorAll(".more").forEach((one) => (one.open = true));
+  const wanted = chosenTheme || (dark.matches ? "dark" : "light");
+  document.documentElement.dataset.theme = printing.matches ? "light" : wanted;
+  for (const player of players) player.readColours();
+}
+
+class SmallPlayer {
+  constructor(figure, source) {
+    this.figure = figure;
+    this.history = new History(source.header);
+    source.start((bytes) => this.history.add(bytes));
+    const [canvas, overlay] = figure.querySelectorAll("canvas");
+    [this.slider, this.place, this.button] = ["input", "output", "button"].map((name) => figure.querySelector(name));
+    this.stage = new Stage(canvas, overlay, this.history);
+    this.player = new Player(this.history, () => this.draw());
+    this.player.speed = Number(figure.dataset.speed);
+    this.player.moment = this.player.last; // at rest, the whole path is seen
+    this.slider.max = this.player.last;
+    this.button.addEventListener("click", () => this.press());
+    this.slider.addEventListener("input", () => {
+      const moment = Number(this.slider.value); // drawing moves the slider
+      this.player.pause();
+      this.player.go(moment);
+    });
+    new ResizeObserver(() => this.stage.resize() && this.draw()).observe(canvas);
+    this.stage.resize();
+    this.draw();
+  }
+
+  press() {
+    const { player } = this;
+    if (player.playing) return player.pause();
+    for (const other of players) if (other !== this) other.player.pause();
+    player.play();
+    this.before = null;
+    if (!this.runs) this.run();
+  }
+
+  run() {
+    this.runs = true;
+    requestAnimationFrame((now) => {
+      const moved = this.player.pass((now - (this.before ?? now)) / 1000);
+      this.before = now;
+      if (moved) this.draw();
+      this.runs = this.player.playing;
+      if (this.runs) this.run();
+    });
+  }
+
+  readColours() {
+    this.stage.readColours();
+    this.draw();
+  }
+
+  draw() {
+    const { player, history, figure } = this, { moment } = player;
+    const share = player.playing && !still.matches ? player.share : 0, followed = history.header.follow;
+    const ant = followed === null ? null : history.ant(moment, followed);
+    const next = ant && moment < player.last ? history.ant(moment + 1, followed) : null;
+    this.stage.draw(moment, share, { ant, next, letters: [], cell: -1, path: ant ? history.path(moment, followed) : [] });
+    this.slider.value = moment;
+    this.place.textContent = `${moment} / ${player.last}`;
+    this.slider.setAttribute("aria-valuetext", `tick ${moment} of ${player.last}`);
+    figure.classList.toggle("playing", player.playing);
+    this.button.setAttribute("aria-label", `${player.playing ? "Pause" : "Play"}: ${figure.dataset.title}`);
+  }
+}
+
+/* Lines of a table by the text, the place or the verdict; those that do not fit are hidden. */
+class Statements {
+  constructor(part) {
+    this.part = part;
+    this.body = part.querySelector("tbody");
+    this.lines = [...this.body.rows];
+    this.words = part.querySelector("input");
+    this.verdict = part.querySelector("select");
+    this.found = part.querySelector("output");
+    this.words.addEventListener("input", () => this.filter());
+    this.verdict.addEventListener("change", () => this.filter());
+    part.querySelectorAll("th").forEach((head, column) => {
+      head.querySelector("button").addEventListener("click", () => this.sort(head, column));
+    });
+    this.filter();
+  }
+
+  filter() {
+    const words = this.words.value.toLowerCase().split(/\s+/).filter(Boolean), wanted = this.verdict.value;
+    let shown = 0;
+    for (const line of this.lines) {
+      const text = line.textContent.toLowerCase();
+      const verdicts = [...line.querySelectorAll(".v")].map((one) => one.textContent.trim());
+      line.hidden = !(words.every((word) => text.includes(word)) && (!wanted || verdicts.includes(wanted)));
+      if (!line.hidden) shown++;
+    }
+    this.found.textContent = `${shown} of ${this.lines.length} ${this.part.dataset.noun}`;
+  }
+
+  /* Up, down, and back to the order of the page. */
+  sort(head, column) {
+    const order = { none: "ascending", ascending: "descending", descending: "none" }[head.ariaSort ?? "none"];
+    this.part.querySelectorAll("th").forEach((other) => (other.ariaSort = "none"));
+    head.ariaSort = order;
+    const key = (line) => line.cells[column].dataset.key ?? "", sign = order === "descending" ? -1 : 1;
+    const compare = (one, other) => sign * key(one).localeCompare(key(other), "en", { numeric: true });
+    const lines = order === "none" ? this.lines : [...this.lines].sort(compare);
+    this.body.append(...lines);
+  }
+}
+
+async function open() {
+  document.querySelectorAll(".statements").forEach((part) => new Statements(part));
+  const theme = document.getElementById("theme");
+  theme.addEventListener("click", () => {
+    chosenTheme = document.documentElement.dataset.theme === "dark" ? "light" : "dark";
+    showTheme();
+  });
+  for (const one of [dark, printing]) one.addEventListener("change", showTheme);
+  showTheme();
+  for (const figure of document.querySelectorAll(".player")) {
+    players.push(new SmallPlayer(figure, await recordingIn(figure.querySelector("script").textContent)));
+  }
+  window.report = { players }; // for tests, and for those who look inside
+}
+
+open();

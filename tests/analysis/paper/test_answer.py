@@ -1,0 +1,126 @@
+"""The answer in three sentences, on made-up comparisons where it is so and where it is not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic_comparison import build, change, level_truth, subset, unchanged
+
+from taichi_ants.analysis.behaviour import CIRCLES, DELIVERS, OTHER, WALKS
+from taichi_ants.analysis.paper.answer import NEEDS, answer, temptation
+from taichi_ants.analysis.paper.audit import assess
+from taichi_ants.analysis.paper.claims import CLAIMS
+from taichi_ants.analysis.paper.comparison import Comparison
+from taichi_ants.analysis.paper.published import DYNA_P5, Q_LEARNING, SARSA
+from taichi_ants.analysis.paper.summary import summarise
+from taichi_ants.analysis.paper.table2 import table2
+
+CHOSEN = [claim for claim in CLAIMS if claim.id in ("q-return-highest", "overall-sarsa-length")]
+
+
+def told(comparison: Comparison) -> list[str]:
+    lines = table2(comparison, summarise(comparison), 50)
+    return answer(comparison, lines, assess(comparison, CHOSEN))
+
+
+@pytest.fixture(scope="module")
+def paper() -> Comparison:
+    return build({"continuing": unchanged}, seeds=12)
+
+
+def test_what_the_paper_says_is_said_where_it_is_so(paper: Comparison) -> None:
+    returns, steps, doings = told(paper)
+    assert returns.startswith("Q-learning returns most, as the paper says: Q-learning minus ")
+    assert steps.startswith("SARSA needs the fewest steps, as the paper says: ")
+    assert "reward [" in returns
+    assert "steps [" in steps
+    assert doings == f"All of {paper.behaviours.size} final policies deliver."
+
+
+def test_the_opposite_is_said_where_it_is_so() -> None:
+    worse = change(Q_LEARNING, late_return=-20)
+    slow = change(SARSA, late_steps=90, early_steps=90)
+    for edit, number, words in (
+        (worse, 0, "Q-learning does not return most, other than the paper says: "),
+        (slow, 1, "SARSA does not need the fewest, other than the paper says: "),
+    ):
+        sentence = told(build({"continuing": edit}, seeds=12))[number]
+        assert sentence.startswith(words)
+        assert float(sentence.split(" is ")[1].split(" ")[0]) < -5
+
+
+def test_alike_and_open_are_two_things() -> None:
+    level = build({"absorbing": unchanged}, seeds=12, truth=level_truth, shared=0.0)
+    returns, steps, _ = told(level)
+    assert returns.startswith("Q-learning does not return most, other than the paper says: ")
+    assert returns.endswith("], less than matters.")
+    assert steps.endswith("], less than matters.")
+    noisy = build({"absorbing": unchanged}, seeds=6, truth=level_truth, noise=200)
+    assert told(noisy)[0].startswith("Whether Q-learning returns most, as the paper says, stays ")
+
+
+def test_delivery_settings_that_disagree_are_told_apart(paper: Comparison) -> None:
+    edits = {"continuing": unchanged, "absorbing": change(DYNA_P5, late_return=200)}
+    returns, steps, _ = told(build(edits, seeds=12))
+    first, second = returns.split("; ")
+    assert first.startswith("With continuing delivery Q-learning returns most, as the paper says:")
+    assert second.startswith("with absorbing delivery Q-learning does not return most, other than")
+    assert "Q-learning minus Dyna-Q (p5) is -" in second
+    assert steps.count("as the paper says") == 1  # both agree
+    assert "delivery" not in steps  # even in the numbers
+
+
+def test_who_does_not_deliver_is_told(paper: Comparison) -> None:
+    codes = np.full_like(paper.behaviours, DELIVERS)
+    position = paper.positions("continuing", DYNA_P5)[0]
+    codes[position, :3], codes[position, 3] = WALKS, CIRCLES
+    codes[0, 0] = OTHER
+    mixed = replace(paper, behaviours=codes)
+    assert told(mixed)[2] == (
+        f"Of {codes.size} final policies, {codes.size - 5} deliver; 3 walk the trail, 1 circle "
+        "with food and 1 do something else, 80 % of them Dyna-Q (p5) with continuing delivery."
+    )
+    none = replace(paper, behaviours=np.full_like(codes, WALKS))
+    assert f"Of {codes.size} final policies, none deliver; {codes.size} walk" in told(none)[2]
+
+
+def test_without_the_papers_world_the_learners_are_compared(paper: Comparison) -> None:
+    garden = replace(paper, world="garden.txt")
+    first, second, _ = told(garden)
+    assert first == f"The paper's claims are not tested here: {NEEDS}."
+    lines = table2(garden, summarise(garden), 50)
+    best = max(line["return_last50_iqm"] for line in lines)
+    assert f"returns {best:.1f}, the most, and SARSA" in second
+    one = subset(garden, [20], 3, 9)
+    assert told(one)[1].startswith("In the typical run SARSA with continuing delivery returns ")
+    assert told(one)[1].endswith(" steps.")
+
+
+def test_one_seed_has_no_interval(paper: Comparison) -> None:
+    returns = told(subset(paper, range(len(paper.rows)), 1, 120))[0]
+    assert "[" not in returns
+    assert "nan" not in returns
+
+
+def test_learners_that_are_missing_leave_a_claim_untested(paper: Comparison) -> None:
+    rows = [number for number, row in enumerate(paper.rows) if row.variant != DYNA_P5]
+    few = subset(paper, rows, 12, 120)
+    assert told(few)[0] == f"The paper's claims are not tested here: {NEEDS}."
+
+
+BASELINES = [
+    {"baseline": "exact bounds", "discount": None, "return_mean": None, "deliveries_mean": None},
+    {"baseline": "shortest delivery", "discount": None, "return_mean": 45.0, "deliveries_mean": 1},
+    {"baseline": "optimal policy", "discount": 0.9, "return_mean": 45.0, "deliveries_mean": 1},
+    {"baseline": "optimal policy", "discount": 0.99, "return_mean": 476.0, "deliveries_mean": 0},
+]
+
+
+def test_what_pays_more_than_deliveries() -> None:
+    assert temptation(BASELINES) == (
+        "At discount 0.99 the optimal policy does not deliver either: it returns 476, the shortest "
+        "delivery 45."
+    )
+    assert temptation(BASELINES[:3]) == temptation([]) == ""

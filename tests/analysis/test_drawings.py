@@ -1,0 +1,80 @@
+"""Figures as markup: what is drawn is what the figure shows, in the colours of the page."""
+
+from __future__ import annotations
+
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from taichi_ants.analysis.drawings import COLOURS, Drawing, drawing, drawings
+from taichi_ants.analysis.style import BLUE, INK, frame, legend_entries, new_figure, styled
+
+TITLE, CAPTION = 'Ants & <more> "ants"', "First line\nof two, <here>"
+POINTS = np.random.default_rng(0).random((4000, 2)).round(2)
+
+
+def made(look: dict, label: str = "runs <1>"):
+    with styled():
+        figure = new_figure(3)
+        axis = figure.subplots()
+        axis.plot(*POINTS.T, "o", label=label, **look)
+        axis.axhline(0.125, color=INK)
+        axis.set_xlabel("discount 0.9999")
+        frame(figure, TITLE, CAPTION, legend_entries([axis]))
+    return figure
+
+
+@pytest.fixture(scope="module")
+def drawn() -> Drawing:
+    return drawing("one", made({"color": BLUE, "alpha": 0.6, "markersize": 3}))
+
+
+def texts(svg: str) -> list[str]:
+    return ["".join(one.itertext()) for one in ElementTree.fromstring(svg).iter() if one.text]
+
+
+def test_title_and_caption_are_told_by_the_page(drawn: Drawing) -> None:
+    assert drawn[:3] == ("one", TITLE, "First line of two, <here>")
+    assert drawn.svg.startswith('<svg viewBox="0 0 648 216" role="img" aria-label="Ants &amp; &lt;')
+    assert not [line for line in texts(drawn.svg) if "Ants" in line or "First" in line]
+
+
+def test_it_is_well_formed_and_text_stays_as_it_is(drawn: Drawing) -> None:
+    assert {"discount 0.9999", "runs <1>"} <= {line.strip() for line in texts(drawn.svg)}
+    assert "font-family" not in drawn.svg
+    assert "<style" not in drawn.svg  # it would change the whole page
+    assert "xlink" not in drawn.svg
+
+
+def test_colours_are_those_of_the_page(drawn: Drawing) -> None:
+    assert "var(--plot-blue)" in drawn.svg
+    assert "var(--ink)" in drawn.svg
+    for colour in COLOURS:
+        assert colour.lower() not in drawn.svg.lower()
+
+
+def test_every_mark_is_drawn_where_it_is(drawn: Drawing) -> None:
+    """To half a point, and no place twice."""
+    exact = drawing("two", made({"color": BLUE, "markersize": 3}))  # its marks are left alone
+
+    def places(svg: str) -> set[tuple[float, float]]:
+        found = re.findall(r'<use href="[^"]*" x="([^"]*)" y="([^"]*)"', svg)
+        return {(round(2 * float(x)) / 2, round(2 * float(y)) / 2) for x, y in found}
+
+    assert places(drawn.svg) == places(exact.svg)
+    assert len(drawn.svg) < len(exact.svg) / 2
+    group = max(re.findall(r"<g style=[^>]*opacity[^>]*>(.*?)</g>", drawn.svg), key=len)
+    marks = re.findall(r"<use [^>]*>", group)
+    assert len(marks) == len(set(marks)) > 1000
+
+
+def test_names_in_several_drawings_do_not_meet() -> None:
+    look = {"color": BLUE, "alpha": 0.6}
+    several = drawings({"one": made(look), "two": made(look)})
+    ids = [set(re.findall(r'id="([^"]*)"', one.svg)) for one in several]
+    assert ids[0]
+    assert not ids[0] & ids[1]
+    again = drawing("one", made(look))
+    assert again == several[0]  # the same figure gives the same bytes

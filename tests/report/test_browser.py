@@ -1,0 +1,187 @@
+"""The pages in a real browser: sort, filter, open, play, print."""
+
+from __future__ import annotations
+
+import pytest
+from browser import started
+from finished_pages import colony_html, comparison_html, results
+
+from taichi_ants.analysis.paper.audit import claims_rows
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with started() as one:
+        yield one
+
+
+@pytest.fixture(scope="module")
+def paths(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("reports")
+    for name, text in (("comparison", comparison_html()), ("colony", colony_html())):
+        (folder / f"{name}.html").write_text(text, encoding="utf-8")
+    return folder
+
+
+@pytest.fixture
+def opened(browser, paths):
+    """Opens a page; at the end nothing must have gone wrong, and nothing was asked for."""
+    faults, contexts = [], []
+
+    def show(name: str, width: int = 1280, **options):
+        # The page allows no evaluation of text, which is how Playwright waits.
+        usual = {"viewport": {"width": width, "height": 800}, "bypass_csp": True, "offline": True}
+        context = browser.new_context(**usual, **options)
+        contexts.append(context)
+        tab = context.new_page()
+        tab.on("console", lambda message: faults.append(message.text))
+        tab.on("pageerror", lambda error: faults.append(str(error)))
+        address = (paths / f"{name}.html").as_uri()
+        tab.on("request", lambda one: faults.append(one.url) if own(one.url, address) else None)
+        tab.goto(address)
+        tab.wait_for_function("window.report")
+        return tab
+
+    yield show
+    for context in contexts:
+        context.close()
+    assert faults == []
+
+
+def own(url: str, address: str) -> bool:
+    """Whether a request leaves the file."""
+    return url.partition("#")[0] != address and not url.startswith("data:")
+
+
+def shown(tab) -> list[list[str]]:
+    """The cells of the lines that are not hidden, without details."""
+    script = """() => [...document.querySelectorAll(".statements tbody tr:not([hidden])")]
+      .map((one) => [...one.cells]
+        .map((cell) => (cell.querySelector("summary") ?? cell).textContent.trim()))"""
+    return tab.evaluate(script)
+
+
+def test_claims_are_sorted(opened):
+    tab = opened("comparison")
+    order = shown(tab)
+    for column, key in ((0, str.lower), (1, None)):
+        head = tab.locator(".statements th").nth(column)
+        head.locator("button").click()
+        assert head.get_attribute("aria-sort") == "ascending"
+        up = [cells[column] for cells in shown(tab)]
+        if key:
+            assert up == sorted(up, key=key)
+        head.locator("button").press("Enter")  # by keyboard, too
+        assert head.get_attribute("aria-sort") == "descending"
+        assert shown(tab)[0][column] == up[-1]
+        head.locator("button").click()
+        assert shown(tab) == order
+    verdicts = ["supported", "equivalent", "undecided", "contradicted", "not tested"]
+    tab.locator(".statements th button").nth(3).click()
+    places = [verdicts.index(cells[3]) for cells in shown(tab)]
+    assert places == sorted(places)
+    assert len(set(places)) > 1
+
+
+def test_claims_are_filtered(opened):
+    tab = opened("comparison")
+    tab.fill(".filters input", "sarsa STABLE")
+    assert 0 < len(shown(tab)) < 10
+    assert all("SARSA" in cells[0] for cells in shown(tab))
+    assert tab.inner_text(".filters output") == f"{len(shown(tab))} of 51 claims"
+    tab.fill(".filters input", "")
+    tab.select_option(".filters select", "contradicted")
+    rows = claims_rows(results().audit)
+    wanted = {row["statement"] for row in rows if row["verdict"] == "contradicted"}
+    assert {cells[0] for cells in shown(tab)} == wanted
+    tab.fill(".filters input", "no such words")
+    assert shown(tab) == []
+    assert tab.inner_text(".filters output") == "0 of 51 claims"
+
+
+def test_details_open_on_demand(opened):
+    tab = opened("comparison")
+    told = tab.locator(".statements .told").first
+    assert not told.is_visible()
+    tab.locator(".statements summary").first.focus()
+    tab.keyboard.press("Enter")
+    assert told.is_visible()
+    assert "Tested on" in told.inner_text()
+    assert told.locator("svg.interval").first.bounding_box()["width"] > 200
+    tab.locator(".statements summary").first.click()
+    assert not told.is_visible()
+
+
+PIXELS = """number => [...document.querySelectorAll(".player")[number].querySelectorAll("canvas")]
+  .map((one) => one.toDataURL())"""
+
+
+@pytest.mark.parametrize(("name", "last"), [("comparison", 34), ("colony", 30)])
+def test_players_play(opened, name, last):
+    tab = opened(name)
+    player = tab.locator(".player").first
+    assert player.locator("output").inner_text() == f"{last} / {last}"
+    end = tab.evaluate(PIXELS, 0)
+    slider = player.locator("input")
+    slider.focus()
+    tab.keyboard.press("Home")
+    assert player.locator("output").inner_text() == f"0 / {last}"
+    assert tab.evaluate(PIXELS, 0) != end
+    player.locator("button").click()
+    assert player.locator("button").get_attribute("aria-label").startswith("Pause: ")
+    tab.wait_for_function("report.players[0].player.moment > 2")
+    player.locator("button").click()
+    assert player.locator("button").get_attribute("aria-label").startswith("Play: ")
+    moment = tab.evaluate("report.players[0].player.moment")
+    assert player.locator("output").inner_text() == f"{moment} / {last}"
+    tab.evaluate("report.players[0].player.speed = 500")
+    player.locator("button").click()
+    tab.wait_for_function("!report.players[0].player.playing")
+    assert tab.evaluate("report.players[0].player.moment") == last
+    assert tab.evaluate(PIXELS, 0) == end
+
+
+def test_one_player_at_a_time(opened):
+    tab = opened("comparison")
+    for number in (0, 1):
+        tab.locator(".player button").nth(number).click()
+    assert tab.evaluate("report.players.map((one) => one.player.playing)") == [False, True]
+
+
+@pytest.mark.parametrize("name", ["comparison", "colony"])
+def test_light_and_dark(opened, name):
+    tab = opened(name, color_scheme="dark")
+    ground = "getComputedStyle(document.body).backgroundColor"
+    dark, ants = tab.evaluate(ground), tab.evaluate(PIXELS, 0)
+    tab.click("#theme")
+    assert tab.evaluate(ground) == "rgb(255, 255, 255)" != dark
+    assert tab.evaluate(PIXELS, 0) != ants
+    tab.click("#theme")
+    assert tab.evaluate(ground) == dark
+    assert tab.evaluate(PIXELS, 0) == ants
+
+
+@pytest.mark.parametrize("name", ["comparison", "colony"])
+def test_paper_is_light_and_has_no_controls(opened, name):
+    tab = opened(name, color_scheme="dark")
+    controls = tab.locator("button:visible, input:visible, select:visible, nav:visible")
+    assert controls.count() > 5
+    tab.emulate_media(media="print")
+    tab.wait_for_function("document.documentElement.dataset.theme === 'light'")
+    # What sorts is the head of the table, and stays.
+    assert tab.locator(".icon:visible, input:visible, select:visible, nav:visible").count() == 0
+    assert tab.locator(".more table").first.is_visible()
+    assert tab.locator(".player canvas").first.is_visible()
+    assert tab.pdf().startswith(b"%PDF")
+
+
+@pytest.mark.parametrize("name", ["comparison", "colony"])
+def test_nothing_is_wider_than_a_phone(opened, name):
+    tab = opened(name, width=390)
+    tab.evaluate("document.querySelectorAll('details').forEach((one) => (one.open = true))")
+    assert tab.evaluate("document.documentElement.scrollWidth") == 390
+    assert tab.locator(".plot svg").first.bounding_box()["width"] >= 600  # it can be scrolled
+    size = "[...document.querySelectorAll('main p')].map((p) => getComputedStyle(p).fontSize)"
+    assert min(float(one.removesuffix("px")) for one in tab.evaluate(size)) > 13

@@ -1,0 +1,75 @@
+"""The page of the colony's study: its numbers are those of the tables, and it asks for nothing."""
+
+from __future__ import annotations
+
+import re
+from html import unescape
+
+import pytest
+from finished_pages import colony_html, study_results
+from pages import addresses, tables
+from synthetic_colony_study import build, limits
+
+from taichi_ants.analysis.colony.results import Results
+from taichi_ants.analysis.colony.tables import difference_rows, rows_of_seeds
+from taichi_ants.report.colony import colony_page
+
+BARE = {"drawings": [], "players": [], "facts": {}, "files": []}
+
+
+@pytest.fixture(scope="module")
+def page() -> str:
+    return colony_html()
+
+
+def test_the_answer_is_the_computed_one(page: str) -> None:
+    told = re.search(r'<ol class="answer">(.*?)</ol>', page, re.DOTALL)
+    assert told is not None
+    assert [unescape(one) for one in re.findall(r"<li>(.*?)</li>", told[1])] == list(
+        study_results().answer
+    )
+
+
+def test_deliveries_are_those_of_the_csv(page: str) -> None:
+    rows = tables(page)["Deliveries per 1000 ticks of 8 ants"]
+    assert rows[0] == ["", "The paper's world", "Open worlds (30, 30, 30)"]
+    [line] = [cells for cells in rows if cells[0] == "A + B + C"]
+    means = [
+        row["deliveries_mean"]
+        for row in study_results().rows
+        if (row["rules"], row["way"], row["ants"]) == ("foraging", "joint", 8)
+    ]
+    assert [float(cell) for cell in line[1:]] == pytest.approx(means[:2], abs=0.5)
+
+
+def test_every_finding_has_a_line_with_the_numbers_of_the_csv(page: str) -> None:
+    rows = tables(page)[""][1:]
+    assert len(rows) == len(study_results().judged)
+    assert sum(len(cells) for cells in rows) == 3 * len(rows)
+    whole = " ".join(cells[0] for cells in rows)
+    for row in difference_rows(study_results().judged):
+        digits = 1 if abs(row["mean"]) >= 10 else 2
+        assert f"difference: {row['mean']:.{digits}f}".replace("-0.00", "0.00") in whole
+    firsts = [cells for cells in rows if cells[0].startswith("Ants with all three rules deliver m")]
+    assert {cells[2] for cells in firsts[:1]} == {"supported"}
+
+
+def test_it_asks_for_nothing(page: str) -> None:
+    found = {one for one in addresses(page) if not one.startswith(("#", "data:"))}
+    assert found == {"seeds.csv"}
+    assert len(page) < 1_500_000
+
+
+def test_little_is_told_of_little() -> None:
+    measured = build(seeds=1, sizes=(1,), ways=("open",), arenas=("small",))
+    told = colony_page(*Results.of(measured, limits(measured)), **BARE)
+    assert "nan" not in re.sub(r"<script.*?</script>|<style.*?</style>", "", told, flags=re.S)
+    assert "small worlds (15, 15, 15)" in told
+
+
+def test_the_page_is_the_same_from_the_files() -> None:
+    measured = build(seeds=3, arenas=("paper", "slow"))
+    found = Results.of(measured, {one: float("nan") for one in measured})
+    conditions = [{**row, "deliveries_limit": None} for row in found.rows]
+    again = Results.read(rows_of_seeds(measured, range(3)), conditions)
+    assert colony_page(*again, **BARE) == colony_page(*found, **BARE)

@@ -1,0 +1,105 @@
+"""The page of the comparison: its numbers are those of the tables, and it asks for nothing."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from html import escape, unescape
+
+import pytest
+from finished_pages import FACTS, comparison_html, results
+from pages import addresses, tables
+from synthetic_comparison import build, subset, unchanged
+
+from taichi_ants.analysis.paper.audit import claims_rows
+from taichi_ants.analysis.paper.comparison import Variant
+from taichi_ants.analysis.paper.results import Results
+from taichi_ants.report.comparison import comparison_page
+
+BARE = {"drawings": [], "players": [], "sheet": None, "facts": {}, "files": []}
+
+
+@pytest.fixture(scope="module")
+def page() -> str:
+    return comparison_html()
+
+
+def test_the_answer_is_the_computed_one(page: str) -> None:
+    told = re.search(r'<ol class="answer">(.*?)</ol>', page, re.DOTALL)
+    assert told is not None
+    sentences = re.findall(r"<li>(.*?)</li>", told[1])
+    assert [unescape(one) for one in sentences] == list(results().answer)
+    assert len(sentences) == 3
+
+
+def test_table_2_stands_beside_the_papers(page: str) -> None:
+    rows = tables(page)["Return, last 50 episodes"]
+    assert rows[0] == ["Learner", "Delivery", "Mean", "IQM", "Best run", "Paper", "Below"]
+    for cells, line in zip(rows[1:], results().lines, strict=True):
+        mean, iqm = (line[f"return_last50_{name}"] for name in ("mean", "iqm"))
+        assert float(cells[2].split()[0]) == pytest.approx(mean, abs=0.51)
+        assert float(cells[3].split()[0]) == pytest.approx(iqm, abs=0.51)
+        assert float(cells[5]) == line["paper_return"]
+    titles = tables(page).keys()
+    for title in ("Steps, all episodes", "Deliveries, last 50 episodes", "Greedy evaluation"):
+        assert any(one.startswith(title) for one in titles)
+    assert "Baselines, with evaporation as in training" in titles
+
+
+def test_every_claim_has_a_line_with_the_numbers_of_the_csv(page: str) -> None:
+    rows = tables(page)[""][1:]
+    expected = claims_rows(results().audit)
+    assert len(rows) == len(expected) / 2 == 51
+    for number, cells in enumerate(rows):
+        for column, row in enumerate(expected[2 * number : 2 * number + 2]):
+            assert cells[0].startswith(row["statement"])
+            assert cells[1] == row["section"]
+            assert cells[2 + column] == row["verdict"]
+            digits = 1 if row["centre"] == "interquartile mean" or abs(row["effect"]) >= 10 else 2
+            told = f"{row['delivery'].capitalize()} delivery: {row['verdict']} . {row['contrast']}"
+            assert told in cells[0]
+            if row["verdict"] != "not tested":
+                effect = f"{row['effect']:.{digits}f}".replace("-0.00", "0.00")
+                assert f"{row['contrast']}: {effect.replace('-0.0', '0.0', 1)}" in cells[0] or (
+                    f"{row['contrast']}: {effect} {row['unit']}" in cells[0]
+                )
+
+
+def test_verdicts_are_counted(page: str) -> None:
+    counted = re.findall(r"<li class=\"v-[\w-]+\"><b>(\d+)</b> ([\w ]+)</li>", page)
+    rows = claims_rows(results().audit)
+    assert sum(int(n) for n, _ in counted) == len(rows) == 102
+    n = sum(row["verdict"] == "contradicted" for row in rows)
+    assert sum(int(one) for one, verdict in counted if verdict == "contradicted") == n > 0
+
+
+def test_it_asks_for_nothing_and_links_only_to_what_is_there(page: str) -> None:
+    assert page.startswith("<!doctype html>")
+    found = {one for one in addresses(page) if not one.startswith(("#", "data:"))}
+    assert found == {"claims.csv", "manifest.json"}
+    assert "default-src 'none'" in page
+    assert len(page) < 1_500_000
+
+
+def test_what_comes_from_the_user_is_escaped(page: str) -> None:
+    for text in (*FACTS.values(), "As it <should>", "a <policy>"):
+        assert escape(text, quote=False).replace("'", "&#39;") in page
+    comparison = replace(results().comparison, world="<script>alert(1)</script>.txt")
+    nasty = Variant("<img src=x onerror=alert(1)>")
+    rows = tuple(row._replace(variant=nasty) for row in comparison.rows[:16])
+    found = subset(comparison, range(16), 2, 30)
+    told = comparison_page(Results.of(replace(found, rows=rows), []), **BARE)
+    assert "<script>alert" not in told
+    assert "<img src=x" not in told
+    assert "&lt;script&gt;alert(1)&lt;/script&gt;.txt" in told
+
+
+def test_little_is_told_of_little() -> None:
+    """One seed of one configuration, no figures, no players, another world."""
+    one = subset(build({"absorbing": unchanged}, variants=[Variant("sarsa")]), [3], 1, 7)
+    told = comparison_page(Results.of(replace(one, world="garden.txt"), []), **BARE)
+    assert "nan" not in re.sub(r"<script.*?</script>|<style.*?</style>", "", told, flags=re.S)
+    assert "table 2, beside ours" not in told
+    assert 'class="player"' not in told
+    assert '<svg class="interval"' not in told
+    assert "The paper&#39;s claims are not tested here" in told

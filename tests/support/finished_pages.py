@@ -1,0 +1,84 @@
+"""Pages of made-up studies, for tests that read them and for tests in a browser."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from synthetic_colony_study import build as build_study
+from synthetic_colony_study import limits
+from synthetic_comparison import build, change, unchanged
+
+from taichi_ants import Colony, Task, TrainingConfig, worlds
+from taichi_ants.analysis.colony.figures import draw_all as draw_study
+from taichi_ants.analysis.colony.results import Results as StudyResults
+from taichi_ants.analysis.drawings import drawings
+from taichi_ants.analysis.paper.figures import draw_all
+from taichi_ants.analysis.paper.published import DYNA_P5
+from taichi_ants.analysis.paper.results import Results
+from taichi_ants.learners.policies import trail_follower
+from taichi_ants.rendering import Episode
+from taichi_ants.report.colony import colony_page
+from taichi_ants.report.comparison import comparison_page
+from taichi_ants.report.page import Picture, Player
+from taichi_ants.viewer import record_colony, record_episode
+
+FACTS = {"World": "the <paper's>", "Command": "compare.py --out 'a & b'"}
+BASELINES = [
+    {
+        "baseline": "shortest delivery",
+        "discount": None,
+        **{"return_mean": 45.0, "steps_mean": 34.0, "deliveries_mean": 1.0},
+    }
+]
+
+
+@cache
+def results() -> Results:
+    """A comparison in which all claims hold with one kind of delivery, not with the other."""
+    edits = {"continuing": unchanged, "absorbing": change(DYNA_P5, late_return=200)}
+    return Results.of(build(edits, seeds=6), BASELINES)
+
+
+@cache
+def comparison_html() -> str:
+    """Its page."""
+    recording = record_episode(Episode.play(worlds.paper(), trail_follower()))
+    sheet = Picture("a <policy>", np.full((20, 30, 3), 200, np.uint8))
+    return comparison_page(
+        results(),
+        drawings=drawings(draw_all(results().comparison, BASELINES)),
+        players=[Player(f"Delivers {n}", "As it <should>", recording) for n in (1, 2)],
+        sheet=sheet,
+        facts=FACTS,
+        files=["claims.csv", "manifest.json", "mine.txt"],
+    )
+
+
+@cache
+def study_results() -> StudyResults:
+    """A study in which all three rules double what ants deliver."""
+
+    def truth(rules: str, way: str, ants: int) -> float:
+        return 20.0 * ants * (2 if rules in ("foraging", "queueing") and ants > 1 else 1)
+
+    measured = build_study(truth, seeds=6, arenas=("paper", "open", "small"))
+    return StudyResults.of(measured, limits(measured))
+
+
+@cache
+def colony_html() -> str:
+    """Its page."""
+    steady = TrainingConfig("sarsa", 0.1, 0.9, 0.01, 1.0)
+    colony = Colony(
+        worlds.paper(), Task(), steady, 3, ants=9, sharing="fixed", q_values=trail_follower()
+    )
+    colony.begin_episode()
+    found = study_results()
+    return colony_page(
+        *found,
+        drawings=drawings(draw_study(found.rows)),
+        players=[Player("Paper's rules", "Nine ants", record_colony(colony, 30))],
+        facts=FACTS,
+        files=["seeds.csv"],
+    )
