@@ -61,7 +61,7 @@ class Controls {
 
   /* Offer what there is, and choose what the session has. */
   fill() {
-    const { choices, state } = this.live, options = (pairs) =>
+    const { choices, chosen } = this.live, options = (pairs) =>
       pairs.map(([value, words]) => `<option value="${safe(value)}">${safe(words)}</option>`).join("");
     if (!this.filled) {
       this.filled = "yes";
@@ -77,7 +77,7 @@ class Controls {
       byId("map").value = MAP;
       byId("map").maxLength = choices.most.text;
     }
-    this.choose(state.chosen);
+    this.choose(chosen);
     this.hush();
   }
 

@@ -240,8 +240,9 @@ class Room:
 
     def _about(self) -> list[str | bytes]:
         """What a page needs to know before the first frame of a session."""
-        header, choices = self.session.header(), self.choices.as_dict()
-        return [_say("begin", header=header, choices=choices), self._state()]
+        header, setup, choices = self.session.header(), self.session.setup, self.choices
+        offered = {"choices": choices.as_dict(), "chosen": choices.chosen(setup)}
+        return [_say("begin", header=header, **offered), self._state()]
 
     def _moment(self) -> list[str | bytes]:
         """All as it is now, for a page that knows nothing of it."""
@@ -327,7 +328,6 @@ class Room:
             pages=len(self._pages),
             ticks=session.ticks,
             values=session.values(),
-            chosen=self.choices.chosen(session.setup),
         )
 
     def _tell_all(self, message: str) -> None:

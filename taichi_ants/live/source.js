@@ -31,6 +31,7 @@ class Live {
     if (message.say === "begin") {
       this.begins = message.header;
       this.choices = message.choices;
+      this.chosen = message.chosen;
     } else if (message.say === "names") Object.assign(this.viewer.history.header.names, message.names);
     else if (message.say === "moment" || message.say === "file") this.waiting = message;
     else {

@@ -446,7 +446,7 @@ def test_what_the_page_would_choose_is_the_session(room):
             guest.ask("begin", chosen=chosen)
             guest.until("begin")
             guest.until("whole")
-            back = guest.state["chosen"]
+            back = guest.chosen
             wanted = {**chosen, "rules": [] if chosen["rules"] is None else chosen["rules"]}
             if chosen["policy"] == "by hand":
                 wanted["policy"] = "file mine"  # the same values

@@ -55,6 +55,7 @@ class Guest:
         usual = {"origin": f"http://127.0.0.1:{room.port}", "max_size": None, "proxy": None}
         self.socket: ClientConnection = connect(address, **{**usual, **given}).__enter__()
         self.header: dict[str, Any] = {}
+        self.chosen: dict[str, Any] = {}
         self.frames: list[bytes] = []  # since the last one that was whole, with that
         self.state: dict[str, Any] = {}
         self.errors: list[str] = []
@@ -70,7 +71,7 @@ class Guest:
             return "frame", message
         said = json.loads(message)
         if said["say"] == "begin":
-            self.header = said["header"]
+            self.header, self.chosen = said["header"], said["chosen"]
         elif said["say"] == "state":
             self.state = said
         elif said["say"] == "error":
