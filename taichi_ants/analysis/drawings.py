@@ -8,9 +8,12 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from taichi_ants.analysis.style import BLUE, GREY, INK, ORANGE, PALE, RED, SKY, WINE, styled
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 # Colours of the figures -> those of the page, which differ in light and dark.
@@ -24,6 +27,7 @@ COLOURS = {
     WINE: "plot-wine",
     SKY: "plot-sky",
 }
+_MANY = 500  # marks
 
 
 class Drawing(NamedTuple):
@@ -48,6 +52,8 @@ def drawing(name: str, figure: Figure) -> Drawing:
     title, caption = legend.get_title().get_text(), figure.get_supxlabel()
     legend.set_title("")
     figure.supxlabel("")
+    for axis in figure.axes:
+        _thin(axis)
     text = io.StringIO()
     # Text stays text, and the names inside of a figure are those of no other one.
     with styled(), rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
@@ -58,6 +64,17 @@ def drawing(name: str, figure: Figure) -> Drawing:
 def drawings(figures: Mapping[str, Figure]) -> list[Drawing]:
     """All of some figures, see `drawing`."""
     return [drawing(name, figure) for name, figure in figures.items()]
+
+
+def _thin(axis: Axes) -> None:
+    """Of many marks, leave out those that lie within half a point of another one."""
+    axis.get_xlim(), axis.get_ylim()  # until they are asked for, they may be old
+    for line in axis.lines:
+        data = np.asarray(line.get_xydata())
+        if len(data) > _MANY:
+            points = axis.transData.transform(data) * 72 / axis.figure.dpi
+            _, first = np.unique(np.round(2 * points), axis=0, return_index=True)
+            line.set_data(*data[np.sort(first)].T)
 
 
 def _for_page(svg: str, title: str) -> str:
@@ -86,13 +103,10 @@ _USE = re.compile(r'href="([^"]*)" x="([^"]*)" y="([^"]*)"(?: style="([^"]*)")?'
 
 
 def _marks(found: re.Match) -> str:
-    """The marks of many runs: their look once, and each place once, to half a point."""
+    """Marks that look alike: their look once."""
     uses = _USE.findall(found[0])
     [(mark, look), *others] = {(mark, look) for mark, _, _, look in uses}
     if others or "opacity" not in look:
         return found[0]
-    places = dict.fromkeys(
-        (round(2 * float(x)) / 2, round(2 * float(y)) / 2) for _, x, y, _ in uses
-    )
-    marks = "".join(f'<use href="{mark}" x="{x:g}" y="{y:g}"/>' for x, y in places)
+    marks = "".join(f'<use href="{mark}" x="{x}" y="{y}"/>' for _, x, y, _ in uses)
     return f'<g style="{look}">{marks}</g>\n'

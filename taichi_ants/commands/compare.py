@@ -358,7 +358,7 @@ def make_page(
         arrays = files.read_npz(folder / EPISODES)
         results = results_of(settings, study, arrays, files.read_csv(folder / BASELINES))
     comparison, shown = results.comparison, not settings.no_figures
-    # Drawn anew, not those of the files: a figure that has been saved is laid out a little otherwise.
+    # Drawn anew: a figure that has been saved as a file is laid out a little otherwise.
     drawn = draw_all(comparison, results.baselines) if shown else {}
     players, sheet = what_is_seen(folder / POLICIES, study, comparison) if shown else ([], None)
     return comparison_page(
