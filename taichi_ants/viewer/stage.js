@@ -327,7 +327,7 @@ class Stage {
   }
 
   /* The ring and the view of the followed ant; the chosen cell. */
-  drawMarks(share, { ant, next, letters, cell, cursor, tool }) {
+  drawMarks(share, { ant, next, letters, cell, cursor, tool = [] }) {
     const { above, grid, colours, camera } = this;
     above.lineJoin = "round";
     // Where cells are small, a ring shows where the queen is.
