@@ -359,7 +359,7 @@ def test_the_tracked_pictures_are_those_of_the_gallery() -> None:
         for path in listed.stdout.split()
         if Path(path).suffix in (".png", ".gif", ".mp4") and not path.startswith("tests/")
     }
-    figures = {f"docs/figures/{name}" for name in (*gallery.FIGURES, gallery.VIEWER)}
+    figures = {f"docs/figures/{name}" for name in (*gallery.FIGURES, gallery.VIEWER, gallery.LIVE)}
     assert pictures == figures | {f"renders/{name}" for name in gallery.GALLERY}
 
 
