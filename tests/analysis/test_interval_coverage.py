@@ -93,7 +93,7 @@ def test_the_coverage_of_a_known_pool() -> None:
     assert text.splitlines()[2].startswith("| made up | 20.00 | 0.00 | 0.")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_intervals_cover_the_centres_of_real_runs_as_documented() -> None:
     data = pools()
     print(coverage_table(data, None, DRAWS))

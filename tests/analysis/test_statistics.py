@@ -44,7 +44,7 @@ bootstrap = partial(bootstrap_interval, resamples=4000)
 cautious = partial(cautious_interval, resamples=4000)
 
 
-@pytest.mark.parametrize("n", [10, 100])
+@pytest.mark.parametrize("n", [10, pytest.param(100, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", DISTRIBUTIONS)
 def test_intervals_cover_the_truth_as_often_as_they_say(name: str, n: int) -> None:
     draw, truth = DISTRIBUTIONS[name]
@@ -137,7 +137,7 @@ def test_the_bootstrap_of_the_iqm_agrees_with_scipy() -> None:
     np.testing.assert_allclose(ours, theirs, atol=0.01)
 
 
-@pytest.mark.parametrize("n", [10, 30])
+@pytest.mark.parametrize("n", [10, pytest.param(30, marks=pytest.mark.slow)])
 def test_intervals_of_the_iqm_cover_what_they_say_where_those_of_the_mean_do_not(n: int) -> None:
     """One run in fifty is far away: it moves the mean by 8 and the typical run hardly."""
 

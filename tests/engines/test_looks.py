@@ -37,6 +37,7 @@ def of_trails(look):
     return index
 
 
+@pytest.mark.slow
 def test_one_of_ones_own_works_in_all_engines():
     observations.register(Observation("mine", 2 * 4**5, of_five_cells, (0, 1, 2, -2, -1)))
     world, names = random_world(5, 7), ("mine", "five_cells")
@@ -76,7 +77,10 @@ def lesser_trail(look):
     return index
 
 
-@pytest.mark.parametrize(("row", "n_states"), [(load, 2), (own_trail, 4), (lesser_trail, 256)])
+@pytest.mark.parametrize(
+    ("row", "n_states"),
+    [(load, 2), (own_trail, 4), pytest.param(lesser_trail, 256, marks=pytest.mark.slow)],
+)
 def test_a_row_may_leave_any_part_of_a_look_unread(row, n_states):
     """Taichi's compiler drops what computes the parts that nobody reads."""
     task = Task(observations.register(Observation("mine", n_states, row)).name)

@@ -132,7 +132,7 @@ def test_sb3_accepts_the_spaces_of_single_environments(form: str) -> None:
     check_env(HexForageEnv(observation_format=form, max_steps=50))  # type: ignore[arg-type]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_agents_of_sb3_train_on_it() -> None:
     """On-policy and off-policy, with SB3's monitor of episodes around it."""
     envs = made(4)

@@ -54,14 +54,14 @@ def test_ppo_leaves_a_policy_file(kernels: Path, tmp_path: Path) -> None:
     assert policy.metadata["seed"] == 1
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_sb3_ppo_counts_the_rollouts_that_deliver(kernels: Path, tmp_path: Path) -> None:
     said = run("sb3_ppo", ["--seeds", 0, "--steps", 2048], kernels, tmp_path)
     assert re.search(r"^seed 0: \d+ of 100 rollouts deliver; greedily \d+, with ", said, re.M)
     assert load_policy(tmp_path / "sb3_ppo.npz").observation == "paper"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_shared_policy_sets_a_network_beside_a_table(kernels: Path, tmp_path: Path) -> None:
     said = run("shared_policy", ["--seeds", 0, "--episodes", 1], kernels, tmp_path)
     assert re.search(r"^seed 0: network \d+, greedily \d+, table \d+$", said, re.M)

@@ -77,6 +77,7 @@ def test_two_hundred_edits_are_replayed_to_the_bit(edited, name, tmp_path):
     assert Session.from_bytes(again.to_bytes()).hand.state() == session.hand.state()
 
 
+@pytest.mark.slow
 def test_threads_and_processes_do_not_matter(edited, tmp_path, kernels):
     script = (
         "import sys; from taichi_ants import runtime; from taichi_ants.live.session import Session;"

@@ -8,7 +8,7 @@ import pytest
 from command_lines import assert_one_sentence, run
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_offline_prints_three_tables(kernels: Path, tmp_path: Path) -> None:
     done = run("offline", ["--seeds", 2, "--markdown"], kernels, tmp_path)
     assert done.returncode == 0, done.stderr

@@ -105,6 +105,7 @@ WORLDS = tuple(open_world(seed, (12, 12, 12)) for seed in (3, 5))
 ALONE = ColonyPoint(WORLDS, LIVELY, SARSA, episodes=2, ticks=60, rollouts=2)
 
 
+@pytest.mark.slow
 def test_a_study_of_colonies_is_learning_and_evaluation(tmp_path):
     joint = replace(ALONE, ants=4, after=ALONE)
     own = replace(ALONE, ants=4, sharing="own", start="spread")

@@ -48,10 +48,9 @@ def without_rocks(world: World) -> World:
     return World(world.ranges, world.queen, foods=world.foods[::2], ants=world.ants)
 
 
-# With tables of their own, learners do what they do in independent runs, which are compared, too;
-# and where nobody learns there is nothing that the others do not do.
-FEW = ("q_learning", "double_q")
-SLOW = [one for one in KERNELS if one[1] == "fixed" or (one[1] == "own" and one[0] not in FEW)]
+# The others come later: what they add, the tests of independent runs and of pages have as well.
+QUICK = (0, 1, 4, 11, 12)
+SLOW = [one for k, one in enumerate(KERNELS) if k not in QUICK]
 MARKED = [pytest.param(one, marks=pytest.mark.slow) if one in SLOW else one for one in KERNELS]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from taichi_ants import AntsError, Colony, TrainingConfig, World, worlds
@@ -67,6 +67,7 @@ def test_diffusion_keeps_the_mass(rate):
     assert levels_after(pheromone, 300).sum(dtype=np.float64) == pytest.approx(400, rel=1e-4)
 
 
+@settings(max_examples=40)
 @given(
     seed=st.integers(0, 10_000),
     ants=st.integers(1, 25),
@@ -174,7 +175,7 @@ def test_the_capacity_leaves_room_for_ants_that_are_born(settings, capacity):
     assert Colony(**{**usual, **settings}).capacity == capacity
 
 
-@pytest.mark.parametrize("schedule", ["by_world", "by_chunk"])
+@pytest.mark.parametrize("schedule", ["by_world", pytest.param("by_chunk", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("pheromone", [Pheromone(), Pheromone(diffusion=0.5)])
 def test_a_world_whose_episode_has_ended_stays_as_it_is(schedule, pheromone):
     """Trails too stand still, whatever the other worlds do."""

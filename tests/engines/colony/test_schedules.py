@@ -82,12 +82,12 @@ def test_the_internal_order_of_the_ants_does_not_matter(learner):
     [
         ("q_learning", "shared"),
         ("sarsa", "own"),
-        ("expected_sarsa", "shared"),
+        pytest.param("expected_sarsa", "shared", marks=pytest.mark.slow),
         ("dyna_q", "shared"),
-        ("dyna_q", "own"),
-        ("double_q", "own"),
+        pytest.param("dyna_q", "own", marks=pytest.mark.slow),
+        pytest.param("double_q", "own", marks=pytest.mark.slow),
         ("sarsa_lambda", "own"),
-        ("prioritized_sweeping", "own"),
+        pytest.param("prioritized_sweeping", "own", marks=pytest.mark.slow),
     ],
 )
 def test_one_ant_equals_the_engine_of_independent_runs(learner, sharing):

@@ -37,6 +37,9 @@ KERNELS = [
     ),
     *((name, "paper", "set") for name in ("q_learning", "sarsa", "expected_sarsa")),
 ]
+# Those of the first deposits, and the paper's, are compared at once; the others later.
+LATER = KERNELS[4:-3]
+MARKED = [pytest.param(*one, marks=[pytest.mark.slow] * (one in LATER)) for one in KERNELS]
 
 
 def random_config(seed: int, learner: str) -> TrainingConfig:
@@ -106,7 +109,7 @@ def assert_equal_step(ours, k, step):
     assert ours.delivered[k] == (step.event is Event.DELIVERED)
 
 
-@pytest.mark.parametrize(("learner", "observation", "deposit"), KERNELS)
+@pytest.mark.parametrize(("learner", "observation", "deposit"), MARKED)
 def test_every_step_in_random_worlds(learner, observation, deposit):
     """Several foods, rocks, trails of all strengths; deliveries and choices among foods occur."""
     delivered = 0
