@@ -62,7 +62,7 @@ def values(hand: Hand) -> dict[str, Value]:
     """What "set" changes in a colony, by name; only what makes a difference there.
 
     - ants: how many live now, and start each later episode.
-    - epsilon, learning_rate: of this episode, from which they decay.
+    - epsilon, learning_rate: from now on; what a hand has set decays no more.
     - deposit, slope, cap: as `Pheromone` has them; the deposit is its level.
     - evaporation: 1 if trails fall, else 0. half_life, diffusion: as `Pheromone` has them.
     """

@@ -29,6 +29,8 @@ class Hand:
     def __init__(self, colony: ReferenceColony) -> None:
         self.colony, self.ants = colony, colony.n_ants
         self._stream = RandomStream(stream_state(colony.seed, STREAM_HAND, 0))
+        self._epsilon: float | None = None  # as they were set
+        self._learning_rate: float | None = None
         self._first = colony.start_world
         self._pheromone = colony.task.pheromone
         self._falls = colony.pheromone.evaporation == self._pheromone.evaporation
@@ -143,18 +145,22 @@ class Hand:
         self._new_trail()
 
     def set_epsilon(self, epsilon: float) -> None:
-        """The epsilon of this episode."""
-        self.colony.epsilon = epsilon
+        """The epsilon of this episode and of all that follow."""
+        self._epsilon = self.colony.epsilon = epsilon
 
     def set_learning_rate(self, learning_rate: float) -> None:
-        """The learning rate of this episode."""
-        self.colony.learning_rate = learning_rate
+        """The learning rate of this episode and of all that follow."""
+        self._learning_rate = self.colony.learning_rate = learning_rate
         self.colony.minds.pace(learning_rate)
 
     def begin_episode(self) -> None:
         """End the episode, and begin the next one as the hand has left the world."""
         colony, first = self.colony, self._first
         colony.end_episode()
+        if self._epsilon is not None:
+            colony.epsilon = self._epsilon
+        if self._learning_rate is not None:
+            self.set_learning_rate(self._learning_rate)
         colony.n_ants = self.ants
         for number in range(len(colony.streams), self.ants):
             state = stream_state(colony.seed, STREAM_ANT, number)

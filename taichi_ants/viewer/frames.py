@@ -12,8 +12,17 @@ from typing import Any
 
 import numpy as np
 
-# In `clock`, in this order. Deliveries and returns are of the episode.
-CLOCK = ("episode", "tick", "deliveries", "returns", "epsilon", "learning_rate", "ants")
+# In `clock`, in this order. Deliveries and returns are of the episode, delivered of all so far.
+CLOCK = (
+    "episode",
+    "tick",
+    "deliveries",
+    "returns",
+    "epsilon",
+    "learning_rate",
+    "ants",
+    "delivered",
+)
 
 # The sections, in order, and their types; "cell", "state" and "level" depend on the world.
 SECTIONS = {

@@ -19,7 +19,7 @@ const EMPTY = 0, OBSTACLE = 5, FOOD = 7, QUEEN = 13; // what a cell holds, as in
 const FAILED = 1, PICKED_UP = 3, DELIVERED = 4; // events
 const N_ACTIONS = 5;
 const MOST_BYTES = 2 ** 27; // of frames; a simulation that runs for hours has more
-const CLOCK = ["episode", "tick", "deliveries", "returns", "epsilon", "learningRate", "ants"];
+const CLOCK = ["episode", "tick", "deliveries", "returns", "epsilon", "learningRate", "ants", "delivered"];
 const ARRAYS = {
   u1: Uint8Array, u2: Uint16Array, u4: Uint32Array, i4: Int32Array, f4: Float32Array, f8: Float64Array,
 };
@@ -103,7 +103,6 @@ class History {
     this.bytes = 0;
     this.events = []; // pick-ups and deliveries: {moment, kind, ant, cell}, in order
     this.values = new Map(); // entry of a table -> [moments, values] of its changes
-    this.totals = [0]; // deliveries before each episode
     this.world = { moment: -1, ground: new Uint8Array(this.grid.size), trail: this.emptyTrail() };
     this.kept = []; // copies of the world now and then, so that seeking is quick
     this.lastKept = -Infinity;
@@ -127,10 +126,6 @@ class History {
     frame.number = moment;
     frame.whole = whole;
     frame.passed = before && before.episode === frame.episode ? frame.tick - before.tick : 0;
-    if (before && before.episode !== frame.episode) {
-      this.totals[frame.episode] = this.totals[before.episode] + before.deliveries;
-    } else this.totals[frame.episode] ??= 0;
-    frame.delivered = this.totals[frame.episode] + frame.deliveries; // in all episodes
     this.frames.push(frame);
     this.bytes += frame.size;
     for (let i = 0; i < frame.table.length; i++) {

@@ -59,7 +59,8 @@ class Panel {
     const frame = this.history.frames[moment];
     let loaded = 0;
     for (const pose of frame.poses) loaded += pose >> 3;
-    const episodes = this.history.frames[this.history.length - 1].episode > this.history.frames[0].episode;
+    const { length, frames, live } = this.history;
+    const episodes = frames[length - 1].episode > (live ? 0 : frames[0].episode);
     const facts = [
       ...(episodes ? [["episode", frame.episode]] : []),
       ["tick", frame.tick], ...(episodes && frame.ants === 1 ? [] : [["ants", frame.ants]]), ["with food", loaded],

@@ -230,7 +230,8 @@ class Recorder:
         tick = int(outcome.ticks[0, self.world])
         totals = (outcome.deliveries[0, self.world], outcome.returns[0, self.world])
         rates = (colony.epsilon, colony.learning_rate)
-        sections["clock"] = (colony.episode, tick, *totals, *rates, len(numbers))
+        delivered = colony.delivered[self.world] + totals[0]
+        sections["clock"] = (colony.episode, tick, *totals, *rates, len(numbers), delivered)
         # Trails fall by themselves; all else is told.
         episode, last = self._clock
         passed = tick - last if episode == colony.episode else 0

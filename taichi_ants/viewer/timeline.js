@@ -155,7 +155,7 @@ class Timeline {
     this.time.value = player.moment;
     this.time.style.setProperty("--filled", `${(100 * player.moment) / Math.max(player.last, 1)}%`);
     const end = history.frames[player.last];
-    const episode = end.episode > history.frames[0].episode ? `, episode ${frame.episode}` : "";
+    const episode = end.episode > (history.live ? 0 : history.frames[0].episode) ? `, episode ${frame.episode}` : "";
     this.time.setAttribute("aria-valuetext", `tick ${frame.tick}${episode}`);
     const of = episode || history.live ? `<span>${episode}</span>` : ` <span>of ${end.tick}</span>`;
     byId("place").innerHTML = `<span>tick</span> <b>${frame.tick}</b>${of}`;

@@ -21,6 +21,7 @@ from taichi_ants.live import session as session_module
 from taichi_ants.live.session import Session, Setup
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
 from taichi_ants.viewer import Recording
+from taichi_ants.viewer.frames import CLOCK, unpack
 
 LEARNS = TrainingConfig("sarsa", 0.2, 0.9, 0.3, 0.9, learning_rate_decay=0.8)
 LIVELY = Task(
@@ -418,3 +419,43 @@ def test_setups_are_json(name):
 def test_a_policy_is_a_training_or_one_table(table):
     with pytest.raises(AntsError, match=r"^(policy|q_values) .*\.$"):
         Setup("paper", Task(), table)
+
+
+def test_what_a_hand_has_set_stays_in_later_episodes():
+    session = Session(SETUPS["foraging"])
+    session.apply({"kind": "set", "name": "epsilon", "value": 0.0})
+    for _ in range(3):
+        session.apply({"kind": "episode"})
+    assert session.colony.epsilon == 0.0
+    assert session.colony.learning_rate < LEARNS.learning_rate  # which nobody has set
+    session.apply({"kind": "set", "name": "learning_rate", "value": 0.0})
+    tables = session.colony.q_values
+    session.advance(25)
+    session.advance(25)
+    session.advance(25)
+    assert session.colony.episode == 4
+    assert np.array_equal(session.colony.q_values, tables)
+
+
+def test_a_recording_counts_what_was_delivered_between_its_frames(edited):
+    """And a page that joins late is told the same."""
+    session = edited["foraging"]
+    counted, again = 0, Session(session.setup)
+    for steps, edit in session.edits:
+        while again.steps < steps:
+            counted += int(again.colony.outcome().deliveries[0, 0]) * again.ended
+            again._go(again.steps + 1)
+        counted += int(again.colony.outcome().deliveries[0, 0]) * (edit["kind"] == "episode")
+        again.apply(edit)
+    while again.steps < session.steps:
+        counted += int(again.colony.outcome().deliveries[0, 0]) * again.ended
+        again._go(again.steps + 1)
+    counted += int(again.colony.outcome().deliveries[0, 0])
+    few = session.recording(most_frames=20)
+    types = few.header["types"]
+    told = [
+        unpack(types, frame)["clock"][CLOCK.index("delivered")]
+        for frame in (few.frames[-1], session.moment())
+    ]
+    assert told == [counted, counted]
+    assert counted > 0

@@ -197,6 +197,8 @@ class Colony:
         self.epsilon, self.learning_rate = self.training.epsilon, self.training.learning_rate
         self.length = 0  # of the episode in ticks, 0 if nobody has said
         self.ticks = 0  # since an episode began for all worlds
+        # Foods that were delivered in the episodes before the present one, in each world.
+        self.delivered = np.zeros(len(self.seeds), np.int64)
 
     @property
     def episode(self) -> int:
@@ -230,8 +232,11 @@ class Colony:
         Raises:
             AntsError: A world is not allowed.
         """
-        if world is not None:
-            self._lay_out(_checked_worlds(world, len(self.seeds), self.sharing != "fixed"))
+        learns = self.sharing != "fixed"
+        others = None if world is None else _checked_worlds(world, len(self.seeds), learns)
+        self.delivered += self.arrays["worlds"][WorldRow.DELIVERIES]
+        if others is not None:
+            self._lay_out(others)
         self.length = 0 if length is None else checked_whole("length", length, most=MAX_STEPS)
         self.ticks = 0
         memory.begin_episode(self)
@@ -258,6 +263,7 @@ class Colony:
             memory.keep_streams(self, which)
         else:
             self._reseed(which, [seed for one in seeds for seed in checks.checked_seeds(one)])
+        self.delivered += self.arrays["worlds"][WorldRow.DELIVERIES] * which
         memory.begin_episode(self, which)
         self._launch("begin_phases")
 

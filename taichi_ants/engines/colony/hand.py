@@ -7,6 +7,7 @@ drawn to do already, it still does.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -209,19 +210,24 @@ class Hand:
         arrays["trail"][:] = np.where(levels > 0, levels + self._clock(), 0)
 
     def set_epsilon(self, epsilon: float) -> None:
-        """The epsilon of this episode, from which it decays."""
-        self.colony.epsilon = epsilon
+        """The epsilon from now on; it decays no more."""
+        colony = self.colony
+        colony.epsilon = epsilon
+        colony.training = replace(colony.training, epsilon_decay=1.0, min_epsilon=0.0)
 
     def set_learning_rate(self, learning_rate: float) -> None:
-        """The learning rate of this episode, from which it decays."""
-        self.colony.learning_rate = learning_rate
-        set_learning_rate(self.colony)
+        """The learning rate from now on; it decays no more."""
+        colony = self.colony
+        colony.learning_rate = learning_rate
+        steady = {"learning_rate_decay": 1.0, "min_learning_rate": 0.0}
+        colony.training = replace(colony.training, **steady)
+        set_learning_rate(colony)
 
     def state(self) -> str:
         """A hash of all that goes on: where it is equal, all that follows is equal."""
         colony = self.colony
         moment = (colony.epsilon, colony.learning_rate, colony.length, colony.ticks, colony.ants)
-        rest = (self.ants, self._stream.state, colony.task.as_dict())
+        rest = (self.ants, self._stream.state, colony.task.as_dict(), colony.training.as_dict())
         arrays = {name: colony.arrays[name] for name in (*colony.stored, "walls", "closer")}
         text = files.to_json([*moment, *rest])
         return digest_of({**arrays, "start": self._start, "moment": np.array(text)})
