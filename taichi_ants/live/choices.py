@@ -162,17 +162,17 @@ class Choices:
             table = self._file(policy).q_values
         world = chosen["world"]
         check_one_of("the world", world, tuple(WORLDS))
-        size = checked_whole("size", chosen["size"], *SIZES)
+        size = checked_whole("the size", chosen["size"], *SIZES)
         shares = table is not None or learners.get(name).td_error is not None
         return Setup(
             world=_map(chosen["map"]) if world == "map" else world,
             task=rules,
             policy=TrainingConfig(name, **_LEARNING) if table is None else table,
-            ants=checked_whole("ants", chosen["ants"], 1, MOST_ANTS),
-            seed=checked_whole("seed", chosen["seed"], 0),
-            ticks_per_episode=checked_whole("ticks", chosen["ticks"], 0, 1_000_000),
+            ants=checked_whole("how many ants", chosen["ants"], 1, MOST_ANTS),
+            seed=checked_whole("the seed", chosen["seed"], 0),
+            ticks_per_episode=checked_whole("ticks an episode", chosen["ticks"], 0, 1_000_000),
             sharing="shared" if shares else "own",
-            world_seed=checked_whole("world_seed", chosen["world_seed"], 0),
+            world_seed=checked_whole("the seed of the world", chosen["world_seed"], 0),
             world_settings={"ranges": [size] * 3} if world in DRAWN else {},
         )
 

@@ -25,7 +25,7 @@ from taichi_ants.viewer import Recorder, Recording
 MOST_TICKS = 1_000_000_000
 _MOST_BYTES = 1 << 28  # of a session, unpacked
 
-_KIND = FileKind("taichi-ants session 1", "session", "Session.save")
+_KIND = FileKind("taichi-ants session 1", "session", "Session.save, or Save on its page,")
 
 
 class Session:
@@ -165,7 +165,7 @@ class Session:
             size = 0  # no archive at all, which `_replayed` says
         if size > _MOST_BYTES:
             raise AntsError("what was given takes too much memory; give a file of Session.save.")
-        return cls._replayed("session", content)
+        return cls._replayed("the loaded file", content)
 
     @classmethod
     def _replayed(cls, path: files.PathLike, content: bytes | None) -> Session:

@@ -299,7 +299,7 @@ class Viewer {
   key(event) {
     if (event.ctrlKey || event.metaKey || event.altKey || byId("help").open) return;
     const { player, timeline, stage } = this, inside = event.target;
-    const slider = inside.type === "range", pressable = inside.closest?.("button, summary, a");
+    const slider = inside.type === "range", pressable = inside.closest?.("button, summary, a, [type=checkbox]");
     const times = event.shiftKey ? 10 : 1, key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
     const acts = {
       " ": () => (player.playing ? player.pause() : player.play()),
@@ -316,7 +316,7 @@ class Viewer {
     Object.assign(acts, this.source.acts);
     for (const [letter, heading] of Object.entries(CURSOR)) acts[letter] = () => this.moveCursor(heading);
     // Sliders keep the keys that move them, buttons the keys that press them, fields all.
-    if (inside.closest?.("textarea, select, input:not([type=range])")) return;
+    if (inside.closest?.("textarea, select, input:not([type=range], [type=checkbox])")) return;
     if (slider && /^(Arrow|Home|End|Page)/.test(event.key)) return;
     if (pressable && (event.key === "Enter" || event.key === " ")) return;
     if (event.key === "Enter" && inside.id !== "world") return;

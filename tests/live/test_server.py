@@ -395,7 +395,7 @@ def test_a_session_is_saved_and_loaded(room):
         assert_same(guest, room.session)
         assert_same(other, room.session)
         guest.socket.send(saved[:-200] + b"\0" * 200)
-        assert "session" in guest.until("error")["words"]
+        assert "the loaded file" in guest.until("error")["words"]
         assert state_of(room) == before
 
 

@@ -347,7 +347,7 @@ def test_files_that_were_altered_are_refused(edited, changes, said, tmp_path):
     facts = {**json.loads(str(arrays["facts"][()])), **changes}
     np.savez(path, **{**arrays, "facts": np.array(json.dumps(facts))})
     with pytest.raises(
-        AntsError, match=r"^the session in .* is damaged .*Session.save wrote.$"
+        AntsError, match=r"^the session in .* is damaged .*; name a file that .* wrote\.$"
     ) as e:
         Session.load(path)
     assert said in str(e.value)
@@ -361,7 +361,7 @@ def test_a_file_that_unpacks_to_much_more_is_refused(edited, monkeypatch):
 
 @pytest.mark.parametrize("content", [b"", b"nothing", b"PK\3\4" + bytes(100)])
 def test_no_session_at_all(content):
-    with pytest.raises(AntsError, match=r"'session' .*\.$"):
+    with pytest.raises(AntsError, match=r"'the loaded file' .*\.$"):
         Session.from_bytes(content)
 
 
