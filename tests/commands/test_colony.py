@@ -229,7 +229,7 @@ def test_stopped_and_killed_it_goes_on_to_the_same_results(finished, kernels, tm
     assert (done.returncode, done.stderr) == (0, "")
     after, expected = contents(folder), contents(finished[1])
     assert set(after) == FILES
-    for name in set(after) - {"manifest.json"}:
+    for name in set(after) - {"manifest.json", "report.html"}:  # these two tell times
         assert after[name] == expected[name], name
 
 
