@@ -163,8 +163,6 @@ def _check_restart(ti: ModuleType, running: Runtime | None, wanted: Runtime) -> 
 def _init(ti: ModuleType, wanted: Runtime, **others: object) -> None:
     settings = {
         "fast_math": False,  # no reordering of floats: the same bits everywhere
-        # It takes half of the time to compile, and LLVM does its work again: kernels are as fast.
-        "cfg_optimization": False,
         "cpu_max_num_threads": wanted.threads,
         "make_cpu_multithreading_loop": False,  # hand out runs one by one, they are uneven
         "offline_cache_file_path": str(_cache_folder()),
