@@ -13,6 +13,7 @@ from taichi_ants.errors import (
     check_one_of,
     checked_flag,
     checked_whole,
+    entries_of,
     expect,
     shown,
     whole,
@@ -92,11 +93,9 @@ def check_sharing(learner: Learner, sharing: str) -> None:
 
 def checked_configs(configs: TrainingConfig | Sequence[TrainingConfig]) -> tuple:
     """One configuration or several as a tuple, with all hyperparameters of their learners."""
-    if isinstance(configs, TrainingConfig):
-        configs = (configs,)
-    elif not isinstance(configs, Iterable):
+    several = [configs] if isinstance(configs, TrainingConfig) else entries_of(configs)
+    if several is None:
         raise AntsError(f"configs is {shown(configs)}; it must be one TrainingConfig or several.")
-    several = tuple(configs)
     if not several:
         raise AntsError("configs is empty; give at least one TrainingConfig.")
     for config in several:
@@ -147,6 +146,12 @@ def checked_share(name: str, value: float) -> float:
     if not share_of_one(value):
         raise AntsError(f"{name} is {shown(value)}; it must be a number between 0 and 1.")
     return float(value)
+
+
+def check_progress(progress: object) -> None:
+    """Refuse what cannot be called with the share of the work that is done; None is no function."""
+    if progress is not None and not callable(progress):
+        raise AntsError(f"progress is {shown(progress)}; it must be a function or None.")
 
 
 def check_finite(

@@ -4,8 +4,14 @@ from __future__ import annotations
 
 import operator
 import reprlib
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import numpy as np
+
+
+_MOST_CHARACTERS = 1000  # of a message
 
 
 class AntsError(ValueError):
@@ -13,8 +19,17 @@ class AntsError(ValueError):
 
     Its message is one sentence that names the value, what is allowed and what to do. The command
     lines print it on standard error and exit with status 2; library users catch it as a
-    `ValueError`.
+    `ValueError`. Where a value makes it very long, its middle is left out.
     """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(without_middle(message))
+
+
+def without_middle(message: str, most: int = _MOST_CHARACTERS) -> str:
+    """A message of at most so many characters: its middle is left out if it is longer."""
+    half = (most - 5) // 2
+    return message if len(message) <= most else f"{message[:half]} ... {message[-half:]}"
 
 
 def unusable(thing: Any, fault: object) -> AntsError:
@@ -99,6 +114,30 @@ def checked_whole(
             f"{name} is {shown(value)}; it must lie between {least} and {most}{otherwise}."
         )
     return number
+
+
+def entries_of(values: object) -> list | None:
+    """The entries of a sequence; None for all else, text and mappings included."""
+    if isinstance(values, (str, bytes, Mapping)):
+        return None
+    try:
+        return list(values)  # type: ignore[call-overload]
+    except TypeError:
+        return None
+
+
+def array_of(name: str, values: object) -> np.ndarray:
+    """`values` as an array of whatever type they have.
+
+    Raises:
+        AntsError: They have no form that an array can have; names them `name`.
+    """
+    import numpy as np
+
+    try:
+        return np.asarray(values)
+    except ValueError:
+        raise AntsError(f"{name} is {shown(values)}; it must be an array.") from None
 
 
 def expect(name: str, value: object, *kinds: type) -> None:

@@ -1,24 +1,27 @@
-"""Files of results: written whole or not at all, read with errors that name the file."""
+"""Files: written whole or not at all, read with limits, and errors that name the file."""
 
 from __future__ import annotations
 
 import csv
+import hashlib
 import io
 import json
+import math
 import os
 import secrets
+import stat
 import tempfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-import numpy.typing as npt
 
 from taichi_ants.errors import AntsError, expect, shown
 
 PathLike = str | os.PathLike[str]
+HALF_WRITTEN = f".{16 * '[0-9a-f]'}.tmp"  # how a file is called until it is whole
 
 
 def write_atomically(path: PathLike, writer: Callable[[BinaryIO], None]) -> None:
@@ -32,28 +35,37 @@ def write_atomically(path: PathLike, writer: Callable[[BinaryIO], None]) -> None
     Raises:
         AntsError: The file cannot be written. Other exceptions of the writer pass through.
     """
-    expect("path", path, str, os.PathLike)
-    if "\0" in os.fspath(path):
-        raise AntsError(f"{_named(path)} contains a null character; name a file to write to.")
     temporary: Path | None = None
     try:
-        target = Path(os.path.realpath(path))
-        # Replacing a device, a pipe or a folder would destroy it or fail.
-        if target.exists() and not target.is_file():
-            raise AntsError(f"{_named(path)} is not a regular file; name a file to write to.")
-        # Not derived from the file's name: it fits even if that one has the greatest length.
-        temporary = target.parent / f".{secrets.token_hex(8)}.tmp"
-        with open(temporary, "xb") as file:
-            writer(file)
-        os.replace(temporary, target)
-    except (OSError, UnicodeError) as error:
-        raise AntsError(
-            f"cannot write {_named(path)}: {_reason(error)}; choose another place."
-        ) from error
+        with _writing(path):
+            target = _target_of(path)
+            # Not derived from the file's name: it fits even if that one has the greatest length.
+            temporary = target.parent / f".{secrets.token_hex(8)}.tmp"
+            with open(temporary, "xb") as file:
+                writer(file)
+            os.replace(temporary, target)
     finally:
         if temporary is not None:
             with suppress(OSError):
                 temporary.unlink()
+
+
+def check_writable_file(path: PathLike) -> Path:
+    """The path, if `write_atomically` can write a file there: to be called before long work.
+
+    Nothing is written or made, and what is there stays. The folder of the file may be missing, if
+    it can be made; that of what a symbolic link names may not.
+
+    Raises:
+        AntsError: The path is one of a folder, a device or a pipe, or nothing can be written there.
+    """
+    with _writing(path):
+        target = _target_of(path)
+        folder = target.parent
+        if not os.path.islink(path):
+            folder = next(one for one in target.parents if one.exists())
+        _try_to_write(folder)
+    return Path(path)
 
 
 def write_text(path: PathLike, text: str) -> None:
@@ -99,6 +111,67 @@ def write_csv(path: PathLike, rows: Iterable[Mapping[str, Any]], columns: Sequen
     write_text(path, text.getvalue())
 
 
+@contextmanager
+def opened(path: PathLike, most: float = math.inf) -> Iterator[BinaryIO]:
+    """A file to read from, if it is a regular one of at most `most` bytes.
+
+    A pipe could wait forever, and a device has no end.
+
+    Raises:
+        AntsError: It cannot be read, or is none; also where reading it fails later.
+    """
+    expect("path", path, str, os.PathLike)
+    try:
+        if "\0" in os.fspath(path):
+            raise OSError("it contains a null character")
+        with open(path, "rb", opener=_without_waiting) as file:
+            status = os.fstat(file.fileno())
+            if not stat.S_ISREG(status.st_mode):
+                raise OSError("it is a device or a pipe")
+            if status.st_size > most:
+                raise OSError(f"it has {status.st_size} bytes, and {most} are allowed")
+            yield file
+    except (OSError, UnicodeEncodeError) as error:
+        raise AntsError(
+            f"cannot read {_named(path)}: {_reason(error)}; name another file."
+        ) from error
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    """Opens a pipe at once, even if nobody writes to it."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+
+
+def read_text(path: PathLike, most: int = 1 << 26) -> str:
+    """The text of a file in UTF-8, lines ending with a line feed.
+
+    Raises:
+        AntsError: It cannot be read, has more bytes than `most`, or is no text.
+    """
+    with opened(path, most) as file:
+        content = file.read(os.fstat(file.fileno()).st_size)
+    try:
+        return content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
+    except UnicodeError as error:
+        raise AntsError(f"{_named(path)} is no text in UTF-8; name another file.") from error
+
+
+def read_json(path: PathLike) -> Any:
+    """What a JSON file holds.
+
+    Raises:
+        AntsError: It cannot be read, or is none.
+    """
+    try:
+        return json.loads(read_text(path))
+    except RecursionError as error:
+        raise AntsError(f"{_named(path)} is nested too deep; name another file.") from error
+    except ValueError as error:
+        if isinstance(error, AntsError):
+            raise
+        raise AntsError(f"{_named(path)} is no JSON ({error}); name another file.") from error
+
+
 def read_csv(path: PathLike) -> list[dict[str, Any]]:
     """The rows of a file of `write_csv`: what is a number as a float, an empty field as None.
 
@@ -106,25 +179,23 @@ def read_csv(path: PathLike) -> list[dict[str, Any]]:
         AntsError: The file cannot be read.
     """
     try:
-        with open(path, newline="", encoding="utf-8") as file:
-            rows = list(csv.DictReader(file))
-    except (OSError, UnicodeError, csv.Error) as error:
-        raise AntsError(f"cannot read {_named(path)}: {_reason(error)}.") from error
-    return [{name: _number_in(text) for name, text in row.items()} for row in rows]
+        header, *lines = csv.reader(io.StringIO(read_text(path, 1 << 30)))
+        rows = [zip(header, line, strict=True) for line in lines if line]
+        return [{name: _number_in(text) for name, text in row} for row in rows]
+    except (csv.Error, ValueError) as error:
+        if isinstance(error, AntsError):
+            raise
+        raise AntsError(f"{_named(path)} is no table; name another file.") from error
 
 
-def write_npz(path: PathLike, arrays: Mapping[str, npt.ArrayLike], compress: bool = True) -> None:
-    """Write named arrays as an .npz; raises as `write_atomically` does.
-
-    Equal arrays give equal bytes. ValueError if one holds Python objects, which a reader that is
-    careful refuses to load.
-    """
-    converted = {name: np.asarray(array) for name, array in arrays.items()}
-    for name, array in converted.items():
-        if array.dtype.hasobject:
-            raise ValueError(f"array {name!r} holds Python objects")
-    save: Callable[..., None] = np.savez_compressed if compress else np.savez
-    write_atomically(path, lambda file: save(file, **converted))
+def hash_of(file: BinaryIO, size: int | None = None) -> str:
+    """The SHA-256 of the first so many bytes of a file, or of all, hexadecimal."""
+    digest, left = hashlib.sha256(), file.seek(0, os.SEEK_END) if size is None else size
+    file.seek(0)
+    while chunk := file.read(min(left, 1 << 20)):
+        digest.update(chunk)
+        left -= len(chunk)
+    return digest.hexdigest()
 
 
 def smallest(array: np.ndarray) -> np.ndarray:
@@ -133,41 +204,12 @@ def smallest(array: np.ndarray) -> np.ndarray:
     return array.astype(np.promote_types(np.min_scalar_type(low), np.min_scalar_type(high)))
 
 
-def read_npz(path: PathLike, content: bytes | None = None) -> dict[str, np.ndarray]:
-    """Read all arrays of an .npz file into memory, without executing anything that it holds.
-
-    Args:
-        path: The file.
-        content: What it holds, if that is known already; `path` is then what messages call it.
-
-    Raises:
-        AntsError: The file is missing, unreadable, damaged, or no .npz of plain arrays.
-    """
-    expect("path", path, str, os.PathLike)
-    try:
-        with open(path, "rb") if content is None else io.BytesIO(content) as file:
-            archive = np.load(file, allow_pickle=False)
-            if not isinstance(archive, np.lib.npyio.NpzFile):
-                raise ValueError("it holds a single array")
-            with archive:
-                arrays = {name: archive[name] for name in archive.files}
-    except OSError as error:
-        raise AntsError(f"cannot read {_named(path)}: {_reason(error)}.") from error
-    # A damaged archive fails in many ways (zipfile, zlib, struct, tokenize, memory ...).
-    except Exception as error:
-        raise AntsError(
-            f"{_named(path)} is damaged or not an .npz file; write it again or name another file."
-        ) from error
-    if not all(isinstance(array, np.ndarray) for array in arrays.values()):
-        raise AntsError(f"{_named(path)} holds more than arrays; name an .npz file.")
-    return arrays
-
-
-def check_writable_folder(path: PathLike) -> Path:
+def check_writable_folder(path: PathLike, named: PathLike | None = None) -> Path:
     """The folder, made if it is missing, if files can be written to it.
 
-    It makes a file without a name, of which nothing can be left, since permission bits alone do not
-    tell (root passes them, a read-only mount does not).
+    Args:
+        path: The folder.
+        named: What the message calls it, such as the folder above it that somebody has chosen.
 
     Raises:
         AntsError: The folder cannot be created or written to.
@@ -175,13 +217,46 @@ def check_writable_folder(path: PathLike) -> Path:
     try:
         folder = Path(path)
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
+        _try_to_write(folder)
     except (OSError, ValueError) as error:
         raise AntsError(
-            f"cannot write to the folder {_named(path)}: {_reason(error)}; choose another folder."
+            f"cannot write to the folder {_named(named or path)}: {_reason(error)}; choose another "
+            "folder."
         ) from error
     return folder
+
+
+@contextmanager
+def _writing(path: PathLike) -> Iterator[None]:
+    """What the system has against writing a file, said of the path."""
+    try:
+        yield
+    except (OSError, UnicodeError) as error:
+        raise AntsError(
+            f"cannot write {_named(path)}: {_reason(error)}; choose another place."
+        ) from error
+
+
+def _target_of(path: PathLike) -> Path:
+    """The regular file that a path names, which need not exist; links are followed."""
+    expect("path", path, str, os.PathLike)
+    if "\0" in os.fspath(path):
+        raise AntsError(f"{_named(path)} contains a null character; name a file to write to.")
+    target = Path(os.path.realpath(path))
+    # Replacing a device, a pipe or a folder would destroy it or fail.
+    if str(path).endswith(os.sep) or (target.exists() and not target.is_file()):
+        raise AntsError(f"{_named(path)} is not a regular file; name a file to write to.")
+    return target
+
+
+def _try_to_write(folder: Path) -> None:
+    """Write something into a folder, and leave nothing there.
+
+    Permission bits alone do not tell: root passes them, a read-only mount or a full disk does not.
+    The file has no name where the system knows such files, so that not even a kill leaves it.
+    """
+    with tempfile.TemporaryFile(dir=folder) as file:
+        file.write(bytes(4096))
 
 
 def _named(path: PathLike) -> str:

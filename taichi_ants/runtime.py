@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from taichi_ants.environment import fallback_folder, is_writable_folder
 from taichi_ants.errors import AntsError, check_one_of, checked_whole
@@ -108,19 +109,30 @@ def holds_data() -> bool:
 
 @contextlib.contextmanager
 def quiet() -> Iterator[None]:
-    """Leave out Taichi's warnings while a kernel of ours compiles, whatever the caller has set.
+    """Compile kernels of ours inside: without Taichi's warnings, whatever the caller has set.
 
     Numbers are narrowed there on purpose; a Taichi that the caller has started warns of each.
+    Errors tell the line that they are in, without a mark below the place in it: Taichi would draw
+    one for each expression, which takes half of its time for a kernel that it has in its cache.
     """
     from taichi._lib import core
+    from taichi.lang.ast.ast_transformer_utils import ASTTransformerContext as Context
 
     levels = ("trace", "debug", "info", "warn", "error")
     before = next((level for level in levels if core.logging_effective(level)), "critical")
     core.set_logging_level("error")
+    marked, Context.get_pos_info = Context.get_pos_info, _line_of
     try:
         yield
     finally:
+        Context.get_pos_info = marked
         core.set_logging_level(before)
+
+
+def _line_of(context: Any, node: Any) -> str:
+    """The line of a node of a kernel, as Taichi words it."""
+    number, function = context.lineno_offset + node.lineno, context.func.func.__name__
+    return f'File "{context.file}", line {number}, in {function}:\n{context.src[node.lineno - 1]}\n'
 
 
 def _running(ti: ModuleType) -> Runtime | None:

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import pickle
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from taichi_ants import files
+from taichi_ants import archives
 from taichi_ants.errors import AntsError
 
 
 def test_arrays_read_back(tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
     arrays = {"x": np.arange(6, dtype=np.int16).reshape(2, 3), "text": np.array("é")}
-    files.write_npz(path, arrays)
-    read = files.read_npz(path)
+    archives.write(path, arrays)
+    read = archives.read(path)
     assert set(read) == {"x", "text"}
     np.testing.assert_array_equal(read["x"], arrays["x"])
     assert read["x"].dtype == np.int16
@@ -27,13 +27,13 @@ def test_arrays_read_back(tmp_path: Path) -> None:
 
 def test_equal_arrays_give_equal_bytes(tmp_path: Path) -> None:
     for name in ("a.npz", "b.npz"):
-        files.write_npz(tmp_path / name, {"x": np.arange(100)})
+        archives.write(tmp_path / name, {"x": np.arange(100)})
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
 
 
 def test_python_objects_are_not_written(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="'x' holds Python objects"):
-        files.write_npz(tmp_path / "a.npz", {"x": np.array([object()])})
+        archives.write(tmp_path / "a.npz", {"x": np.array([object()])})
     assert list(tmp_path.iterdir()) == []
 
 
@@ -52,10 +52,12 @@ def test_reading_executes_nothing(tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
     np.savez(path, x=np.array([Trap(sprung)], dtype=object))
     with pytest.raises(AntsError, match=r"a\.npz"):
-        files.read_npz(path)
+        archives.read(path)
+    with pytest.raises(AntsError, match="damaged or not"):
+        archives.read(path, foreign=True)
     path.write_bytes(pickle.dumps(Trap(sprung)))
     with pytest.raises(AntsError, match="damaged or not"):
-        files.read_npz(path)
+        archives.read(path)
     assert not sprung.exists()
 
 
@@ -87,5 +89,99 @@ def test_what_is_no_archive_is_refused(
     path = tmp_path / "a.npz"
     write(path)
     with pytest.raises(AntsError, match=message) as raised:
-        files.read_npz(path)
+        archives.read(path, foreign=True)
     assert str(path) in str(raised.value)
+
+
+def flipped(content: bytes, places: Iterable[int]) -> Iterator[bytes]:
+    """The content with each bit of some bytes flipped, one after the other."""
+    for place in places:
+        for bit in range(8):
+            yield content[:place] + bytes([content[place] ^ 1 << bit]) + content[place + 1 :]
+
+
+@pytest.mark.filterwarnings("ignore")  # of damaged types
+@pytest.mark.parametrize("compress", [False, True])
+def test_a_flipped_bit_in_the_header_of_an_array_is_noticed(compress: bool, tmp_path: Path) -> None:
+    """One that makes the header shorter shifts the data, whose checksum stands at their end."""
+    path, numbers = tmp_path / "a.npz", np.random.default_rng(0).random(3000)
+    (np.savez_compressed if compress else np.savez)(path, x=numbers)
+    content = path.read_bytes()
+    for damaged in flipped(content, range(200)):
+        try:
+            read = archives.read(path, damaged, foreign=True)
+        except AntsError:
+            continue
+        np.testing.assert_array_equal(read["x"], numbers)
+    archives.write(path, {"x": numbers}, compress)
+    for damaged in flipped(path.read_bytes(), range(200)):
+        with pytest.raises(AntsError, match="damaged"):
+            archives.read(path, damaged)
+
+
+def test_only_files_of_ours_are_read_unless_others_are_asked_for(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", x=1)
+    with pytest.raises(
+        AntsError, match=r"not an \.npz file that this version wrote; write it again"
+    ):
+        archives.read(tmp_path / "a.npz")
+    assert archives.read(tmp_path / "a.npz", foreign=True) == {"x": 1}
+
+
+def test_others_read_our_files(tmp_path: Path) -> None:
+    archives.write(tmp_path / "a.npz", {"x": np.arange(3)})
+    with np.load(tmp_path / "a.npz") as archive:
+        assert archive["x"].tolist() == [0, 1, 2]
+
+
+@pytest.fixture
+def no_array(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*arguments: object, **options: object) -> None:
+        raise AssertionError("an array was unpacked")
+
+    monkeypatch.setattr("numpy.lib.format.read_array", refuse)
+
+
+@pytest.mark.usefixtures("no_array")
+def test_what_would_take_too_much_memory_is_not_unpacked(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    archives.write(path, {"x": np.zeros(10**6)})
+    assert path.stat().st_size < 10_000
+    with pytest.raises(AntsError, match=r"a\.npz' unpacks to 8000128 bytes, and 7999999 are"):
+        archives.read(path, most=7_999_999)
+    with pytest.raises(AntsError, match=r"it has .* bytes, and 1000 are allowed"):
+        archives.read(path, most=1000)
+
+
+def test_an_array_that_is_larger_than_it_declares_is_refused(tmp_path: Path) -> None:
+    """And no more of it is unpacked than it declares."""
+    path = tmp_path / "a.npz"
+    np.savez_compressed(path, x=np.zeros(10**6))
+    content = path.read_bytes()
+    assert content.count((8_000_128).to_bytes(4, "little")) == 2
+    path.write_bytes(content.replace((8_000_128).to_bytes(4, "little"), bytes([0, 2, 0, 0])))
+    with pytest.raises(AntsError, match="damaged"):
+        archives.read(path, foreign=True)
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_only_what_numpy_packs_is_unpacked(method: int, tmp_path: Path) -> None:
+    """Others need memory that no file declares."""
+    path = tmp_path / "a.npz"
+    np.save(tmp_path / "x.npy", np.zeros(3))
+    with zipfile.ZipFile(path, "w", method) as archive:
+        archive.write(tmp_path / "x.npy", "x.npy")
+    with pytest.raises(AntsError, match="damaged"):
+        archives.read(path, foreign=True)
+
+
+def test_memory_that_there_is_not_is_no_damage(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*arguments: object, **options: object) -> None:
+        raise MemoryError
+
+    archives.write(tmp_path / "a.npz", {"x": np.zeros(3)})
+    monkeypatch.setattr("numpy.lib.format.read_array", refuse)
+    with pytest.raises(AntsError, match=r"a\.npz' takes more memory than there is; "):
+        archives.read(tmp_path / "a.npz")

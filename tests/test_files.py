@@ -7,6 +7,7 @@ import errno
 import json
 import os
 import stat
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -175,6 +176,69 @@ def test_a_folder_without_permission_is_refused(tmp_path: Path) -> None:
     assert names(locked) == []
 
 
+# check_writable_file.
+
+
+@pytest.mark.parametrize("name", ["old", "new", "new/folder/file", "link", "loop"])
+def test_a_file_that_can_be_written_is_let_be(tmp_path: Path, name: str) -> None:
+    (tmp_path / "old").write_text("old")
+    (tmp_path / "link").symlink_to(tmp_path / "to be made")
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    before = names(tmp_path)
+    assert files.check_writable_file(tmp_path / name) == tmp_path / name
+    assert names(tmp_path) == before
+    assert (tmp_path / "old").read_text() == "old"
+
+
+BAD_TARGETS = {
+    "folder": "not a regular file",
+    "": "not a regular file",
+    "new/": "not a regular file",
+    "pipe": "not a regular file",
+    "/dev/null": "not a regular file",
+    "dangling": "no such file or directory",
+    "file/below": "not a directory",
+    "/proc/file": "no such file or directory",
+    "n" * 256: "too long",
+    "a\0b": "null character",
+}
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+@pytest.mark.parametrize("name", BAD_TARGETS)
+def test_a_file_that_cannot_be_written_is_told_before_the_work(
+    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "file").write_text("content")
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "dangling").symlink_to(tmp_path / "nowhere" / "file")
+    monkeypatch.chdir(tmp_path)
+    before = names(tmp_path)
+    with pytest.raises(AntsError, match=BAD_TARGETS[name]) as early:
+        files.check_writable_file(name)
+    with pytest.raises(AntsError) as late:
+        files.write_text(name, "text")
+    assert str(early.value) == str(late.value)
+    assert names(tmp_path) == before
+
+
+@pytest.mark.parametrize("check", [files.check_writable_file, files.check_writable_folder])
+def test_a_disk_that_is_full_is_told_before_the_work(check, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(tempfile, "TemporaryFile", lambda dir: open("/dev/full", "wb"))  # noqa: SIM115
+    with pytest.raises(AntsError, match="no space left on device"):
+        check(tmp_path / "new")
+
+
+@pytest.mark.parametrize("below", ["file", "new/folder/file"])
+def test_no_permission_for_a_file_is_told_before_the_work(tmp_path: Path, below: str) -> None:
+    locked = tmp_path / "locked"
+    locked.mkdir(mode=0o500)
+    with without_privileges(), pytest.raises(AntsError, match="ermission denied"):
+        files.check_writable_file(locked / below)
+    assert names(locked) == []
+
+
 # Text, JSON and CSV.
 
 
@@ -240,6 +304,60 @@ def test_what_csv_holds_is_read_as_numbers_and_text(tmp_path: Path) -> None:
     assert read == expected
     with pytest.raises(AntsError, match=r"cannot read '.*none\.csv'"):
         files.read_csv(tmp_path / "none.csv")
+
+
+@pytest.mark.parametrize("text", ["", "a,b\n1\n", "a,b\n1,2,3\n", 'a\n"' + "x" * 200_000 + '"\n'])
+def test_what_is_no_table_is_named(text: str, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(text)
+    with pytest.raises(AntsError, match=r"a\.csv' is no table; name another file\."):
+        files.read_csv(tmp_path / "a.csv")
+
+
+# Reading.
+
+
+def test_text_is_read_with_any_line_ends(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_bytes("é\r\nb\rc\n".encode())
+    assert files.read_text(tmp_path / "a.txt") == "é\nb\nc\n"
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"\xff", "is no text in UTF-8; name another file."),
+        (b"12345678 ", "it has 9 bytes, and 8 are allowed; name another file."),
+    ],
+)
+def test_text_that_is_none_or_too_long_is_refused(
+    content: bytes, said: str, tmp_path: Path
+) -> None:
+    (tmp_path / "a.txt").write_bytes(content)
+    with pytest.raises(AntsError) as caught:
+        files.read_text(tmp_path / "a.txt", most=8)
+    assert str(tmp_path / "a.txt") in str(caught.value)
+    assert str(caught.value).endswith(said)
+
+
+@pytest.mark.parametrize("text", ["", "{", "[" * 99_999, "1" * 9999])
+def test_what_is_no_json_is_named(text: str, tmp_path: Path) -> None:
+    (tmp_path / "a.json").write_text(text)
+    with pytest.raises(AntsError, match=r"a\.json' is .*; name another file\."):
+        files.read_json(tmp_path / "a.json")
+
+
+def test_reading_that_fails_names_the_file(tmp_path: Path) -> None:
+    (tmp_path / "a").touch()
+    with (
+        pytest.raises(AntsError, match=r"cannot read '.*a': input/output error; name another"),
+        files.opened(tmp_path / "a"),
+    ):
+        raise OSError(5, "Input/output error")
+
+
+@pytest.mark.parametrize("path", ["a\0b", "n" * 5000, "\udc80/\ud800"])
+def test_a_name_that_no_file_has_is_refused(path: str) -> None:
+    with pytest.raises(AntsError, match="cannot read"):
+        files.read_text(path)
 
 
 def test_csv_without_rows_is_a_header(tmp_path: Path) -> None:

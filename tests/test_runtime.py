@@ -428,3 +428,31 @@ def test_what_the_user_has_set_stays(temporary, monkeypatch):
     assert os.environ["ENABLE_TAICHI_HEADER_PRINT"] == "1"
     assert os.environ["TI_SKIP_VERSION_CHECK"] == "ON"
     monkeypatch.setenv("TI_SKIP_VERSION_CHECK", "ON")  # so that it is put back
+
+
+def test_an_error_in_a_kernel_tells_its_line_and_costs_no_marks_below_it(tmp_path):
+    """Taichi draws a mark for each expression, also where nothing is wrong."""
+    (tmp_path / "wrong.py").write_text(
+        BEGINNING
+        + """
+runtime.start()
+import taichi as ti
+
+@ti.kernel
+def wrong() -> ti.i32:
+    return 1 + nothing
+
+def complaint():
+    try:
+        wrong()
+    except ti.TaichiCompilationError as error:
+        return str(error)
+
+with runtime.quiet():
+    told = complaint()
+assert "wrong.py" in told and "in wrong:" in told and "return 1 + nothing" in told, told
+assert '"nothing" is not defined' in told and "^" not in told, told
+assert "^" in complaint()
+"""
+    )
+    python("import runpy; runpy.run_path('wrong.py')", tmp_path)

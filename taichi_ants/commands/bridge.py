@@ -32,8 +32,7 @@ SHARES, FIGURE = "shares.csv", "figures/bridge.png"
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """The settings of the command line."""
-    summary, more = __doc__.split("\n", 1)
-    parser = Parser(summary, epilog=more)
+    parser = Parser(__doc__)
     add = parser.add_argument
     add("--seeds", type=whole_number(1, 1000), default=40, metavar="N", help="how many")
     add("--seed", type=whole_number(), default=0, metavar="N", help="the first of them")

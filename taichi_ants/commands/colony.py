@@ -69,8 +69,7 @@ _OF_PHEROMONE = (
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """The settings of the command line."""
-    summary, more = __doc__.split("\n", 1)
-    parser = Parser(summary, epilog=more)
+    parser = Parser(__doc__)
     kinds = parser.add_subparsers(metavar="|".join(KINDS), required=True)
     options = {"study": _add_study, "live": _add_live}
     for kind, words in KINDS.items():
@@ -292,17 +291,19 @@ def make_page(
 def study_facts(settings: argparse.Namespace) -> dict[str, str]:
     """How it was done, in words."""
     from taichi_ants.analysis.colony.study import WORLDS
+    from taichi_ants.errors import count
+    from taichi_ants.report.page import span
 
-    last = settings.seed + settings.seeds - 1
+    ticks = count(settings.ticks, "tick")
     return {
         "Worlds": "; ".join(WORLDS[arena] for arena in settings.arenas),
         "Ants": ", ".join(map(str, settings.sizes)),
         "Learner": f"{settings.learner}, learning rate {settings.learning_rate:g}, "
         f"discount {settings.discount:g}, epsilon {settings.epsilon:g} at first, "
         f"{EVALUATION_EPSILON:g} at last and in the evaluation",
-        "Seeds": f"{settings.seed} to {last}",
-        "Training": f"{settings.episodes} episodes of {settings.ticks} ticks",
-        "Evaluation": f"{settings.rollouts} episodes of {settings.ticks} ticks",
+        "Seeds": span(settings.seed, settings.seeds),
+        "Training": f"{count(settings.episodes, 'episode')} of {ticks}",
+        "Evaluation": f"{count(settings.rollouts, 'episode')} of {ticks}",
     }
 
 

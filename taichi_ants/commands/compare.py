@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
@@ -47,7 +47,7 @@ _ARRAYS = ("returns", "steps", "deliveries", "greedy_returns", "greedy_steps", "
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """The settings of the command line; the defaults are the paper's."""
-    parser = Parser(__doc__.split("\n", 1)[0])
+    parser = Parser(__doc__)
     add = parser.add_argument
     seeds: dict[str, Any] = {"type": whole_number(1, MOST_SEEDS), "metavar": "N"}
     add("--seeds", **seeds, default=100, help="how many seeds")
@@ -250,18 +250,14 @@ def compare(settings: argparse.Namespace) -> None:
     work_or_show(settings, study.settings(), work, page=page)
 
 
-def results_of(
-    settings: argparse.Namespace,
-    study: Study[RunPoint],
-    arrays: dict[str, np.ndarray],
-    baselines: Sequence[Mapping],
-) -> Results:
-    """All that follows from what the episodes gave."""
+def comparison_of(
+    settings: argparse.Namespace, study: Study[RunPoint], arrays: dict[str, np.ndarray]
+) -> Comparison:
+    """What the episodes gave, with what it was measured on."""
     from taichi_ants.analysis.paper.comparison import Comparison, Row
-    from taichi_ants.analysis.paper.results import Results
 
     first = study.points[0]
-    comparison = Comparison(
+    return Comparison(
         rows=tuple(Row.of(point.task, point.training) for point in study.points),
         seeds=study.seeds,
         **arrays,
@@ -269,19 +265,21 @@ def results_of(
         task=first.task,
         world=world_name(settings, study),
     )
-    return Results.of(comparison, baselines)
 
 
 def do_comparison(
     settings: argparse.Namespace, study: Study[RunPoint], blocks: Path, ready: Path
 ) -> Results:
     """Do what is not done yet, and write all results."""
+    from concurrent.futures import ThreadPoolExecutor
+
     import numpy as np
 
-    from taichi_ants import files
+    from taichi_ants import archives, files
     from taichi_ants.analysis import style
     from taichi_ants.analysis.bounds.baselines import BASELINE_COLUMNS, baseline_rows
     from taichi_ants.analysis.paper.figures import draw_all
+    from taichi_ants.analysis.paper.results import Results
     from taichi_ants.engines.runs.training import evaluate
 
     where = {"threads": settings.threads, "arch": settings.arch}
@@ -292,24 +290,34 @@ def do_comparison(
     q_values = np.stack([one["q_values"] for one in in_order])
     arrays |= what_policies_do(study, q_values)
     small = {name: files.smallest(array) for name, array in arrays.items()}
-    files.write_npz(ready / EPISODES, small)
     first = study.points[0]
     baselines = baseline_rows(
         *(first.world, first.task, partial(evaluate, **where), study.seeds),
         *(ROLLOUTS, tuple(dict.fromkeys(settings.discounts)), first.max_steps),
     )
     files.write_csv(ready / BASELINES, baselines, BASELINE_COLUMNS)
-    results = results_of(settings, study, arrays, baselines)
+    comparison = comparison_of(settings, study, arrays)
+    # To pack and to resample is work of libraries, which leave Python to the thread that draws.
+    with ThreadPoolExecutor() as beside:
+        packed = beside.submit(archives.write, ready / EPISODES, small)
+        found = beside.submit(Results.of, comparison, baselines)
+        write_policies(settings, ready, study, comparison, q_values)
+        if not settings.no_figures:
+            style.save_all(draw_all(comparison, baselines), ready / FIGURES)
+    packed.result()
+    results = found.result()
     write_tables(ready, results)
-    write_policies(settings, ready, study, results.comparison, q_values)
-    if not settings.no_figures:
-        style.save_all(draw_all(results.comparison, baselines), ready / FIGURES)
     return results
+
+
+_PLAIN = str.maketrans("_=", "  ")  # "planning_steps=3" in words
 
 
 def facts(settings: argparse.Namespace, study: Study[RunPoint]) -> dict[str, str]:
     """How it was done, in words."""
+    from taichi_ants.analysis.paper.comparison import Row
     from taichi_ants.errors import count
+    from taichi_ants.report.page import span
 
     first, task = study.points[0], study.points[0].task
     numbers = {
@@ -318,24 +326,24 @@ def facts(settings: argparse.Namespace, study: Study[RunPoint]) -> dict[str, str
         "epsilon": settings.epsilons,
         "decay of epsilon": settings.epsilon_decays,
     }
-    learners = ", ".join(" ".join([name, *_own(more)]) for name, more in variants(settings))
+    learners = dict.fromkeys(Row.of(one.task, one.training).variant for one in study.points)
+    named = [
+        ", ".join([one.label, *(pair.translate(_PLAIN) for pair in one.hyperparameters.split())])
+        for one in learners
+    ]
     grid = [f"{name} {' or '.join(f'{x:g}' for x in few)}" for name, few in numbers.items()]
     falls = {True: "evaporate", False: "do not evaporate"}
     return {
         "World": world_name(settings, study),
-        "Learners": learners,
+        "Learners": "; ".join(named),
         "Configurations": "; ".join(grid),
         "Delivery": " and ".join(dict.fromkeys(point.task.delivery for point in study.points)),
-        "Seeds": f"{study.seeds[0]} to {study.seeds[-1]}",
+        "Seeds": span(settings.seed, settings.seeds),
         "Episodes": f"{first.episodes} of at most {first.max_steps} steps, "
         f"then {count(first.rollouts, 'greedy rollout')}",
         "Trails": f"{falls[task.evaporation_in_training]} in training, "
         f"{falls[task.evaporation_in_evaluation]} in the greedy evaluation",
     }
-
-
-def _own(hyperparameters: Mapping[str, Any]) -> list[str]:
-    return [f"{name}={value:g}" for name, value in hyperparameters.items()]
 
 
 def make_page(
@@ -346,17 +354,18 @@ def make_page(
     made: Mapping[str, Any],
 ) -> str:
     """The page of the results in a folder, which are read from there if they are not given."""
-    from taichi_ants import files
+    from taichi_ants import archives, files
     from taichi_ants.analysis.drawings import drawings
     from taichi_ants.analysis.paper.figures import draw_all
+    from taichi_ants.analysis.paper.results import Results
     from taichi_ants.report.comparison import comparison_page
     from taichi_ants.report.page import made_facts
     from taichi_ants.report.players import what_is_seen
     from taichi_ants.studies.result_folder import MANIFEST
 
     if results is None:
-        arrays = files.read_npz(folder / EPISODES)
-        results = results_of(settings, study, arrays, files.read_csv(folder / BASELINES))
+        told = comparison_of(settings, study, archives.read(folder / EPISODES))
+        results = Results.of(told, files.read_csv(folder / BASELINES))
     comparison, shown = results.comparison, not settings.no_figures
     # Drawn anew: a figure that has been saved as a file is laid out a little otherwise.
     drawn = draw_all(comparison, results.baselines) if shown else {}

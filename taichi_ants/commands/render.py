@@ -3,6 +3,7 @@
 All but learning follow a policy from a file, or one that is trained on the spot. The ending of
 --out chooses the kind of file: .gif, .mp4, .png for a picture of the end, .html for a page that
 plays an episode or a colony, and without an ending a folder of PNG pictures.
+`%(prog)s episode --help` tells what it has to offer.
 """
 
 from __future__ import annotations
@@ -102,8 +103,7 @@ _DEFAULTS: dict[str, dict[str, Any]] = {
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """The settings of the command line."""
-    summary, more = __doc__.split("\n", 1)
-    parser = Parser(summary, epilog=f"{more} `%(prog)s episode --help` tells what it has to offer.")
+    parser = Parser(__doc__)
     kinds = parser.add_subparsers(metavar="|".join(KINDS), required=True)
     for kind, (shows, example) in KINDS.items():
         example = f"Example: %(prog)s {example}"
@@ -204,10 +204,14 @@ def show_colony(settings: argparse.Namespace, world: World) -> None:
 
 def show_learning(settings: argparse.Namespace, world: World) -> None:
     """Write the same ant after more and more episodes, side by side."""
+    from taichi_ants import learners
     from taichi_ants.rendering import learning_frames
 
     stages = noted_stages(settings, world)
-    title = settings.title or f"{settings.learner}: the same ant before and after learning"
+    title = (
+        settings.title
+        or f"{learners.label(settings.learner)}: the same ant before and after learning"
+    )
     longest = max(len(stage.episode) for stage in stages)
     _save(settings, learning_frames(stages, settings.size, title), longest)
     print(f"{settings.out}: {', '.join(stage.title for stage in stages)}")
@@ -224,18 +228,20 @@ def show_sheet(settings: argparse.Namespace, world: World) -> None:
 
 def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray, Task, str]:
     """The action values (n_states, 5) to follow, their task, and a title that says whence."""
-    from taichi_ants import Colony, Life, Task, load_policy, train
+    from taichi_ants import Colony, Life, Task, learners, load_policy, train
     from taichi_ants.errors import count
 
     if settings.policy:
         policy = load_policy(settings.policy)
-        title = settings.title or f"policy {Path(settings.policy).stem}"
+        title = settings.title or f"Following {Path(settings.policy).name}"
         task = policy.task
         if settings.kind == "episode":  # of one ant: nothing comes and goes
             task = replace(task, life=Life())
         return policy.q_values, task, title
     config, seed, episodes = training_config(settings), settings.seed, settings.episodes
-    title = settings.title or f"{settings.learner} after {count(episodes, 'episode')}"
+    title = (
+        settings.title or f"{learners.label(settings.learner)} after {count(episodes, 'episode')}"
+    )
     with progress_bar("Training") as progress:
         if settings.kind != "colony":
             task = Task(settings.observation)

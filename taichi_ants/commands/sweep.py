@@ -33,8 +33,7 @@ _WORDS = {"supported": "more", "contradicted": "less", "equivalent": "equal"}
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """The settings of the command line."""
-    summary, more = __doc__.split("\n", 1)
-    parser = Parser(summary, epilog=more)
+    parser = Parser(__doc__)
     parser.add_argument("file", type=Path, metavar="FILE", help="what to do (.toml)")
     add_common(parser)
     add_results(parser, "sweep-NAME, by the name of FILE")

@@ -15,7 +15,13 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from taichi_ants.studies.command_line import Parser, load_plugin, run_command, whole_number
+from taichi_ants.studies.command_line import (
+    Parser,
+    load_plugin,
+    progress_bar,
+    run_command,
+    whole_number,
+)
 
 if TYPE_CHECKING:
     from taichi_ants.learners.policies import Policy
@@ -30,8 +36,7 @@ START: dict[str, Any] = {
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """The settings of the command line."""
-    summary, more = __doc__.split("\n", 1)
-    parser = Parser(summary, epilog=more)
+    parser = Parser(__doc__)
     add = parser.add_argument
     files: dict[str, Any] = {"action": "extend", "nargs": "+", "default": [], "metavar": "FILE"}
     add("--policy", **files, help="policies that the page offers besides those of a clone")
@@ -55,8 +60,11 @@ def watch(settings: argparse.Namespace) -> None:
         load_plugin(settings.plugin)
     choices = Choices(policies(settings.policy))
     runtime.start(settings.threads)
-    saved = settings.session
-    session = Session.load(saved) if saved else Session(choices.setup(START))
+    if settings.session:
+        with progress_bar("Replaying") as progress:
+            session = Session.load(settings.session, progress)
+    else:
+        session = Session(choices.setup(START))
     prepare = partial(load_plugin, settings.plugin) if settings.plugin else None
     room = Room(session, choices, settings.port, prepare)
     print(f"{room.url}\nOpen this address; Ctrl-C ends.", flush=True)

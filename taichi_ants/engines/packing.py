@@ -14,7 +14,7 @@ import numpy as np
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.registry import Memory
-from taichi_ants.task.constants import EMPTY
+from taichi_ants.task.constants import EMPTY, N_ACTIONS
 from taichi_ants.worlds.world import World
 
 _OCCUPIED = 16
@@ -34,11 +34,15 @@ def unpack_cells(packed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def compass_of(grid: AxialGrid) -> np.ndarray:
-    """Index steps and turns by heading, i32 (38,); its layout is that of `rules.actions`."""
+    """Index steps and turns by heading, and set bits, i32 (294,); laid out as `rules.actions`."""
     headings = np.arange(N_HEADINGS)
     steps = grid.offsets[(np.arange(N_HEADINGS + 2) - 1) % N_HEADINGS]
     turns = [(headings + by) % N_HEADINGS for by in (-1, 0, 1, 0, 0)]
-    return np.concatenate([steps, *turns]).astype(np.int32)
+    bits = np.zeros((1 << N_ACTIONS, 8), np.int64)
+    for mask in range(1 << N_ACTIONS):
+        (numbers,) = np.nonzero(mask >> np.arange(N_ACTIONS) & 1)
+        bits[mask, : len(numbers)] = numbers
+    return np.concatenate([steps, *turns, bits.reshape(-1)]).astype(np.int32)
 
 
 def padded(memory: Memory) -> Memory:

@@ -13,23 +13,28 @@ from functools import cached_property
 
 import numpy as np
 
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, array_of
 from taichi_ants.grid.constants import HEADING_STEPS
 
 # A grid's arrays are allocated whole; four bytes for each of this many cells are one gibibyte.
 MAX_ARRAY_CELLS = 1 << 28
+
+# Coordinates beyond this are in no world, and their differences would leave 64 bits.
+FAR = 1 << 40
 
 _SQRT_3 = math.sqrt(3.0)
 
 
 def _cells(values: object) -> np.ndarray:
     """Cube coordinates in any form as int64 (..., 3)."""
-    array = np.asarray(values)
+    array = array_of("cells", values)
     if array.dtype.kind not in "iu" or array.ndim == 0 or array.shape[-1] != 3:
         raise AntsError(
             f"cells have shape {array.shape} and type {array.dtype}; they must be whole numbers of "
             "shape (..., 3)."
         )
+    if (far := (array > FAR) | (array < -FAR)).any():
+        raise AntsError(f"a coordinate is {array[far][0]}; it must be at most 2**40 either way.")
     return array.astype(np.int64)
 
 
@@ -159,7 +164,7 @@ class AxialGrid:
         Raises:
             AntsError: An index is not in [0, size).
         """
-        flat = np.asarray(index)
+        flat = array_of("index", index)
         if flat.dtype.kind not in "iu" or ((flat < 0) | (flat >= self.size)).any():
             raise AntsError(f"flat indices must be whole numbers from 0 to {self.size - 1}.")
         # int32 throughout: a world has up to MAX_ARRAY_CELLS cells, and millions are usual.

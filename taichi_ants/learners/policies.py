@@ -15,13 +15,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from taichi_ants import archives
 from taichi_ants.errors import AntsError, check_one_of, expect, shown
-from taichi_ants.files import PathLike, read_npz, to_json, write_npz
+from taichi_ants.files import PathLike, to_json
 from taichi_ants.task import Task, observations
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, N_ACTIONS, PICK_UP, RIGHT
 from taichi_ants.task.states import TASK_NAMES
 
 ActionValues = npt.NDArray[np.float32]
+_MOST_BYTES = 1 << 26  # of a policy file, unpacked
 
 
 class Policy(NamedTuple):
@@ -172,7 +174,7 @@ def save_policy(
             "lists and mappings."
         ) from error
     arrays = {"q_values": table, "observation": np.array(observation), "metadata": np.array(text)}
-    write_npz(path, arrays)
+    archives.write(path, arrays)
 
 
 def load_policy(path: PathLike) -> Policy:
@@ -182,7 +184,7 @@ def load_policy(path: PathLike) -> Policy:
         AntsError: The file is missing, damaged, no policy file, of an observation that is not
             registered, or its values are no policy of it.
     """
-    arrays = read_npz(path)
+    arrays = archives.read(path, most=_MOST_BYTES, foreign=True)
     missing = [name for name in ("q_values", "observation", "metadata") if name not in arrays]
     if missing:
         raise AntsError(

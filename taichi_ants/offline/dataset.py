@@ -17,7 +17,7 @@ from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.worlds.world import World
 
-_KIND = FileKind("taichi-ants data set 1", "data set", "Dataset.save")
+_KIND = FileKind("taichi-ants data set 2", "data set", "Dataset.save")
 
 
 # The arrays and their types, in order.
@@ -176,7 +176,7 @@ class Dataset(Record):
         return replace(self, **columns)
 
     def save(self, path: PathLike) -> None:
-        """Write a .npz file; raises as `files.write_npz` does."""
+        """Write a .npz file; raises as `archives.write` does."""
         arrays = {name: getattr(self, name) for name in COLUMNS}
         arrays = {n: smallest(a) if a.dtype.kind == "i" else a for n, a in arrays.items()}
         arrays |= world_arrays(self.world, "world")

@@ -19,10 +19,12 @@ import numpy as np
 
 from taichi_ants import runtime
 from taichi_ants.checks import checked_share
-from taichi_ants.errors import AntsError, checked_whole, expect, shown
+from taichi_ants.errors import AntsError, checked_flag, checked_whole, expect, shown
+from taichi_ants.learners.config import checked_initial_value
 from taichi_ants.offline.dataset import Dataset
 from taichi_ants.task.constants import N_ACTIONS
 
+_MOST_PENALTY = 1e9
 _MOST_DISCOUNT = 0.9999  # with which Q iteration takes half a second
 
 
@@ -55,7 +57,8 @@ def batch_q_learning(
     expect("data", data, Dataset)
     rates = checked_share("learning_rate", learning_rate), checked_share("discount", discount)
     sweeps, groups = checked_whole("sweeps", sweeps), _groups(data, by_run)
-    q = np.full((len(groups) - 1, data.task.n_states, N_ACTIONS), initial_value, np.float32)
+    first = checked_initial_value(initial_value)
+    q = np.full((len(groups) - 1, data.task.n_states, N_ACTIONS), first, np.float32)
     runtime.start(threads)
     from taichi_ants.offline.kernels import replay  # imports Taichi
 
@@ -80,6 +83,7 @@ def fitted_q_iteration(
     Pairs that the data lack keep `initial_value`. Arguments and errors are those of
     `batch_q_learning`, but the discount must be at most 0.9999.
     """
+    initial_value = checked_initial_value(initial_value)
     model = EmpiricalModel.of(data, _groups(data, by_run))
     q = model.solve(discount, model.rewards, initial_value, threads=threads).astype(np.float32)
     return q if by_run else q[0]
@@ -100,10 +104,12 @@ def pessimistic_q_iteration(
     falls below that of the worst reward for ever, which is what pairs have that the data lack.
 
     Args:
-        penalty: At least 0, in rewards; the others, and errors, as of `fitted_q_iteration`.
+        penalty: From 0 to 1e9, in rewards; the others, and errors, as of `fitted_q_iteration`.
     """
-    if not (isinstance(penalty, Real) and 0 <= penalty < np.inf):
-        raise AntsError(f"penalty is {shown(penalty)}; it must be a number of at least 0.")
+    if not (isinstance(penalty, Real) and 0 <= penalty <= _MOST_PENALTY):
+        raise AntsError(
+            f"penalty is {shown(penalty)}; it must be a number from 0 to {_MOST_PENALTY:g}."
+        )
     model = EmpiricalModel.of(data, _groups(data, by_run))
     lowest = data.task.rewards.by_event().min() / (1.0 - checked_discount(discount))
     rewards = model.rewards - float(penalty) / np.sqrt(model.counts)
@@ -265,5 +271,6 @@ def checked_discount(discount: float) -> float:
 def _groups(data: Dataset, by_run: bool) -> np.ndarray:
     """Where the rows of each run begin, and end; of all runs together without `by_run`."""
     expect("data", data, Dataset)
-    runs = np.arange(len(data.seeds) + 1) if by_run else np.array([0, len(data.seeds)])
+    n = len(data.seeds)
+    runs = np.arange(n + 1) if checked_flag("by_run", by_run) else np.array([0, n])
     return np.searchsorted(data.run, runs).astype(np.int32)

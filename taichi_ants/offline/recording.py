@@ -124,6 +124,7 @@ def record_colony(
     expect("colony", colony, Colony)
     episodes = checked_whole("episodes", episodes)
     ticks = checked_whole("ticks", ticks, most=MAX_STEPS)
+    checks.check_progress(progress)
     if len(dict.fromkeys(colony.worlds)) > 1:
         raise AntsError("the colony lives in different worlds; record a colony for each world.")
     facts = {"policy": "colony", "sharing": colony.sharing, "ants": colony.ants}
@@ -159,7 +160,7 @@ def _tick(colony: Colony, tables: np.ndarray, before: np.ndarray) -> dict[str, n
 
     arrays, slots = colony.arrays, colony.capacity
     row_at = AntRow.PERCEPT if is_percept(colony.task.sees) else AntRow.STATE
-    ants, streams, step = arrays["ants"].copy(), arrays["streams"].copy(), colony.ticks
+    ants, streams, step = colony.ant_rows(), arrays["streams"].copy(), colony.ticks
     running = np.repeat(arrays["worlds"][WorldRow.RUNNING] == 1, slots)
     (columns,) = np.nonzero((ants[AntRow.STAGE] == Stage.LIVING) & running)
     owner = np.unravel_index(columns, (len(colony.seeds), slots))[: tables.ndim - 2]
@@ -169,7 +170,7 @@ def _tick(colony: Colony, tables: np.ndarray, before: np.ndarray) -> dict[str, n
     action = np.where(known, action, _drawn(values, colony.epsilon, streams[columns]))
     chances = action_probabilities(values, colony.epsilon)[np.arange(len(columns)), action]
     colony.tick()
-    run, agent, after = columns // slots, ants[AntRow.NUMBER, columns], arrays["ants"]
+    run, agent, after = columns // slots, ants[AntRow.NUMBER, columns], colony.ant_rows()
     there = columns
     if not np.array_equal(after[AntRow.NUMBER, columns], agent):  # the colony has sorted its ants
         keys = np.arange(ants.shape[1]) // slots * 2**32 + after[AntRow.NUMBER]

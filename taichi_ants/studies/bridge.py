@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taichi_ants import files
 from taichi_ants.analysis.bridge import (
     EQUAL,
     EQUAL_ASIDE,
@@ -20,10 +20,10 @@ from taichi_ants.analysis.bridge import (
     Design,
 )
 from taichi_ants.engines.colony.layout import AntRow
-from taichi_ants.errors import AntsError
 from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.studies.blocks import Form, kept
 from taichi_ants.studies.colony_study import scheduled
-from taichi_ants.studies.runner import EVALUATION_SEEDS, ColonyPoint
+from taichi_ants.studies.runner import EVALUATION_SEEDS, ColonyPoint, settings_of
 from taichi_ants.task import Life, Task, foraging, queueing
 from taichi_ants.worlds import double_bridge
 from taichi_ants.worlds.double_bridge import ROOM_RADIUS, branch_cells, junction_cells
@@ -98,12 +98,22 @@ def followed(
         ticks: Length of the episode on each bridge.
         where: Threads and arch, as of a `Colony`.
     """
+    form = Form(np.integer, (WINDOWS, len(LOADS), 2, len(seeds)), 0)
+    about = {**settings_of([learned], seeds), "design": asdict(design), "ticks": ticks}
+    make = partial(_followed, design, learned, seeds, q_values, ticks, where)
+    return kept(path, about, dict.fromkeys(bridges(design), form), make)
+
+
+def _followed(
+    design: Design,
+    learned: ColonyPoint,
+    seeds: Sequence[int],
+    q_values: np.ndarray,
+    ticks: int,
+    where: tuple[int | None, str | None],
+) -> dict[str, np.ndarray]:
     from taichi_ants.engines.colony.colony import Colony
 
-    try:
-        return files.read_npz(path)
-    except AntsError:  # it is not there, or is damaged
-        pass
     least = learned.training.min_epsilon
     calm = replace(learned.training, epsilon=least, epsilon_decay=1.0)
     found = {}
@@ -119,7 +129,6 @@ def followed(
             schedule="by_world",
         )
         found[name] = crossings(colony, bridge, ticks)
-    files.write_npz(path, found, compress=False)
     return found
 
 
@@ -148,8 +157,8 @@ def crossings(colony: Colony, bridge: dict[str, Any], ticks: int) -> np.ndarray:
     while colony.ticks < ticks:
         window = colony.ticks * WINDOWS // ticks
         colony.tick(min(_LOOK_EVERY, ticks - colony.ticks))
-        now = zone[colony.arrays["ants"][AntRow.CELL]]
-        carries = colony.arrays["ants"][AntRow.CARRIES] == 1
+        now = zone[colony.of_ants(AntRow.CELL)]
+        carries = colony.of_ants(AntRow.CARRIES) == 1
         inside = now <= _FOOD_ROOM
         crossed = inside & (now != room)
         useful = crossed & (carries == (now == _QUEEN_ROOM))

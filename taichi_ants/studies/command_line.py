@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, without_middle
 from taichi_ants.studies.interruption import stop_if_noted, stoppable
 
 EXIT_BAD_INPUT = 2
@@ -28,18 +28,21 @@ class _HelpFormatter(argparse.ArgumentDefaultsHelpFormatter):
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose errors are one sentence on standard error."""
+    """A parser whose errors are one sentence on standard error.
+
+    Args:
+        about: The docstring of the command's module, whose first line stands above the options and
+            the rest below them; `python -OO` leaves out docstrings, so None is one, too.
+        settings: Those of `argparse.ArgumentParser`.
+    """
 
     program: str | None = None  # what --help calls it; None: the name of the script
 
-    def __init__(self, description: str, **settings: Any) -> None:
-        settings.setdefault("prog", self.program)
-        super().__init__(
-            description=description,
-            formatter_class=_HelpFormatter,
-            allow_abbrev=False,
-            **settings,
-        )
+    def __init__(self, about: str | None = None, **settings: Any) -> None:
+        summary, _, more = (about or "").partition("\n")
+        usual: dict[str, Any] = {"description": summary, "epilog": more, "prog": self.program}
+        usual |= {"formatter_class": _HelpFormatter, "allow_abbrev": False}
+        super().__init__(**{**usual, **settings})
 
     def parse_given(self, arguments: list[str] | None = None) -> tuple[argparse.Namespace, dict]:
         """The settings; and of those that were given, even as their defaults, the flag by name."""
@@ -48,7 +51,7 @@ class Parser(argparse.ArgumentParser):
         return self.parse_args(words), {flag[2:].replace("-", "_"): flag for flag in flags}
 
     def error(self, message: str) -> NoReturn:
-        text = _on_one_line(message).removeprefix("argument ").rstrip(".")
+        text = without_middle(_on_one_line(message)).removeprefix("argument ").rstrip(".")
         self.exit(EXIT_BAD_INPUT, f"error: {text}; see --help.\n")
 
 
@@ -174,7 +177,7 @@ def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
 
 def notice(text: str) -> None:
     """Say something on one line of standard error."""
-    print(_on_one_line(text), file=sys.stderr)
+    print(without_middle(_on_one_line(text), 2000), file=sys.stderr)
 
 
 def _on_one_line(text: str) -> str:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 from taichi_ants import files
 from taichi_ants.analysis.colony import over_time
 from taichi_ants.analysis.colony.over_time import Moment
-from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.errors import AntsError, count
 
 if TYPE_CHECKING:
@@ -25,16 +24,14 @@ def check_places(save: str | None, render: str | None, figure: str | None = None
     """Make sure, before the work begins, that what `live` shall write can be written."""
     from taichi_ants.rendering.writers import check_animation, check_picture, is_picture
 
-    if render and is_picture(render):
+    if render is not None and is_picture(render):
         check_picture(render)
-    elif render:
+    elif render is not None:
         check_animation(render, FRAMES_PER_SECOND)
-    if figure:
-        check_picture(figure)
-    if save:
-        if Path(save).is_dir():
-            raise AntsError(f"{save!r} is a folder; name a file to save to.")
-        files.check_writable_folder(Path(save).parent)
+    if figure is not None:
+        files.check_writable_file(over_time.numbers_beside(check_picture(figure)))
+    if save is not None:
+        files.check_writable_file(save)
 
 
 def live(
@@ -80,11 +77,16 @@ def live(
             over_time.save(over_time.rates(moments), who, figure)
     except (AntsError, OSError):
         # Pictures are drawn between ticks, so this one is whole, and may have taken hours.
-        if save:
-            colony.save(save)
+        _save(colony, save)
         raise
-    if save:
-        colony.save(save)
+    _save(colony, save)
+
+
+def _save(colony: Colony, path: str | None) -> None:
+    """Save a colony, if there is a file to save it to, into a folder that is made if need be."""
+    if path is not None:
+        files.check_writable_folder(Path(path).parent)
+        colony.save(path)
 
 
 def _pieces(
@@ -95,20 +97,25 @@ def _pieces(
     every: int,
     span: int,
 ) -> Iterator[int]:
-    """Move a colony on by pieces of `every` ticks, with 0 by short ones; yields after each.
+    """Move a colony on by short pieces, after which it can be stopped.
 
-    One also ends after every `span` ticks.
+    Yields after each piece, or with `every` above 0 after so many ticks; in any case after every
+    `span` ticks and at the end.
     """
-    begun, piece = colony.ticks, every or 1
-    while colony.ticks < begun + ticks and not stopped():
-        began = time.perf_counter()
-        passed = colony.ticks - begun
-        colony.tick(min(piece, ticks - passed, span - passed % span))
-        if not every:
-            short = time.perf_counter() - began < _PIECE_SECONDS
-            piece = 2 * piece if short else max(1, piece // 2)
-        yield colony.ticks
-        progress((colony.ticks - begun) / ticks)
+    begun, piece, passed, ends = colony.ticks, 1, 0, stopped()
+    while not ends:
+        began, left = time.perf_counter(), min(ticks - passed, span - passed % span)
+        now = min(piece, left, every - passed % every if every else left)
+        colony.tick(now)
+        took, passed = time.perf_counter() - began, colony.ticks - begun
+        if took > _PIECE_SECONDS:
+            piece = max(1, piece // 2)
+        elif now == piece:
+            piece *= 2
+        ends = passed == ticks or stopped()
+        if ends or not every or passed % every == 0 or passed % span == 0:
+            yield colony.ticks
+        progress(passed / ticks)
 
 
 def _noted(
@@ -124,9 +131,9 @@ def _noted(
 
 def _so_far(colony: Colony) -> Moment:
     """What all colonies together have done in this episode."""
-    of_worlds = colony.arrays["worlds"]
-    rows = WorldRow.DELIVERIES, WorldRow.MOVES, WorldRow.BLOCKED
-    return Moment(colony.ticks, *(int(of_worlds[row].sum()) for row in rows))
+    now = colony.outcome()
+    counts = now.deliveries, now.moves, now.blocked
+    return Moment(colony.ticks, *(int(count.sum()) for count in counts))
 
 
 def summary(colony: Colony, ticks: int, seconds: float) -> str:

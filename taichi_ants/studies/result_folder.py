@@ -27,6 +27,7 @@ MANIFEST = "manifest.json"
 UNFINISHED, BLOCKS, READY = "unfinished", "blocks", "ready"
 REPORT = "report.txt"  # what commands print
 PAGE = "report.html"  # what tells the whole result
+_SEAL = "sha256"  # of all else in a manifest
 
 
 Results = TypeVar("Results")
@@ -61,15 +62,19 @@ def work_or_show(
     folder = ResultFolder(settings.out, facts, leading)
     if not settings.force and folder.is_finished():
         folder.check_whole(but=PAGE if page else None)
-        if page and not (settings.out / PAGE).exists():
+        folder.tidy()
+        gone = page and not (settings.out / PAGE).exists()
+        if page and gone:
             folder.add(PAGE, page(settings.out, None, _manifest_in(settings.out)))
-        print((settings.out / REPORT).read_text("utf-8"))
+        print(files.read_text(settings.out / REPORT))
         print(f"{settings.out}/ holds these results already; --force makes them again.")
+        if gone:
+            print(f"{PAGE} was gone, and is written again from the other files.")
     else:
         began = time.perf_counter()
         with folder.work(settings.force) as (blocks, ready):
             results = work(blocks, ready)
-            report = (ready / REPORT).read_text("utf-8")
+            report = files.read_text(ready / REPORT)
             seconds = folder.seconds_before + time.perf_counter() - began
             made = {**provenance(sys.argv), "seconds": seconds}
             if page:
@@ -154,19 +159,19 @@ class ResultFolder:
         manifest, blocks = self._unfinished / MANIFEST, self._unfinished / BLOCKS
         new = [part for part in (self.path, *self.path.parents) if not part.exists()]
         try:
-            files.check_writable_folder(self.path)
             # Without a manifest nobody knows whose blocks these are.
             if replace or not manifest.exists():
                 self._clear()
+            # What a kill leaves in these two is removed with them.
             for folder in (blocks, self._unfinished / READY):
-                files.check_writable_folder(folder)
+                files.check_writable_folder(folder, self.path)
             self.seconds_before = self._seconds_so_far()
             contents = {"settings": self._settings, "seconds": self.seconds_before}
-            files.write_json(manifest, contents)
+            _write_manifest(self._unfinished, contents)
             with tempfile.TemporaryDirectory(dir=self._unfinished / READY) as ready:
                 yield blocks, Path(ready)
         finally:
-            if self._unfinished.is_dir() and not any(blocks.rglob("*.npz")):
+            if not any(blocks.rglob("*.npz")):
                 self._clear()
             for folder in new:
                 with suppress(OSError, ValueError):  # it holds something, or was never made
@@ -185,15 +190,26 @@ class ResultFolder:
             (self.path / path).parent.mkdir(parents=True, exist_ok=True)
             (ready / path).replace(self.path / path)
         contents = {**manifest, "files": hashes, "settings": self._settings}
-        files.write_json(self.path / MANIFEST, contents)
+        _write_manifest(ready, contents)
+        (ready / MANIFEST).replace(self.path / MANIFEST)
         self._clear()  # now it is finished
 
     def add(self, name: str, text: str) -> None:
         """Write one more file of finished results, or one again, and list it among them."""
-        files.write_text(self.path / name, text)
-        manifest = _manifest_in(self.path)
-        manifest["files"][name] = _hash(self.path / name)
-        files.write_json(self.path / MANIFEST, manifest)
+        folder = files.check_writable_folder(self._unfinished / READY)
+        with tempfile.TemporaryDirectory(dir=folder) as place:
+            files.write_text(Path(place, name), text)
+            manifest = _manifest_in(self.path)
+            manifest["files"][name] = _hash(Path(place, name))
+            _write_manifest(Path(place), manifest)
+            for one in (MANIFEST, name):  # who finds the first alone makes the other again
+                Path(place, one).replace(self.path / one)
+        self.tidy()
+
+    def tidy(self) -> None:
+        """Remove what a process has left that was killed when it had finished."""
+        if not (self._unfinished / MANIFEST).exists():
+            self._clear()
 
     def _seconds_so_far(self) -> float:
         """The seconds of the processes that have worked in `unfinished`, even if they were killed.
@@ -207,11 +223,15 @@ class ResultFolder:
         begun = manifest.stat().st_mtime
         blocks = (self._unfinished / BLOCKS).rglob("*.npz")
         last = max((block.stat().st_mtime for block in blocks), default=begun)
-        return float(_manifest_in(self._unfinished).get("seconds", 0.0)) + max(0.0, last - begun)
+        return _manifest_in(self._unfinished)["seconds"] + max(0.0, last - begun)
 
     def _clear(self) -> None:
         """Remove what is ours in `unfinished`, and the folder if that was all."""
+        if not self._unfinished.is_dir():
+            return
         (self._unfinished / MANIFEST).unlink(missing_ok=True)
+        for half in self._unfinished.glob(files.HALF_WRITTEN):
+            half.unlink(missing_ok=True)
         for name in (BLOCKS, READY):
             shutil.rmtree(self._unfinished / name, ignore_errors=True)
         with suppress(OSError):
@@ -233,15 +253,29 @@ class ResultFolder:
 def _manifest_in(folder: Path) -> dict[str, Any]:
     """What the manifest in a folder says; AntsError if it is damaged."""
     try:
-        manifest = json.loads((folder / MANIFEST).read_text("utf-8"))
+        manifest = files.read_json(folder / MANIFEST)
+        seal = manifest.pop(_SEAL, None)  # older ones have none
+        if seal is not None and seal != _seal_of(manifest):
+            raise ValueError("it is not as it was written")
         parts = {name: dict(manifest.get(name, {})) for name in ("settings", "files")}
-        return {**manifest, **parts}
-    except (OSError, ValueError, TypeError, AttributeError) as error:
+        return {**manifest, **parts, "seconds": float(manifest.get("seconds", 0.0))}
+    except (ValueError, TypeError, AttributeError) as error:
         raise AntsError(
             f"{str(folder / MANIFEST)!r} is damaged, so nobody knows what here is ours; choose "
             "another --out."
         ) from error
 
 
+def _write_manifest(folder: Path, contents: Mapping[str, Any]) -> None:
+    """Write a manifest with a seal, which tells whether it was altered."""
+    plain = json.loads(files.to_json(contents))
+    files.write_json(folder / MANIFEST, {**plain, _SEAL: _seal_of(plain)})
+
+
+def _seal_of(manifest: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(manifest, sort_keys=True).encode()).hexdigest()
+
+
 def _hash(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    with files.opened(path) as file:
+        return files.hash_of(file)

@@ -9,8 +9,10 @@ any order without changing anything.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -19,9 +21,10 @@ import numpy as np
 from taichi_ants import __version__, checks, files, learners
 from taichi_ants.errors import AntsError, check_one_of, checked_whole
 from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.studies.blocks import Form, Outcome, kept
 from taichi_ants.studies.provenance import world_facts
 from taichi_ants.task import Task
-from taichi_ants.task.constants import EPISODE_STEPS, EPISODES, MAX_STEPS
+from taichi_ants.task.constants import EPISODE_STEPS, EPISODES, MAX_STEPS, N_ACTIONS
 from taichi_ants.worlds.world import World
 
 # Seeds of a colony's evaluation are those of the training plus this, so that no random number
@@ -33,7 +36,6 @@ _RUN_ARRAYS = ("returns", "steps", "deliveries")
 _COLONY_ARRAYS = ("deliveries", "first_delivery", "moves", "blocked", "returns")
 
 Progress = Callable[[float], None]
-Outcome = dict[str, np.ndarray]  # by name, first axis the seeds
 Piece = TypeVar("Piece")
 
 
@@ -89,6 +91,20 @@ class RunPoint:
     def weight(self) -> float:
         """About how much work a seed is."""
         return self.episodes * self.max_steps
+
+    @property
+    def forms(self) -> dict[str, Form]:
+        """Of the arrays of its outcome, for one seed."""
+        forms = {
+            f"{of}{name}": Form(np.integer, (length,), *bounds)
+            for of, length in (("", self.episodes), ("greedy_", self.rollouts))
+            for name, bounds in zip(_RUN_ARRAYS, ((), (1, self.max_steps), (0, 1)), strict=True)
+        }
+        return {
+            **forms,
+            "q_values": Form(np.float32, (self.task.n_states, N_ACTIONS)),
+            "seconds": Form(np.float64, (), 0),
+        }
 
     @staticmethod
     def do(
@@ -174,6 +190,17 @@ class ColonyPoint:
         """About how much work a seed is."""
         return self.ants * self.ticks * (self.episodes + self.rollouts)
 
+    @property
+    def forms(self) -> dict[str, Form]:
+        """Of the arrays of its outcome, for one seed."""
+        least = {"returns": -math.inf, "first_delivery": -1}
+        forms = {
+            name: Form(np.integer, (self.rollouts,), least.get(name, 0)) for name in _COLONY_ARRAYS
+        }
+        if self.episodes and self.sharing == "shared":
+            forms["q_values"] = Form(np.float32, (self.task.n_states, N_ACTIONS))
+        return forms
+
     def places(self, seeds: Sequence[int]) -> list[list[World]] | None:
         """The world of each training episode and seed; None without a pool."""
         if self.pool is None:
@@ -256,8 +283,7 @@ class Study(Generic[PointKind]):
     @property
     def in_order(self) -> tuple[PointKind, ...]:
         """The points, each once, those that others go on from before these."""
-        pairs = ((getattr(point, "after", None), point) for point in self.points)
-        return tuple(dict.fromkeys(point for pair in pairs for point in pair if point))
+        return _in_order(self.points)
 
     def blocks(self) -> Iterator[tuple[Sequence[PointKind], Sequence[int]]]:
         """The points and seeds of each block."""
@@ -269,29 +295,8 @@ class Study(Generic[PointKind]):
                     yield some, seeds
 
     def settings(self) -> dict[str, Any]:
-        """All that determines the numbers; equal settings give equal results.
-
-        What all points have in common is there once, all else as a list with an entry for each.
-        """
-        points = self.in_order
-        places: list[Any] = [place for one in points for place in (one.world, _pool(one)) if place]
-        worlds = list(dict.fromkeys(places))
-        rows = [_facts(point, worlds, points) for point in points]
-        columns = {name: [row.get(name) for row in rows] for row in rows for name in row}
-        return {
-            "version": __version__,
-            "seeds": list(self.seeds),
-            "worlds": [
-                [world_facts(one) for one in world]
-                if isinstance(world, tuple)
-                else world_facts(world)
-                for world in worlds
-            ],
-            **{
-                name: values[0] if all(one == values[0] for one in values) else values
-                for name, values in columns.items()
-            },
-        }
+        """All that determines the numbers; equal settings give equal results."""
+        return settings_of(self.points, self.seeds)
 
     def run(
         self,
@@ -316,16 +321,15 @@ class Study(Generic[PointKind]):
         pieces: dict[PointKind, list[Outcome]] = {point: [] for point in self.in_order}
         progress(0.0)
         for number, ((points, seeds), weight) in enumerate(zip(blocks, weights, strict=True)):
-            path = folder / f"{number:06d}.npz"
-            try:
-                block = files.read_npz(path)
-            except AntsError:  # it is not there, or is damaged
-                after = getattr(points[0], "after", None)
-                learned = pieces[after][0]["q_values"] if after else None
-                part = _part(progress, begun / total, weight / total)
-                where = {"threads": threads, "arch": arch}
-                block = points[0].do(points, seeds, learned, part, where)
-                files.write_npz(path, block, compress=False)
+            after = getattr(points[0], "after", None)
+            learned = pieces[after][0]["q_values"] if after else None
+            part = _part(progress, begun / total, weight / total)
+            where = {"threads": threads, "arch": arch}
+            shape = len(points), len(seeds)
+            forms = {n: one._replace(shape=shape + one.shape) for n, one in points[0].forms.items()}
+            about = settings_of(points, seeds)
+            do: Any = partial(points[0].do, points, seeds, learned, part, where)
+            block = kept(folder / f"{number:06d}.npz", about, forms, do)
             for place, point in enumerate(points):
                 pieces[point].append({name: array[place] for name, array in block.items()})
             begun += weight
@@ -334,6 +338,35 @@ class Study(Generic[PointKind]):
             point: {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
             for point, parts in pieces.items()
         }
+
+
+def settings_of(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Any]:
+    """All that determines the numbers of points and seeds.
+
+    What all points have in common is there once, all else as a list with an entry for each.
+    """
+    points = _in_order(points)
+    places: list[Any] = [place for one in points for place in (one.world, _pool(one)) if place]
+    worlds = list(dict.fromkeys(places))
+    rows = [_facts(point, worlds, points) for point in points]
+    columns = {name: [row.get(name) for row in rows] for row in rows for name in row}
+    return {
+        "version": __version__,
+        "seeds": list(seeds),
+        "worlds": [
+            [world_facts(one) for one in world] if isinstance(world, tuple) else world_facts(world)
+            for world in worlds
+        ],
+        **{
+            name: values[0] if all(one == values[0] for one in values) else values
+            for name, values in columns.items()
+        },
+    }
+
+
+def _in_order(points: Sequence[Piece]) -> tuple[Piece, ...]:
+    pairs = ((getattr(point, "after", None), point) for point in points)
+    return tuple(dict.fromkeys(point for pair in pairs for point in pair if point))
 
 
 def _part(progress: Progress, begin: float, share: float) -> Progress:

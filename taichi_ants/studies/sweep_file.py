@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from taichi_ants import checks, learners, worlds
+from taichi_ants import checks, files, learners, worlds
 from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, shown
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.runner import ColonyPoint, Point, RunPoint, Study, flat
@@ -64,13 +64,10 @@ def read_sweep(path: Path, measures: Mapping[str, Mapping[str, Any]]) -> Sweep:
     Raises:
         AntsError: The file cannot be read, or asks for something that cannot be.
     """
+    text = files.read_text(path)
     try:
-        file = tomllib.loads(path.read_text("utf-8"))
-    except OSError as error:
-        raise AntsError(
-            f"cannot read {str(path)!r}: {error.strerror}; name a .toml file."
-        ) from error
-    except (ValueError, RecursionError) as error:  # what is no TOML, or no UTF-8
+        file = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
         raise AntsError(f"{str(path)!r} is no TOML: {error}; mend the file.") from error
     try:
         return _sweep(file, measures)

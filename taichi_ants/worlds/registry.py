@@ -48,8 +48,8 @@ def check_seed_counts(name_or_path: str, option: str = "--world-seed") -> None:
     drawn = [name for name in names() if name not in ("paper", "double_bridge")]
     if name_or_path not in drawn:
         raise AntsError(
-            f"{option} is for a world drawn at random, not for {name_or_path!r}; leave it out, "
-            f"or choose a world of {', '.join(drawn)}."
+            f"{option} is for a world drawn at random, not for {shown(name_or_path)}; leave it "
+            f"out, or choose a world of {', '.join(drawn)}."
         )
 
 

@@ -18,10 +18,10 @@ import os
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
+from taichi_ants import files
 from taichi_ants.errors import AntsError, expect, shown
 from taichi_ants.grid.hexgrid import AxialGrid, cube
 from taichi_ants.task.constants import MAX_TRAIL_LEVEL
@@ -44,16 +44,7 @@ def load_map(path: str | os.PathLike[str]) -> World:
     Raises:
         AntsError: The file cannot be read, or its map is damaged.
     """
-    try:
-        text = Path(path).read_text("utf-8")
-    except UnicodeError:
-        raise AntsError(f"{path} is no text file; give the path of a map file.") from None
-    except (OSError, TypeError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise AntsError(
-            f"the map file {shown(path)} cannot be read: {reason}; give the path of a map file."
-        ) from None
-    return from_text(text, str(path))
+    return from_text(files.read_text(path), str(path))
 
 
 def from_text(text: str, source: str = "the map") -> World:

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from taichi_ants.errors import AntsError, shown, whole
+from taichi_ants.errors import AntsError, entries_of, shown, whole
 from taichi_ants.grid.constants import N_HEADINGS
-from taichi_ants.grid.hexgrid import MAX_ARRAY_CELLS, AxialGrid
+from taichi_ants.grid.hexgrid import FAR, MAX_ARRAY_CELLS, AxialGrid
 from taichi_ants.task.constants import MAX_TRAIL_LEVEL
 
-# Coordinates beyond this are in no world, and their differences would leave 64 bits.
-_FAR = 1 << 40
 _STANDS = ("nothing", "the queen", "a food", "an obstacle")
 
 
@@ -94,7 +90,7 @@ def _parse(
 def _inside(name: str, given: np.ndarray, grid: AxialGrid) -> np.ndarray:
     """Rows in normal form, int32; int64 (n, 3 or more) are given."""
     rows = given.copy()
-    rows[:, :3] -= given[:, :3].min(axis=1, keepdims=True, initial=_FAR)
+    rows[:, :3] -= given[:, :3].min(axis=1, keepdims=True, initial=FAR)
     (outside,) = np.nonzero((rows[:, :3] >= np.array(grid.ranges)).any(axis=1))
     if len(outside):
         place = f"{name}[{outside[0]}]" if name != "queen" else name
@@ -108,7 +104,7 @@ def _inside(name: str, given: np.ndarray, grid: AxialGrid) -> np.ndarray:
 def _rows(name: str, values: object, form: str, columns: int) -> np.ndarray:
     """Entries of `columns` whole numbers as int64 (n, columns)."""
     if not isinstance(values, np.ndarray):
-        entries = _entries(values)
+        entries = entries_of(values)
         if entries is None:
             raise AntsError(f"{name} is {shown(values)}; it must be a sequence of {form}.")
         rows = [_row(f"{name}[{i}]", entry, form, columns) for i, entry in enumerate(entries)]
@@ -120,7 +116,7 @@ def _rows(name: str, values: object, form: str, columns: int) -> np.ndarray:
             f"{name} is an array of shape {values.shape} and type {values.dtype}; "
             f"it must hold whole numbers in the shape (n, {columns}), each row {form}."
         )
-    (far,) = np.nonzero((np.abs(values.astype(np.float64)) > _FAR).any(axis=1))
+    (far,) = np.nonzero((np.abs(values.astype(np.float64)) > FAR).any(axis=1))
     if len(far):
         _row(f"{name}[{far[0]}]", tuple(values[far[0]].tolist()), form, columns)  # raises
     return values.astype(np.int64)
@@ -128,11 +124,11 @@ def _rows(name: str, values: object, form: str, columns: int) -> np.ndarray:
 
 def _row(name: str, entry: object, form: str, columns: int) -> list[int]:
     """One entry as `columns` integers; a pair (cell, number) is taken apart."""
-    values = _entries(entry) or []
+    values = entries_of(entry) or []
     if columns == 4 and len(values) == 2:
-        values = [*(_entries(values[0]) or []), values[1]]
+        values = [*(entries_of(values[0]) or []), values[1]]
     numbers = _whole_numbers(values)
-    if len(numbers) != columns or max(map(abs, numbers)) > _FAR:
+    if len(numbers) != columns or max(map(abs, numbers)) > FAR:
         raise AntsError(
             f"{name} is {shown(entry)}; it must be {form} in whole numbers of up to 2**40."
         )
@@ -142,19 +138,9 @@ def _row(name: str, entry: object, form: str, columns: int) -> list[int]:
 def _whole_numbers(values: object) -> list[int]:
     """The entries of a sequence as integers; none if it is no sequence of whole numbers."""
     try:
-        return [whole("", value) for value in _entries(values) or []]
+        return [whole("", value) for value in entries_of(values) or []]
     except AntsError:
         return []
-
-
-def _entries(values: object) -> list | None:
-    """The entries of a sequence; None for all else, text and mappings included."""
-    if isinstance(values, (str, bytes, Mapping)):
-        return None
-    try:
-        return list(values)  # type: ignore[call-overload]
-    except TypeError:
-        return None
 
 
 def _cell(row: np.ndarray) -> tuple[int, ...]:

@@ -30,7 +30,8 @@ class World:
         foods: Cells with food, int32 (F, 3); given as a sequence of (x, y, z) or such an array.
         obstacles: Cells that cannot be entered, int32 (O, 3); given likewise.
         trails: int32 (T, 4) = x, y, z, trail level (ticks until it has evaporated); given as a
-            sequence of ((x, y, z), level) or such an array. Entries of level 0 are left out.
+            sequence of ((x, y, z), level) or such an array. Entries of level 0 are left out. Where
+            trails are float32 (see `Pheromone.dense`), levels above 2**24 are rounded to that.
         ants: int32 (A, 4) = x, y, z, heading; given as a sequence of ((x, y, z), heading) or such
             an array. More ants than these are placed by `start`.
 

@@ -9,6 +9,7 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import faults
 import numpy as np
 import pytest
 from command_lines import EXPERIMENTS, assert_one_sentence, call, contents, load, run
@@ -432,6 +433,14 @@ def test_other_settings_do_not_mix_with_results(change, named, copy, compare):
     assert contents(copy) == before
 
 
+def test_learners_are_told_by_the_names_that_readers_know():
+    settings = commands.parse_arguments(["--seeds", "1"])
+    told = commands.facts(settings, commands.build_study(settings))
+    assert told["Learners"] == (
+        "Q-learning; SARSA; Dyna-Q (p3), planning steps 3; Dyna-Q (p5), planning steps 5"
+    )
+
+
 def test_lists_drop_what_is_said_twice(tmp_path, compare):
     lists = ["--discounts", "0.5", "0.9", "0.90", "--epsilons", "0.1", "0.2"]
     status, _, _ = compare(*TINY, *lists, "--out", tmp_path / "out")
@@ -517,3 +526,13 @@ def test_training_of_the_comparison_can_be_continued(finished):
     longer = continue_training(first, 5)
     with np.load(finished / "episodes.npz") as archive:
         assert np.array_equal(longer.returns[0, :, :EPISODES], archive["returns"][0])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", [faults.killed, faults.full])
+def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
+    fault, tmp_path, monkeypatch
+):
+    faults.remember(monkeypatch)
+    both = [*TINY, "--delivery", "both"]
+    assert faults.assert_it_survives(fault, "compare", both, tmp_path / "out") > 40

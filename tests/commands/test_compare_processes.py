@@ -61,50 +61,6 @@ def stop_after_a_block(process, folder, stop_signal, least):
     return out, err, time.perf_counter() - sent
 
 
-@pytest.fixture(scope="module")
-def uninterrupted(tmp_path_factory, kernels):
-    place = tmp_path_factory.mktemp("uninterrupted")
-    assert run("compare", [*MANY, "--out", "out"], kernels, place).returncode == 0
-    return contents(place / "out")
-
-
-@pytest.mark.slow
-def test_stopped_and_killed_it_goes_on_to_the_same_results(uninterrupted, kernels, tmp_path):
-    folder = tmp_path / "out"
-    arguments = [*MANY, "--out", "out"]
-
-    process = start("compare", arguments, kernels, tmp_path)
-    out, err, seconds = stop_after_a_block(process, folder, signal.SIGINT, 1)
-    assert process.returncode == 130
-    assert (out, err) == (
-        "",
-        "Stopped; finished runs are kept, and the same command goes on from there.\n",
-    )
-    assert seconds < PROMPTLY
-    kept = blocks_in(folder)
-    assert 1 <= len(kept) < BLOCKS
-    assert [path.name for path in folder.iterdir()] == ["unfinished"]
-
-    other = [*arguments, "--seeds", 5]
-    refused = run("compare", other, kernels, tmp_path)
-    assert refused.returncode == 2
-    assert_one_sentence(refused.stderr)
-    assert "unfinished" in refused.stderr
-
-    process = start("compare", arguments, kernels, tmp_path)
-    stop_after_a_block(process, folder, signal.SIGKILL, len(kept) + 1)
-    assert process.returncode == -signal.SIGKILL
-    assert len(kept) < len(blocks_in(folder)) < BLOCKS
-    assert kept.items() <= blocks_in(folder).items()  # none of them was done again
-
-    done = run("compare", arguments, kernels, tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-    after = contents(folder)
-    assert set(after) == set(uninterrupted)
-    for name in set(after) - {"manifest.json", "report.html"}:  # these two tell times
-        assert after[name] == uninterrupted[name], name
-
-
 @pytest.mark.parametrize(("stop", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_an_interruption_before_the_first_block_leaves_nothing(stop, status, kernels, tmp_path):
     process = start("compare", [*LONG, "--out", "new/folder"], kernels, tmp_path)
@@ -119,17 +75,27 @@ def test_an_interruption_before_the_first_block_leaves_nothing(stop, status, ker
         assert list(tmp_path.iterdir()) == []
 
 
-def test_a_damaged_block_is_done_again(kernels, tmp_path):
-    process = start("compare", [*MANY, "--out", "out"], kernels, tmp_path)
-    stop_after_a_block(process, tmp_path / "out", signal.SIGTERM, 1)
-    assert process.returncode == 143
-    name = min(blocks_in(tmp_path / "out"))
-    path = tmp_path / "out" / "unfinished" / "blocks" / name
-    path.write_bytes(path.read_bytes()[:-100])
-    process = start("compare", [*MANY, "--out", "out"], kernels, tmp_path)
-    _, err, _ = stop_after_a_block(process, tmp_path / "out", signal.SIGINT, 2)
-    assert err.startswith("Stopped")
-    assert np.load(path)["returns"].size
+def test_finished_blocks_are_kept_and_a_damaged_one_is_done_again(kernels, tmp_path):
+    folder, arguments = tmp_path / "out", [*MANY, "--out", "out"]
+    process = start("compare", arguments, kernels, tmp_path)
+    out, err, seconds = stop_after_a_block(process, folder, signal.SIGTERM, 2)
+    assert (process.returncode, out) == (143, "")
+    assert err == "Stopped; finished runs are kept, and the same command goes on from there.\n"
+    assert seconds < PROMPTLY
+    assert [path.name for path in folder.iterdir()] == ["unfinished"]
+    kept = blocks_in(folder)
+    assert 2 <= len(kept) < BLOCKS
+    damaged = folder / "unfinished" / "blocks" / min(kept)
+    damaged.write_bytes(damaged.read_bytes()[:-100])
+    process = start("compare", arguments, kernels, tmp_path)
+    _, err, _ = stop_after_a_block(process, folder, signal.SIGINT, len(kept) + 1)
+    said, stopped = err.splitlines()
+    assert damaged.name in said
+    assert said.endswith("is damaged or of other work, so it is done anew.")
+    assert stopped.startswith("Stopped")
+    assert np.load(damaged)["returns"].size
+    del kept[damaged.name]
+    assert kept.items() < blocks_in(folder).items()  # none of the others was done again
 
 
 @pytest.mark.parametrize("seconds", [0.05, 0.6])

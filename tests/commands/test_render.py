@@ -110,6 +110,18 @@ def test_a_policy_of_another_observation_is_shown_as_such(tmp_path, shown) -> No
     assert files_in(tmp_path) == ["a.png", "five.npz"]
 
 
+@pytest.mark.parametrize("name", ["a.gif", "a.png", "a.html"])
+def test_a_place_that_cannot_be_written_is_refused_before_the_training(
+    name, tmp_path, monkeypatch, capsys
+) -> None:
+    monkeypatch.setattr(render, "find_policy", lambda *_: pytest.fail("it trains first"))
+    (tmp_path / name).mkdir()
+    with pytest.raises(SystemExit) as end:
+        render.main(["colony", "--out", str(tmp_path / name)])
+    assert end.value.code == 2
+    assert "is not a regular file; name a file to write to." in capsys.readouterr().err
+
+
 def test_a_wrong_size_is_refused_before_the_training(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(render, "find_policy", lambda *_: pytest.fail("it trains first"))
     wrong = ["episode", "--size", "63x63", "--out", str(tmp_path / "a.gif")]
@@ -130,7 +142,7 @@ def test_what_is_trained_on_the_spot_sees_what_is_asked_for(shown, monkeypatch) 
         table, task = stage.episode.q_values, stage.episode.task
     else:
         table, task, title = render.find_policy(settings, paper())
-        assert title == "dyna_q after 1 episode"
+        assert title == "Dyna-Q after 1 episode"
     assert (table.shape, task.observation) == ((250, 5), "ants_seen")
 
 
@@ -357,9 +369,12 @@ def test_the_tracked_pictures_are_those_of_the_gallery() -> None:
     pictures = {
         path
         for path in listed.stdout.split()
-        if Path(path).suffix in (".png", ".gif", ".mp4") and not path.startswith("tests/")
+        if Path(path).suffix in (".png", ".gif", ".mp4")
+        and not path.startswith(("tests/", "docs/lessons/"))  # which others make
     }
-    figures = {f"docs/figures/{name}" for name in (*gallery.FIGURES, gallery.VIEWER, gallery.LIVE)}
+    of_benchmarks = ("growth.png", "peers.png")
+    drawn = (*gallery.FIGURES, gallery.VIEWER, gallery.LIVE, *of_benchmarks)
+    figures = {f"docs/figures/{name}" for name in drawn}
     assert pictures == figures | {f"renders/{name}" for name in gallery.GALLERY}
 
 

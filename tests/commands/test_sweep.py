@@ -4,24 +4,19 @@ from __future__ import annotations
 
 import csv
 import json
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 from command_lines import (
     EXPERIMENTS,
-    PROMPTLY,
     assert_one_sentence,
     call,
     contents,
     environment,
     load,
-    run,
-    start,
 )
 
 from taichi_ants import Colony, Life, Pheromone, Rewards, Task, TrainingConfig, train, worlds
@@ -166,35 +161,6 @@ def test_a_finished_sweep_is_shown(sweep):
     status, out, err = sweep(RUNS.replace("lure = [1, 0]", "lure = [1, 2]"))
     assert status == 2
     assert "(task.rewards.lure, vary differ)" in err
-
-
-@pytest.mark.slow
-def test_stopped_and_killed_it_goes_on_to_the_same_results(kernels, tmp_path):
-    long = COLONY.replace("episodes = 2", "episodes = 60")
-    long = long.replace("[5, 10, 20]", "[5, 10, 20, 40, 80, 160, 320]")
-    (tmp_path / "long.toml").write_text(long)
-    blocks = tmp_path / "out" / "unfinished" / "blocks"
-
-    def stopped(number, least):
-        process = start("sweep", ["long.toml", "--out", "out"], kernels, tmp_path)
-        while process.poll() is None and len(list(blocks.glob("*.npz"))) < least:
-            time.sleep(0.002)
-        sent = time.perf_counter()
-        process.send_signal(number)
-        _, err = process.communicate(timeout=60)
-        assert time.perf_counter() - sent < PROMPTLY
-        return process.returncode, err
-
-    status, err = stopped(signal.SIGINT, 1)
-    assert (status, err.split(";")[0]) == (130, "Stopped")
-    kept = {path: path.stat().st_mtime_ns for path in blocks.glob("*.npz")}
-    assert stopped(signal.SIGKILL, len(kept) + 1)[0] == -signal.SIGKILL
-    assert all(path.stat().st_mtime_ns == stamp for path, stamp in kept.items())
-    for place in ("out", "whole"):
-        arguments = ["long.toml", "--out", place, "--no-figures"]
-        assert run("sweep", arguments, kernels, tmp_path).returncode == 0
-    one, other = contents(tmp_path / "out"), contents(tmp_path / "whole")
-    assert all(one[name] == other[name] for name in one if name != "manifest.json")
 
 
 WRONG = {

@@ -7,6 +7,7 @@ import signal
 import sys
 import time
 import urllib.request
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -34,6 +35,20 @@ def test_ctrl_c_ends_it_promptly_in_one_line(number: int, kernels: Path, tmp_pat
     assert process.returncode == 128 + number
     assert said == "Stopped.\n"
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.slow
+def test_ctrl_c_ends_the_replay_of_a_session(kernels: Path, tmp_path: Path) -> None:
+    log = Session(Choices({}).setup(load("watch").START)).log()
+    replace(log, steps=10**9, ticks=10**9).write(tmp_path / "endless.npz")
+    process = start("watch", ["--session", tmp_path / "endless.npz"], kernels, tmp_path)
+    time.sleep(5)
+    assert process.poll() is None
+    began = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    printed, said = process.communicate(timeout=30)
+    assert time.monotonic() - began < PROMPTLY
+    assert (process.returncode, printed, said) == (130, "", "Stopped.\n")
 
 
 def test_it_ends_after_some_seconds(capsys: pytest.CaptureFixture[str]) -> None:

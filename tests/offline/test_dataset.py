@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from taichi_ants import AntsError, Dataset, Task, record, worlds
-from taichi_ants.files import read_npz, write_npz
+from taichi_ants import AntsError, Dataset, Task, archives, record, worlds
 from taichi_ants.offline.dataset import COLUMNS
 
 
@@ -28,11 +27,11 @@ def test_files_hold_everything(data, tmp_path):
 def test_other_files_are_refused_in_one_sentence(data, tmp_path):
     path = tmp_path / "ants.npz"
     data.save(path)
-    arrays = read_npz(path)
-    write_npz(path, {**arrays, "action": arrays["action"] + np.int8(1)})
+    arrays = archives.read(path)
+    archives.write(path, {**arrays, "action": arrays["action"] + np.int8(9)})
     with pytest.raises(AntsError, match="is damaged"):
         Dataset.load(path)
-    write_npz(path, {"facts": np.array("{}")})
+    archives.write(path, {"facts": np.array("{}")})
     with pytest.raises(AntsError, match="holds no data set"):
         Dataset.load(path)
 

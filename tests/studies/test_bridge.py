@@ -32,7 +32,7 @@ class Scripted:
         assert len(set(self.cells.values())) == 4
         self.script, self.seeds, self.ticks = script, (7, 8), 0
         self.capacity = len(script) // 2
-        self.arrays = {"ants": np.zeros((len(AntRow), len(script)), np.int32)}
+        self.rows = np.zeros((len(AntRow), len(script)), np.int32)
 
     def begin_episode(self, length: int) -> None:
         self.ticks = 0
@@ -42,11 +42,14 @@ class Scripted:
         self.ticks += n
         self._place()
 
+    def of_ants(self, row: AntRow) -> np.ndarray:
+        return self.rows[row]
+
     def _place(self) -> None:
         for ant, moments in enumerate(self.script):
             name, load = moments[max(tick for tick in moments if tick <= self.ticks)]
-            self.arrays["ants"][AntRow.CELL, ant] = self.cells[name]
-            self.arrays["ants"][AntRow.CARRIES, ant] = load
+            self.rows[AntRow.CELL, ant] = self.cells[name]
+            self.rows[AntRow.CARRIES, ant] = load
 
 
 def test_an_ant_crosses_when_it_comes_to_the_other_room_by_its_last_branch() -> None:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import io
 import signal
+import subprocess
 import sys
 
 import pytest
+from command_lines import environment
 
 from taichi_ants import worlds
+from taichi_ants.commands import COMMANDS
 from taichi_ants.errors import AntsError
 from taichi_ants.studies import command_line
 from taichi_ants.studies.command_line import (
@@ -244,3 +247,25 @@ def test_what_is_no_plugin(name, tmp_path, monkeypatch):
     (tmp_path / "text.txt").write_text("x = 1")
     with pytest.raises(AntsError, match="cannot read the plugin"):
         load_plugin(name)
+
+
+def test_commands_need_no_docstrings(tmp_path):
+    """`python -OO` leaves them out; --help is shorter then."""
+    script = (
+        "from importlib import import_module\n"
+        "from taichi_ants.commands import COMMANDS\n"
+        "for name in COMMANDS:\n"
+        "    try:\n"
+        "        import_module(f'taichi_ants.commands.{name}').parse_arguments(['--help'])\n"
+        "    except SystemExit:\n"
+        "        pass\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-OO", "-c", script],
+        env=environment(tmp_path),
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.count("usage: ") == len(COMMANDS)

@@ -8,12 +8,13 @@ from itertools import islice
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from taichi_ants import AntsError, Colony, Task, TrainingConfig, worlds
 from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.rendering import writers
 from taichi_ants.studies.interruption import held, stoppable
-from taichi_ants.studies.one_colony import live, summary
+from taichi_ants.studies.one_colony import check_places, live, summary
 
 TASK = Task(delivery="continuing", evaporation_in_training=True)
 TRAINING = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0, 0.1)
@@ -39,8 +40,8 @@ def test_a_colony_is_saved_although_its_picture_cannot_be(
     error = OSError(28, "No space left on device")
     pictures = []
 
-    def fourth(frames, *settings, **options) -> bytes:  # at the start and after 2, 4, 6 ticks
-        pictures.extend(islice(frames, 4) if writer == "_gif" else [frames])
+    def fourth(*given, **options) -> bytes:  # at the start and after 2, 4, 6 ticks
+        pictures.extend(islice(given[1], 4) if writer == "_gif" else given[:1])
         if len(pictures) == 4 or render == "a.png":
             raise error
         return b""
@@ -59,6 +60,12 @@ def test_a_colony_is_saved_although_its_picture_cannot_be(
     np.testing.assert_array_equal(saved.q_values, other.q_values)
 
 
+def test_the_numbers_of_a_figure_need_a_place_too(tmp_path) -> None:
+    (tmp_path / "a.csv").mkdir()
+    with pytest.raises(AntsError, match=r"a\.csv' is not a regular file"):
+        check_places(None, None, str(tmp_path / "a.png"))
+
+
 def test_a_stopped_colony_ends_at_a_whole_tick_with_all_its_files(tmp_path, capsys) -> None:
     def progress(share: float) -> None:
         os.kill(os.getpid(), signal.SIGTERM)
@@ -75,6 +82,27 @@ def test_a_stopped_colony_ends_at_a_whole_tick_with_all_its_files(tmp_path, caps
     assert (end.value.code, colony.ticks) == (143, 2)
     assert Colony.load(save).ticks == 2
     assert (tmp_path / "a.gif").exists()
+
+
+def test_a_colony_with_pictures_far_apart_hears_a_signal_between_them(tmp_path) -> None:
+    """With `--every 1000000` it used to be heard at the next picture, minutes later."""
+    shares = []
+
+    def progress(share: float) -> None:
+        shares.append(share)
+        if len(shares) == 3:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    colony, other = begun(), begun()
+    path = str(tmp_path / "a.gif")
+    with pytest.raises(SystemExit), stoppable(), held() as stopped:
+        live(colony, 10**7, progress, stopped, render=path, every=10**6)
+    assert 3 < colony.ticks < 100
+    other.tick(colony.ticks)
+    assert colony == other
+    assert len(shares) == 4
+    with Image.open(path) as picture:
+        assert picture.n_frames == 2  # the start, and how it was when it was stopped
 
 
 def test_the_summary_counts_in_words() -> None:

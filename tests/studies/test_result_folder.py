@@ -54,6 +54,7 @@ def test_finished_work(tmp_path):
     assert names(path) == ["manifest.json", "report.txt", "table.csv"]
     assert (path / "table.csv").read_text() == "result"
     manifest = json.loads((path / "manifest.json").read_text())
+    assert manifest.pop("sha256")
     assert manifest == {
         "made": "result",
         "files": dict.fromkeys(["report.txt", "table.csv"], hashlib.sha256(b"result").hexdigest()),
@@ -146,10 +147,14 @@ def test_blocks_without_a_manifest_are_not_trusted(tmp_path):
         assert names(blocks) == []
 
 
-def test_what_a_killed_clean_up_has_left_does_not_matter(tmp_path):
-    folder = finish(tmp_path)
+def test_what_a_killed_clean_up_has_left_is_removed_with_the_next_look(tmp_path):
+    settings = Namespace(out=tmp_path, force=False, plugin=None, arch="cpu")
+    finish(tmp_path, {**SETTINGS, "arch": "cpu", "plugin": None})
+    before = names(tmp_path)
     (tmp_path / "unfinished" / "blocks").mkdir(parents=True)
-    assert folder.is_finished()
+    (tmp_path / "unfinished" / f".{16 * '0'}.tmp").touch()
+    work_or_show(settings, SETTINGS, lambda blocks, ready: pytest.fail("it is finished"))
+    assert names(tmp_path) == before
 
 
 @pytest.mark.parametrize("moment", ["pathlib.Path.replace", "pathlib.Path.unlink"])
@@ -175,7 +180,9 @@ def test_a_kill_while_results_move_up_loses_nothing(moment, tmp_path, monkeypatc
     assert (tmp_path / "table.csv").read_text() == "new"
 
 
-@pytest.mark.parametrize("damage", ["", "{", "[]", '{"settings": 3}', "\0"])
+@pytest.mark.parametrize(
+    "damage", ["", "{", "[]", "[" * 9999, '{"settings": 3}', '{"seconds": "x"}', "\0"]
+)
 @pytest.mark.parametrize("place", [".", "unfinished"])
 def test_a_damaged_manifest_is_named(place, damage, tmp_path):
     if place == ".":
@@ -226,6 +233,7 @@ def test_only_files_of_the_folder_itself_are_removed(tmp_path):
     digest = manifest["files"]["old.csv"]
     for name in ("../precious", str(tmp_path / "precious"), "..", "."):
         manifest["files"][name] = digest
+    del manifest["sha256"]  # as older versions have left it
     path.write_text(json.dumps(manifest))
     finish(tmp_path / "out", replace=True)
     assert names(tmp_path) == ["out", "precious"]
@@ -283,10 +291,34 @@ def test_what_was_altered_is_noticed(change, tmp_path):
         folder.check_whole()
 
 
+@pytest.mark.parametrize(
+    ("old", "new"), [('"files"', '"filez"'), ('"a.csv"', '"b.csv"'), ("true", "null")]
+)
+def test_a_manifest_that_was_altered_is_noticed(old, new, tmp_path):
+    folder = finish(tmp_path, {**SETTINGS, "quick": True}, names=("a.csv",))
+    path = tmp_path / "manifest.json"
+    text = path.read_text()
+    assert old in text
+    assert folder.is_finished()
+    path.write_text(text.replace(old, new))
+    for look in (folder.is_finished, folder.check_whole):
+        with pytest.raises(AntsError, match=r"manifest\.json' is damaged"):
+            look()
+
+
+def test_a_manifest_of_an_older_version_has_no_seal(tmp_path):
+    folder = finish(tmp_path)
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    del manifest["sha256"]
+    (tmp_path / "manifest.json").write_text(json.dumps(manifest))
+    assert folder.is_finished()
+    folder.check_whole()
+
+
 def test_a_page_that_is_gone_is_made_again(tmp_path, capsys):
     """And listed among the files; what is altered is not passed over."""
     settings = Namespace(out=tmp_path / "out", force=False, plugin=None, arch="cpu")
-    made = []
+    made, again = [], []
 
     def work(blocks, ready):
         (ready / "report.txt").write_text("result")
@@ -301,6 +333,7 @@ def test_a_page_that_is_gone_is_made_again(tmp_path, capsys):
         work_or_show(settings, SETTINGS, work, page=page)
         out = capsys.readouterr().out
         assert out.splitlines()[-1] == str(settings.out / "report.html")
+        again.append("report.html was gone, and is written again from the other files." in out)
         return json.loads((settings.out / "manifest.json").read_text())
 
     first = run()
@@ -312,7 +345,8 @@ def test_a_page_that_is_gone_is_made_again(tmp_path, capsys):
     assert run() == first
     assert (settings.out / "report.html").read_bytes() == whole
     assert made == ["new", None]
-    del first["files"]["report.html"]  # as a version without pages has left it
+    assert again == [False, False, True]  # and this is said
+    del first["files"]["report.html"], first["sha256"]  # as a version without pages has left it
     (settings.out / "report.html").unlink()
     (settings.out / "manifest.json").write_text(json.dumps(first))
     assert "report.html" in run()["files"]

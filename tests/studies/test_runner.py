@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from taichi_ants import AntsError, Colony, TrainingConfig, evaluate, files, train
+from taichi_ants import AntsError, Colony, TrainingConfig, archives, evaluate, train
 from taichi_ants.studies import runner
 from taichi_ants.studies.provenance import commit, provenance, world_facts
 from taichi_ants.studies.runner import EVALUATION_SEEDS, ColonyPoint, RunPoint, Study
@@ -175,7 +175,16 @@ def flip_a_bit(path):
     path.write_bytes(content)
 
 
+def shift_an_array(path):
+    """One bit of the length of a header, so that its array begins elsewhere."""
+    content = bytearray(path.read_bytes())
+    content[content.index(b"NUMPY") + 7] ^= 16
+    path.write_bytes(content)
+
+
 DAMAGES = {
+    "another header": shift_an_array,
+    "of other points": lambda path: path.write_bytes(min(path.parent.iterdir()).read_bytes()),
     "empty": lambda path: path.write_bytes(b""),
     "cut off": lambda path: path.write_bytes(path.read_bytes()[:-40]),
     "no archive": lambda path: path.write_text("block"),
@@ -184,12 +193,14 @@ DAMAGES = {
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_damaged_blocks_are_done_again(damage, study, tmp_path):
+def test_damaged_blocks_are_done_again(damage, study, tmp_path, capsys):
     first = study.run(tmp_path)
     path = sorted(tmp_path.iterdir())[2]
     DAMAGES[damage](path)
     assert same(study.run(tmp_path), first)
-    assert files.read_npz(path)["returns"].size
+    (said,) = capsys.readouterr().err.splitlines()
+    assert said.startswith(f"{str(path)!r} is damaged or of other work")
+    assert archives.read(path)["returns"].size
 
 
 def test_an_interruption_loses_one_block_at_most(study, tmp_path):

@@ -167,9 +167,9 @@ def test_the_examples_of_the_guide_work() -> None:
     ("content", "message"),
     [
         (b"", "map.txt draws no cell"),
-        (b"\x89PNG\r\n\x1a\n", "map.txt is no text file"),
+        (b"\x89PNG\r\n\x1a\n", "map.txt' is no text in UTF-8"),
         (b"Q\n\x00\n", r"line 2, column 1 of .*map.txt has '\\x00'"),
-        ("Q\n  .".encode("utf-16"), "map.txt is no text file"),
+        ("Q\n  .".encode("utf-16"), "map.txt' is no text in UTF-8"),
         (b"Q\n  x", "line 2, column 3 of .*map.txt has 'x'"),
     ],
 )
@@ -207,20 +207,20 @@ def test_only_worlds_are_drawn(world: object) -> None:
 
 
 def test_files_that_cannot_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(AntsError, match=r"nothing\.txt.* cannot be read: No such file"):
+    with pytest.raises(AntsError, match=r"cannot read .*nothing\.txt': no such file"):
         load_map(tmp_path / "nothing.txt")
-    with pytest.raises(AntsError, match="cannot be read: Is a directory"):
+    with pytest.raises(AntsError, match=r"cannot read .*: is a directory"):
         load_map(tmp_path)
-    with pytest.raises(AntsError, match="the map file 5 cannot be read"):
+    with pytest.raises(AntsError, match="path is 5; it must be text or a path"):
         load_map(5)
-    with pytest.raises(AntsError, match="cannot be read"):
+    with pytest.raises(AntsError, match=r"cannot read .*: file name too long"):
         load_map("x" * 10_000)
 
-    def refuse(self: Path, encoding: str) -> None:
+    def refuse(*arguments: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(Path, "read_text", refuse)
-    with pytest.raises(AntsError, match=r"garden\.txt.* cannot be read: Permission denied"):
+    monkeypatch.setattr("os.open", refuse)
+    with pytest.raises(AntsError, match=r"cannot read .*garden\.txt': permission denied"):
         load_map(GARDEN)
 
 

@@ -18,7 +18,7 @@ from taichi_ants.task.constants import N_ACTIONS
 if TYPE_CHECKING:
     from taichi_ants.engines.colony.colony import Colony
 
-_KIND = FileKind("taichi-ants colony 7", "colony", "Colony.save")
+_KIND = FileKind("taichi-ants colony 8", "colony", "Colony.save")
 _OPTIONS = ("seeds", "ants", "capacity", "start", "ends_at_delivery", "sharing", "schedule")
 _MOMENT = ("epsilon", "learning_rate", "length", "ticks")
 
@@ -51,6 +51,7 @@ def _contents(colony: Colony) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
         "worlds": [world_facts(world) for world in numbers],
         "world_of": [numbers[world] for world in colony.worlds],
         "one_a_slot": colony.one_a_slot,
+        "rounds": colony.rounds.tolist(),
         "homes": colony.n_homes,  # more than there are foods at the start, if a hand put food there
         **{name: getattr(colony, name) for name in (*_OPTIONS, *_MOMENT)},
     }
@@ -89,6 +90,10 @@ def load_colony(
         set_learning_rate(colony)
         colony.length = checked_whole("length", facts["length"], least=0)
         colony.ticks = checked_whole("ticks", facts["ticks"], least=0)
+        rounds = np.array(facts.get("rounds", colony.rounds), np.int64)  # files had none before
+        if rounds.shape != colony.rounds.shape or rounds.min() < 0:
+            raise ValueError("rounds has another shape, or is below 0")
+        colony.rounds = rounds
         if facts.get("homes", colony.n_homes) != colony.n_homes:
             colony.make_room_for_homes(facts["homes"])
         for name in colony.stored:

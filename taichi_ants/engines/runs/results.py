@@ -23,7 +23,7 @@ from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS, ROW
 from taichi_ants.worlds.world import World
 
-_KIND = FileKind("taichi-ants training 5", "training result", "TrainingResult.save")
+_KIND = FileKind("taichi-ants training 6", "training result", "TrainingResult.save")
 _SUMMED_UP, _LISTED = 50, 6  # episodes and configurations that a result shows
 
 

@@ -118,6 +118,7 @@ def rollout(
     Other arguments and errors are those of `evaluate`.
     """
     task = checks.checked_runs_task(task)
+    max_steps = checks.checked_max_steps(max_steps, task)
     tables = checks.checked_q_values(q_values, task)
     if tables.ndim != 2:
         raise AntsError(f"q_values has shape {tables.shape}; a rollout follows one table.")
@@ -173,6 +174,7 @@ def trace_training(
     """
     checks.checked_world(world, learns=True)
     task = checks.checked_runs_task(task)
+    max_steps = checks.checked_max_steps(max_steps, task)
     several = checks.checked_configs(config)
     if len(several) > 1:
         raise AntsError(f"config holds {len(several)} configurations; a trace is of one.")
@@ -185,7 +187,7 @@ def trace_training(
 
 def _trace(world: World, task: Task, runs: Runs, max_steps: int, episodes: int = 1) -> Trace:
     """The episodes of runs, one run if it learns, numbered one after the other; in one launch."""
-    capacity = episodes * checks.checked_max_steps(max_steps, task)
+    capacity = episodes * max_steps
     learns = runs.learner is not None
     most = MAX_TABLE_ROWS // task.n_states if learns else MAX_ROLLOUT_STEPS
     if capacity > most:
@@ -226,6 +228,7 @@ def record_steps(
         with which the ant chose its action; and int64 (n,), the number of the run. Of a run, pieces
         come in order.
     """
+    checks.check_progress(progress)
     runtime.start()
     launcher = Launcher(world, task, max_steps, runs, traced=True)
     runs_each = max(1, min(len(runs), MAX_ROLLOUT_STEPS // max_steps))

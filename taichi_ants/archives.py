@@ -1,0 +1,130 @@
+"""Archives of arrays (.npz): sealed when they are written, and believed by nobody when read.
+
+The comment of the archive is its seal: a hash of all bytes before it. So one flipped bit anywhere
+is noticed before anything is unpacked. Files of others have none: of these the sizes are checked
+that they declare, and the checksum of each array.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import zipfile
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
+from typing import BinaryIO
+
+import numpy as np
+import numpy.typing as npt
+
+from taichi_ants import files
+from taichi_ants.errors import AntsError, shown
+
+MOST_BYTES = 1 << 36  # of a file, unpacked
+_MARK = b"taichi-ants sha256 "
+_SEAL_BYTES = len(_MARK) + 64  # with the digest, hexadecimal
+
+
+def write(path: files.PathLike, arrays: Mapping[str, npt.ArrayLike], compress: bool = True) -> None:
+    """Write named arrays as a sealed .npz; raises as `files.write_atomically` does.
+
+    Equal arrays give equal bytes. ValueError if one holds Python objects, which a reader that is
+    careful refuses to load.
+    """
+    converted = {name: np.asarray(array) for name, array in arrays.items()}
+    for name, array in converted.items():
+        if array.dtype.hasobject:
+            raise ValueError(f"array {name!r} holds Python objects")
+    save: Callable[..., None] = np.savez_compressed if compress else np.savez
+
+    def save_sealed(file: BinaryIO) -> None:
+        save(file, **converted)
+        file.seek(-2, os.SEEK_END)  # an archive ends with the length of its comment
+        file.write(_SEAL_BYTES.to_bytes(2, "little") + _MARK)
+        file.flush()
+        with open(file.name, "rb") as written:
+            digest = files.hash_of(written)
+        file.write(digest.encode())
+
+    files.write_atomically(path, save_sealed)
+
+
+def read(
+    path: files.PathLike,
+    content: bytes | None = None,
+    most: int = MOST_BYTES,
+    foreign: bool = False,
+) -> dict[str, np.ndarray]:
+    """Read all arrays of an .npz file into memory, without executing anything that it holds.
+
+    Args:
+        path: The file.
+        content: What it holds, if that is known already; `path` is then what messages call it.
+        most: How many bytes the file and its arrays may have.
+        foreign: Whether a file without a seal is read too.
+
+    Raises:
+        AntsError: The file is missing, unreadable, too large, damaged, or no .npz of plain arrays.
+    """
+    given = files.opened(path, most) if content is None else nullcontext(io.BytesIO(content))
+    name, ours = shown(str(path), 400), "" if foreign else " that this version wrote"
+    with given as file:
+        try:
+            if not _is_sealed(file) and not foreign:
+                raise ValueError("it has no seal")
+            with zipfile.ZipFile(file) as archive:
+                members = archive.infolist()
+                _check_size(members, most, name)
+                arrays = {
+                    one.filename: _unpacked(archive, one) for one in members if _is_array(one)
+                }
+        except (AntsError, OSError):
+            raise
+        except MemoryError as error:
+            raise AntsError(
+                f"{name} takes more memory than there is; name a smaller file."
+            ) from error
+        # What is damaged fails in many ways (zipfile, zlib, struct, tokenize ...).
+        except Exception as error:
+            raise AntsError(
+                f"{name} is damaged or not an .npz file{ours}; write it again or name another file."
+            ) from error
+    if len(arrays) < len(members):
+        raise AntsError(f"{name} holds more than arrays; name an .npz file.")
+    return {one.removesuffix(".npy"): array for one, array in arrays.items()}
+
+
+def _is_sealed(file: BinaryIO) -> bool:
+    """Whether a file ends with a seal; ValueError if that is not the one of its bytes."""
+    size = file.seek(0, os.SEEK_END)
+    file.seek(max(0, size - _SEAL_BYTES))
+    seal = file.read(_SEAL_BYTES)
+    if not seal.startswith(_MARK):
+        return False
+    if seal[len(_MARK) :] != files.hash_of(file, size - 64).encode():
+        raise ValueError("its bytes are not those that were written")
+    return True
+
+
+def _check_size(members: Sequence[zipfile.ZipInfo], most: int, name: str) -> None:
+    """Refuse what declares to be larger; reading a member gives no more than it declares."""
+    size = sum(member.file_size for member in members)
+    if size > most:
+        raise AntsError(
+            f"{name} unpacks to {size} bytes, and {most} are allowed; name another file."
+        )
+
+
+def _is_array(member: zipfile.ZipInfo) -> bool:
+    return member.filename.endswith(".npy")
+
+
+def _unpacked(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> np.ndarray:
+    """An array, read to the end of its member, where its checksum is compared."""
+    if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        raise ValueError("it is packed in a way in which NumPy packs nothing")
+    with archive.open(member) as file:
+        array = np.lib.format.read_array(file, allow_pickle=False)
+        if file.read(1):
+            raise ValueError("an array is longer than it declares")
+    return array

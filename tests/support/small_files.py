@@ -1,0 +1,178 @@
+"""One small file of each kind that is read, and the reader that users have of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from taichi_ants import (
+    AntsError,
+    Colony,
+    Dataset,
+    Task,
+    TrainingConfig,
+    TrainingResult,
+    files,
+    load_policy,
+    save_policy,
+    worlds,
+)
+from taichi_ants.engines.runs.results import RunState
+from taichi_ants.live.session import Session
+from taichi_ants.live.setup import Setup
+from taichi_ants.offline.dataset import COLUMNS
+from taichi_ants.studies.blocks import Form, kept
+from taichi_ants.studies.result_folder import ResultFolder
+from taichi_ants.studies.sweep_file import read_sweep
+from taichi_ants.worlds import World
+
+WORLD = World((3, 3, 3), (0, 0, 0), foods=[(2, 0, 0)])
+TASK = Task(delivery="continuing")
+SARSA = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.99)
+Q_VALUES = np.random.default_rng(0).normal(size=(128, 5)).round(1).astype(np.float32)
+MAP = "trail = 7\n; a comment\n  .\n.   F\n  Q\n.   #\n  0\n"
+SWEEP = """kind = "runs"
+measures = "greedy_return"
+seeds = 2
+episodes = 60
+training.learner = "sarsa"
+training.learning_rate = 0.1
+training.epsilon = 0.3
+training.epsilon_decay = 0.99
+[vary]
+training.discount = [0.8, 0.9]
+"""
+
+
+class SmallFile(NamedTuple):
+    """A file, and a reader that gives something that can be compared.
+
+    Attributes:
+        path: The file.
+        read: What `path` holds.
+        sealed: Whether its reader notices all that was altered.
+    """
+
+    path: Path
+    read: Callable[[], Any]
+    sealed: bool = True
+
+
+def small_files(folder: Path) -> dict[str, SmallFile]:
+    """A file of each kind, by its name, written into a folder."""
+
+    def of(name: str, read: Callable[[Path], Any]) -> SmallFile:
+        return SmallFile(folder / name, lambda: read(folder / name))
+
+    found = {
+        "policy": of("policy.npz", _policy),
+        "policy of others": of("other.npz", _policy),
+        "training result": of("training.npz", TrainingResult.load),
+        "data set": of("data.npz", Dataset.load),
+        "colony": of("colony.npz", Colony.load),
+        "session": of("session.npz", lambda path: Session.load(path).hand.state()),
+        "block": of("block.npz", _block),
+        "manifest": of("finished/manifest.json", lambda path: _finished(path.parent)),
+        "table": of("finished/table.csv", lambda path: _finished(path.parent)),
+        "map": of("map.txt", worlds.load_map)._replace(sealed=False),
+        "sweep": of("sweep.toml", _sweep)._replace(sealed=False),
+        "table of others": of("other.csv", files.read_csv)._replace(sealed=False),
+    }
+    save_policy(found["policy"].path, Q_VALUES, {"seed": 3})
+    arrays = {"q_values": Q_VALUES, "observation": "paper", "metadata": '{"seed": 3}'}
+    np.savez(found["policy of others"].path, **arrays)
+    _training().save(found["training result"].path)
+    _dataset().save(found["data set"].path)
+    colony = Colony(WORLD, TASK, SARSA)
+    colony.begin_episode()
+    colony.save(found["colony"].path)
+    Session(Setup("paper", TASK, SARSA, ants=2)).save(found["session"].path)
+    _block(found["block"].path, first=True)
+    with ResultFolder(folder / "finished", {"seeds": (0, 1)}).work() as (_, ready):
+        files.write_csv(ready / "table.csv", [{"a": 1.5, "b": "text"}], ("a", "b"))
+        ResultFolder(folder / "finished", {"seeds": (0, 1)}).publish(ready, {"seconds": 2.0})
+    files.write_csv(found["table of others"].path, [{"a": 1.5, "b": None}], ("a", "b"))
+    found["map"].path.write_text(MAP)
+    found["sweep"].path.write_text(SWEEP)
+    return found
+
+
+def same(one: Any, other: Any) -> bool:
+    """Whether two things that were read are the same."""
+    if isinstance(one, dict):
+        return one.keys() == other.keys() and all(same(one[name], other[name]) for name in one)
+    return np.array_equal(one, other) if isinstance(one, np.ndarray) else bool(one == other)
+
+
+def outcome(file: SmallFile) -> Any:
+    """What is read, or the error, if that is one sentence."""
+    try:
+        return file.read()
+    except AntsError as error:
+        text = str(error)
+        assert text.endswith("."), text
+        assert "\n" not in text, text
+        assert len(text) < 1500, text
+        return error
+
+
+@contextmanager
+def restored(file: SmallFile) -> Iterator[bytes]:
+    """The content of a file, which has it again in the end."""
+    content = file.path.read_bytes()
+    try:
+        yield content
+    finally:
+        file.path.write_bytes(content)
+
+
+def _policy(path: Path) -> dict[str, Any]:
+    policy = load_policy(path)
+    return {**policy._asdict(), "task": policy.task}
+
+
+def _training() -> TrainingResult:
+    arrays = {name: np.ones((1, 1, 2), np.int32) for name in ("returns", "steps", "deliveries")}
+    state = RunState.fresh([SARSA], [0], TASK.n_states)
+    return TrainingResult(WORLD, (SARSA,), (0,), 9, TASK, **arrays, seconds=1.0, state=state)
+
+
+def _dataset() -> Dataset:
+    columns = {name: np.zeros(3, dtype) for name, dtype in COLUMNS.items()}
+    columns["step"][:], columns["truncated"][2] = range(3), True
+    columns["behaviour_probability"][:] = 0.5
+    return Dataset(WORLD, TASK, (0,), {"policy": "random"}, **columns)
+
+
+def _block(path: Path, first: bool = False) -> dict[str, np.ndarray]:
+    """A block; AntsError where it would be made anew."""
+    forms = {"steps": Form(np.integer, (2, 3), 0, 9), "q_values": Form(np.float32, (2, 5))}
+
+    def make() -> dict[str, np.ndarray]:
+        if not first:
+            raise AntsError(f"{str(path)!r} is done anew.")
+        return {"steps": np.arange(6).reshape(2, 3), "q_values": Q_VALUES[:2]}
+
+    return kept(path, {"seeds": [0, 1]}, forms, make)
+
+
+def _finished(folder: Path) -> dict[str, Any]:
+    results = ResultFolder(folder, {"seeds": (0, 1)})
+    assert results.is_finished()
+    results.check_whole()
+    manifest = json.loads((folder / "manifest.json").read_text())
+    told = {name: manifest[name] for name in ("files", "settings", "seconds")}
+    return {"table": files.read_csv(folder / "table.csv"), **told}
+
+
+def _sweep(path: Path) -> Any:
+    return read_sweep(path, {"runs": {"greedy_return": _Measure}, "colony": {}}).study
+
+
+class _Measure:
+    episodes = 1

@@ -1,0 +1,117 @@
+"""Damaged files of every kind: a sentence, or what was written; never anything else."""
+
+from __future__ import annotations
+
+import os
+import resource
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_files import SmallFile, outcome, restored, same, small_files
+
+from taichi_ants import AntsError
+
+KINDS = (
+    *("policy", "policy of others", "training result", "data set", "colony", "session", "block"),
+    *("manifest", "table", "map", "sweep", "table of others"),
+)
+SEALED = KINDS[:9]
+MOST_GROWTH = 64  # MiB of memory
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> dict[str, SmallFile]:
+    found = small_files(tmp_path_factory.mktemp("small"))
+    assert (tuple(found), tuple(one for one in found if found[one].sealed)) == (KINDS, SEALED)
+    return found
+
+
+def check_flips(file: SmallFile, every: int) -> None:
+    """Flip every so many bits, each alone."""
+    whole = file.read()
+    with restored(file) as content:
+        for bit in range(0, 8 * len(content), every):
+            write_byte(file.path, bit // 8, content[bit // 8] ^ 1 << bit % 8)
+            read = outcome(file)
+            assert isinstance(read, AntsError) or same(read, whole), f"bit {bit}"
+            write_byte(file.path, bit // 8, content[bit // 8])
+
+
+def write_byte(path: Path, at: int, byte: int) -> None:
+    with open(path, "r+b") as file:
+        file.seek(at)
+        file.write(bytes([byte]))
+
+
+@pytest.mark.parametrize("kind", SEALED)
+def test_one_flipped_bit(kind: str, small: dict[str, SmallFile]) -> None:
+    check_flips(small[kind], 61)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", SEALED)
+def test_any_flipped_bit(kind: str, small: dict[str, SmallFile]) -> None:
+    check_flips(small[kind], 1)
+
+
+def mutated(content: bytes, rng: np.random.Generator, times: int) -> bytes:
+    """Content to which something happened so many times."""
+    for _ in range(times):
+        at, length = int(rng.integers(len(content) + 1)), int(rng.integers(1, 17))
+        before, after = content[:at], content[at:]
+        noise = rng.bytes(length)
+        content = (
+            before,
+            after + before,
+            before + after[length:],
+            before + after[:length] + after,
+            before + noise + after,
+            before + noise + after[length:],
+            before + noise[:1] + after[1:],
+            before + bytes(length) + after[length:],
+            before + b"\xff" * 4 + after[4:],
+        )[int(rng.integers(9))]
+    return content
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_anything_that_can_happen_to_a_file(kind: str, small: dict[str, SmallFile]) -> None:
+    """Ten thousand files in all, the same each time."""
+    file, rng = small[kind], np.random.default_rng(KINDS.index(kind))
+    whole, begun = file.read(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with restored(file) as content:
+        for number in range(10_000 // len(KINDS) + 1):
+            # A manifest without a seal is that of an older version.
+            times = 1 if kind == "manifest" else int(rng.integers(1, 5))
+            file.path.write_bytes(mutated(content, rng, times))
+            began = time.process_time()
+            read = outcome(file)
+            assert time.process_time() - began < 2, number
+            if not isinstance(read, AntsError):
+                assert same(read, whole) if file.sealed else type(read) is type(whole), number
+    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - begun
+    assert grown < MOST_GROWTH * 1024
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_no_regular_file_is_refused_at_once(
+    kind: str, small: dict[str, SmallFile], capsys: pytest.CaptureFixture
+) -> None:
+    file = small[kind]
+    with restored(file):
+        for place in ("pipe", "device", "folder"):
+            file.path.unlink()
+            if place == "pipe":
+                os.mkfifo(file.path)
+            elif place == "device":
+                file.path.symlink_to("/dev/zero")
+            else:
+                file.path.mkdir()
+            read = outcome(file)
+            assert isinstance(read, AntsError)
+            assert file.path.name in str(read)
+            (Path.rmdir if place == "folder" else Path.unlink)(file.path)
+            file.path.touch()

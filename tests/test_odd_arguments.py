@@ -1,0 +1,110 @@
+"""Arguments of a wrong kind are told where they are given; no message fills a screen."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from taichi_ants import (
+    Colony,
+    Rewards,
+    TrainingConfig,
+    evaluate,
+    learners,
+    offline,
+    record,
+    rendering,
+    rollout,
+    states,
+    train,
+)
+from taichi_ants import worlds as places
+from taichi_ants.errors import AntsError
+from taichi_ants.rendering import learning_stages, policy_sheet, save_animation
+from taichi_ants.studies.command_line import Parser, notice
+from taichi_ants.viewer import record_colony
+
+WORLD = places.paper()
+CONFIG = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 0.9)
+TABLE = np.zeros((128, 5))
+SCALAR, RAGGED, LONG, HUGE = np.array(5), [[1], [1, 2]], "x" * 10**6, 10**5000
+
+
+@cache
+def data() -> offline.Dataset:
+    return record(WORLD, episodes=1, max_steps=3)
+
+
+@pytest.fixture(scope="module")
+def colony() -> Colony:
+    return Colony(WORLD, None, None, 0, 2, sharing="fixed")
+
+
+ODD = {
+    "configs": lambda _: train(WORLD, SCALAR, 0, 1),
+    "progress": lambda _: train(WORLD, CONFIG, 0, 1, progress="x"),
+    "progress of rollouts": lambda _: evaluate(WORLD, TABLE, progress=np.zeros(0)),
+    "progress of stages": lambda _: learning_stages(WORLD, CONFIG, stages=[1], progress=3),
+    "progress of a colony": lambda colony: colony.run(1, 1, progress=object()),
+    "stages": lambda _: learning_stages(WORLD, CONFIG, stages=range(10**6, 0, -1)),
+    "world": lambda _: Colony(SCALAR, None, CONFIG),
+    "world of an episode": lambda colony: colony.begin_episode(world=SCALAR),
+    "which": lambda colony: colony.begin_some(RAGGED),
+    "seeds": lambda colony: colony.begin_some(np.array([True]), seeds=object()),
+    "actions": lambda colony: (colony.begin_episode(), colony.act(RAGGED)),
+    "a reward": lambda _: Rewards(give=HUGE),
+    "cells": lambda _: WORLD.grid.index(RAGGED),
+    "a far cell": lambda _: WORLD.grid.index([(2**63, 0, 0)]),
+    "far cells": lambda _: WORLD.grid.number([(2**62, -(2**62), 0)]),
+    "index": lambda _: WORLD.grid.cells(RAGGED),
+    "moments": lambda _: next(rendering.frames("x")),
+    "frames": lambda _: save_animation("never.gif", SCALAR),
+    "a learner": lambda _: learners.get(LONG),
+    "no learner": lambda _: learners.get(["sarsa"]),
+    "no configuration": lambda _: learners.settle(None),
+    "a name of one's own": lambda _: learners.td_learner(LONG, print),
+    "a stage": lambda _: learning_stages(WORLD, CONFIG, stages=SCALAR),
+    "a task": lambda _: learning_stages(WORLD, CONFIG, stages=[0], task=np.zeros(0)),
+    "who is followed": lambda colony: record_colony(colony, follow=np.zeros(0)),
+    "a state": lambda _: states.state_name(2**31),
+    "progress of a record": lambda _: record(WORLD, episodes=1, max_steps=2, progress=3),
+    "a first value": lambda _: offline.fitted_q_iteration(data(), initial_value=None),
+    "no first value": lambda _: offline.batch_q_learning(data(), initial_value=HUGE),
+    "an offline model's": lambda _: offline.model_based(data(), TABLE, initial_value="x"),
+    "by run": lambda _: offline.fitted_q_iteration(data(), by_run=np.zeros(0)),
+    "a penalty": lambda _: offline.pessimistic_q_iteration(data(), penalty=HUGE),
+    "a world's name": lambda _: places.check_seed_counts(LONG),
+}
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_what_is_odd_is_named(name: str, colony: Colony) -> None:
+    with pytest.raises(AntsError) as caught:
+        ODD[name](colony)
+    assert len(str(caught.value)) < 400
+
+
+def test_whole_numbers_of_numpy_are_whole_numbers() -> None:
+    assert len(rollout(WORLD, TABLE, max_steps=SCALAR)) == 5
+
+
+def test_a_title_longer_than_a_picture_is_shortened() -> None:
+    shown = policy_sheet(TABLE, LONG)
+    assert (shown == policy_sheet(TABLE, LONG[:1000])).all()
+
+
+def test_no_message_fills_a_screen(capsys: pytest.CaptureFixture[str]) -> None:
+    error = AntsError(f"the beginning {LONG} the end.")
+    assert str(error).startswith("the beginning xxx")
+    assert str(error).endswith("xxx the end.")
+    assert len(str(error)) <= 1000
+    notice(LONG)
+    parser = Parser()
+    parser.add_argument("--kind", choices=("a", "b"))
+    with pytest.raises(SystemExit):
+        parser.parse_args(["--kind", LONG])
+    said = capsys.readouterr().err
+    assert "invalid choice: 'xxx" in said
+    assert len(said) < 4000
