@@ -47,7 +47,9 @@ class Arguments:
             memory = self._pack._ArgPack__argpack
             finalize(self._pack, _delete, self._taichi, memory).atexit = False
         for name, value in values.items():
-            if self._values[name] is not value:
+            known = self._values[name]
+            # Each number that is told again would cost Taichi some bytes for good.
+            if known is not value and (isinstance(value, np.ndarray) or known != value):
                 self._pack[name] = self._values[name] = value
         return self._pack
 

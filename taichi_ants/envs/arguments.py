@@ -51,7 +51,7 @@ def seeds_of(seed: Any, n: int) -> Sequence[int | None]:
         return [None] * n
     if isinstance(seed, (int, np.integer)):
         return range(int(seed), int(seed) + n)
-    if not isinstance(seed, (list, tuple, np.ndarray)) or len(seed) != n:
+    if not isinstance(seed, (list, tuple, np.ndarray)) or np.shape(seed)[:1] != (n,):
         raise ValueError(f"seed is {shown(seed)}; give a whole number, or a list of {n}.")
     for one in seed:
         if one is not None and not isinstance(one, (int, np.integer)):
@@ -86,7 +86,10 @@ def checked_autoreset(mode: Any) -> AutoresetMode:
 
 def checked_actions(actions: Any, n: int) -> np.ndarray:
     """The actions of n ants, whole numbers (n,) from 0 to 4."""
-    given = np.asarray(actions)
+    try:
+        given = np.asarray(actions)
+    except ValueError:  # lists of several lengths
+        given = np.empty(0)
     if given.shape != (n,) or given.dtype.kind not in "iu":
         raise InvalidAction(
             f"the actions are {shown(actions)}; they must be an array of an integer type and of "

@@ -2,7 +2,16 @@
 
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.hyperparameters import Hyperparameters, number
-from taichi_ants.learners.registry import Learner, Memory, get, names, register, settle, td_learner
+from taichi_ants.learners.registry import (
+    Learner,
+    Memory,
+    get,
+    label,
+    names,
+    register,
+    settle,
+    td_learner,
+)
 
 __all__ = [
     "Hyperparameters",
@@ -10,6 +19,7 @@ __all__ = [
     "Memory",
     "TrainingConfig",
     "get",
+    "label",
     "names",
     "number",
     "register",

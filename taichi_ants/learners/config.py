@@ -11,6 +11,7 @@ import numpy as np
 
 from taichi_ants.errors import AntsError, shown
 
+_LEAST_RATE = 1e-37
 MOST_VALUE = 1_000_000  # of an action before learning
 
 
@@ -20,7 +21,7 @@ class TrainingConfig:
 
     Attributes:
         learner: Name of a registered learner, for example "q_learning".
-        learning_rate: Step size alpha of the tabular update in the first episode, in (0, 1].
+        learning_rate: Step size alpha of the tabular update in the first episode, in [1e-37, 1].
         discount: Discount factor gamma, in [0, 1].
         epsilon: Probability of a random action in the first episode, in [0, 1].
         epsilon_decay: Factor on epsilon after each episode, in (0, 1].
@@ -69,19 +70,18 @@ class TrainingConfig:
             raise AntsError(f"learner is {shown(learner)}; it must be the name of a learner.")
         object.__setattr__(self, "learner", learner)
         self._set("learning_rate", learning_rate, "above 0 and at most 1")
+        if self.learning_rate < _LEAST_RATE:
+            raise AntsError(
+                f"learning_rate is {learning_rate}; in the 32 bits of an action value it is "
+                f"nothing, so it must be at least {_LEAST_RATE}."
+            )
         self._set("discount", discount, "between 0 and 1")
         self._set("epsilon", epsilon, "between 0 and 1")
         self._set("epsilon_decay", epsilon_decay, "above 0 and at most 1")
         self._set("min_epsilon", min_epsilon, "between 0 and 1")
         self._set("learning_rate_decay", learning_rate_decay, "above 0 and at most 1")
         self._set("min_learning_rate", min_learning_rate, "between 0 and 1")
-        real = isinstance(initial_value, Real) and not isinstance(initial_value, bool)
-        if not (real and abs(initial_value) <= MOST_VALUE):
-            raise AntsError(
-                f"initial_value is {shown(initial_value)}; it must be a number from "
-                f"-{MOST_VALUE} to {MOST_VALUE}."
-            )
-        object.__setattr__(self, "initial_value", float(initial_value))
+        object.__setattr__(self, "initial_value", checked_initial_value(initial_value))
         try:
             pairs = {**dict(hyperparameters), **more}
         except (TypeError, ValueError):
@@ -117,6 +117,17 @@ class TrainingConfig:
     def as_dict(self) -> dict[str, Any]:
         """The settings as names and numbers, for files; `TrainingConfig(**facts)` reads them."""
         return {**asdict(self), "hyperparameters": dict(self.hyperparameters)}
+
+
+def checked_initial_value(value: Any) -> float:
+    """What actions are worth before learning, a number from -1e6 to 1e6."""
+    real = isinstance(value, Real) and not isinstance(value, bool)
+    if not (real and abs(value) <= MOST_VALUE):
+        raise AntsError(
+            f"initial_value is {shown(value)}; it must be a number from -{MOST_VALUE} to "
+            f"{MOST_VALUE}."
+        )
+    return float(value)
 
 
 def share_of_one(value: Any) -> bool:

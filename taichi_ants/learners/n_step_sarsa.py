@@ -48,7 +48,7 @@ def learn(memory: ti.template(), at, step, rates, random_state):
             place = (oldest + waiting - 1 - back) % rates.n_steps
             worth = memory.floats[at.floats + place] + rates.discount * worth
         updated = at.table + memory.integers[at.integers + 2 + oldest]
-        memory.q[updated] += rates.learning_rate * (worth - memory.q[updated])
+        memory.q[updated] = memory.q[updated] + rates.learning_rate * (worth - memory.q[updated])
         oldest = (oldest + 1) % rates.n_steps
         waiting -= 1
     memory.integers[at.integers], memory.integers[at.integers + 1] = waiting, oldest

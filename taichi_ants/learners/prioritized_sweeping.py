@@ -58,7 +58,7 @@ def learn(memory: ti.template(), at, step, rates, random_state):
         memory.floats[at.floats + urgent] = 0.0
         updated, seen = recall(memory, at, urgent)
         change = error_of(memory, at, rates, updated, seen)
-        memory.q[at.table + updated] += rates.learning_rate * change
+        memory.q[at.table + updated] = memory.q[at.table + updated] + rates.learning_rate * change
         # Pairs that lead to its state may have got an error by this.
         for before in range(visited(memory, at)):
             leading, led_to = recall(memory, at, before)

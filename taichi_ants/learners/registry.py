@@ -115,18 +115,18 @@ def td_learner(
     )
 
 
-# The package's own: NAME in the file `name.py`, imported when it is asked for, since that starts
-# to import Taichi.
-BUILT_IN = (
-    "q_learning",
-    "sarsa",
-    "expected_sarsa",
-    "dyna_q",
-    "double_q",
-    "sarsa_lambda",
-    "n_step_sarsa",
-    "prioritized_sweeping",
-)
+# The package's own, and what readers know them as: NAME in the file `name.py`, imported when it is
+# asked for, since that starts to import Taichi.
+BUILT_IN = {
+    "q_learning": "Q-learning",
+    "sarsa": "SARSA",
+    "expected_sarsa": "Expected SARSA",
+    "dyna_q": "Dyna-Q",
+    "double_q": "Double Q-learning",
+    "sarsa_lambda": "SARSA(lambda)",
+    "n_step_sarsa": "n-step SARSA",
+    "prioritized_sweeping": "Prioritized sweeping",
+}
 _LEARNERS: dict[str, Learner] = {}
 
 
@@ -190,15 +190,16 @@ def _check_arguments(what: str, function: Any, wanted: list[str]) -> list[str]:
 
 def _check_td_error(name: str, td_error: Any, draws_next_action: bool) -> None:
     wanted = ["value", "reward", "discount", "next_values", "next_action", "epsilon"]
-    next_action = _check_arguments(f"the TD error of {name!r}", td_error, wanted)[4]
+    next_action = _check_arguments(f"the TD error of {shown(name)}", td_error, wanted)[4]
     # Some instructions load two variables at once.
     instructions = dis.get_instructions(td_error.func.func)
     loaded = [one.argval for one in instructions if one.opname.startswith("LOAD")]
     looks = any(next_action in (one if isinstance(one, tuple) else (one,)) for one in loaded)
     if looks and not draws_next_action:
         raise AntsError(
-            f"the TD error of {name!r} looks at {next_action}, but no next action is drawn; give "
-            "draws_next_action=True (a learner that plans has none in its updates from the model)."
+            f"the TD error of {shown(name)} looks at {next_action}, but no next action is drawn; "
+            "give draws_next_action=True (a learner that plans has none in its updates from the "
+            "model)."
         )
 
 
@@ -208,13 +209,20 @@ def get(name: str) -> Learner:
     Raises:
         AntsError: There is none; the message lists those that exist.
     """
+    expect("the learner", name, str)
     if name in BUILT_IN:
         return getattr(import_module(f"taichi_ants.learners.{name}"), name.upper())
     if name not in _LEARNERS:
         raise AntsError(
-            f"there is no learner {name!r}; choose one of {', '.join(names())}, or add a --plugin."
+            f"there is no learner {shown(name)}; choose one of {', '.join(names())}, or add a "
+            "--plugin."
         )
     return _LEARNERS[name]
+
+
+def label(name: str) -> str:
+    """What readers know a learner as, for example "Dyna-Q"; one of a plugin by its own name."""
+    return BUILT_IN.get(name, name)
 
 
 def settle(config: TrainingConfig) -> TrainingConfig:
@@ -224,6 +232,7 @@ def settle(config: TrainingConfig) -> TrainingConfig:
         AntsError: There is no such learner, it has no such hyperparameter, or a value is outside
             its range.
     """
+    expect("the configuration", config, TrainingConfig)
     kind = get(config.learner).hyperparameters
     given, known = dict(config.hyperparameters), [field.name for field in fields(kind)]
     for name in given:

@@ -49,18 +49,18 @@ def learn(memory: ti.template(), at, step, rates, random_state):
         if i < places:
             memory.integers[at.integers + 1 + i] = moved
             memory.floats[at.floats + i] = trace
-            memory.q[at.table + moved] += scaled * trace
+            memory.q[at.table + moved] = memory.q[at.table + moved] + scaled * trace
             moved, trace = there, faded
             if there == pair:
                 places = i + 1
         else:
             memory.floats[at.floats + i] = faded
-            memory.q[at.table + there] += scaled * faded
+            memory.q[at.table + there] = memory.q[at.table + there] + scaled * faded
     if (known == 0 or moved != pair) and known < rates.trace_length:
         memory.integers[at.integers] = known + 1
         memory.integers[at.integers + 1 + known] = moved
         memory.floats[at.floats + known] = trace
-        memory.q[at.table + moved] += scaled * trace
+        memory.q[at.table + moved] = memory.q[at.table + moved] + scaled * trace
     return error, random_state
 
 

@@ -6,7 +6,7 @@ from dataclasses import astuple, dataclass, fields
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, whole
+from taichi_ants.errors import checked_whole
 
 MOST = 1000
 
@@ -33,11 +33,8 @@ class Rewards:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            value = whole(f"the reward {field.name}", getattr(self, field.name))
-            if not -MOST <= value <= MOST:
-                raise AntsError(
-                    f"the reward {field.name} is {value}; it must lie between {-MOST} and {MOST}."
-                )
+            value = getattr(self, field.name)
+            value = checked_whole(f"the reward {field.name}", value, -MOST, MOST)
             object.__setattr__(self, field.name, value)
 
     def by_event(self) -> np.ndarray:

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from numbers import Integral
 from typing import NamedTuple
 
-from taichi_ants.errors import AntsError, shown
+from taichi_ants.errors import AntsError, checked_whole, shown
 from taichi_ants.task.constants import N_STATES, SEES_GOAL, SEES_LURE
 
 # Indexed by `carries`, then by code.
@@ -58,7 +58,7 @@ def name_of_codes(n_cells: int, foraging: str, carrying: str) -> Callable[[int],
     """
 
     def name_of(row: int) -> str:
-        codes = []
+        row, codes = checked_whole("a state", row, 0, 2 * len(foraging) ** n_cells - 1), []
         for _ in range(n_cells):
             row, code = divmod(row, len(foraging))
             codes.append(code)

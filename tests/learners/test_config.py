@@ -36,7 +36,8 @@ def test_defaults():
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        *((name, value) for name in NOT_ZERO for value in (1, 1e-300)),
+        *((name, 1) for name in NOT_ZERO),
+        *(("learning_rate", 1e-37), ("epsilon_decay", 1e-300), ("learning_rate_decay", 5e-324)),
         *((name, value) for name in MAY_BE_ZERO for value in (0, 1)),
         *(("initial_value", value) for value in (-1e6, 0, 1e6)),
         *(("planning_steps", 0), ("planning_steps", 1000)),
@@ -45,6 +46,12 @@ def test_defaults():
 )
 def test_bounds_are_allowed(name, value):
     assert getattr(TrainingConfig(**{**GOOD, name: value}), name) == value
+
+
+@pytest.mark.parametrize("rate", [5e-324, 1e-300, 9e-38])
+def test_a_learning_rate_that_is_nothing_in_32_bits_is_refused(rate):
+    with pytest.raises(AntsError, match=rf"^learning_rate is {rate}; .* at least 1e-37\.$"):
+        TrainingConfig(**{**GOOD, "learning_rate": rate})
 
 
 NO_SHARES = [-1e-9, 1.0000001, float("nan"), float("inf"), 10**400, True, "0.5", None, [0.5], 1j]

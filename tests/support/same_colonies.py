@@ -14,7 +14,7 @@ def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None
     ours = colony.snapshot(world)
     grid, arrays = ours.grid, colony.arrays
     of_world = slice(world * colony.capacity, (world + 1) * colony.capacity)
-    ants, streams = arrays["ants"][:, of_world], arrays["streams"][of_world]
+    ants, streams = colony.ant_rows()[:, of_world], arrays["streams"][of_world]
     (slots,) = np.nonzero(ants[AntRow.STAGE] == Stage.LIVING)
     assert slots.tolist() == sorted(plain.ants)
     cells = grid.cells(ants[AntRow.CELL, slots]).tolist()

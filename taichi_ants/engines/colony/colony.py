@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from importlib import import_module
 from typing import Any, Literal, get_args
@@ -13,10 +13,26 @@ import numpy as np
 from taichi_ants import checks, learners, runtime
 from taichi_ants.engines.colony import files as colony_files
 from taichi_ants.engines.colony import memory
-from taichi_ants.engines.colony.layout import ADDS, FADES, LINEAR, SETS, AntRow, Stage, WorldRow
+from taichi_ants.engines.colony.layout import (
+    ADDS,
+    FADES,
+    FIRST_TRAIT,
+    LINEAR,
+    SETS,
+    AntRow,
+    Stage,
+    WorldRow,
+)
 from taichi_ants.engines.packing import padded
 from taichi_ants.engines.records import Record
-from taichi_ants.errors import AntsError, check_one_of, checked_whole, shown
+from taichi_ants.errors import (
+    AntsError,
+    array_of,
+    check_one_of,
+    checked_whole,
+    entries_of,
+    shown,
+)
 from taichi_ants.files import PathLike
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.config import TrainingConfig
@@ -31,10 +47,16 @@ Sharing = Literal["shared", "own", "fixed"]
 SHARINGS: tuple[str, ...] = get_args(Sharing)
 
 _LARGE_COLONY = 16_384  # slots from which ants, not worlds, are handed to threads
-_ANTS_PER_CHUNK = 2048
+# Every chunk has sums of its own, which are to stay in a cache; and threads take turns.
+_CHUNKS_PER_THREAD, _ANTS_PER_CHUNK = 4, 32_768
 _MOST_CHUNKS = 256
-_TICKS_BETWEEN_SORTS = 32
+_TICKS_BETWEEN_SORTS = 16
 _PIECE_SECONDS = 0.4
+_WHOLE_TICKS = "whole ticks"  # instead of the name of phases: all of them, by world
+# Kernels count moves in 32 bits, which 10 000 ants fill in 200 000 ticks; so these counters begin
+# anew after so many, and what comes of a piece of ticks is far less.
+_LARGE = (WorldRow.MOVES, WorldRow.BLOCKED)
+_ROUND = 1 << 30
 
 # Where actions are given, nobody chooses or learns, and none of these matters.
 _NO_TRAINING = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
@@ -51,8 +73,8 @@ class ColonyEpisodes(Record):
         ticks: int32, length.
         deliveries: int32, foods given to the queen.
         first_delivery: int32, ticks until the first delivery; -1 if there was none.
-        moves: int32, moves that ants tried.
-        blocked: int32, moves that failed.
+        moves: int64, moves that ants tried.
+        blocked: int64, moves that failed.
         births, deaths: int32, ants.
         regrown: int32, foods that grew back.
         living: int32, ants at the end.
@@ -179,7 +201,7 @@ class Colony:
         self.pheromone = self.task.pheromone_while(learns)
         self.seeds = checks.checked_seeds(seeds)
         self.seed_words = np.array([seed % 2**64 for seed in self.seeds], dtype=np.uint64)
-        runtime.start(threads, arch)
+        running = runtime.start(threads, arch)
         life = self.task.life
         self._ants_change = life.births or life.lifespan is not None
         self.food_changes = life.regrowth is not None or life.wander is not None
@@ -187,16 +209,19 @@ class Colony:
         self.schedule = usual if schedule is None else schedule
         check_one_of("schedule", self.schedule, ("by_world", "by_chunk"))
         by_chunk = self.schedule == "by_chunk"
-        self.chunks = min(_MOST_CHUNKS, -(-self.capacity // _ANTS_PER_CHUNK)) if by_chunk else 1
+        chunks = max(_CHUNKS_PER_THREAD * running.threads, self.capacity // _ANTS_PER_CHUNK)
+        self.chunks = min(_MOST_CHUNKS, chunks) if by_chunk else 1
         self.arrays: dict[str, np.ndarray] = {}
         self._lay_out(_checked_worlds(world, len(self.seeds), learns))
         self.arrays |= (lasting := memory.lasting(self, table))
         self.stored = (*self.at_start, *lasting)  # the names of those that a file needs to hold
-        self._arguments: Any = None
+        self._launches: dict[str, Any] = {}  # of kernels, by their phases
         self._piece = 1  # ticks that take less than _PIECE_SECONDS
         self.epsilon, self.learning_rate = self.training.epsilon, self.training.learning_rate
         self.length = 0  # of the episode in ticks, 0 if nobody has said
         self.ticks = 0  # since an episode began for all worlds
+        # How often each counter of `_LARGE` has begun anew in this episode, in each world.
+        self.rounds = np.zeros((len(_LARGE), len(self.seeds)), np.int64)
         # Foods that were delivered in the episodes before the present one, in each world.
         self.delivered = np.zeros(len(self.seeds), np.int64)
 
@@ -239,6 +264,7 @@ class Colony:
             self._lay_out(others)
         self.length = 0 if length is None else checked_whole("length", length, most=MAX_STEPS)
         self.ticks = 0
+        self.rounds[:] = 0
         memory.begin_episode(self)
         self._launch("begin_phases")
 
@@ -256,14 +282,18 @@ class Colony:
         Raises:
             AntsError: There are other numbers of worlds or seeds, or a seed is not allowed.
         """
-        which = np.asarray(which)
+        which = array_of("which", which)
         if which.dtype != bool or which.shape != (len(self.seeds),):
             raise AntsError(f"which is {shown(which)}; give a bool for each of the worlds.")
         if seeds is None:
             memory.keep_streams(self, which)
         else:
-            self._reseed(which, [seed for one in seeds for seed in checks.checked_seeds(one)])
+            listed = entries_of(seeds)
+            if listed is None:
+                raise AntsError(f"seeds is {shown(seeds)}; give a seed for each of these worlds.")
+            self._reseed(which, [seed for one in listed for seed in checks.checked_seeds(one)])
         self.delivered += self.arrays["worlds"][WorldRow.DELIVERIES] * which
+        self.rounds[:, which] = 0
         memory.begin_episode(self, which)
         self._launch("begin_phases")
 
@@ -320,7 +350,7 @@ class Colony:
                 "this colony has a training by which ants choose; call tick, or make it with "
                 'training=None and sharing="fixed".'
             )
-        given, shape = np.asarray(actions), (len(self.seeds), self.capacity)
+        given, shape = array_of("actions", actions), (len(self.seeds), self.capacity)
         if given.dtype.kind not in "iu" or given.shape != shape:
             raise AntsError(
                 f"actions is {shown(given)}; give whole numbers of shape {shape}, one a slot."
@@ -333,7 +363,7 @@ class Colony:
                     f"an action is {wrong[0]}; it must lie between 0 and {N_ACTIONS - 1}: "
                     f"{', '.join(ACTION_NAMES)}."
                 )
-        self.arrays["ants"][AntRow.ACTION] = given.reshape(-1)
+        self.of_ants(AntRow.ACTION)[:] = given.reshape(-1)
         self._advance(1)
 
     @property
@@ -352,8 +382,18 @@ class Colony:
         return self.ants_by_slot(AntRow.PERCEPT if is_percept(self.task.sees) else AntRow.STATE)
 
     def ants_by_slot(self, row: AntRow) -> np.ndarray:
-        """What is stored of each ant, int32 (W, capacity); not a copy."""
-        return self.arrays["ants"][row].reshape(len(self.seeds), self.capacity)
+        """What is stored of each ant, int32 or int8 (W, capacity); not a copy."""
+        return self.of_ants(row).reshape(len(self.seeds), self.capacity)
+
+    def of_ants(self, row: AntRow) -> np.ndarray:
+        """The same of all worlds, one behind the other, (W * capacity,)."""
+        if row < FIRST_TRAIT:
+            return self.arrays["ants"][row]
+        return self.arrays["traits"][row - FIRST_TRAIT]
+
+    def ant_rows(self) -> np.ndarray:
+        """A copy of all that is stored of the ants, int32 (len(AntRow), W * capacity)."""
+        return np.concatenate([self.arrays["ants"], self.arrays["traits"]])
 
     def _pass(self, n: int) -> Iterator[None]:
         """Let n ticks pass, in short pieces: a launch of a kernel cannot be interrupted."""
@@ -369,20 +409,29 @@ class Colony:
 
     def _advance(self, n: int) -> None:
         if self.schedule == "by_world":
-            self._launch(None, n)
+            self._launch(_WHOLE_TICKS, self._values(n))
             self.ticks += n
-            return
+        else:
+            self._advance_by_chunk(n)
+        for rounds, row in zip(self.rounds, _LARGE, strict=True):
+            counter = self.arrays["worlds"][row]
+            if counter.max() >= _ROUND:
+                more, counter[:] = np.divmod(counter, _ROUND)
+                rounds += more
+
+    def _advance_by_chunk(self, n: int) -> None:
         rounds = self.training.planning_steps if self._plans_together else 0
+        values = self._values()
         for _ in range(n):
             if self.ticks % _TICKS_BETWEEN_SORTS == 0:
                 self._sort_ants()
             worlds = self.arrays["worlds"]
             running = worlds[WorldRow.RUNNING].copy()
-            self._launch("tick_phases")
+            self._launch("tick_phases", values)
             for _ in range(rounds):
-                self._launch("planning_phases")
+                self._launch("planning_phases", values)
             if self._ants_change or self.ends_at_delivery:
-                self._launch("last_phases")
+                self._launch("last_phases", values)
             worlds[WorldRow.TICKS] += running
             self.ticks += 1
 
@@ -416,6 +465,7 @@ class Colony:
         episodes = checked_whole("episodes", episodes)
         ticks = checked_whole("ticks", ticks, most=MAX_STEPS)
         places = self._checked_places(worlds, episodes)
+        checks.check_progress(progress)
         outcomes = []
         for episode in range(episodes):
             self.begin_episode(ticks, places[episode])
@@ -458,6 +508,8 @@ class Colony:
             for field in fields(ColonyEpisodes)
             if field.name != "returns"
         }
+        for rounds, row in zip(self.rounds, _LARGE, strict=True):
+            counts[row.name.lower()] = counts[row.name.lower()] + rounds * _ROUND
         return ColonyEpisodes(returns=self.arrays["returns"][None].copy(), **counts)
 
     @property
@@ -477,10 +529,10 @@ class Colony:
         self._check_begun()
         world = checked_whole("world", world, most=len(self.seeds) - 1, least=0)
         cells = slice(world * self.grid.size, (world + 1) * self.grid.size)
-        ants = self.arrays["ants"][:, world * self.capacity : (world + 1) * self.capacity]
-        ants = ants[:, ants[AntRow.STAGE] == Stage.LIVING]
+        living = self.living[world]
+        ant_cells = self.ants_by_slot(AntRow.CELL)[world, living]
         ground = self.arrays["ground"][cells].copy()
-        ground[ants[AntRow.CELL]] = EMPTY
+        ground[ant_cells] = EMPTY
         if self.pheromone.dense:
             trail = self.arrays["level"][cells].copy()
         else:
@@ -491,9 +543,9 @@ class Colony:
             self.grid,
             ground,
             trail,
-            ants[AntRow.CELL].copy(),
-            ants[AntRow.HEADING].copy(),
-            ants[AntRow.CARRIES].astype(bool),
+            ant_cells,
+            self.ants_by_slot(AntRow.HEADING)[world, living].astype(np.int32),
+            self.ants_by_slot(AntRow.CARRIES)[world, living].astype(bool),
         )
 
     def save(self, path: PathLike) -> None:
@@ -518,7 +570,7 @@ class Colony:
 
     def __getstate__(self) -> dict[str, Any]:
         """All but what belongs to the Taichi that runs: copies and pickles go on alike."""
-        return {**vars(self), "_arguments": None, "_learner": None}
+        return {**vars(self), "_launches": {}, "_learner": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
@@ -575,22 +627,26 @@ class Colony:
         slots_matter = self._ants_change or self.one_a_slot or self.is_given_actions
         if slots_matter or self.arrays["worlds"][WorldRow.LIVING].min() < self.capacity:
             return
-        ants = self.arrays["ants"]
-        cells = ants[AntRow.CELL].reshape(len(self.seeds), -1)
+        cells = self.ants_by_slot(AntRow.CELL)
         first = np.arange(len(self.seeds))[:, None] * self.capacity
         order = (np.argsort(cells, axis=1) + first).ravel()
-        for row in ants:
+        for row in (*self.arrays["ants"], *self.arrays["traits"]):
             row[:] = row[order]
         self.arrays["streams"][:] = self.arrays["streams"][order]
 
-    def _launch(self, phases: str | None, n_ticks: int = 1) -> None:
-        """Do some phases of `kernels` by chunk; whole ticks by world if none are named."""
-        from taichi_ants.engines.arguments import Arguments
+    def _launch(self, phases: str, values: dict[str, Any] | None = None) -> None:
+        """Do some phases of `kernels`, or whole ticks; `values` are those of `_values`."""
+        runtime.start()  # the caller may have reset Taichi, or forked
+        values = self._values() if values is None else values
+        if phases not in self._launches:
+            self._launches[phases] = self._prepared(phases, values)
+        self._launches[phases](values)
+
+    def _prepared(self, phases: str, values: dict[str, Any]) -> Any:
+        """A kernel that can be launched again and again."""
+        from taichi_ants.engines.arguments import Arguments, Launch
         from taichi_ants.engines.colony import kernels
 
-        runtime.start()  # the caller may have reset Taichi, or forked
-        if self._arguments is None:
-            self._arguments = Arguments()
         variant = kernels.variant(
             self._learner,
             self.one_a_slot,
@@ -601,14 +657,14 @@ class Colony:
             self._ants_change,
             self.food_changes,
         )
-        values = {**self._numbers(), **self.arrays}
-        kind = self._arguments.type_of(values)
-        with runtime.quiet():
-            pack = self._arguments.pack(values)
-            if phases:
-                kernels.by_chunk(variant, getattr(kernels, phases), kind)(pack)
-            else:
-                kernels.by_world(variant, kind)(pack, n_ticks)
+        kind = Arguments.type_of(values)
+        if phases == _WHOLE_TICKS:
+            return Launch(kernels.by_world(variant, kind))
+        return Launch(kernels.by_chunk(variant, getattr(kernels, phases), kind))
+
+    def _values(self, n_ticks: int = 1) -> dict[str, Any]:
+        """All arrays and numbers of the kernels, which pass `n_ticks` at a time by world."""
+        return {**self._numbers(), "n_ticks": n_ticks, **self.arrays}
 
     def _numbers(self) -> dict[str, Any]:
         """What kernels know besides arrays; -1 stands for an option that is off."""
@@ -655,8 +711,7 @@ def _checked_worlds(
     world: World | Sequence[World], n_seeds: int, learns: bool
 ) -> tuple[World, ...]:
     """A world for each seed, all of the same ranges."""
-    one = isinstance(world, (str, World)) or not isinstance(world, Iterable)
-    given: Any = (world,) * n_seeds if one else world
+    given = entries_of(world) or [world] * n_seeds
     worlds = tuple(checks.checked_world(one, learns) for one in given)
     if len(worlds) != n_seeds:
         raise AntsError(f"there are {len(worlds)} worlds for {n_seeds} seeds.")

@@ -7,6 +7,7 @@ drawn to do already, it still does.
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,6 @@ import numpy as np
 from taichi_ants import files
 from taichi_ants.engines.colony.layout import ANT_GROUND, AntRow, HomeRow, Stage, WorldRow
 from taichi_ants.engines.colony.memory import homes_arrays, set_learning_rate
-from taichi_ants.engines.stored import digest_of
 from taichi_ants.errors import AntsError, count
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_BORN, STREAM_HAND, STREAM_START_CELL
 from taichi_ants.grid.randomness import Stream, choose, stream_state
@@ -48,6 +48,11 @@ class Hand:
         self._start = self._first.ground()
         self._stream = Stream(colony.seeds[0], STREAM_HAND)
         self._changed = False  # whether the next episode begins otherwise than the present one
+
+    @property
+    def living(self) -> int:
+        """How many ants live now."""
+        return int(self.colony.arrays["worlds"][WorldRow.LIVING, 0])
 
     def put(self, cells: np.ndarray, what: int) -> None:
         """Make cells EMPTY, OBSTACLE or FOOD, but none on which an ant or the queen stands.
@@ -118,25 +123,25 @@ class Hand:
             AntsError: The colony has no room for so many.
         """
         colony, arrays = self.colony, self.colony.arrays
-        ants, world = arrays["ants"], arrays["worlds"][:, 0]
+        world, of_ants = arrays["worlds"][:, 0], colony.of_ants
         cells = cells[arrays["ground"][cells] == EMPTY]
-        n, living = len(cells), int(world[WorldRow.LIVING])
+        n, living = len(cells), self.living
         if living + n > colony.capacity:
             raise AntsError(
                 f"{count(n, 'ant')} cannot join {count(living, 'ant')}; the capacity of this "
                 f"colony is {colony.capacity}, so remove ants, or begin with a larger one."
             )
-        slots = np.flatnonzero(ants[AntRow.STAGE] == Stage.VACANT)[:n]
+        slots = np.flatnonzero(of_ants(AntRow.STAGE) == Stage.VACANT)[:n]
         numbers = world[WorldRow.NEXT_NUMBER] + np.arange(n)
         headings: int | np.ndarray
         if heading is None:
             headings = choose(self._stream.bits(n) >> np.uint64(32), N_HEADINGS)
         else:
             headings = heading
-        ants[:, slots] = 0
-        ants[AntRow.CELL, slots], ants[AntRow.HEADING, slots] = cells, headings
-        ants[AntRow.NUMBER, slots], ants[AntRow.ACTION, slots] = numbers, -1
-        ants[AntRow.STAGE, slots] = Stage.NEWBORN
+        arrays["ants"][:, slots] = arrays["traits"][:, slots] = 0
+        of_ants(AntRow.CELL)[slots], of_ants(AntRow.HEADING)[slots] = cells, headings
+        of_ants(AntRow.NUMBER)[slots], of_ants(AntRow.ACTION)[slots] = numbers, -1
+        of_ants(AntRow.STAGE)[slots] = Stage.NEWBORN
         born = (colony.episode << 32) + numbers.astype(np.int64)
         arrays["streams"][slots] = stream_state(colony.seeds[0], STREAM_BORN, born)
         arrays["ground"][cells] = ANT_GROUND
@@ -146,24 +151,23 @@ class Hand:
 
     def remove_ants(self, cells: np.ndarray) -> None:
         """Take the ants on these cells away, with the food that they carry."""
-        ants = self.colony.arrays["ants"]
-        found = (ants[AntRow.STAGE] == Stage.LIVING) & np.isin(ants[AntRow.CELL], cells)
+        of_ants = self.colony.of_ants
+        found = (of_ants(AntRow.STAGE) == Stage.LIVING) & np.isin(of_ants(AntRow.CELL), cells)
         self._remove(np.flatnonzero(found))
 
     def _remove(self, slots: np.ndarray) -> None:
-        arrays = self.colony.arrays
-        ants = arrays["ants"]
-        numbers = ants[AntRow.NUMBER, slots]
+        arrays, of_ants = self.colony.arrays, self.colony.of_ants
+        numbers = of_ants(AntRow.NUMBER)[slots]
         first = numbers < self.colony.ants  # their streams go on in the next episode
         arrays["first_streams"][numbers[first]] = arrays["streams"][slots[first]]
-        arrays["ground"][ants[AntRow.CELL, slots]] = EMPTY
-        ants[AntRow.STAGE, slots] = Stage.VACANT
+        arrays["ground"][of_ants(AntRow.CELL)[slots]] = EMPTY
+        of_ants(AntRow.STAGE)[slots] = Stage.VACANT
         self._count_ants()
         self.colony.look()
 
     def _count_ants(self) -> None:
-        world, stages = self.colony.arrays["worlds"][:, 0], self.colony.arrays["ants"][AntRow.STAGE]
-        taken = stages != Stage.VACANT
+        world = self.colony.arrays["worlds"][:, 0]
+        taken = self.colony.of_ants(AntRow.STAGE) != Stage.VACANT
         world[WorldRow.LIVING] = np.count_nonzero(taken)
         world[WorldRow.TOP] = np.max(np.flatnonzero(taken), initial=-1) + 1
         world[WorldRow.FIRST_VACANT] = np.argmin(taken) if not taken.all() else len(taken)
@@ -177,8 +181,8 @@ class Hand:
         Raises:
             AntsError: The colony, or the world, has no room for so many.
         """
-        colony, ants = self.colony, self.colony.arrays["ants"]
-        (slots,) = np.nonzero(ants[AntRow.STAGE] == Stage.LIVING)
+        colony = self.colony
+        (slots,) = np.nonzero(colony.of_ants(AntRow.STAGE) == Stage.LIVING)
         missing, free = n - len(slots), np.flatnonzero(colony.arrays["ground"] == EMPTY)
         later = int(np.count_nonzero(self._start == EMPTY))
         room = min(colony.capacity, len(free) + len(slots), later)
@@ -189,7 +193,7 @@ class Hand:
         if missing > 0:
             self.add_ants(self._nearest(free)[:missing])
         elif missing < 0:
-            self._remove(slots[np.argsort(ants[AntRow.NUMBER, slots])[missing:]])
+            self._remove(slots[np.argsort(colony.of_ants(AntRow.NUMBER)[slots])[missing:]])
 
     def _nearest(self, cells: np.ndarray) -> np.ndarray:
         """Cells in the order in which ants would start there."""
@@ -229,8 +233,11 @@ class Hand:
         moment = (colony.epsilon, colony.learning_rate, colony.length, colony.ticks, colony.ants)
         rest = (self.ants, self._stream.state, colony.task.as_dict(), colony.training.as_dict())
         arrays = {name: colony.arrays[name] for name in (*colony.stored, "walls", "closer")}
-        text = files.to_json([*moment, *rest])
-        return digest_of({**arrays, "start": self._start, "moment": np.array(text)})
+        digest = hashlib.sha256(files.to_json([*moment, *rest]).encode())
+        for name, array in sorted({**arrays, "start": self._start}.items()):
+            digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
+            digest.update(np.ascontiguousarray(array).data)
+        return digest.hexdigest()
 
     def world(self) -> World:
         """How later episodes begin."""

@@ -87,8 +87,6 @@ class Variant:
         self.sees_percept = looks.is_percept(observation)
         # Whether the cell of an ant has to tell what the ant carries.
         self.sees_ants = not self.sees_percept or view == "strongest_under_carriers"
-        # Where an ant keeps the row of its table.
-        self.row_at = AntRow.PERCEPT if self.sees_percept else AntRow.STATE
         if not self.sees_percept:
             self.row = looks.row_function(observation)
             self.look_type = looks.look_type(observation, dense)
@@ -110,23 +108,23 @@ def look_phases(v: Variant) -> Iterator[Phase]:
 def tick_phases(v: Variant) -> Iterator[Phase]:
     """A tick; rounds of `planning_phases` and the `last_phases` follow."""
     yield Phase(ANTS, steps.want)
-    yield Phase(ANTS, steps.resolve)
     if v.traffic.shared:
-        yield Phase(ANTS, steps.settle)
-    yield Phase(ANTS, steps.commit)
+        yield Phase(ANTS, steps.resolve)
+    yield Phase(ANTS, steps.act)
     if v.dense:
         yield Phase(CELLS, trail.evaporate)
         yield Phase(CELLS, trail.diffuse)
         yield Phase(CELLS, trail.settle)
-    yield Phase(WORLD, life.count)
+    if v.ants_change or v.food_changes:
+        yield Phase(WORLD, life.count)
     if v.ants_change:
         yield Phase(WORLD, life.give_birth)
         yield Phase(ANTS, life.grow_old)
-        yield Phase(WORLD, life.count)
     if v.food_changes:
         yield Phase(WORLD, life.regrow)
         yield Phase(WORLD, life.wander)
     yield Phase(ANTS, learning.observe_and_learn)
+    yield Phase(WORLD, life.count)
     if v.together:
         yield Phase(WORLD, learning.learn_together)
 
@@ -155,7 +153,7 @@ def do(phase: ti.template(), c: ti.template(), v: ti.template(), chunk):
         first, last = share_of(c, chunk, c.n_slots)
         last = ti.min(last, c.worlds[WorldRow.TOP, w]) * running
         for ant in range(w * c.n_slots + first, w * c.n_slots + last):
-            if c.ants[AntRow.STAGE, ant] != Stage.VACANT:
+            if steps.trait(c, AntRow.STAGE, ant) != Stage.VACANT:
                 phase.do(c, v, w, chunk, ant, tick)
     elif ti.static(phase.of == CELLS):
         first, last = share_of(c, chunk, c.size)
@@ -177,32 +175,41 @@ def share_of(c: ti.template(), chunk, n):
 def by_chunk(
     v: Variant, phases_of: Callable[[Variant], Iterator[Phase]], arguments: Any
 ) -> Callable[..., None]:
-    """A kernel of some phases, each a parallel loop over chunks or worlds."""
-    phases = tuple(phases_of(v))
+    """A kernel of some phases, each a parallel loop over chunks or worlds.
+
+    Phases of whole worlds that follow each other share a loop, since loops take a while to begin.
+    """
+    loops: list[tuple[Phase, ...]] = []
+    for phase in phases_of(v):
+        if loops and phase.of == loops[-1][0].of == WORLD:
+            loops[-1] += (phase,)
+        else:
+            loops.append((phase,))
 
     @ti.kernel
     def advance_colony(c: arguments):
-        for phase in ti.static(phases):
+        for loop in ti.static(loops):
             ti.loop_config(block_dim=1)
             for chunk in range(
-                c.n_worlds if ti.static(phase.of == WORLD) else c.n_worlds * c.n_chunks
+                c.n_worlds if ti.static(loop[0].of == WORLD) else c.n_worlds * c.n_chunks
             ):
-                do(phase, c, v, chunk)
+                for phase in ti.static(loop):
+                    do(phase, c, v, chunk)
 
     return advance_colony
 
 
 @cache
 def by_world(v: Variant, arguments: Any) -> Callable[..., None]:
-    """A kernel (arguments, ticks) of whole ticks of worlds with a single chunk each."""
+    """A kernel of whole ticks, `n_ticks` of them, of worlds with a single chunk each."""
     phases, last = tuple(tick_phases(v)), tuple(last_phases(v))
     planning = tuple(planning_phases(v))
 
     @ti.kernel
-    def advance_colony(c: arguments, n_ticks: ti.i32):
+    def advance_colony(c: arguments):
         ti.loop_config(block_dim=1)
         for w in range(c.n_worlds):
-            for _ in range(n_ticks):
+            for _ in range(c.n_ticks):
                 if c.worlds[WorldRow.RUNNING, w] == 1:
                     for phase in ti.static(phases):
                         do(phase, c, v, w)

@@ -1,4 +1,4 @@
-"""Names of what lies in the memory of a colony: the rows of its tables of integers (int32)."""
+"""Names of what lies in the memory of a colony: the rows of its tables of integers."""
 
 from __future__ import annotations
 
@@ -8,22 +8,29 @@ from taichi_ants.task.constants import OBSTACLE
 
 
 class AntRow(IntEnum):
-    """Rows of `ants`, one column for each slot."""
+    """What is known of an ant: rows of `ants` (int32), then of `traits` (int8); columns are slots.
+
+    What is small and used in each tick lies in `traits`, a quarter as much for memory to move.
+    """
 
     CELL = 0
-    HEADING = auto()
-    CARRIES = auto()
-    STAGE = auto()  # a `Stage`
     AGE = auto()
     CARRIED = auto()  # ticks with the food that it carries
     NUMBER = auto()  # -1 in a slot that was never used in this episode
-    PERCEPT = auto()  # the paper's state: what acting and rewards go by
     STATE = auto()  # the row of the table; unused where the percept is the row
+    WANT = auto()  # the cell to enter, or of the food to take, else its own; then where it was
+    HEADING = auto()
+    CARRIES = auto()
+    STAGE = auto()  # a `Stage`
+    PERCEPT = auto()  # the paper's state: what acting and rewards go by
     ACTION = auto()  # the one that is drawn already, -1
-    WANT = auto()  # the cell to enter, or of the food to take, -1
     EVENT = auto()  # what came of the last action
-    GOES = auto()  # where it is after the tick, and whether another ant enters the cell that it
-    FILLED = auto()  # leaves, or PUSHES it out; only where cells with ants can be entered
+    # Whether another ant enters the cell that it leaves, or PUSHES it out; only where cells with
+    # ants can be entered.
+    FILLED = auto()
+
+
+FIRST_TRAIT = AntRow.HEADING
 
 
 class Stage(IntEnum):
@@ -58,14 +65,18 @@ class WorldRow(IntEnum):
     LIVING = auto()
 
 
-class TallyRow(IntEnum):
-    """Rows of `tallies`, one column for each chunk: counted in a tick."""
+class Tally(IntEnum):
+    """Columns of `tallies`, one row for each chunk: counted in a tick."""
 
     RETURNS = 0
     DELIVERIES = auto()
     MOVES = auto()
     BLOCKED = auto()
     DEATHS = auto()
+
+
+# Columns that there are, so that no two chunks share a line of a cache: threads would fight for it.
+TALLY_WIDTH = 16
 
 
 class HomeRow(IntEnum):
@@ -86,15 +97,16 @@ class SumRow(IntEnum):
     OUTCOME = auto()  # and what that ant saw
 
 
-# What the lower four bits of a cell say is how it looks, see `task.constants`; the upper four, of
-# a cell on which an ant stands, are a mark of that ant. Between two phases of acting it says what
-# the ant wants: nothing (0), to enter the cell at a heading, or to take the food there.
-ENTER, TAKE = 1, 9  # plus the heading
-# Otherwise whether it carries food. Where cells with ants can be entered, an ant that wants nothing
-# has STANDS for its mark, so that every ant has one.
+# What the lower four bits of a cell in `ground` say is how it looks, see `task.constants`; the
+# upper four mark the ant on it, and tell whether it carries food where somebody sees that.
 STANDS, STANDS_WITH_FOOD = 7, 15
-# What else the others need to know of an ant then, in `crowd` at its cell.
-HAS_FOOD, TAKES_FOOD, WINS = 1, 2, 4
+# What an ant wants is in `wants` at its cell while it acts: nothing (0), to enter the cell at a
+# heading, or to take the food there. Where cells with ants can be entered, an ant that wants
+# nothing has STANDS for its mark, so that every ant has one,
+ENTER, TAKE = 1, 9  # plus the heading
+MARK = 15
+# and above the mark is what else the others need to know of it.
+HAS_FOOD, TAKES_FOOD, WINS = 16, 32, 64
 PUSHES = 2  # in FILLED, instead of 1
 ANT_GROUND = OBSTACLE | STANDS << 4  # the cell of an ant without food
 

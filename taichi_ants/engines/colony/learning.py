@@ -9,7 +9,14 @@ in turn towards one target would give. Every chunk of ants sums for itself; noth
 import taichi as ti
 
 from taichi_ants.engines.colony.layout import AntRow, Stage, SumRow
-from taichi_ants.engines.colony.steps import draw_action, observe, table_of
+from taichi_ants.engines.colony.steps import (
+    draw_action,
+    observe,
+    put,
+    row_seen,
+    table_of,
+    trait,
+)
 from taichi_ants.learners.memory import At, LearnerArrays, Transition, discount_of, values_of
 from taichi_ants.learners.model import (
     next_state_of,
@@ -21,27 +28,42 @@ from taichi_ants.learners.model import (
     visited,
 )
 from taichi_ants.task.constants import DELIVERED, N_ACTIONS, ROW
-from taichi_ants.task.rules.random_bits import draw_below
+from taichi_ants.task.rules.random_bits import advance, draw_below
 
 _ONE = 4294967296.0  # fixed-point numbers have 32 binary places
+
+
+@ti.func
+def see_anew(c: ti.template(), v: ti.template(), w, ant, clock):
+    """Note what an ant sees."""
+    percept, row = observe(c, v, w, ant, clock)
+    note_look(c, v, ant, percept, row)
+
+
+@ti.func
+def note_look(c: ti.template(), v: ti.template(), ant, percept, row):
+    """Note what an ant has seen."""
+    put(c, AntRow.PERCEPT, ant, percept)
+    if ti.static(not v.sees_percept):
+        c.ants[AntRow.STATE, ant] = row
 
 
 @ti.func
 def begin(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """An ant looks around, and its learner begins an episode; worlds in the midst of one go on."""
     if tick == 0:
-        c.ants[AntRow.PERCEPT, ant], c.ants[v.row_at, ant] = observe(c, v, w, ant, 0)
+        see_anew(c, v, w, ant, 0)
         begin_to_learn(c, v, ant)
 
 
 @ti.func
 def look(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Between two ticks an ant sees what a hand has changed; one that it has put there begins."""
-    if c.ants[AntRow.STAGE, ant] == Stage.NEWBORN:
-        c.ants[AntRow.STAGE, ant] = Stage.LIVING
+    if trait(c, AntRow.STAGE, ant) == Stage.NEWBORN:
+        put(c, AntRow.STAGE, ant, Stage.LIVING)
         if ti.static(v.alone):
             forget(c, v, ant)
-    c.ants[AntRow.PERCEPT, ant], c.ants[v.row_at, ant] = observe(c, v, w, ant, tick * c.evaporates)
+    see_anew(c, v, w, ant, tick * c.evaporates)
 
 
 @ti.func
@@ -49,18 +71,18 @@ def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Observe, choose the next action where the learner asks for it, and learn."""
     percept, row = observe(c, v, w, ant, (tick + 1) * c.evaporates)
     next_action = -1
-    if c.ants[AntRow.STAGE, ant] != Stage.NEWBORN:
+    if trait(c, AntRow.STAGE, ant) != Stage.NEWBORN:
+        c.wants[w * c.size + c.ants[AntRow.WANT, ant]] = 0
         if ti.static(v.draws_next_action):
-            if terminates(c, c.ants[AntRow.EVENT, ant]) == 0:
-                next_action = draw_action(c, v, w, ant, row)
+            if terminates(c, trait(c, AntRow.EVENT, ant)) == 0:
+                c.streams[ant] = advance(c.streams[ant])
+                next_action = draw_action(c, v, w, ant, row, c.streams[ant])
         if ti.static(v.alone):
             learn_alone(c, v, ant, row, next_action, tick)
         elif ti.static(v.together):
             share_error(c, v, w, chunk, ant, row, next_action)
-    c.ants[AntRow.PERCEPT, ant] = percept
-    if ti.static(not v.sees_percept):
-        c.ants[AntRow.STATE, ant] = row
-    c.ants[AntRow.ACTION, ant] = next_action
+    note_look(c, v, ant, percept, row)
+    put(c, AntRow.ACTION, ant, next_action)
 
 
 @ti.func
@@ -100,13 +122,13 @@ def forget(c: ti.template(), v: ti.template(), ant):
 def learn_alone(c: ti.template(), v: ti.template(), ant, seen, next_action, tick):
     """Update the ant's own table, as an ant that is alone does."""
     memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
-    event = c.ants[AntRow.EVENT, ant]
+    event = trait(c, AntRow.EVENT, ant)
     terminated = terminates(c, event)
-    last = c.ants[AntRow.STAGE, ant] == Stage.DYING or tick + 1 == c.length
+    last = trait(c, AntRow.STAGE, ant) == Stage.DYING or tick + 1 == c.length
     last = last or (c.ends_at_delivery == 1 and event == DELIVERED)
     step = Transition(
-        state=c.ants[v.row_at, ant],
-        action=c.ants[AntRow.ACTION, ant],
+        state=row_seen(c, v, ant),
+        action=trait(c, AntRow.ACTION, ant),
         reward=ti.cast(c.rewards[event], ti.f32),
         next_state=seen,
         next_action=next_action,
@@ -146,9 +168,9 @@ def error_of(
 @ti.func
 def share_error(c: ti.template(), v: ti.template(), w, chunk, ant, seen, next_action):
     """Add the TD error of an ant to the sums of its chunk, and what it saw."""
-    event = c.ants[AntRow.EVENT, ant]
+    event = trait(c, AntRow.EVENT, ant)
     reward, terminated = ti.cast(c.rewards[event], ti.f32), terminates(c, event)
-    pair = c.ants[v.row_at, ant] * ROW + c.ants[AntRow.ACTION, ant]
+    pair = row_seen(c, v, ant) * ROW + trait(c, AntRow.ACTION, ant)
     error = error_of(c, v, w, pair, reward, terminated, seen, next_action)
     add_to_sums(c, v, chunk, pair, error, fixed(error), 1)
     if ti.static(v.learner.plans):
@@ -174,12 +196,12 @@ def add_to_sums(c: ti.template(), v: ti.template(), chunk, pair, error, total, c
     place, listed = v.n_pairs * chunk + pair, list_of(v, chunk)
     known = c.sums_of[SumRow.COUNT, place]
     if known == 0:
-        c.touched[listed] += 1
+        c.touched[listed] = c.touched[listed] + 1
         c.touched[listed + c.touched[listed]] = pair
         c.sums[place] = 0
         c.sums_of[SumRow.LATEST, place] = -1
     c.sums_of[SumRow.COUNT, place] = known + count
-    c.sums[place] += total
+    c.sums[place] = c.sums[place] + total
     c.errors[place] = error
 
 
@@ -251,7 +273,7 @@ def apply_sums(c: ti.template(), v: ti.template(), w):
         if count > 1:
             mean = ti.cast(c.sums[place], ti.f64) / (ti.cast(count, ti.f64) * _ONE)
             error = ti.cast(mean, ti.f32)
-        c.q[table + pair] += rate * error
+        c.q[table + pair] = c.q[table + pair] + rate * error
         c.sums_of[SumRow.COUNT, place] = 0
     c.touched[listed] = 0
 
@@ -259,7 +281,7 @@ def apply_sums(c: ti.template(), v: ti.template(), w):
 @ti.func
 def draw_pair(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """One planning draw of an ant: count an update of a visited pair."""
-    if c.ants[AntRow.STAGE, ant] != Stage.NEWBORN:
+    if trait(c, AntRow.STAGE, ant) != Stage.NEWBORN:
         memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
         at = memory_of(c, v, w)
         drawn, c.streams[ant] = draw_below(c.streams[ant], visited(memory, at))

@@ -7,9 +7,9 @@ serially; there is little to do in a tick.
 import taichi as ti
 from taichi.math import popcnt
 
-from taichi_ants.engines.colony.layout import ANT_GROUND, AntRow, HomeRow, Stage, TallyRow, WorldRow
+from taichi_ants.engines.colony.layout import ANT_GROUND, AntRow, HomeRow, Stage, Tally, WorldRow
 from taichi_ants.engines.colony.learning import forget
-from taichi_ants.engines.colony.steps import tally
+from taichi_ants.engines.colony.steps import put, tally, trait
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_BORN
 from taichi_ants.task.constants import EMPTY, FOOD, QUEEN
 from taichi_ants.task.rules.policy import bit_number
@@ -29,15 +29,15 @@ def count(c: ti.template(), v: ti.template(), w, tick):
     """Add up what the chunks have counted since this was done last."""
     gives = 0
     for chunk in range(w * c.n_chunks, (w + 1) * c.n_chunks):
-        c.returns[w] += c.tallies[TallyRow.RETURNS, chunk]
-        gives += ti.cast(c.tallies[TallyRow.DELIVERIES, chunk], ti.i32)
-        c.worlds[WorldRow.MOVES, w] += ti.cast(c.tallies[TallyRow.MOVES, chunk], ti.i32)
-        c.worlds[WorldRow.BLOCKED, w] += ti.cast(c.tallies[TallyRow.BLOCKED, chunk], ti.i32)
-        deaths = ti.cast(c.tallies[TallyRow.DEATHS, chunk], ti.i32)
+        c.returns[w] += c.tallies[chunk, Tally.RETURNS]
+        gives += ti.cast(c.tallies[chunk, Tally.DELIVERIES], ti.i32)
+        c.worlds[WorldRow.MOVES, w] += ti.cast(c.tallies[chunk, Tally.MOVES], ti.i32)
+        c.worlds[WorldRow.BLOCKED, w] += ti.cast(c.tallies[chunk, Tally.BLOCKED], ti.i32)
+        deaths = ti.cast(c.tallies[chunk, Tally.DEATHS], ti.i32)
         c.worlds[WorldRow.DEATHS, w] += deaths
         c.worlds[WorldRow.LIVING, w] -= deaths
-        for row in ti.static(range(len(TallyRow))):
-            c.tallies[row, chunk] = 0
+        for row in ti.static(range(len(Tally))):
+            c.tallies[chunk, row] = 0
     c.worlds[WorldRow.DELIVERIES, w] += gives
     c.worlds[WorldRow.STORE, w] += gives * c.births
     if gives > 0 and c.worlds[WorldRow.FIRST_DELIVERY, w] < 0:
@@ -65,7 +65,7 @@ def give_birth(c: ti.template(), v: ti.template(), w, tick):
         k, c.queen_streams[w] = draw_below(c.queen_streams[w], popcnt(free))
         heading = bit_number(free, k)
         slot = c.worlds[WorldRow.FIRST_VACANT, w]
-        while c.ants[AntRow.STAGE, w * c.n_slots + slot] != Stage.VACANT:
+        while trait(c, AntRow.STAGE, w * c.n_slots + slot) != Stage.VACANT:
             slot += 1
         c.worlds[WorldRow.FIRST_VACANT, w] = slot + 1
         c.worlds[WorldRow.TOP, w] = ti.max(c.worlds[WorldRow.TOP, w], slot + 1)
@@ -81,10 +81,10 @@ def place_newborn(c: ti.template(), w, ant, cell, heading):
     """Fill a slot and a cell with a new ant."""
     number = c.worlds[WorldRow.NEXT_NUMBER, w]
     c.ants[AntRow.CELL, ant] = cell
-    c.ants[AntRow.HEADING, ant] = heading
-    c.ants[AntRow.CARRIES, ant] = 0
+    put(c, AntRow.HEADING, ant, heading)
+    put(c, AntRow.CARRIES, ant, 0)
     c.ants[AntRow.CARRIED, ant] = 0  # the last ant in the slot may have died with food
-    c.ants[AntRow.STAGE, ant] = Stage.NEWBORN
+    put(c, AntRow.STAGE, ant, Stage.NEWBORN)
     c.ants[AntRow.AGE, ant] = 0
     c.ants[AntRow.NUMBER, ant] = number
     born = ti.cast(c.episodes[w], ti.u64) << ti.u64(32) | ti.cast(number, ti.u64)
@@ -98,12 +98,12 @@ def place_newborn(c: ti.template(), w, ant, cell, heading):
 @ti.func
 def grow_old(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Age by one tick; at the end of its life an ant leaves its cell, and its food there."""
-    if c.lifespan > 0 and c.ants[AntRow.STAGE, ant] == Stage.LIVING:
-        c.ants[AntRow.AGE, ant] += 1
+    if c.lifespan > 0 and trait(c, AntRow.STAGE, ant) == Stage.LIVING:
+        c.ants[AntRow.AGE, ant] = c.ants[AntRow.AGE, ant] + 1
         if c.ants[AntRow.AGE, ant] >= c.lifespan:
-            c.ants[AntRow.STAGE, ant] = Stage.DYING
-            tally(c, TallyRow.DEATHS, chunk, 1)
-            left_behind = ti.select(c.ants[AntRow.CARRIES, ant] == 1, FOOD, EMPTY)
+            put(c, AntRow.STAGE, ant, Stage.DYING)
+            tally(c, Tally.DEATHS, chunk, 1)
+            left_behind = ti.select(trait(c, AntRow.CARRIES, ant) == 1, FOOD, EMPTY)
             c.ground[w * c.size + c.ants[AntRow.CELL, ant]] = ti.cast(left_behind, ti.u8)
 
 
@@ -190,10 +190,10 @@ def can_move(c: ti.template(), w, home, step):
 @ti.func
 def retire(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """At the end of the tick the dead leave their slots, and the newborn are ants."""
-    if c.ants[AntRow.STAGE, ant] == Stage.NEWBORN:
-        c.ants[AntRow.STAGE, ant] = Stage.LIVING
-    elif c.ants[AntRow.STAGE, ant] == Stage.DYING:
-        c.ants[AntRow.STAGE, ant] = Stage.VACANT
+    if trait(c, AntRow.STAGE, ant) == Stage.NEWBORN:
+        put(c, AntRow.STAGE, ant, Stage.LIVING)
+    elif trait(c, AntRow.STAGE, ant) == Stage.DYING:
+        put(c, AntRow.STAGE, ant, Stage.VACANT)
         ti.atomic_min(c.worlds[WorldRow.FIRST_VACANT, w], ant - w * c.n_slots)
         if c.ants[AntRow.NUMBER, ant] < c.n_ants:
             c.first_streams[w * c.n_slots + c.ants[AntRow.NUMBER, ant]] = c.streams[ant]

@@ -9,11 +9,12 @@ import numpy as np
 
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
+    FIRST_TRAIT,
+    TALLY_WIDTH,
     AntRow,
     HomeRow,
     Stage,
     SumRow,
-    TallyRow,
     WorldRow,
 )
 from taichi_ants.engines.packing import compass_of
@@ -47,13 +48,14 @@ def start_of_episode(colony: Colony) -> dict[str, np.ndarray]:
     ground = _of_each(colony, World.ground)
     np.put_along_axis(ground, cells.astype(np.int64), ANT_GROUND, axis=1)
     levels, dense = _of_each(colony, World.trail_levels).reshape(-1), colony.pheromone.dense
-    ants = np.zeros((len(AntRow), len(worlds), colony.capacity), np.int32)
+    ants = np.zeros((FIRST_TRAIT, len(worlds), colony.capacity), np.int32)
     ants[AntRow.CELL, :, :n] = cells
-    ants[AntRow.HEADING, :, :n] = [headings for _, headings in starts]
-    ants[AntRow.STAGE, :, :n] = Stage.LIVING
     ants[AntRow.NUMBER] = -1
     ants[AntRow.NUMBER, :, :n] = np.arange(n)
-    ants[AntRow.ACTION] = -1
+    traits = np.zeros((len(AntRow) - FIRST_TRAIT, len(worlds), colony.capacity), np.int8)
+    traits[AntRow.HEADING - FIRST_TRAIT, :, :n] = [headings for _, headings in starts]
+    traits[AntRow.STAGE - FIRST_TRAIT, :, :n] = Stage.LIVING
+    traits[AntRow.ACTION - FIRST_TRAIT] = -1
     rows = np.zeros((len(WorldRow), len(worlds)), np.int32)
     rows[WorldRow.RUNNING] = 1
     for row in (WorldRow.TOP, WorldRow.FIRST_VACANT, WorldRow.LIVING, WorldRow.NEXT_NUMBER):
@@ -67,7 +69,8 @@ def start_of_episode(colony: Colony) -> dict[str, np.ndarray]:
         "trail": np.zeros(1, np.int32) if dense else levels,
         # Dense trails: the levels.
         "level": levels.astype(np.float32) if dense else np.zeros(1, np.float32),
-        "ants": ants.reshape(len(AntRow), -1),
+        "ants": ants.reshape(len(ants), -1),
+        "traits": traits.reshape(len(traits), -1),
         "worlds": rows,
         # Rewards of all ants in this episode.
         "returns": np.zeros(len(worlds), np.int64),
@@ -204,10 +207,10 @@ def constants(colony: Colony) -> dict[str, np.ndarray]:
         "hyperparameters": np.array([*dict(colony.training.hyperparameters).values(), 0.0]),
         # How far the mean of n errors moves a value, by n.
         "weights": np.zeros(1 + (colony.capacity if shared else 1), np.float32),
-        # What other ants need to know of the ant on a cell, see `layout`.
-        "crowd": np.zeros(cells if colony.task.traffic.shared else 1, np.uint8),
+        # What the ant on a cell wants, see `layout`.
+        "wants": np.zeros(cells, np.uint8),
         "spare": np.zeros_like(colony.arrays["level"]),  # the next levels, with diffusion
-        "tallies": np.zeros((len(TallyRow), chunks), np.int64),
+        "tallies": np.zeros((chunks, TALLY_WIDTH), np.int64),
         # By chunk and pair: fixed-point sums of TD errors, the last error, and see SumRow.
         "sums": np.zeros(sums, np.int64),
         "errors": np.zeros(sums, np.float32),
@@ -260,11 +263,10 @@ def copy_worlds(
 
 def keep_streams(colony: Colony, which: Which = ALL) -> None:
     """At the end of an episode of these worlds, keep the streams of the ants that started it."""
-    ants, slots = colony.arrays["ants"], colony.capacity
-    number = ants[AntRow.NUMBER]
+    slots, number = colony.capacity, colony.of_ants(AntRow.NUMBER)
     ours = np.zeros((len(colony.seeds), slots), bool)
     ours[which] = True
-    there = (ants[AntRow.STAGE] != Stage.VACANT) & ours.reshape(-1)
+    there = (colony.of_ants(AntRow.STAGE) != Stage.VACANT) & ours.reshape(-1)
     (columns,) = np.nonzero(there & (number >= 0) & (number < colony.ants))
     places = columns // slots * slots + number[columns]
     colony.arrays["first_streams"][places] = colony.arrays["streams"][columns]

@@ -3,11 +3,12 @@
 The conflict rule: a cell to enter must be empty at the start of the tick. Of several ants that want
 one cell (to enter it, or to take the food in it) the one with the smallest key wins, a hash of the
 cell it stands on and the tick. So neither ant numbers nor threads matter, and nothing is atomic:
-each ant writes what it wants into its own cell, and looks at the six cells around what it wants.
+each ant writes what it wants into `wants` at its own cell, and looks at the six cells around what
+it wants. `wants` stays as it is while ants act, and each ant takes its own mark away when it looks
+around at the end of the tick.
 
-Where cells with ants can be entered, see `Traffic`, the winners settle in a phase of their own who
-of them moves: each ant finds its own way out of what all have written, and changes nothing that
-another one reads.
+Where cells with ants can be entered, see `Traffic`, the winners are marked in a phase of their own
+before all act: each ant finds its own way out of what all have written.
 """
 
 import taichi as ti
@@ -16,7 +17,9 @@ from taichi.math import popcnt
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
     ENTER,
+    FIRST_TRAIT,
     HAS_FOOD,
+    MARK,
     PUSHES,
     STANDS,
     TAKE,
@@ -24,9 +27,14 @@ from taichi_ants.engines.colony.layout import (
     WINS,
     AntRow,
     HomeRow,
-    TallyRow,
+    Tally,
 )
-from taichi_ants.engines.colony.trail import deposit, level_in_view, level_of, level_that_counts
+from taichi_ants.engines.colony.trail import (
+    deposit,
+    level_in_view,
+    level_of,
+    level_that_counts,
+)
 from taichi_ants.engines.looks import judge
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.learners.memory import values_of
@@ -48,11 +56,12 @@ from taichi_ants.task.constants import (
 from taichi_ants.task.rules.actions import (
     is_open,
     move_event,
+    step_around,
     step_towards,
     turn_round,
     turned_by,
 )
-from taichi_ants.task.rules.policy import bit_number, choose, lowest_bit_number
+from taichi_ants.task.rules.policy import bit_number, choose_in_crowd, lowest_bit_number
 from taichi_ants.task.rules.random_bits import advance, bits_of, draw_below
 from taichi_ants.task.rules.vision import (
     code_in_view,
@@ -61,6 +70,24 @@ from taichi_ants.task.rules.vision import (
     percept_carrying,
     percept_foraging,
 )
+
+
+@ti.func
+def trait(c: ti.template(), row, ant):
+    """One of the small numbers of an ant, as i32."""
+    return ti.cast(c.traits[row - FIRST_TRAIT, ant], ti.i32)
+
+
+@ti.func
+def put(c: ti.template(), row, ant, value):
+    """Write down one of the small numbers of an ant."""
+    c.traits[row - FIRST_TRAIT, ant] = ti.cast(value, ti.i8)
+
+
+@ti.func
+def row_seen(c: ti.template(), v: ti.template(), ant):
+    """The row of its table that an ant looks at."""
+    return trait(c, AntRow.PERCEPT, ant) if ti.static(v.sees_percept) else c.ants[AntRow.STATE, ant]
 
 
 @ti.func
@@ -80,14 +107,14 @@ def observe(c: ti.template(), v: ti.template(), w, ant, clock):
 @ti.func
 def see(c: ti.template(), v: ti.template(), w, ant, clock):
     """The percept alone, without what only other observations need."""
-    heading, here = c.ants[AntRow.HEADING, ant], w * c.size + c.ants[AntRow.CELL, ant]
+    heading, here = trait(c, AntRow.HEADING, ant), w * c.size + c.ants[AntRow.CELL, ant]
     left = here + step_towards(c.compass, heading, LEFT)
     forward = here + step_towards(c.compass, heading, FORWARD)
     right = here + step_towards(c.compass, heading, RIGHT)
     ground_left, ground_forward = looks_of(c.ground[left]), looks_of(c.ground[forward])
     ground_right = looks_of(c.ground[right])
     percept = 0
-    if c.ants[AntRow.CARRIES, ant] == 1:
+    if trait(c, AntRow.CARRIES, ant) == 1:
         nearer = nearer_from(c.closer[here], heading)
         percept = percept_carrying(ground_left, ground_forward, ground_right, nearer)
     else:
@@ -114,13 +141,12 @@ def strongest_of(c: ti.template(), v: ti.template(), left, forward, right, clock
 @ti.func
 def look_around(c: ti.template(), v: ti.template(), w, ant, clock):
     """All that the ant can look at."""
-    heading, here = c.ants[AntRow.HEADING, ant], w * c.size + c.ants[AntRow.CELL, ant]
+    heading, here = trait(c, AntRow.HEADING, ant), w * c.size + c.ants[AntRow.CELL, ant]
     nearer = nearer_from(c.closer[here], heading)
-    look = v.look_type(carries=c.ants[AntRow.CARRIES, ant], own_level=level_of(c, v, here, clock))
+    look = v.look_type(carries=trait(c, AntRow.CARRIES, ant), own_level=level_of(c, v, here, clock))
     cells = ti.static(v.observation.cells)
     for k in ti.static(range(len(cells))):
-        towards = (heading + cells[k] + N_HEADINGS) % N_HEADINGS
-        place = here + step_towards(c.compass, towards, FORWARD)
+        place = here + step_around(c.compass, heading, cells[k])
         standable = (looks_of(c.ground[place]) == EMPTY) | (c.ground[place] >= ANT_GROUND)
         look.levels[k] = ti.select(standable, level_of(c, v, place, clock), 0)
         look.ants[k] = ant_on(c.ground[place])
@@ -161,11 +187,11 @@ def table_of(c: ti.template(), v: ti.template(), owner):
 
 
 @ti.func
-def draw_action(c: ti.template(), v: ti.template(), w, ant, row):
-    """The ant's choice at a row of its table."""
-    c.streams[ant] = advance(c.streams[ant])
+def draw_action(c: ti.template(), v: ti.template(), w, ant, row, random_state):
+    """The ant's choice at a row of its table, by a random stream that was advanced for it."""
     table = table_of(c, v, ant if ti.static(v.own_tables) else w)
-    return choose(values_of(c.q, table, row), bits_of(c.streams[ant]), c.explore_below)
+    values, bits = values_of(c.q, table, row), bits_of(random_state)
+    return choose_in_crowd(c.compass, values, bits, c.explore_below)
 
 
 @ti.func
@@ -174,51 +200,62 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 
     Hardly a branch: what the next ant does cannot be predicted from what this one did.
     """
-    action = c.ants[AntRow.ACTION, ant]
+    action, percept = trait(c, AntRow.ACTION, ant), trait(c, AntRow.PERCEPT, ant)
+    cell, carries = c.ants[AntRow.CELL, ant], trait(c, AntRow.CARRIES, ant)
+    random_state = c.streams[ant]
     if action < 0:
-        action = draw_action(c, v, w, ant, c.ants[v.row_at, ant])
-    percept, cell = c.ants[AntRow.PERCEPT, ant], c.ants[AntRow.CELL, ant]
-    heading = turned_by(c.compass, c.ants[AntRow.HEADING, ant], action)
+        random_state = advance(random_state)
+        action = draw_action(c, v, w, ant, row_seen(c, v, ant), random_state)
+    heading = turned_by(c.compass, trait(c, AntRow.HEADING, ant), action)
     ahead = cell + step_towards(c.compass, heading, FORWARD)
-    enters = is_open(code_in_view(percept, ti.min(action, RIGHT))) and action <= RIGHT
+    enters = is_open(code_in_view(percept, ti.min(action, RIGHT)))
     if ti.static(v.traffic.shared):
-        enters = enters or (action <= RIGHT and has_ant(c, w * c.size + ahead))
-    wanted = ti.select(enters, ahead, -1)
+        enters = enters | (c.ground[w * c.size + ahead] >> 4 != 0)
+    enters = enters & (action <= RIGHT)
+    wanted = ti.select(enters, ahead, cell)
     mark = ti.select(enters, ENTER + heading, v.idle)
-    if action == PICK_UP and c.ants[AntRow.CARRIES, ant] == 0:
-        foods = goals_in_view(percept)
-        if foods != 0:
-            position = lowest_bit_number(foods)
-            if foods & (foods - 1) != 0:  # several foods in view
-                k, c.streams[ant] = draw_below(c.streams[ant], popcnt(foods))
-                position = bit_number(foods, k)
-            wanted = cell + step_towards(c.compass, heading, position)
-            mark = TAKE + (heading + position + N_HEADINGS - 1) % N_HEADINGS
-    c.ants[AntRow.HEADING, ant] = heading
-    c.ants[AntRow.ACTION, ant] = action
+    foods = goals_in_view(percept)
+    if foods != 0 and action == PICK_UP and carries == 0:
+        position = lowest_bit_number(foods)
+        if foods & (foods - 1) != 0:  # several foods in view
+            k, random_state = draw_below(random_state, popcnt(foods))
+            position = bit_number(foods, k)
+        wanted = cell + step_towards(c.compass, heading, position)
+        mark = TAKE + (heading + position + N_HEADINGS - 1) % N_HEADINGS
+    c.streams[ant] = random_state
+    put(c, AntRow.HEADING, ant, heading)
+    put(c, AntRow.ACTION, ant, action)
     c.ants[AntRow.WANT, ant] = wanted
-    c.ground[w * c.size + cell] = ti.cast(OBSTACLE | mark << 4, ti.u8)
     if ti.static(v.traffic.shared):
-        takes = ti.select(mark >= TAKE, TAKES_FOOD, 0)
-        c.crowd[w * c.size + cell] = ti.cast(c.ants[AntRow.CARRIES, ant] | takes, ti.u8)
+        mark |= ti.select(carries == 1, HAS_FOOD, 0) | ti.select(mark >= TAKE, TAKES_FOOD, 0)
+    c.wants[w * c.size + cell] = ti.cast(mark, ti.u8)
+
+
+@ti.func
+def prevails(c: ti.template(), v: ti.template(), base, cell, wanted, tick):
+    """Whether the ant on a cell gets what it wants; one that wants nothing wants its own cell."""
+    kind = ti.cast(c.wants[base + cell], ti.i32) & 8  # 8 to take, else 0
+    rivals = -1  # the ant itself is found too
+    for heading in ti.static(range(N_HEADINGS)):
+        other = ti.cast(c.wants[base + wanted + c.compass[heading + 1]], ti.i32) & MARK
+        rivals += ti.cast(other == wanting(kind, heading), ti.i32)
+    won = wanted != cell
+    if rivals > 0:
+        won = won and wins(c, v, base, cell, wanted, kind, tick)
+    return won
 
 
 @ti.func
 def resolve(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
-    """Give up what another ant wins."""
-    wanted, base = c.ants[AntRow.WANT, ant], w * c.size
-    if wanted >= 0:
-        mark = ti.cast(c.ground[base + c.ants[AntRow.CELL, ant]] >> 4, ti.i32)
-        kind = mark & 8  # 8 to take, else 0
-        rivals = -1  # the ant itself is found too
-        for heading in ti.static(range(N_HEADINGS)):
-            other = c.ground[base + wanted + c.compass[heading + 1]] >> 4
-            rivals += ti.cast(other == wanting(kind, heading), ti.i32)
-        cell = c.ants[AntRow.CELL, ant]
-        if rivals > 0 and not wins(c, v, base, cell, wanted, kind, tick):
-            c.ants[AntRow.WANT, ant] = -1
-        elif ti.static(v.traffic.shared):
-            c.crowd[base + cell] |= ti.cast(WINS, ti.u8)
+    """Where cells with ants can be entered: mark the winners, and note what a move would be.
+
+    A move is judged before any ant lays a trail.
+    """
+    base, cell, wanted = w * c.size, c.ants[AntRow.CELL, ant], c.ants[AntRow.WANT, ant]
+    won = prevails(c, v, base, cell, wanted, tick)
+    c.wants[base + cell] = c.wants[base + cell] | ti.cast(ti.select(won, WINS, 0), ti.u8)
+    c.ants[AntRow.WANT, ant] = ti.select(won, wanted, cell)
+    put(c, AntRow.EVENT, ant, event_of(c, v, base, ant, tick * c.evaporates))
 
 
 @ti.func
@@ -233,11 +270,12 @@ def wins(c: ti.template(), v: ti.template(), base, cell, wanted, kind, tick):
     own, won = conflict_key(cell, tick), True
     for heading in range(N_HEADINGS):
         other = wanted + c.compass[heading + 1]
-        if c.ground[base + other] >> 4 == wanting(kind, heading) and other != cell:
+        mark = ti.cast(c.wants[base + other], ti.i32) & MARK
+        if mark == wanting(kind, heading) and other != cell:
             after = conflict_key(other, tick) > own
             if ti.static(v.traffic.carriers_first):
-                loaded = c.crowd[base + cell] & HAS_FOOD
-                other_loaded = c.crowd[base + other] & HAS_FOOD
+                loaded = c.wants[base + cell] & HAS_FOOD
+                other_loaded = c.wants[base + other] & HAS_FOOD
                 after = loaded > other_loaded or (loaded == other_loaded and after)
             won = won and after
     return won
@@ -251,9 +289,15 @@ def conflict_key(cell, tick):
 
 
 @ti.func
-def has_ant(c: ti.template(), place):
-    """Whether an ant stands on a cell; where cells with ants can be entered, all have a mark."""
-    return c.ground[place] >> 4 != 0
+def had_ant(c: ti.template(), place):
+    """Whether an ant stood on a cell at the start of the tick; there all have a mark."""
+    return c.wants[place] != 0
+
+
+@ti.func
+def heading_wanted(c: ti.template(), place):
+    """The heading at which the ant on a cell wants to enter the next one."""
+    return (ti.cast(c.wants[place], ti.i32) & MARK) - ENTER
 
 
 @ti.func
@@ -267,12 +311,11 @@ def way_is_free(c: ti.template(), v: ti.template(), base, cell, wanted):
     if ti.static(v.traffic.follow):
         moving = True
         while moving:
-            moving = has_ant(c, base + ahead) and ahead != cell
-            moving = moving and c.crowd[base + ahead] & (WINS | TAKES_FOOD) == WINS
+            moving = had_ant(c, base + ahead) and ahead != cell
+            moving = moving and c.wants[base + ahead] & (WINS | TAKES_FOOD) == WINS
             if moving:
-                heading = ti.cast(c.ground[base + ahead] >> 4, ti.i32) - ENTER
-                ahead += c.compass[heading + 1]
-    return not has_ant(c, base + ahead)
+                ahead += c.compass[heading_wanted(c, base + ahead) + 1]
+    return not had_ant(c, base + ahead)
 
 
 @ti.func
@@ -281,9 +324,8 @@ def entering(c: ti.template(), base, cell):
     found = -1
     for heading in ti.static(range(N_HEADINGS)):
         other = cell + c.compass[heading + 1]
-        mark = c.ground[base + other] >> 4
-        if mark == wanting(0, heading) and c.crowd[base + other] & WINS != 0:
-            found = other
+        mark = ti.cast(c.wants[base + other], ti.i32) & (MARK | WINS)
+        found = ti.select(mark == wanting(WINS, heading), other, found)
     return found
 
 
@@ -293,49 +335,44 @@ def gives_way(c: ti.template(), v: ti.template(), base, cell):
 
     Where ants follow, one that moves is never asked: then the other one moves as well.
     """
-    crowd = c.crowd[base + cell]
-    stays = crowd & (HAS_FOOD | TAKES_FOOD) == 0
+    mark = c.wants[base + cell]
+    stays = mark & (HAS_FOOD | TAKES_FOOD) == 0
     if ti.static(not v.traffic.follow):
-        if stays and crowd & WINS != 0:
-            heading = ti.cast(c.ground[base + cell] >> 4, ti.i32) - ENTER
-            stays = has_ant(c, base + cell + c.compass[heading + 1])
+        if stays and mark & WINS != 0:
+            stays = had_ant(c, base + cell + c.compass[heading_wanted(c, base + cell) + 1])
     return stays
 
 
 @ti.func
 def step_ahead(c: ti.template(), ant):
     """The index step to the cell before an ant."""
-    return step_towards(c.compass, c.ants[AntRow.HEADING, ant], FORWARD)
+    return step_towards(c.compass, trait(c, AntRow.HEADING, ant), FORWARD)
 
 
 @ti.func
 def event_of(c: ti.template(), v: ti.template(), base, ant, clock):
     """The event of a move that succeeds; a cell with an ant is a lure if it is the better one."""
-    action, percept = c.ants[AntRow.ACTION, ant], c.ants[AntRow.PERCEPT, ant]
+    action, percept = trait(c, AntRow.ACTION, ant), trait(c, AntRow.PERCEPT, ant)
     here = base + c.ants[AntRow.CELL, ant]
     ahead = here + step_ahead(c, ant)
-    event = move_event(code_in_view(percept, action))
-    if has_ant(c, ahead):
-        better = level_of(c, v, ahead, clock) > level_of(c, v, here, clock)
-        if c.ants[AntRow.CARRIES, ant] == 1:
-            better = ti.cast(c.closer[here], ti.i32) >> c.ants[AntRow.HEADING, ant] & 1 == 1
-        event = ti.select(better, ENTERED_LURE, ENTERED_EMPTY)
-    return event
+    rises = level_of(c, v, ahead, clock) > level_of(c, v, here, clock)
+    nearer = ti.cast(c.closer[here], ti.i32) >> trait(c, AntRow.HEADING, ant) & 1 == 1
+    better = ti.select(trait(c, AntRow.CARRIES, ant) == 1, nearer, rises)
+    onto_ant = ti.select(better, ENTERED_LURE, ENTERED_EMPTY)
+    onto_ground = move_event(code_in_view(percept, ti.min(action, RIGHT)))
+    return ti.select(had_ant(c, ahead), onto_ant, onto_ground)
 
 
 @ti.func
-def settle(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
-    """Find out where the ant is after the tick, and what comes of its move.
+def settle(c: ti.template(), v: ti.template(), base, ant, cell, wanted, carries, moves):
+    """Where the ant is after the tick, whether another one enters its cell, and its event.
 
     It moves on an empty way; or, with food, it changes places with the ant in its way; or it gives
     way to an ant with food that wins its cell; or it stays.
     """
-    base, clock = w * c.size, tick * c.evaporates
-    cell, wanted = c.ants[AntRow.CELL, ant], c.ants[AntRow.WANT, ant]
-    carries, moves = c.ants[AntRow.CARRIES, ant], c.ants[AntRow.ACTION, ant] <= RIGHT
     enters, follower = False, entering(c, base, cell)
     event, goes, filled = FAILED, cell, 0
-    if moves and wanted >= 0:
+    if moves and wanted != cell:
         enters = way_is_free(c, v, base, cell, wanted)
         if ti.static(v.traffic.follow):
             filled = ti.cast(enters and follower >= 0, ti.i32)
@@ -343,70 +380,72 @@ def settle(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
             if not enters and carries == 1 and gives_way(c, v, base, wanted):
                 enters, filled = True, 1
         if enters:
-            goes, event = wanted, event_of(c, v, base, ant, clock)
+            goes, event = wanted, trait(c, AntRow.EVENT, ant)
     if ti.static(v.traffic.swap):
         if not enters and follower >= 0:
-            if c.crowd[base + follower] & HAS_FOOD != 0 and gives_way(c, v, base, cell):
+            if c.wants[base + follower] & HAS_FOOD != 0 and gives_way(c, v, base, cell):
                 goes, filled, event = follower, PUSHES, ENTERED_EMPTY
                 if ti.static(v.traffic.grant):
                     if moves and cell + step_ahead(c, ant) == follower:
                         enters, filled = True, 1
-                        event = event_of(c, v, base, ant, clock)
-    c.ants[AntRow.GOES, ant], c.ants[AntRow.FILLED, ant] = goes, filled
-    c.ants[AntRow.EVENT, ant] = event
-    tally(c, TallyRow.BLOCKED, chunk, ti.cast(moves and not enters, ti.i32))
+                        event = trait(c, AntRow.EVENT, ant)
+    return goes, filled, event, enters
 
 
 @ti.func
-def commit(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
-    """Do what was won: move, take, give, deposit."""
+def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
+    """Do what is won: move, take, give, deposit."""
     base, clock = w * c.size, tick * c.evaporates
-    action, percept = c.ants[AntRow.ACTION, ant], c.ants[AntRow.PERCEPT, ant]
+    action, percept = trait(c, AntRow.ACTION, ant), trait(c, AntRow.PERCEPT, ant)
     cell, wanted = c.ants[AntRow.CELL, ant], c.ants[AntRow.WANT, ant]
+    carries, heading = trait(c, AntRow.CARRIES, ant), trait(c, AntRow.HEADING, ant)
     moves = action <= RIGHT
-    enters = moves and wanted >= 0
-    destination = ti.select(enters, wanted, cell)
-    event = ti.select(enters, move_event(code_in_view(percept, ti.min(action, RIGHT))), FAILED)
+    goes, filled, event, enters = cell, 0, FAILED, False
+    takes = False
     if ti.static(v.traffic.shared):
-        destination, event = c.ants[AntRow.GOES, ant], c.ants[AntRow.EVENT, ant]
-        enters = destination != cell
-        if c.ants[AntRow.FILLED, ant] == 0:
-            c.ground[base + cell] = EMPTY
+        goes, filled, event, enters = settle(c, v, base, ant, cell, wanted, carries, moves)
+        takes = not moves and wanted != cell
+        put(c, AntRow.FILLED, ant, filled)
     else:
+        won = prevails(c, v, base, cell, wanted, tick)
+        enters, takes = won & moves, won & (not moves)
+        goes = ti.select(enters, wanted, cell)
+        event = ti.select(enters, move_event(code_in_view(percept, ti.min(action, RIGHT))), FAILED)
+    if filled == 0:
         c.ground[base + cell] = EMPTY
-        tally(c, TallyRow.BLOCKED, chunk, ti.cast(moves and not enters, ti.i32))
-    c.ground[base + destination] = ANT_GROUND
-    c.ants[AntRow.CELL, ant] = destination
-    tally(c, TallyRow.MOVES, chunk, ti.cast(moves, ti.i32))
-    if c.ants[AntRow.CARRIES, ant] == 1:
-        if enters:
-            deposit(c, v, base + destination, clock, c.ants[AntRow.CARRIED, ant])
+    c.ants[AntRow.WANT, ant] = cell  # where its mark is
+    if carries == 1:
+        carried = c.ants[AntRow.CARRIED, ant]
+        if goes != cell:
+            deposit(c, v, base + goes, clock, carried)
         elif action == GIVE and goals_in_view(percept) != 0:
-            event = DELIVERED
-            c.ants[AntRow.CARRIES, ant] = 0
-            c.ants[AntRow.CARRIED, ant] = 0
+            event, carries, carried = DELIVERED, 0, -1
+            put(c, AntRow.CARRIES, ant, 0)
             if c.turns_at_queen == 1:
-                c.ants[AntRow.HEADING, ant] = turn_round(c.ants[AntRow.HEADING, ant])
-            tally(c, TallyRow.DELIVERIES, chunk, 1)
-    elif action == PICK_UP and wanted >= 0:
-        event = PICKED_UP
-        c.ants[AntRow.CARRIES, ant] = 1
+                put(c, AntRow.HEADING, ant, turn_round(heading))
+            tally(c, Tally.DELIVERIES, chunk, 1)
+        c.ants[AntRow.CARRIED, ant] = carried + 1
+    elif takes:
+        event, carries = PICKED_UP, 1
+        put(c, AntRow.CARRIES, ant, 1)
+        c.ants[AntRow.CARRIED, ant] = 1
         c.ground[base + wanted] = EMPTY
         take_from_home(c, base + wanted, tick)
         deposit(c, v, base + wanted, clock, 0)
         deposit(c, v, base + cell, clock, 0)
-        c.ants[AntRow.HEADING, ant] = turn_round(c.ants[AntRow.HEADING, ant])
-    if ti.static(v.sees_ants):
-        c.ground[base + destination] = ground_under(c.ants[AntRow.CARRIES, ant])
-    c.ants[AntRow.CARRIED, ant] += c.ants[AntRow.CARRIES, ant]
-    c.ants[AntRow.EVENT, ant] = event
-    tally(c, TallyRow.RETURNS, chunk, c.rewards[event])
+        put(c, AntRow.HEADING, ant, turn_round(heading))
+    c.ground[base + goes] = ground_under(carries) if ti.static(v.sees_ants) else ANT_GROUND
+    c.ants[AntRow.CELL, ant] = goes
+    put(c, AntRow.EVENT, ant, event)
+    tally(c, Tally.MOVES, chunk, ti.cast(moves, ti.i32))
+    tally(c, Tally.BLOCKED, chunk, ti.cast(moves & (not enters), ti.i32))
+    tally(c, Tally.RETURNS, chunk, c.rewards[event])
 
 
 @ti.func
 def tally(c: ti.template(), row, chunk, n):
     """Count in a chunk, whose ants one thread moves; `+=` would be atomic, which takes longer."""
-    c.tallies[row, chunk] = c.tallies[row, chunk] + n
+    c.tallies[chunk, row] = c.tallies[chunk, row] + n
 
 
 @ti.func

@@ -116,7 +116,7 @@ def step_kernel(
         if after.event == PICKED_UP:
             changed, a.random_states[i] = 1, after.random_state
         a.changed[i] = ti.cast(changed, ti.u8)
-        a.steps[i] += 1
+        a.steps[i] = a.steps[i] + 1
         put(a, i, after)
         look(a, i, ti.select(changed == 1, own, origin), after, clock + a.falls)
         delivered = ti.cast(after.event == DELIVERED, ti.i32)

@@ -13,6 +13,7 @@ import numpy as np
 from taichi_ants import runtime
 from taichi_ants.checks import (
     check_finite,
+    check_progress,
     checked_configs,
     checked_max_steps,
     checked_q_values,
@@ -108,6 +109,7 @@ def continue_training(
     checked_configs(result.configs)
     _check_memory(result)
     episodes = checked_whole("episodes", episodes)
+    check_progress(progress)
     runtime.start(threads, arch)
     state = copy.deepcopy(result.state)
     shape = (len(result.configs), len(result.seeds))
@@ -195,6 +197,7 @@ def evaluate(
     rollouts = checked_whole("rollouts", rollouts)
     epsilon = checked_share("epsilon", epsilon)
     max_steps = checked_max_steps(max_steps, task)
+    check_progress(progress)
     runtime.start(threads, arch)
     flat = tables.reshape(-1, *tables.shape[-2:])
     runs = Runs.following(flat, run_seeds, np.arange(rollouts), epsilon)

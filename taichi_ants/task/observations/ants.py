@@ -30,6 +30,6 @@ ANTS = Observation(
     row,
     name_of=name_of_codes(3, "EOTFPA", "EOSQPA"),
     summary="the three cells ahead, ants with the other load told from rocks",
-    letters="P ant on a better cell, A not",
+    letters="P ant on a better cell, A ant on no better one",
     shape=(2, 6, 6, 6),
 )

@@ -32,6 +32,6 @@ QUEUES = Observation(
     row,
     name_of=name_of_codes(3, "EOTFPAp", "EOSQPAp"),
     summary="as ants; also ants with the same load on a better cell",
-    letters="P p ant on a better cell",
+    letters="P other load, p same load: ant on a better cell, A ant on no better one",
     shape=(2, 7, 7, 7),
 )

@@ -5,16 +5,27 @@ import taichi as ti
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task.constants import FAILED, LEFT, RIGHT
 
-# A compass is an i32 array of 38: the index steps to the left, forward and right cell of heading h
-# at h, h + 1 and h + 2, then the heading after each of the five actions, by action and heading
-# (picking up turns round only if it succeeds, so that it stands there as no turn).
-_TURNS_AT = 8
+# A compass is an i32 array of 294: the index steps to the left, forward and right cell of heading h
+# at h, h + 1 and h + 2; the heading after each of the five actions, by action and heading (picking
+# up turns round only if it succeeds, so that it stands there as no turn); then the number of the
+# k-th set bit of each mask of five bits, by mask and k, in rows of eight.
+_TURNS_AT, _BITS_AT = 8, 38
 
 
 @ti.func
 def step_towards(compass: ti.template(), heading, position):
     """The index step to the cell in view at position 0 (left), 1 (forward) or 2 (right)."""
     return compass[heading + position]
+
+
+@ti.func
+def step_around(compass: ti.template(), heading, turns: ti.template()):
+    """The index step to the cell at so many turns (from -3 to 3) clockwise from a heading."""
+    towards = heading
+    if ti.static(abs(turns) > 1):
+        towards += ti.static(turns % N_HEADINGS)
+        towards -= N_HEADINGS * ti.cast(towards >= N_HEADINGS, ti.i32)
+    return compass[towards + 1 + ti.static(turns if abs(turns) <= 1 else 0)]
 
 
 @ti.func
@@ -54,3 +65,9 @@ def is_open(code):
 def move_event(code):
     """What comes of a move to a cell that looks like this: ENTERED_EMPTY, ENTERED_LURE, FAILED."""
     return ti.select(is_open(code), code, FAILED)
+
+
+@ti.func
+def bit_number_in(compass: ti.template(), mask, k):
+    """The number of the k-th set bit (from 0, ascending) of a mask of five bits, by look-up."""
+    return compass[_BITS_AT + 8 * mask + k]

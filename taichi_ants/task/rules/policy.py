@@ -4,6 +4,7 @@ import taichi as ti
 from taichi.math import popcnt
 
 from taichi_ants.task.constants import N_ACTIONS
+from taichi_ants.task.rules.actions import bit_number_in
 from taichi_ants.task.rules.random_bits import below, high_word, low_word
 
 
@@ -61,6 +62,17 @@ def choose(values, bits, explore_below):
         else:
             action = bit_number(mask, below(low_word(bits), popcnt(mask)))
     return action
+
+
+@ti.func
+def choose_in_crowd(compass: ti.template(), values, bits, explore_below):
+    """The same without a branch: for crowds, of which nobody can predict who explores."""
+    best = best_value(values)
+    mask = (1 << N_ACTIONS) - 1
+    for a in ti.static(range(N_ACTIONS)):
+        mask ^= ti.cast(values[a] < best, ti.i32) << a
+    mask = ti.select(high_word(bits) < explore_below, (1 << N_ACTIONS) - 1, mask)
+    return bit_number_in(compass, mask, below(low_word(bits), popcnt(mask)))
 
 
 @ti.func

@@ -125,7 +125,7 @@ def test_ants_see_which_ants_stand_around_them_and_what_these_carry(seen_crowd):
         colony.begin_episode()
         for _ in range(15):
             colony.tick()
-            ants = colony.arrays["ants"]
+            ants = colony.ant_rows()
             ants = ants[:, ants[AntRow.STAGE] == Stage.LIVING]
             load = dict(zip(ants[AntRow.CELL].tolist(), ants[AntRow.CARRIES].tolist(), strict=True))
             for cell, heading, row in ants[[AntRow.CELL, AntRow.HEADING, AntRow.STATE]].T.tolist():

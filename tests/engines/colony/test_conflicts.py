@@ -27,14 +27,14 @@ def begun(world: World, ants: int, life: Life = Life()) -> Colony:  # noqa: B008
 def act(world: World, actions: list[int], life: Life = Life()) -> Colony:  # noqa: B008
     """One tick in which the listed ants do these actions."""
     colony = begun(world, len(actions), life)
-    colony.arrays["ants"][AntRow.ACTION] = actions
+    colony.of_ants(AntRow.ACTION)[:] = actions
     colony.tick()
     return colony
 
 
 def ants(colony: Colony) -> list[tuple[tuple[int, ...], int, int, int]]:
     """Cell, heading, carries and reward of each ant."""
-    table = colony.arrays["ants"]
+    table = colony.ant_rows()
     cells = colony.snapshot().grid.cells(table[AntRow.CELL]).tolist()
     rewards = colony.arrays["rewards"][table[AntRow.EVENT]]
     rows = (table[AntRow.HEADING], table[AntRow.CARRIES], rewards)
@@ -111,10 +111,9 @@ def test_six_ants_around_the_queen_all_give_in_one_tick():
     around = [(tuple((queen + step).tolist()), (h + 3) % 6) for h, step in enumerate(steps)]
     world = World((8, 8, 1), tuple(queen.tolist()), ants=around)
     colony = begun(world, 6)
-    table = colony.arrays["ants"]
-    table[AntRow.CARRIES] = 1
-    table[AntRow.PERCEPT] = 64 | 3 << 2  # the queen ahead
-    table[AntRow.ACTION] = GIVE
+    colony.of_ants(AntRow.CARRIES)[:] = 1
+    colony.of_ants(AntRow.PERCEPT)[:] = 64 | 3 << 2  # the queen ahead
+    colony.of_ants(AntRow.ACTION)[:] = GIVE
     colony.tick()
     assert [ant[2:] for ant in ants(colony)] == [(0, 10)] * 6
     assert [ant[1] for ant in ants(colony)] == [(h + 3) % 6 for h in range(6)]
@@ -130,10 +129,10 @@ def test_a_blocked_move_turns_the_ant():
 def test_ants_look_like_obstacles_to_each_other():
     world = World((8, 8, 1), (0, 7, 0), ants=[((2, 2, 0), 0), ((3, 2, 0), 0)])
     colony = begun(world, 2)
-    assert colony.arrays["ants"][AntRow.PERCEPT, 0] >> 2 & 3 == 1
-    colony.arrays["ants"][AntRow.ACTION] = [PICK_UP, RIGHT]  # the second moves away
+    assert colony.of_ants(AntRow.PERCEPT)[0] >> 2 & 3 == 1
+    colony.of_ants(AntRow.ACTION)[:] = [PICK_UP, RIGHT]  # the second moves away
     colony.tick()
-    assert colony.arrays["ants"][AntRow.PERCEPT, 0] >> 2 & 3 == 0
+    assert colony.of_ants(AntRow.PERCEPT)[0] >> 2 & 3 == 0
 
 
 def test_food_that_is_taken_grows_back_at_once():

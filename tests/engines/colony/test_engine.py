@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from taichi_ants import AntsError, Colony, TrainingConfig, World, worlds
 from taichi_ants.checks import MAX_ANTS
+from taichi_ants.engines import arguments
 from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.rendering import colony_moments
@@ -259,3 +260,22 @@ def test_worlds_are_checked_before_the_first_episode(last, says):
     with pytest.raises(AntsError, match=says):
         one.run(2, 9, worlds=[worlds.paper(), last])
     assert one == other
+
+
+def test_kernels_are_told_only_what_has_changed(monkeypatch):
+    """Taichi keeps some bytes for good each time, which made long lives grow."""
+    colony = Colony(worlds.paper(), None, TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.5), 0, 3)
+    colony.begin_episode()
+    told, tell = [], arguments._Pack.__setitem__
+
+    def telling(pack, name, value):
+        told.append(name)
+        tell(pack, name, value)
+
+    monkeypatch.setattr(arguments._Pack, "__setitem__", telling)
+    for _ in range(3):
+        colony.tick()
+    assert told == []
+    colony.end_episode()
+    colony.begin_episode()
+    assert sorted(told) == ["epsilon", "explore_below"]

@@ -66,12 +66,13 @@ def test_the_internal_order_of_the_ants_does_not_matter(learner):
     rng = np.random.default_rng(0)
     for _ in range(60):
         order = rng.permutation(60)
-        shuffled.arrays["ants"] = np.ascontiguousarray(shuffled.arrays["ants"][:, order])
+        for rows in ("ants", "traits"):
+            shuffled.arrays[rows] = np.ascontiguousarray(shuffled.arrays[rows][:, order])
         shuffled.arrays["streams"] = shuffled.arrays["streams"][order]
         plain.tick()
         shuffled.tick()
-    back = np.argsort(shuffled.arrays["ants"][AntRow.NUMBER])
-    assert np.array_equal(shuffled.arrays["ants"][:, back], plain.arrays["ants"])
+    back = np.argsort(shuffled.of_ants(AntRow.NUMBER))
+    assert np.array_equal(shuffled.ant_rows()[:, back], plain.ant_rows())
     assert np.array_equal(shuffled.arrays["q"], plain.arrays["q"])
     assert np.array_equal(shuffled.arrays["ground"], plain.arrays["ground"])
     assert plain.outcome().blocked[0, 0] > 0

@@ -60,23 +60,23 @@ def after_a_tick(
     kernels, plain = Colony(*given, **options), ReferenceColony(*given, **options)
     kernels.begin_episode()
     plain.begin_episode()
-    table = kernels.arrays["ants"]
+    of_ants = kernels.of_ants
     for slot, one in enumerate(row):
         ant = plain.ants[slot]
         ant.carries, ant.chosen = one.food, one.action
         plain.look(ant)
-        table[AntRow.CARRIES, slot], table[AntRow.ACTION, slot] = one.food, one.action
-        table[AntRow.PERCEPT, slot] = ant.percept
+        of_ants(AntRow.CARRIES)[slot], of_ants(AntRow.ACTION)[slot] = one.food, one.action
+        of_ants(AntRow.PERCEPT)[slot] = ant.percept
         if one.food:
-            kernels.arrays["ground"][table[AntRow.CELL, slot]] = OBSTACLE | STANDS_WITH_FOOD << 4
+            kernels.arrays["ground"][of_ants(AntRow.CELL)[slot]] = OBSTACLE | STANDS_WITH_FOOD << 4
     kernels.tick()
     plain.tick()
-    cells = kernels.snapshot().grid.cells(table[AntRow.CELL])
-    payments = kernels.arrays["rewards"][table[AntRow.EVENT]]
+    cells = kernels.snapshot().grid.cells(of_ants(AntRow.CELL))
+    payments = kernels.arrays["rewards"][of_ants(AntRow.EVENT)]
     found = [After(int(x), int(pay)) for (x, *_), pay in zip(cells, payments, strict=True)]
     ants = [plain.ants[slot] for slot in range(len(row))]
     assert found == [After(ant.cell[0], ant.reward) for ant in ants]
-    assert table[AntRow.HEADING].tolist() == [ant.heading for ant in ants]
+    assert of_ants(AntRow.HEADING).tolist() == [ant.heading for ant in ants]
     assert int(kernels.outcome().blocked[0, 0]) == plain.record.blocked
     assert np.count_nonzero(kernels.arrays["ground"] >> 4) == len(row)
     return found
@@ -197,10 +197,10 @@ def test_a_ring_of_three_ants_stays(traffic):
         *(world, Task(traffic=traffic), TRAINING, 0, 3), sharing="fixed", q_values=random_policy()
     )
     colony.begin_episode()
-    colony.arrays["ants"][AntRow.ACTION] = FORWARD
-    before = colony.arrays["ants"][AntRow.CELL].tolist()
+    colony.of_ants(AntRow.ACTION)[:] = FORWARD
+    before = colony.of_ants(AntRow.CELL).tolist()
     colony.tick()
-    assert colony.arrays["ants"][AntRow.CELL].tolist() == before
+    assert colony.of_ants(AntRow.CELL).tolist() == before
     assert int(colony.outcome().blocked[0, 0]) == 3
 
 

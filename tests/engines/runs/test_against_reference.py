@@ -136,7 +136,7 @@ def test_every_step_in_the_papers_world(learner, delivery):
 
 def test_whole_trainings_of_a_mixed_sweep():
     """The kernel that trains equals the reference too, and runs do not disturb each other."""
-    names = learners.registry.BUILT_IN
+    names = list(learners.registry.BUILT_IN)
     for number, world in enumerate((paper(), random_world(12), random_world(13, 8))):
         task = random_task(number)
         configs = [random_config(seed, names[seed % len(names)]) for seed in range(2 * len(names))]

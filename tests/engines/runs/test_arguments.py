@@ -48,7 +48,7 @@ def with_more(learner, **more):
         ([], "configs is empty"),
         (None, "configs is None"),
         (3, "configs is 3"),
-        ("q_learning", "a configuration is 'q'"),
+        ("q_learning", "configs is 'q_learning'"),
         ([CONFIG, None], "a configuration is None"),
         (TrainingConfig("td_zero", 0.1, 0.9, 0.3, 0.99), "there is no learner 'td_zero'"),
         (with_more("dyna_q", planning_steps=0), "planning_steps is 0; it must lie between 1 and"),
