@@ -83,7 +83,7 @@ def measure(num_envs: list[int], rounds: int, threads: int | None) -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """The command line."""
-    parser = Parser(__doc__.split("\n", 1)[0], epilog=__doc__.split("\n", 1)[1])
+    parser = Parser(__doc__)
     add = parser.add_argument
     add("--num-envs", type=whole_number(1), nargs="+", default=[256, 4096, 65536], metavar="N")
     add("--rounds", type=whole_number(1), default=5, metavar="N", help="measurements of each")

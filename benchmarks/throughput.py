@@ -20,6 +20,7 @@ import numpy as np
 
 from taichi_ants import Task, TrainingConfig, World, train, worlds
 from taichi_ants.analysis.paper.published import GRID
+from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.studies.command_line import Parser, run_command, whole_number
@@ -107,8 +108,12 @@ def measure_c(command: str, seeds: int) -> float:
     return seconds * 1e9 / total
 
 
-def measure(seeds: int, threads: int | None) -> None:
-    """Print a line for each learner, and for C."""
+def measure(seeds: int, threads: int | None, least: float) -> None:
+    """Print a line for each learner, and for C.
+
+    Raises:
+        AntsError: C is so much faster that the ratio is below `least`.
+    """
     print(
         f"{'':16}{'runs':>6}{'steps':>13}{'wall s':>9}{'CPU s':>9}{'M steps/s':>11}{'ns/step':>9}"
     )
@@ -130,14 +135,20 @@ def measure(seeds: int, threads: int | None) -> None:
         return
     in_c = measure_c(command, min(seeds, SEEDS_IN_C))
     print(f"Q-learning in plain C takes {in_c:.1f} ns a step: {in_c / fastest:.2f} times ours.")
+    if in_c / fastest < least:
+        raise AntsError(
+            f"training goes at {in_c / fastest:.2f} of the pace of C; at least {least:g} is "
+            "expected, so look for what has made it slower."
+        )
 
 
 def main(arguments: list[str] | None = None) -> None:
     """The command line."""
-    parser = Parser(__doc__.split("\n", 1)[0])
+    parser = Parser(__doc__)
     add = parser.add_argument
     add("--seeds", type=whole_number(1), default=100, metavar="N", help="seeds of each setting")
     add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
+    add("--least", type=float, default=0.0, metavar="RATIO", help="fail below this ratio to C")
     run_command(lambda: measure(**vars(parser.parse_args(arguments))))
 
 

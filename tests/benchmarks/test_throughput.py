@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
 
 import numpy as np
 import pytest
-from command_lines import ROOT
+import throughput
 from random_worlds import random_world
 
 from taichi_ants import Task, TrainingConfig, train
@@ -15,23 +14,14 @@ from taichi_ants.worlds import paper
 
 
 @pytest.fixture(scope="module")
-def throughput():
-    path = ROOT / "benchmarks" / "throughput.py"
-    spec = importlib.util.spec_from_file_location("throughput", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-@pytest.fixture(scope="module")
-def yardstick(throughput, tmp_path_factory):
+def yardstick(tmp_path_factory):
     if throughput.compiler() is None:
         pytest.skip("there is no C compiler")
     return throughput.load_yardstick(throughput.compiler(), tmp_path_factory.mktemp("c"))
 
 
 @pytest.mark.parametrize("delivery", ["continuing", "absorbing"])
-def test_c_gives_the_same_runs(delivery, throughput, yardstick):
+def test_c_gives_the_same_runs(delivery, yardstick):
     configs = throughput.grid("q_learning", 0)[::5]
     configs.append(TrainingConfig("q_learning", 1.0, 0.9, 0.7, 0.5, 0.2))
     deliveries = 0
@@ -49,7 +39,7 @@ def test_c_gives_the_same_runs(delivery, throughput, yardstick):
     assert deliveries > 100
 
 
-def printed_by(throughput, arguments, capsys):
+def printed_by(arguments, capsys):
     with pytest.raises(SystemExit) as end:
         throughput.main(arguments)
     assert end.value.code == 0
@@ -59,8 +49,8 @@ def printed_by(throughput, arguments, capsys):
 SMALL = ["--seeds", "1"]
 
 
-def test_its_table(throughput, capsys):
-    lines = printed_by(throughput, SMALL, capsys).splitlines()
+def test_its_table(capsys):
+    lines = printed_by(SMALL, capsys).splitlines()
     assert lines[0].split() == ["runs", "steps", "wall", "s", "CPU", "s", "M", "steps/s", "ns/step"]
     labels = [line[:16].strip() for line in lines[1:5]]
     assert labels == ["q_learning", "sarsa", "dyna_q (p3)", "dyna_q (p5)"]
@@ -74,8 +64,8 @@ def test_its_table(throughput, capsys):
         )
 
 
-def test_without_a_compiler(throughput, capsys, monkeypatch):
+def test_without_a_compiler(capsys, monkeypatch):
     monkeypatch.setenv("PATH", "")
     monkeypatch.delenv("CC", raising=False)
-    lines = printed_by(throughput, SMALL, capsys).splitlines()
+    lines = printed_by(SMALL, capsys).splitlines()
     assert lines[-1].startswith("There is no C compiler")

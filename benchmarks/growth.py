@@ -1,0 +1,297 @@
+"""How cost grows: steps a second against runs, ants, cells, states and threads, and memory.
+
+Runs learn by Q-learning in the paper's world, 500 episodes each; ants forage in open worlds and
+learn into one table, scattered. All sizes are measured in turn with 1 thread and with all, several
+times, by the wall clock; the tables have medians. Memory is how much more the process takes at most
+while it works on twice as many of a thing, beside the sum of the arrays that are kept.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+from collections.abc import Callable, Sequence
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from measuring import FIGURES, PAGE, Work, machine, pace, publish
+from systems.ours import SARSA
+
+from taichi_ants import Task, TrainingConfig, World, runtime, train, worlds
+from taichi_ants.analysis import style
+from taichi_ants.analysis.sweeps import draw_lines
+from taichi_ants.analysis.tables import MISSING, Table, figure, interval, plain_text, thousands
+from taichi_ants.engines.colony.colony import Colony
+from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
+from taichi_ants.task import foraging, observations
+
+Q_LEARNING = TrainingConfig("q_learning", 0.01, 0.9, 0.3, 0.99)
+_STATUS = Path("/proc/self/status")  # of this process, on Linux
+
+
+class Direction(NamedTuple):
+    """What grows.
+
+    Attributes:
+        of: For readers.
+        step: What a step is.
+        make: The work at a size.
+        sizes: Which are measured.
+    """
+
+    of: str
+    step: str
+    make: Callable[[int], Work]
+    sizes: tuple[int, ...]
+
+
+def runs(n: int, observation: str = "paper", episodes: int = 500) -> Work:
+    """Training of n runs."""
+    task = Task(delivery="continuing", observation=observation)
+
+    def work() -> int:
+        came = train(worlds.paper(), Q_LEARNING, range(n), episodes, task=task)
+        return int(came.steps.sum(dtype=np.int64))
+
+    return work
+
+
+def states(n_states: int) -> Work:
+    """Training of 64 runs by the observation of so many states."""
+    named = {observations.get(name).n_states: name for name in STATES}
+    return runs(64, named[n_states], 100)
+
+
+def ants(n: int) -> Work:
+    """Ticks of n ants, four cells an ant."""
+    return ticks(n, max(10, round((4 * n / 3) ** 0.5)))
+
+
+def cells(side: int) -> Work:
+    """Ticks of 10 000 ants in a world of so many values a coordinate."""
+    return ticks(10_000, side)
+
+
+def ticks(n: int, side: int) -> Work:
+    """Ticks of a colony."""
+    colony, several = colony_of(n, side), max(1, 50_000 // n)
+
+    def work() -> int:
+        colony.tick(several)
+        return several * n
+
+    return work
+
+
+@cache
+def open_world(side: int) -> World:
+    """The same for all."""
+    return worlds.open_world(0, (side, side, side))
+
+
+def colony_of(n: int, side: int) -> Colony:
+    """Ants that forage, at the start of an episode."""
+    colony = Colony(open_world(side), foraging(), SARSA, ants=n, start="spread")
+    colony.begin_episode()
+    return colony
+
+
+def n_cells(side: int) -> int:
+    """The cells of a world of equal ranges."""
+    return 3 * side * (side - 1) + 1
+
+
+STATES = ("paper", "trail_levels", "five_cells", "six_cells")
+DIRECTIONS = (
+    Direction("runs", "of a run", runs, (1, 4, 16, 64, 256, 1024)),
+    Direction("ants", "of an ant", ants, (100, 1000, 10_000, 100_000, 1_000_000)),
+    Direction("cells", "of an ant, 10 000 ants", cells, (100, 200, 400, 800, 1600)),
+    Direction("states", "of a run, 64 runs", states, (128, 432, 2048, 8192)),
+)
+SMALL = (
+    Direction("runs", "of a run", lambda n: runs(n, episodes=2), (1, 4)),
+    Direction("ants", "of an ant", ants, (50, 100)),
+)
+
+# By direction, threads and size: steps a second, CPU nanoseconds a step.
+Paces = dict[tuple[Direction, int, int], list[tuple[float, float]]]
+
+
+def measured(directions: Sequence[Direction], rounds: int, seconds: float) -> Paces:
+    """The paces of all sizes, with 1 thread and with all."""
+    every = [(one, size) for one in directions for size in one.sizes]
+    threads = sorted({1, runtime.available_threads()})
+    found: Paces = {(one, k, size): [] for one, size in every for k in threads}
+    total, done = len(every) * len(threads) * rounds, 0
+    with progress_bar("Measuring") as progress:
+        works = [one.make(size) for one, size in every]
+        for _ in range(rounds):
+            for k in threads:
+                runtime.start(k)
+                for (one, size), work in zip(every, works, strict=True):
+                    work()  # Taichi has been started anew, and loads its kernels
+                    found[one, k, size].append(pace(work, seconds))
+                    done += 1
+                    progress(done / total)
+    return found
+
+
+class Memory(NamedTuple):
+    """Bytes for each of a thing: of the arrays that are kept, and of the process at most."""
+
+    of: str
+    arrays: float
+    process: float
+
+
+def memory(small: bool) -> list[Memory]:
+    """What a run takes beyond its results, an ant and a cell."""
+    few = 200 if small else 20_000
+    side = 20 if small else 600
+    n_ants = 200 if small else 600_000  # of fewer, each thread's sums are shared by fewer
+    episodes, outcomes = 20, 3 * np.dtype(np.int32).itemsize
+
+    def training(n: int) -> Callable[[], list[np.ndarray]]:
+        def work() -> list[np.ndarray]:
+            came = train(worlds.paper(), Q_LEARNING, range(n), episodes, 100)
+            return list(vars(came.state).values())
+
+        return work
+
+    def colony(n: int, side: int) -> Callable[[], list[np.ndarray]]:
+        made = colony_of(n, side)
+
+        def work() -> list[np.ndarray]:
+            made.begin_episode()
+            made.tick(1)
+            return [*made.arrays.values(), *made.at_start.values()]
+
+        return work
+
+    sides = {n_cells(one): one for one in (side, 2 * side)}
+    for one in sides.values():
+        open_world(one)  # which is not counted
+    with progress_bar("Memory") as progress:
+        kept, taken = growth(training, few, 2 * few)
+        found = [Memory("run", kept, taken - episodes * outcomes)]
+        progress(0.3)
+        found.append(Memory("ant", *growth(lambda n: colony(n, 2 * side), n_ants, 2 * n_ants)))
+        progress(0.8)
+        found.append(Memory("cell", *growth(lambda n: colony(100, sides[n]), *sides)))
+    return found
+
+
+def growth(
+    prepare: Callable[[int], Callable[[], list[np.ndarray]]], few: int, many: int
+) -> tuple[float, float]:
+    """Bytes for each more: of the arrays that work keeps, and of the process at most in it."""
+    prepare(few)()  # compiles, and fills caches
+    (kept, peak), (kept_more, higher_peak) = (_measure(prepare, n) for n in (few, many))
+    return (kept_more - kept) / (many - few), (higher_peak - peak) / (many - few)
+
+
+def _measure(prepare: Callable[[int], Callable[[], list[np.ndarray]]], n: int) -> tuple[int, float]:
+    _give_back()
+    before, work = _kilobytes("VmRSS"), prepare(n)
+    _give_back()
+    if _STATUS.exists():
+        Path("/proc/self/clear_refs").write_text("5")  # the peak begins anew
+    kept = sum(array.nbytes for array in work())
+    return kept, (_kilobytes("VmHWM") - before) * 1024
+
+
+def _give_back() -> None:
+    """Return memory that is free to the system, which counts it as ours until then."""
+    gc.collect()
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if _STATUS.exists() else None
+    if trim is not None:
+        trim(0)
+
+
+def _kilobytes(name: str) -> float:
+    """What the system says of this process, nan where it is not Linux."""
+    if not _STATUS.exists():
+        return float("nan")
+    lines = _STATUS.read_text().splitlines()
+    return next(float(line.split()[1]) for line in lines if line.startswith(f"{name}:"))
+
+
+def tables(found: Paces, memories: Sequence[Memory], rounds: int) -> list[Table]:
+    """Throughput, then memory."""
+    rows = []
+    for (one, threads, size), values in found.items():
+        steps, cpu = np.array(values).T
+        shown = thousands(n_cells(size) if one.of == "cells" else size)
+        spread = interval(steps.min() / 1e6, steps.max() / 1e6)
+        numbers = figure(np.median(steps) / 1e6), spread, figure(np.median(cpu))
+        rows.append([one.of, one.step, shown, str(threads), *numbers])
+    columns = ["", "a step", "how many", "threads", "M steps/s", "lowest, highest", "CPU ns"]
+    about = f"Medians of {rounds} rounds. {machine(('taichi', 'numpy'))}"
+    paces = Table("How throughput grows", columns, rows, [about], text_columns=2)
+    bytes_each = [
+        [f"a {one.of}" if one.of != "ant" else "an ant", *map(_whole, one[1:])] for one in memories
+    ]
+    columns = ["bytes for", "arrays that are kept", "the process at most"]
+    note = "Of a run beyond its outcomes, which are 12 bytes an episode."
+    return [paces, Table("How memory grows", columns, bytes_each, [note])]
+
+
+def _whole(value: float) -> str:
+    return MISSING if np.isnan(value) else thousands(round(value))
+
+
+def draw(found: Paces) -> None:
+    """Draw the throughput for the page, docs/figures/growth.png.
+
+    Raises:
+        AntsError: The file cannot be written.
+    """
+    directions = list(dict.fromkeys(one for one, *_ in found))
+    with style.styled():
+        drawn = style.new_figure(2.9)
+        panels = drawn.subplots(1, len(directions), squeeze=False)[0]
+        for axes, one in zip(panels, directions, strict=True):
+            lines: dict[str, list[tuple[float, ...]]] = {}
+            for (which, threads, size), values in found.items():
+                if which is one:
+                    steps = np.array(values)[:, 0] / 1e6
+                    label = f"{threads} thread{'s' * (threads > 1)}"
+                    place = n_cells(size) if one.of == "cells" else size
+                    point = (place, float(np.median(steps)), steps.min(), steps.max())
+                    lines.setdefault(label, []).append(point)
+            draw_lines(axes, lines)
+            axes.set_xscale("log")
+            axes.set(title=one.of, xlabel=f"{one.of}; a step {one.step}", ylim=(0, None))
+        panels[0].set_ylabel("million steps a second")
+        caption = "Medians, with the lowest and highest. Runs learn by Q-learning, ants by SARSA."
+        style.frame(drawn, "How throughput grows", caption, style.legend_entries(panels))
+    style.save_all({"growth": drawn}, FIGURES)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """The command line."""
+    parser = Parser(__doc__.split("\n", 1)[0], epilog=__doc__.split("\n", 1)[1])
+    add = parser.add_argument
+    add("--rounds", type=whole_number(1), default=5, metavar="N", help="measurements of each")
+    add("--small", action="store_true", help="little work, to try the command; says nothing")
+    add("--publish", action="store_true", help="put tables and figure into docs/performance.md")
+
+    def command() -> None:
+        given = parser.parse_args(arguments)
+        memories = memory(given.small)
+        found = measured(
+            SMALL if given.small else DIRECTIONS, given.rounds, 0.3 * (not given.small)
+        )
+        made = tables(found, memories, given.rounds)
+        print(plain_text(made, 120), end="")
+        if given.publish:
+            draw(found)
+            publish("growth", made, PAGE)
+
+    run_command(command)
+
+
+if __name__ == "__main__":
+    main()

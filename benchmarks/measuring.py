@@ -1,0 +1,63 @@
+"""What benchmarks share: the machine in words, a pace, and tables that go into a page."""
+
+from __future__ import annotations
+
+import platform
+import time
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
+from importlib.util import find_spec
+from pathlib import Path
+
+from taichi_ants import runtime
+from taichi_ants.analysis.tables import Table
+from taichi_ants.errors import AntsError
+from taichi_ants.files import read_text, write_text
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "docs" / "performance.md"
+FIGURES = ROOT / "docs" / "figures"
+
+Work = Callable[[], int]  # does a piece of work, and gives the steps in it
+
+
+def machine(packages: Sequence[str]) -> str:
+    """Processor, threads and versions, of packages those that are installed."""
+    versions = [f"{name} {version(name)}" for name in packages if find_spec(name) is not None]
+    return (
+        f"{_processor()}, {runtime.available_threads()} threads, {platform.system()}, "
+        f"Python {platform.python_version()}, {', '.join(versions)}."
+    )
+
+
+def _processor() -> str:
+    described = Path("/proc/cpuinfo")
+    if described.exists():
+        for line in described.read_text().splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
+
+
+def pace(work: Work, seconds: float) -> tuple[float, float]:
+    """Work for so long at least: steps a second by the wall clock, CPU nanoseconds a step."""
+    steps, began, cpu = 0, time.perf_counter(), time.process_time()
+    while not steps or time.perf_counter() - began < seconds:
+        steps += work()
+    wall, cpu = time.perf_counter() - began, time.process_time() - cpu
+    return steps / wall, cpu * 1e9 / steps
+
+
+def publish(name: str, tables: Sequence[Table], page: Path) -> None:
+    """Replace what stands between `<!-- name -->` and `<!-- /name -->` of a page by tables.
+
+    Raises:
+        AntsError: The page has no such place, or cannot be read or written.
+    """
+    text, first, last = read_text(page), f"<!-- {name} -->\n", f"<!-- /{name} -->"
+    before, begins, rest = text.partition(first)
+    _, ends, after = rest.partition(last)
+    if not begins or not ends:
+        raise AntsError(f"{page} has no place {first.strip()} ... {last}; put both lines there.")
+    new = "\n".join(table.markdown() for table in tables)
+    write_text(page, f"{before}{first}\n{new}\n{last}{after}")

@@ -1,0 +1,136 @@
+"""Whether a large colony stays sound: 10 000 ants for 20 000 ticks under two sets of rules.
+
+Under the paper's rules nothing comes or goes. Under lively ones ants are born and die, food grows
+back and wanders, trails evaporate and spread, and ants queue. Now and then it checks that no food
+has appeared or vanished, that no two ants share a cell, that all numbers are finite and all clocks
+agree; at the end that the process has not grown. The first fault ends it with a sentence.
+`--ticks 1000000` takes about an hour on two cores.
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from taichi_ants import AntsError, Colony, Life, Pheromone, Task, TrainingConfig, runtime, worlds
+from taichi_ants.engines.colony.layout import AntRow, HomeRow, Stage, WorldRow
+from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
+from taichi_ants.task import Traffic
+from taichi_ants.task.constants import EMPTY, FOOD, QUEEN
+
+RULES = {
+    "paper": Task(delivery="continuing", evaporation_in_training=True),
+    "lively": Task(
+        "queues",
+        pheromone=Pheromone("exponential", 50.0, 0.1, "fading", 500, view="strongest"),
+        traffic=Traffic.named("following"),
+        delivery="continuing",
+        evaporation_in_training=True,
+        life=Life(births=True, lifespan=40_000, regrowth=50, wander=100),
+    ),
+}
+RANGES = (100, 100, 100)
+_MOST_GROWTH = 16.0  # MB of the process, after the first tenth
+
+
+def new_colony(rules: str, ants: int) -> Colony:
+    """At the start of its episode; the ants learn into one table."""
+    world = worlds.open_world(1, RANGES)
+    training = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0, 0.1)
+    colony = Colony(world, RULES[rules], training, 1, ants, start="spread")
+    colony.begin_episode()
+    lifespan, ages = colony.task.life.lifespan, colony.of_ants(AntRow.AGE)
+    if lifespan is not None:  # not all of them shall die at once
+        ages[:ants] = np.arange(ants) * lifespan // ants
+    for array in colony.arrays.values():
+        array[...] = array.copy()  # so that all memory that it will need is in use
+    return colony
+
+
+def faults(colony: Colony) -> list[str]:
+    """What does not hold, in words, of what must hold at the end of every tick."""
+    arrays, world = colony.arrays, colony.arrays["worlds"][:, 0]
+    ants = colony.ant_rows()
+    ants = ants[:, ants[AntRow.STAGE] != Stage.VACANT]
+    cells, numbers, ground = ants[AntRow.CELL], ants[AntRow.NUMBER], colony.snapshot().ground
+    stored = world[WorldRow.STORE] + world[WorldRow.BIRTHS]
+    foods = np.count_nonzero(ground == FOOD) + ants[AntRow.CARRIES].sum()
+    came, walls = len(colony.worlds[0].foods) + world[WorldRow.REGROWN], arrays["walls"] != 0
+    trails = arrays["level"] if colony.pheromone.dense else arrays["trail"]
+    homes = arrays["homes"][:, : world[WorldRow.HOMES]]
+    ages, lifespan = ants[AntRow.AGE], colony.task.life.lifespan
+    outcome = colony.outcome()  # which makes sure that action values are finite
+    moves, blocked = outcome.moves[0, 0], outcome.blocked[0, 0]
+    holds = {
+        "food was lost, or came from nowhere": foods + world[WorldRow.DELIVERIES] == came,
+        "the queen's food is not what she was given": not colony.task.life.births
+        or stored == world[WorldRow.DELIVERIES],
+        "ants share a cell": len(np.unique(cells)) == len(cells),
+        "ants share a number": len(np.unique(numbers)) == len(numbers),
+        "ants were lost": (ants[AntRow.STAGE] == Stage.LIVING).all()
+        and len(cells) == world[WorldRow.LIVING]
+        and len(cells) == colony.ants + world[WorldRow.BIRTHS] - world[WorldRow.DEATHS],
+        "cells and ants disagree": (np.flatnonzero(arrays["ground"] > 15) == np.sort(cells)).all(),
+        "an ant stands on something": not walls[cells].any() and (ground[cells] == EMPTY).all(),
+        "the queen is gone": np.flatnonzero(ground == QUEEN).tolist()
+        == [world[WorldRow.QUEEN_CELL]],
+        "an ant has no heading": ((ants[AntRow.HEADING] >= 0) & (ants[AntRow.HEADING] < 6)).all(),
+        "a trail is no number, below 0, or on rock": np.isfinite(trails).all()
+        and trails.min() >= 0
+        and not trails[walls].any(),
+        "clocks disagree": world[WorldRow.TICKS] == colony.ticks,
+        "an ant is too old": lifespan is None or ages.max(initial=0) < lifespan,
+        "a food was taken later than now": homes[HomeRow.TAKEN].max(initial=-1) < colony.ticks,
+        "a counter has overflowed": 0 <= blocked <= moves <= colony.capacity * colony.ticks,
+    }
+    return [words for words, true in holds.items() if not true]
+
+
+def megabytes() -> float:
+    """What the process holds in memory now."""
+    with open("/proc/self/status", encoding="utf-8") as status:
+        (line,) = (line for line in status if line.startswith("VmRSS:"))
+    return int(line.split()[1]) / 1000
+
+
+def soak(rules: list[str], ants: int, ticks: int, every: int, threads: int | None) -> None:
+    """Print a line for each tenth of the ticks, under each of the rules."""
+    runtime.start(threads)
+    print(f"{'rules':8}{'tick':>9}{'ants':>8}{'delivered':>11}{'MB':>8}{'ticks/s':>9}")
+    for name in rules:
+        colony, began, first = new_colony(name, ants), time.perf_counter(), 0.0
+        with progress_bar(name) as progress:
+            while colony.ticks < ticks:
+                colony.tick(min(every, ticks - colony.ticks))
+                if wrong := faults(colony):
+                    raise AntsError(f"{name}, tick {colony.ticks}: {'; '.join(wrong)}.")
+                progress(colony.ticks / ticks)
+                if colony.ticks % (-(-ticks // 10)) < every or colony.ticks == ticks:
+                    first = first or megabytes()
+                    world = colony.arrays["worlds"][:, 0]
+                    pace = colony.ticks / (time.perf_counter() - began)
+                    print(
+                        f"{name:8}{colony.ticks:9}{world[WorldRow.LIVING]:8}"
+                        f"{world[WorldRow.DELIVERIES]:11}{megabytes():8.1f}{pace:9.0f}",
+                        flush=True,
+                    )
+        if megabytes() - first > _MOST_GROWTH:
+            raise AntsError(f"{name}: the process has grown from {first:.1f} MB.")
+    print("All held.")
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """The command line."""
+    parser = Parser(__doc__)
+    add = parser.add_argument
+    add("--rules", choices=RULES, nargs="+", default=tuple(RULES), help="one or both")
+    add("--ants", type=whole_number(1, 20_000), default=10_000, metavar="N", help="that start")
+    add("--ticks", type=whole_number(1, 10_000_000), default=20_000, metavar="N", help="how long")
+    add("--every", type=whole_number(1), default=100, metavar="N", help="ticks between checks")
+    add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
+    run_command(lambda: soak(**vars(parser.parse_args(arguments))))
+
+
+if __name__ == "__main__":
+    main()

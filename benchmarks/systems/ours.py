@@ -1,0 +1,56 @@
+"""Taichi Ants, as its users run it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import gymnasium
+import numpy as np
+
+from systems.paper_world import CONFIGS
+from taichi_ants import Task, TrainingConfig, runtime, train, worlds
+from taichi_ants.engines.colony.colony import Colony
+from taichi_ants.task import foraging
+
+_CONTINUING = Task(delivery="continuing")
+_BATCHES = 16  # of actions drawn beforehand
+# As in the colony's study.
+SARSA = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.98, initial_value=10.0)
+
+
+def training(each: int) -> Callable[[], int]:
+    """Work on the paper's grid: all of its runs, of which each configuration has so many."""
+    train(worlds.paper(), CONFIGS, 0, 1, 1)  # compiles
+    return lambda: int(train(worlds.paper(), CONFIGS, range(each), task=_CONTINUING).steps.sum())
+
+
+def environments(n: int) -> Callable[[], int]:
+    """Steps of n environments of one ant at random, the actions drawn beforehand."""
+    runtime.start()
+    env = gymnasium.make_vec("taichi_ants/HexForage-v0", num_envs=n)
+    env.reset(seed=0)
+    actions = np.random.default_rng(0).integers(0, 5, (_BATCHES, n))
+
+    def work() -> int:
+        for batch in actions:
+            env.step(batch)
+        return _BATCHES * n
+
+    work()
+    return work
+
+
+def colony(ants: int, ranges: int | None = None) -> Callable[[], int]:
+    """Ticks of a colony that forages and learns into one table; ten cells an ant if no ranges."""
+    side = ranges or max(10, round((10 * ants / 3) ** 0.5))
+    world = worlds.open_world(0, (side, side, side))
+    colony = Colony(world, foraging(), SARSA, ants=ants, start="spread")
+    colony.begin_episode()
+    ticks = max(1, 50_000 // ants)
+
+    def work() -> int:
+        colony.tick(ticks)
+        return ticks * ants
+
+    work()
+    return work

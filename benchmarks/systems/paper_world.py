@@ -1,0 +1,76 @@
+"""The paper's world and grid as plain arrays, for those who do the same task with other means.
+
+One food, one queen, a trail that does not evaporate, continuing delivery: what `throughput.py`
+trains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from taichi_ants import TrainingConfig, worlds
+from taichi_ants.analysis.paper.published import GRID
+
+N_STATES, N_ACTIONS = 128, 5
+PICK_UP, GIVE = 3, 4
+LURE, GOAL = 2, 3  # codes of cells in view
+DEPOSIT = 250
+
+CONFIGS = [TrainingConfig("q_learning", *point) for point in GRID]
+
+
+class Layout(NamedTuple):
+    """The world; cells lie in flat arrays of one size, a neighbour is a fixed step away.
+
+    Attributes:
+        ground: int8 (size,), how a cell looks: two bits without food, above them two with food.
+        trail: int16 (size,), levels at the start of an episode.
+        closer: bool (3, size, 6): whether the cell in view at a position, from a cell at a heading,
+            is nearer to the queen.
+        ahead: int32 (3, 6), steps to the cells in view at a heading.
+        cell, heading: where the ant starts.
+    """
+
+    ground: np.ndarray
+    trail: np.ndarray
+    closer: np.ndarray
+    ahead: np.ndarray
+    cell: int
+    heading: int
+
+
+def layout() -> Layout:
+    """The paper's world."""
+    world = worlds.paper()
+    (cell,), (heading,) = world.start(0)
+    seen = (np.arange(6) + np.arange(-1, 2)[:, None]) % 6  # the headings of the cells in view
+    return Layout(
+        world.ground().astype(np.int8),
+        world.trail_levels().astype(np.int16),
+        (world.closer()[None, :, None] >> seen[:, None, :] & 1).astype(bool),
+        world.grid.offsets[seen].astype(np.int32),
+        int(cell),
+        int(heading),
+    )
+
+
+class Settings(NamedTuple):
+    """Of n runs, arrays (n,)."""
+
+    learning_rate: np.ndarray
+    discount: np.ndarray
+    epsilon: np.ndarray
+    decay: np.ndarray
+    least: np.ndarray
+
+
+def settings(configs: Sequence[TrainingConfig], each: int) -> Settings:
+    """Every configuration so many times, one configuration after the other; float32."""
+    rows = [
+        (one.learning_rate, one.discount, one.epsilon, one.epsilon_decay, one.min_epsilon)
+        for one in configs
+    ]
+    return Settings(*np.repeat(np.array(rows, np.float32), each, axis=0).T)

@@ -1,0 +1,74 @@
+"""The colony's yardstick in C, a third writing of the rules, and the command."""
+
+from __future__ import annotations
+
+import colony_in_c
+import numpy as np
+import pytest
+from throughput import compiler
+
+from taichi_ants import AntsError
+
+pytestmark = pytest.mark.skipif(compiler() is None, reason="there is no C compiler")
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory):
+    return colony_in_c.load(compiler(), tmp_path_factory.mktemp("c"))
+
+
+@pytest.mark.parametrize("rules", colony_in_c.TASKS)
+def test_c_gives_the_same_colonies(rules, library):
+    colony = colony_in_c.scattered(colony_in_c.TASKS[rules], 300)
+    colony.begin_episode()
+    before = {name: array.copy() for name, array in colony.arrays.items()}
+    one, two = (colony_in_c.live_in_c(library, colony, 400, threads) for threads in (1, 2))
+    assert np.array_equal(one.q_values, two.q_values)
+    assert one[1:] == two[1:]
+    assert one.deliveries > 20
+    assert one.blocked > 10_000
+    assert all(np.array_equal(before[name], colony.arrays[name]) for name in before)
+    colony_in_c.check_same(library, colony, 400, 2)
+    colony.arrays["rewards"][3] += 1  # of C alone
+    colony.begin_episode()
+    other = colony_in_c.live_in_c(library, colony, 400, 1)
+    assert other.returns != one.returns
+
+
+def run(arguments, capsys):
+    with pytest.raises(SystemExit) as end:
+        colony_in_c.main(arguments)
+    return end.value.code, capsys.readouterr()
+
+
+def test_the_command_and_its_guard(library, capsys, monkeypatch):
+    monkeypatch.setattr(colony_in_c, "_SECONDS", 0.0)
+    few = ["--ants", "300", "--rounds", "1", "--threads", "1"]
+    code, said = run(few, capsys)
+    assert code == 0
+    assert "the paper's" in said.out
+    assert "foraging" in said.out
+    code, said = run([*few, "--least", "1000"], capsys)
+    assert code != 0
+    assert "at least 1000 is expected" in said.err
+    monkeypatch.setattr(
+        colony_in_c, "live_in_c", lambda *_: colony_in_c.Lived(np.zeros(1), 0, 0, 0, 0)
+    )
+    code, said = run(few, capsys)
+    assert code != 0
+    assert "gives other results" in said.err
+
+
+def test_without_a_compiler(capsys, monkeypatch):
+    monkeypatch.setattr(colony_in_c, "compiler", lambda: None)
+    code, said = run(["--ants", "10"], capsys)
+    assert code == 0
+    assert said.out.startswith("There is no C compiler")
+
+
+def test_results_that_differ_are_no_comparison(library, monkeypatch):
+    colony = colony_in_c.scattered(colony_in_c.TASKS["foraging"], 50)
+    lived = colony_in_c.live_in_c
+    monkeypatch.setattr(colony_in_c, "live_in_c", lambda *given: lived(*given)._replace(blocked=-1))
+    with pytest.raises(AntsError, match="gives other results"):
+        colony_in_c.check_same(library, colony, 5, 1)

@@ -1,0 +1,141 @@
+"""Peers that train in the paper's world train as we do; the command and what it writes."""
+
+from __future__ import annotations
+
+import measuring
+import numpy as np
+import peers
+import pytest
+from systems import numpy_runs
+
+from taichi_ants import AntsError, Task, TrainingConfig, train, worlds
+from taichi_ants.analysis.tables import Table, plain_text
+from taichi_ants.engines.runs.traces import trace_training
+from taichi_ants.task.constants import DELIVERED
+
+# They learn soon, so that deliveries and long episodes both occur.
+CONFIGS = [
+    TrainingConfig("q_learning", 0.3, 0.9, 0.3, 0.9),
+    TrainingConfig("q_learning", 0.1, 0.99, 0.5, 0.95),
+]
+SEEDS, EPISODES, STEPS = 60, 40, 150
+CONTINUING = "continuing"
+
+
+@pytest.fixture(scope="module")
+def ours():
+    given = worlds.paper(), CONFIGS, range(SEEDS), EPISODES, STEPS
+    result = train(*given, Task(delivery=CONTINUING))
+    assert 0.2 < result.deliveries.mean() < 0.9
+    return [values.reshape(-1, EPISODES) for values in (result.returns, result.steps)]
+
+
+def assert_distributed_alike(ours, theirs):
+    for expected, given in zip(ours, theirs, strict=True):
+        for some in (slice(0, SEEDS), slice(SEEDS, None)):
+            for part in (slice(0, 10), slice(10, None)):  # before and after most is learned
+                a, b = expected[some, part].mean(axis=1), given[some, part].mean(axis=1)
+                error = np.sqrt((a.var(ddof=1) + b.var(ddof=1)) / SEEDS)
+                assert abs(a.mean() - b.mean()) < 3.5 * error
+
+
+@pytest.fixture(scope="module")
+def trace():
+    """Forty episodes of one run: what it sees and does, and its table after each step."""
+    made = trace_training(worlds.paper(), CONFIGS[0], 3, EPISODES, STEPS, Task(delivery=CONTINUING))
+    assert (made.events == DELIVERED).sum() > 5
+    return made
+
+
+def test_numpy_steps_as_we_do(trace):
+    run = numpy_runs.NumpyRuns(CONFIGS[:1], 1, STEPS)
+    for state, action, table in zip(trace.states, trace.actions, trace.tables, strict=True):
+        assert run.row[0] == state
+        run.learn(np.array([action]))
+        assert np.allclose(run.q, table, rtol=1e-4, atol=1e-4)
+    returns = np.bincount(trace.episodes, trace.rewards)
+    assert [int(returned[0]) for _, returned, _ in run.ended] == returns.tolist()
+
+
+def test_numpy_trains_as_we_do(ours):
+    assert_distributed_alike(ours, numpy_runs.train(CONFIGS, SEEDS, EPISODES, STEPS))
+
+
+@pytest.mark.slow
+def test_jax_trains_as_we_do(ours):
+    pytest.importorskip("jax")
+    from systems import jax_runs
+
+    assert_distributed_alike(ours, jax_runs.train(CONFIGS, SEEDS, EPISODES, STEPS))
+
+
+@pytest.mark.slow
+def test_jax_steps_as_we_do(trace):
+    pytest.importorskip("jax")
+    from systems import jax_runs
+
+    runs, numbers = jax_runs.first(CONFIGS[:1], 1)
+    words = np.zeros((len(trace.actions), 1, 6), np.float32)  # explores always, by the largest
+    words[np.arange(len(words)), 0, trace.actions] = 0.5
+    runs, (ended, returned, _) = jax_runs.follow(runs, numbers, words, STEPS)
+    assert np.allclose(runs.q[0], trace.tables[-1], rtol=1e-4, atol=1e-4)
+    returns = np.bincount(trace.episodes, trace.rewards)
+    assert np.asarray(returned)[np.asarray(ended)].tolist() == returns.tolist()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("parallel", [False, True])
+def test_numba_gives_the_same_runs(ours, parallel):
+    pytest.importorskip("numba")
+    from systems import numba_runs
+
+    theirs = numba_runs.train(CONFIGS, SEEDS, EPISODES, STEPS, parallel)
+    assert all(map(np.array_equal, ours, theirs))
+
+
+def test_the_tables():
+    first, *_, last = peers.GROUPS["Steps of ants in a colony"]
+    absent = last._replace(name="Absent", needs=("no_such_package",))
+    groups = {"Ants": (first, last, absent)}
+    paces = {first: [(4e6, 250.0), (9e6, 240.0)], last: [(2e3, 5e5), (3e3, 4e5)]}
+    table, below = peers.tables({"Ants": paces}, groups, peers.SMALL, 2)
+    assert [row[2:] for row in table.rows] == [
+        ["6.50", "[4.000, 9.000]", "245", "1"],
+        ["0.0025", "[0.002, 0.003]", "450000", "2500"],
+    ]
+    text = plain_text([table, below], 120)
+    assert "16 ants, trails, right of way" in text
+    assert "Absent is left out for lack of no_such_package." in text
+
+
+def test_a_page_takes_tables_in_their_place(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("before\n<!-- one -->\nold\n<!-- /one -->\nafter\n")
+    table = Table("A title", ["a", "b"], [["c", "1"]])
+    for _ in range(2):
+        measuring.publish("one", [table], page)
+        text = page.read_text()
+        assert text.startswith("before\n<!-- one -->\n\n**A title**\n\n| a | b |\n")
+        assert text.endswith("| c | 1 |\n\n<!-- /one -->\nafter\n")
+    with pytest.raises(AntsError, match="has no place <!-- two -->"):
+        measuring.publish("two", [table], page)
+    assert page.read_text() == text
+
+
+def test_the_pages_places():
+    text = measuring.PAGE.read_text()
+    for name in ("peers", "growth"):
+        assert text.index(f"<!-- {name} -->\n") < text.index(f"<!-- /{name} -->")
+
+
+@pytest.mark.slow
+def test_the_command(capfd):
+    with pytest.raises(SystemExit) as end:
+        peers.main(["--small", "--rounds", "1"])
+    assert end.value.code == 0
+    out, err = capfd.readouterr()
+    assert err == ""
+    for group, systems in peers.GROUPS.items():
+        assert group in out
+        for one in systems:
+            assert one.name in out  # measured, or left out by name

@@ -1,0 +1,61 @@
+"""The soak: a small one holds, and each fault that is put into a colony is found."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import soak
+
+from taichi_ants.engines.colony.layout import AntRow, WorldRow
+from taichi_ants.task.constants import EMPTY, FOOD
+
+
+def put_food(colony):
+    empty = (colony.arrays["ground"] == EMPTY) & (colony.arrays["walls"] == 0)
+    colony.arrays["ground"][np.argmax(empty)] = FOOD
+
+
+def share_a_cell(colony):
+    colony.arrays["ants"][AntRow.CELL, 0] = colony.arrays["ants"][AntRow.CELL, 1]
+
+
+def change(name, row, value):
+    def fault(colony):
+        colony.arrays[name][row, 0] = value(colony.arrays[name][row, 0])
+
+    return fault
+
+
+def put_trail(colony):
+    colony.arrays["trail"][np.argmax(colony.arrays["walls"])] = 1
+
+
+FAULTS = {
+    "food was lost, or came from nowhere": put_food,
+    "ants share a cell": share_a_cell,
+    "ants share a number": change("ants", AntRow.NUMBER, lambda number: 1),
+    "ants were lost": change("worlds", WorldRow.LIVING, lambda living: living - 1),
+    "a trail is no number, below 0, or on rock": put_trail,
+    "clocks disagree": change("worlds", WorldRow.TICKS, lambda ticks: ticks + 1),
+    "a counter has overflowed": change("worlds", WorldRow.MOVES, lambda moves: -moves),
+}
+
+
+@pytest.mark.slow
+def test_each_fault_is_found():
+    for words, put in FAULTS.items():
+        colony = soak.new_colony("paper", 200)
+        colony.tick(100)
+        assert soak.faults(colony) == []
+        put(colony)
+        assert words in soak.faults(colony)
+
+
+@pytest.mark.long
+def test_a_small_soak_holds(capsys):
+    with pytest.raises(SystemExit) as end:
+        soak.main(["--ants", "300", "--ticks", "9000"])
+    assert end.value.code == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[-1] == "All held."
+    assert len(lines) == 2 + 2 * 10
