@@ -30,6 +30,7 @@ RANDOM_SEED = 20_250_801
 TIE_TOLERANCE = 1e-9
 _BLOCK_ROWS = 64
 _BLOCK_DRAWS = 4096
+_BLOCK_WEIGHTS = 1 << 22  # as float 32 MB; a product of few wakes the threads for too little
 
 
 @lru_cache(maxsize=8)
@@ -230,10 +231,10 @@ def _percentile(values: np.ndarray, level: float, counts: np.ndarray) -> np.ndar
 def _resampled_means(deviations: np.ndarray, counts: np.ndarray) -> np.ndarray:
     """Float64 (rows, resamples), relative to each row's mean."""
     n = deviations.shape[1]
-    draws = np.empty((len(deviations), len(counts)))
-    for start in range(0, len(counts), _BLOCK_DRAWS):
-        weights = counts[start : start + _BLOCK_DRAWS].astype(float)
-        np.matmul(deviations, weights.T, out=draws[:, start : start + _BLOCK_DRAWS])
+    draws, size = np.empty((len(deviations), len(counts))), max(1, _BLOCK_WEIGHTS // n)
+    for start in range(0, len(counts), size):
+        weights = counts[start : start + size].astype(float)
+        np.matmul(deviations, weights.T, out=draws[:, start : start + size])
     draws /= n
     return draws
 

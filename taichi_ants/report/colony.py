@@ -11,7 +11,7 @@ from taichi_ants.analysis.colony.tables import glance, means, of_largest
 from taichi_ants.analysis.drawings import Drawing
 from taichi_ants.analysis.tables import sentence
 from taichi_ants.errors import count
-from taichi_ants.report.page import KINDS, Player, Statement, Statements, fill, judged
+from taichi_ants.report.page import Player, Statement, Statements, fill, judged
 
 FILES = {
     "report.txt": "what the command prints",
@@ -57,7 +57,6 @@ def colony_page(
         worlds=[ARENAS[arena] for arena in trained],
         answer=answer,
         findings=_statements(findings),
-        kinds=KINDS,
         glance=glance(rows),
         tables=means(rows),
         drawings=drawings,
@@ -73,7 +72,7 @@ def _statements(findings: Judged) -> Statements:
     for (arena, series), by_sizes in findings.items():
         unit = MEASURES[series.measure]
         told = [
-            judged(f"{n} ants" if n == less else f"{n} against {less}", finding, "difference")
+            judged(count(n, "ant") if n == less else f"{n} against {less}", finding, "Difference")
             for (n, less), finding in by_sizes.items()
         ]
         facts = {"Question": series.question, "Difference in": unit}

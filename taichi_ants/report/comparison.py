@@ -18,7 +18,6 @@ from taichi_ants.analysis.paper.results import Results
 from taichi_ants.analysis.tables import sentence, thousands
 from taichi_ants.errors import count
 from taichi_ants.report.page import (
-    KINDS,
     Picture,
     Player,
     Statement,
@@ -27,6 +26,12 @@ from taichi_ants.report.page import (
     judged,
 )
 
+DELIVERY = {
+    "continuing": "With continuing delivery, its update at the delivery also counts, discounted, "
+    "the value of what the ant then sees, as after every other step.",
+    "absorbing": "With absorbing delivery, nothing comes after the delivery: its update counts the "
+    "reward alone.",
+}
 FILES = {
     "report.txt": "what the command prints",
     "table2.csv": "the paper's table 2 beside ours, with all intervals",
@@ -66,7 +71,7 @@ def comparison_page(
     comparison = results.comparison
     first, *others = all_tables(comparison, results.lines, results.behaviours, results.baselines)
     # The notes explain the first four tables, of which one is shown at once.
-    notes = next(one for one in others if isinstance(one, str))
+    notes = next(one for one in others if not one.rows)
     behaviours = behaviour_table(results.lines, results.behaviours)
     more = [one for one in others if one not in (notes, behaviours)]
     returns = sorted((row.reward for one, row in TABLE_2.items() if one != Q_LEARNING))
@@ -82,10 +87,10 @@ def comparison_page(
         others=(returns[0], returns[-1]),
         greedy_return=f"{GREEDY_RETURN:g}",
         greedy_steps=[f"{one:g}" for one in GREEDY_STEPS],
+        deliveries=[DELIVERY[one] for one in comparison.delivery_settings],
         in_paper_world=comparison.in_paper_world,
         answer=results.answer,
         claims=_claims(results),
-        kinds=KINDS,
         first_table=first,
         table_notes=notes,
         more_tables=more,

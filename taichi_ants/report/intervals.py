@@ -36,7 +36,8 @@ def interval_drawing(finding: Finding) -> str:
         return f'<rect class="{kind}" {size}/>'
 
     def label(value: float, y: float, kind: str = "") -> str:
-        return f'<text x="{at(value)}" y="{y}" class="{kind}">{figure(value)}</text>'
+        signed = figure(value).replace("-", "\N{MINUS SIGN}")
+        return f'<text x="{at(value)}" y="{y}" class="{kind}">{signed}</text>'
 
     low, high = at(finding.low), at(finding.high)
     ends = sorted({one for one in edges if math.isfinite(one)})

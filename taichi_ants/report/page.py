@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import base64
 import io
+import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -37,10 +39,17 @@ def _templates() -> Environment:
     return Environment(
         loader=FunctionLoader(_text),
         autoescape=True,
+        finalize=signed,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
+
+
+def signed(text: Any) -> Any:
+    """Text with true minus signs before numbers, as figures have them; what is no text stays."""
+    plain = isinstance(text, str) and not hasattr(text, "__html__")
+    return re.sub(r"(?<![\w.-])-(?=[\d.])", "\N{MINUS SIGN}", text) if plain else text
 
 
 def fill(template: str, **parts: Any) -> str:
@@ -117,7 +126,8 @@ def judged(setting: str, finding: Finding, label: str, unit: str = "") -> Judged
         digits = 1 if finding.contrast.typical or abs(finding.effect) >= 10 else 2
         effect, low, high = (number(x, digits) for x in (finding.effect, finding.low, finding.high))
         words += f": {effect} {unit}".rstrip()
-        words += f", between {low} and {high}" if finding.contrast.seeds > 1 else ""
+        known = math.isfinite(finding.low) and math.isfinite(finding.high)
+        words += f", between {low} and {high}" if known else ", without an interval"
     by_mean = finding.by_mean
     if by_mean and by_mean.verdict is not finding.verdict:
         words += f"; by the mean {by_mean.verdict.value}, {number(by_mean.effect)}"
@@ -157,11 +167,17 @@ class Statements(NamedTuple):
     noun: str
 
     @property
+    def kinds(self) -> list[Verdict]:
+        """The verdicts that occur, in the order in which a reader wants them."""
+        given = {one for line in self.lines for one in line.verdicts}
+        return [one for one in KINDS if one in given]
+
+    @property
     def tallies(self) -> list[tuple[str, list[tuple[Verdict, int]]]]:
         """How many verdicts of each kind there are, for each column of verdicts."""
         columns = zip(*(line.verdicts for line in self.lines), strict=True)
         return [
-            (header, [(one, column.count(one)) for one in KINDS if one in column])
+            (header, [(one, column.count(one)) for one in self.kinds if one in column])
             for header, column in zip(self.headers[2:], columns, strict=True)
         ]
 
@@ -173,9 +189,15 @@ KINDS = (
 )
 
 
+def span(first: int, n: int) -> str:
+    """Seeds in words: "0 to 9", or "0" if it is one."""
+    return str(first) if n == 1 else f"{first} to {first + n - 1}"
+
+
 def made_facts(made: Mapping[str, Any]) -> dict[str, str]:
     """What made the results, from a manifest, in words."""
-    facts = {"Command": made["command"], "Finished": made["finished"].replace("T", " ")}
+    finished = made["finished"].replace("T", " ").replace("+00:00", " UTC")
+    facts = {"Command": made["command"], "Finished": finished}
     if made.get("commit"):
         facts["Commit"] = made["commit"]
     packages = ", ".join(f"{name} {version}" for name, version in made["packages"].items())

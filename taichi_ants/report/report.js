@@ -23,11 +23,13 @@ class SmallPlayer {
     this.stage = new Stage(canvas, overlay, this.history);
     this.player = new Player(this.history, () => this.draw());
     this.player.speed = Number(figure.dataset.speed);
-    this.player.moment = this.player.last; // at rest, the whole path is seen
+    this.player.moment = Math.round(this.player.last / 2); // something goes on there
+    this.fresh = true;
     this.slider.max = this.player.last;
     this.button.addEventListener("click", () => this.press());
     this.slider.addEventListener("input", () => {
       const moment = Number(this.slider.value); // drawing moves the slider
+      this.fresh = false;
       this.player.pause();
       this.player.go(moment);
     });
@@ -40,6 +42,8 @@ class SmallPlayer {
     const { player } = this;
     if (player.playing) return player.pause();
     for (const other of players) if (other !== this) other.player.pause();
+    if (this.fresh) player.go(0);
+    this.fresh = false;
     player.play();
     this.before = null;
     if (!this.runs) this.run();
@@ -82,13 +86,16 @@ class Statements {
     this.body = part.querySelector("tbody");
     this.lines = [...this.body.rows];
     this.words = part.querySelector("input");
-    this.verdict = part.querySelector("select");
+    this.verdict = part.querySelector("[name=verdict]");
+    this.order = part.querySelector("[name=order]"); // where there is no room for heads
     this.found = part.querySelector("output");
     this.words.addEventListener("input", () => this.filter());
     this.verdict.addEventListener("change", () => this.filter());
-    part.querySelectorAll("th").forEach((head, column) => {
-      head.querySelector("button").addEventListener("click", () => this.sort(head, column));
+    this.heads = [...part.querySelectorAll("th")];
+    this.heads.forEach((head, column) => {
+      head.querySelector("button").addEventListener("click", () => this.turn(column, head.getAttribute("aria-sort")));
     });
+    this.order.addEventListener("change", () => this.sort(this.order.value));
     this.filter();
   }
 
@@ -97,7 +104,7 @@ class Statements {
     let shown = 0;
     for (const line of this.lines) {
       const text = line.textContent.toLowerCase();
-      const verdicts = [...line.querySelectorAll(".v")].map((one) => one.textContent.trim());
+      const verdicts = [...line.querySelectorAll("td.verdict")].map((one) => one.textContent.trim());
       line.hidden = !(words.every((word) => text.includes(word)) && (!wanted || verdicts.includes(wanted)));
       if (!line.hidden) shown++;
     }
@@ -105,18 +112,35 @@ class Statements {
   }
 
   /* Up, down, and back to the order of the page. */
-  sort(head, column) {
-    const order = { none: "ascending", ascending: "descending", descending: "none" }[head.ariaSort ?? "none"];
-    this.part.querySelectorAll("th").forEach((other) => (other.ariaSort = "none"));
-    head.ariaSort = order;
-    const key = (line) => line.cells[column].dataset.key ?? "", sign = order === "descending" ? -1 : 1;
+  turn(column, order) {
+    const next = { none: "ascending", ascending: "descending", descending: "" }[order];
+    this.sort(next && `${column} ${next}`);
+  }
+
+  /* Sorts by what the choice of an order says; "" is the order of the page. */
+  sort(chosen) {
+    const [column, order] = chosen.split(" ");
+    this.order.value = chosen;
+    this.heads.forEach((head, place) => head.setAttribute("aria-sort", column === String(place) ? order : "none"));
+    const key = (line) => line.cells[column].dataset.key, sign = order === "descending" ? -1 : 1;
     const compare = (one, other) => sign * key(one).localeCompare(key(other), "en", { numeric: true });
-    const lines = order === "none" ? this.lines : [...this.lines].sort(compare);
-    this.body.append(...lines);
+    this.body.append(...(chosen ? [...this.lines].sort(compare) : this.lines));
   }
 }
 
+/* What is wider than its place fades where more of it can be scrolled to. */
+function fade(part) {
+  const show = () => {
+    const rest = part.scrollWidth - part.clientWidth - part.scrollLeft;
+    part.classList.toggle("more-right", rest > 1);
+    part.classList.toggle("more-left", part.scrollLeft > 1);
+  };
+  part.addEventListener("scroll", show, { passive: true });
+  new ResizeObserver(show).observe(part); // also when what folds is opened
+}
+
 async function open() {
+  document.querySelectorAll(".scroll, .plot > div, .sheet").forEach(fade);
   document.querySelectorAll(".statements").forEach((part) => new Statements(part));
   const theme = document.getElementById("theme");
   theme.addEventListener("click", () => {

@@ -10,6 +10,8 @@ from taichi_ants.analysis.paper.audit import claims_rows
 
 pytestmark = pytest.mark.browser
 
+VERDICTS = ["supported", "equivalent", "undecided", "contradicted", "not tested"]
+
 
 @pytest.fixture(scope="module")
 def browser():
@@ -78,9 +80,8 @@ def test_claims_are_sorted(opened):
         assert shown(tab)[0][column] == up[-1]
         head.locator("button").click()
         assert shown(tab) == order
-    verdicts = ["supported", "equivalent", "undecided", "contradicted", "not tested"]
     tab.locator(".statements th button").nth(3).click()
-    places = [verdicts.index(cells[3]) for cells in shown(tab)]
+    places = [VERDICTS.index(cells[3]) for cells in shown(tab)]
     assert places == sorted(places)
     assert len(set(places)) > 1
 
@@ -92,13 +93,40 @@ def test_claims_are_filtered(opened):
     assert all("SARSA" in cells[0] for cells in shown(tab))
     assert tab.inner_text(".filters output") == f"{len(shown(tab))} of 51 claims"
     tab.fill(".filters input", "")
-    tab.select_option(".filters select", "contradicted")
+    tab.select_option(".filters [name=verdict]", "contradicted")
     rows = claims_rows(results().audit)
     wanted = {row["statement"] for row in rows if row["verdict"] == "contradicted"}
     assert {cells[0] for cells in shown(tab)} == wanted
     tab.fill(".filters input", "no such words")
     assert shown(tab) == []
     assert tab.inner_text(".filters output") == "0 of 51 claims"
+
+
+def test_only_verdicts_that_occur_are_offered(opened):
+    tab = opened("colony")
+    offered = tab.locator(".filters [name=verdict] option").all_inner_texts()
+    assert offered[1:] == [one for one in VERDICTS if any(one in cells for cells in shown(tab))]
+    assert 1 < len(offered) < 1 + len(VERDICTS)
+    for one in offered[1:]:
+        tab.select_option(".filters [name=verdict]", one)
+        assert {cells[2] for cells in shown(tab)} == {one}
+
+
+def test_a_phone_sorts_by_a_choice_that_the_heads_share(opened):
+    tab = opened("comparison", width=390)
+    order = shown(tab)
+    choice = tab.locator(".filters [name=order]")
+    assert not tab.locator(".statements thead").is_visible()
+    choice.select_option("Continuing ↓")
+    verdicts = [VERDICTS.index(cells[2]) for cells in shown(tab)]
+    assert verdicts == sorted(verdicts, reverse=True) != sorted(verdicts)
+    tab.set_viewport_size({"width": 1280, "height": 800})
+    head = tab.locator(".statements th").nth(2)
+    assert not choice.is_visible()
+    assert head.get_attribute("aria-sort") == "descending"
+    head.locator("button").click()
+    assert shown(tab) == order
+    assert choice.input_value() == ""
 
 
 def test_details_open_on_demand(opened):
@@ -122,10 +150,14 @@ PIXELS = """number => [...document.querySelectorAll(".player")[number].querySele
 def test_players_play(opened, name, last):
     tab = opened(name)
     player = tab.locator(".player").first
-    assert player.locator("output").inner_text() == f"{last} / {last}"
-    end = tab.evaluate(PIXELS, 0)
+    assert player.locator("output").inner_text() == f"{last // 2} / {last}"  # something goes on
+    player.locator("button").click()
+    assert tab.evaluate("report.players[0].player.moment") < last // 2  # it begins at the start
+    player.locator("button").click()
     slider = player.locator("input")
     slider.focus()
+    tab.keyboard.press("End")
+    end = tab.evaluate(PIXELS, 0)
     tab.keyboard.press("Home")
     assert player.locator("output").inner_text() == f"0 / {last}"
     assert tab.evaluate(PIXELS, 0) != end
@@ -163,6 +195,13 @@ def test_light_and_dark(opened, name):
     assert tab.evaluate(PIXELS, 0) == ants
 
 
+CONTENT = "all => all.map((one) => getComputedStyle(one, '::after').content)"
+SIZES = """() => Object.fromEntries(["td small", "td", "p", ".notes"].map((one) => {
+  const found = document.querySelector(`main ${one}`);
+  return [one, found ? parseFloat(getComputedStyle(found).fontSize) : 0];
+}))"""
+
+
 @pytest.mark.parametrize("name", ["comparison", "colony"])
 def test_paper_is_light_and_has_no_controls(opened, name):
     tab = opened(name, color_scheme="dark")
@@ -170,11 +209,37 @@ def test_paper_is_light_and_has_no_controls(opened, name):
     assert controls.count() > 5
     tab.emulate_media(media="print")
     tab.wait_for_function("document.documentElement.dataset.theme === 'light'")
-    # What sorts is the head of the table, and stays.
-    assert tab.locator(".icon:visible, input:visible, select:visible, nav:visible").count() == 0
+    assert controls.count() == 0
+    heads = tab.locator(".statements th").evaluate_all(CONTENT)
+    assert all(one.strip('"') for one in heads)
+    # What explains is not larger than what it explains.
+    sizes = tab.evaluate(SIZES)
+    assert sizes["td small"] < sizes["td"] <= sizes["p"]
+    assert sizes[".notes"] < sizes["p"]
     assert tab.locator(".more table").first.is_visible()
     assert tab.locator(".player canvas").first.is_visible()
     assert tab.pdf().startswith(b"%PDF")
+
+
+FADES = "one => getComputedStyle(one).maskImage"
+
+
+def test_what_is_cut_on_a_phone_fades_there_and_the_papers_column_stays(opened):
+    tab = opened("comparison", width=390)
+    plot = tab.locator(".plot > div").first
+    tab.wait_for_function("document.querySelector('.plot > div.more-right')")
+    assert "rgb(0, 0, 0) 0px, rgb(0, 0, 0) calc(100% - " in plot.evaluate(FADES)
+    plot.evaluate("one => (one.scrollLeft = one.scrollWidth)")
+    tab.wait_for_function("document.querySelector('.plot > div.more-left:not(.more-right)')")
+    table = tab.locator(".scroll").first
+    assert table.evaluate("one => one.classList.contains('more-right')")
+    box = table.bounding_box()
+    for paper in table.locator(".paper").all():
+        inside = paper.bounding_box()
+        assert inside["x"] + inside["width"] <= box["x"] + box["width"] + 1
+    tab.set_viewport_size({"width": 1280, "height": 800})
+    tab.wait_for_function("!document.querySelector('.plot > .more-right, .plot > .more-left')")
+    assert plot.evaluate(FADES) == "none"
 
 
 @pytest.mark.parametrize("name", ["comparison", "colony"])

@@ -12,9 +12,16 @@ from synthetic_colony_study import build, limits
 
 from taichi_ants.analysis.colony.results import Results
 from taichi_ants.analysis.colony.tables import difference_rows, rows_of_seeds
+from taichi_ants.analysis.tables import number
 from taichi_ants.report.colony import colony_page
+from taichi_ants.report.page import signed
 
 BARE = {"drawings": [], "players": [], "facts": {}, "files": []}
+
+
+def words_of(page: str) -> str:
+    """What one reads, with all that is marked up."""
+    return re.sub(r"<script.*?</script>|<style.*?</style>", "", page, flags=re.DOTALL)
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +56,7 @@ def test_every_finding_has_a_line_with_the_numbers_of_the_csv(page: str) -> None
     whole = " ".join(cells[0] for cells in rows)
     for row in difference_rows(study_results().judged):
         digits = 1 if abs(row["mean"]) >= 10 else 2
-        assert f"difference: {row['mean']:.{digits}f}".replace("-0.00", "0.00") in whole
+        assert signed(f"Difference: {number(row['mean'], digits)}") in whole
     firsts = [cells for cells in rows if cells[0].startswith("Ants with all three rules deliver m")]
     assert {cells[2] for cells in firsts[:1]} == {"supported"}
 
@@ -63,8 +70,16 @@ def test_it_asks_for_nothing(page: str) -> None:
 def test_little_is_told_of_little() -> None:
     measured = build(seeds=1, sizes=(1,), ways=("open",), arenas=("small",))
     told = colony_page(*Results.of(measured, limits(measured)), **BARE)
-    assert "nan" not in re.sub(r"<script.*?</script>|<style.*?</style>", "", told, flags=re.S)
+    assert not re.search(r"\b(nan|inf)\b", words_of(told))
     assert "small worlds (15, 15, 15)" in told
+
+
+def test_what_has_no_interval_says_so() -> None:
+    alike = build(seeds=3, noise=0, sizes=(1, 4))
+    told = words_of(colony_page(*Results.of(alike, limits(alike)), **BARE))
+    assert "Difference: 0.00, without an interval." in told
+    assert "1 ant: " in told
+    assert not re.search(r"\b(nan|inf)\b|\b1 ants", told)
 
 
 def test_the_page_is_the_same_from_the_files() -> None:

@@ -14,7 +14,9 @@ from synthetic_comparison import build, subset, unchanged
 from taichi_ants.analysis.paper.audit import claims_rows
 from taichi_ants.analysis.paper.comparison import Variant
 from taichi_ants.analysis.paper.results import Results
-from taichi_ants.report.comparison import comparison_page
+from taichi_ants.analysis.tables import number
+from taichi_ants.report.comparison import DELIVERY, comparison_page
+from taichi_ants.report.page import signed, span
 
 BARE = {"drawings": [], "players": [], "sheet": None, "facts": {}, "files": []}
 
@@ -28,8 +30,14 @@ def test_the_answer_is_the_computed_one(page: str) -> None:
     told = re.search(r'<ol class="answer">(.*?)</ol>', page, re.DOTALL)
     assert told is not None
     sentences = re.findall(r"<li>(.*?)</li>", told[1])
-    assert [unescape(one) for one in sentences] == list(results().answer)
+    assert [unescape(one) for one in sentences] == [signed(one) for one in results().answer]
     assert len(sentences) == 3
+
+
+def test_both_deliveries_are_explained_before_the_answer(page: str) -> None:
+    above = page[: page.index('<section id="answer">')]
+    for words in DELIVERY.values():
+        assert words in above
 
 
 def test_table_2_stands_beside_the_papers(page: str) -> None:
@@ -50,8 +58,8 @@ def test_every_claim_has_a_line_with_the_numbers_of_the_csv(page: str) -> None:
     rows = tables(page)[""][1:]
     expected = claims_rows(results().audit)
     assert len(rows) == len(expected) / 2 == 51
-    for number, cells in enumerate(rows):
-        for column, row in enumerate(expected[2 * number : 2 * number + 2]):
+    for place, cells in enumerate(rows):
+        for column, row in enumerate(expected[2 * place : 2 * place + 2]):
             assert cells[0].startswith(row["statement"])
             assert cells[1] == row["section"]
             assert cells[2 + column] == row["verdict"]
@@ -59,14 +67,33 @@ def test_every_claim_has_a_line_with_the_numbers_of_the_csv(page: str) -> None:
             told = f"{row['delivery'].capitalize()} delivery: {row['verdict']} . {row['contrast']}"
             assert told in cells[0]
             if row["verdict"] != "not tested":
-                effect = f"{row['effect']:.{digits}f}".replace("-0.00", "0.00")
-                assert f"{row['contrast']}: {effect.replace('-0.0', '0.0', 1)}" in cells[0] or (
-                    f"{row['contrast']}: {effect} {row['unit']}" in cells[0]
-                )
+                effect = signed(number(row["effect"], digits))
+                assert f"{row['contrast']}: {effect} {row['unit']}".rstrip() in cells[0]
+
+
+def test_notes_are_whole_sentences(page: str) -> None:
+    lists = re.findall(r'<ul class="notes">(.*?)</ul>', page, re.DOTALL)
+    notes = [note for one in lists for note in re.findall(r"<li>(.*?)</li>", one, re.DOTALL)]
+    assert len(notes) > 10
+    assert all(note.endswith(".") and "\n" not in note for note in notes)
+
+
+def test_minus_signs_are_true_ones_wherever_a_number_stands(page: str) -> None:
+    words = re.sub(r"<(script|style|svg).*?</\1>|<[^>]+>", " ", page, flags=re.DOTALL)
+    assert "\N{MINUS SIGN}" in words
+    assert not re.findall(r"[\s(\[]-[\d.]+", words)
+    assert signed("-1.5, [-3, 4] of 1-2 --seeds 5 and Dyna-Q") == (
+        "\N{MINUS SIGN}1.5, [\N{MINUS SIGN}3, 4] of 1-2 --seeds 5 and Dyna-Q"
+    )
+
+
+def test_seeds_are_told_in_words() -> None:
+    assert span(0, 10) == "0 to 9"
+    assert span(7, 1) == "7"
 
 
 def test_verdicts_are_counted(page: str) -> None:
-    counted = re.findall(r"<li class=\"v-[\w-]+\"><b>(\d+)</b> ([\w ]+)</li>", page)
+    counted = re.findall(r"<b>(\d+)</b> ([\w ]+)</li>", page)
     rows = claims_rows(results().audit)
     assert sum(int(n) for n, _ in counted) == len(rows) == 102
     n = sum(row["verdict"] == "contradicted" for row in rows)

@@ -13,14 +13,17 @@ from taichi_ants.analysis.colony.study import (
     Design,
     Measured,
 )
-from taichi_ants.analysis.findings import Verdict
+from taichi_ants.analysis.findings import LEAST_SEEDS, Verdict, too_few
 from taichi_ants.analysis.tables import figure, joined
 from taichi_ants.errors import count
 
 # What the designs are called here, in a sentence of the form "64 ants ... deliver more ...".
 _SENTENCES: dict[tuple[Design, Design], tuple[str, str]] = {
     (Design(ABC), Design(PAPER)): ("with all three rules", "than under the paper's rules"),
-    (Design(PAPER), Design(SILENT)): ("under the paper's rules that lay trails", "than without"),
+    (Design(PAPER), Design(SILENT)): (
+        "that lay trails under the paper's rules",
+        "than without trails",
+    ),
     (Design(ABC), Design(ABC, ALONE)): (
         "with all three rules that train together",
         "than copies of one that trains alone",
@@ -72,7 +75,12 @@ def _told(measured: Measured, judged: Judged, series: Series, who: str, than: st
         for verdict, more in ((Verdict.SUPPORTED, "more"), (Verdict.CONTRADICTED, "less"))
         if verdict in places
     ]
+    seeds = len(measured[next(iter(measured))][series.measure])
+    few = seeds < LEAST_SEEDS
+    if not known and few:
+        return f"{too_few(seeds)} {ants} deliver more {than}: {still}."
     if not known:
         return f"Whether {ants} deliver more {than} stays open: {still}."
-    more = f"; the difference stays open: {still}" if still else ""
+    stays_open = f"{count(seeds, 'seed')} leave it open" if few else "the difference stays open"
+    more = f"; {stays_open}: {still}" if still else ""
     return f"{ants} deliver {'; '.join(known)}{more}."

@@ -99,8 +99,8 @@ def _dots(rows: Rows, designs: Sequence[Design], title: str) -> Figure | None:
         for axis in axes.flat[len(panels) :]:
             axis.set_axis_off()
         ants = sorted({int(row["ants"]) for lines in panels.values() for row in lines.values()})
-        sizes = " or ".join(map(str, ants))
-        caption = f"{sizes} ants. {_spread(rows)} Grey bar: no colony can deliver more."
+        sizes = f"{' or '.join(map(str, ants))} {'ant' if ants == [1] else 'ants'}"
+        caption = f"{sizes}. {_spread(rows)} Grey bar: no colony can deliver more."
         style.frame(figure, f"{title}: {MEASURES['deliveries']}", caption, {})
     return figure
 

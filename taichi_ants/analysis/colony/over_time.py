@@ -49,8 +49,13 @@ def save(rows: Rates, who: str, path: PathLike) -> None:
         AntsError: A file cannot be written.
     """
     check_writable_folder(Path(path).parent)
-    write_csv(Path(path).with_suffix(".csv"), rows, COLUMNS)
+    write_csv(numbers_beside(path), rows, COLUMNS)
     style.save(draw(rows, who), Path(path))
+
+
+def numbers_beside(path: PathLike) -> Path:
+    """The file with the numbers of a figure."""
+    return Path(path).with_suffix(".csv")
 
 
 def draw(rows: Rates, who: str) -> Figure:

@@ -25,7 +25,7 @@ from taichi_ants.analysis.colony.study import (
 )
 from taichi_ants.analysis.findings import Finding, Verdict, weakest
 from taichi_ants.analysis.sweeps import seed_rows, summary_rows
-from taichi_ants.analysis.tables import MISSING, Block, Table, figure, sentence
+from taichi_ants.analysis.tables import MISSING, Block, Table, figure, number, sentence
 from taichi_ants.errors import count
 
 
@@ -95,7 +95,7 @@ def means(rows: Sequence[Mapping[str, Any]]) -> list[Table]:
             there.setdefault(row["arena"], {})[row["rules"]] = row["deliveries_mean"]
         cells = [[WORLDS[a], *(figure(by[one]) for one in rules)] for a, by in there.items()]
         headers = ("world", *(RULES[one] for one in rules))
-        title = f"{sentence(WAYS[ABROAD])}, {abroad[0]['ants']} ants, {seeds}"
+        title = f"{sentence(WAYS[ABROAD])}, {count(abroad[0]['ants'], 'ant')}, {seeds}"
         tables.append(Table(title, headers, cells))
     return tables
 
@@ -110,8 +110,9 @@ def glance(rows: Sequence[Mapping[str, Any]]) -> Table:
     designs = [Design(PAPER, ALONE), *(Design(rules) for rules in RULES), Design(ABC, ALONE)]
     arenas = [arena for arena in ARENAS if any(row["arena"] == arena for row in shown)]
     by_place = {(row["arena"], Design(row["rules"], row["way"])): row for row in shown}
+    digits = 0 if max((row["deliveries_mean"] for row in shown), default=0) >= 100 else 1
     cells = [
-        [sentence(one.words), *(_delivered(by_place.get((arena, one))) for arena in arenas)]
+        [sentence(one.words), *(_delivered(by_place.get((arena, one)), digits) for arena in arenas)]
         for one in designs
         if any((arena, one) in by_place for arena in arenas)
     ]
@@ -125,8 +126,8 @@ def glance(rows: Sequence[Mapping[str, Any]]) -> Table:
     return Table(title, headers, cells)
 
 
-def _delivered(row: Mapping[str, Any] | None) -> str:
-    return MISSING if row is None else figure(row["deliveries_mean"])
+def _delivered(row: Mapping[str, Any] | None, digits: int) -> str:
+    return MISSING if row is None else number(row["deliveries_mean"], digits)
 
 
 def on_one_screen(

@@ -14,15 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from taichi_ants.analysis.paper.measures import RunOutcomes
-from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.learners import TrainingConfig, label
 from taichi_ants.task import Task
 
-_NAMES = {
-    "q_learning": "Q-learning",
-    "sarsa": "SARSA",
-    "expected_sarsa": "Expected SARSA",
-    "dyna_q": "Dyna-Q",
-}
 # The name of the world in which the paper's figures and claims mean something.
 PAPER_WORLD = "the paper's"
 _PAPER_TASK = Task()
@@ -44,7 +38,7 @@ class Variant(NamedTuple):
     @property
     def label(self) -> str:
         """Its name for readers, for example "Dyna-Q (p3)"."""
-        name = _NAMES.get(self.learner, self.learner)
+        name = label(self.learner)
         return f"{name} ({', '.join(self.short)})" if self.short else name
 
 

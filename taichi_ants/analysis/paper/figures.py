@@ -69,6 +69,8 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Mapping] = ()) -
             axis.set_ylabel(f"{label} of an episode")
             if name == "steps":
                 logarithmic(axis.yaxis, (1, 2, 5))
+            if name == "deliveries":  # a share, of which few hundredths are not to look like much
+                axis.set_ylim(min(0.9, axis.get_ylim()[0]), 1.02)
         for column, setting in zip(axes.T, settings, strict=True):
             column[0].set_title(f"{setting.capitalize()} delivery")
             _shortest_delivery(column, baselines)
@@ -77,8 +79,10 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Mapping] = ()) -
         words = (
             f"Line: interquartile mean of {count(len(comparison.seeds), 'seed')} (of deliveries "
             "the mean), band: their middle half. Later points are means over longer spans.\n"
-            f"Learners have {FIGURE_1.label} unless named otherwise: the paper's figure 1 names no "
-            "configuration, this one\nstands twice in its table 2."
+            "Where the legend names nothing else, the learning rate is "
+            f"{FIGURE_1.learning_rate:g}, the discount {FIGURE_1.discount:g}, epsilon "
+            f"{FIGURE_1.epsilon:g}\nand its decay {FIGURE_1.epsilon_decay:g}: the paper's figure 1 "
+            "names no configuration, this one stands twice in its table 2."
         )
         frame(figure, "Learning", words, legend_entries(axes.flat))
     return figure

@@ -218,19 +218,21 @@ def rank_correlation(first: str, second: str, variant: Variant) -> Quantity:
     """Spearman's, of two measures over a learner's 16 runs of a seed; 0 where one is constant."""
 
     def correlation(part: Slice) -> np.ndarray:
-        from scipy.stats import rankdata
-
-        ranks = (
-            rankdata(part.grid(measure, variant).reshape(len(GRID), -1), axis=0)
+        one, other = (
+            _centred_ranks(part.grid(measure, variant).reshape(len(GRID), -1))
             for measure in (first, second)
         )
-        one, other = (rank - (len(GRID) + 1) / 2 for rank in ranks)
         scale = np.sqrt((one**2).sum(axis=0) * (other**2).sum(axis=0))
         return (one * other).sum(axis=0) / np.where(scale > 0, scale, 1.0)
 
     pair = f"{MEASURES[first].words} and {MEASURES[second].words}"
     words = f"rank correlation of {pair} over the 16 configurations of a seed"
     return Quantity(words, "correlation", {variant.label: correlation}, DIFFERENCE)
+
+
+def _centred_ranks(values: np.ndarray) -> np.ndarray:
+    """Ranks in each column of (n, columns), less their mean; equal values share the middle one."""
+    return np.sign(values[:, None] - values).sum(axis=1) / 2
 
 
 def stronger(measure: str, factor: str) -> Quantity:

@@ -49,7 +49,7 @@ def all_tables(
     lines: Sequence[Mapping],
     behaviours: Sequence[Mapping],
     baselines: Sequence[Mapping] = (),
-) -> list[Block]:
+) -> list[Table]:
     """All tables, but those of the claims, each with its notes.
 
     What is given is from `table2.table2`, `summary.summarise_behaviours` and
@@ -85,8 +85,8 @@ def _glance(lines: Sequence[Mapping]) -> Table:
         rows.append([label(line), line["delivery"], *cells, deliveries])
     headers = ("Learner", "Delivery", *columns.values(), "Food\nmean")
     notes = [
-        "Return and food of the last 50 episodes, steps of all. IQM: interquartile mean,",
-        "the typical run. Best run: best by return of all configurations, one run each.",
+        "Return and food of the last 50 episodes, steps of all. IQM: interquartile mean, the "
+        "typical run. Best run: best by return of all configurations, one run each.",
     ]
     if any(apart(line, "return_last50") for line in shown):
         notes.append(f"{APART} a few far runs have moved the mean away from the typical run.")
@@ -132,7 +132,8 @@ def _greedy(lines: Sequence[Mapping]) -> Table:
 
 def behaviour_table(lines: Sequence[Mapping], behaviours: Sequence[Mapping]) -> Table:
     """What the final policies do, in the configurations that the tables above show."""
-    headers = ("Learner", "Delivery", "Behaviour", "Runs", "Return\ntraining", "followed", "greedy")
+    returns = ("Return\nin training", "Return\nfollowed", "Return\ngreedy")
+    headers = ("Learner", "Delivery", "Behaviour", "Runs", *returns)
     configuration = ("learner", "hyperparameters", "delivery", *GridPoint._fields)
     means = ("return_last50_mean", "policy_return_mean", "greedy_return_mean")
     rows = [
@@ -146,14 +147,12 @@ def behaviour_table(lines: Sequence[Mapping], behaviours: Sequence[Mapping]) -> 
     ]
     notes = (
         "Each policy is followed greedily once, with evaporation as in training.",
-        *(f"{one}: {means}" for one, means in zip(BEHAVIOURS, DEFINITIONS, strict=True)),
+        *(f"{one}: {means}." for one, means in zip(BEHAVIOURS, DEFINITIONS, strict=True)),
         "An episode without delivery is told by its second half.",
-        "Return: mean of the last 50 training episodes, of the episode that tells the",
-        "behaviour, of the greedy evaluation. summary.csv counts all configurations.",
+        "Return: mean of the last 50 training episodes, of the episode that tells the behaviour, "
+        "of the greedy evaluation. summary.csv counts all configurations.",
     )
-    return Table(
-        "What they do in the configurations of table 2", headers, rows, notes, text_columns=3
-    )
+    return Table("What they do, in the configurations above", headers, rows, notes, text_columns=3)
 
 
 def _baselines(baselines: Sequence[Mapping]) -> Table:

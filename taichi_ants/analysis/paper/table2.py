@@ -23,7 +23,7 @@ from taichi_ants.analysis.paper.best_of import (
 )
 from taichi_ants.analysis.paper.comparison import Comparison, GridPoint, Variant
 from taichi_ants.analysis.paper.measures import WINDOW
-from taichi_ants.analysis.tables import MISSING, Block, Table, interval, number, percent
+from taichi_ants.analysis.tables import MISSING, Table, interval, number, percent
 from taichi_ants.errors import count
 
 # Below, a note warns that means have too few seeds; what intervals cover is measured in
@@ -81,6 +81,11 @@ def apart(line: Mapping, measure: str) -> bool:
     return mean < low or mean > high
 
 
+def _moved(line: Mapping, measure: str) -> bool:
+    """Whether it is so, of a measure that may have no IQM."""
+    return f"{measure}_iqm" in line and apart(line, measure)
+
+
 def _spread(line: Mapping, stem: str, *names: str, mark: str = "") -> str:
     """A centre and below it its interval, of which one seed has none; "-" where it has none."""
     if f"{stem}_{names[0]}" not in line:
@@ -92,7 +97,7 @@ def _spread(line: Mapping, stem: str, *names: str, mark: str = "") -> str:
     return text if math.isnan(low) or low == high else f"{text}\n{interval(low, high, digits)}"
 
 
-def figure_tables(lines: Sequence[Mapping], comparison: Comparison) -> list[Block]:
+def figure_tables(lines: Sequence[Mapping], comparison: Comparison) -> list[Table]:
     """A table for each figure of a run, beside the paper's in its world, and what they mean."""
     runs = comparison.episodes
     late = f"last {WINDOW} episodes" if runs > WINDOW else f"all {count(runs, 'episode')}"
@@ -100,7 +105,7 @@ def figure_tables(lines: Sequence[Mapping], comparison: Comparison) -> list[Bloc
     headers = ("Learner", "Delivery", "Mean", "IQM", "Best run", "Paper", "Below")
     beside = not all(math.isnan(line["paper_return"]) for line in lines)
     width = len(headers) if beside else len(headers) - 2
-    tables: list[Block] = []
+    tables = []
     for name, title in zip(FIGURES, titles, strict=True):
         best = f"best_run_{name}"
         rows = [
@@ -109,7 +114,7 @@ def figure_tables(lines: Sequence[Mapping], comparison: Comparison) -> list[Bloc
                 line["delivery"],
                 _spread(
                     *(line, name, "mean", "ci_low", "ci_high"),
-                    mark=f" {APART}" if f"{name}_iqm" in line and apart(line, name) else "",
+                    mark=f" {APART}" if _moved(line, name) else "",
                 ),
                 _spread(line, name, "iqm", "iqm_ci_low", "iqm_ci_high"),
                 _spread(line, best, "median", "low", "high"),
@@ -119,16 +124,19 @@ def figure_tables(lines: Sequence[Mapping], comparison: Comparison) -> list[Bloc
             for line in lines
         ]
         tables.append(Table(title, headers[:width], rows, text_columns=2))
-    return [*tables, "  \n".join(_notes(lines, len(comparison.seeds), beside))]
+    return [*tables, Table("", (), (), _notes(lines, len(comparison.seeds), beside))]
 
 
 def _notes(lines: Sequence[Mapping], seeds: int, beside: bool) -> list[str]:
     notes = [
-        f"Mean, IQM: over {count(seeds, 'seed')}, with intervals at 95 %.",
+        f"Mean, IQM: over {seeds} seeds, with intervals at 95 %."
+        if seeds > 1
+        else "Mean, IQM: of one seed, which has no interval.",
         "IQM: interquartile mean, of the middle half of the runs: the typical run.",
-        f"{APART} the mean lies outside of the IQM's interval: a few far runs have moved it.",
-        "Best run: best by return of all configurations, one run each: median [95 %].",
+        "Best run: best by return of all configurations, one run each: median, [95 % range].",
     ]
+    if any(_moved(line, name) for line in lines for name in FIGURES):
+        notes.append(f"{APART} the mean is outside of the IQM's interval: far runs have moved it.")
     if beside:
         notes += [
             "Paper: its table 2. Its steps may be of all episodes or of the last 50.",
@@ -136,7 +144,7 @@ def _notes(lines: Sequence[Mapping], seeds: int, beside: bool) -> list[str]:
         ]
     if 1 < seeds < FEW_SEEDS:
         notes += [
-            f"Few seeds ({seeds}): where one run in a hundred is far off, the interval of the mean",
+            f"Few seeds ({seeds}): where one run in a hundred is far off, the interval of the mean "
             "misses it more often than not. The IQM's holds from 10 seeds on (docs/statistics.md).",
         ]
     starred = [
@@ -146,8 +154,8 @@ def _notes(lines: Sequence[Mapping], seeds: int, beside: bool) -> list[str]:
         if not line["paper_configuration"]
     ]
     if starred:
-        notes += ["* its best by the IQM of the return, on these seeds, which flatters it"]
-        notes += ["  (learning rate / discount / epsilon / decay):", *starred]
+        best = "* its best by the IQM of the return, on these seeds, which flatters it"
+        notes += [f"{best} (learning rate / discount / epsilon / decay):", *starred]
     if any(map(mixed, lines)):
-        notes.append("+ the runs do different things, and no run has their mean")
+        notes.append("+ the runs do different things, and no run has their mean.")
     return notes

@@ -61,6 +61,19 @@ def test_worlds_that_disagree_are_told_apart() -> None:
     assert still.endswith(" with three far piles.")
 
 
+def test_few_seeds_say_that_they_cannot_tell() -> None:
+    sentence = told(noise=20, seeds=3)[0]
+    assert sentence.startswith("3 seeds are too few to tell whether 8 ants with all three rules ")
+    assert told(seeds=1)[1].startswith("1 seed is too few to tell whether 8 ants that lay trails ")
+    study = dict(build(times(2, ABC), noise=1, seeds=3, arenas=("paper", "open")))
+    for condition, measures in study.items():
+        if condition.arena == "open":
+            study[condition] = {**measures, "deliveries": measures["deliveries"] * [0, 1, 5]}
+    known, open_one = Results.of(study, limits(study)).answer[0].split("; ")
+    assert known.endswith(" in the paper's world")
+    assert open_one.startswith("3 seeds leave it open: ")
+
+
 def test_one_ant_alone_answers_nothing() -> None:
     for sentence in told(sizes=(1,)):
         assert sentence.startswith("Whether ants ")

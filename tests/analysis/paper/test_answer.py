@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,13 +10,14 @@ import pytest
 from synthetic_comparison import build, change, level_truth, subset, unchanged
 
 from taichi_ants.analysis.behaviour import CIRCLES, DELIVERS, OTHER, WALKS
-from taichi_ants.analysis.paper.answer import NEEDS, answer, temptation
+from taichi_ants.analysis.paper.answer import NEEDS, USUAL_SEEDS, answer, temptation
 from taichi_ants.analysis.paper.audit import assess
 from taichi_ants.analysis.paper.claims import CLAIMS
 from taichi_ants.analysis.paper.comparison import Comparison
 from taichi_ants.analysis.paper.published import DYNA_P5, Q_LEARNING, SARSA
 from taichi_ants.analysis.paper.summary import summarise
 from taichi_ants.analysis.paper.table2 import table2
+from taichi_ants.commands.compare import parse_arguments
 
 CHOSEN = [claim for claim in CLAIMS if claim.id in ("q-return-highest", "overall-sarsa-length")]
 
@@ -34,8 +36,8 @@ def test_what_the_paper_says_is_said_where_it_is_so(paper: Comparison) -> None:
     returns, steps, doings = told(paper)
     assert returns.startswith("Q-learning returns most, as the paper says: Q-learning minus ")
     assert steps.startswith("SARSA needs the fewest steps, as the paper says: ")
-    assert "reward [" in returns
-    assert "steps [" in steps
+    assert re.search(r" is [\d.]+ reward, between [\d.]+ and [\d.]+\.$", returns)
+    assert re.search(r" is [\d.]+ steps, between [\d.]+ and [\d.]+\.$", steps)
     assert doings == f"All of {paper.behaviours.size} final policies deliver."
 
 
@@ -55,10 +57,50 @@ def test_alike_and_open_are_two_things() -> None:
     level = build({"absorbing": unchanged}, seeds=12, truth=level_truth, shared=0.0)
     returns, steps, _ = told(level)
     assert returns.startswith("Q-learning does not return most, other than the paper says: ")
-    assert returns.endswith("], less than matters.")
-    assert steps.endswith("], less than matters.")
-    noisy = build({"absorbing": unchanged}, seeds=6, truth=level_truth, noise=200)
+    assert returns.endswith(", too little to matter.")
+    assert steps.endswith(", too little to matter.")
+    noisy = build({"absorbing": unchanged}, seeds=100, truth=level_truth, noise=200)
     assert told(noisy)[0].startswith("Whether Q-learning returns most, as the paper says, stays ")
+
+
+def test_a_quick_look_says_why_it_leaves_things_open_and_what_tells_more() -> None:
+    quick = build({"absorbing": unchanged}, seeds=10, truth=level_truth, noise=200)
+    assert re.fullmatch(
+        r"10 seeds are too few to tell whether Q-learning returns most, as the paper says: .* is "
+        r".* reward, between .* and .*; compare --seeds 100 tells more\.",
+        told(quick)[0],
+    )
+    assert parse_arguments([]).seeds == USUAL_SEEDS
+
+
+@pytest.mark.parametrize(("seeds", "who"), [(1, "1 seed is"), (3, "3 seeds are")])
+def test_few_seeds_say_that_they_cannot_tell(seeds: int, who: str) -> None:
+    few = build({"continuing": unchanged}, seeds, truth=level_truth, noise=200)
+    first, second, third = told(few)
+    assert first == (
+        f"{who} too few to tell whether Q-learning returns most or SARSA needs the fewest steps, "
+        "as the paper says; compare --seeds 100 tells more."
+    )
+    assert second.startswith(f"With {who.rsplit(' ', 1)[0]}, ")
+    assert "between" not in first + second
+    assert third == f"All of {few.behaviours.size} final policies deliver."
+
+
+def test_what_few_seeds_do_tell_is_told(paper: Comparison) -> None:
+    noisy = build({"continuing": unchanged}, seeds=6, truth=level_truth, noise=200)
+    both = build({"continuing": unchanged, "absorbing": unchanged}, seeds=6)
+    half = len(paper.rows)
+    arrays = {
+        name: np.concatenate([getattr(both, name)[:half], getattr(noisy, name)])
+        for name in ("returns", "steps")
+    }
+    returns = told(replace(both, **arrays))[0]
+    assert re.fullmatch(
+        r"With continuing delivery Q-learning returns most, as the paper says: .* is .* reward, "
+        r"between .* and .*; with absorbing delivery 6 seeds are too few to tell whether "
+        r"Q-learning returns most; compare --seeds 100 tells more\.",
+        returns,
+    )
 
 
 def test_delivery_settings_that_disagree_are_told_apart(paper: Comparison) -> None:
@@ -80,7 +122,8 @@ def test_who_does_not_deliver_is_told(paper: Comparison) -> None:
     mixed = replace(paper, behaviours=codes)
     assert told(mixed)[2] == (
         f"Of {codes.size} final policies, {codes.size - 5} deliver; 3 walk the trail, 1 circle "
-        "with food and 1 do something else, 80 % of them Dyna-Q (p5) with continuing delivery."
+        "with food and 1 do something else; of those that do not deliver, 80 % are "
+        "Dyna-Q (p5) with continuing delivery."
     )
     none = replace(paper, behaviours=np.full_like(codes, WALKS))
     assert f"Of {codes.size} final policies, none deliver; {codes.size} walk" in told(none)[2]
@@ -94,14 +137,8 @@ def test_without_the_papers_world_the_learners_are_compared(paper: Comparison) -
     best = max(line["return_last50_iqm"] for line in lines)
     assert f"returns {best:.1f}, the most, and SARSA" in second
     one = subset(garden, [20], 3, 9)
-    assert told(one)[1].startswith("In the typical run SARSA with continuing delivery returns ")
+    assert told(one)[1].startswith("With 3 seeds, SARSA with continuing delivery returns ")
     assert told(one)[1].endswith(" steps.")
-
-
-def test_one_seed_has_no_interval(paper: Comparison) -> None:
-    returns = told(subset(paper, range(len(paper.rows)), 1, 120))[0]
-    assert "[" not in returns
-    assert "nan" not in returns
 
 
 def test_learners_that_are_missing_leave_a_claim_untested(paper: Comparison) -> None:

@@ -29,7 +29,7 @@ ROW = Row("continuing", SARSA, FIGURE_1)
 def test_hyperparameters_with_the_same_first_letter_are_named_in_full() -> None:
     assert DYNA_P3.label == "Dyna-Q (p3)"
     alike = Variant("sarsa_lambda", "trace_decay=0.9 trace_length=32")
-    assert alike.label == "sarsa_lambda (trace_decay=0.9, trace_length=32)"
+    assert alike.label == "SARSA(lambda) (trace_decay=0.9, trace_length=32)"
     assert Variant("mine", "depth=2 alpha=0.1").label == "mine (d2, a0.1)"
 
 

@@ -108,7 +108,8 @@ def test_learning_curves_are_interquartile_means_of_growing_spans(comparison: Co
             assert (list(found.get_ydata()) if found else None) == shortest
     titles = [axis.get_title(loc="left") for axis in axes[0]]
     assert titles == ["Continuing delivery", "Absorbing delivery"]
-    assert f"Learners have {FIGURE_1.label} unless named otherwise" in words_of(figure)
+    words = " ".join(words_of(figure).split())
+    assert "the learning rate is 0.01, the discount 0.9, epsilon 0.3 and its decay 0.995" in words
 
 
 def test_a_learner_without_the_shared_configuration_is_shown_at_its_own(
@@ -123,6 +124,15 @@ def test_a_learner_without_the_shared_configuration_is_shown_at_its_own(
         parts = np.array([some.returns[best][:, part].mean(axis=1) for part in spans(120)])
         line = labelled(axis)[f"SARSA, {setting}: {some.rows[best].point.label}"]
         np.testing.assert_allclose(line.get_ydata(), interquartile_mean(parts))
+
+
+def test_few_hundredths_of_deliveries_do_not_look_like_much(comparison: Comparison) -> None:
+    always = replace(comparison, deliveries=np.ones_like(comparison.deliveries))
+    figure = learning_curves(always, BASELINES)
+    low, high = figure.axes[-1].get_ylim()
+    assert figure.axes[-2].get_ylabel() == "Deliveries of an episode"
+    assert low <= 0.9
+    assert 1 < high < 1.05
 
 
 def test_returns_against_deliveries_shows_what_runs_do_and_baselines(
