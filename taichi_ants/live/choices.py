@@ -123,7 +123,10 @@ class Choices:
             "rules": RULES,
             "life": LIFE,
             "sees": {name: observations.get(name).summary for name in observations.names()},
-            "learners": {name: learners.get(name).summary for name in learners.names()},
+            "learners": {
+                name: {"words": learners.label(name), "summary": learners.get(name).summary}
+                for name in learners.names()
+            },
             "by_hand": list(FOLLOWED),
             "policies": {
                 name: {"sees": policy.observation, "rules": rules_of(policy.task)}

@@ -5,8 +5,9 @@ const SLIDERS = {
   deposit: "Deposit", cap: "Most of a trail", slope: "Slope of trails", epsilon: "Epsilon", learning_rate: "Learning rate",
 };
 const FILE_TYPES = { html: "text/html", gif: "image/gif" };
+const WORKS = { page: "page", gif: "GIF" };
 const MOST_UPLOAD = 2 ** 24;
-const MAP = `; lines are offset by two columns
+const MAP = `; lines shift by two columns
           .
         .   F
       .   .   .
@@ -28,11 +29,17 @@ class Controls {
     this.live = live;
     this.held = new Map(); // sliders that somebody moves -> until when
     this.filled = "";
+    this.works = new Map(); // what takes long -> its part of the page
+    this.roomy = matchMedia("(min-height: 1150px) and (min-width: 841px)"); // for all cards at once
+    byId("new").open = this.roomy.matches;
+    document.querySelector(".stage").append(byId("notices"));
     byId("theme").insertAdjacentHTML("beforebegin", '<span class="watchers" id="watchers"></span>');
     const on = (id, kind, act) => byId(id).addEventListener(kind, act);
     on("chosen", "submit", (event) => {
       event.preventDefault();
       this.busy("The session begins …");
+      this.begins = true;
+      live.stand();
       live.ask("begin", { chosen: this.chosen() });
     });
     on("world-name", "change", () => this.showWorld());
@@ -40,7 +47,12 @@ class Controls {
     on("rules", "change", () => this.nameTask());
     on("sees", "change", () => this.nameTask());
     on("policy", "change", () => this.showPolicy());
-    on("restart", "click", () => live.ask("restart"));
+    on("chosen", "change", () => this.explain());
+    on("map", "beforeinput", (event) => this.paste(event));
+    on("restart", "click", () => {
+      live.stand();
+      live.ask("restart");
+    });
     on("next-episode", "click", () => live.ask("edit", { edit: { kind: "episode" } }));
     on("files", "click", (event) => {
       const kind = event.target.dataset.export;
@@ -54,9 +66,13 @@ class Controls {
     on("sliders", "input", (event) => this.slide(event.target));
     live.news.addEventListener("begin", () => this.fill());
     live.news.addEventListener("state", ({ detail }) => this.show(detail));
-    live.news.addEventListener("error", ({ detail }) => this.say(detail.words, true));
+    live.news.addEventListener("error", ({ detail }) => this.refuse(detail.words));
+    live.news.addEventListener("drawn", ({ detail }) => this.showRates(detail));
     live.news.addEventListener("file", ({ detail }) => this.download(detail));
-    live.news.addEventListener("over", () => this.end());
+    live.news.addEventListener("cancelled", () => this.say("Cancelled."));
+    live.news.addEventListener("over", ({ detail }) => this.end(detail));
+    this.busy("Waiting for the simulation …");
+    this.hold(true);
   }
 
   /* Offer what there is, and choose what the session has. */
@@ -69,15 +85,18 @@ class Controls {
       byId("task").innerHTML = options([...Object.entries(choices.tasks).map(([name, { words }]) => [name, words]), ["", "single rules"]]);
       byId("rules").innerHTML = Object.entries(choices.rules).map(([name, words]) =>
         `<label class="rule"><input type="checkbox" value="${name}"> ${safe(words)}</label>`).join("");
-      byId("sees").innerHTML = options(Object.entries(choices.sees).map(([name, words]) => [name, `${name}: ${words}`]));
-      byId("policy").innerHTML = `<optgroup label="Learn now">${options(Object.keys(choices.learners).map((name) => [`learn ${name}`, `learn now: ${name.replaceAll("_", " ")}`]))}</optgroup>
-        <optgroup label="Follow a policy">${options([["by hand", "follow the trail, by hand"], ...Object.keys(choices.policies).map((name) => [`file ${name}`, `follow ${name}`])])}</optgroup>`;
+      byId("sees").innerHTML = options(Object.keys(choices.sees).map((name) => [name, name.replaceAll("_", " ")]));
+      byId("policy").innerHTML = `<optgroup label="Learn now">${options(Object.entries(choices.learners).map(([name, { words }]) => [`learn ${name}`, words]))}</optgroup>
+        <optgroup label="Follow a policy">${options([["by hand", "the trail, by hand"], ...Object.keys(choices.policies).map((name) => [`file ${name}`, name.replaceAll("_", " ")])])}</optgroup>`;
       byId("ants").max = choices.most.ants;
       [byId("size").min, byId("size").max] = choices.sizes;
       byId("map").value = MAP;
       byId("map").maxLength = choices.most.text;
     }
     this.choose(chosen);
+    if (this.begins && !this.roomy.matches) byId("new").open = false;
+    this.begins = false;
+    this.hold(false);
     this.hush();
   }
 
@@ -94,12 +113,34 @@ class Controls {
     this.keepsRules = chosen.rules === null; // those of a policy, which have no names
     this.showWorld();
     this.nameTask();
+    this.explain();
+    const words = (id) => byId(id).selectedOptions[0]?.text ?? "";
+    byId("now-chosen").textContent = [words("world-name"), words("task"), words("policy")].join(" · ");
+  }
+
+  /* Tell what the chosen names mean, whole names too, which may be too long for their boxes. */
+  explain() {
+    const { choices } = this.live, policy = byId("policy").value, name = policy.replace(/^(learn|file) /, "");
+    byId("sees-help").textContent = choices.sees[byId("sees").value] ?? "";
+    const follows = policy === "by hand" ? "They follow a trail, with values set by hand." : `They follow ${name}, and do not learn.`;
+    byId("policy-help").textContent = policy.startsWith("learn ") ? `They learn: ${choices.learners[name]?.summary ?? ""}.` : follows;
+  }
+
+  /* Put long text into the map at once: browsers take a time that grows with the square of its lines. */
+  paste(event) {
+    const { target: map, data } = event;
+    if ((data?.length ?? 0) < 1000) return;
+    event.preventDefault();
+    const { selectionStart: from, selectionEnd: to } = map, room = map.maxLength - map.textLength + to - from;
+    map.setRangeText(data.slice(0, room), from, to, "end");
+    if (room < data.length) this.say(`The map is longer than ${map.maxLength} characters; its end is left out.`, true);
   }
 
   chosen() {
-    const value = (id) => byId(id).value, number = (id) => byId(id).valueAsNumber;
+    const value = (id) => byId(id).value, usual = this.live.chosen;
+    const number = (id, name = id) => (byId(id).disabled ? usual[name] : byId(id).valueAsNumber);
     return {
-      world: value("world-name"), map: value("map"), world_seed: number("world-seed"), size: number("size"), sees: value("sees"), policy: value("policy"),
+      world: value("world-name"), map: value("map"), world_seed: number("world-seed", "world_seed"), size: number("size"), sees: value("sees"), policy: value("policy"),
       rules: this.keepsRules ? null : this.rules(), ants: number("ants"), ticks: number("episode"), seed: number("seed"),
     };
   }
@@ -117,6 +158,8 @@ class Controls {
     const world = byId("world-name").value;
     byId("map-label").hidden = world !== "map";
     byId("drawn").hidden = !this.live.choices.drawn.includes(world);
+    // What nobody sees holds nobody up, whatever it says.
+    for (const field of byId("drawn").querySelectorAll("input")) field.disabled = byId("drawn").hidden;
   }
 
   showTask() {
@@ -152,7 +195,8 @@ class Controls {
   }
 
   /* Show how things stand; sliders that somebody moves are left alone. */
-  show({ values, pages }) {
+  show({ values, pages, works }) {
+    this.showWorks(works);
     const box = byId("sliders"), names = Object.keys(values).join();
     if (box.dataset.names !== names) {
       box.dataset.names = names;
@@ -172,7 +216,51 @@ class Controls {
       }
     }
     this.live.viewer?.timeline.showSpeed();
-    byId("watchers").textContent = pages > 1 ? `${pages} pages look on` : "";
+    byId("watchers").innerHTML = pages > 1 ? `${pages} pages<span> look on</span>` : "";
+  }
+
+  /* What decays from episode to episode, as it was in the frame that is drawn. */
+  showRates({ epsilon, learningRate }) {
+    for (const [name, value] of Object.entries({ epsilon, learning_rate: learningRate })) {
+      const slider = byId(`set-${name}`);
+      if (!slider || (this.held.get(name) ?? 0) > performance.now()) continue;
+      slider.value = value;
+      this.showSlider(slider, value);
+    }
+  }
+
+  /* What takes long, each with a bar and a button; while a session is replayed, nothing else begins. */
+  showWorks(works) {
+    const box = byId("works"), kinds = works.map(({ kind }) => kind);
+    for (const [kind, part] of this.works) {
+      if (kinds.includes(kind)) continue;
+      part.remove();
+      this.works.delete(kind);
+    }
+    for (const { kind, done, total } of works) {
+      if (!this.works.has(kind)) this.addWork(kind, box);
+      const part = this.works.get(kind), number = (n) => n.toLocaleString("en").replaceAll(",", "\u202f");
+      const words = kind === "kernels" ? "Preparing the kernels" : kind === "load" ? "Replaying" : `Making the ${WORKS[kind]}:`, bar = part.querySelector("progress");
+      part.querySelector("span").textContent = done ? `${words} ${number(done)} of ${number(total)} ticks` : `${words.replace(":", "")} …`;
+      if (done) Object.assign(bar, { value: done, max: total });
+      else bar.removeAttribute("value");
+    }
+    this.hold(kinds.includes("load"));
+  }
+
+  /* Whether nothing can be asked for. */
+  hold(holds) {
+    for (const part of document.querySelectorAll(".controls, .palette, .buttons")) part.inert = holds;
+  }
+
+  addWork(kind, box) {
+    const part = document.createElement("div");
+    part.innerHTML = `<span></span><progress aria-label="${{ load: "Replaying", kernels: "Preparing the kernels" }[kind] ?? WORKS[kind]}"></progress>`
+      + (kind === "kernels" ? "" : '<button type="button" class="text-button">Cancel</button>');
+    part.querySelector("button")?.addEventListener("click", () => this.live.ask("cancel", { kind }));
+    box.append(part);
+    this.works.set(kind, part);
+    this.hush();
   }
 
   showSlider(slider, value) {
@@ -199,7 +287,7 @@ class Controls {
     if (!file) return;
     if (file.size > MOST_UPLOAD) this.say("This file is larger than any session.", true);
     else {
-      this.busy("The session is replayed …");
+      this.busy("The session is read …");
       this.live.socket.send(await file.arrayBuffer());
     }
     byId("upload").value = "";
@@ -226,14 +314,22 @@ class Controls {
     }, 4000);
   }
 
-  end() {
-    this.say("The server has ended; this page shows what happened so far.", true);
+  end({ code, reason }) {
+    if (this.ended) return;
+    this.ended = true;
+    this.showWorks([]);
+    const why = { 1006: "The connection is lost", 1008: `The server has cut this page off (${reason})` }[code];
+    this.say(why ? `${why}; reload the page to go on.` : "The server has ended; this page shows what happened so far.", true);
     clearTimeout(this.fading);
     for (const one of document.querySelectorAll(".controls :is(button, input, select, textarea), .palette :is(button, input), #play, #speed")) one.disabled = true;
     this.live.running = false;
     this.live.viewer?.player.take();
   }
 
+  refuse(words) {
+    this.begins = false;
+    this.say(words.charAt(0).toUpperCase() + words.slice(1), true);
+  }
   busy(words) {
     this.say(words);
     clearTimeout(this.fading);

@@ -61,14 +61,14 @@ class Value(NamedTuple):
 def values(hand: Hand) -> dict[str, Value]:
     """What "set" changes in a colony, by name; only what makes a difference there.
 
-    - ants: how many live now, and start each later episode.
+    - ants: how many live now; set, it is how many start each later episode as well.
     - epsilon, learning_rate: from now on; what a hand has set decays no more.
     - deposit, slope, cap: as `Pheromone` has them; the deposit is its level.
     - evaporation: 1 if trails fall, else 0. half_life, diffusion: as `Pheromone` has them.
     """
     colony, pheromone = hand.colony, hand.colony.pheromone
     found = {
-        "ants": Value(hand.ants, 1, colony.capacity, 1),
+        "ants": Value(max(hand.living, 1), 1, colony.capacity, 1),
         "epsilon": Value(colony.epsilon, 0.0, 1.0, 0.01),
     }
     if colony.sharing != "fixed":

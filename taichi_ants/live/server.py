@@ -16,23 +16,21 @@ import hmac
 import json
 import logging
 import math
-import multiprocessing
 import queue
 import secrets
-import signal
 import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
-from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
 from taichi_ants.errors import AntsError
 from taichi_ants.live.choices import Choices
+from taichi_ants.live.exports import QUICK, SLOW, Making
+from taichi_ants.live.log import Log
 from taichi_ants.live.page import live_page
 from taichi_ants.live.session import Session
-from taichi_ants.viewer import page as html_page
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -47,7 +45,11 @@ _MOST_TEXT = 2**18  # bytes of a request
 _MOST_UPLOAD = 2**24  # bytes of a session
 _MOST_UNSEEN = 12  # frames that a page is sent before it has drawn the first of them
 _MOST_WAITING = 2**27  # bytes that wait for a page that does not read
+_FEW = 4  # frames of an episode, below which each shows another one
+_PHASES = 24  # frames that such episodes make one of
 _STATE_EVERY = 0.5  # seconds
+_PROGRESS_EVERY = 0.2  # seconds
+_SLICE = 0.05  # seconds of replaying, after which requests are answered
 _BREATH = 0.004  # seconds after each frame, in which the thread of the sockets gets its turn
 _LONGEST_WAIT = 0.2  # seconds, for a request, before it looks whether it is to end
 _QUIET = logging.getLogger("taichi_ants.live")  # what strangers send is no news for the terminal
@@ -128,11 +130,15 @@ class Room:
         self.playing, self.speed = False, 12.0
         self._pages: set[Page] = set()
         self._joined = 0  # sockets, a page or not yet
-        self._requests: queue.Queue[tuple[Page, Any, Callable[[], None]]] = queue.Queue()
+        self._requests: queue.Queue[tuple[Page, Any, asyncio.Future[None]]] = queue.Queue()
         self._loop = asyncio.new_event_loop()
         self._over, self._leave = threading.Event(), asyncio.Event()
         self._pace, self._piece, self._due = 0.0, 1.0, 0.0  # see _pass
-        self._prepare, self._making = prepare, threading.Lock()  # see _make
+        self._prepare = prepare
+        self._replay: _Replay | None = None  # of a session that is loaded
+        self._making: Making | None = None
+        self._compiles = False  # whether the first step of the session goes on
+        self._for: Page | None = None  # who is given the file
         self._tells = 0.0  # when pages are told next how things stand
 
     @property
@@ -156,65 +162,151 @@ class Room:
                 self._turn()
         finally:
             self._over.set()
+            if self._making is not None:
+                self._making.cancel()
             with contextlib.suppress(RuntimeError):  # it has ended by itself
                 self._loop.call_soon_threadsafe(self._leave.set)
             sockets.join(2)
 
     def _turn(self) -> None:
         """Let a frame's time pass if it is due, and do what a page asks for."""
-        runs = self.playing and bool(self._pages)  # time stands still while nobody looks on
-        if runs and time.monotonic() >= self._due:
+        runs = self._runs and bool(self._pages)  # time stands still while nobody looks on
+        if self._replay is not None:
+            self._go_on(self._replay)
+        elif runs and time.monotonic() >= self._due:
             self._pass()
         now = time.monotonic()
         if now >= self._tells:
-            self._tells = now + _STATE_EVERY if runs else math.inf
+            every = _PROGRESS_EVERY if self._works() else _STATE_EVERY if runs else math.inf
+            self._tells = now + every
             self._tell_all(self._state())
-        wait = min((self._due if runs else math.inf) - now, self._tells - now, _LONGEST_WAIT)
+        due = now if self._replay is not None else self._due if runs else math.inf
+        wait = min(due - now, self._tells - now, _LONGEST_WAIT)
         with contextlib.suppress(queue.Empty):
             for _ in range(1 + len(self._pages)):  # all have their turn
-                page, request, done = self._requests.get(timeout=max(wait, _BREATH))
-                self._answer(page, request)
-                self._post(done)
+                page, request, answered = self._requests.get(timeout=max(wait, _BREATH))
+                self._answer(page, request, answered)
                 wait = 0.0
+
+    @property
+    def _runs(self) -> bool:
+        """Whether time passes: it stands still while another session is replayed."""
+        return self.playing and self._replay is None
+
+    def _go_on(self, replay: _Replay) -> None:
+        """Replay for a moment; at its end, the session takes the place of the present one."""
+        until = time.monotonic() + _SLICE
+        try:
+            for session in replay.pieces:
+                replay.session = session
+                if time.monotonic() > until:
+                    return
+        except (AntsError, MemoryError) as error:
+            self._replay = None
+            self._tell_all(_say("error", words=_words(_of_page(error))))
+        else:
+            self._replay = None
+            assert replay.session is not None
+            self._begin(replay.session)
+        self._tells = 0.0
+
+    def _works(self) -> list[dict[str, Any]]:
+        """What goes on that takes long: what it is, and how many of its ticks are done."""
+        works, replay, making = [], self._replay, self._making
+        if replay is not None:
+            done = 0 if replay.session is None else replay.session.ticks
+            works.append({"kind": "load", "done": done, "total": replay.ticks})
+        if self._compiles:
+            works.append({"kind": "kernels", "done": 0, "total": 0})
+        if making is not None and not making.over:
+            works.append({"kind": making.kind, "done": making.done, "total": making.total})
+        return works
 
     def _pass(self) -> None:
         """Let the ticks of one frame pass, and show it."""
-        began, before = time.monotonic(), self.session.ticks
+        began, before = time.monotonic(), self.session.steps
         if self.speed >= FASTEST:
-            ticks = int(self._piece)  # that fill the time of a frame, as far as is known
+            ticks = self._leap()
         else:
             self._pace += max(1.0, self.speed / FRAMES_A_SECOND)
             ticks = int(self._pace)
             self._pace -= ticks
         try:
-            self._show(self.session.advance(ticks))
+            self._show(self.session.advance() if ticks == 1 else self.session.leap(ticks))
         except AntsError as error:  # as of a learner whose values are no longer finite
             self.playing = False
             self._tell_all(_say("error", words=str(error)))
-        took, passed = time.monotonic() - began, self.session.ticks - before
-        if passed == ticks:  # and no episode has ended before
+        self._end_preparing()
+        took, passed = time.monotonic() - began, self.session.steps - before
+        if passed == ticks and took > 0:
             self._piece = min(2.0 * passed, max(1.0, passed / (took * FRAMES_A_SECOND)))
         usual = 0.0 if self.speed >= FASTEST else 1 / min(self.speed, FRAMES_A_SECOND)
         self._due = max(self._due + usual, began + took)  # lost time is not made up
 
-    def _answer(self, page: Page, request: Any) -> None:
+    def _leap(self) -> int:
+        """The steps that fill the time of a frame, as far as is known.
+
+        Where these are a large part of an episode, frames would show it at any of its moments. Then
+        each shows another episode, some ticks later in it than the one before: pages see the slow
+        course of an episode, as a stroboscope shows a wheel.
+        """
+        steps, length = int(self._piece), self.session.setup.ticks_per_episode
+        if not length or _FEW * steps < length:
+            return steps
+        cycle = length + 1  # with the step that begins the next one
+        return max(1, round(steps / cycle)) * cycle + max(1, length // _PHASES)
+
+    def _answer(self, page: Page, request: Any, answered: asyncio.Future[None]) -> None:
         """Do what a page asks for, or tell it why not; all are told soon how things stand then."""
+        refused = None
         try:
-            if isinstance(request, bytes):
-                self._begin(Session.from_bytes(request))
+            what = "load" if isinstance(request, bytes) else request["do"]
+            if self._replay is not None and what in _CHANGES:
+                raise AntsError("a session is being replayed; wait for its end, or cancel it.")
+            REQUESTS[what](self, page, request)
+        except Closed as error:
+            refused = error
+        except (AntsError, MemoryError) as error:
+            self._tell(page, _say("error", words=_words(error)))
+
+        def answer() -> None:
+            if answered.done():  # as where the page has gone
+                return
+            if refused is None:
+                answered.set_result(None)
             else:
-                REQUESTS[request["do"]](self, page, request)
-        except Closed:
-            self._post(page.connection.transport.abort)
-        except AntsError as error:
-            self._tell(page, _say("error", words=str(error)))
-        except MemoryError:
-            self._tell(page, _say("error", words="this needs more memory than there is."))
+                answered.set_exception(refused)
+
+        self._post(answer)
         self._tells = min(self._tells, time.monotonic() + 1 / FRAMES_A_SECOND)
+
+    def _load(self, page: Page, content: bytes) -> None:
+        try:
+            log = Log.from_bytes(content)
+        except AntsError as error:
+            raise _of_page(error) from error
+        self._replay = _Replay(Session.replay(log), log.ticks)
+
+    def _cancel(self, page: Page, request: dict[str, Any]) -> None:
+        """End what takes long, of a kind that `_works` names; without it all stays as it is."""
+        kinds = [work["kind"] for work in self._works() if work["kind"] != "kernels"]
+        if (kind := request.get("kind")) not in kinds:
+            return  # it has ended meanwhile
+        if kind == "load":
+            self._replay = None
+        elif self._making is not None:
+            self._making.cancel()
+        self._tell_all(_say("cancelled", kind=kind))
+
+    def _leave_room(self, page: Page, request: dict[str, Any]) -> None:
+        """Nobody waits for the file of a page that has gone; the others learn of it, too."""
+        if self._making is not None and self._for is page:
+            self._making.cancel()
 
     def _begin(self, session: Session) -> None:
         """Go on with another session; all pages are shown it from its beginning."""
         self.session, self.playing, self._piece = session, False, 1.0
+        self._compiles = False
         messages = [*self._about(), *self._moment()]
 
         def show() -> None:
@@ -250,14 +342,31 @@ class Room:
 
     def _play(self, page: Page, request: dict[str, Any]) -> None:
         self.playing, self._due = True, time.monotonic()
+        self._prepare_first()
+
+    def _prepare_first(self) -> None:
+        """Tell pages that the first step of a session may take seconds: kernels are compiled."""
+        if self.session.steps == 0:
+            self._compiles = True
+            self._tell_all(self._state())
+            time.sleep(_BREATH)  # in which the thread of the sockets tells it
 
     def _pause(self, page: Page, request: dict[str, Any]) -> None:
         self.playing = False
+        self._end_preparing()
 
     def _step(self, page: Page, request: dict[str, Any]) -> None:
         self.playing = False
-        for _ in range(int(_number(request, "ticks", 1, 100))):
-            self._show(self.session.advance(1))
+        self._prepare_first()
+        try:
+            for _ in range(int(_number(request, "ticks", 1, 100))):
+                self._show(self.session.advance(1))
+        finally:
+            self._end_preparing()
+
+    def _end_preparing(self) -> None:
+        if self._compiles:
+            self._compiles, self._tells = False, 0.0  # as soon as that is so
 
     def _set_speed(self, page: Page, request: dict[str, Any]) -> None:
         self.speed, self._due = _number(request, "value", 1, FASTEST), time.monotonic()
@@ -265,7 +374,7 @@ class Room:
     def _edit(self, page: Page, request: dict[str, Any]) -> None:
         edit = request.get("edit")
         if not isinstance(edit, dict):
-            raise Closed
+            raise Closed("an edit has to be an object")
         self._show(self.session.apply(edit))
 
     def _begin_chosen(self, page: Page, request: dict[str, Any]) -> None:
@@ -276,33 +385,27 @@ class Room:
 
     def _export(self, page: Page, request: dict[str, Any]) -> None:
         kind = request.get("kind")
-        if not isinstance(kind, str) or kind not in EXPORTS:
-            raise Closed
-        name, make = EXPORTS[kind]
-        if kind in _SLOW:
+        if not isinstance(kind, str) or kind not in {**QUICK, **SLOW}:
+            raise Closed("there is no file of this kind")
+        if kind in SLOW:
             self._make(page, kind)
-        else:
-            content = make(self.session)
-            self._post(lambda: page.tell(_say("file", name=name), content))
+            return
+        name, make = QUICK[kind]
+        content = make(self.session)
+        self._post(lambda: page.tell(_say("file", name=name), content))
 
     def _make(self, page: Page, kind: str) -> None:
-        """Make a file in a process of its own, which replays the session; time goes on here."""
-        if not self._making.acquire(blocking=False):
-            raise AntsError("another file is being made; ask again when it is there.")
-        content, context = self.session.to_bytes(), multiprocessing.get_context("spawn")
+        """Begin to make a file, for a page; time goes on."""
+        if self._making is not None and not self._making.over:
+            raise AntsError("another file is being made; wait for it, or cancel it.")
 
-        def make() -> None:
-            ours, theirs = context.Pipe(duplex=False)
-            given = (kind, content, self._prepare, theirs)
-            messages: list[str | bytes] = [_say("error", words="the file could not be made.")]
-            with ours, contextlib.suppress(EOFError, OSError):  # as where there is no memory
-                context.Process(target=_make_file, args=given, daemon=True).start()
-                theirs.close()
-                messages = ours.recv()
-            self._making.release()
-            self._post(lambda: page.tell(*messages))
+        def end(made: bytes | str) -> None:
+            if isinstance(made, str):
+                self._tell(page, _say("error", words=made))
+            else:
+                self._post(lambda: page.tell(_say("file", name=SLOW[kind][0]), made))
 
-        threading.Thread(target=make, daemon=True).start()
+        self._making, self._for = Making(kind, self.session, self._prepare, end), page
 
     def _quit(self, page: Page, request: dict[str, Any]) -> None:
         self.end()
@@ -323,11 +426,12 @@ class Room:
         session = self.session
         return _say(
             "state",
-            playing=self.playing,
+            playing=self._runs,
             speed=self.speed,
             pages=len(self._pages),
             ticks=session.ticks,
             values=session.values(),
+            works=self._works(),
         )
 
     def _tell_all(self, message: str) -> None:
@@ -407,13 +511,14 @@ class Room:
             async for message in connection:
                 for request in self._read(page, message):
                     await self._ask(page, request)
-        except Closed:
-            await connection.close(1008, "this is no request of a page")
+        except Closed as error:
+            await connection.close(1008, str(error))
         except ConnectionClosed:
             pass
         finally:
             self._joined -= 1
             self._pages.discard(page)
+            self._requests.put((page, {"do": "leave"}, self._loop.create_future()))
 
     def _read(self, page: Page, message: str | bytes) -> Iterator[Any]:
         """The request in a message, if the session has to do with it."""
@@ -421,31 +526,47 @@ class Room:
             yield message
             return
         if len(message) > _MOST_TEXT:
-            raise Closed
+            raise Closed("this is too long")
         try:
             request = json.loads(message, parse_constant=_refuse)
         except (ValueError, RecursionError):
-            raise Closed from None
+            raise Closed("this is no JSON") from None
         if not isinstance(request, dict) or not isinstance(request.get("do"), str):
-            raise Closed
+            raise Closed('a request has to be an object with a "do"')
         if request["do"] == "seen":
             page.unseen = max(0, page.unseen - int(_number(request, "frames", 0, 1000)))
             if page.behind and page.unseen == 0:
                 yield {"do": "catch up"}
-        elif request["do"] in REQUESTS:
+        elif request["do"] in REQUESTS and request["do"] not in _INWARD:
             yield request
         else:
-            raise Closed
+            raise Closed("there is no such request")
 
     async def _ask(self, page: Page, request: Any) -> None:
-        done = asyncio.Event()
-        self._requests.put((page, request, done.set))
-        await done.wait()
+        answered = self._loop.create_future()
+        self._requests.put((page, request, answered))
+        await answered
 
 
-REQUESTS: dict[str, Callable[[Room, Page, dict[str, Any]], None]] = {
+class _Replay:
+    """A session that is being loaded.
+
+    Attributes:
+        pieces: What replays it.
+        ticks: How many it has at its end.
+        session: As far as it has come.
+    """
+
+    def __init__(self, pieces: Iterator[Session], ticks: int) -> None:
+        self.pieces, self.ticks = pieces, ticks
+        self.session: Session | None = None
+
+
+REQUESTS: dict[str, Callable[[Room, Page, Any], None]] = {
     "join": Room._welcome,  # what a socket says by being opened
+    "leave": Room._leave_room,  # what it says by being closed
     "catch up": Room._catch_up,  # what a page says by having seen all that it was sent
+    "load": Room._load,  # what it says by sending bytes
     "play": Room._play,
     "pause": Room._pause,
     "step": Room._step,  # {"ticks": 1 to 100}
@@ -453,34 +574,13 @@ REQUESTS: dict[str, Callable[[Room, Page, dict[str, Any]], None]] = {
     "edit": Room._edit,  # {"edit": see taichi_ants.live.edits}
     "begin": Room._begin_chosen,  # {"chosen": see taichi_ants.live.choices}
     "restart": Room._restart,
-    "export": Room._export,  # {"kind": of `EXPORTS`}
+    "export": Room._export,  # {"kind": of `QUICK` or `SLOW`}
+    "cancel": Room._cancel,  # {"kind": of what takes long}
     "quit": Room._quit,
 }
-
-# What pages call it, the name of the file, and what makes it.
-EXPORTS: dict[str, tuple[str, Callable[[Session], bytes]]] = {
-    "session": ("session.npz", Session.to_bytes),
-    "page": ("session.html", lambda session: html_page(session.recording()).encode()),
-    "gif": ("session.gif", Session.gif_bytes),
-    "policy": ("policy.npz", Session.policy_bytes),
-    "colony": ("colony.npz", Session.colony_bytes),
-}
-_SLOW = ("page", "gif")
-
-
-def _make_file(
-    kind: str, content: bytes, prepare: Callable[[], None] | None, answer: Connection
-) -> None:
-    """Answer with what a page is told that has asked for a file; in a process of its own."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends this one
-    try:
-        if prepare is not None:
-            prepare()
-        name, make = EXPORTS[kind]
-        answer.send([_say("file", name=name), make(Session.from_bytes(content))])
-    except AntsError as error:
-        answer.send([_say("error", words=str(error))])
-
+_INWARD = ("join", "leave", "catch up", "load")
+# What would be lost, or would take away the session that is to go on if a replay is cancelled.
+_CHANGES = ("load", "play", "step", "edit", "begin", "restart")
 
 _HEADERS = {
     "Content-Type": "text/html; charset=utf-8",
@@ -492,7 +592,21 @@ _HEADERS = {
 }
 
 
-def _say(kind: str, **facts: Any) -> str:
+def _of_page(error: Exception) -> Exception:
+    """What is wrong with a file, with the way out that a page has."""
+    if not isinstance(error, AntsError):
+        return error
+    what = str(error).partition("; ")[0].replace("'the loaded file'", "the loaded file")
+    return AntsError(f"{what}; load one that Save has made.")
+
+
+def _words(error: Exception) -> str:
+    if isinstance(error, MemoryError):
+        return "this needs more memory than there is."
+    return str(error)
+
+
+def _say(kind: str, /, **facts: Any) -> str:
     """A message to a page."""
     return json.dumps({"say": kind, **facts}, separators=(",", ":"))
 
@@ -505,5 +619,5 @@ def _number(request: dict[str, Any], name: str, least: float, most: float) -> fl
     """A number of a request; no page of ours sends one that is not allowed."""
     value = request.get(name)
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value <= most:
-        raise Closed
+        raise Closed(f"{name} has to be a number from {least} to {most}")
     return value

@@ -2,30 +2,23 @@
 
 from __future__ import annotations
 
-import io
 import tempfile
-import zipfile
+import time
 from collections.abc import Callable, Iterator
 from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from taichi_ants import files
 from taichi_ants.engines.colony.hand import Hand
-from taichi_ants.engines.stored import FileKind
 from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.learners.policies import save_policy
 from taichi_ants.live import edits
+from taichi_ants.live.log import KIND, MOST_TICKS, Log
 from taichi_ants.live.setup import Setup
-from taichi_ants.task.constants import N_ACTIONS
-from taichi_ants.viewer import Recorder, Recording
+from taichi_ants.viewer import Recorder
 
-MOST_TICKS = 1_000_000_000
-_MOST_BYTES = 1 << 28  # of a session, unpacked
-
-_KIND = FileKind("taichi-ants session 1", "session", "Session.save, or Save on its page,")
+_PIECE = 0.02  # seconds, of a session that is replayed
 
 
 class Session:
@@ -54,7 +47,10 @@ class Session:
         self.edits: list[tuple[int, edits.Edit]] = []
         self.hand.begin_episode(self._length)
         self.colony.look()  # changes nothing, but compiles what the first edit needs
-        self._recorder = Recorder(self.colony)
+        # A hand changes how many ants there are.
+        title = f"Ants in a world of {self.colony.grid.count} cells"
+        self._recorder = Recorder(self.colony, title=title)
+        self._recorder.course.note()
         self._recorder.moment()
         self._named = set(self._recorder.names())
 
@@ -94,9 +90,24 @@ class Session:
         """
         return self._pass(checked_whole("n", n), self._recorder.tick) or self._recorder.moment()
 
+    def leap(self, n: int) -> bytes:
+        """Let time make n steps, also through several episodes; a frame of what has changed.
+
+        What ants did between is in no frame, as it may be in those of `advance`.
+
+        Raises:
+            AntsError: n is not allowed.
+        """
+        until = self.steps + checked_whole("n", n)
+        while self.steps < until:
+            self._pass(until - self.steps, self.colony.tick)
+        return self._recorder.moment()
+
     def _pass(self, n: int, tick: Callable[[int], Any]) -> Any:
         """As `advance`, by a function that lets ticks pass; what it gives, None without ticks."""
+        course = self._recorder.course
         if self.ended:
+            course.note(ended=True)
             self.hand.begin_episode(self._length)
             self.steps += 1
             return None
@@ -105,10 +116,12 @@ class Session:
             raise AntsError(f"a session has at most {MOST_TICKS} ticks; begin another one.")
         before = self.colony.ticks
         try:
-            return tick(n)
+            frame = tick(n)
         finally:  # even if somebody interrupts it
             self.ticks += self.colony.ticks - before
             self.steps += self.colony.ticks - before
+        course.note()
+        return frame
 
     def apply(self, edit: object) -> bytes:
         """Do an edit now, see `edits`, and record it; a frame of what has changed.
@@ -123,6 +136,8 @@ class Session:
 
     def _do(self, edit: object) -> None:
         plain = edits.checked(edit, self.hand)
+        if plain["kind"] == "episode":
+            self._recorder.course.note(ended=True)
         edits.apply(plain, self.hand, self._length)
         self.edits.append((self.steps, plain))
 
@@ -130,78 +145,79 @@ class Session:
         """What the edit "set" can change, by name: value, least, most and step."""
         return {name: value._asdict() for name, value in edits.values(self.hand).items()}
 
+    def log(self) -> Log:
+        """How it began, the edits, and what its end is like."""
+        state = self.hand.state()
+        return Log(self.setup, tuple(self.edits), self.steps, self.ticks, state)
+
     def to_bytes(self) -> bytes:
-        """The session as a file holds it: how it began, the edits, and what its end is like."""
+        """The log, as a file holds it."""
         return _bytes_of("session.npz", self.save)
 
     def save(self, path: files.PathLike) -> None:
-        """Write the session; raises as `files.write_npz` does."""
-        table = np.zeros((0, N_ACTIONS)) if self.setup.learns else self.setup.policy
-        facts = {
-            "task": self.setup.task.as_dict(),
-            "setup": self.setup.to_json(),
-            "edits": self.edits,
-            "steps": self.steps,
-            "state": self.hand.state(),
-        }
-        _KIND.write(path, facts, {"table": np.asarray(table, np.float32)}, compress=True)
+        """Write the log; raises as `archives.write` does."""
+        self.log().write(path)
 
     @classmethod
-    def load(cls, path: files.PathLike) -> Session:
+    def load(cls, path: files.PathLike, progress: Callable[[float], None] | None = None) -> Session:
         """Replay a session that `save` wrote, up to its end.
+
+        Args:
+            path: The file.
+            progress: Called now and then with the share of the ticks that have passed.
 
         Raises:
             AntsError: The file is missing, damaged or altered, or its end is another one here.
         """
-        return cls._replayed(path, None)
-
-    @classmethod
-    def from_bytes(cls, content: bytes) -> Session:
-        """As `load`, of what a file holds."""
-        try:
-            with zipfile.ZipFile(io.BytesIO(content)) as archive:
-                size = sum(one.file_size for one in archive.infolist())
-        except Exception:
-            size = 0  # no archive at all, which `_replayed` says
-        if size > _MOST_BYTES:
-            raise AntsError("what was given takes too much memory; give a file of Session.save.")
-        return cls._replayed("the loaded file", content)
-
-    @classmethod
-    def _replayed(cls, path: files.PathLike, content: bytes | None) -> Session:
-        stored, facts = _KIND.read(path, content)
-        with _KIND.rebuilding(path):
-            session = cls(Setup.from_json(facts["setup"], stored["table"]))
-            end = checked_whole("steps", facts["steps"], 0, MOST_TICKS)
-            for steps, edit in facts["edits"]:
-                session._go(checked_whole("steps", steps, session.steps, end))
-                session._do(edit)
-            session._go(end)
-            if session.hand.state() != facts["state"]:
-                raise ValueError("replayed, it does not end as it did")
-            session._recorder.moment()
+        log = Log.read(path)
+        for session in cls.replay(log):
+            if progress is not None:
+                progress(session.steps / max(log.steps, 1))
         return session
 
-    def _go(self, steps: int) -> None:
-        """Let time pass until it has made so many steps."""
-        while self.steps < steps:
-            self._pass(steps - self.steps, self.colony.tick)
-
-    def moments(self, most: int = 1000) -> Iterator[tuple[Session, bytes]]:
-        """The session once more from its beginning, moment by moment; this one stays as it is.
+    @classmethod
+    def replay(cls, log: Log) -> Iterator[Session]:
+        """Make a session once more, in pieces, so that one can do something else between them.
 
         Args:
+            log: Of the session.
+
+        Yields:
+            The session as far as it has come, some times a second at least; at last all of it.
+
+        Raises:
+            AntsError: The log is damaged, or its end is another one here.
+        """
+        with KIND.rebuilding(log.name):
+            session = cls(log.setup)
+            for steps, edit in log.edits:
+                for _ in session._pieces(steps):
+                    yield session
+                session._do(edit)
+            for _ in session._pieces(log.steps):
+                yield session
+            if session.hand.state() != log.state:
+                raise ValueError("replayed, it does not end as it did")
+            session._recorder.moment()
+        yield session
+
+    @classmethod
+    def moments(cls, log: Log, most: int = 1000) -> Iterator[tuple[Session, bytes]]:
+        """A session once more from its beginning, moment by moment.
+
+        Args:
+            log: Of the session.
             most: About how many moments there are at most. If there are fewer steps and edits, each
                 step has a moment, and what a hand has changed before it as well.
 
         Yields:
             The session at that moment, and a frame of what has changed since the last one.
         """
-        changes = len({steps for steps, _ in self.edits})
-        every = max(1, -(-(self.steps + changes) // checked_whole("most", most)))
-        session = Session(self.setup)
+        changes = len({steps for steps, _ in log.edits})
+        every = max(1, -(-(log.steps + changes) // checked_whole("most", most)))
+        session = cls(log.setup)
         yield session, session.moment()
-        for steps, edits_then in groupby([*self.edits, (self.steps, None)], lambda one: one[0]):
+        for steps, edits_then in groupby([*log.edits, (log.steps, None)], lambda one: one[0]):
             while session.steps < steps:
                 if every == 1:
                     yield session, session.advance()
@@ -212,22 +228,22 @@ class Session:
             wanted = [edit for _, edit in edits_then if edit is not None]
             for edit in wanted:
                 session._do(edit)
-            if wanted if every == 1 else steps == self.steps:
+            if wanted if every == 1 else steps == log.steps:
                 yield session, session._recorder.moment()
 
-    def recording(self, most_frames: int = 1000) -> Recording:
-        """The session as a page plays it without a server, see `moments`."""
-        passed = list(self.moments(most_frames))
-        return Recording(passed[-1][0].header(), [frame for _, frame in passed])
+    def _pieces(self, steps: int) -> Iterator[None]:
+        """Let time pass until it has made so many steps, in pieces of about `_PIECE` seconds."""
+        ticks = 1
+        while self.steps < steps:
+            began = time.perf_counter()
+            self._pass(min(ticks, steps - self.steps), self.colony.tick)
+            ticks = max(1, 2 * ticks if time.perf_counter() - began < _PIECE else ticks // 2)
+            yield
 
-    def gif_bytes(self, most_frames: int = 300, fps: float = 12.0) -> bytes:
-        """An animation of the session, see `moments`."""
-        from taichi_ants.rendering import colony_moments, frames, save_animation
-
-        passed = self.moments(most_frames)
-        shown = (moment for session, _ in passed for moment in colony_moments(session.colony))
-        pictures = frames(shown, strongest=self.setup.task.pheromone.level)
-        return _bytes_of("session.gif", lambda path: save_animation(path, pictures, fps))
+    def _go(self, steps: int) -> None:
+        """Let time pass until it has made so many steps."""
+        for _ in self._pieces(steps):
+            pass
 
     def policy_bytes(self) -> bytes:
         """The action values as they are now, as a policy file holds them.

@@ -5,10 +5,11 @@
 
 class Live {
   constructor() {
-    this.news = new EventTarget(); // "state", "error", "file", "over"
+    this.news = new EventTarget(); // "state", "error", "drawn", "file", "cancelled", "over"
     this.waiting = null; // what the next bytes are, if no frame
     this.arrived = 0; // frames since the server was told
     this.running = false;
+    this.stands = false;
     this.speed = 12;
     this.speedUntil = 0;
     this.viewer = null;
@@ -16,11 +17,18 @@ class Live {
     this.socket = new WebSocket(`ws://${host}/socket${search}`);
     this.socket.binaryType = "arraybuffer";
     this.socket.addEventListener("message", ({ data }) => (typeof data === "string" ? this.hear(JSON.parse(data)) : this.take(data)));
-    this.socket.addEventListener("close", () => this.tell("over", {}));
+    this.socket.addEventListener("close", ({ code, reason }) => this.tell("over", { code, reason }));
   }
 
   ask(what, more = {}) {
     if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify({ do: what, ...more }));
+  }
+
+  /* Another session stands still at first; who presses play before it is there means that one. */
+  stand() {
+    this.stands = true; // until it begins, or cannot
+    this.running = false;
+    this.viewer?.player.take();
   }
 
   tell(kind, detail) {
@@ -28,6 +36,7 @@ class Live {
   }
 
   hear(message) {
+    if (message.say === "begin" || message.say === "error") this.stands = false;
     if (message.say === "begin") {
       this.begins = message.header;
       this.choices = message.choices;
@@ -36,7 +45,7 @@ class Live {
     else if (message.say === "moment" || message.say === "file") this.waiting = message;
     else {
       if (message.say === "state") {
-        this.running = message.playing;
+        if (!this.stands) this.running = message.playing;
         if (performance.now() > this.speedUntil) this.speed = message.speed; // not while somebody moves it
         this.state = message;
       }
@@ -75,6 +84,8 @@ class Live {
   }
 
   seen() {
+    const { history, player } = this.viewer;
+    if (player.moment === player.last) this.tell("drawn", history.frames[player.last]);
     if (this.arrived) this.ask("seen", { frames: this.arrived });
     this.arrived = 0;
   }
@@ -107,10 +118,17 @@ class LivePlayer extends Player {
   }
   play() {
     this.back = false;
+    this.wish(true);
     this.live.ask("play");
   }
   pause() {
+    this.wish(false);
     this.live.ask("pause");
+  }
+  /* The page shows what is wanted until the server tells how things stand. */
+  wish(running) {
+    this.live.running = running;
+    this.take();
   }
   go(moment) {
     super.go(moment);

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
 
+from taichi_ants import checks
 from taichi_ants.engines.runs.training import train
-from taichi_ants.errors import AntsError, count, expect, whole
+from taichi_ants.errors import AntsError, count, entries_of, expect, shown, whole
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.rendering import colours, text
 from taichi_ants.rendering.marks import cell
@@ -96,11 +97,15 @@ def learning_stages(
     Raises:
         AntsError: An argument is not allowed; the message names it.
     """
-    expect("stages", stages, Iterable)
-    stages = [whole("a stage", stage) for stage in stages]
+    checks.check_progress(progress)
+    task = checks.checked_task(Task() if task is None else task)
+    listed = entries_of(stages)
+    if listed is None:
+        raise AntsError(f"stages is {shown(stages)}; it must be numbers of episodes.")
+    stages = [whole("a stage", stage) for stage in listed]
     if not stages or stages != sorted(set(stages)) or stages[0] < 0:
-        raise AntsError(f"stages are {tuple(stages)!r}; they must ascend, from 0 or more.")
-    task, played = task or Task(), []
+        raise AntsError(f"stages are {shown(tuple(stages))}; they must ascend, from 0 or more.")
+    played = []
     for n in stages:
         table = np.zeros((task.n_states, N_ACTIONS), dtype=np.float32)
         if n:

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.engines.colony.layout import AntRow, Stage
-from taichi_ants.engines.looks import is_percept
+from taichi_ants.engines.colony.layout import AntRow
 from taichi_ants.engines.runs.traces import Trace, rollout
 from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.grid.constants import STREAM_ROLLOUT
@@ -41,7 +40,10 @@ def frames(
         look: What to draw, see `Scene`.
     """
     scene = None
-    for snapshot, status in moments:
+    expect("moments", moments, Iterable)
+    for moment in moments:
+        expect("a moment", moment, tuple)
+        snapshot, status = moment
         expect("the snapshot", snapshot, Snapshot)
         view = getattr(status, "state", None) is not None
         scene = scene or Scene(snapshot.grid, size, view=view, **look)
@@ -165,9 +167,8 @@ def _moment(colony: Colony, follow: int | None) -> Moment:
         ("delivered", str(outcome.deliveries[0, 0])),
         ("moves blocked", f"{100 * blocked:.0f} %"),
     ]
-    ants = colony.arrays["ants"][:, : colony.capacity]
-    (slots,) = np.nonzero(ants[AntRow.STAGE] == Stage.LIVING)  # those of the snapshot
-    followed = ants[AntRow.NUMBER, slots] == follow
+    (slots,) = np.nonzero(colony.living[0])  # those of the snapshot
+    followed = colony.of_ants(AntRow.NUMBER)[slots] == follow
     if follow is None or not followed.any():
         return snapshot, Status(tuple(lines))
     # The one that is followed comes first, since pictures mark what the first one sees.
@@ -186,8 +187,7 @@ def _moment(colony: Colony, follow: int | None) -> Moment:
 def _status_of(colony: Colony, slot: int, lines: list[tuple[str, str]]) -> Status:
     """The lines, then what the ant in a slot of the first world sees, and its action values."""
     observation, table = colony.task.sees, colony.q_values[0]
-    row = AntRow.PERCEPT if is_percept(observation) else AntRow.STATE
-    state = int(colony.arrays["ants"][row, slot])
+    state = int(colony.states[0, slot])
     task, seen, _ = name_parts(observation, state)
     lines += [("task", task), ("sees", seen)] if task else [("state", seen)]
     lines += [("", observation.letters)] if observation.letters else []

@@ -36,7 +36,9 @@ def kernels() -> ModuleType:
 
 def draw_marks(frame: np.ndarray, *tables: np.ndarray) -> None:
     """Draw tables of `marks` over a frame, uint8 (height, width, 3), in their order."""
-    kernels().draw_marks(frame, np.concatenate(tables))
+    draw = kernels().draw_marks
+    with runtime.quiet():
+        draw(frame, np.concatenate(tables))
 
 
 class Rasteriser:
@@ -77,6 +79,8 @@ class Rasteriser:
         size = np.array([width, height])
         self.hexagon = float((np.maximum(size - 2 * margin, 1) / (high - low)).min())
         self._origin = size / 2 - self.hexagon * (low + high) / 2
+        self._page = np.full((height, width, 3), colours.channels(colours.PAGE))
+        self._drawn: tuple[np.ndarray, np.ndarray] | None = None  # colours of cells, their picture
 
     def centres(self, cells: object) -> np.ndarray:
         """Pixel coordinates, float64 (..., 2), of the centres of cells (..., 3) in any form."""
@@ -112,9 +116,17 @@ class Rasteriser:
         return frame
 
     def draw_cells(self, of_cells: np.ndarray) -> np.ndarray:
-        """The picture of the cells in the given colours, uint32 (grid.size,)."""
+        """The picture of the cells in the given colours, uint32 (grid.size,).
+
+        The last one is kept: where an ant lays no trail, cells look as they did.
+        """
+        if self._drawn is None or not np.array_equal(self._drawn[0], of_cells):
+            self._drawn = of_cells.copy(), self._cells(of_cells)
+        return self._drawn[1].copy()
+
+    def _cells(self, of_cells: np.ndarray) -> np.ndarray:
         grid, hexagon = self.grid, self.hexagon
-        frame = np.full((self.height, self.width, 3), colours.channels(colours.PAGE))
+        frame = self._page.copy()
         if hexagon < DOTS_BELOW:
             layout = (*self._origin.tolist(), hexagon, grid.width, grid.height, grid.ranges[2])
             kernels().draw_small_cells(frame, of_cells, *layout)

@@ -131,7 +131,7 @@ def _write_head(sheet: np.ndarray, title: str, observation: Observation) -> None
     room = WIDTH - 2 * _MARGIN
     text.write(sheet, title, _MARGIN, _MARGIN + _LARGE, _LARGE, room=room)
     *lines, letters = _EXPLANATION
-    letters = ", ".join(filter(None, [letters, observation.letters])) + "."
+    letters = "; ".join(filter(None, [letters, observation.letters])) + "."
     if not name_parts(observation, 0)[2]:
         letters = (
             "The text in a drawing is the name or the number of the state; cells have no letters."

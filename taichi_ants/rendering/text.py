@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import unicodedata
+from bisect import bisect_right
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -72,12 +73,11 @@ def width(text: str, size: int) -> float:
 
 def shortened(text: str, size: int, room: float) -> str:
     """The text, or as much of its beginning as fits into `room` pixels, with three dots."""
-    if width(text, size) <= room:
+    kept = text[: 4 * max(1, round(room))]  # more letters than there is room for
+    if kept == text and width(text, size) <= room:
         return text
-    kept = text
-    while kept and width(kept + "...", size) > room:
-        kept = kept[:-1]
-    return kept + "..." if kept else ""
+    n = bisect_right(range(len(kept) + 1), room, key=lambda n: width(kept[:n] + "...", size)) - 1
+    return kept[:n] + "..." if n > 0 else ""
 
 
 def _plain(text: str) -> str:

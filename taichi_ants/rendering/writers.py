@@ -1,19 +1,22 @@
 """Files of pictures: they appear when they are whole, or not at all.
 
-A GIF or MP4 is made in memory and written at the end. A GIF holds all frames until then, as indices
-of one palette; an MP4 does not, so it is the kind for very long animations.
+Frames are written as they come and then forgotten, so that the length of an animation takes room on
+the disk alone.
 """
 
 from __future__ import annotations
 
 import io
 import os
+import struct
 import tempfile
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from itertools import chain
 from numbers import Real
 from pathlib import Path
 from types import ModuleType
+from typing import BinaryIO
 
 import numpy as np
 
@@ -23,6 +26,13 @@ from taichi_ants.rendering import colours
 
 DEFAULT_FPS = 8.0
 PAUSE = 1.5  # seconds, for which episodes are shown as they ended
+_LONGEST_PAUSE = 60
+# The shortest and the longest side of a picture in pixels, by the kind of file; of PNG anything
+# that fits into the memory.
+_SIDES = {".gif": (1, 65_535), ".mp4": (2, 16_384), "": (1, 2**31 - 1)}
+
+_SAME = 255  # in a GIF, for pixels that stay as they are; palettes have fewer colours
+_LONGEST = 655_350  # milliseconds for which a GIF can show a picture
 
 # The colours of scenes, which all palettes hold.
 _KEPT = (
@@ -44,7 +54,10 @@ def check_animation(path: files.PathLike, fps: float = DEFAULT_FPS) -> Path:
         AntsError: The ending or the speed is not allowed, PyAV is missing for an .mp4, the folder
             holds something, or the place cannot be written to.
     """
-    target = writable(path)
+    expect("path", path, str, os.PathLike)
+    target = Path(path)
+    if target.suffix or not os.path.lexists(target):
+        files.check_writable_file(target)
     if target.suffix.lower() not in (".gif", ".mp4", ""):
         raise AntsError(
             f"{str(path)!r} ends in {target.suffix!r}; an animation ends in .gif, .mp4, or in "
@@ -55,7 +68,7 @@ def check_animation(path: files.PathLike, fps: float = DEFAULT_FPS) -> Path:
         raise AntsError(f"fps is {shown(fps)}; it must be a number from 0.1 to 50.")
     if target.suffix.lower() == ".mp4":
         _import_av()
-    if not target.suffix and target.exists() and (not target.is_dir() or any(target.iterdir())):
+    if not target.suffix and os.path.lexists(target) and not _can_be_replaced(target):
         raise AntsError(
             f"{str(path)!r} exists already and is no empty folder; name a new folder, or a file "
             "that ends in .gif or .mp4."
@@ -70,7 +83,7 @@ def is_picture(path: files.PathLike) -> bool:
 
 def check_picture(path: files.PathLike) -> Path:
     """Make sure that a picture can be written; raises as `save_picture` does."""
-    target = writable(path)
+    target = files.check_writable_file(path)
     if not is_picture(target):
         raise AntsError(f"{str(path)!r} is to hold one picture; give it a name that ends in .png.")
     return target
@@ -89,14 +102,20 @@ def save_animation(
         path: The file or folder, see `check_animation`. A file that exists is replaced.
         frames: At least one, uint8 (height, width, 3), all of one size.
         fps: Frames per second.
-        pause: Seconds for which the last one is shown, so that it can be looked at before all
-            begins anew.
+        pause: Seconds, at most 60, for which the last one is shown, so that it can be looked at
+            before all begins anew.
     """
     target = check_animation(path, fps)
-    checked = _checked(frames, round(pause * fps) - 1)
+    if isinstance(pause, bool) or not isinstance(pause, Real) or not 0 <= pause <= _LONGEST_PAUSE:
+        raise AntsError(
+            f"pause is {shown(pause)}; it must be a number of seconds from 0 to {_LONGEST_PAUSE}."
+        )
+    sides = _SIDES.get(target.suffix.lower(), _SIDES[""])
+    checked = _checked(frames, round(pause * fps) - 1, sides)
     if target.suffix:
-        encoded = _mp4 if target.suffix.lower() == ".mp4" else _gif
-        write(target, encoded(checked, fps))
+        encode = _mp4 if target.suffix.lower() == ".mp4" else _gif
+        with _folder_of(target):
+            files.write_atomically(target, lambda file: encode(file, checked, fps))
     else:
         _write_folder(target, checked)
 
@@ -112,12 +131,11 @@ def save_picture(path: files.PathLike, frame: np.ndarray) -> None:
     write(target, _png(frame, optimize=True))
 
 
-def writable(path: files.PathLike) -> Path:
-    """The path, if files can be written to the folder that holds it, or is to hold it."""
-    expect("path", path, str, os.PathLike)
-    target = Path(path)
-    files.check_writable_folder(_existing_folder(target))
-    return target
+def _can_be_replaced(folder: Path) -> bool:
+    """Whether what is there is an empty folder that can be made anew."""
+    files.check_writable_folder(folder.absolute().parent)
+    named = folder.name not in ("", "..") and not folder.is_symlink()
+    return named and folder.is_dir() and not any(folder.iterdir())
 
 
 def _existing_folder(target: Path) -> Path:
@@ -128,6 +146,20 @@ def write(target: Path, content: bytes) -> None:
     """Write a file into a folder that is made if it is missing."""
     files.check_writable_folder(target.parent)
     files.write_bytes(target, content)
+
+
+@contextmanager
+def _folder_of(target: Path) -> Iterator[None]:
+    """The folder of a file; if writing fails, folders that were missing are gone again."""
+    missing = [folder for folder in target.absolute().parents if not folder.exists()]
+    try:
+        files.check_writable_folder(target.parent)
+        yield
+    except BaseException:
+        for folder in missing:
+            with suppress(OSError):
+                folder.rmdir()
+        raise
 
 
 def _write_folder(folder: Path, frames: Iterable[np.ndarray]) -> None:
@@ -143,12 +175,17 @@ def _write_folder(folder: Path, frames: Iterable[np.ndarray]) -> None:
         os.replace(whole, folder)
 
 
-def _checked(frames: Iterable[np.ndarray], more: int) -> Iterator[np.ndarray]:
-    """The frames, if they fit together, the last one so many times more."""
-    expect("frames", frames, Iterable)
+def _checked(
+    frames: Iterable[np.ndarray], more: int, sides: tuple[int, int]
+) -> Iterator[np.ndarray]:
+    """The frames, if they fit together and into the file, the last one so many times more."""
+    try:
+        coming = iter(frames)
+    except TypeError:
+        raise AntsError(f"frames is {shown(frames)}; it must be pictures, one by one.") from None
     shape = None
-    for frame in frames:
-        _check_frame(frame)
+    for frame in coming:
+        _check_frame(frame, sides)
         shape = shape or frame.shape
         if frame.shape != shape:
             raise AntsError(
@@ -161,11 +198,18 @@ def _checked(frames: Iterable[np.ndarray], more: int) -> Iterator[np.ndarray]:
         yield frame
 
 
-def _check_frame(frame: np.ndarray) -> None:
+def _check_frame(frame: np.ndarray, sides: tuple[int, int] = _SIDES[""]) -> None:
     expect("a frame", frame, np.ndarray)
     if frame.dtype != np.uint8 or frame.shape[2:] != (3,) or 0 in frame.shape:
         raise AntsError(
             f"a frame is {frame.dtype} {frame.shape}; it must be uint8 (height, width, 3)."
+        )
+    height, width = frame.shape[:2]
+    least, most = sides
+    if not least <= min(height, width) <= max(height, width) <= most:
+        raise AntsError(
+            f"a frame is {width} pixels wide and {height} high; this kind of file has from {least} "
+            f"to {most}, so choose another size, or another ending."
         )
 
 
@@ -177,28 +221,58 @@ def _png(frame: np.ndarray, optimize: bool = False) -> bytes:
     return buffer.getvalue()
 
 
-def _gif(frames: Iterable[np.ndarray], fps: float) -> bytes:
-    """A GIF that repeats for ever; Pillow joins frames that are alike, and stores what changes."""
-    from PIL import Image
+def _gif(file: BinaryIO, frames: Iterable[np.ndarray], fps: float) -> None:
+    """Write a GIF that repeats for ever.
+
+    Pillow's own writer keeps all frames until the last one; this one keeps two, and has Pillow
+    compress one at a time.
+    """
+    from PIL import GifImagePlugin, Image
 
     waiting = iter(frames)
     first = next(waiting)
+    colour_table = _palette(first).tobytes()
     palette = Image.new("P", (1, 1))
-    palette.putpalette(_palette(first).tobytes())
+    palette.putpalette(colour_table)
+    height, width = first.shape[:2]
+    file.write(b"GIF89a" + struct.pack("<HHBBB", width, height, 0xF7, 0, 0))
+    file.write(colour_table.ljust(3 * 256, b"\0"))
+    file.write(b"!\xff\x0bNETSCAPE2.0\x03\x01\0\0\0")  # repeat without end
 
-    def pictures() -> Iterator[Image.Image]:
-        shown = 0
-        for number, frame in enumerate(chain([first], waiting), start=1):
-            picture = Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
-            # A GIF counts hundredths of a second; rounded so that their sum is right.
-            until = 10 * round(100 * number / fps)
-            picture.info["duration"], shown = until - shown, until
-            yield picture
+    def write(picture: np.ndarray, place: tuple[int, int], duration: int) -> None:
+        options = {"duration": duration, "transparency": _SAME, "disposal": 1}
+        image = Image.frombytes("P", picture.shape[::-1], picture.tobytes())
+        for part in GifImagePlugin.getdata(image, place, **options):
+            file.write(part)
 
-    drawn, buffer = pictures(), io.BytesIO()
-    options = {"save_all": True, "append_images": drawn, "loop": 0, "optimize": True}
-    next(drawn).save(buffer, "GIF", **options)
-    return buffer.getvalue()
+    before, change, place, shown, lasts = None, np.empty(0), (0, 0), 0, 0
+    for number, frame in enumerate(chain([first], waiting), start=1):
+        drawn = Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
+        picture = np.asarray(drawn)
+        # A GIF counts hundredths of a second; rounded so that their sum is right.
+        until = 10 * round(100 * number / fps)
+        duration, shown = until - shown, until
+        if before is None:
+            change, place, lasts = picture, (0, 0), duration
+        elif (picture == before).all() and lasts + duration <= _LONGEST:
+            lasts += duration
+        else:
+            write(change, place, lasts)
+            (change, place), lasts = _change(before, picture), duration
+        before = picture
+    write(change, place, lasts)
+    file.write(b";")
+
+
+def _change(before: np.ndarray, picture: np.ndarray) -> tuple[np.ndarray, tuple[int, int]]:
+    """The smallest part of a picture that holds all that has changed, and its left upper corner."""
+    differs = picture != before
+    rows, columns = (np.flatnonzero(differs.any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return np.full((1, 1), _SAME, np.uint8), (0, 0)
+    top, left = rows[0], columns[0]
+    part = (slice(top, rows[-1] + 1), slice(left, columns[-1] + 1))
+    return np.where(differs[part], picture[part], np.uint8(_SAME)), (int(left), int(top))
 
 
 def _palette(first: np.ndarray) -> np.ndarray:
@@ -215,16 +289,15 @@ def _palette(first: np.ndarray) -> np.ndarray:
     return np.concatenate([kept, others[away > 20]])
 
 
-def _mp4(frames: Iterable[np.ndarray], fps: float) -> bytes:
-    """An MP4 (H.264); of an odd width or height it leaves out the last column or row."""
+def _mp4(file: BinaryIO, frames: Iterable[np.ndarray], fps: float) -> None:
+    """Write an MP4 (H.264); of an odd width or height the last column or row is left out."""
     av = _import_av()
     from fractions import Fraction
 
     waiting = iter(frames)
     first = next(waiting)
     height, width = first.shape[0] // 2 * 2, first.shape[1] // 2 * 2
-    buffer = io.BytesIO()
-    with av.open(buffer, "w", format="mp4") as container:
+    with av.open(file, "w", format="mp4") as container:
         stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1000))
         stream.width, stream.height = width, height
         stream.pix_fmt = "yuv420p"
@@ -239,7 +312,6 @@ def _mp4(frames: Iterable[np.ndarray], fps: float) -> bytes:
             video = video.reformat(format="yuv420p", dst_colorspace="ITU709")
             container.mux(stream.encode(video))
         container.mux(stream.encode())
-    return buffer.getvalue()
 
 
 def _import_av() -> ModuleType:

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-# In `clock`, in this order. Deliveries and returns are of the episode, delivered of all so far.
+# In `clock`, in this order. Deliveries and returns are of the episode, delivered and ticks of
+# all so far.
 CLOCK = (
     "episode",
     "tick",
@@ -22,6 +23,7 @@ CLOCK = (
     "learning_rate",
     "ants",
     "delivered",
+    "ticks",
 )
 
 # The sections, in order, and their types; "cell", "state" and "level" depend on the world.
@@ -43,6 +45,8 @@ SECTIONS = {
     "trail": "level",
     "table_at": "f8",  # (owner * n_states + state) * 5 + action; the owner is 0, or an ant
     "table": "f4",
+    # Points for curves since the frame before, of six numbers each, see `course.POINT`.
+    "course": "f8",
 }
 _HEAD = 8 * -(-(1 + len(SECTIONS)) // 2)  # bytes
 

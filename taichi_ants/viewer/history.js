@@ -19,7 +19,9 @@ const EMPTY = 0, OBSTACLE = 5, FOOD = 7, QUEEN = 13; // what a cell holds, as in
 const FAILED = 1, PICKED_UP = 3, DELIVERED = 4; // events
 const N_ACTIONS = 5;
 const MOST_BYTES = 2 ** 27; // of frames; a simulation that runs for hours has more
-const CLOCK = ["episode", "tick", "deliveries", "returns", "epsilon", "learningRate", "ants", "delivered"];
+const CLOCK = ["episode", "tick", "deliveries", "returns", "epsilon", "learningRate", "ants", "delivered", "ticks"];
+const POINT = ["episode", "ticks", "delivered", "returns", "epsilon", "ended"]; // as in course.py
+const MOST_POINTS = 1500;
 const ARRAYS = {
   u1: Uint8Array, u2: Uint16Array, u4: Uint32Array, i4: Int32Array, f4: Float32Array, f8: Float64Array,
 };
@@ -102,6 +104,8 @@ class History {
     this.first = 0; // the earliest moment that is still known
     this.bytes = 0;
     this.events = []; // pick-ups and deliveries: {moment, kind, ant, cell}, in order
+    this.within = []; // points for curves, within the first episode: objects of `POINT`
+    this.ends = []; // those at the ends of episodes
     this.values = new Map(); // entry of a table -> [moments, values] of its changes
     this.world = { moment: -1, ground: new Uint8Array(this.grid.size), trail: this.emptyTrail() };
     this.kept = []; // copies of the world now and then, so that seeking is quick
@@ -142,6 +146,13 @@ class History {
         moment, kind: event, ant: before.numbers[i], cell: before.cells[i],
       });
     }
+    if (whole) [this.within, this.ends] = [[], []];
+    for (let at = 0; at < frame.course.length; at += POINT.length) {
+      const point = Object.fromEntries(POINT.map((name, i) => [name, frame.course[at + i]]));
+      if (point.ended) this.ends.push(point);
+      else if (!moment || whole) this.within.push(point); // later frames tell of it themselves
+    }
+    if (this.ends.length > 2 * MOST_POINTS) this.ends = this.ends.filter((_, i) => i % 2 === 0);
     if (this.bytes > MOST_BYTES) this.forget();
     return frame;
   }
@@ -152,9 +163,10 @@ class History {
     const { moment: first } = this.kept[this.kept.length >> 1];
     this.kept = this.kept.filter((copy) => copy.moment >= first);
     for (; this.first < first; this.first++) {
-      const { number, episode, tick, deliveries, returns, epsilon, learningRate, ants, delivered, size } = this.frames[this.first];
+      const { number, size, ...rest } = this.frames[this.first];
+      const clock = Object.fromEntries(CLOCK.map((name) => [name, rest[name]]));
       const nothing = { numbers: [], cells: [], poses: [], states: [], acts: [], td_errors: [], passed: 0 };
-      this.frames[this.first] = { number, episode, tick, deliveries, returns, epsilon, learningRate, ants, delivered, ...nothing };
+      this.frames[this.first] = { number, ...clock, ...nothing };
       this.bytes -= size;
     }
     this.events = this.events.filter(({ moment }) => moment > first);
@@ -162,6 +174,28 @@ class History {
       const old = Math.max(0, changes[0].findLastIndex((moment) => moment <= first));
       changes.forEach((list) => list.splice(0, old));
     }
+  }
+
+  /* Whether there is more than one episode, so that what is of one differs from what is of all. */
+  get several() {
+    const last = this.frames[this.length - 1];
+    return this.ends.length > 0 || last.delivered !== last.deliveries || last.episode > this.frames[0].episode;
+  }
+
+  /* Where curves begin, in ticks over all episodes. */
+  get origin() {
+    return Math.min(this.frames[0].ticks, ...this.within.slice(0, 1).map(({ ticks }) => ticks));
+  }
+
+  /* The last moment of so many ticks over all episodes, or the one before. */
+  momentAt(ticks) {
+    let low = this.first, high = this.length - 1;
+    while (low < high) {
+      const middle = (low + high + 1) >> 1;
+      if (this.frames[middle].ticks <= ticks) low = middle;
+      else high = middle - 1;
+    }
+    return low;
   }
 
   read(bytes) {
@@ -224,7 +258,7 @@ class History {
       for (let i = 0; i < n && ticks > 0; i++) if (trail[i] > 0) trail[i] = Math.max(trail[i] - ticks, 0);
       return;
     }
-    for (let tick = 0; tick < ticks; tick++) {
+    for (let tick = 0; tick < ticks && trail.some((level) => level > 0); tick++) {
       if (evaporation === "linear") {
         for (let i = 0; i < n; i++) if (trail[i] > 0) trail[i] = Math.max(Math.fround(trail[i] - 1), 0);
       } else if (evaporation === "exponential") {
@@ -331,12 +365,13 @@ class History {
     return values[Math.max(low - 1, 0)] ?? 0;
   }
 
-  /* The cells where an ant was, the latest first, back to the start of its episode or its birth. */
+  /* The cells where an ant was, the latest first, back to the start of its episode or its birth, or
+     to where more than a tick passed between two moments: nobody knows its way then. */
   path(moment, number, most = 150) {
     const cells = [], episode = this.frames[moment].episode;
     for (let then = moment; then >= 0 && cells.length < most; then--) {
       const i = this.frames[then].episode === episode ? this.place(then, number) : -1;
-      if (i < 0 || (this.live && then < moment && this.frames[then + 1].passed > 1)) break;
+      if (i < 0 || (then < moment && this.frames[then + 1].passed > 1)) break;
       if (cells[cells.length - 1] !== this.frames[then].cells[i]) cells.push(this.frames[then].cells[i]);
     }
     return cells;

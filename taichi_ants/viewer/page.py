@@ -12,7 +12,7 @@ from typing import Any
 from taichi_ants import files
 from taichi_ants.engines.runs.traces import Trace
 from taichi_ants.errors import AntsError, expect
-from taichi_ants.rendering.writers import writable, write
+from taichi_ants.rendering.writers import write
 from taichi_ants.viewer.recording import Recording, record_colony, record_trace
 
 # The parts of one script, in this order: what a part uses stands in those before it.
@@ -80,7 +80,7 @@ def check_page(path: files.PathLike) -> Path:
     Raises:
         AntsError: The file does not end in .html, or cannot be written.
     """
-    target = writable(path)
+    target = files.check_writable_file(path)
     if not is_page(target):
         raise AntsError(f"{str(path)!r} is to hold a page; give it a name that ends in .html.")
     return target

@@ -61,10 +61,11 @@ class Panel {
     for (const pose of frame.poses) loaded += pose >> 3;
     const { length, frames, live } = this.history;
     const episodes = frames[length - 1].episode > (live ? 0 : frames[0].episode);
+    const ofOne = this.history.several ? " this episode" : "";
     const facts = [
       ...(episodes ? [["episode", frame.episode]] : []),
       ["tick", frame.tick], ...(episodes && frame.ants === 1 ? [] : [["ants", frame.ants]]), ["with food", loaded],
-      ["delivered", frame.deliveries], ["return", plain(frame.returns, 0)],
+      [`delivered${ofOne}`, frame.deliveries], [`return${ofOne}`, plain(frame.returns, 0)],
       ["epsilon", plain(frame.epsilon, frame.epsilon < 0.01 && frame.epsilon ? 4 : 2)],
     ];
     byId("now").classList.toggle("many", facts.length > 6);
@@ -81,6 +82,7 @@ class Panel {
       + button("ant-close", "Stop following (Esc)", "close");
     const badge = ant ? ` <span class="badge ${ant.loaded ? "loaded" : ""}">${ant.loaded ? "with food" : "no food"}</span>` : "";
     const head = `<div class="head"><h2>Ant ${followed}${badge}</h2>${buttons}</div>`;
+    if (ant) ant.tick = this.history.frames[moment].tick;
     if (ant && !ant.act && this.history.live) ant.past = this.lastAct(moment, followed);
     card.innerHTML = head + (ant ? this.viewOf(ant) + this.barsOf(ant) + this.storyOf(ant) : "<p>It does not live now.</p>");
   }
@@ -106,8 +108,8 @@ class Panel {
     });
     const kinds = [...new Set(letters.map((letter) => letter[0]))], known = kinds.filter((kind) => LETTERS[kind]);
     const meanings = known.map((kind) => `${kind} ${LETTERS[kind]}`);
-    if (known.length < kinds.length || !kinds.length) meanings.push(header.letters);
-    const meaning = meanings.filter(Boolean).join(", ");
+    const more = known.length < kinds.length || !kinds.length ? header.letters : "";
+    const meaning = [meanings.join(", "), more].filter(Boolean).join("; ");
     const around = header.view.some((turn) => Math.abs(turn) > 1);
     const box = around ? "-2.9 -2.9 5.8 5.8" : "-2.6 -2.65 5.2 3.65";
     return `<div class="sees"><svg viewBox="${box}" role="img" aria-label="It sees, from left to right: ${safe(rest)}">`
@@ -147,7 +149,8 @@ class Panel {
     const { header, live } = this.history, act = ant.act;
     if (ant.past) return this.storyOf(ant.past, '<span class="label">In the last tick, before what it sees now:</span>');
     if (!act) {
-      const words = live ? "It has not chosen yet." : "What it does next is not in the recording.";
+      const early = ant.tick === 0 ? "It has not chosen yet." : "Time passes too fast to show each step; slow down, or pause and step.";
+      const words = live ? early : "What it does next is not in the recording.";
       return `<div class="story"><span class="label">${words}</span></div>`;
     }
     const why = { best: "the best", tie: `a tie of ${act.ties}`, explored: "explored" }[act.why];
@@ -192,7 +195,7 @@ class Panel {
   /* One sentence for those who hear the page. */
   sentence(moment, followed) {
     const frame = this.history.frames[moment];
-    let said = `Tick ${frame.tick}, ${frame.deliveries} delivered.`;
+    let said = `Tick ${frame.tick}, ${frame.deliveries} delivered${this.history.several ? " this episode" : ""}.`;
     const ant = followed >= 0 ? this.history.ant(moment, followed) : null;
     if (!ant) return said;
     const { task, rest } = this.history.stateName(ant.state);

@@ -18,6 +18,7 @@ from taichi_ants.grid.randomness import GAMMA, choose, mix
 from taichi_ants.rendering.observed import name_parts
 from taichi_ants.task import Pheromone
 from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS, OBSTACLE
+from taichi_ants.viewer.course import Course
 from taichi_ants.viewer.frames import pack, types_of
 
 _MOST_NAMES = 4096  # of states that a header holds, seen or not
@@ -64,6 +65,7 @@ class Recorder:
         if not self._learns:
             self._fixed = self._tables()
         self._clock = (-1, 0)
+        self.course = Course(colony, world)
 
     def header(self) -> dict[str, Any]:
         """What all frames are about.
@@ -72,9 +74,11 @@ class Recorder:
         the rest of the name, and a letter or two for each cell in view where the name has them.
         """
         colony, task, pheromone = self.colony, self.colony.task, self._pheromone
+        changes = task.life.births or task.life.lifespan
+        ants = "Ants" if changes else count(colony.ants, "ant")
         return {
             "format": 1,
-            "title": self._title or f"{count(colony.ants, 'ant')} in a world of {self.grid.count}",
+            "title": self._title or f"{ants} in a world of {self.grid.count} cells",
             "ranges": list(self.grid.ranges),
             "types": self.types,
             "trail": {
@@ -113,7 +117,7 @@ class Recorder:
         x, y, z = self.grid.ranges
         lines = [
             ("world", f"{self.grid.count} cells, ranges {x}, {y}, {z}"),
-            ("ants", str(colony.ants)),
+            ("ants at first", str(colony.ants)),
             ("seed", str(colony.seeds[self.world])),
             ("they see", f"{self.observation.name}, {self._n_states} states"),
         ]
@@ -122,7 +126,7 @@ class Recorder:
         tables = "each has its own" if colony.one_a_slot else "one for all"
         return [
             *lines,
-            ("learner", config.learner),
+            ("learner", learners.label(config.learner)),
             ("table", tables),
             ("learning rate", f"{config.learning_rate:g}"),
             ("discount", f"{config.discount:g}"),
@@ -139,7 +143,7 @@ class Recorder:
         late._ground, late._trail = np.zeros_like(self._ground), np.zeros_like(self._trail)
         late._known, late._owners = self._known.copy(), self._owners.copy()
         late._table = np.full_like(self._table, np.nan)
-        return late._frame({})
+        return late._frame({"course": self.course.points()})
 
     def tick(self, n: int = 1, td_errors: np.ndarray | None = None) -> bytes:
         """Let n ticks pass and return a frame; what ants did is in it only where n is 1.
@@ -165,13 +169,13 @@ class Recorder:
         return self._frame(acts if td_errors is None else {**acts, "td_errors": td_errors})
 
     def _ants(self) -> np.ndarray:
-        """The rows of `AntRow` of this world, (rows, slots)."""
+        """A copy of the rows of `AntRow` of this world, (rows, slots)."""
         slots = self.colony.capacity
-        return self.colony.arrays["ants"][:, self.world * slots : (self.world + 1) * slots]
+        return self.colony.ant_rows()[:, self.world * slots : (self.world + 1) * slots]
 
     def _living(self) -> tuple[np.ndarray, np.ndarray]:
         """A copy of the rows, and the slots of the living ants in the order of their numbers."""
-        ants = self._ants().copy()
+        ants = self._ants()
         (slots,) = np.nonzero(ants[AntRow.STAGE] == Stage.LIVING)
         return ants, slots[np.argsort(ants[AntRow.NUMBER, slots], kind="stable")]
 
@@ -231,7 +235,9 @@ class Recorder:
         totals = (outcome.deliveries[0, self.world], outcome.returns[0, self.world])
         rates = (colony.epsilon, colony.learning_rate)
         delivered = colony.delivered[self.world] + totals[0]
-        sections["clock"] = (colony.episode, tick, *totals, *rates, len(numbers), delivered)
+        counts = (len(numbers), delivered, self.course.ticks)
+        sections["clock"] = (colony.episode, tick, *totals, *rates, *counts)
+        sections.setdefault("course", self.course.news())
         # Trails fall by themselves; all else is told.
         episode, last = self._clock
         passed = tick - last if episode == colony.episode else 0
@@ -269,7 +275,13 @@ def fallen(
 
     Pages expect the same, to the bit.
     """
+    if pheromone.share == 0 and pheromone.evaporation == "linear":
+        return np.maximum(trail - trail.dtype.type(min(ticks, trail.max(initial=0) + 1)), 0)
+    if pheromone.share == 0 and pheromone.evaporation == "none":
+        return trail
     for _ in range(ticks):
+        if not trail.any():
+            break
         if pheromone.evaporation == "linear":
             trail = np.maximum(trail - trail.dtype.type(1), 0)
         elif pheromone.evaporation == "exponential":

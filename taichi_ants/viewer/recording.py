@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from taichi_ants.checks import check_progress
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.traces import Trace
 from taichi_ants.errors import AntsError, checked_whole, expect
@@ -94,8 +95,11 @@ def record_colony(
     """
     ticks = checked_whole("ticks", ticks, least=0)
     every = checked_whole("every", every)
+    check_progress(progress)
+    if follow is not None:
+        follow = checked_whole("follow", follow, least=0)
     recorder = Recorder(colony, world, title, follow)
-    if follow is not None and not 0 <= follow < colony.ants and not colony.task.life.births:
+    if follow is not None and follow >= colony.ants and not colony.task.life.births:
         raise AntsError(f"follow is {follow}; the {colony.ants} ants have numbers from 0.")
     frames = [recorder.moment()]
     for done in range(0, ticks, every):
@@ -140,6 +144,7 @@ def record_trace(trace: Trace, title: str = "") -> Recording:
     for step, error in zip(trace.steps.tolist(), errors.tolist(), strict=True):
         if step == 0:
             if recorder is not None:
+                recorder.course.note(ended=True)
                 colony.end_episode()
             colony.begin_episode(made.max_steps)
             recorder = recorder or Recorder(colony, 0, title, 0)
@@ -161,6 +166,7 @@ def _record_rollout(
     title: str,
 ) -> Recording:
     """n ticks of one ant, played again by a colony of one, which has the same random stream."""
+    expect("title", title, str)
     steady = TrainingConfig("q_learning", 1.0, 0.0, epsilon, 1.0, min_epsilon=0.0)
     colony = Colony(world, task, steady, seed, sharing="fixed", q_values=q_values)
     colony.begin_episode()

@@ -1,11 +1,11 @@
 /* Time: where in the recording the page is, how fast it goes on, what happened when, and curves. */
 
+/* Name, name where there are several episodes, key of a frame or a point, digits. */
 const CURVES = [
-  ["delivered", (frame) => frame.delivered, 0],
-  ["return", (frame) => frame.returns, 0],
-  ["epsilon", (frame) => frame.epsilon, 3],
+  ["delivered", "delivered in all", "delivered", 0],
+  ["return", "return by episode", "returns", 0],
+  ["epsilon", "epsilon", "epsilon", 3],
 ];
-const MOST_POINTS = 1500;
 const SLOWEST = 0.5, FASTEST = 200; // ticks a second
 const SMOOTH_BELOW = 24; // ticks a second: ants glide from cell to cell
 
@@ -73,7 +73,7 @@ class Timeline {
     this.player = player;
     this.time = byId("time");
     this.speed = byId("speed");
-    this.time.addEventListener("input", () => player.seek(Number(this.time.value)), { signal });
+    this.time.addEventListener("input", () => this.seek(Number(this.time.value)), { signal });
     this.speed.addEventListener("input",
       () => this.setSpeed(player.slowest * (player.fastest / player.slowest) ** (this.speed.value / 100)), { signal });
     for (const [id, act] of Object.entries({
@@ -87,11 +87,15 @@ class Timeline {
           <line class="cursor" y1="0" y2="100"/>
         </svg></div>`).join("");
     this.curves = [...document.querySelectorAll(".curve")];
+    // Who only follows a policy has no curve of epsilon.
+    const explores = history.live || history.frames.some((frame) => frame.epsilon > 0);
+    this.curves.forEach((curve, number) => (curve.hidden = CURVES[number][0] === "epsilon" && !explores));
     for (const curve of this.curves) {
       const svg = curve.querySelector("svg");
       const seek = (event) => {
         const box = svg.getBoundingClientRect();
-        player.seek(((event.clientX - box.left) / box.width) * player.last);
+        const { origin } = history, share = (event.clientX - box.left) / box.width;
+        player.seek(history.momentAt(Math.round(origin + share * (this.ticks(player.last) - origin))));
       };
       svg.addEventListener("pointerdown", (event) => {
         svg.setPointerCapture(event.pointerId);
@@ -105,6 +109,31 @@ class Timeline {
     this.draw();
   }
 
+  /* Ticks over all episodes, of a moment: what lies left and right on the page. */
+  ticks(moment) {
+    return this.history.frames[moment].ticks;
+  }
+
+  /* Ticks between two moments, on average; a recording may leave most of them out. */
+  get ticksAMoment() {
+    const { history, player } = this;
+    const passed = history.live ? 1 : (this.ticks(player.last) - this.ticks(0)) / Math.max(player.last, 1);
+    return passed > 1.5 ? passed : 1;
+  }
+
+  /* How far to the right so many ticks are, in percent. */
+  across(ticks) {
+    const { origin } = this.history;
+    return (100 * (ticks - origin)) / Math.max(this.ticks(this.player.last) - origin, 1);
+  }
+
+  /* Where the slider was put; a key that moves it by a tick leads to another moment in any case. */
+  seek(ticks) {
+    const { player, history } = this, moment = history.momentAt(ticks);
+    const on = ticks > this.ticks(player.moment) && moment === player.moment;
+    player.seek(moment + Number(on));
+  }
+
   setSpeed(speed) {
     const { player } = this;
     player.setSpeed(Math.min(Math.max(speed, player.slowest), player.fastest));
@@ -116,18 +145,20 @@ class Timeline {
     this.speed.value = Math.round(100 * share);
     this.speed.style.setProperty("--filled", `${this.speed.value}%`);
     const unlimited = this.history.live && speed >= fastest;
-    const shown = unlimited ? "fastest" : `${speed < 3 ? speed.toFixed(1) : Math.round(speed)} / s`;
+    const pace = speed * this.ticksAMoment;
+    const shown = unlimited ? "fastest" : `${pace < 3 ? pace.toFixed(1) : Math.round(pace)} / s`;
     byId("speed-value").textContent = shown;
     this.speed.setAttribute("aria-valuetext", unlimited ? "as fast as it can" : `${shown.split(" ")[0]} ticks a second`);
   }
 
   /* Draw the events and the curves, as far as the history goes. */
   draw() {
-    const { history, player } = this, last = Math.max(player.last, 1);
+    const { history, player } = this;
     this.drawn = history.length;
-    this.time.max = player.last;
+    this.time.min = history.origin;
+    this.time.max = this.ticks(player.last);
     const strokes = { [PICKED_UP]: new Set(), [DELIVERED]: new Set() };
-    for (const { moment, kind } of history.events) strokes[kind].add(Math.round((2000 * moment) / last) / 2);
+    for (const { moment, kind } of history.events) strokes[kind].add(Math.round(20 * this.across(this.ticks(moment))) / 2);
     const paths = Object.entries(strokes).map(([kind, places]) => {
       const [name, y] = Number(kind) === PICKED_UP ? ["picked", 9] : ["delivered", 1];
       return `<path class="${name}" d="${[...places].map((x) => `M${x} ${y}v4`).join("")}"/>`;
@@ -138,13 +169,18 @@ class Timeline {
     const every = Math.ceil(history.length / MOST_POINTS), picked = [];
     for (let i = 0; i < history.length; i += every) picked.push(i);
     if (picked[picked.length - 1] !== history.length - 1) picked.push(history.length - 1);
+    // A page that came late has points of what was before its first frame.
+    const early = [...history.within, ...history.ends].filter(({ ticks }) => ticks < this.ticks(0));
+    const known = [...early, ...picked.map((i) => history.frames[i])];
     this.curves.forEach((curve, number) => {
-      const values = picked.map((i) => CURVES[number][1](history.frames[i]));
+      const [name, ofAll, key] = CURVES[number], shown = key === "returns" && history.ends.length ? history.ends : known;
+      curve.querySelector("span").textContent = history.several ? ofAll : name;
+      const values = shown.map((one) => one[key]), places = shown.map(({ ticks }) => this.across(ticks).toFixed(2));
       const low = Math.min(0, ...values), high = Math.max(0, ...values, low + 1e-9);
       const at = (value) => 100 - (94 * (value - low)) / (high - low);
-      const points = values.map((value, i) => `${((100 * picked[i]) / last).toFixed(2)} ${at(value).toFixed(2)}`);
-      curve.querySelector(".line").setAttribute("d", `M${points.join("L")}`);
-      curve.querySelector(".area").setAttribute("d", `M0 ${at(0)}L${points.join("L")}L${(100 * player.last) / last} ${at(0)}Z`);
+      const points = values.map((value, i) => `${places[i]} ${at(value).toFixed(2)}`);
+      curve.querySelector(".line").setAttribute("d", `M${points.join("L")}h0`);
+      curve.querySelector(".area").setAttribute("d", `M${places[0]} ${at(0)}L${points.join("L")}L${places.at(-1)} ${at(0)}Z`);
       curve.querySelector(".base").setAttribute("d", `M0 ${at(0)}H100`);
     });
   }
@@ -152,8 +188,9 @@ class Timeline {
   show() {
     const { player, history } = this, frame = history.frames[player.moment];
     if (history.length !== this.drawn) this.draw();
-    this.time.value = player.moment;
-    this.time.style.setProperty("--filled", `${(100 * player.moment) / Math.max(player.last, 1)}%`);
+    const x = this.across(frame.ticks);
+    this.time.value = frame.ticks;
+    this.time.style.setProperty("--filled", `${x}%`);
     const end = history.frames[player.last];
     const episode = end.episode > (history.live ? 0 : history.frames[0].episode) ? `, episode ${frame.episode}` : "";
     this.time.setAttribute("aria-valuetext", `tick ${frame.tick}${episode}`);
@@ -166,9 +203,10 @@ class Timeline {
     byId("last").disabled = player.moment === player.last;
     byId("forward").disabled = player.moment === player.last && !history.live;
     this.curves.forEach((curve, number) => {
-      const [, value, digits] = CURVES[number];
-      curve.querySelector("b").textContent = plain(value(frame), digits);
-      const x = (100 * player.moment) / Math.max(player.last, 1), cursor = curve.querySelector(".cursor");
+      const [, , key, digits] = CURVES[number], { ends } = history;
+      const at = key === "returns" && ends.length ? ends.findLast(({ ticks }) => ticks <= frame.ticks) : frame;
+      curve.querySelector("b").textContent = at ? plain(at[key], digits) : "–";
+      const cursor = curve.querySelector(".cursor");
       cursor.setAttribute("x1", x);
       cursor.setAttribute("x2", x);
     });

@@ -18,7 +18,7 @@ const KEYS = [
   ["?", "this help"],
 ];
 const CURSOR = { u: 5, i: 0, o: 1, j: 4, k: 3, l: 2 }; // headings, as the keys lie
-const PANEL_EVERY = 80; // milliseconds, while playing
+const PANEL_SHARE = 0.5; // of the time, which the text beside the world may take while playing
 
 class Viewer {
   constructor(source) {
@@ -33,7 +33,8 @@ class Viewer {
     this.aims = false;
     this.dirty = true;
     this.frames = 0; // drawn so far, for measurements
-    this.lastPanel = -Infinity;
+    this.panelTells = -1; // of which moment
+    this.panelDue = -Infinity; // milliseconds
     this.still = matchMedia("(prefers-reduced-motion: reduce)");
     source.start((bytes, whole) => this.receive(bytes, whole));
   }
@@ -63,7 +64,8 @@ class Viewer {
     }, signal);
     this.timeline = new Timeline(this.history, this.player, signal);
     if (this.source.live) document.querySelector(".about summary").textContent = "About this session";
-    byId("hint").textContent = "Click an ant to follow it, or a cell to look at it. Press ? for all keys.";
+    byId("hint").textContent = matchMedia("(hover: none)").matches ? "Tap an ant to follow it, or a cell to look at it."
+      : "Click an ant to follow it, or a cell to look at it. Press ? for all keys.";
     byId("keys").innerHTML = [...(this.source.keys ?? []), ...KEYS].map(([keys, does]) =>
       `<dt>${keys.split(" ").map((key) => `<kbd>${key}</kbd>`).join(" ")}</dt><dd>${does}</dd>`).join("");
     this.listen();
@@ -84,6 +86,7 @@ class Viewer {
   }
 
   draw(now, moved) {
+    const asked = this.dirty;
     this.dirty = false;
     const { player, history, stage, followed } = this, moment = player.moment;
     const smooth = player.playing && player.speed <= SMOOTH_BELOW && !this.still.matches;
@@ -98,15 +101,20 @@ class Viewer {
     });
     this.frames++;
     this.source.seen?.();
-    // The text need not change sixty times a second.
-    if (moved && player.playing && now - this.lastPanel < PANEL_EVERY) {
-      this.dirty = true;
-      return;
+    // The text tells of the same moment, but where writing it takes too long while time goes on.
+    if (moved && player.playing) {
+      if (moment === this.panelTells && !asked) return;
+      if (now < this.panelDue) {
+        this.dirty = true;
+        return;
+      }
     }
-    this.lastPanel = now;
+    const began = performance.now();
     history.worldAt(moment);
     this.panel.show(moment, followed, this.cell, this.aims);
     this.timeline.show();
+    this.panelTells = moment;
+    this.panelDue = now + (performance.now() - began) * (1 / PANEL_SHARE - 1);
     if (!player.playing) {
       const said = this.panel.sentence(moment, followed);
       if (byId("spoken").textContent !== said) byId("spoken").textContent = said;

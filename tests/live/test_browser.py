@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,8 +11,10 @@ from browser import Page, started
 from rooms import CHOSEN, Guest, running
 
 from taichi_ants import Colony, load_policy
+from taichi_ants.learners.expected_sarsa import EXPECTED_SARSA
 from taichi_ants.learners.policies import Policy, trail_follower
 from taichi_ants.live.choices import Choices
+from taichi_ants.live.log import Log
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
 pytestmark = pytest.mark.browser
@@ -22,6 +25,9 @@ WORLD = """() => {
   return { ground: [...ground], trail: [...trail], cells: [...frame.cells],
            poses: [...frame.poses], tick: frame.tick, deliveries: frame.deliveries };
 }"""
+
+
+LINES = """[...document.querySelectorAll(".curve .line")].map((line) => line.getAttribute("d"))"""
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +64,9 @@ def wait(page: Page, script: str) -> None:
 
 
 def assert_same(page: Page, room) -> None:
-    """What the page has is what the engine has."""
+    """What the page has is what the engine has, once time stands still there too."""
+    while room.playing:
+        time.sleep(0.01)
     wait(page, f"viewer.history.frames.at(-1).tick === {room.session.colony.ticks}")
     shown, snapshot = page.read(WORLD), room.session.colony.snapshot()
     assert shown["ground"] == snapshot.ground.tolist()
@@ -86,13 +94,20 @@ def place(page: Page, cell: int) -> tuple[float, float]:
     return box["x"] + x, box["y"] + y
 
 
+def open_new(page: Page) -> None:
+    """Show what a new session can be."""
+    page.tab.click("#new > summary")
+    page.tab.wait_for_selector("#begin")
+
+
 def cell_of(room, *cube: int) -> int:
     return int(room.session.colony.grid.index(cube))
 
 
 def test_steps_and_play_show_the_world_of_the_engine(page, room):
-    for _ in range(3):
+    for tick in (1, 2, 3):
         page.click("#forward")
+        wait(page, f"viewer.history.frames.at(-1).tick === {tick}")
         assert_same(page, room)
     assert room.session.ticks == 3
     page.tab.focus("#world")
@@ -141,6 +156,13 @@ def test_an_ant_is_followed_and_explained(page, room):
     said = page.text("#ant")
     assert "Chooses" in said
     assert "TD error" in said
+    page.tab.fill("#speed", "100")
+    page.tab.click("#play")
+    wait(page, "viewer.history.frames.at(-1).episode >= 2")
+    page.tab.click("#play")
+    wait(page, "!live.running && viewer.history.frames.at(-1).acts.length === 0")
+    if page.read("viewer.history.frames.at(-1).tick"):
+        assert "too fast to show each step" in page.text("#ant")
 
 
 @pytest.mark.parametrize("how", ["mouse", "keyboard"])
@@ -238,6 +260,7 @@ def test_sliders_change_the_colony(page, room):
 
 
 def test_a_new_session_is_what_was_chosen(page, room):
+    open_new(page)
     page.tab.select_option("#world-name", "far_piles")
     page.tab.fill("#world-seed", "4")
     page.tab.fill("#size", "25")
@@ -256,10 +279,14 @@ def test_a_new_session_is_what_was_chosen(page, room):
     assert (setup.task.observation, setup.task.life.births) == ("ants", True)
     assert page.tab.input_value("#task") == "foraging"
     assert_same(page, room)
+    assert page.text("#now-chosen") == "three far piles · foraging · Expected SARSA"
+    open_new(page)
+    assert page.text("#policy-help") == f"They learn: {EXPECTED_SARSA.summary}."
     page.tab.uncheck('#rules [value="right_of_way"]')
     assert page.tab.input_value("#task") == ""  # single rules
     page.tab.select_option("#policy", "file mine")
     assert page.tab.is_disabled("#sees")
+    assert page.text("#policy-help") == "They follow mine, and do not learn."
     page.tab.select_option("#world-name", "map")
     page.tab.fill("#ants", "3")
     page.click("#begin")
@@ -267,10 +294,110 @@ def test_a_new_session_is_what_was_chosen(page, room):
     assert np.array_equal(room.session.setup.policy, trail_follower("ants"))
     assert not room.session.setup.learns
     assert_same(page, room)
+    open_new(page)
+    page.tab.select_option("#world-name", "open")
+    page.tab.fill("#size", "9999")
+    page.tab.fill("#world-seed", "")
+    page.click("#begin")  # the browser says why not
+    assert room.session.setup.ants == 3
+    page.tab.select_option("#world-name", "map")  # what is hidden now does not matter
     page.tab.fill("#map", "nothing\nat all")
     page.click("#begin")
     page.tab.wait_for_selector("#toast.bad:not([hidden])")
     assert page.text("#toast").endswith(".")
+
+
+def test_a_long_map_is_pasted_at_once(page, room):
+    open_new(page)
+    page.tab.select_option("#world-name", "map")
+    most, lines = room.choices.as_dict()["most"]["text"], 4000
+    page.tab.fill("#map", "Q . .\n" + ". . .\n" * (lines - 1), timeout=3000)
+    assert page.tab.input_value("#map").count("\n") == lines
+    page.tab.focus("#map")
+    page.tab.keyboard.insert_text("x" * most)
+    page.tab.wait_for_selector("#toast.bad:not([hidden])")
+    assert len(page.tab.input_value("#map")) == most
+    page.tab.fill("#map", "Q F 0\n")
+    assert page.tab.input_value("#map") == "Q F 0\n"
+
+
+def test_all_pages_see_how_far_a_replay_is(page, browser, room, tmp_path):
+    page.press("Shift+ArrowRight")
+    wait(page, "viewer.history.frames.at(-1).tick === 10")
+    before, log = room.session, room.session.log()
+    replace(log, steps=10**8, ticks=10**8).write(tmp_path / "endless.npz")
+    page.tab.set_input_files("#upload", tmp_path / "endless.npz")
+    late = Page(browser, room.url, (390, 844), has_touch=True)
+    assert_same(late, room)
+    for one in (page, late):
+        wait(one, "document.querySelector('#works progress')?.value > 0")
+        assert one.text("#works span").endswith(" of 100 000 000 ticks")
+        assert one.read("document.querySelector('.controls').inert")
+    late.tab.click("#works button")
+    for one in (page, late):
+        wait(one, "!document.querySelector('#works progress')")
+        assert not one.read("document.querySelector('.controls').inert")
+    assert room.session is before
+    page.click("#forward")
+    assert_same(page, room)
+    late.close()
+
+
+def test_a_file_that_is_made_shows_how_far_it_is(page, room, tmp_path):
+    page.press("Shift+ArrowRight")
+    wait(page, "viewer.history.frames.at(-1).tick === 10")
+    replace(room.session.log(), steps=10**8, ticks=10**8).write(tmp_path / "endless.npz")
+    room.session.log = lambda: Log.read(tmp_path / "endless.npz")
+    page.tab.click('[data-export="gif"]')
+    page.tab.wait_for_selector("#works progress")
+    assert page.text("#works span").startswith("Making the GIF")
+    page.tab.click("#works button")
+    wait(page, "!document.querySelector('#works progress')")
+    assert page.text("#toast") == "Cancelled."
+
+
+def test_the_panel_tells_of_the_moment_that_is_drawn(page, room):
+    page.tab.fill("#speed", "100")
+    page.tab.click("#play")
+    wait(page, "viewer.history.length > 20")
+    # As the screen shows it, between two frames of the page.
+    told = """new Promise((done) => requestAnimationFrame(() => setTimeout(() => done(
+        [viewer.panelTells, Number(viewer.stage.shown.split(" ")[0])]))))"""
+    agree = [one == other for one, other in (page.read(told) for _ in range(20))]
+    assert sum(agree) > 10  # where it costs too much, the panel may be a moment behind
+    page.tab.click("#play")
+    wait(page, "!live.running")
+    page.settle()
+    told, drawn = page.read(told)
+    assert told == drawn
+    facts = page.read(
+        "Object.fromEntries([...document.querySelectorAll('#now div')]"
+        ".map((one) => [one.children[0].innerText, one.children[1].innerText]))"
+    )
+    assert int(facts["tick"]) == page.read("viewer.history.frames[viewer.player.moment].tick")
+
+
+def test_a_page_that_waits_says_so(browser, room, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(room, "_turn", lambda: time.sleep(0.01))  # as while a large world is drawn
+        time.sleep(0.3)
+        context = browser.new_context(bypass_csp=True)
+        tab = context.new_page()
+        tab.goto(room.url)
+        assert tab.inner_text("#toast") == "Waiting for the simulation …"
+        assert tab.evaluate("document.querySelector('.controls').inert")
+    tab.wait_for_function("window.viewer")
+    assert tab.is_hidden("#toast")
+    assert not tab.evaluate("document.querySelector('.controls').inert")
+    context.close()
+
+
+def test_a_page_that_was_cut_off_says_why(browser, room):
+    page = Page(browser, room.url)
+    page.read("live.ask('edit')")
+    wait(page, "document.querySelector('#toast').innerText.includes('an edit has to be')")
+    assert page.tab.is_disabled("#play")
+    page.close()
 
 
 def test_files_are_saved_and_loaded(page, room, tmp_path):
@@ -374,6 +501,7 @@ def test_fingers_draw_and_two_of_them_move_the_view(browser, room):
 
 
 def test_every_control_is_reached_by_keyboard_and_has_a_name(page):
+    open_new(page)
     reached = {}
     page.tab.focus("#theme")
     for _ in range(90):
@@ -419,3 +547,50 @@ def test_it_stays_at_thirty_frames_a_second(page, room, record_property):
     page.tab.click("#play")
     wait(page, "!live.running")
     assert rate > 20  # of 30, on a machine that others share
+
+
+def test_curves_are_over_time_and_a_late_page_has_them(page, browser, room):
+    """A point for the return of each episode, and ticks over all of them as the axis."""
+    page.tab.fill("#speed", "100")
+    page.tab.click("#play")
+    wait(page, "viewer.history.frames.at(-1).episode >= 4")
+    page.tab.click("#play")
+    wait(page, "!live.running")
+    page.settle()
+    late = Page(browser, room.url)
+    session = room.session
+    for one in (page, late):
+        assert one.read("viewer.history.frames.at(-1).ticks") == session.ticks
+        assert one.tab.get_attribute("#time", "max") == str(session.ticks)
+        assert one.tab.get_attribute("#time", "min") == "0"
+        names = one.tab.locator(".curve .label span").all_inner_texts()
+        assert names == ["delivered in all", "return by episode", "epsilon"]
+        assert "delivered this episode" in one.text("#now")
+        lines = [
+            [float(point.split()[0]) for point in line.removesuffix("h0").lstrip("M").split("L")]
+            for line in one.read(LINES)
+        ]
+        ended = [50 * (n + 1) / session.ticks * 100 for n in range(session.colony.episode)]
+        assert np.allclose(lines[1], ended, atol=0.01)
+        for line in lines:
+            assert line == sorted(line)
+        assert (lines[0][0], lines[0][-1]) == (0, 100)
+    late.close()
+
+
+def test_play_pressed_while_a_session_begins_is_kept(page, room):
+    page.tab.click("#play")
+    wait(page, "live.running")
+    open_new(page)
+    page.read("""() => {
+      [window.told, window.old] = [[], viewer];
+      const note = ({ detail }) => told.push(...detail.works.map((one) => one.kind));
+      live.news.addEventListener("state", note);
+    }""")
+    page.tab.click("#begin")
+    page.tab.click("#play")
+    wait(page, "viewer !== old && viewer.history.frames.at(-1).tick > 2")
+    assert page.tab.get_attribute("#play", "aria-label") == "Pause"
+    assert "kernels" in page.read("told")
+    page.tab.click("#play")
+    wait(page, "!live.running")

@@ -42,7 +42,8 @@ def test_what_the_command_begins_with_can_be_chosen():
 
 def test_the_python_of_the_guide_works(tmp_path, monkeypatch):
     text = (ROOT / "docs" / "watching.md").read_text(encoding="utf-8")
-    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    names: dict = {}
     monkeypatch.chdir(tmp_path)
-    exec(code, {})
+    exec("\n".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL)), names)
+    assert names["session"].ticks == 2500
     assert (tmp_path / "mine.npz").exists()

@@ -7,6 +7,8 @@ import json
 import socket
 import time
 from contextlib import closing, suppress
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,7 +21,10 @@ from taichi_ants import Colony
 from taichi_ants.learners.policies import Policy, trail_follower
 from taichi_ants.live import server
 from taichi_ants.live.choices import Choices
+from taichi_ants.live.exports import QUICK, SLOW
+from taichi_ants.live.log import Log
 from taichi_ants.viewer import Recording
+from taichi_ants.viewer.frames import unpack
 
 
 @pytest.fixture(scope="module")
@@ -214,6 +219,8 @@ def test_who_sends_what_no_page_sends_is_cut_off(room, message):
     with Guest(room) as guest:
         guest.socket.send(message)
         guest.until_cut_off()
+        assert guest.socket.close_code == 1008
+        assert len(guest.socket.close_reason) > 10
     with Guest(room):  # it goes on for others
         assert state_of(room) == before
         assert not room.playing
@@ -395,7 +402,9 @@ def test_a_session_is_saved_and_loaded(room):
         assert_same(guest, room.session)
         assert_same(other, room.session)
         guest.socket.send(saved[:-200] + b"\0" * 200)
-        assert "the loaded file" in guest.until("error")["words"]
+        words = guest.until("error")["words"]
+        assert words.startswith("the loaded file is damaged")
+        assert words.endswith("; load one that Save has made.")
         assert state_of(room) == before
 
 
@@ -406,7 +415,7 @@ def test_a_session_can_be_taken_away_in_every_form(room, tmp_path):
 
     with Guest(room) as guest:
         guest.ask("step", ticks=12)
-        for kind, (name, _) in server.EXPORTS.items():
+        for kind, (name, _) in {**QUICK, **SLOW}.items():
             guest.ask("export", kind=kind)
             (tmp_path / name).write_bytes(guest.until(name))
     before = state_of(room)
@@ -435,6 +444,136 @@ def test_time_goes_on_while_a_file_is_made(room):
         guest.until("session.html")
 
 
+@pytest.fixture
+def endless(room, tmp_path) -> bytes:
+    """A file of a session that takes minutes to replay."""
+    log = room.session.log()
+    replace(log, steps=10**8, ticks=10**8).write(tmp_path / "endless.npz")
+    return (tmp_path / "endless.npz").read_bytes()
+
+
+def working(guest: Guest, kind: str, done: int = 1) -> dict:
+    """What a page is told of work that takes long, as soon as so much is done."""
+    while True:
+        for work in guest.state["works"]:
+            if work["kind"] == kind and work["done"] >= done:
+                return work
+        guest.until("state")
+
+
+def test_pages_are_answered_while_a_session_is_replayed(room, endless):
+    with Guest(room) as guest, Guest(room) as other:
+        guest.ask("step", ticks=3)
+        guest.ask("play")
+        guest.until("frame")
+        before = room.session
+        guest.socket.send(endless)
+        done = working(other, "load")["done"]
+        stands = state_of(room)
+        assert working(guest, "load", done + 1)["total"] == 10**8
+        assert not guest.state["playing"]
+        with Guest(room) as late:  # sees the session that is still there
+            assert_same(late, before)
+            working(late, "load")
+        for what, more in {
+            "play": {},
+            "step": {"ticks": 1},
+            "edit": {"edit": {"kind": "episode"}},
+            "begin": {"chosen": CHOSEN},
+            "restart": {},
+        }.items():
+            guest.ask(what, **more)
+            assert guest.until("error")["words"].startswith("a session is being replayed; ")
+        guest.socket.send(endless)
+        assert guest.until("error")["words"].startswith("a session is being replayed; ")
+        guest.ask("export", kind="policy")
+        guest.until("policy.npz")
+        assert state_of(room) == stands
+        other.ask("cancel", kind="load")
+        both(guest, other, "cancelled")
+        assert room.session is before
+        guest.until("frame")  # time goes on where it stood
+        guest.seen(100)
+        guest.ask("pause")
+        while guest.state["playing"] or guest.state["works"]:
+            guest.hear()
+        assert room.session is before
+
+
+def test_a_replay_that_fails_leaves_the_session(room, tmp_path):
+    with Guest(room) as guest:
+        guest.ask("step", ticks=5)
+        guest.ask("export", kind="session")
+        guest.until("session.npz")
+        replace(room.session.log(), state="0").write(tmp_path / "x.npz")
+        before = room.session, state_of(room)
+        guest.socket.send((tmp_path / "x.npz").read_bytes())
+        assert "does not end as it did" in guest.until("error")["words"]
+        assert (room.session, state_of(room)) == before
+        guest.ask("cancel", kind="load")  # too late
+        guest.ask("step", ticks=1)
+        guest.until("frame")
+
+
+def test_it_ends_while_a_session_is_replayed(shared, tmp_path):
+    with running(shared.choices) as one, Guest(one) as guest:
+        replace(one.session.log(), steps=10**8, ticks=10**8).write(tmp_path / "x.npz")
+        guest.socket.send((tmp_path / "x.npz").read_bytes())
+        working(guest, "load")
+        guest.ask("quit")
+        guest.until("over")
+
+
+def test_a_file_that_is_made_can_be_cancelled(room, endless):
+    with Guest(room) as guest, Guest(room) as other:
+        room.session.log = lambda: Log.from_bytes(endless)
+        guest.ask("export", kind="gif")
+        while not other.state["works"]:
+            other.until("state")
+        assert other.state["works"][0]["kind"] == "gif"
+        making = room._making
+        other.ask("cancel", kind="gif")
+        both(guest, other, "cancelled")
+        for page in (guest, other):
+            while page.state["works"]:
+                page.until("state")
+        assert making.over
+        assert not making._process.is_alive()
+        guest.ask("export", kind="page")
+        while not other.state["works"]:
+            other.until("state")
+        guest.close()  # nobody waits for it any more
+        while other.state["works"] or other.state["pages"] > 1:
+            other.until("state")
+        assert room._making.over
+
+
+@pytest.mark.slow
+def test_the_progress_of_a_file_is_told(room, endless):
+    with Guest(room) as guest:
+        room.session.log = lambda: Log.from_bytes(endless)
+        guest.ask("export", kind="gif")
+        working(guest, "gif")
+        guest.ask("cancel", kind="gif")
+        guest.until("cancelled")
+
+
+def test_pages_that_are_gone_are_not_counted(room):
+    with Guest(room) as guest:
+        for cut in ('{"do":"edit"}', None):
+            other = Guest(room)
+            other.until("whole")
+            while guest.state["pages"] < 2:
+                guest.ask("pause")
+                guest.until("state")
+            if cut:
+                other.socket.send(cut)
+            else:
+                other.socket.socket.close()  # as if it had crashed
+            while guest.state["pages"] > 1:
+                guest.until("state")
+
+
 def test_what_the_page_would_choose_is_the_session(room):
     with Guest(room) as guest:
         for chosen in [
@@ -460,3 +599,54 @@ def test_it_ends_when_a_page_asks(shared):
         guest.ask("quit")
         guest.until("over")
         guest.until_cut_off()
+
+
+def test_the_fastest_pages_see_moments_from_inside_episodes(room):
+    with Guest(room) as guest:
+        guest.ask("speed", value=server.FASTEST)
+        guest.ask("play")
+        seen = []
+        while len(seen) < 60:
+            sections = unpack(guest.header["types"], guest.until("frame"))
+            seen.append(sections["clock"][:2].tolist())
+            guest.seen(1)
+        guest.ask("pause")
+    late = seen[20:]  # once it knows how many fill a frame
+    assert sum(tick in (0, 50) for _, tick in late) < len(late) / 4
+    assert len({tick for _, tick in late}) > 10
+
+
+@pytest.mark.parametrize(
+    ("piece", "length", "steps"),
+    [(7, 0, 7), (249, 1000, 249), (250, 1000, 1042), (2400, 1000, 2043), (9.5, 1, 9)],
+)
+def test_frames_show_the_phases_of_episodes_in_turn(piece, length, steps):
+    room = SimpleNamespace(
+        _piece=piece, session=SimpleNamespace(setup=SimpleNamespace(ticks_per_episode=length))
+    )
+    assert server.Room._leap(room) == steps
+
+
+def test_pages_are_told_that_kernels_are_prepared(room):
+    with Guest(room) as guest:
+        guest.ask("play")
+        while not guest.state.get("playing"):
+            guest.until("state")
+        assert [work["kind"] for work in guest.state["works"]] == ["kernels"]
+        guest.until("frame")
+        while guest.state["works"]:
+            guest.until("state")
+        assert guest.state["playing"]
+        guest.ask("restart")
+        guest.until("whole")
+        guest.ask("play")
+        guest.ask("pause")
+        while guest.state["playing"] or guest.state["works"]:
+            guest.until("state")
+
+
+def test_values_tell_how_many_ants_live(room):
+    cells = room.session.colony.snapshot().ant_cells[:3].tolist()
+    before = room.session.values()["ants"]["value"]
+    room.session.apply({"kind": "remove_ants", "cells": cells})
+    assert room.session.values()["ants"]["value"] == before - 3

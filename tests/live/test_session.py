@@ -7,6 +7,7 @@ import math
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -14,13 +15,25 @@ from command_lines import ROOT, environment
 from playback import played
 from random_edits import random_edit
 
-from taichi_ants import AntsError, Colony, Life, Pheromone, Task, TrainingConfig, load_policy
+from taichi_ants import (
+    AntsError,
+    Colony,
+    Life,
+    Pheromone,
+    Task,
+    TrainingConfig,
+    archives,
+    load_policy,
+)
 from taichi_ants import task as tasks
 from taichi_ants.learners.policies import trail_follower
-from taichi_ants.live import session as session_module
+from taichi_ants.live import log as log_module
+from taichi_ants.live.exports import gif_bytes, recording
+from taichi_ants.live.log import Log
 from taichi_ants.live.session import Session, Setup
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
-from taichi_ants.viewer import Recording
+from taichi_ants.viewer import Recording, course
+from taichi_ants.viewer.course import POINT
 from taichi_ants.viewer.frames import CLOCK, unpack
 
 LEARNS = TrainingConfig("sarsa", 0.2, 0.9, 0.3, 0.9, learning_rate_decay=0.8)
@@ -58,6 +71,12 @@ def with_edits(setup: Setup, n: int, seed: int = 0) -> Session:
     return session
 
 
+def replayed(content: bytes) -> Session:
+    """The session in a file that somebody has sent."""
+    *_, session = Session.replay(Log.from_bytes(content))
+    return session
+
+
 @pytest.fixture(scope="module")
 def edited() -> dict[str, Session]:
     return {name: with_edits(setup, 200) for name, setup in SETUPS.items()}
@@ -75,7 +94,7 @@ def test_two_hundred_edits_are_replayed_to_the_bit(edited, name, tmp_path):
     assert again.hand.state() == session.hand.state()
     assert (again.ticks, again.steps, again.edits) == (session.ticks, session.steps, session.edits)
     assert again.to_bytes() == session.to_bytes()
-    assert Session.from_bytes(again.to_bytes()).hand.state() == session.hand.state()
+    assert replayed(again.to_bytes()).hand.state() == session.hand.state()
 
 
 @pytest.mark.slow
@@ -165,11 +184,11 @@ def test_states_have_names_before_they_are_seen_on_pages():
 def test_a_recording_holds_what_happened(edited):
     session = edited["foraging"]
     before = session.hand.state()
-    whole = session.recording(most_frames=10_000)
-    few = session.recording(most_frames=50)
+    whole = recording(session.log(), most_frames=10_000)
+    few = recording(session.log(), most_frames=50)
     pheromone = session.setup.task.pheromone
-    for recording in (whole, few):
-        last = list(played(Recording.from_bytes(recording.to_bytes()), pheromone))[-1]
+    for one in (whole, few):
+        last = list(played(Recording.from_bytes(one.to_bytes()), pheromone))[-1]
         snapshot = session.colony.snapshot()
         assert np.array_equal(last.ground, snapshot.ground)
         assert np.array_equal(last.trail, snapshot.trail)
@@ -193,12 +212,12 @@ def test_exports_are_files_of_the_project(edited, tmp_path):
         (tmp_path / name).write_bytes(one.colony_bytes())
         colony = Colony.load(tmp_path / name)
         assert colony == one.colony
-        again = Session.from_bytes(one.to_bytes())
+        again = replayed(one.to_bytes())
         again.colony_bytes()
         colony.tick(9)
         again.colony.tick(9)
         assert colony == again.colony, name
-    assert session.gif_bytes(most_frames=4).startswith(b"GIF89a")
+    assert gif_bytes(session.log(), most_frames=4).startswith(b"GIF89a")
 
 
 def test_what_a_hand_has_put_stays_and_what_is_of_an_episode_goes():
@@ -302,7 +321,7 @@ def test_what_was_interrupted_is_counted(monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         session.advance(7)
     assert (session.ticks, session.colony.ticks) == (7, 7)
-    assert Session.from_bytes(session.to_bytes()).hand.state() == session.hand.state()
+    assert replayed(session.to_bytes()).hand.state() == session.hand.state()
 
 
 def test_edits_without_room_change_nothing():
@@ -345,7 +364,7 @@ def test_files_that_were_altered_are_refused(edited, changes, said, tmp_path):
     with np.load(path) as archive:
         arrays = dict(archive)
     facts = {**json.loads(str(arrays["facts"][()])), **changes}
-    np.savez(path, **{**arrays, "facts": np.array(json.dumps(facts))})
+    archives.write(path, {**arrays, "facts": np.array(json.dumps(facts))})
     with pytest.raises(
         AntsError, match=r"^the session in .* is damaged .*; name a file that .* wrote\.$"
     ) as e:
@@ -354,15 +373,15 @@ def test_files_that_were_altered_are_refused(edited, changes, said, tmp_path):
 
 
 def test_a_file_that_unpacks_to_much_more_is_refused(edited, monkeypatch):
-    monkeypatch.setattr(session_module, "_MOST_BYTES", 1000)
-    with pytest.raises(AntsError, match="too much memory"):
-        Session.from_bytes(edited["foraging"].to_bytes())
+    monkeypatch.setattr(log_module, "KIND", replace(log_module.KIND, most=1000))
+    with pytest.raises(AntsError, match=r"unpacks to .* bytes, and 1000 are allowed"):
+        replayed(edited["foraging"].to_bytes())
 
 
 @pytest.mark.parametrize("content", [b"", b"nothing", b"PK\3\4" + bytes(100)])
 def test_no_session_at_all(content):
     with pytest.raises(AntsError, match=r"'the loaded file' .*\.$"):
-        Session.from_bytes(content)
+        replayed(content)
 
 
 @pytest.mark.parametrize(
@@ -451,7 +470,7 @@ def test_a_recording_counts_what_was_delivered_between_its_frames(edited):
         counted += int(again.colony.outcome().deliveries[0, 0]) * again.ended
         again._go(again.steps + 1)
     counted += int(again.colony.outcome().deliveries[0, 0])
-    few = session.recording(most_frames=20)
+    few = recording(session.log(), most_frames=20)
     types = few.header["types"]
     told = [
         unpack(types, frame)["clock"][CLOCK.index("delivered")]
@@ -459,3 +478,47 @@ def test_a_recording_counts_what_was_delivered_between_its_frames(edited):
     ]
     assert told == [counted, counted]
     assert counted > 0
+
+
+def clock(session: Session, frame: bytes) -> dict[str, float]:
+    types = session.header()["types"]
+    return dict(zip(CLOCK, unpack(types, frame)["clock"].tolist(), strict=True))
+
+
+def test_a_leap_is_as_many_steps_through_episodes():
+    slow, quick = Session(SETUPS["foraging"]), Session(SETUPS["foraging"])
+    while slow.steps < 57:  # two episodes of 25 ticks, and some
+        slow.advance()
+    told = clock(quick, quick.leap(57))
+    assert quick.hand.state() == slow.hand.state()
+    assert (told["episode"], told["tick"]) == (2, 5)
+    assert told["ticks"] == quick.ticks == slow.ticks == 55
+    assert clock(quick, quick.moment())["ticks"] == 55
+
+
+def test_a_late_page_is_told_of_the_whole_course():
+    """Also of a session that was loaded, and of episodes that a hand has ended."""
+    session, ends = Session(SETUPS["foraging"]), []
+    for steps in (26, 26, 10):
+        session.leap(steps - 1)
+        outcome = session.colony.outcome()
+        ends.append([session.colony.episode, session.ticks, outcome.returns[0, 0]])
+        session.apply({"kind": "episode"})
+    *_, again = Session.replay(session.log())
+    for one in (session, again):
+        points = unpack(one.header()["types"], one.moment())["course"].reshape(-1, len(POINT))
+        ended = points[:, POINT.index("ended")] == 1
+        named = [POINT.index(name) for name in ("episode", "ticks", "returns")]
+        assert points[ended][:, named].tolist() == ends
+        assert points[0, POINT.index("ticks")] == 0
+        assert (points[~ended][:, POINT.index("episode")] == 0).all()
+
+
+def test_a_long_course_is_thinned(monkeypatch):
+    monkeypatch.setattr(course, "_MOST", 8)
+    session = Session(SETUPS["foraging"])
+    for _ in range(60):
+        session.apply({"kind": "episode"})
+    ends = [point for point in session._recorder.course.points() if point[-1]]
+    assert 4 <= len(ends) <= 8
+    assert len({b[0] - a[0] for a, b in pairwise(ends)}) == 1

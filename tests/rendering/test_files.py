@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import sys
+import weakref
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -101,6 +103,42 @@ def test_pictures_that_stay_the_same_are_joined(tmp_path, frames) -> None:
     assert len(pictures) == 3
 
 
+class Watched(np.ndarray):
+    """A frame of which one can ask whether anybody still has it."""
+
+    __hash__ = object.__hash__
+
+
+@pytest.mark.parametrize("name", ["a.gif", "a.mp4", "frames"])
+def test_frames_are_forgotten_once_they_are_written(tmp_path, frames, name) -> None:
+    """So that the length of an animation takes no memory."""
+    if name == "a.mp4":
+        pytest.importorskip("av")
+    held: weakref.WeakSet[Watched] = weakref.WeakSet()
+    kept = []
+
+    def drawn() -> Iterator[np.ndarray]:
+        for number in range(30):
+            frame = frames[number % len(frames)][:60, :60].copy().view(Watched)
+            held.add(frame)
+            yield frame
+            del frame
+        pictures = sum(isinstance(one, Image.Image) for one in gc.get_objects())
+        kept.extend((len(held), pictures - before))
+
+    before = sum(isinstance(one, Image.Image) for one in gc.get_objects())
+    save_animation(tmp_path / name, drawn(), 8)
+    assert kept[0] <= 2
+    assert kept[1] <= 4
+
+
+def test_a_picture_may_stay_longer_than_a_gif_can_tell(tmp_path, frames) -> None:
+    save_animation(tmp_path / "a.gif", [frames[0][:9, :9]] * 80, 0.1)
+    pictures, durations = decoded(tmp_path / "a.gif")
+    assert sum(durations) == 800_000
+    assert all((picture == pictures[0]).all() for picture in pictures)
+
+
 def test_a_single_pixel_may_change(tmp_path) -> None:
     first = np.full((70, 81, 3), 255, dtype=np.uint8)
     second = first.copy()
@@ -170,6 +208,23 @@ def test_a_folder_is_no_file(tmp_path, frames) -> None:
         save_animation(tmp_path / "a.gif", frames, 8)
 
 
+@pytest.mark.parametrize("place", ["link", "dangling", "full", "file", ".", "..", ""])
+def test_a_folder_that_cannot_be_made_is_refused_before_frames_are_drawn(
+    tmp_path, monkeypatch, place
+) -> None:
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "mine").touch()
+    (tmp_path / "file").touch()
+    (tmp_path / "link").symlink_to(tmp_path / "empty")
+    (tmp_path / "dangling").symlink_to(tmp_path / "nowhere")
+    monkeypatch.chdir(tmp_path / "empty")
+    before, path = leftovers(tmp_path), place if place in (".", "..", "") else tmp_path / place
+    with pytest.raises(AntsError, match="is no empty folder; name a new folder"):
+        check_animation(path)
+    assert leftovers(tmp_path) == before
+
+
 def test_frames_must_fit(tmp_path, frames) -> None:
     for wrong in (
         [],
@@ -181,6 +236,30 @@ def test_frames_must_fit(tmp_path, frames) -> None:
         with pytest.raises(AntsError, match="frame"):
             save_animation(tmp_path / "a.gif", wrong, 8)
     assert leftovers(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "shape"), [("a.gif", (1, 65_536)), ("a.mp4", (64, 16_386)), ("a.mp4", (64, 1))]
+)
+def test_pictures_too_large_for_a_kind_of_file_are_refused(name, shape, tmp_path) -> None:
+    pytest.importorskip("av")
+    frame = np.zeros((*shape, 3), np.uint8)
+    with pytest.raises(AntsError, match=r"this kind of file has from . to .*, so choose another"):
+        save_animation(tmp_path / name, [frame])
+    assert leftovers(tmp_path) == []
+    save_picture(tmp_path / "a.png", frame)
+
+
+@pytest.mark.parametrize("pause", [None, -1, 61, float("nan"), float("inf"), 2**70, True, "1"])
+def test_wrong_pauses(tmp_path, frames, pause) -> None:
+    with pytest.raises(AntsError, match=r"^pause is .* a number of seconds from 0 to 60"):
+        save_animation(tmp_path / "a.gif", frames, pause=pause)
+
+
+@pytest.mark.parametrize("path", ["n" * 300, "a\0b", "\ud800"])
+def test_names_that_no_folder_can_have(tmp_path, path) -> None:
+    with pytest.raises(AntsError, match=r"cannot write|null character"):
+        check_animation(tmp_path / path)
 
 
 def test_the_last_picture_stays(tmp_path, frames) -> None:

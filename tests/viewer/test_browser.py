@@ -228,7 +228,8 @@ def test_the_time_line_and_the_curves_seek(ant):
     events = ant.read("viewer.history.events.map(({ moment, kind }) => [moment, kind])")
     assert events == [[17, PICKED_UP], [34, DELIVERED]]
     assert ant.tab.locator("#events .picked").get_attribute("d").count("M") == 1
-    assert ant.tab.locator(".curve b").all_inner_texts() == ["0", "19", "0.000"]
+    # Who never explores has no curve of epsilon.
+    assert ant.tab.locator(".curve:visible b").all_inner_texts() == ["0", "19"]
 
 
 def test_a_click_follows_an_ant_or_looks_at_a_cell(crowd, colony):
@@ -570,3 +571,31 @@ def test_the_script_is_whole():
             *("DecompressionStream", "Uint8Array", "Uint32Array", "Int32Array", "Float32Array"),
             *("ResizeObserver", "AbortController", "Promise", "Error"),
         )
+
+
+def test_what_lies_between_moments_is_not_made_up(browser, folder):
+    """The pace is in ticks, and there is no way from a cell to one far away."""
+    rules = TrainingConfig("q_learning", 0.2, 0.9, 0.2, 1.0)
+    one = Colony(worlds.paper(), Task("queues", life=Life(births=True)), rules)
+    one.begin_episode()
+    recording = record_colony(one, 60, every=10)
+    assert recording.header["title"].startswith("Ants in a world of ")
+    opened = Page(browser, written(folder, "thinned", recording))
+    opened.read("viewer.player.go(6)")
+    assert opened.read("viewer.history.path(6, 0).length") == 1
+    assert opened.tab.get_attribute("#time", "max") == "60"
+    opened.read("viewer.timeline.setSpeed(12)")
+    assert opened.text("#speed-value") == "120 / s"
+    opened.tab.focus("#time")
+    opened.press("ArrowLeft")
+    assert opened.moment == 5
+    opened.press("ArrowRight")
+    assert opened.moment == 6
+    opened.read("viewer.follow(0)")
+    meaning = opened.text("#ant .sees small")
+    assert re.match(r"[A-Z] \w+(, [A-Z] [\w ]+)*", meaning)
+    letters = "P other load, p same load: ant on a better cell, A ant on no better one"
+    view = {"task": "", "rest": "EPA", "letters": ["E", "P", "A"]}
+    opened.read("view => { viewer.history.stateName = () => view; viewer.dirty = true; }", view)
+    assert opened.text("#ant .sees small") == f"E empty; {letters}"
+    opened.close()

@@ -66,7 +66,7 @@ def test_a_recording_is_what_engine_and_reference_do(learner, sharing, sees, den
         for tick in range(TICKS + 1):
             snapshots.append(colony.snapshot())
             tables.append(colony.q_values[0])
-            ants.append(colony.arrays["ants"].copy())
+            ants.append(colony.ant_rows())
             if tick < TICKS and not plain.over:
                 frames.append(recorder.tick())
                 plain.tick(last=tick == TICKS - 1)

@@ -1,0 +1,139 @@
+"""The files that a session gives, and how those that take long are made while time goes on."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+from taichi_ants.errors import AntsError
+from taichi_ants.live.log import Log
+from taichi_ants.live.session import Session
+from taichi_ants.viewer import Recording, page
+
+Progress = Callable[[int], None]  # called with the number of ticks that have passed
+
+_PROGRESS_EVERY = 0.1  # seconds
+
+
+def recording(log: Log, most_frames: int = 1000, progress: Progress | None = None) -> Recording:
+    """The session as a page plays it without a server, see `Session.moments`."""
+    moments = _moments(log, most_frames, progress)
+    session, first = next(moments)
+    frames = [first, *(frame for _, frame in moments)]
+    return Recording(session.header(), frames)
+
+
+def page_bytes(log: Log, progress: Progress | None = None) -> bytes:
+    """The page that plays it, as a file holds it."""
+    return page(recording(log, progress=progress)).encode()
+
+
+def gif_bytes(log: Log, progress: Progress | None = None, most_frames: int = 300) -> bytes:
+    """An animation of the session, see `Session.moments`."""
+    from taichi_ants.rendering import colony_moments, frames, save_animation
+
+    passed = _moments(log, most_frames, progress)
+    shown = (moment for session, _ in passed for moment in colony_moments(session.colony))
+    pictures = frames(shown, strongest=log.setup.task.pheromone.level)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "session.gif")
+        save_animation(path, pictures, fps=12.0)
+        return path.read_bytes()
+
+
+def _moments(log: Log, most: int, progress: Progress | None) -> Iterator[tuple[Session, bytes]]:
+    for session, frame in Session.moments(log, most):
+        yield session, frame
+        if progress is not None:
+            progress(session.ticks)
+
+
+# What pages call it, the name of the file, and what makes it: at once, or from the beginning.
+QUICK: dict[str, tuple[str, Callable[[Session], bytes]]] = {
+    "session": ("session.npz", Session.to_bytes),
+    "policy": ("policy.npz", Session.policy_bytes),
+    "colony": ("colony.npz", Session.colony_bytes),
+}
+SLOW: dict[str, tuple[str, Callable[[Log, Progress], bytes]]] = {
+    "page": ("session.html", page_bytes),
+    "gif": ("session.gif", gif_bytes),
+}
+
+
+class Making:
+    """A file of `SLOW` that a process of its own makes.
+
+    Args:
+        kind: Of `SLOW`.
+        session: Up to its present moment.
+        prepare: Called first in that process, as to load a plugin.
+        end: Called in a thread of its own with what was made, or with why there is nothing; not if
+            it was cancelled.
+
+    Attributes:
+        total: The ticks that it is about.
+        done: How many of them have passed.
+        over: Whether it has ended.
+    """
+
+    def __init__(
+        self,
+        kind: str,
+        session: Session,
+        prepare: Callable[[], None] | None,
+        end: Callable[[bytes | str], None],
+    ) -> None:
+        self.kind, self.done, self.total, self.over = kind, 0, session.ticks, False
+        self._cancelled, self._end = False, end
+        context = multiprocessing.get_context("spawn")
+        self._answers, answers = context.Pipe(duplex=False)
+        given = (kind, session.to_bytes(), prepare, answers)
+        self._process = context.Process(target=_make, args=given, daemon=True)
+        threading.Thread(target=self._run, args=(answers,), daemon=True).start()
+
+    def cancel(self) -> None:
+        """End it now; for any thread."""
+        self._cancelled = True
+        if self._process.pid is not None:
+            self._process.terminate()
+
+    def _run(self, answers: Connection) -> None:
+        answer: bytes | str | int = 0
+        with self._answers, suppress(EOFError, OSError):  # as where there is no memory
+            self._process.start()
+            answers.close()  # so that the end of the process is the end of its answers
+            if self._cancelled:
+                self._process.terminate()
+            while isinstance(answer := self._answers.recv(), int):
+                self.done = answer
+        self.over = True
+        if not self._cancelled:
+            self._end("the file could not be made." if isinstance(answer, int) else answer)
+
+
+def _make(
+    kind: str, content: bytes, prepare: Callable[[], None] | None, answers: Connection
+) -> None:
+    """Answer with numbers of ticks, then with a file, or with why there is none."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends this one
+    told = 0.0
+
+    def progress(ticks: int) -> None:
+        nonlocal told
+        if time.monotonic() - told > _PROGRESS_EVERY:
+            told = time.monotonic()
+            answers.send(ticks)
+
+    try:
+        if prepare is not None:
+            prepare()
+        answers.send(SLOW[kind][1](Log.from_bytes(content), progress))
+    except AntsError as error:
+        answers.send(str(error))

@@ -1,0 +1,76 @@
+"""The log of a session: how it began, and all that a hand has changed. It replays the session."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from taichi_ants import files
+from taichi_ants.engines.stored import FileKind
+from taichi_ants.errors import checked_whole
+from taichi_ants.live.setup import Setup
+from taichi_ants.task.constants import N_ACTIONS
+
+MOST_TICKS = 1_000_000_000
+KIND = FileKind(
+    "taichi-ants session 2", "session", "Session.save, or Save on its page,", most=1 << 28
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """What a session was up to some moment; see `Session.replay`.
+
+    Attributes:
+        setup: How it begins.
+        edits: (steps, edit) of each edit, in order, see `edits`.
+        steps: How many steps time has made, see `Session`.
+        ticks: How many ticks have passed.
+        state: What `Hand.state` gives then.
+        name: What messages call it.
+    """
+
+    setup: Setup
+    edits: tuple[tuple[int, Any], ...]
+    steps: int
+    ticks: int
+    state: str
+    name: str = "the session"
+
+    def write(self, path: files.PathLike) -> None:
+        """Write the log; raises as `archives.write` does."""
+        table = np.zeros((0, N_ACTIONS)) if self.setup.learns else self.setup.policy
+        facts = {
+            "task": self.setup.task.as_dict(),
+            "setup": self.setup.to_json(),
+            "edits": self.edits,
+            **{"steps": self.steps, "ticks": self.ticks, "state": self.state},
+        }
+        KIND.write(path, facts, {"table": np.asarray(table, np.float32)}, compress=True)
+
+    @classmethod
+    def read(cls, path: files.PathLike, content: bytes | None = None) -> Log:
+        """The log in a file; arguments as of `archives.read`.
+
+        Raises:
+            AntsError: The file is missing, damaged, or of another kind.
+        """
+        stored, facts = KIND.read(path, content)
+        with KIND.rebuilding(path):
+            steps = checked_whole("steps", facts["steps"], 0, MOST_TICKS)
+            edits, before = [], 0
+            for at, edit in facts["edits"]:
+                before = checked_whole("steps", at, before, steps)
+                edits.append((before, edit))
+            return cls(
+                *(Setup.from_json(facts["setup"], stored["table"]), tuple(edits), steps),
+                checked_whole("ticks", facts["ticks"], 0, steps),
+                *(facts["state"], str(path)),
+            )
+
+    @classmethod
+    def from_bytes(cls, content: bytes) -> Log:
+        """As `read`, of what a file holds that somebody has sent."""
+        return cls.read("the loaded file", content)
