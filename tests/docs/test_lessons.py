@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import importlib.util
+import io
 import json
 import re
 
+import numpy as np
 import pytest
 from command_lines import ROOT, environment
+from PIL import Image
 
 FOLDER = ROOT / "docs" / "lessons"
 LESSONS = sorted(FOLDER.glob("*.ipynb"))
-MOST = 600_000  # bytes
+MOST = 50_000  # bytes
+_REFERENCE = re.compile(r"!\[([^\]]+)\]\((images/[\w-]+\.png)\)")
 
 each_lesson = pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
 
@@ -25,16 +29,21 @@ def cells_of(path):
 
 
 def shown(cells):
-    """What code cells put out: texts as they are, and of pictures that there is one."""
+    """What code cells put out: texts, and references to pictures."""
     given = []
     for cell in cells:
         for output in cell.get("outputs", ()):
-            data = output.get("data", {})
-            text = output["text"] if output["output_type"] == "stream" else data["text/plain"]
-            is_picture = "image/png" in data
-            # Which kind of object a picture is depends on who draws it.
-            given.append("a picture" if is_picture else "".join(text))
+            data = output.get("data", {"text/plain": output.get("text")})
+            given.append("".join(data.get("text/markdown", data["text/plain"])))
     return given
+
+
+def executor():
+    """The script that runs the lessons."""
+    spec = importlib.util.spec_from_file_location("execute", FOLDER / "execute.py")
+    execute = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(execute)
+    return execute
 
 
 def test_there_are_three():
@@ -44,7 +53,7 @@ def test_there_are_three():
 
 
 @each_lesson
-def test_it_was_run_from_top_to_bottom_and_has_no_page_in_it(path):
+def test_it_was_run_from_top_to_bottom_and_holds_text_alone(path):
     assert path.stat().st_size < MOST
     codes = [cell for cell in cells_of(path) if cell["cell_type"] == "code"]
     assert [cell["execution_count"] for cell in codes] == list(range(1, len(codes) + 1))
@@ -56,7 +65,37 @@ def test_it_was_run_from_top_to_bottom_and_has_no_page_in_it(path):
     }
     assert all(output.get("name", "stdout") == "stdout" for output in outputs)
     kinds = {kind for output in outputs for kind in output.get("data", ())}
-    assert kinds == {"text/plain", "image/png"}
+    assert kinds == {"text/plain", "text/markdown"}
+
+
+def test_pictures_lie_beside_the_notebooks():
+    """Each where a notebook shows it, with words for those who do not see it, and no others."""
+    references = [
+        _REFERENCE.fullmatch(text)
+        for path in LESSONS
+        for text in shown(cells_of(path))
+        if text.startswith("![")
+    ]
+    names = [reference[2] for reference in references]
+    assert len(names) > 15
+    lying = {f"images/{path.name}" for path in (FOLDER / "images").iterdir()}
+    assert sorted(names) == sorted(lying)
+    for words, name in (reference.groups() for reference in references):
+        assert len(words) > 60
+        with Image.open(FOLDER / name) as image:
+            image.verify()
+            assert image.format == "PNG"
+            assert 800 < image.width <= 1280
+
+
+def test_a_picture_is_packed_without_being_changed_much():
+    pixels = np.full((40, 60, 3), (0, 114, 178), np.uint8)
+    pixels[10:20, 10:50] = 255
+    file = io.BytesIO()
+    Image.fromarray(pixels).save(file, "png")
+    packed = Image.open(io.BytesIO(executor().packed(file.getvalue())))
+    assert packed.mode == "P"
+    np.testing.assert_array_equal(np.asarray(packed.convert("RGB")), pixels)
 
 
 @each_lesson
@@ -83,9 +122,10 @@ def test_questions_come_before_results_and_solutions_after_exercises(path):
 def test_run_afresh_it_says_the_same(path, kernels, monkeypatch):
     for name, value in environment(kernels).items():
         monkeypatch.setenv(name, value)
-    spec = importlib.util.spec_from_file_location("execute", FOLDER / "execute.py")
-    execute = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(execute)
-    afresh = execute.executed(path)
+    execute = executor()
+    afresh, pictures = execute.executed(path)
     assert shown(afresh.cells) == shown(cells_of(path))
+    for name, picture in pictures.items():
+        sizes = [Image.open(file).size for file in (io.BytesIO(picture), FOLDER / name)]
+        assert sizes[0] == sizes[1]
     assert execute.INSTEAD in shown(afresh.cells)
