@@ -21,7 +21,7 @@ HEAD = f"{'world':20} {'method':11} shortest  found by  iteration  first and las
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """The settings of the command line."""
-    parser = Parser(__doc__.split("\n", 1)[0], epilog=__doc__.split("\n", 1)[1])
+    parser = Parser(__doc__)
     add = parser.add_argument
     places = ("paper", "double_bridge")
     add("--worlds", nargs="+", default=places, metavar="WORLD", help="names or map files")

@@ -55,7 +55,7 @@ HEAD = "world  rules              epsilon  deliveries  interval      first  bloc
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """The settings of the command line."""
-    parser = Parser(__doc__.split("\n", 1)[0], epilog=__doc__.split("\n", 1)[1])
+    parser = Parser(__doc__)
     add = parser.add_argument
     add("--ants", type=whole_number(1), default=64, metavar="N", help="of each colony")
     add("--seeds", type=whole_number(2), default=20, metavar="N", help="how many, from 0 on")

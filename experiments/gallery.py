@@ -81,7 +81,7 @@ MILLION = [
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """The settings of the command line."""
-    parser = Parser(__doc__.split("\n", 1)[0], epilog=__doc__.split("\n", 1)[1])
+    parser = Parser(__doc__)
     add = parser.add_argument
     add("--folder", type=Path, default=ROOT, help="put renders/ and docs/figures/ there")
     add("--no-figures", action="store_true", help="only renders/, which takes half a minute")

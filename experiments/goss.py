@@ -16,7 +16,7 @@ from taichi_ants.studies.command_line import Parser, run_command, whole_number
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """The settings of the command line."""
-    parser = Parser(__doc__.split("\n", 1)[0], epilog=__doc__.split("\n", 1)[1])
+    parser = Parser(__doc__)
     add = parser.add_argument
     add("--colonies", type=whole_number(1, 10_000_000), default=100_000, help="for each ratio")
     add("--seed", type=whole_number(), default=0, help="of all colonies")

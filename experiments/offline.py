@@ -61,7 +61,7 @@ LIFESPANS, TICKS, COLONY_SIZES = (None, 100, 50), 250, (3000, 15_000)
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """The settings of the command line."""
-    parser = Parser(__doc__.split("\n", 1)[0], epilog=__doc__.split("\n", 1)[1])
+    parser = Parser(__doc__)
     add = parser.add_argument
     add("--seeds", type=whole_number(2), default=10, metavar="N", help="how many, from 0 on")
     add("--markdown", action="store_true", help="print tables for documents")

@@ -33,7 +33,7 @@ HEAD = "world   room  deliveries  interval      first  found by  tick  length  a
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """The settings of the command line."""
-    parser = Parser(__doc__.split("\n", 1)[0], epilog=__doc__.split("\n", 1)[1])
+    parser = Parser(__doc__)
     add = parser.add_argument
     add("--ants", type=whole_number(1), default=64, metavar="N", help="of each colony")
     add("--room", type=whole_number(1), nargs="+", default=[1, 10], metavar="N", help="in a cell")

@@ -20,7 +20,7 @@ import taichi_ants
 LAYERS = (
     {"errors", "environment"},
     {"files", "grid"},
-    {"task"},
+    {"archives", "task"},
     {"runtime", "worlds", "learners"},
     {"checks"},
     {"baselines", "engines", "reference"},
