@@ -3,7 +3,10 @@
    are drawn on a second canvas above. The outlines are those of rendering/shapes.py, the colours
    are those of the style sheet. */
 
-const DOTS_BELOW = 2.5, DARTS_BELOW = 11; // pixels, as in rendering/marks.py
+const DOTS_BELOW = 2.1, DRAWN_FROM = 9; // pixels, of an ant; between them it is an arrowhead
+const ANT = 0.83; // its radius in one of a cell
+const SEEN = 5.5; // pixels, of an ant that one sees at a glance
+const CROWDED = 0.06; // of the world, by ants that are larger than their cells
 const DRAWINGS_FROM = 6; // smaller cells are wholly coloured by food and queen
 const MOST_PIXELS = 3e6; // of the cells; sharper screens get coarser ones
 const INSIDE = 7; // how much of a pixel its cell covers, in sevenths; the rest is a line
@@ -26,6 +29,7 @@ class Stage {
     this.foods = [];
     this.queens = [];
     this.exists = Uint8Array.from({ length: this.grid.size }, (_, cell) => (this.grid.exists(cell) ? 1 : 0));
+    this.count = this.exists.reduce((sum, one) => sum + one);
     this.fills = new Uint32Array(this.grid.size);
     // It is written by this script alone, never by a graphics processor.
     this.context = canvas.getContext("2d", { alpha: false, willReadFrequently: true });
@@ -245,11 +249,18 @@ class Stage {
     }
   }
 
+  /* The radius of ants: where cells are small, larger than these, as long as the world stays in sight. */
+  antRadius(ants) {
+    const { scale } = this.camera, cells = 2.6 * scale ** 2 * this.count; // square pixels
+    return Math.max(ANT * scale, Math.min(SEEN, Math.sqrt((CROWDED * cells) / (2 * Math.max(ants, 1)))));
+  }
+
   drawAnts(moment, share) {
     const { history, grid, above, sharpness, camera } = this, frame = history.frames[moment];
     const next = history.frames[moment + 1], moves = share > 0 && next && next.passed === 1;
     const same = moves && next.numbers === frame.numbers, z = grid.ranges[2], root = Math.sqrt(3);
-    const dots = camera.scale < DOTS_BELOW, looks = dots ? [] : [0, 1].map((loaded) => this.antSprite(loaded));
+    const radius = this.antRadius(frame.cells.length), dots = radius < DOTS_BELOW;
+    const looks = dots ? [] : [0, 1].map((loaded) => this.antSprite(loaded, radius));
     const squares = [new Path2D(), new Path2D()], side = Math.max(1.5 * camera.scale, 2 * DOT);
     for (let i = 0; i < frame.cells.length; i++) {
       const cell = frame.cells[i];
@@ -285,14 +296,15 @@ class Stage {
     above.globalAlpha = 1;
   }
 
-  antSprite(loaded) {
-    const { colours, camera } = this, { scale } = camera;
+  antSprite(loaded, radius) {
+    const { colours } = this;
     // A line of the colour of the page sets ants apart from a dark trail.
-    const edge = Math.min(0.11, 2.4 / scale), large = scale >= DARTS_BELOW;
+    const large = radius >= DRAWN_FROM, edge = large ? Math.min(0.11, 2 / radius) : 2 / radius;
     const crumb = circle(0, -0.7, large ? 0.25 : 0.34), body = new Path2D(large ? BODY : DART);
-    return this.sprite(`ant ${loaded}`, 0.83 * scale, (context) => {
+    const ink = loaded && !large ? colours["loaded-dot"] : colours.ant; // a crumb alone is too small to be seen
+    return this.sprite(`ant ${loaded}`, radius, (context) => {
       const legs = new Path2D(LIMBS), sides = large ? [1, -1] : [];
-      for (const [colour, food, more] of [[colours.halo, colours.halo, edge], [colours.ant, colours.food, 0]]) {
+      for (const [colour, food, more] of [[colours.halo, colours.halo, edge], [ink, colours.food, 0]]) {
         context.fillStyle = context.strokeStyle = colour;
         for (const side of sides) {
           context.save();
