@@ -15,11 +15,12 @@ import plain_runs
 import pytest
 from command_lines import (
     EXPERIMENTS,
-    PROMPTLY,
     assert_one_sentence,
     command,
     contents,
+    crowding,
     environment,
+    promptly,
     run,
     start,
 )
@@ -81,7 +82,7 @@ def test_finished_blocks_are_kept_and_a_damaged_one_is_done_again(kernels, tmp_p
     out, err, seconds = stop_after_a_block(process, folder, signal.SIGTERM, 2)
     assert (process.returncode, out) == (143, "")
     assert err == "Stopped; finished runs are kept, and the same command goes on from there.\n"
-    assert seconds < PROMPTLY
+    assert seconds < promptly()
     assert [path.name for path in folder.iterdir()] == ["unfinished"]
     kept = blocks_in(folder)
     assert 2 <= len(kept) < BLOCKS
@@ -113,7 +114,7 @@ def test_an_interruption_of_the_pictures_keeps_the_runs(seconds, kernels, tmp_pa
     assert (process.returncode, out) == (130, "")
     assert err.startswith("Stopped")
     assert err.count("\n") == 1
-    assert time.perf_counter() - sent < PROMPTLY
+    assert time.perf_counter() - sent < promptly()
     assert len(blocks_in(tmp_path / "out")) == 2 * 2
 
 
@@ -154,7 +155,7 @@ def test_help_is_quick_and_needs_no_taichi(tmp_path):
         text=True,
         timeout=60,
     )
-    assert time.perf_counter() - began < 1
+    assert time.perf_counter() - began < crowding()
     assert done.stdout.endswith("heavy: []\n")
     for flag in (
         *("--seeds", "--seed", "--episodes", "--max-steps", "--delivery", "--learners"),

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from browser import Page, started
+from command_lines import crowding
 from rooms import CHOSEN, Guest, running
 
 from taichi_ants import Colony, load_policy
@@ -364,7 +365,7 @@ def test_the_panel_tells_of_the_moment_that_is_drawn(page, room):
     told = """new Promise((done) => requestAnimationFrame(() => setTimeout(() => done(
         [viewer.panelTells, Number(viewer.stage.shown.split(" ")[0])]))))"""
     agree = [one == other for one, other in (page.read(told) for _ in range(20))]
-    assert sum(agree) > 10  # where it costs too much, the panel may be a moment behind
+    assert sum(agree) > 10 / crowding()  # where it costs too much, the panel may be a moment behind
     page.tab.click("#play")
     wait(page, "!live.running")
     page.settle()
@@ -546,7 +547,7 @@ def test_it_stays_at_thirty_frames_a_second(page, room, record_property):
     print(f"{rate:.0f} frames a second")
     page.tab.click("#play")
     wait(page, "!live.running")
-    assert rate > 20  # of 30, on a machine that others share
+    assert rate > 20 / crowding()  # of 30
 
 
 def test_curves_are_over_time_and_a_late_page_has_them(page, browser, room):
