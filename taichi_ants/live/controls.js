@@ -49,11 +49,19 @@ class Controls {
     on("policy", "change", () => this.showPolicy());
     on("chosen", "change", () => this.explain());
     on("map", "beforeinput", (event) => this.paste(event));
-    on("restart", "click", () => {
-      live.stand();
-      live.ask("restart");
+    for (const [id, what] of [["restart", "restart"], ["undo", "undo"], ["go-back", "back"]]) {
+      on(id, "click", () => {
+        live.stand();
+        live.ask(what);
+      });
+    }
+    document.addEventListener("keydown", (event) => {
+      const fields = "textarea, input:not([type=range], [type=checkbox])"; // they undo what was typed
+      if (event.key.toLowerCase() !== "z" || event.shiftKey || !(event.ctrlKey || event.metaKey) || event.target.closest(fields)) return;
+      event.preventDefault();
+      byId("undo").click();
     });
-    on("next-episode", "click", () => live.ask("edit", { edit: { kind: "episode" } }));
+    on("next-episode", "click", () => live.edit({ kind: "episode" }, live.nextStroke()));
     on("files", "click", (event) => {
       const kind = event.target.dataset.export;
       if (!kind) return;
@@ -195,8 +203,10 @@ class Controls {
   }
 
   /* Show how things stand; sliders that somebody moves are left alone. */
-  show({ values, pages, works }) {
+  show({ values, pages, works, can_undo: canUndo, can_go_back: canGoBack }) {
     this.showWorks(works);
+    byId("undo").disabled = !canUndo || this.ended;
+    byId("go-back").hidden = !canGoBack;
     const box = byId("sliders"), names = Object.keys(values).join();
     if (box.dataset.names !== names) {
       box.dataset.names = names;
@@ -270,15 +280,16 @@ class Controls {
   }
 
   slide(slider) {
-    const { name } = slider.dataset, waits = this.held.get(name) > performance.now() && this.sliding === name;
+    const { name } = slider.dataset, held = this.held.get(name) > performance.now() && this.sliding === name;
+    if (!held) this.stroke = this.live.nextStroke();
     this.held.set(name, performance.now() + 500);
     if (slider.type === "range") this.showSlider(slider, slider.valueAsNumber);
     this.sliding = name;
-    if (waits && this.timer) return; // the last of several values is sent
+    if (held && this.timer) return; // the last of several values is sent
     this.timer = setTimeout(() => {
       this.timer = null;
       const value = slider.type === "range" ? slider.valueAsNumber : Number(slider.checked);
-      this.live.ask("edit", { edit: { kind: "set", name, value } });
+      this.live.edit({ kind: "set", name, value }, this.stroke);
     }, 40);
   }
 

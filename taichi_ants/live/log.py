@@ -9,7 +9,7 @@ import numpy as np
 
 from taichi_ants import files
 from taichi_ants.engines.stored import FileKind
-from taichi_ants.errors import checked_whole
+from taichi_ants.errors import checked_whole, expect
 from taichi_ants.live.setup import Setup
 from taichi_ants.task.constants import N_ACTIONS
 
@@ -27,17 +27,19 @@ class Log:
         setup: How it begins.
         edits: (steps, edit) of each edit, in order, see `edits`.
         steps: How many steps time has made, see `Session`.
-        ticks: How many ticks have passed.
-        state: What `Hand.state` gives then.
+        ticks: How many ticks have passed; None if that is not known, as of what was undone.
+        state: What `Hand.state` gives then; None if that is not known.
         name: What messages call it.
+        changes: As in `Session`; a file has each edit as a change of its own.
     """
 
     setup: Setup
     edits: tuple[tuple[int, Any], ...]
     steps: int
-    ticks: int
-    state: str
+    ticks: int | None
+    state: str | None
     name: str = "the session"
+    changes: tuple[int, ...] = ()
 
     def write(self, path: files.PathLike) -> None:
         """Write the log; raises as `archives.write` does."""
@@ -59,6 +61,7 @@ class Log:
         """
         stored, facts = KIND.read(path, content)
         with KIND.rebuilding(path):
+            expect("state", facts["state"], str)
             steps = checked_whole("steps", facts["steps"], 0, MOST_TICKS)
             edits, before = [], 0
             for at, edit in facts["edits"]:
@@ -67,7 +70,7 @@ class Log:
             return cls(
                 *(Setup.from_json(facts["setup"], stored["table"]), tuple(edits), steps),
                 checked_whole("ticks", facts["ticks"], 0, steps),
-                *(facts["state"], str(path)),
+                *(facts["state"], str(path), tuple(range(len(edits)))),
             )
 
     @classmethod

@@ -135,7 +135,9 @@ class Room:
         self._over, self._leave = threading.Event(), asyncio.Event()
         self._pace, self._piece, self._due = 0.0, 1.0, 0.0  # see _pass
         self._prepare = prepare
-        self._replay: _Replay | None = None  # of a session that is loaded
+        self._former: Session | None = None  # whose place the present one has taken
+        self._stroke: tuple[Page, float] | None = None  # by whom, and which, of the last edit
+        self._replay: _Replay | None = None  # of a session that is loaded, or in part undone
         self._making: Making | None = None
         self._compiles = False  # whether the first step of the session goes on
         self._for: Page | None = None  # who is given the file
@@ -214,8 +216,8 @@ class Room:
         """What goes on that takes long: what it is, and how many of its ticks are done."""
         works, replay, making = [], self._replay, self._making
         if replay is not None:
-            done = 0 if replay.session is None else replay.session.ticks
-            works.append({"kind": "load", "done": done, "total": replay.ticks})
+            done = 0 if replay.session is None else replay.session.steps
+            works.append({"kind": "load", "done": done, "total": replay.steps})
         if self._compiles:
             works.append({"kind": "kernels", "done": 0, "total": 0})
         if making is not None and not making.over:
@@ -285,7 +287,17 @@ class Room:
             log = Log.from_bytes(content)
         except AntsError as error:
             raise _of_page(error) from error
-        self._replay = _Replay(Session.replay(log), log.ticks)
+        self._replay = _Replay(log)
+
+    def _undo(self, page: Page, request: dict[str, Any]) -> None:
+        """Go back to the moment before the last change."""
+        self._replay = _Replay(self.session.undone())
+
+    def _go_back(self, page: Page, request: dict[str, Any]) -> None:
+        """Go on with the session whose place the present one has taken."""
+        if self._former is None:
+            raise AntsError("there is no session before this one.")
+        self._begin(self._former)
 
     def _cancel(self, page: Page, request: dict[str, Any]) -> None:
         """End what takes long, of a kind that `_works` names; without it all stays as it is."""
@@ -304,8 +316,9 @@ class Room:
             self._making.cancel()
 
     def _begin(self, session: Session) -> None:
-        """Go on with another session; all pages are shown it from its beginning."""
-        self.session, self.playing, self._piece = session, False, 1.0
+        """Go on with another session; all pages are shown it, and can go back to the one before."""
+        self.session, self._former = session, self.session
+        self.playing, self._piece, self._stroke = False, 1.0, None
         self._compiles = False
         messages = [*self._about(), *self._moment()]
 
@@ -375,7 +388,9 @@ class Room:
         edit = request.get("edit")
         if not isinstance(edit, dict):
             raise Closed("an edit has to be an object")
-        self._show(self.session.apply(edit))
+        stroke = page, _number(request, "stroke", 0, 2**53)
+        self._show(self.session.apply(edit, goes_on=stroke == self._stroke))
+        self._stroke = stroke
 
     def _begin_chosen(self, page: Page, request: dict[str, Any]) -> None:
         self._begin(Session(self.choices.setup(request.get("chosen"))))
@@ -430,6 +445,8 @@ class Room:
             speed=self.speed,
             pages=len(self._pages),
             ticks=session.ticks,
+            can_undo=bool(session.changes),
+            can_go_back=self._former is not None,
             values=session.values(),
             works=self._works(),
         )
@@ -549,16 +566,16 @@ class Room:
 
 
 class _Replay:
-    """A session that is being loaded.
+    """A session that is being made once more from its log.
 
     Attributes:
         pieces: What replays it.
-        ticks: How many it has at its end.
+        steps: How many time has made at its end.
         session: As far as it has come.
     """
 
-    def __init__(self, pieces: Iterator[Session], ticks: int) -> None:
-        self.pieces, self.ticks = pieces, ticks
+    def __init__(self, log: Log) -> None:
+        self.pieces, self.steps = Session.replay(log), log.steps
         self.session: Session | None = None
 
 
@@ -571,7 +588,9 @@ REQUESTS: dict[str, Callable[[Room, Page, Any], None]] = {
     "pause": Room._pause,
     "step": Room._step,  # {"ticks": 1 to 100}
     "speed": Room._set_speed,  # {"value": ticks a second, 1 to FASTEST}
-    "edit": Room._edit,  # {"edit": see taichi_ants.live.edits}
+    "edit": Room._edit,  # {"edit": see taichi_ants.live.edits, "stroke": same in those of a stroke}
+    "undo": Room._undo,
+    "back": Room._go_back,
     "begin": Room._begin_chosen,  # {"chosen": see taichi_ants.live.choices}
     "restart": Room._restart,
     "export": Room._export,  # {"kind": of `QUICK` or `SLOW`}
@@ -580,7 +599,7 @@ REQUESTS: dict[str, Callable[[Room, Page, Any], None]] = {
 }
 _INWARD = ("join", "leave", "catch up", "load")
 # What would be lost, or would take away the session that is to go on if a replay is cancelled.
-_CHANGES = ("load", "play", "step", "edit", "begin", "restart")
+_CHANGES = ("load", "play", "step", "edit", "undo", "back", "begin", "restart")
 
 _HEADERS = {
     "Content-Type": "text/html; charset=utf-8",

@@ -34,6 +34,7 @@ class Session:
         ticks: How many have passed in all episodes.
         steps: How many steps time has made: ticks, and episodes that began since one had ended.
         edits: (steps, edit) of each edit, in order.
+        changes: Where in `edits` each change begins; the strokes of a brush are one change.
 
     Raises:
         AntsError: The world or the colony cannot be built.
@@ -45,6 +46,7 @@ class Session:
         self.hand = Hand(self.colony)
         self.ticks = self.steps = 0
         self.edits: list[tuple[int, edits.Edit]] = []
+        self.changes: list[int] = []
         self.hand.begin_episode(self._length)
         self.colony.look()  # changes nothing, but compiles what the first edit needs
         # A hand changes how many ants there are.
@@ -123,22 +125,28 @@ class Session:
         course.note()
         return frame
 
-    def apply(self, edit: object) -> bytes:
+    def apply(self, edit: object, goes_on: bool = False) -> bytes:
         """Do an edit now, see `edits`, and record it; a frame of what has changed.
 
         If the episode has ended, what is of this episode alone goes with it.
 
+        Args:
+            edit: What to do.
+            goes_on: Whether it belongs to the same change as the edit before, see `undone`.
+
         Raises:
             AntsError: It is none, or there is no room for it; nothing has changed.
         """
-        self._do(edit)
+        self._do(edit, goes_on)
         return self._recorder.moment()
 
-    def _do(self, edit: object) -> None:
+    def _do(self, edit: object, goes_on: bool = False) -> None:
         plain = edits.checked(edit, self.hand)
         if plain["kind"] == "episode":
             self._recorder.course.note(ended=True)
         edits.apply(plain, self.hand, self._length)
+        if not (goes_on and self.changes):
+            self.changes.append(len(self.edits))
         self.edits.append((self.steps, plain))
 
     def values(self) -> dict[str, dict[str, float]]:
@@ -148,7 +156,8 @@ class Session:
     def log(self) -> Log:
         """How it began, the edits, and what its end is like."""
         state = self.hand.state()
-        return Log(self.setup, tuple(self.edits), self.steps, self.ticks, state)
+        done, changes = tuple(self.edits), tuple(self.changes)
+        return Log(self.setup, done, self.steps, self.ticks, state, changes=changes)
 
     def to_bytes(self) -> bytes:
         """The log, as a file holds it."""
@@ -196,10 +205,23 @@ class Session:
                 session._do(edit)
             for _ in session._pieces(log.steps):
                 yield session
-            if session.hand.state() != log.state:
+            if log.state not in (None, session.hand.state()):
                 raise ValueError("replayed, it does not end as it did")
+            session.changes = list(log.changes)
             session._recorder.moment()
         yield session
+
+    def undone(self) -> Log:
+        """The log up to the moment before the last change, from which it can be made once more.
+
+        Raises:
+            AntsError: Nothing has been changed.
+        """
+        if not self.changes:
+            raise AntsError("there is nothing to undo: nobody has changed this session by hand.")
+        *changes, last = self.changes
+        steps, _ = self.edits[last]
+        return Log(self.setup, tuple(self.edits[:last]), steps, None, None, changes=tuple(changes))
 
     @classmethod
     def moments(cls, log: Log, most: int = 1000) -> Iterator[tuple[Session, bytes]]:

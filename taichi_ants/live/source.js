@@ -12,6 +12,7 @@ class Live {
     this.stands = false;
     this.speed = 12;
     this.speedUntil = 0;
+    this.strokes = 0;
     this.viewer = null;
     const { host, search } = location;
     this.socket = new WebSocket(`ws://${host}/socket${search}`);
@@ -22,6 +23,14 @@ class Live {
 
   ask(what, more = {}) {
     if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify({ do: what, ...more }));
+  }
+
+  /* Edits of one stroke are undone together. */
+  edit(edit, stroke) {
+    this.ask("edit", { edit, stroke });
+  }
+  nextStroke() {
+    return ++this.strokes;
   }
 
   /* Another session stands still at first; who presses play before it is there means that one. */
@@ -36,7 +45,7 @@ class Live {
   }
 
   hear(message) {
-    if (message.say === "begin" || message.say === "error") this.stands = false;
+    if (["begin", "error", "cancelled"].includes(message.say)) this.stands = false;
     if (message.say === "begin") {
       this.begins = message.header;
       this.choices = message.choices;

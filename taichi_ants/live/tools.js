@@ -37,6 +37,7 @@ class Tools {
     live.keys = [
       ["1 2 3 4 5 6 7", Object.values(TOOLS).map(([label]) => label.toLowerCase()).join(", ")],
       ["[ ]", "a smaller brush, a larger one"], ["Enter", "use the tool at the cell cursor"],
+      ["Ctrl+Z", "undo: back to the moment before the last change"],
     ];
     live.news.addEventListener("begin", () => this.choose(this.name));
   }
@@ -76,6 +77,7 @@ class Tools {
 
   down(cell) {
     this.stroke.clear();
+    this.number = this.live.nextStroke();
     this.last = -1;
     this.draw(cell);
   }
@@ -129,6 +131,6 @@ class Tools {
 
   edit(edit, cells = null) {
     if (cells && !cells.length) return;
-    this.live.ask("edit", { edit: cells ? { ...edit, cells } : edit });
+    this.live.edit(cells ? { ...edit, cells } : edit, this.number);
   }
 }

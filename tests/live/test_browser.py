@@ -213,6 +213,45 @@ def test_each_tool_changes_the_world_of_the_engine(page, room, how):
     assert "holds food" in page.text("#cell")
 
 
+def test_a_change_is_undone_and_the_session_before_comes_back(page, room):
+    page.press("Shift+ArrowRight")
+    wait(page, "viewer.history.frames.at(-1).tick === 10")
+    assert page.tab.is_disabled("#undo")
+    assert page.tab.is_hidden("#go-back") == (room._former is None)
+    ground = room.session.colony.snapshot().ground
+    page.press("2", "]")
+    page.tab.mouse.move(*place(page, cell_of(room, 5, 5, 0)))
+    page.tab.mouse.down()
+    for k in range(4):  # in several edits
+        page.tab.mouse.move(*place(page, cell_of(room, 5, 5 - k, k)))
+        page.settle()
+    page.tab.mouse.up()
+    assert len(edits(room, 2)) > 1
+    page.tab.fill("#set-epsilon", "0.5")
+    wait(page, "live.state.values.epsilon.value === 0.5")
+    page.tab.focus("#world")
+    page.press("ArrowRight")
+    wait(page, "viewer.history.frames.at(-1).tick === 11")
+    drawn = room.session
+    page.press("Control+z")  # the slider
+    wait(page, "live.state.values.epsilon.value !== 0.5 && viewer.history.length === 1")
+    assert len(room.session.edits) == len(drawn.edits) - 1
+    assert_same(page, room)
+    page.click("#undo")  # the whole stroke
+    wait(page, "document.querySelector('#undo').disabled")
+    assert np.array_equal(room.session.colony.snapshot().ground, ground)
+    assert_same(page, room)
+    page.click("#restart")
+    wait(page, "viewer.history.frames.at(-1).tick === 0")
+    page.click("#go-back")
+    wait(page, "viewer.history.frames.at(-1).tick === 10")
+    assert_same(page, room)
+    page.tab.click("#play")  # it goes on from there
+    wait(page, "viewer.history.frames.at(-1).tick > 11")
+    page.tab.click("#play")
+    wait(page, "!live.running")
+
+
 def test_a_stroke_of_a_large_brush_is_drawn_without_holes(page, room):
     page.press("2", "]", "]", "[")
     page.tab.mouse.move(*place(page, cell_of(room, 6, 1, 0)))

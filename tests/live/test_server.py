@@ -23,6 +23,7 @@ from taichi_ants.live import server
 from taichi_ants.live.choices import Choices
 from taichi_ants.live.exports import QUICK, SLOW
 from taichi_ants.live.log import Log
+from taichi_ants.task.constants import EMPTY
 from taichi_ants.viewer import Recording
 from taichi_ants.viewer.frames import unpack
 
@@ -133,7 +134,7 @@ def test_all_pages_see_the_world_of_the_engine(room):
             first.ask("step", ticks=ticks)
             for _ in range(ticks):
                 both(first, second)
-        first.ask("edit", edit={"kind": "ground", "what": "food", "cells": [free]})
+        first.edit({"kind": "ground", "what": "food", "cells": [free]})
         both(first, second)
         with Guest(room) as late:
             for guest in (first, second, late):
@@ -208,6 +209,7 @@ CLOSED = [
     *('{"do":"speed","value":' + "9" * 5000 + "}", '{"do":"step","ticks":1000000}'),
     *('{"do":"seen","frames":-5}', '{"do":"seen","frames":1e400}', '{"do":"seen"}'),
     *('{"do":"edit"}', '{"do":"edit","edit":7}', deep(3), deep(100_000)),
+    *('{"do":"edit","edit":{"kind":"episode"}}', '{"do":"edit","edit":{},"stroke":"1"}'),
     *('{"do":"export"}', '{"do":"export","kind":"/etc/passwd"}', '{"do":"export","kind":[]}'),
     *("\0", "\ufeff{}", "x" * (server._MOST_TEXT + 1), '{"do":"play"' + " " * 2**18 + "}"),
 ]
@@ -248,7 +250,7 @@ REFUSED = [
 def test_an_edit_that_is_not_allowed_is_refused_in_one_sentence(room, edit):
     before = state_of(room)
     with Guest(room) as guest:
-        guest.ask("edit", edit=edit)
+        guest.edit(edit)
         words = guest.until("error")["words"]
         assert words.endswith(".")
         assert "\n" not in words
@@ -388,7 +390,7 @@ def test_a_session_is_saved_and_loaded(room):
     with Guest(room) as guest, Guest(room) as other:
         guest.ask("step", ticks=20)
         free = int(room.session.colony.grid.index((5, 5, 0)))
-        guest.ask("edit", edit={"kind": "ground", "what": "rock", "cells": [free]})
+        guest.edit({"kind": "ground", "what": "rock", "cells": [free]})
         guest.ask("step", ticks=20)
         guest.ask("export", kind="session")
         saved = guest.until("session.npz")
@@ -406,6 +408,53 @@ def test_a_session_is_saved_and_loaded(room):
         assert words.startswith("the loaded file is damaged")
         assert words.endswith("; load one that Save has made.")
         assert state_of(room) == before
+
+
+def test_a_change_is_undone_and_done_again(room):
+    with Guest(room) as guest:
+        guest.ask("step", ticks=3)
+        assert not guest.state["can_undo"]
+        first, second, third = np.flatnonzero(room.session.colony.snapshot().ground == EMPTY)[:3]
+        guest.edit({"kind": "ground", "what": "rock", "cells": [int(first)]})
+        guest.ask("step", ticks=2)
+        before = state_after(guest, room, 5)
+        for cell in (second, third):  # of one stroke
+            guest.ask("edit", edit={"kind": "trail", "level": 9, "cells": [int(cell)]}, stroke=7)
+        guest.ask("step", ticks=4)
+        drawn, whole = room.session, state_after(guest, room, 9)
+        guest.ask("undo")
+        guest.until("whole")
+        assert room.session is not drawn
+        assert (room.session.ticks, len(room.session.edits)) == (5, 1)
+        assert state_of(room) == before
+        guest.ask("back")
+        guest.until("whole")
+        assert (room.session, state_of(room)) == (drawn, whole)
+        guest.ask("back")
+        guest.until("whole")
+        assert state_of(room) == before
+        guest.ask("undo")
+        guest.until("whole")
+        assert (room.session.ticks, room.session.edits) == (3, [])
+        guest.ask("undo")
+        assert guest.until("error")["words"].startswith("there is nothing to undo")
+        guest.until("state")
+        assert not guest.state["can_undo"]
+        assert guest.state["can_go_back"]
+
+
+def state_after(guest: Guest, room, ticks: int) -> object:
+    """How the session is as soon as so many ticks have passed and all was answered."""
+    guest.until("state")
+    while guest.state["ticks"] < ticks:
+        guest.until("state")
+    return state_of(room)
+
+
+def test_the_first_session_has_none_before_it(shared):
+    with running(shared.choices) as one, Guest(one) as guest:
+        guest.ask("back")
+        assert guest.until("error")["words"] == "there is no session before this one."
 
 
 def test_a_session_can_be_taken_away_in_every_form(room, tmp_path):
@@ -478,9 +527,9 @@ def test_pages_are_answered_while_a_session_is_replayed(room, endless):
         for what, more in {
             "play": {},
             "step": {"ticks": 1},
-            "edit": {"edit": {"kind": "episode"}},
+            "edit": {"edit": {"kind": "episode"}, "stroke": 1},
             "begin": {"chosen": CHOSEN},
-            "restart": {},
+            **{"restart": {}, "undo": {}, "back": {}},
         }.items():
             guest.ask(what, **more)
             assert guest.until("error")["words"].startswith("a session is being replayed; ")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import subprocess
@@ -95,6 +96,27 @@ def test_two_hundred_edits_are_replayed_to_the_bit(edited, name, tmp_path):
     assert (again.ticks, again.steps, again.edits) == (session.ticks, session.steps, session.edits)
     assert again.to_bytes() == session.to_bytes()
     assert replayed(again.to_bytes()).hand.state() == session.hand.state()
+
+
+@pytest.mark.parametrize("name", SETUPS)
+def test_changes_are_undone_one_by_one(name):
+    """Each time the session is as it was before the change, whatever happened since."""
+    session, rng, before = Session(SETUPS[name]), np.random.default_rng(7), []
+    for _ in range(6):
+        session.advance(int(rng.integers(1, 9)))
+        stands = session.hand.state(), session.ticks, session.steps, list(session.edits)
+        for part in range(int(rng.integers(1, 4))):
+            with contextlib.suppress(AntsError):
+                session.apply(random_edit(rng, session.hand), goes_on=part > 0)
+        if len(session.edits) > len(stands[-1]):
+            before.append(stands)
+    session.advance(20)
+    assert len(before) > 3
+    for stands in reversed(before):
+        *_, session = Session.replay(session.undone())
+        assert (session.hand.state(), session.ticks, session.steps, session.edits) == stands
+    with pytest.raises(AntsError, match="there is nothing to undo"):
+        session.undone()
 
 
 @pytest.mark.slow
@@ -355,6 +377,7 @@ def test_edits_without_room_change_nothing():
         ({"edits": 7}, "damaged"),
         ({"setup": {"world": "/etc/passwd"}}, "damaged"),
         ({"state": "0"}, "does not end as it did"),
+        ({"state": None}, "state is None"),
         ({"setup": None}, "damaged"),
     ],
 )

@@ -59,9 +59,15 @@ class Guest:
         self.frames: list[bytes] = []  # since the last one that was whole, with that
         self.state: dict[str, Any] = {}
         self.errors: list[str] = []
+        self.strokes = 0
 
     def ask(self, what: str, **more: Any) -> None:
         self.socket.send(json.dumps({"do": what, **more}))
+
+    def edit(self, edit: dict[str, Any]) -> None:
+        """Ask for a change of its own."""
+        self.strokes += 1
+        self.ask("edit", edit=edit, stroke=self.strokes)
 
     def hear(self) -> tuple[str, Any]:
         """The next that it is told: its kind, and a message or bytes."""
