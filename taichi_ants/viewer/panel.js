@@ -149,7 +149,9 @@ class Panel {
     const { header, live } = this.history, act = ant.act;
     if (ant.past) return this.storyOf(ant.past, '<span class="label">In the last tick, before what it sees now:</span>');
     if (!act) {
-      const early = ant.tick === 0 ? "It has not chosen yet." : "Time passes too fast to show each step; slow down, or pause and step.";
+      const late = this.history.length === 1 ? "What it did before this page came is not known; it is shown from the next tick on."
+        : "Time passes too fast to show each step; slow down, or pause and step.";
+      const early = ant.tick === 0 ? "It has not chosen yet." : late;
       const words = live ? early : "What it does next is not in the recording.";
       return `<div class="story"><span class="label">${words}</span></div>`;
     }
