@@ -96,6 +96,10 @@ class Statements {
       head.querySelector("button").addEventListener("click", () => this.turn(column, head.getAttribute("aria-sort")));
     });
     this.order.addEventListener("change", () => this.sort(this.order.value));
+    this.details = [...this.body.querySelectorAll("details")];
+    this.opener = part.querySelector("[name=details]");
+    this.opener.addEventListener("click", () => this.openAll(this.details.some((one) => !one.open)));
+    for (const one of this.details) one.addEventListener("toggle", () => this.nameOpener());
     this.filter();
   }
 
@@ -109,6 +113,14 @@ class Statements {
       if (!line.hidden) shown++;
     }
     this.found.textContent = `${shown} of ${this.lines.length} ${this.part.dataset.noun}`;
+  }
+
+  /* Paper shows what is open. */
+  openAll(opens) {
+    for (const one of this.details) one.open = opens;
+  }
+  nameOpener() {
+    this.opener.textContent = this.details.every((one) => one.open) ? "Close all details" : "Open all details";
   }
 
   /* Up, down, and back to the order of the page. */

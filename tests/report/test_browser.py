@@ -129,6 +129,20 @@ def test_a_phone_sorts_by_a_choice_that_the_heads_share(opened):
     assert choice.input_value() == ""
 
 
+def test_all_details_open_at_once_and_stay_on_paper(opened):
+    tab = opened("comparison")
+    told, opener = tab.locator(".statements .told"), tab.locator(".filters [name=details]")
+    assert opener.inner_text() == "Open all details"
+    opener.click()
+    tab.wait_for_function("""document.querySelector("[name=details]").innerText.startsWith("Close")""")
+    tab.emulate_media(media="print")
+    assert all(one.is_visible() for one in told.all())
+    assert not opener.is_visible()
+    tab.emulate_media(media="screen")
+    opener.click()
+    assert not any(one.is_visible() for one in told.all())
+
+
 def test_details_open_on_demand(opened):
     tab = opened("comparison")
     told = tab.locator(".statements .told").first
