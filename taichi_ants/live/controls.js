@@ -42,6 +42,7 @@ class Controls {
       live.stand();
       live.ask("begin", { chosen: this.chosen() });
     });
+    on("chosen", "input", () => (this.touched = true));
     on("world-name", "change", () => this.showWorld());
     on("task", "change", () => this.showTask());
     on("rules", "change", () => this.nameTask());
@@ -101,7 +102,14 @@ class Controls {
       byId("map").value = MAP;
       byId("map").maxLength = choices.most.text;
     }
+    const fields = [...byId("chosen").elements], typed = fields.map(({ value, checked }) => ({ value, checked })), { keepsRules } = this;
     this.choose(chosen);
+    if (this.touched && !this.begins) { // who fills the form goes on, whatever others begin
+      fields.forEach((field, place) => (field.type === "checkbox" ? (field.checked = typed[place].checked) : (field.value = typed[place].value)));
+      this.keepsRules = keepsRules;
+      this.showWorld();
+      this.explain();
+    } else this.touched = false;
     if (this.begins && !this.roomy.matches) byId("new").open = false;
     this.begins = false;
     this.hold(false);

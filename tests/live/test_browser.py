@@ -347,6 +347,30 @@ def test_a_new_session_is_what_was_chosen(page, room):
     assert page.text("#toast").endswith(".")
 
 
+def test_who_fills_the_form_goes_on_while_others_begin_a_session(page, room):
+    open_new(page)
+    page.tab.select_option("#world-name", "open")
+    page.tab.fill("#size", "33")
+    page.tab.click("#rules-box summary")
+    page.tab.check('#rules [value="births"]')
+    with Guest(room) as other:
+        other.ask("begin", chosen={**CHOSEN, "ants": 7})
+        other.until("whole")
+    wait(page, "live.state.values.ants.value === 7")
+    assert page.text("#now-chosen").startswith("the paper")
+    assert page.tab.input_value("#world-name") == "open"
+    assert page.tab.input_value("#size") == "33"
+    assert page.tab.is_checked('#rules [value="births"]')
+    page.click("#begin")
+    wait(page, "viewer.history.grid.ranges[0] === 33")
+    assert room.session.setup.task.life.births
+    with Guest(room) as other:  # what has begun is not half filled
+        other.ask("begin", chosen=CHOSEN)
+        other.until("whole")
+    wait(page, "viewer.history.grid.ranges[0] < 33")
+    assert page.tab.input_value("#world-name") == "paper"
+
+
 def test_a_long_map_is_pasted_at_once(page, room):
     open_new(page)
     page.tab.select_option("#world-name", "map")
