@@ -85,7 +85,7 @@ def live_in_c(library: ctypes.CDLL, colony: Colony, ticks: int, threads: int) ->
     Only what the colonies of `scattered` have: one world, Q-learning into one table, no life.
     """
     arrays, numbers = colony.arrays, colony._numbers()
-    ground = arrays["ground"] & 15
+    ground, last = arrays["ground"] & 15, len(arrays["weights"]) - 1
     ground[colony.of_ants(AntRow.CELL)] |= 1 << _ANT_SHIFT
     kept = {
         "ground": ground,
@@ -96,7 +96,7 @@ def live_in_c(library: ctypes.CDLL, colony: Colony, ticks: int, threads: int) ->
         "headings": colony.of_ants(AntRow.HEADING).astype(np.uint8),
         "random": arrays["streams"].copy(),
         "q": arrays["q"].copy(),
-        "weights": arrays["weights"],
+        "weights": arrays["weights"][np.minimum(np.arange(colony.ants + 1), last)],
         "rewards": arrays["rewards"].astype(np.int32),
     }
     names = ("evaporates", "slope", "fades_after", "discount")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from numbers import Real
@@ -141,10 +142,14 @@ def update_weights(alpha: float, most: int) -> np.ndarray:
 
     So far n updates in turn, each with learning rate alpha, go towards one target. Kernels and
     reference take these numbers from here, since powers differ in the last bit between libraries.
-    float32 (most + 1,); at 1 it is alpha itself, as float32.
+    float32 (at most most + 1,); at 1 it is alpha itself, as float32. The last number is that of all
+    larger n as well: from some n on they are 1, or 0 where 1 - alpha is 1.
     """
     rate = np.float32(alpha)
-    weights = (1.0 - (1.0 - np.float64(rate)) ** np.arange(most + 1)).astype(np.float32)
+    kept = 1.0 - np.float64(rate)
+    # A power below 2^-26 is lost when the weight is rounded.
+    different = math.ceil(26 / -math.log2(kept)) if 0 < kept < 1 else 2
+    weights = (1.0 - kept ** np.arange(min(most, max(2, different)) + 1)).astype(np.float32)
     # In float64 1 - (1 - alpha) may differ from alpha by a rounding.
     weights[1:2] = rate
     return weights

@@ -97,7 +97,8 @@ class SharedTable(FixedTable):
             errors_of[step.pair].append(error)
         for pair, several in errors_of.items():
             mean = several[0] if len(several) == 1 else mean_error(several)
-            self._common.update(pair, self._weights[len(several)], mean)
+            weight = self._weights[min(len(several), len(self._weights) - 1)]
+            self._common.update(pair, weight, mean)
         return errors
 
 

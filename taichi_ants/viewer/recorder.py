@@ -218,7 +218,8 @@ class Recorder:
         pairs = self._rows(slots, states) * N_ACTIONS + actions
         moved = self._tables().astype(np.float64).ravel()[pairs] - before.ravel()[pairs]
         _, place, ants = np.unique(pairs, return_inverse=True, return_counts=True)
-        weights = self.colony.arrays["weights"][ants[place]]
+        weights = self.colony.arrays["weights"]
+        weights = weights[np.minimum(ants[place], len(weights) - 1)]
         return np.divide(moved, weights, out=np.full(len(moved), np.nan), where=weights > 0)
 
     def _frame(self, sections: dict[str, Any]) -> bytes:

@@ -30,7 +30,6 @@ from command_lines import (
 from taichi_ants import Colony, Life, Pheromone, Task, TrainingConfig, load_policy, worlds
 from taichi_ants.analysis.colony.study import ABC, ABC_SILENT, BC, PAPER, A
 from taichi_ants.commands import colony as command
-from taichi_ants.engines.colony.layout import AntRow
 from taichi_ants.learners import registry
 from taichi_ants.learners.policies import save_policy
 from taichi_ants.studies import colony_study
@@ -530,7 +529,7 @@ def test_colonies_live_side_by_side_and_can_start_spread(capsys, tmp_path, monke
         assert alone.outcome().deliveries[0, 0] == colony.outcome().deliveries[0, 2]
         assert np.array_equal(alone.q_values[0], colony.q_values[2])
         cells, _ = world.start(5, 9, place)
-        assert np.array_equal(colony.at_start["ants"][AntRow.CELL, 18:27], cells)
+        assert np.array_equal(colony.at_start["cells"][2], cells)
 
 
 @pytest.mark.parametrize(

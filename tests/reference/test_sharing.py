@@ -151,6 +151,18 @@ def test_the_weights():
     assert update_weights(0.3, 0).tolist() == [0]
 
 
+@pytest.mark.parametrize("alpha", [1e-30, 1e-12, 0.001, 0.1, 0.3, 0.5, 0.999, 1 - 2**-24, 1.0])
+def test_the_last_weight_is_that_of_all_larger_numbers(alpha):
+    rate = np.float64(np.float32(alpha))
+    n = np.arange(2, 100_000)
+    weights = update_weights(alpha, int(n[-1]))
+    assert len(weights) <= len(n) + 2
+    expected = (1 - (1 - rate) ** n).astype(np.float32)
+    assert np.array_equal(weights[np.minimum(n, len(weights) - 1)], expected)
+    if alpha >= 0.001:
+        assert len(weights) < 30 / alpha
+
+
 # In the world: two ants want one cell, both by (0, forward).
 MEETING = World((5, 5, 5), (0, 0, 4), ants=[((0, 0, 0), 0), ((2, 0, 0), 3)])
 

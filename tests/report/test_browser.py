@@ -134,7 +134,9 @@ def test_all_details_open_at_once_and_stay_on_paper(opened):
     told, opener = tab.locator(".statements .told"), tab.locator(".filters [name=details]")
     assert opener.inner_text() == "Open all details"
     opener.click()
-    tab.wait_for_function("""document.querySelector("[name=details]").innerText.startsWith("Close")""")
+    tab.wait_for_function(
+        """document.querySelector("[name=details]").innerText.startsWith("Close")"""
+    )
     tab.emulate_media(media="print")
     assert all(one.is_visible() for one in told.all())
     assert not opener.is_visible()

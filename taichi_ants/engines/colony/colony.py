@@ -203,7 +203,7 @@ class Colony:
         self.seed_words = np.array([seed % 2**64 for seed in self.seeds], dtype=np.uint64)
         running = runtime.start(threads, arch)
         life = self.task.life
-        self._ants_change = life.births or life.lifespan is not None
+        self.ants_change = life.births or life.lifespan is not None
         self.food_changes = life.regrowth is not None or life.wander is not None
         usual = "by_chunk" if self.capacity >= _LARGE_COLONY else "by_world"
         self.schedule = usual if schedule is None else schedule
@@ -214,7 +214,8 @@ class Colony:
         self.arrays: dict[str, np.ndarray] = {}
         self._lay_out(_checked_worlds(world, len(self.seeds), learns))
         self.arrays |= (lasting := memory.lasting(self, table))
-        self.stored = (*self.at_start, *lasting)  # the names of those that a file needs to hold
+        # The names of those that a file needs to hold.
+        self.stored = (*self._changing, *lasting)
         self._launches: dict[str, Any] = {}  # of kernels, by their phases
         self._piece = 1  # ticks that take less than _PIECE_SECONDS
         self.epsilon, self.learning_rate = self.training.epsilon, self.training.learning_rate
@@ -241,7 +242,8 @@ class Colony:
         """Begin anew, with room for n homes of food in each world, at least as many as foods."""
         self.n_homes = n
         self.at_start = memory.start_of_episode(self)
-        self.arrays |= {name: array.copy() for name, array in self.at_start.items()}
+        self.arrays |= (changing := memory.of_episode(self))
+        self._changing = tuple(changing)
 
     def begin_episode(
         self, length: int | None = None, world: World | Sequence[World] | None = None
@@ -392,8 +394,14 @@ class Colony:
         return self.arrays["traits"][row - FIRST_TRAIT]
 
     def ant_rows(self) -> np.ndarray:
-        """A copy of all that is stored of the ants, int32 (len(AntRow), W * capacity)."""
-        return np.concatenate([self.arrays["ants"], self.arrays["traits"]])
+        """A copy of all that is stored of the ants, int32 (len(AntRow), W * capacity).
+
+        0 in rows that this colony does not keep, see `layout.AntRow`.
+        """
+        ants, traits = self.arrays["ants"], self.arrays["traits"]
+        rows = np.zeros((len(AntRow), ants.shape[1]), np.int32)
+        rows[: len(ants)], rows[FIRST_TRAIT : FIRST_TRAIT + len(traits)] = ants, traits
+        return rows
 
     def _pass(self, n: int) -> Iterator[None]:
         """Let n ticks pass, in short pieces: a launch of a kernel cannot be interrupted."""
@@ -430,7 +438,7 @@ class Colony:
             self._launch("tick_phases", values)
             for _ in range(rounds):
                 self._launch("planning_phases", values)
-            if self._ants_change or self.ends_at_delivery:
+            if self.ants_change or self.ends_at_delivery:
                 self._launch("last_phases", values)
             worlds[WorldRow.TICKS] += running
             self.ticks += 1
@@ -624,7 +632,7 @@ class Colony:
         born, have tables of their own or are given actions, and vacant ones stay behind the others;
         there the order stays.
         """
-        slots_matter = self._ants_change or self.one_a_slot or self.is_given_actions
+        slots_matter = self.ants_change or self.one_a_slot or self.is_given_actions
         if slots_matter or self.arrays["worlds"][WorldRow.LIVING].min() < self.capacity:
             return
         cells = self.ants_by_slot(AntRow.CELL)
@@ -654,7 +662,7 @@ class Colony:
             self.pheromone.dense,
             self.pheromone.view,
             self.task.traffic,
-            self._ants_change,
+            self.ants_change,
             self.food_changes,
         )
         kind = Arguments.type_of(values)

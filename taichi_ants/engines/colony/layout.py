@@ -10,15 +10,16 @@ from taichi_ants.task.constants import OBSTACLE
 class AntRow(IntEnum):
     """What is known of an ant: rows of `ants` (int32), then of `traits` (int8); columns are slots.
 
-    What is small and used in each tick lies in `traits`, a quarter as much for memory to move.
+    What is small and used in each tick lies in `traits`, a quarter as much for memory to move. Rows
+    that a colony does not use, at the end of either table, are left out.
     """
 
     CELL = 0
-    AGE = auto()
     CARRIED = auto()  # ticks with the food that it carries
     NUMBER = auto()  # -1 in a slot that was never used in this episode
-    STATE = auto()  # the row of the table; unused where the percept is the row
     WANT = auto()  # the cell to enter, or of the food to take, else its own; then where it was
+    STATE = auto()  # the row of the table; where the percept is the row, it is not used
+    AGE = auto()  # in ticks; only where ants are born or die
     HEADING = auto()
     CARRIES = auto()
     STAGE = auto()  # a `Stage`

@@ -269,7 +269,7 @@ def apply_sums(c: ti.template(), v: ti.template(), w):
         place = v.n_pairs * chunk + pair
         count = c.sums_of[SumRow.COUNT, place]
         error = c.errors[place]
-        rate = c.weights[count]
+        rate = c.weights[ti.min(count, c.weights.shape[0] - 1)]  # the last is that of all above
         if count > 1:
             mean = ti.cast(c.sums[place], ti.f64) / (ti.cast(count, ti.f64) * _ONE)
             error = ti.cast(mean, ti.f32)

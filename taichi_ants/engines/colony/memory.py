@@ -17,6 +17,7 @@ from taichi_ants.engines.colony.layout import (
     SumRow,
     WorldRow,
 )
+from taichi_ants.engines.looks import is_percept
 from taichi_ants.engines.packing import compass_of
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import STREAM_ANT, STREAM_QUEEN
@@ -32,10 +33,11 @@ if TYPE_CHECKING:
 Which = slice | np.ndarray
 ALL = slice(None)  # the worlds, where a bool (W,) would name some
 _MOST_NUMBERS = 2**31 - 1  # kernels index arrays by 32 bits
+_PLACES = ("cells", "headings")  # what is said of ants at the start
 
 
 def start_of_episode(colony: Colony) -> dict[str, np.ndarray]:
-    """What each episode begins with; streams, tables and memories go on, see `lasting`.
+    """What each episode begins with, as short as it can be said; see `set_to_start`.
 
     Raises:
         AntsError: A world has too few free cells for the ants.
@@ -47,15 +49,8 @@ def start_of_episode(colony: Colony) -> dict[str, np.ndarray]:
     cells = np.stack([cells for cells, _ in starts])
     ground = _of_each(colony, World.ground)
     np.put_along_axis(ground, cells.astype(np.int64), ANT_GROUND, axis=1)
-    levels, dense = _of_each(colony, World.trail_levels).reshape(-1), colony.pheromone.dense
-    ants = np.zeros((FIRST_TRAIT, len(worlds), colony.capacity), np.int32)
-    ants[AntRow.CELL, :, :n] = cells
-    ants[AntRow.NUMBER] = -1
-    ants[AntRow.NUMBER, :, :n] = np.arange(n)
-    traits = np.zeros((len(AntRow) - FIRST_TRAIT, len(worlds), colony.capacity), np.int8)
-    traits[AntRow.HEADING - FIRST_TRAIT, :, :n] = [headings for _, headings in starts]
-    traits[AntRow.STAGE - FIRST_TRAIT, :, :n] = Stage.LIVING
-    traits[AntRow.ACTION - FIRST_TRAIT] = -1
+    levels, dense = _of_each(colony, World.trail_levels), colony.pheromone.dense
+    levels = levels if levels.any() else levels[:, :1].copy()  # all cells begin alike
     rows = np.zeros((len(WorldRow), len(worlds)), np.int32)
     rows[WorldRow.RUNNING] = 1
     for row in (WorldRow.TOP, WorldRow.FIRST_VACANT, WorldRow.LIVING, WorldRow.NEXT_NUMBER):
@@ -63,19 +58,57 @@ def start_of_episode(colony: Colony) -> dict[str, np.ndarray]:
     rows[WorldRow.FIRST_DELIVERY] = -1
     rows[WorldRow.QUEEN_CELL] = [int(colony.grid.index(world.queen)) for world in worlds]
     return {
+        # Where the ants start, by world and number.
+        "cells": cells,
+        "headings": np.array([headings for _, headings in starts], np.int8),
         # What a cell holds, and a mark of the ant on it, see `layout`.
         "ground": ground.reshape(-1),
-        # Integer trails: the clock at which a cell's trail has evaporated.
-        "trail": np.zeros(1, np.int32) if dense else levels,
-        # Dense trails: the levels.
-        "level": levels.astype(np.float32) if dense else np.zeros(1, np.float32),
-        "ants": ants.reshape(len(ants), -1),
-        "traits": traits.reshape(len(traits), -1),
+        # Integer trails: the clock at which a cell's trail has evaporated; dense ones: the levels.
+        "level" if dense else "trail": levels.reshape(-1),
         "worlds": rows,
         # Rewards of all ants in this episode.
         "returns": np.zeros(len(worlds), np.int64),
         **homes_arrays(colony, rows, _homes_at_start(colony) if colony.n_homes else ()),
     }
+
+
+def of_episode(colony: Colony) -> dict[str, np.ndarray]:
+    """Room for what changes in an episode, as it is at the start of one."""
+    n_worlds, dense = len(colony.worlds), colony.pheromone.dense
+    slots, cells = n_worlds * colony.capacity, n_worlds * colony.grid.size
+    start = {name: array.copy() for name, array in colony.at_start.items() if name not in _PLACES}
+    sees_more = not is_percept(colony.task.sees)
+    n_rows = FIRST_TRAIT if colony.ants_change else AntRow.AGE if sees_more else AntRow.STATE
+    n_traits = len(AntRow) - FIRST_TRAIT - (not colony.task.traffic.shared)
+    made = {
+        **start,
+        "trail": np.zeros(1 if dense else cells, np.int32),
+        "level": np.zeros(cells if dense else 1, np.float32),
+        "ants": np.zeros((n_rows, slots), np.int32),
+        "traits": np.zeros((n_traits, slots), np.int8),
+    }
+    set_to_start(colony, made)
+    return made
+
+
+def set_to_start(colony: Colony, arrays: dict[str, np.ndarray], which: Which = ALL) -> None:
+    """Set what changes in an episode of these worlds to its start."""
+    start, n_worlds = colony.at_start, len(colony.worlds)
+    copy_worlds(
+        arrays,
+        {name: array for name, array in start.items() if name not in _PLACES},
+        n_worlds,
+        which,
+    )
+    ants = arrays["ants"].reshape(-1, n_worlds, colony.capacity)
+    traits = arrays["traits"].reshape(-1, n_worlds, colony.capacity)
+    ants[:, which] = traits[:, which] = 0
+    ants[AntRow.NUMBER, which], traits[AntRow.ACTION - FIRST_TRAIT, which] = -1, -1
+    n = start["cells"].shape[1]
+    ants[AntRow.CELL][which, :n] = start["cells"][which]
+    ants[AntRow.NUMBER][which, :n] = np.arange(n)
+    traits[AntRow.HEADING - FIRST_TRAIT][which, :n] = start["headings"][which]
+    traits[AntRow.STAGE - FIRST_TRAIT][which, :n] = Stage.LIVING
 
 
 def _homes_at_start(colony: Colony) -> Iterator[np.ndarray]:
@@ -205,8 +238,8 @@ def constants(colony: Colony) -> dict[str, np.ndarray]:
         "seeds": colony.seed_words,
         "rewards": colony.task.rewards.by_event(),
         "hyperparameters": np.array([*dict(colony.training.hyperparameters).values(), 0.0]),
-        # How far the mean of n errors moves a value, by n.
-        "weights": np.zeros(1 + (colony.capacity if shared else 1), np.float32),
+        # How far the mean of n errors moves a value, by n; see `set_learning_rate`.
+        "weights": np.zeros(2, np.float32),
         # What the ant on a cell wants, see `layout`.
         "wants": np.zeros(cells, np.uint8),
         "spare": np.zeros_like(colony.arrays["level"]),  # the next levels, with diffusion
@@ -234,8 +267,11 @@ def _of_each(colony: Colony, make: Callable[[World], np.ndarray]) -> np.ndarray:
 
 def set_learning_rate(colony: Colony) -> None:
     """Set what follows from the learning rate of the episode."""
-    weights = colony.arrays["weights"]
-    weights[:] = update_weights(colony.learning_rate, len(weights) - 1)
+    most = colony.capacity if colony.sharing == "shared" else 1
+    weights, kept = update_weights(colony.learning_rate, most), colony.arrays["weights"]
+    if len(weights) > len(kept):  # seldom: Taichi keeps some bytes for good of each array
+        kept = colony.arrays["weights"] = np.empty(min(2 * len(weights), most + 1), np.float32)
+    kept[: len(weights)], kept[len(weights) :] = weights, weights[-1]
 
 
 def begin_episode(colony: Colony, which: Which = ALL) -> None:
@@ -246,7 +282,7 @@ def begin_episode(colony: Colony, which: Which = ALL) -> None:
     """
     arrays = colony.arrays
     set_learning_rate(colony)
-    copy_worlds(arrays, colony.at_start, len(colony.seeds), which)
+    set_to_start(colony, arrays, which)
     copy_worlds(arrays, {"streams": arrays["first_streams"]}, len(colony.seeds), which)
     arrays["episodes"][which] += 1
 
