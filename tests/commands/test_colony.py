@@ -391,6 +391,23 @@ def test_stopped_a_colony_is_saved_at_a_whole_tick(sent, status, kernels, tmp_pa
     assert saved.outcome().deliveries == colony.outcome().deliveries
 
 
+@pytest.mark.parametrize(
+    ("kind", "owner", "name", "said"),
+    [
+        ("live", command, "new_colony", "Stopped.\n"),
+        (
+            *("study", colony_study, "plan"),
+            "Stopped; finished parts are kept, and the same command goes on from there.\n",
+        ),
+    ],
+)
+def test_stopped_before_it_begins_it_promises_only_what_is_so(
+    kind, owner, name, said, capsys, monkeypatch
+):
+    monkeypatch.setattr(owner, name, lambda *given: signal.raise_signal(signal.SIGINT))
+    assert call("colony", [kind], capsys) == (130, "", said)
+
+
 def test_a_colony_starts_from_a_policy(capsys):
     policy = EXPERIMENTS / "policies" / "foraging.npz"
     fixed = ["live", "--ants", 2, "--world", "paper", "--ticks", 60, "--sharing", "fixed"]
