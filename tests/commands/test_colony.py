@@ -262,7 +262,7 @@ def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
         (["live", "--render", "x.bmp"], "'x.bmp' ends in '.bmp'"),
         (["live", "--save", "/proc/x/y"], "cannot write '/proc/x/y'"),
         (["live", "--save", "."], "'.' is not a regular file"),
-        (["live", "--save", ""], "'' is not a regular file"),
+        (["live", "--save", ""], "--save is empty"),
         # Told before what comes later, as the work does.
         (["live", "--save", "/dev/null", "--resume", "x"], "'/dev/null' is not a regular file"),
         (["live", "--render", "../a.png/", "--resume", "x"], "'../a.png/' is not a regular file"),
