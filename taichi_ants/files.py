@@ -40,7 +40,7 @@ def write_atomically(path: PathLike, writer: Callable[[BinaryIO], None]) -> None
     Raises:
         AntsError: The file cannot be written. Other exceptions of the writer pass through.
     """
-    with _writing(path):
+    with writing(path):
         target = _target_of(path)
         with unfinished(target, partial(Path.touch, exist_ok=False)) as place:
             with open(place, "wb") as file:
@@ -108,7 +108,7 @@ def check_writable_file(path: PathLike) -> Path:
     Raises:
         AntsError: The path is one of a folder, a device or a pipe, or nothing can be written there.
     """
-    with _writing(path):
+    with writing(path):
         target = _target_of(path)
         folder = target.parent
         if not os.path.islink(path):
@@ -276,8 +276,8 @@ def check_writable_folder(path: PathLike, named: PathLike | None = None) -> Path
 
 
 @contextmanager
-def _writing(path: PathLike) -> Iterator[None]:
-    """What the system has against writing a file, said of the path."""
+def writing(path: PathLike) -> Iterator[None]:
+    """What the system has against writing a file or a folder becomes an AntsError that names it."""
     try:
         yield
     except (OSError, UnicodeError) as error:

@@ -133,10 +133,11 @@ def from_minari(
             path = Path(minari.storage.get_dataset_path(dataset))
         else:
             path = Path(dataset.storage.data_path)
-    except (ValueError, AttributeError) as error:
-        raise _there_is_none(dataset) from error
-    if not path.is_dir():
-        raise _there_is_none(dataset)
+        there_is_one = path.is_dir()
+    except (OSError, ValueError, AttributeError):
+        there_is_one = False
+    if not there_is_one:
+        raise AntsError(f"Minari has no data set {shown(dataset)}; see `minari list local`.")
     with _reading(path):
         source = minari.load_dataset(dataset) if isinstance(dataset, str) else dataset
         facts = source.storage.metadata.get(_FACTS)
@@ -160,10 +161,6 @@ def from_minari(
             for name, dtype in COLUMNS.items()
         }
         return Dataset(world=world, **{"behaviour": {"policy": "unknown"}, **known}, **rows)
-
-
-def _there_is_none(dataset: object) -> AntsError:
-    return AntsError(f"Minari has no data set {shown(dataset)}; see `minari list local`.")
 
 
 @contextmanager

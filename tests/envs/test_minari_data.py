@@ -132,6 +132,9 @@ def test_names_that_are_taken_missing_or_wrong():
             to_minari(data, name)
     with pytest.raises(AntsError, match="Minari has no data set 'ants/missing-v0'"):
         from_minari("ants/missing-v0")
+    for odd in (None, 3, "", "n" * 300, "a\0b"):
+        with pytest.raises(AntsError):
+            from_minari(odd)
 
 
 def test_damaged_files_are_named(tmp_path):
