@@ -7,14 +7,17 @@ the first and the last iteration are. See docs/baselines.md.
 
 from __future__ import annotations
 
-import argparse
-from itertools import product
+from taichi_ants.studies.interruption import stoppable
 
-import numpy as np
+with stoppable():  # these imports take a moment, in which Ctrl-C shall be heard too
+    import argparse
+    from itertools import product
 
-from taichi_ants import World, worlds
-from taichi_ants.baselines.ant_system import METHODS, Method, search
-from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
+    import numpy as np
+
+    from taichi_ants import World, worlds
+    from taichi_ants.baselines.ant_system import METHODS, Method, search
+    from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
 
 HEAD = f"{'world':20} {'method':11} shortest  found by  iteration  first and last mean length"
 

@@ -8,22 +8,25 @@ docs/baselines.md.
 
 from __future__ import annotations
 
-import argparse
-import math
-from collections.abc import Sequence
-from dataclasses import replace
-from itertools import product
-from typing import TYPE_CHECKING
+from taichi_ants.studies.interruption import stoppable
 
-import numpy as np
+with stoppable():  # these imports take a moment, in which Ctrl-C shall be heard too
+    import argparse
+    import math
+    from collections.abc import Sequence
+    from dataclasses import replace
+    from itertools import product
+    from typing import TYPE_CHECKING
 
-from taichi_ants import Colony, Life, Pheromone, Task, TrainingConfig, World, task, worlds
-from taichi_ants.analysis.statistics import bootstrap_interval
-from taichi_ants.learners.policies import trail_follower
-from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
+    import numpy as np
 
-if TYPE_CHECKING:
-    from taichi_ants.engines.colony.colony import ColonyEpisodes
+    from taichi_ants import Colony, Life, Pheromone, Task, TrainingConfig, World, task, worlds
+    from taichi_ants.analysis.statistics import bootstrap_interval
+    from taichi_ants.learners.policies import trail_follower
+    from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
+
+    if TYPE_CHECKING:
+        from taichi_ants.engines.colony.colony import ColonyEpisodes
 
 SIZE = (30, 30, 30)
 WORLDS = {

@@ -8,18 +8,21 @@ comparison, six for the colony and five for the bridge on two cores. A million a
 
 from __future__ import annotations
 
-import argparse
-import io
-import shutil
-import tempfile
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
-from typing import Any
+from taichi_ants.studies.interruption import stoppable
 
-from taichi_ants.commands import render, watch
-from taichi_ants.studies.command_line import Parser, run_command
+with stoppable():  # these imports take a moment, in which Ctrl-C shall be heard too
+    import argparse
+    import io
+    import shutil
+    import tempfile
+    import threading
+    from collections.abc import Iterator
+    from contextlib import contextmanager
+    from pathlib import Path
+    from typing import Any
+
+    from taichi_ants.commands import render, watch
+    from taichi_ants.studies.command_line import Parser, run_command
 
 ROOT = Path(__file__).parents[1]
 _MAP = str(ROOT / "experiments" / "maps" / "garden.txt")

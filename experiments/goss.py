@@ -7,11 +7,14 @@ See docs/baselines.md.
 
 from __future__ import annotations
 
-import argparse
+from taichi_ants.studies.interruption import stoppable
 
-from taichi_ants.baselines.goss import PUBLISHED, choices, class_shares, crossing_steps
-from taichi_ants.errors import count
-from taichi_ants.studies.command_line import Parser, run_command, whole_number
+with stoppable():  # these imports take a moment, in which Ctrl-C shall be heard too
+    import argparse
+
+    from taichi_ants.baselines.goss import PUBLISHED, choices, class_shares, crossing_steps
+    from taichi_ants.errors import count
+    from taichi_ants.studies.command_line import Parser, run_command, whole_number
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:

@@ -8,33 +8,38 @@ of ants that appear and die. Means with 95 % intervals over seeds. See docs/offl
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Callable
-from dataclasses import replace
-from pathlib import Path
+from taichi_ants.studies.interruption import stoppable
 
-import numpy as np
+with stoppable():  # all this takes a moment, in which Ctrl-C shall be heard too
+    import argparse
+    from collections.abc import Callable
+    from dataclasses import replace
+    from pathlib import Path
 
-from taichi_ants import (
-    Colony,
-    Dataset,
-    Life,
-    Task,
-    TrainingConfig,
-    evaluate,
-    load_policy,
-    offline,
-    record,
-    record_colony,
-    train,
-    worlds,
-)
-from taichi_ants.analysis.statistics import bootstrap_interval
-from taichi_ants.analysis.tables import Table, interval, markdown, number, plain_text
-from taichi_ants.learners.policies import random_policy, trail_follower
-from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
+    import numpy as np
 
-WORLD = worlds.paper()
+    from taichi_ants import (
+        Colony,
+        Dataset,
+        Life,
+        Task,
+        TrainingConfig,
+        evaluate,
+        load_policy,
+        offline,
+        record,
+        record_colony,
+        train,
+        worlds,
+    )
+    from taichi_ants.analysis.statistics import bootstrap_interval
+    from taichi_ants.analysis.tables import Table, interval, markdown, number, plain_text
+    from taichi_ants.learners.policies import random_policy, trail_follower
+    from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
+
+    WORLD = worlds.paper()
+    FORAGING = load_policy(Path(__file__).parent / "policies" / "foraging.npz")
+
 STILL = Task(evaporation_in_evaluation=False)  # trails stay, as where ants learn
 ONLINE = TrainingConfig("q_learning", 0.1, 0.9, epsilon=0.3, epsilon_decay=0.99)
 LEARNERS: dict[str, Callable[..., np.ndarray]] = {
@@ -54,8 +59,6 @@ JUDGES: dict[str, Callable[..., offline.PolicyValues]] = {
 }
 
 # Colonies of 64 ants, three far piles; those with a lifespan have births.
-FORAGING = load_policy(Path(__file__).parent / "policies" / "foraging.npz")
-PILES = worlds.far_piles(1, (20, 20, 20))
 LIFESPANS, TICKS, COLONY_SIZES = (None, 100, 50), 250, (3000, 15_000)
 
 
@@ -206,7 +209,8 @@ def _colony(seeds: range, life: Life, epsilon: float, q_values: np.ndarray | Non
     table = FORAGING.q_values if q_values is None else q_values
     training = TrainingConfig("sarsa", 0.1, 0.9, epsilon, 1.0)
     task = replace(FORAGING.task, life=life)
-    return Colony(PILES, task, training, seeds, 64, 64, sharing="fixed", q_values=table)
+    world = worlds.far_piles(1, (20, 20, 20))
+    return Colony(world, task, training, seeds, 64, 64, sharing="fixed", q_values=table)
 
 
 def _delivered(seeds: range, q_values: np.ndarray) -> np.ndarray:

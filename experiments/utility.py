@@ -10,15 +10,18 @@ docs/baselines.md.
 
 from __future__ import annotations
 
-import argparse
-from itertools import product
+from taichi_ants.studies.interruption import stoppable
 
-import numpy as np
+with stoppable():  # these imports take a moment, in which Ctrl-C shall be heard too
+    import argparse
+    from itertools import product
 
-from taichi_ants import World, worlds
-from taichi_ants.analysis.statistics import bootstrap_interval
-from taichi_ants.baselines.utility import Foraging, forage
-from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
+    import numpy as np
+
+    from taichi_ants import World, worlds
+    from taichi_ants.analysis.statistics import bootstrap_interval
+    from taichi_ants.baselines.utility import Foraging, forage
+    from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
 
 SIZE = (30, 30, 30)
 WORLDS = {

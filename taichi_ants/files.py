@@ -9,10 +9,13 @@ import json
 import math
 import os
 import secrets
+import shutil
 import stat
 import tempfile
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -21,7 +24,9 @@ import numpy as np
 from taichi_ants.errors import AntsError, expect, shown
 
 PathLike = str | os.PathLike[str]
-HALF_WRITTEN = f".{16 * '[0-9a-f]'}.tmp"  # how a file is called until it is whole
+_HEX = 16 * "[0-9a-f]"
+HALF_WRITTEN = f".{_HEX}.{_HEX}.tmp"  # how a file is called until it is whole
+_SECONDS_TO_LOCK = 1.0  # within which one that is made is locked, see `unfinished`
 
 
 def write_atomically(path: PathLike, writer: Callable[[BinaryIO], None]) -> None:
@@ -30,24 +35,68 @@ def write_atomically(path: PathLike, writer: Callable[[BinaryIO], None]) -> None
     Args:
         path: The file. One that exists is replaced; a symbolic link is followed.
         writer: Called once with a binary file to write to. It lies in the same folder until it is
-            complete and is removed if the writer raises.
+            complete and is removed if the writer raises, see `unfinished`.
 
     Raises:
         AntsError: The file cannot be written. Other exceptions of the writer pass through.
     """
-    temporary: Path | None = None
-    try:
-        with _writing(path):
-            target = _target_of(path)
-            # Not derived from the file's name: it fits even if that one has the greatest length.
-            temporary = target.parent / f".{secrets.token_hex(8)}.tmp"
-            with open(temporary, "xb") as file:
+    with writing(path):
+        target = _target_of(path)
+        with unfinished(target, partial(Path.touch, exist_ok=False)) as place:
+            with open(place, "wb") as file:
                 writer(file)
-            os.replace(temporary, target)
+            os.replace(place, target)
+
+
+@contextmanager
+def unfinished(target: Path, make: Callable[[Path], object]) -> Iterator[Path]:
+    """A place for what is not whole yet, to be moved to its target when it is.
+
+    What is still there at the end is removed. A process that is killed cannot do that. So who
+    writes holds a lock, and what nobody holds is removed when the same target is written again.
+
+    Args:
+        target: The file or folder; its own folder exists.
+        make: Makes the file or the folder in the place, which lies beside the target.
+    """
+    # Not the name itself: this one fits even if that has the greatest length.
+    name = hashlib.sha256(os.fsencode(target.name)).hexdigest()[:16]
+    for left in target.parent.glob(f".{name}.{_HEX}.tmp"):
+        with suppress(OSError), _locked(left) as is_free:
+            if is_free and time.time() - left.stat().st_mtime > _SECONDS_TO_LOCK:
+                _remove(left)
+    place = target.parent / f".{name}.{secrets.token_hex(8)}.tmp"
+    try:
+        make(place)
+        with _locked(place):
+            yield place
     finally:
-        if temporary is not None:
-            with suppress(OSError):
-                temporary.unlink()
+        with suppress(OSError):
+            _remove(place)
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[bool]:
+    """Lock a file or folder; whether that can be done here, and nobody else has done it."""
+    descriptor, is_locked = None, False
+    try:
+        with suppress(OSError, ImportError):  # on Windows, or on a network's disk
+            import fcntl
+
+            descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            is_locked = True
+        yield is_locked
+    finally:
+        if descriptor is not None:
+            os.close(descriptor)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink()
 
 
 def check_writable_file(path: PathLike) -> Path:
@@ -59,7 +108,7 @@ def check_writable_file(path: PathLike) -> Path:
     Raises:
         AntsError: The path is one of a folder, a device or a pipe, or nothing can be written there.
     """
-    with _writing(path):
+    with writing(path):
         target = _target_of(path)
         folder = target.parent
         if not os.path.islink(path):
@@ -227,8 +276,8 @@ def check_writable_folder(path: PathLike, named: PathLike | None = None) -> Path
 
 
 @contextmanager
-def _writing(path: PathLike) -> Iterator[None]:
-    """What the system has against writing a file, said of the path."""
+def writing(path: PathLike) -> Iterator[None]:
+    """What the system has against writing a file or a folder becomes an AntsError that names it."""
     try:
         yield
     except (OSError, UnicodeError) as error:

@@ -7,6 +7,8 @@ import errno
 import json
 import os
 import stat
+import subprocess
+import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -71,6 +73,46 @@ def test_an_interrupted_write_leaves_nothing(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         files.write_atomically(tmp_path / "a.bin", writer)
     assert names(tmp_path) == []
+
+
+KILLED = """
+import os, sys, time
+from pathlib import Path
+from taichi_ants import files
+
+def writer(file):
+    print("writing", flush=True)
+    time.sleep(60)
+
+with files.unfinished(Path("frames"), Path.mkdir):
+    files.write_atomically("a.bin", writer)
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="the system has no locks that end with a process")
+def test_what_a_kill_has_left_is_gone_after_the_next_write(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    command, pipe = [sys.executable, "-c", KILLED], subprocess.PIPE
+    monkeypatch.setattr(files, "_SECONDS_TO_LOCK", -1.0)
+    kept = tmp_path / f".{16 * 'a'}.{16 * 'b'}.tmp"
+    kept.touch()  # of another file, or of another program
+
+    def write() -> None:
+        files.write_text(tmp_path / "a.bin", "whole")
+        with files.unfinished(tmp_path / "frames", Path.mkdir) as place:
+            place.rename(tmp_path / "frames")
+        (tmp_path / "frames").rmdir()
+
+    with subprocess.Popen(command, cwd=tmp_path, stdout=pipe, text=True) as process:
+        assert process.stdout.readline() == "writing\n"
+        half = set(names(tmp_path))
+        write()
+        assert set(names(tmp_path)) == half | {"a.bin"}  # it is alive
+        process.kill()
+    assert len(half) == 3
+    write()
+    assert names(tmp_path) == [kept.name, "a.bin"]
 
 
 def test_a_full_disk_is_reported_with_the_file(tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ from taichi_ants import worlds as places
 from taichi_ants.errors import AntsError
 from taichi_ants.rendering import learning_stages, policy_sheet, save_animation
 from taichi_ants.studies.command_line import Parser, notice
-from taichi_ants.viewer import record_colony
+from taichi_ants.viewer import frame, is_page, notebook, record_colony
 
 WORLD = places.paper()
 CONFIG = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 0.9)
@@ -75,6 +75,11 @@ ODD = {
     "an offline model's": lambda _: offline.model_based(data(), TABLE, initial_value="x"),
     "by run": lambda _: offline.fitted_q_iteration(data(), by_run=np.zeros(0)),
     "a penalty": lambda _: offline.pessimistic_q_iteration(data(), penalty=HUGE),
+    "a label": lambda _: learners.label(["sarsa"]),
+    "a page's path": lambda _: is_page(None),
+    "a frame": lambda _: frame(SCALAR),
+    "what a notebook shows": lambda _: notebook(RAGGED),
+    "data of a model": lambda _: offline.EmpiricalModel.of(None, SCALAR),
     "a world's name": lambda _: places.check_seed_counts(LONG),
 }
 

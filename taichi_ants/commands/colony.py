@@ -27,7 +27,7 @@ from taichi_ants.studies.command_line import (
     whole_number,
     with_folder,
 )
-from taichi_ants.studies.interruption import held
+from taichi_ants.studies.interruption import held, stoppable
 
 if TYPE_CHECKING:
     from taichi_ants import Colony, Task
@@ -58,6 +58,7 @@ WIDTH = 79  # of the report, in columns
 COUNT: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
 SEEDS, CONDITIONS = "seeds.csv", "conditions.csv"
 FIGURES, POLICIES = "figures", "policies"
+AGAIN = "Stopped; finished parts are kept, and the same command goes on from there."
 _OF_RESUMED = ("resume", "ticks", "save", "render", "every", "figure", "plugin", "threads", "arch")
 _OF_LEARNING = ("learner", "learning_rate", "discount", "hyperparameter")
 _OF_LIFE = ("births", "lifespan", "regrowth", "wander")
@@ -396,10 +397,13 @@ def start(settings: argparse.Namespace) -> None:
     """The study, or one colony."""
     if settings.plugin:
         load_plugin(settings.plugin)
-    {"study": study, "live": live}[settings.kind](settings)
+    if settings.kind == "live":
+        live(settings)
+    else:
+        with stoppable(AGAIN):
+            study(settings)
 
 
 def main(arguments: list[str] | None = None) -> None:
     """The command line."""
-    again = "Stopped; finished parts are kept, and the same command goes on from there."
-    run_command(lambda: start(parse_arguments(arguments)), again)
+    run_command(lambda: start(parse_arguments(arguments)))

@@ -22,6 +22,7 @@ from taichi_ants.studies.command_line import (
     run_command,
     whole_number,
 )
+from taichi_ants.studies.interruption import stop_if_noted
 
 if TYPE_CHECKING:
     from taichi_ants.learners.policies import Policy
@@ -70,7 +71,7 @@ def watch(settings: argparse.Namespace) -> None:
     print(f"{room.url}\nOpen this address; Ctrl-C ends.", flush=True)
     if not settings.no_browser and sys.stdout.isatty():
         _open(room.url)
-    room.run(settings.seconds)
+    room.run(settings.seconds, stop_if_noted)
     print("Ended.")
 
 

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -126,18 +129,24 @@ def from_minari(
     """
     minari = _minari()
     try:
+        if isinstance(dataset, str):
+            path = Path(minari.storage.get_dataset_path(dataset))
+        else:
+            path = Path(dataset.storage.data_path)
+        there_is_one = path.is_dir()
+    except (OSError, ValueError, AttributeError):
+        there_is_one = False
+    if not there_is_one:
+        raise AntsError(f"Minari has no data set {shown(dataset)}; see `minari list local`.")
+    with _reading(path):
         source = minari.load_dataset(dataset) if isinstance(dataset, str) else dataset
         facts = source.storage.metadata.get(_FACTS)
-    except (FileNotFoundError, ValueError, AttributeError) as error:
-        raise AntsError(
-            f"Minari has no data set {shown(dataset)}; see `minari list local`."
-        ) from error
-    known: dict[str, Any] = {"task": task or Task(), "seeds": (0,)}
-    if facts is not None:
-        described = json.loads(facts)
-        known = Dataset.described(described)
-        world = world_from(described, "world", described["world"])
-    elif world is None:
+        known: dict[str, Any] = {"task": task or Task(), "seeds": (0,)}
+        if facts is not None:
+            described = json.loads(facts)
+            known = Dataset.described(described)
+            world = world_from(described, "world", described["world"])
+    if world is None:
         raise AntsError("the data set does not tell the world of its ants; give world and task.")
     form = Shown(known["task"].sees, _FORMATS.get(type(source.observation_space), "cells"))
     if (source.observation_space, source.action_space) != (form.space, spaces.Discrete(N_ACTIONS)):
@@ -145,12 +154,26 @@ def from_minari(
             f"the data set has the spaces {source.observation_space} and {source.action_space}; "
             f"for this task they must be {form.space} and Discrete({N_ACTIONS})."
         )
-    pieces = [_rows(episode, k, form) for k, episode in enumerate(source.iterate_episodes())]
-    rows: dict[str, Any] = {
-        name: np.concatenate([piece[name] for piece in pieces]).astype(dtype)
-        for name, dtype in COLUMNS.items()
-    }
-    return Dataset(world=world, **{"behaviour": {"policy": "unknown"}, **known}, **rows)
+    with _reading(path):
+        pieces = [_rows(episode, k, form) for k, episode in enumerate(source.iterate_episodes())]
+        rows: dict[str, Any] = {
+            name: np.concatenate([piece[name] for piece in pieces]).astype(dtype)
+            for name, dtype in COLUMNS.items()
+        }
+        return Dataset(world=world, **{"behaviour": {"policy": "unknown"}, **known}, **rows)
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    """Turns what goes wrong with the files of a data set into one AntsError that names them."""
+    try:
+        yield
+    except Exception as error:  # h5py and Minari fail in many ways
+        text = " ".join(str(error).rstrip(".").split()) or type(error).__name__
+        raise AntsError(
+            f"the data set in {str(path)!r} is damaged or not of such ants ({text}); "
+            "write it again or name another one."
+        ) from error
 
 
 def _rows(episode: Any, number: int, form: Shown) -> dict[str, np.ndarray]:

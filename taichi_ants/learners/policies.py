@@ -46,7 +46,10 @@ class Policy(NamedTuple):
         Raises:
             AntsError: The metadata name other rules than there are.
         """
-        task = Task.from_dict(self.metadata.get("task", {}))
+        try:
+            task = Task.from_dict(self.metadata.get("task", {}))
+        except AntsError as error:
+            raise AntsError(f"the task in the policy's metadata cannot be used: {error}") from error
         return replace(task, observation=self.observation)
 
     def actions(self, states: npt.ArrayLike, rng: np.random.Generator) -> npt.NDArray[np.int64]:

@@ -221,7 +221,12 @@ def get(name: str) -> Learner:
 
 
 def label(name: str) -> str:
-    """What readers know a learner as, for example "Dyna-Q"; one of a plugin by its own name."""
+    """What readers know a learner as, for example "Dyna-Q"; one of a plugin by its own name.
+
+    Raises:
+        AntsError: The name is no text.
+    """
+    expect("name", name, str)
     return BUILT_IN.get(name, name)
 
 

@@ -154,13 +154,21 @@ class Room:
 
     # In the thread that calls `run`: time, and what pages ask for.
 
-    def run(self, seconds: float | None = None) -> None:
-        """Serve pages and let time pass, until somebody ends it, or for some seconds."""
+    def run(
+        self, seconds: float | None = None, each_turn: Callable[[], object] = lambda: None
+    ) -> None:
+        """Serve pages and let time pass, until somebody ends it, or for some seconds.
+
+        Args:
+            seconds: How many; None: until it is ended.
+            each_turn: Called several times a second; what it raises ends it, too.
+        """
         sockets = threading.Thread(target=self._serve, name="sockets", daemon=True)
         sockets.start()
         end = math.inf if seconds is None else time.monotonic() + seconds
         try:
             while not self._over.is_set() and time.monotonic() < end:
+                each_turn()
                 self._turn()
         finally:
             self._over.set()

@@ -149,7 +149,8 @@ class EmpiricalModel:
 
     @classmethod
     def of(cls, data: Dataset, groups: np.ndarray) -> EmpiricalModel:
-        """Of each group of rows; (groups + 1,) their beginnings."""
+        """Of each group of rows; (groups + 1,) their beginnings. AntsError if there are no data."""
+        expect("data", data, Dataset)
         group = np.repeat(np.arange(len(groups) - 1), np.diff(groups))
         pair = (group * data.task.n_states + data.state) * N_ACTIONS + data.action
         return cls._counted(data, len(groups) - 1, *_tally(data, pair)[:4])

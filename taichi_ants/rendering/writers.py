@@ -9,7 +9,6 @@ from __future__ import annotations
 import io
 import os
 import struct
-import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from itertools import chain
@@ -112,12 +111,12 @@ def save_animation(
         )
     sides = _SIDES.get(target.suffix.lower(), _SIDES[""])
     checked = _checked(frames, round(pause * fps) - 1, sides)
-    if target.suffix:
-        encode = _mp4 if target.suffix.lower() == ".mp4" else _gif
-        with _folder_of(target):
+    encode = _mp4 if target.suffix.lower() == ".mp4" else _gif
+    with _folder_of(target):
+        if target.suffix:
             files.write_atomically(target, lambda file: encode(file, checked, fps))
-    else:
-        _write_folder(target, checked)
+        else:
+            _write_folder(target, checked)
 
 
 def save_picture(path: files.PathLike, frame: np.ndarray) -> None:
@@ -136,10 +135,6 @@ def _can_be_replaced(folder: Path) -> bool:
     files.check_writable_folder(folder.absolute().parent)
     named = folder.name not in ("", "..") and not folder.is_symlink()
     return named and folder.is_dir() and not any(folder.iterdir())
-
-
-def _existing_folder(target: Path) -> Path:
-    return next(folder for folder in target.absolute().parents if folder.exists())
 
 
 def write(target: Path, content: bytes) -> None:
@@ -164,12 +159,9 @@ def _folder_of(target: Path) -> Iterator[None]:
 
 def _write_folder(folder: Path, frames: Iterable[np.ndarray]) -> None:
     """Write numbered pictures to a folder that appears when all of them exist."""
-    with tempfile.TemporaryDirectory(prefix=".", dir=_existing_folder(folder)) as place:
-        whole = Path(place, "frames")
-        whole.mkdir()
+    with files.writing(folder), files.unfinished(folder, Path.mkdir) as whole:
         for number, frame in enumerate(frames):
             (whole / f"frame_{number:06d}.png").write_bytes(_png(frame))
-        folder.parent.mkdir(parents=True, exist_ok=True)
         if folder.exists():
             folder.rmdir()  # it was empty
         os.replace(whole, folder)

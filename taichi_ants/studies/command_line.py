@@ -50,6 +50,17 @@ class Parser(argparse.ArgumentParser):
         flags = [word.partition("=")[0] for word in words if word.startswith("--")]
         return self.parse_args(words), {flag[2:].replace("-", "_"): flag for flag in flags}
 
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
+        """As usual; a word that is empty, such as that of a variable that is not set, is refused.
+
+        It would count as no file, and another thing would be done than was asked for.
+        """
+        words = sys.argv[1:] if args is None else list(args)
+        for before, word in zip(["", *words], words, strict=False):
+            if word == "" or (word.startswith("--") and word.endswith("=")):
+                self.error(f"{word or before or 'the first argument'} is empty, leave it out")
+        return super().parse_known_args(words, namespace)
+
     def error(self, message: str) -> NoReturn:
         text = without_middle(_on_one_line(message)).removeprefix("argument ").rstrip(".")
         self.exit(EXIT_BAD_INPUT, f"error: {text}; see --help.\n")
@@ -159,7 +170,7 @@ def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
 
     Yields:
         To be called with the share of the work that is done, 0 to 1. It raises KeyboardInterrupt
-        if a signal to stop came, but a library has swallowed it.
+        if a signal to stop came, but a library has swallowed it; so does the beginning.
     """
     from rich.console import Console
     from rich.progress import Progress
@@ -172,6 +183,7 @@ def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
             stop_if_noted()
             bar.update(task, completed=share)
 
+        stop_if_noted()
         yield update
 
 

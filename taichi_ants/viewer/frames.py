@@ -81,13 +81,3 @@ def unpack(types: Mapping[str, str], frame: bytes) -> dict[str, np.ndarray]:
         sections[name] = np.frombuffer(frame, f"<{kind}", length, at)
         at += 8 * -(-sections[name].nbytes // 8)
     return sections
-
-
-def split(data: bytes) -> list[bytes]:
-    """The frames that stand one after the other in some bytes."""
-    frames, at = [], 0
-    while at < len(data):
-        length = int(np.frombuffer(data, "<u4", 1, at)[0])
-        frames.append(data[at : at + length])
-        at += length
-    return frames

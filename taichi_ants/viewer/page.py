@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import base64
 import html
+import os
 from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from taichi_ants import files
+from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.traces import Trace
 from taichi_ants.errors import AntsError, expect
 from taichi_ants.rendering.writers import write
@@ -30,7 +32,7 @@ def part(name: str) -> str:
 
 
 def page(recording: Recording) -> str:
-    """The page that plays a recording, with all that it needs, as HTML."""
+    """The page that plays a recording, with all that it needs, as HTML; AntsError if it is none."""
     expect("recording", recording, Recording)
     return assemble(
         recording.header["title"], recording=base64.b64encode(recording.to_bytes()).decode()
@@ -70,7 +72,8 @@ def assemble(
 
 
 def is_page(path: files.PathLike) -> bool:
-    """Whether a path is one of a page."""
+    """Whether a path is one of a page; AntsError if it is no path."""
+    expect("path", path, str, os.PathLike)
     return Path(path).suffix.lower() in (".html", ".htm")
 
 
@@ -97,11 +100,12 @@ def save_page(path: files.PathLike, recording: Recording) -> None:
 
 
 def frame(recording: Recording) -> str:
-    """The page inside a frame, for notebooks."""
+    """The page inside a frame, for notebooks; raises as `page` does."""
+    whole = page(recording)
     return (
         f'<iframe title="{html.escape(recording.header["title"])}" width="100%" '
         f'height="{_NOTEBOOK_HEIGHT}" style="border: 0" '
-        f'srcdoc="{html.escape(page(recording))}"></iframe>'
+        f'srcdoc="{html.escape(whole)}"></iframe>'
     )
 
 
@@ -110,5 +114,6 @@ def notebook(shown: Any) -> str | None:
     if isinstance(shown, Trace):
         small = shown.made is not None and len(shown) <= _MOST_STEPS
         return frame(record_trace(shown)) if small else None
+    expect("what is shown", shown, Colony)
     small = shown.grid.size <= _MOST_CELLS and shown.ants <= _MOST_ANTS
     return frame(record_colony(shown)) if small else None

@@ -24,7 +24,7 @@ from taichi_ants.grid.randomness import stream_state
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.rendering.moments import Episode
 from taichi_ants.task import Task
-from taichi_ants.viewer.frames import split, unpack
+from taichi_ants.viewer.frames import unpack
 from taichi_ants.viewer.recorder import Recorder
 from taichi_ants.worlds.world import World
 
@@ -46,18 +46,11 @@ class Recording:
         return len(self.frames)
 
     def to_bytes(self) -> bytes:
-        """The recording, compressed; `from_bytes` reads it."""
+        """The recording as a page holds it, compressed: its header as JSON, then all frames."""
         header = json.dumps(self.header, separators=(",", ":")).encode()
         header += b" " * (-(len(header) + 4) % 8)  # frames begin at a multiple of eight
         length = np.array([len(header)], dtype="<u4").tobytes()
         return zlib.compress(b"".join([length, header, *self.frames]), 9)
-
-    @classmethod
-    def from_bytes(cls, data: bytes) -> Recording:
-        """What `to_bytes` wrote."""
-        whole = zlib.decompress(data)
-        end = 4 + int(np.frombuffer(whole, "<u4", 1)[0])
-        return cls(json.loads(whole[4:end]), split(whole[end:]))
 
     def sections(self, moment: int) -> dict[str, np.ndarray]:
         """The sections of the frame of a moment."""

@@ -261,7 +261,7 @@ def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
         (["live", "--render", "x.bmp"], "'x.bmp' ends in '.bmp'"),
         (["live", "--save", "/proc/x/y"], "cannot write '/proc/x/y'"),
         (["live", "--save", "."], "'.' is not a regular file"),
-        (["live", "--save", ""], "'' is not a regular file"),
+        (["live", "--save", ""], "--save is empty"),
         # Told before what comes later, as the work does.
         (["live", "--save", "/dev/null", "--resume", "x"], "'/dev/null' is not a regular file"),
         (["live", "--render", "../a.png/", "--resume", "x"], "'../a.png/' is not a regular file"),
@@ -388,6 +388,23 @@ def test_stopped_a_colony_is_saved_at_a_whole_tick(sent, status, kernels, tmp_pa
     saved = Colony.load("colony.npz")
     np.testing.assert_array_equal(saved.q_values, colony.q_values)
     assert saved.outcome().deliveries == colony.outcome().deliveries
+
+
+@pytest.mark.parametrize(
+    ("kind", "owner", "name", "said"),
+    [
+        ("live", command, "new_colony", "Stopped.\n"),
+        (
+            *("study", colony_study, "plan"),
+            "Stopped; finished parts are kept, and the same command goes on from there.\n",
+        ),
+    ],
+)
+def test_stopped_before_it_begins_it_promises_only_what_is_so(
+    kind, owner, name, said, capsys, monkeypatch
+):
+    monkeypatch.setattr(owner, name, lambda *given: signal.raise_signal(signal.SIGINT))
+    assert call("colony", [kind], capsys) == (130, "", said)
 
 
 def test_a_colony_starts_from_a_policy(capsys):

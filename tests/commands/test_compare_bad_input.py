@@ -47,7 +47,7 @@ def assert_refused(arguments, named, place, capsys):
     [
         (["--learners", "td_zero"], ["td_zero", "q_learning", "sarsa", "dyna_q"]),
         (["--learners"], ["--learners", "at least one"]),
-        (["--learners", ""], ["''", "q_learning"]),
+        (["--learners", ""], ["--learners is empty"]),
         (["--discounts", " "], ["--discounts", "' '"]),
         (["--epsilons", "half"], ["--epsilons", "'half'"]),
         (["--learning-rates", "-0.1"], ["learning_rate", "-0.1", "above 0"]),
@@ -101,7 +101,7 @@ def test_sizes_and_switches(arguments, named, place, capsys):
         (["--world", "mars"], ["'mars'", "open", "paper"]),
         (["--world", "mars.txt"], ["mars.txt"]),
         (["--world", "full"], ["full"]),
-        (["--world", ""], ["''"]),
+        (["--world", ""], ["--world is empty"]),
         (["--world", "damaged.txt"], ["damaged.txt", "line 2", "'x'"]),
         (["--world", "two_queens.txt"], ["two_queens.txt"]),
         (["--world", "bytes.txt"], ["bytes.txt", "no text"]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import signal
 import sys
@@ -50,6 +51,19 @@ def test_ctrl_c_ends_the_replay_of_a_session(kernels: Path, tmp_path: Path) -> N
     printed, said = process.communicate(timeout=30)
     assert time.monotonic() - began < promptly()
     assert (process.returncode, printed, said) == (130, "", "Stopped.\n")
+
+
+def test_ctrl_c_that_a_library_swallows_ends_it(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def swallowing(given: list[str]) -> dict:
+        with contextlib.suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        return {}
+
+    monkeypatch.setattr(load("watch"), "policies", swallowing)
+    status, _, said = call("watch", ["--for", 3], capsys)
+    assert (status, said) == (130, "Stopped.\n")
 
 
 def test_it_ends_after_some_seconds(capsys: pytest.CaptureFixture[str]) -> None:

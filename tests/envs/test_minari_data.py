@@ -132,3 +132,35 @@ def test_names_that_are_taken_missing_or_wrong():
             to_minari(data, name)
     with pytest.raises(AntsError, match="Minari has no data set 'ants/missing-v0'"):
         from_minari("ants/missing-v0")
+    for odd in (None, 3, "", "n" * 300, "a\0b"):
+        with pytest.raises(AntsError):
+            from_minari(odd)
+
+
+def test_damaged_files_are_named(tmp_path):
+    """Cut, overwritten or gone, and damage that only the numbers show."""
+    data = colony_data()
+    to_minari(data, "ants/colony-v0")
+    folder = tmp_path / "ants" / "colony-v0" / "data"
+    numbers, facts = folder / "main_data.hdf5", folder / "metadata.json"
+    whole, described = numbers.read_bytes(), facts.read_text()
+    damaged = [whole[:1000], whole[: len(whole) // 2], bytes(len(whole)), b""]
+    damaged += [whole[:at] + bytes(64) + whole[at + 64 :] for at in range(0, len(whole), 50_000)]
+    said = []
+    for content in damaged:
+        numbers.write_bytes(content)
+        try:
+            from_minari("ants/colony-v0")
+        except AntsError as error:
+            said.append(str(error))
+    assert len(said) >= 4
+    assert all(str(folder.parent) in one and "\n" not in one for one in said)
+    numbers.write_bytes(whole)
+    assert from_minari("ants/colony-v0") == data
+    for text in ("", "{}", "[" * 100_000, described.replace("taichi_ants", "x" * 11)):
+        facts.write_text(text)
+        with pytest.raises(AntsError):
+            from_minari("ants/colony-v0")
+    numbers.unlink()
+    with pytest.raises(AntsError, match="is damaged"):
+        from_minari("ants/colony-v0")

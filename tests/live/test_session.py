@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from command_lines import ROOT, environment
-from playback import played
+from playback import played, unpacked
 from random_edits import random_edit
 
 from taichi_ants import (
@@ -210,7 +210,7 @@ def test_a_recording_holds_what_happened(edited):
     few = recording(session.log(), most_frames=50)
     pheromone = session.setup.task.pheromone
     for one in (whole, few):
-        last = list(played(Recording.from_bytes(one.to_bytes()), pheromone))[-1]
+        last = list(played(unpacked(one.to_bytes()), pheromone))[-1]
         snapshot = session.colony.snapshot()
         assert np.array_equal(last.ground, snapshot.ground)
         assert np.array_equal(last.trail, snapshot.trail)

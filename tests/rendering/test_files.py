@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import sys
 import weakref
 from collections.abc import Iterator
@@ -93,6 +94,17 @@ def test_one_picture(tmp_path, frames) -> None:
     assert (np.asarray(Image.open(tmp_path / "a.png")) == frames[0]).all()
     with pytest.raises(AntsError, match=r"\.png"):
         save_picture(tmp_path / "a.jpg", frames[0])
+
+
+@pytest.mark.parametrize("name", ["a.gif", "frames", "new/frames"])
+def test_a_disk_that_is_full_is_told_of_the_file(tmp_path, frames, monkeypatch, name) -> None:
+    def full(*given: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", full)
+    with pytest.raises(AntsError, match=f"cannot write .*{name}.*: no space left on device"):
+        save_animation(tmp_path / name, frames)
+    assert not list(tmp_path.iterdir())
 
 
 def test_pictures_that_stay_the_same_are_joined(tmp_path, frames) -> None:

@@ -73,6 +73,9 @@ def test_what_was_given_is_told_even_where_it_is_the_default(parser):
         (["--rates", "1", "x"], "--rates: invalid float value: 'x'"),
         (["--rates"], "--rates: expected at least one argument"),
         (["--siz", "3"], "unrecognized arguments: --siz 3"),
+        (["--size", ""], "--size is empty, leave it out"),
+        (["--size="], "--size= is empty, leave it out"),
+        (["", "--loud"], "the first argument is empty, leave it out"),
         (["a\nb"], "unrecognized arguments: a b"),
     ],
 )
@@ -167,8 +170,8 @@ def test_an_interruption_that_a_library_swallows_is_found_later(capsys):
         except BaseException:
             steps.append("swallowed")
         with progress_bar("title") as progress:
-            progress(0.1)
             steps.append("not reached")
+            progress(0.1)
 
     before = signal.getsignal(signal.SIGINT)
     with pytest.raises(SystemExit) as end:

@@ -169,6 +169,47 @@ def test_while_a_command_is_imported(module, start, tmp_path):
     assert not (tmp_path / "results").exists()
 
 
+SCRIPTS = ("ant_system", "fixed_rules", "gallery", "goss", "offline", "utility")
+COUNTING = """
+import runpy, signal, sys
+
+class Interrupting:
+    left = {imports}
+
+    def find_spec(self, name, path=None, target=None):
+        if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+            self.left -= 1
+            if self.left == 0:
+                signal.raise_signal(signal.SIGINT)
+
+sys.meta_path.insert(0, Interrupting())
+sys.argv = ["script", "--help"]
+runpy.run_path({path!r}, run_name="__main__")
+"""
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_while_a_script_is_imported(name, tmp_path):
+    """Not before its first import: Python itself and what little that one needs come before it."""
+    for imports in (1, 8, 30):
+        script = COUNTING.format(imports=imports, path=str(EXPERIMENTS / f"{name}.py"))
+        done = subprocess.run(
+            [sys.executable, "-c", script],
+            cwd=tmp_path,
+            env=environment(tmp_path),
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
+        assert (done.returncode, done.stdout, done.stderr) == (130, "", "Stopped.\n"), imports
+
+
+def test_all_scripts_are_known():
+    """The others run a command, see above."""
+    own = {path.stem for path in EXPERIMENTS.glob("*.py") if "run_command" in path.read_text()}
+    assert own == set(SCRIPTS)
+
+
 def test_little_is_imported_before_a_command_can_be_stopped(tmp_path):
     script = (
         "import sys, taichi_ants.commands\n"

@@ -152,7 +152,7 @@ def test_what_a_killed_clean_up_has_left_is_removed_with_the_next_look(tmp_path)
     finish(tmp_path, {**SETTINGS, "arch": "cpu", "plugin": None})
     before = names(tmp_path)
     (tmp_path / "unfinished" / "blocks").mkdir(parents=True)
-    (tmp_path / "unfinished" / f".{16 * '0'}.tmp").touch()
+    (tmp_path / "unfinished" / f".{16 * '0'}.{16 * '1'}.tmp").touch()
     work_or_show(settings, SETTINGS, lambda blocks, ready: pytest.fail("it is finished"))
     assert names(tmp_path) == before
 

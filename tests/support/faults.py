@@ -164,7 +164,7 @@ def full(number: int, place: Path) -> Callable[[], bool]:
 
     def opened(path: Any, mode: str, **others: Any) -> Any:
         file = open(path, mode, **others)  # it can be made, but nothing goes into it  # noqa: SIM115
-        return open("/dev/full", "wb") if is_full() and mode == "xb" else file
+        return open("/dev/full", "wb") if is_full() and mode == "wb" else file
 
     files.open = opened  # type: ignore[attr-defined]
     sys.addaudithook(hook)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -80,3 +82,15 @@ def played(recording: Recording, pheromone: Pheromone) -> Iterator[Played]:
             trail,
             dict(values),
         )
+
+
+def unpacked(data: bytes) -> Recording:
+    """What `Recording.to_bytes` gave, read as a page reads it."""
+    whole = zlib.decompress(data)
+    at = 4 + int(np.frombuffer(whole, "<u4", 1)[0])
+    header, frames = json.loads(whole[4:at]), []
+    while at < len(whole):
+        length = int(np.frombuffer(whole, "<u4", 1, at)[0])
+        frames.append(whole[at : at + length])
+        at += length
+    return Recording(header, frames)

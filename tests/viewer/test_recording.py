@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from playback import played
+from playback import played, unpacked
 from random_colonies import random_colony
 
 from taichi_ants import (
@@ -71,7 +71,7 @@ def test_a_recording_is_what_engine_and_reference_do(learner, sharing, sees, den
                 frames.append(recorder.tick())
                 plain.tick(last=tick == TICKS - 1)
                 transitions.append(sorted(plain.transitions, key=lambda one: one.number))
-        recording = Recording.from_bytes(Recording(recorder.header(), frames).to_bytes())
+        recording = unpacked(Recording(recorder.header(), frames).to_bytes())
         moments = list(played(recording, colony.pheromone))
         rewards = np.array(recording.header["rewards"])
         before = None
