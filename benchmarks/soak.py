@@ -40,9 +40,8 @@ def new_colony(rules: str, ants: int) -> Colony:
     training = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0, 0.1)
     colony = Colony(world, RULES[rules], training, 1, ants, start="spread")
     colony.begin_episode()
-    lifespan, ages = colony.task.life.lifespan, colony.of_ants(AntRow.AGE)
-    if lifespan is not None:  # not all of them shall die at once
-        ages[:ants] = np.arange(ants) * lifespan // ants
+    if (lifespan := colony.task.life.lifespan) is not None:  # not all of them shall die at once
+        colony.of_ants(AntRow.AGE)[:ants] = np.arange(ants) * lifespan // ants
     for array in colony.arrays.values():
         array[...] = array.copy()  # so that all memory that it will need is in use
     return colony

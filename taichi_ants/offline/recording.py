@@ -74,7 +74,7 @@ def record(
     facts: dict[str, Any]
     if isinstance(behaviour, TrainingConfig):
         configs = checks.checked_configs(behaviour)
-        state = RunState.fresh(configs, numbers, task.n_states).take([0])
+        state = RunState.fresh(configs, numbers, task.n_states).part([0])
         runs = Runs.learning(configs, numbers, state)
         facts = {"policy": "learner", **configs[0].as_dict()}
     else:

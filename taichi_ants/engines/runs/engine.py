@@ -214,15 +214,21 @@ def do_episodes(
     task: Task,
     max_steps: int,
     runs: Runs,
-    episodes: int,
+    outcomes: np.ndarray,
     progress: Progress | None = None,
-) -> tuple[np.ndarray, float]:
+) -> float:
     """Do the next episodes of n runs, whose state is moved on.
 
+    Args:
+        world, task, max_steps, runs: What is done.
+        outcomes: int32 (3, n, episodes), into which returns, steps and deliveries are written.
+        progress: As of `train`.
+
     Returns:
-        int32 (3, n, episodes): returns, steps, deliveries; and what it took without compilation, in
-        CPU seconds of all threads together, or wall-clock seconds on a GPU.
+        What it took without compilation, in CPU seconds of all threads together, or wall-clock
+        seconds on a GPU.
     """
+    episodes = outcomes.shape[2]
     settings = runtime.start()
     # Seconds of all threads of this process on the CPU, which other processes do not slow.
     clock = time.process_time if settings.arch == "cpu" else time.perf_counter
@@ -230,7 +236,7 @@ def do_episodes(
     launcher = Launcher(world, task, max_steps, runs)
     widest = max(array[0].size for array in vars(runs.state).values())
     size = size_of_launch(workers, episodes, max_steps, runs.cost, launcher.cells_of_a_run, widest)
-    outcomes, seconds = np.empty((len(OUTCOMES), len(runs), episodes), dtype=np.int32), 0.0
+    seconds = 0.0
     for some, part in pieces(len(runs), episodes, *size):
         block = np.empty((len(OUTCOMES), some.stop - some.start, part.stop - part.start), np.int32)
         began = clock()
@@ -240,7 +246,7 @@ def do_episodes(
         if progress is not None:
             done = some.start + (some.stop - some.start) * part.stop / episodes
             progress(done / len(runs))
-    return outcomes, seconds
+    return seconds
 
 
 def size_of_launch(

@@ -80,18 +80,19 @@ class RunState(Record):
             epsilon[:], rate[:] = config.epsilon, config.learning_rate
         return state
 
-    def take(self, configs: Sequence[int]) -> RunState:
-        """A copy of the runs of some configurations, with one leading axis."""
-        chosen, n = list(configs), len(configs) * self.epsilon.shape[1]
-        arrays = vars(self).items()
+    def part(self, configs: slice | list[int]) -> RunState:
+        """The runs of some configurations, with one leading axis: views of a slice, else copies."""
+        n, arrays = self.epsilon[configs].size, vars(self).items()
         return RunState(
-            **{name: array[chosen].reshape(n, *array.shape[2:]) for name, array in arrays}
+            **{name: array[configs].reshape(n, *array.shape[2:]) for name, array in arrays}
         )
 
-    def put(self, configs: Sequence[int], part: RunState) -> None:
-        """Overwrite the runs of some configurations with such a copy."""
+    def put(self, configs: slice | list[int], part: RunState) -> None:
+        """Overwrite the runs of some configurations with such a part, unless it has views."""
         for name, array in vars(self).items():
-            array[list(configs)] = getattr(part, name).reshape(len(configs), *array.shape[1:])
+            new = getattr(part, name)
+            if not np.may_share_memory(array, new):
+                array[configs] = new.reshape(array[configs].shape)
 
 
 def memory_for(configs: Sequence[TrainingConfig], n_states: int) -> Memory:

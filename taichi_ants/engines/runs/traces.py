@@ -179,7 +179,7 @@ def trace_training(
     if len(several) > 1:
         raise AntsError(f"config holds {len(several)} configurations; a trace is of one.")
     seeds = checks.checked_seeds_for(seed, ())
-    state = RunState.fresh(several, seeds.tolist(), task.n_states).take([0])
+    state = RunState.fresh(several, seeds.tolist(), task.n_states).part([0])
     runs = Runs.learning(several, seeds.tolist(), state)
     trace = _trace(world, task, runs, max_steps, checked_whole("episodes", episodes))
     return replace(trace, made=Made(world, task, int(seeds[0]), max_steps, config=several[0]))

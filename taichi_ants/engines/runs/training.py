@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from taichi_ants import runtime
+from taichi_ants import learners, runtime
 from taichi_ants.checks import (
     check_finite,
     check_progress,
@@ -80,7 +80,7 @@ def train(
         seconds=0.0,
         state=RunState.fresh(configs, seeds, task.n_states),
     )
-    return continue_training(start, episodes, threads, arch=arch, progress=progress)
+    return _train(start, episodes, threads, arch, progress)
 
 
 def continue_training(
@@ -108,37 +108,63 @@ def continue_training(
         raise AntsError(f"result is {shown(result)}; give what train has returned.")
     checked_configs(result.configs)
     _check_memory(result)
+    kept = replace(result, state=copy.deepcopy(result.state))
+    return _train(kept, episodes, threads, arch, progress)
+
+
+def _train(
+    result: TrainingResult,
+    episodes: int,
+    threads: int | None,
+    arch: str | None,
+    progress: Progress | None,
+) -> TrainingResult:
+    """As `continue_training`, but the state of the given result is moved on."""
     episodes = checked_whole("episodes", episodes)
     check_progress(progress)
     runtime.start(threads, arch)
-    state = copy.deepcopy(result.state)
-    shape = (len(result.configs), len(result.seeds))
+    state, shape = result.state, (len(result.configs), len(result.seeds))
     outcomes = np.zeros((3, *shape, episodes), dtype=np.int32)
     # One kernel and one cost for each learner with its hyperparameters.
     groups: dict[tuple, list[int]] = {}
     for c, config in enumerate(result.configs):
         groups.setdefault((config.learner, config.hyperparameters), []).append(c)
-    several = [
-        Runs.learning([result.configs[c] for c in group], result.seeds, state.take(group))
-        for group in groups.values()
-    ]
-    work, done, seconds = sum(runs.cost * len(runs) for runs in several), 0.0, 0.0
-    for group, runs in zip(groups.values(), several, strict=True):
-        share = runs.cost * len(runs) / work
+    costs = [_cost(result.configs[group[0]]) * len(group) for group in groups.values()]
+    done, seconds = 0.0, 0.0
+    for group, cost in zip(groups.values(), costs, strict=True):
+        chosen, where = [result.configs[c] for c in group], _place(group)
+        runs = Runs.learning(chosen, result.seeds, state.part(where))
+        share = cost / sum(costs)
         part = progress and partial(_report, progress, done, share)
-        given, took = do_episodes(result.world, result.task, result.max_steps, runs, episodes, part)
-        outcomes[:, group] = given.reshape(3, len(group), shape[1], episodes)
-        check_finite(runs.state.q, [result.configs[c] for c in group], result.seeds)
-        state.put(group, runs.state)
-        seconds += took
+        into = outcomes[:, where].reshape(3, len(runs), episodes)  # a view, or a copy
+        seconds += do_episodes(result.world, result.task, result.max_steps, runs, into, part)
+        outcomes[:, where] = into.reshape(3, len(group), shape[1], episodes)
+        check_finite(runs.state.q, chosen, result.seeds)
+        state.put(where, runs.state)
         done += share
-    before = (result.returns, result.steps, result.deliveries)
     returns, steps, deliveries = (
-        np.concatenate(pair, axis=2) for pair in zip(before, outcomes, strict=True)
+        _joined(before, new)
+        for before, new in zip(
+            (result.returns, result.steps, result.deliveries), outcomes, strict=True
+        )
     )
-    return replace(
-        result, returns=returns, steps=steps, deliveries=deliveries, seconds=seconds, state=state
-    )
+    return replace(result, returns=returns, steps=steps, deliveries=deliveries, seconds=seconds)
+
+
+def _cost(config: TrainingConfig) -> float:
+    learner = learners.get(config.learner)
+    return learner.cost(learner.settings(config))
+
+
+def _place(group: list[int]) -> slice | list[int]:
+    """Where configurations are: a slice, which copies nothing, if one follows the other."""
+    first, end = group[0], group[-1] + 1
+    return slice(first, end) if end - first == len(group) else group
+
+
+def _joined(before: np.ndarray, new: np.ndarray) -> np.ndarray:
+    """The outcomes of old and new episodes."""
+    return np.concatenate([before, new], axis=2) if before.shape[2] else new
 
 
 def _report(progress: Progress, done: float, share: float, part: float) -> None:
@@ -201,5 +227,6 @@ def evaluate(
     runtime.start(threads, arch)
     flat = tables.reshape(-1, *tables.shape[-2:])
     runs = Runs.following(flat, run_seeds, np.arange(rollouts), epsilon)
-    outcomes, _ = do_episodes(checked_world(world), task, max_steps, runs, rollouts, progress)
+    outcomes = np.empty((3, len(runs), rollouts), np.int32)
+    do_episodes(checked_world(world), task, max_steps, runs, outcomes, progress)
     return Rollouts(*outcomes.reshape(3, *shape, rollouts))
