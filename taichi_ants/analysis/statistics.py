@@ -241,10 +241,11 @@ def _resampled_means(deviations: np.ndarray, counts: np.ndarray) -> np.ndarray:
 
 def _at_level(draws: np.ndarray, levels: np.ndarray) -> np.ndarray:
     """Quantiles of rows (rows, resamples) at the levels (rows, k), interpolated (Weibull)."""
-    draws.sort(axis=1)
     last = draws.shape[1] - 1
     place = np.clip(levels * (last + 2) - 1, 0, last)
     left = np.nan_to_num(np.floor(place)).astype(int)
     right = np.minimum(left + 1, last)
+    for row, places in zip(draws, np.hstack([left, right]), strict=True):
+        row.partition(places)  # all that sorting would tell, in half the time
     rows = np.arange(len(draws))[:, None]
     return draws[rows, left] + (place - left) * (draws[rows, right] - draws[rows, left])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -24,6 +25,9 @@ def run(name: str, arguments: Sequence[str] | None = None, program: str | None =
 
     Its --help calls it `program`, by default the name of the script.
     """
+    # Commands share out the cores themselves; more threads of the library for matrices only get in
+    # their way. It asks when NumPy is imported.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     with stoppable():
         from taichi_ants.studies.command_line import Parser
 
