@@ -146,7 +146,7 @@ def no_array(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_what_would_take_too_much_memory_is_not_unpacked(tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
     archives.write(path, {"x": np.zeros(10**6)})
-    assert path.stat().st_size < 10_000
+    assert path.stat().st_size < 100_000
     with pytest.raises(AntsError, match=r"a\.npz' unpacks to 8000128 bytes, and 7999999 are"):
         archives.read(path, most=7_999_999)
     with pytest.raises(AntsError, match=r"it has .* bytes, and 1000 are allowed"):

@@ -73,7 +73,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--world", default="paper", help=WORLDS)
     add("--world-seed", type=whole_number(), metavar="N", help="seed of a world drawn at random")
     add_common(parser)
-    add("--quick", action="store_true", help=f"at most {QUICK_SEEDS} seeds")
+    add("--quick", action="store_true", help=f"at most {QUICK_SEEDS} seeds, no animations")
     add_results(parser, "compare")
     settings = parser.parse_args(arguments)
     if settings.quick:
@@ -202,7 +202,8 @@ def write_policies(
     from taichi_ants.analysis.behaviour import BEHAVIOURS
     from taichi_ants.analysis.paper.best_of import example_name, examples
 
-    for place in (POLICIES, RENDERS):
+    animates = not (settings.no_figures or settings.quick)
+    for place in (POLICIES, RENDERS) if animates else (POLICIES,):
         files.check_writable_folder(folder / place)
     chosen = examples(comparison)
     with progress_bar("policies") as report_progress:
@@ -220,7 +221,7 @@ def write_policies(
             }
             path = folder / POLICIES / f"{example_name(comparison, row, run)}.npz"
             save_policy(path, tables[row, run], metadata)
-            if not settings.no_figures:
+            if animates:
                 title = f"{variant.label}, {point.task.delivery}"
                 shown = folder / RENDERS / f"{path.stem}.gif"
                 render_policy(shown, point, tables[row, run], metadata, title)

@@ -454,8 +454,12 @@ def test_lists_drop_what_is_said_twice(tmp_path, compare):
 def test_quick_takes_few_seeds_and_a_folder_of_its_own(tmp_path, compare, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for seeds, taken in ((50, 10), (2, 2)):
-        assert compare(*TINY, "--quick", "--seeds", seeds)[0] == 0
+        drawn = [one for one in TINY if one != "--no-figures"]
+        assert compare(*drawn, "--quick", "--seeds", seeds)[0] == 0
         folder = tmp_path / "results" / "compare-quick"
+        assert list((folder / "figures").iterdir())
+        assert list((folder / "policies").iterdir())
+        assert not (folder / "renders").exists()
         assert {row["seeds"] for row in read_csv(folder / "summary.csv")} == {str(taken)}
         shutil.rmtree(folder)
     assert load("compare").parse_arguments([]).out == Path("results", "compare")
