@@ -136,6 +136,9 @@ class Room:
         self._pace, self._piece, self._due = 0.0, 1.0, 0.0  # see _pass
         self._prepare = prepare
         self._former: Session | None = None  # whose place the present one has taken
+        self._undone: tuple[int, int] | None = (
+            None  # steps and edits, where it is one in part undone
+        )
         self._stroke: tuple[Page, float] | None = None  # by whom, and which, of the last edit
         self._replay: _Replay | None = None  # of a session that is loaded, or in part undone
         self._making: Making | None = None
@@ -217,7 +220,7 @@ class Room:
         else:
             self._replay = None
             assert replay.session is not None
-            self._begin(replay.session)
+            self._begin(replay.session, replay.undoes)
         self._tells = 0.0
 
     def _works(self) -> list[dict[str, Any]]:
@@ -299,13 +302,14 @@ class Room:
 
     def _undo(self, page: Page, request: dict[str, Any]) -> None:
         """Go back to the moment before the last change."""
-        self._replay = _Replay(self.session.undone())
+        self._replay = _Replay(self.session.undone(), undoes=True)
 
     def _go_back(self, page: Page, request: dict[str, Any]) -> None:
         """Go on with the session whose place the present one has taken."""
         if self._former is None:
             raise AntsError("there is no session before this one.")
-        self._begin(self._former)
+        former, self._former = self._former, self.session
+        self._show_session(former)
 
     def _cancel(self, page: Page, request: dict[str, Any]) -> None:
         """End what takes long, of a kind that `_works` names; without it all stays as it is."""
@@ -323,9 +327,21 @@ class Room:
         if self._making is not None and self._for is page:
             self._making.cancel()
 
-    def _begin(self, session: Session) -> None:
-        """Go on with another session; all pages are shown it, and can go back to the one before."""
-        self.session, self._former = session, self.session
+    def _begin(self, session: Session, undoes: bool = False) -> None:
+        """Go on with another session; all pages are shown it, and can go back to the one before.
+
+        That is the one before several in a row, if nothing would be lost: where each undoes a
+        change of the last one, or where a session begins that stands as the present one does.
+        """
+        before = self.session
+        in_a_row = undoes and self._undone == (before.steps, len(before.edits))
+        if not (in_a_row or before.same(session)):
+            self._former = before
+        self._show_session(session)
+        self._undone = (session.steps, len(session.edits)) if undoes else None
+
+    def _show_session(self, session: Session) -> None:
+        self.session, self._undone = session, None
         self.playing, self._piece, self._stroke = False, 1.0, None
         self._compiles = False
         messages = [*self._about(), *self._moment()]
@@ -579,11 +595,12 @@ class _Replay:
     Attributes:
         pieces: What replays it.
         steps: How many time has made at its end.
+        undoes: Whether it is the present one without its last change.
         session: As far as it has come.
     """
 
-    def __init__(self, log: Log) -> None:
-        self.pieces, self.steps = Session.replay(log), log.steps
+    def __init__(self, log: Log, undoes: bool = False) -> None:
+        self.pieces, self.steps, self.undoes = Session.replay(log), log.steps, undoes
         self.session: Session | None = None
 
 

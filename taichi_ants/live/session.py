@@ -211,6 +211,11 @@ class Session:
             session._recorder.moment()
         yield session
 
+    def same(self, other: Session) -> bool:
+        """Whether another one began alike, was changed alike, and stands where this one does."""
+        one, two = ((it.steps, it.edits, it.setup.to_json()) for it in (self, other))
+        return one == two and self.hand.state() == other.hand.state()
+
     def undone(self) -> Log:
         """The log up to the moment before the last change, from which it can be made once more.
 

@@ -6,6 +6,7 @@ import http.client
 import json
 import socket
 import time
+from collections.abc import Callable
 from contextlib import closing, suppress
 from dataclasses import replace
 from types import SimpleNamespace
@@ -441,6 +442,47 @@ def test_a_change_is_undone_and_done_again(room):
         guest.until("state")
         assert not guest.state["can_undo"]
         assert guest.state["can_go_back"]
+
+
+def test_what_several_in_a_row_have_replaced_comes_back(room):
+    """Neither a second press nor a second page takes away the session that was there before."""
+    with Guest(room) as guest, Guest(room) as other:
+
+        def replaced(ask: Callable[[Guest], None], by: Guest) -> None:
+            ask(by)
+            guest.until("whole")
+
+        guest.ask("step", ticks=3)
+        cell = int(np.flatnonzero(room.session.colony.snapshot().ground == EMPTY)[0])
+        for level in (5, 6, 7):
+            guest.edit({"kind": "trail", "level": level, "cells": [cell]})
+        guest.until("state")
+        while len(room.session.edits) < 3:
+            guest.until("state")
+        drawn = room.session
+        for one in (guest, other):
+            replaced(lambda page: page.ask("undo"), one)
+        assert len(room.session.edits) == 1
+        replaced(lambda page: page.ask("back"), guest)
+        assert room.session is drawn
+        asks: list[Callable[[Guest], None]] = [
+            lambda page: page.ask("restart"),
+            lambda page: page.ask("begin", chosen=CHOSEN),
+        ]
+        for ask in asks:
+            for one in (guest, other):
+                replaced(ask, one)
+            assert room.session.steps == 0
+            replaced(lambda page: page.ask("back"), guest)
+            assert room.session is drawn
+        # What has happened after an undo is not taken away by the next one.
+        replaced(lambda page: page.ask("undo"), guest)
+        guest.ask("step", ticks=1)
+        state_after(guest, room, 4)
+        gone_on = room.session
+        replaced(lambda page: page.ask("undo"), guest)
+        replaced(lambda page: page.ask("back"), guest)
+        assert room.session is gone_on
 
 
 def state_after(guest: Guest, room, ticks: int) -> object:
