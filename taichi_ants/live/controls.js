@@ -112,6 +112,7 @@ class Controls {
     } else this.touched = false;
     if (this.begins && !this.roomy.matches) byId("new").open = false;
     this.begins = false;
+    this.held.clear(); // sliders show what this session has, also the one that was pulled just now
     this.hold(false);
     this.hush();
   }
@@ -134,9 +135,11 @@ class Controls {
     byId("now-chosen").textContent = [words("world-name"), words("task"), words("policy")].join(" · ");
   }
 
-  /* Tell what the chosen names mean, whole names too, which may be too long for their boxes. */
+  /* Tell what the chosen names mean, whole names too, which may be too long for their boxes. A policy
+     of a file reads what its ants saw, so that nobody chooses it. */
   explain() {
     const { choices } = this.live, policy = byId("policy").value, name = policy.replace(/^(learn|file) /, "");
+    byId("sees").disabled = policy.startsWith("file ");
     byId("sees-help").textContent = choices.sees[byId("sees").value] ?? "";
     const follows = policy === "by hand" ? "They follow a trail, with values set by hand." : `They follow ${name}, and do not learn.`;
     byId("policy-help").textContent = policy.startsWith("learn ") ? `They learn: ${choices.learners[name]?.summary ?? ""}.` : follows;
@@ -207,7 +210,6 @@ class Controls {
       sees.value = known[0];
       this.nameTask();
     }
-    sees.disabled = value.startsWith("file ");
   }
 
   /* Show how things stand; sliders that somebody moves are left alone. */

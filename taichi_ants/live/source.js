@@ -89,7 +89,22 @@ class Live {
     this.begins = null;
     before?.close();
     show(source);
+    if (before) this.lookAs(before);
     this.tell("begin", { header });
+  }
+
+  /* What was in sight stays there, as where a change is undone, if the world is as large. */
+  lookAs({ history, stage, followed, aims, cell, cursor }) {
+    const { viewer } = this, { header } = viewer.history;
+    if (history.header.ranges.join() !== header.ranges.join()) return;
+    if (!stage.fitted) Object.assign(viewer.stage.camera, stage.camera);
+    viewer.stage.fitted = stage.fitted;
+    if (header.follow === null && viewer.history.place(0, followed) >= 0) {
+      viewer.follow(followed);
+      viewer.aims = aims;
+    }
+    if (cell >= 0) viewer.chooseCell(cell, cursor);
+    viewer.dirty = true;
   }
 
   seen() {

@@ -252,6 +252,42 @@ def test_a_change_is_undone_and_the_session_before_comes_back(page, room):
     wait(page, "!live.running")
 
 
+def test_fields_and_sliders_are_those_of_the_session_that_comes_back(page, room):
+    page.tab.fill("#set-epsilon", "0.5")
+    edits(room, 1)
+    page.press("Control+z")  # while the slider is still held
+    wait(page, "document.querySelector('#undo').disabled")
+    wait(page, f"Number(byId('set-epsilon').value) === {room.session.colony.epsilon}")
+    open_new(page)
+    page.tab.select_option("#policy", "file mine")
+    page.click("#begin")
+    wait(page, "byId('now-chosen').textContent.endsWith('mine')")
+    assert page.tab.is_disabled("#sees")
+    page.click("#go-back")
+    wait(page, "byId('policy').value.startsWith('learn ')")
+    assert page.tab.is_enabled("#sees")
+    page.click("#go-back")
+    wait(page, "byId('policy').value === 'file mine'")
+    assert page.tab.is_disabled("#sees")
+
+
+def test_what_is_in_sight_stays_there_when_a_change_is_undone(page, room):
+    looks = "[viewer.stage.camera, viewer.stage.fitted, viewer.followed, viewer.aims, viewer.cell]"
+    page.read("viewer.follow(2), viewer.stage.zoom(2), viewer.stage.pan(20, 10)")
+    page.read(f"viewer.chooseCell({cell_of(room, 5, 5, 0)})")
+    before = page.read(looks)
+    page.tab.fill("#set-epsilon", "0.5")
+    edits(room, 1)
+    page.press("Control+z")
+    wait(page, "document.querySelector('#undo').disabled && viewer.history.length === 1")
+    assert page.read(looks) == before
+    assert not page.tab.is_hidden("#ant")
+    with Guest(room) as guest:  # in another world there is another thing to see
+        guest.ask("begin", chosen={**CHOSEN, "world": "far_piles", "size": 20})
+        wait(page, "viewer.history.grid.ranges[0] === 20")
+    assert page.read("viewer.stage.fitted && viewer.followed < 0 && viewer.cell < 0")
+
+
 def test_a_stroke_of_a_large_brush_is_drawn_without_holes(page, room):
     page.press("2", "]", "]", "[")
     page.tab.mouse.move(*place(page, cell_of(room, 6, 1, 0)))
