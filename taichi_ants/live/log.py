@@ -30,7 +30,7 @@ class Log:
         ticks: How many ticks have passed; None if that is not known, as of what was undone.
         state: What `Hand.state` gives then; None if that is not known.
         name: What messages call it.
-        changes: As in `Session`; a file has each edit as a change of its own.
+        changes: As in `Session`; in files without them each edit is a change of its own.
     """
 
     setup: Setup
@@ -47,7 +47,7 @@ class Log:
         facts = {
             "task": self.setup.task.as_dict(),
             "setup": self.setup.to_json(),
-            "edits": self.edits,
+            **{"edits": self.edits, "changes": self.changes},
             **{"steps": self.steps, "ticks": self.ticks, "state": self.state},
         }
         KIND.write(path, facts, {"table": np.asarray(table, np.float32)}, compress=True)
@@ -67,10 +67,17 @@ class Log:
             for at, edit in facts["edits"]:
                 before = checked_whole("steps", at, before, steps)
                 edits.append((before, edit))
+            # Files of a version before have none.
+            changes = [
+                checked_whole("changes", first, 0, max(len(edits) - 1, 0))
+                for first in facts.get("changes", range(len(edits)))
+            ]
+            if changes[:1] != [0][: len(edits)] or changes != sorted(set(changes)):
+                raise ValueError("changes")
             return cls(
                 *(Setup.from_json(facts["setup"], stored["table"]), tuple(edits), steps),
                 checked_whole("ticks", facts["ticks"], 0, steps),
-                *(facts["state"], str(path), tuple(range(len(edits)))),
+                *(facts["state"], str(path), tuple(changes)),
             )
 
     @classmethod

@@ -119,6 +119,23 @@ def test_changes_are_undone_one_by_one(name):
         session.undone()
 
 
+def test_a_file_knows_what_was_one_change(tmp_path):
+    session = Session(SETUPS["paper"])
+    (cells,) = np.nonzero(session.colony.snapshot().ground == EMPTY)
+    for part, cell in enumerate(cells[:5].tolist()):
+        session.apply({"kind": "trail", "level": 9, "cells": [cell]}, goes_on=part not in (0, 2))
+    session.save(tmp_path / "session.npz")
+    again = Session.load(tmp_path / "session.npz")
+    assert again.changes == session.changes == [0, 2]
+    *_, again = Session.replay(again.undone())
+    assert len(again.edits) == 2
+    without = {name: np.array(value) for name, value in np.load(tmp_path / "session.npz").items()}
+    facts = json.loads(str(without["facts"][()]))
+    del facts["changes"]  # as a version before wrote it
+    archives.write(tmp_path / "old.npz", {**without, "facts": np.array(json.dumps(facts))})
+    assert Session.load(tmp_path / "old.npz").changes == [0, 1, 2, 3, 4]
+
+
 @pytest.mark.slow
 def test_threads_and_processes_do_not_matter(edited, tmp_path, kernels):
     script = (
@@ -371,10 +388,16 @@ def test_edits_without_room_change_nothing():
         ({"steps": 10}, "steps is"),
         ({"steps": 10**12}, "steps is"),
         ({"steps": None}, "steps is None"),
-        ({"edits": []}, "does not end as it did"),
-        ({"edits": [[0, {"kind": "explode"}]]}, "explode"),
+        ({"edits": [], "changes": []}, "does not end as it did"),
+        ({"edits": [[0, {"kind": "explode"}]], "changes": [0]}, "explode"),
         ({"edits": [[5, {"kind": "episode"}], [4, {"kind": "episode"}]]}, "steps is 4"),
         ({"edits": 7}, "damaged"),
+        ({"edits": []}, "damaged"),
+        ({"changes": 7}, "damaged"),
+        ({"changes": [1]}, "damaged"),
+        ({"changes": [0, 0]}, "damaged"),
+        ({"changes": [0, 1.0]}, "damaged"),
+        ({"changes": [0, 10**6]}, "damaged"),
         ({"setup": {"world": "/etc/passwd"}}, "damaged"),
         ({"state": "0"}, "does not end as it did"),
         ({"state": None}, "state is None"),
