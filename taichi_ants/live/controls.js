@@ -270,7 +270,11 @@ class Controls {
 
   /* Whether nothing can be asked for. */
   hold(holds) {
+    if (this.holds === holds) return;
+    this.holds = holds;
+    if (holds) this.focused = document.activeElement;
     for (const part of document.querySelectorAll(".controls, .palette, .buttons")) part.inert = holds;
+    if (!holds && document.activeElement === document.body) this.focused?.focus(); // where the keyboard was
   }
 
   addWork(kind, box) {
