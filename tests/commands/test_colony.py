@@ -363,10 +363,8 @@ def test_a_colony_as_the_library_makes_it(capsys, tmp_path, monkeypatch):
     assert f"{colony.outcome().deliveries.sum()} deliveries by tick 90" in out
 
 
-@pytest.mark.parametrize(
-    ("sent", "status"),
-    [(signal.SIGINT, 130), pytest.param(signal.SIGTERM, 143, marks=pytest.mark.slow)],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("sent", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_stopped_a_colony_is_saved_at_a_whole_tick(sent, status, kernels, tmp_path, monkeypatch):
     arguments = ["live", "--ants", 60, "--world", "paper", "--ticks", 10_000_000, "--regrowth", 0]
     again = [*arguments, "--ticks", 1]
