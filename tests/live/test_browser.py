@@ -671,7 +671,9 @@ def test_curves_are_over_time_and_a_late_page_has_them(page, browser, room):
             for line in one.read(LINES)
         ]
         ended = [50 * (n + 1) / session.ticks * 100 for n in range(session.colony.episode)]
-        assert np.allclose(lines[1], ended, atol=0.01)
+        every = -(-len(ended) // len(lines[1]))  # a long course is thinned
+        assert every == 1 or len(ended) > 1000
+        assert np.allclose(lines[1], ended[::every], atol=0.01)
         for line in lines:
             assert line == sorted(line)
         assert (lines[0][0], lines[0][-1]) == (0, 100)

@@ -245,7 +245,7 @@ def test_a_click_follows_an_ant_or_looks_at_a_cell(crowd, colony):
     assert crowd.read("viewer.followed") == true.numbers[5]
     crowd.click("#ant-before")
     crowd.click("#ant-close")
-    assert not crowd.tab.is_visible("#ant")
+    crowd.tab.wait_for_selector("#ant", state="hidden")  # the panel may be a moment behind
     taken = set(true.cells.tolist())
     for held, words in [(7, "holds food"), (5, "holds a rock"), (13, "holds the queen")]:
         cells = [c for c in np.flatnonzero(true.ground == held).tolist() if c not in taken]
@@ -260,7 +260,7 @@ def test_a_click_follows_an_ant_or_looks_at_a_cell(crowd, colony):
     crowd.click_cell(cell)
     assert f"trail {true.trail[cell]:.2f} of 250" in crowd.text("#cell")
     crowd.click("#cell-close")
-    assert not crowd.tab.is_visible("#cell")
+    crowd.tab.wait_for_selector("#cell", state="hidden")
 
 
 def test_who_wants_a_cell_is_told(crowd, colony):
