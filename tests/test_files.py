@@ -272,15 +272,6 @@ def test_a_disk_that_is_full_is_told_before_the_work(check, tmp_path, monkeypatc
         check(tmp_path / "new")
 
 
-@pytest.mark.parametrize("below", ["file", "new/folder/file"])
-def test_no_permission_for_a_file_is_told_before_the_work(tmp_path: Path, below: str) -> None:
-    locked = tmp_path / "locked"
-    locked.mkdir(mode=0o500)
-    with without_privileges(), pytest.raises(AntsError, match="ermission denied"):
-        files.check_writable_file(locked / below)
-    assert names(locked) == []
-
-
 # Text, JSON and CSV.
 
 
@@ -452,10 +443,16 @@ def test_an_impossible_name_is_refused(tmp_path: Path, name: str) -> None:
     assert names(tmp_path) == []
 
 
-@pytest.mark.parametrize("below", ["", "new/folder"])
-def test_no_permission_is_refused(tmp_path: Path, below: str) -> None:
+@pytest.mark.parametrize(
+    ("check", "below"),
+    [
+        *((files.check_writable_folder, below) for below in ("", "new/folder")),
+        *((files.check_writable_file, below) for below in ("file", "new/folder/file")),
+    ],
+)
+def test_no_permission_is_told_before_the_work(check, tmp_path: Path, below: str) -> None:
     locked = tmp_path / "locked"
     locked.mkdir(mode=0o500)
     with without_privileges(), pytest.raises(AntsError, match="ermission denied"):
-        files.check_writable_folder(locked / below)
+        check(locked / below)
     assert names(locked) == []

@@ -13,7 +13,7 @@ from taichi_ants.engines import arguments
 from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.rendering import colony_moments
-from taichi_ants.task import Life, Pheromone, Task
+from taichi_ants.task import Life, Pheromone, Task, foraging
 from taichi_ants.task.constants import FOOD
 
 TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 1.0, 1.0)
@@ -279,3 +279,18 @@ def test_kernels_are_told_only_what_has_changed(monkeypatch):
     colony.end_episode()
     colony.begin_episode()
     assert sorted(told) == ["epsilon", "explore_below"]
+
+
+@pytest.mark.parametrize(("task", "most"), [(Task(), 44), (foraging(), 52)])
+def test_an_ant_and_a_cell_take_few_bytes(task, most):
+    """Of all that a colony keeps, with the start of an episode."""
+
+    def size(side: int, ants: int) -> int:
+        world = worlds.open_world(1, (side, side, side))
+        settings = TrainingConfig("q_learning", 0.1, 0.9, 0.1, 1.0)
+        colony = Colony(world, task, settings, ants=ants, schedule="by_chunk")
+        return sum(one.nbytes for one in (*colony.arrays.values(), *colony.at_start.values()))
+
+    assert (size(60, 2000) - size(60, 1000)) / 1000 < most
+    cells = [worlds.open_world(1, (side,) * 3).grid.size for side in (50, 60)]
+    assert (size(60, 1000) - size(50, 1000)) / (cells[1] - cells[0]) < 10

@@ -26,6 +26,7 @@ from taichi_ants import (
     worlds,
 )
 from taichi_ants.engines.records import same
+from taichi_ants.engines.runs.results import RunState
 
 CONFIGS = (
     TrainingConfig("sarsa", 0.1, 0.9, 0.5, 0.99),
@@ -221,3 +222,19 @@ def test_everything_prints_on_one_screen(result):
     assert "returns: int32 (2, 3, 50), mean" in repr(shown[3])
     assert "World(ranges=(9, 9, 9)" in repr(colony)
     assert "and 2 more" in repr(colony)
+
+
+def test_configurations_that_follow_one_another_are_not_copied_to_be_trained():
+    configs = [TrainingConfig("q_learning", rate, 0.9, 0.1, 1.0) for rate in (0.1, 0.2, 0.3)]
+    state = RunState.fresh(configs, (1, 2), 128)
+    part = state.part(slice(1, 3))
+    assert part.q.shape == (4, *state.q.shape[2:])
+    part.q[:], part.epsilon[:] = 7, 0.5
+    assert (state.q[1:] == 7).all()
+    assert (state.q[0] == 0).all()
+    others = state.part([0, 2])
+    others.q[:] = 9
+    assert (state.q[[0, 2]] != 9).all()
+    state.put([0, 2], others)
+    assert (state.q[[0, 2]] == 9).all()
+    assert (state.q[1] == 7).all()
