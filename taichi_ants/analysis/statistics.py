@@ -13,13 +13,13 @@ for their number: far in the tails a bootstrap of few seeds ends at its most ext
 where the t interval goes on; where ties fill the middle half, the t interval is a point, while
 the bootstrap knows how near the tails are.
 
-The resampling weights are drawn once per number of seeds from a fixed generator and serve all
-rows, so that results are reproducible.
+The resampling weights of a number of seeds come from a fixed generator and serve all rows, so that
+results are reproducible. They are kept for the next rows, unless seeds are too many for that.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 
 import numpy as np
@@ -31,6 +31,7 @@ TIE_TOLERANCE = 1e-9
 _BLOCK_ROWS = 64
 _BLOCK_DRAWS = 4096
 _BLOCK_WEIGHTS = 1 << 22  # as float 32 MB; a product of few wakes the threads for too little
+_MOST_KEPT = 1 << 26  # weights, of a byte each
 
 
 @lru_cache(maxsize=8)
@@ -40,19 +41,30 @@ def resampling_counts(n: int, resamples: int = RESAMPLES, iqm: bool = False) -> 
     With `iqm` how often each of n seeds *in ascending order of their values* occurs in the middle
     half of each resample. Sorting a resample keeps that order, so these hold for all rows.
     """
-    random = np.random.default_rng((RANDOM_SEED, n))
     counts = np.empty((resamples, n), np.uint8)
-    for start in range(0, resamples, _BLOCK_DRAWS):
-        block = counts[start : start + _BLOCK_DRAWS]
-        drawn = random.integers(0, n, size=block.shape)
-        drawn += n * np.arange(len(block))[:, None]
-        drawn = np.bincount(drawn.ravel(), minlength=block.size).reshape(block.shape)
+    for start, block in _drawn(n, resamples, iqm):
+        counts[start : start + len(block)] = block
+    counts.setflags(write=False)
+    return counts
+
+
+def _drawn(n: int, resamples: int, iqm: bool) -> Iterator[tuple[int, np.ndarray]]:
+    """The same in blocks: the number of the first resample of each, and its counts."""
+    random = np.random.default_rng((RANDOM_SEED, n))
+    size = min(_BLOCK_DRAWS, _resamples_of_a_block(n))  # with any, the numbers are the same
+    for start in range(0, resamples, size):
+        shape = min(size, resamples - start), n
+        drawn = random.integers(0, n, size=shape)
+        drawn += n * np.arange(len(drawn))[:, None]
+        drawn = np.bincount(drawn.ravel(), minlength=drawn.size).reshape(shape)
         if iqm:
             cut = n // 4
             drawn = np.diff(np.clip(drawn.cumsum(axis=1), cut, n - cut), axis=1, prepend=cut)
-        block[...] = drawn
-    counts.setflags(write=False)
-    return counts
+        yield start, drawn
+
+
+def _resamples_of_a_block(n: int) -> int:
+    return max(1, _BLOCK_WEIGHTS // n)
 
 
 def interquartile_mean(values: np.ndarray) -> np.ndarray:
@@ -123,10 +135,10 @@ def bootstrap_interval(
     rows, n = values.shape
     ends = np.full((rows, 2), np.nan)
     if n > 1:
-        counts = resampling_counts(n, resamples, iqm)
+        interval = _percentile if iqm else _bca
         for start in range(0, rows, _BLOCK_ROWS):  # bounds the memory of the resampled means
             block = slice(start, start + _BLOCK_ROWS)
-            ends[block] = (_percentile if iqm else _bca)(values[block], level, counts)
+            ends[block] = interval(values[block], level, resamples)
     return ends[:, 0], ends[:, 1]
 
 
@@ -190,19 +202,20 @@ def jackknife_values(
     return n * statistic(total / n) - (n - 1) * statistic((total - values) / (n - 1))
 
 
-def _bca(values: np.ndarray, level: float, counts: np.ndarray) -> np.ndarray:
+def _bca(values: np.ndarray, level: float, resamples: int) -> np.ndarray:
     """Expanded BCa interval of the mean, float64 (rows, 2)."""
     from scipy.special import ndtr, ndtri, stdtrit
 
     n = values.shape[1]
     mean = values.mean(axis=1, keepdims=True)
     deviations = np.where(all_equal(values)[:, None], 0.0, values - mean)
-    draws = _resampled_means(deviations, counts)
+    draws = _resampled_means(deviations, resamples)
 
     # Bias correction: where the mean lies among the resampled means, ties counted by half.
     tie = TIE_TOLERANCE * np.abs(deviations).max(axis=1, keepdims=True)
     below = ((draws < -tie).mean(axis=1) + (draws <= tie).mean(axis=1)) / 2
-    shift = ndtri(np.clip(below, 0.5 / len(counts), 1 - 0.5 / len(counts)))[:, None]
+    least = 0.5 / draws.shape[1]
+    shift = ndtri(np.clip(below, least, 1 - least))[:, None]
     # Acceleration, from the jackknife: a sixth of the skewness of the mean.
     squares = np.square(deviations).sum(axis=1, keepdims=True)
     cubes = (deviations**3).sum(axis=1, keepdims=True)
@@ -217,26 +230,35 @@ def _bca(values: np.ndarray, level: float, counts: np.ndarray) -> np.ndarray:
     return mean + _at_level(draws, ndtr(shift + stretched))
 
 
-def _percentile(values: np.ndarray, level: float, counts: np.ndarray) -> np.ndarray:
-    """Percentile interval of the IQM, float64 (rows, 2); counts are those of ascending values."""
+def _percentile(values: np.ndarray, level: float, resamples: int) -> np.ndarray:
+    """Percentile interval of the IQM, float64 (rows, 2)."""
     middle = interquartile_mean(values)[:, None]
     n = values.shape[1]
-    draws = _resampled_means(np.sort(values, axis=1) - middle, counts)
+    draws = _resampled_means(np.sort(values, axis=1) - middle, resamples, iqm=True)
     draws *= n / (n - 2 * (n // 4))  # from a sum of the middle half to its mean
     draws[all_equal(values)] = 0.0
     levels = np.broadcast_to([(1 - level) / 2, (1 + level) / 2], (len(values), 2))
     return middle + _at_level(draws, levels)
 
 
-def _resampled_means(deviations: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """Float64 (rows, resamples), relative to each row's mean."""
+def _resampled_means(deviations: np.ndarray, resamples: int, iqm: bool = False) -> np.ndarray:
+    """Float64 (rows, resamples), relative to each row's mean; with `iqm` of ascending rows."""
     n = deviations.shape[1]
-    draws, size = np.empty((len(deviations), len(counts))), max(1, _BLOCK_WEIGHTS // n)
-    for start in range(0, len(counts), size):
-        weights = counts[start : start + size].astype(float)
-        np.matmul(deviations, weights.T, out=draws[:, start : start + size])
+    draws = np.empty((len(deviations), resamples))
+    for start, counts in _blocks_of_counts(n, resamples, iqm):
+        np.matmul(deviations, counts.astype(float).T, out=draws[:, start : start + len(counts)])
     draws /= n
     return draws
+
+
+def _blocks_of_counts(n: int, resamples: int, iqm: bool) -> Iterator[tuple[int, np.ndarray]]:
+    """As of `_drawn`; what is not too many to be kept is drawn once."""
+    if n * resamples > _MOST_KEPT:
+        yield from _drawn(n, resamples, iqm)
+    else:
+        counts, size = resampling_counts(n, resamples, iqm), _resamples_of_a_block(n)
+        for start in range(0, resamples, size):
+            yield start, counts[start : start + size]
 
 
 def _at_level(draws: np.ndarray, levels: np.ndarray) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from functools import partial
 
 import numpy as np
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy import stats
 
+from taichi_ants.analysis import statistics
 from taichi_ants.analysis.statistics import (
     all_equal,
     bootstrap_interval,
@@ -227,6 +229,30 @@ def test_resamples_are_drawn_once_with_each_seed_equally_often() -> None:
     # A count is binomial(7, 1/7): mean 1, variance 6/7.
     np.testing.assert_allclose(counts.mean(axis=0), 1.0, atol=0.02)
     np.testing.assert_allclose(counts.var(axis=0), 6 / 7, atol=0.03)
+
+
+@pytest.mark.parametrize("iqm", [False, True])
+def test_resamples_that_are_too_many_to_be_kept_are_the_same(
+    iqm: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    values = np.random.default_rng(1).normal(size=(3, 300))
+    expected = bootstrap_interval(values, iqm=iqm)
+    resampling_counts.cache_clear()
+    monkeypatch.setattr(statistics, "_MOST_KEPT", 0)
+    monkeypatch.setattr(statistics, "_BLOCK_DRAWS", 1111)
+    np.testing.assert_array_equal(bootstrap_interval(values, iqm=iqm), expected)
+    assert resampling_counts.cache_info().currsize == 0
+
+
+def test_memory_of_resamples_does_not_grow_with_seeds() -> None:
+    values = np.zeros((1, 50_000))
+    values[0, ::2] = 1.0
+    tracemalloc.start()
+    low, high = bootstrap_interval(values, resamples=1000)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert low[0] < 0.5 < high[0]
+    assert peak < 200e6  # all together they take 400 MB, and while they are drawn 800 MB
 
 
 def test_rows_are_paired_by_seed() -> None:

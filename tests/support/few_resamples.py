@@ -15,11 +15,11 @@ _RESAMPLES = 2000
 @pytest.fixture(scope="module", autouse=True)
 def few_resamples() -> Iterator[None]:
     """For a whole module; its `conftest.py` imports it."""
-    all_of_them = statistics.resampling_counts
+    all_of_them = statistics._resampled_means
 
-    def fewer(n: int, resamples: int, iqm: bool = False) -> np.ndarray:
-        return all_of_them(n, min(resamples, _RESAMPLES), iqm)
+    def fewer(deviations: np.ndarray, resamples: int, iqm: bool = False) -> np.ndarray:
+        return all_of_them(deviations, min(resamples, _RESAMPLES), iqm)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(statistics, "resampling_counts", fewer)
+        patch.setattr(statistics, "_resampled_means", fewer)
         yield
