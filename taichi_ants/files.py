@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import hashlib
 import io
@@ -148,16 +149,19 @@ def write_csv(path: PathLike, rows: Iterable[Mapping[str, Any]], columns: Sequen
         path: The file.
         rows: Any values that have a text; floats are written so that they read back exactly.
             None, NaN and missing keys become an empty field, a key that is no column is a
-            ValueError.
+            ValueError. They are taken one by one, so there can be more than fit into memory.
         columns: The keys to write, in this order.
     """
-    text = io.StringIO()
-    table = csv.DictWriter(text, fieldnames=columns, restval="", lineterminator="\n")
-    table.writeheader()
-    for row in rows:
-        plain = {key: _plain_scalar(value) for key, value in row.items()}
-        table.writerow({key: None if value != value else value for key, value in plain.items()})
-    write_text(path, text.getvalue())
+
+    def write(file: BinaryIO) -> None:
+        text = codecs.getwriter("utf-8")(file)
+        table = csv.DictWriter(text, fieldnames=columns, restval="", lineterminator="\n")
+        table.writeheader()
+        for row in rows:
+            plain = {key: _plain_scalar(value) for key, value in row.items()}
+            table.writerow({key: None if value != value else value for key, value in plain.items()})
+
+    write_atomically(path, write)
 
 
 @contextmanager

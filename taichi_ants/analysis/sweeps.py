@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +25,7 @@ _WIDE = 20  # a ratio of numbers from which their axis is logarithmic
 
 def seed_rows(
     settings: Sequence[Settings], seeds: Sequence[int], values: Mapping[str, np.ndarray]
-) -> list[dict[str, Any]]:
+) -> Iterator[dict[str, Any]]:
     """A row for each point and seed: what varies, the seed, the measures.
 
     Args:
@@ -33,11 +33,9 @@ def seed_rows(
         seeds: S seeds.
         values: Measures by name, float64 (P, S).
     """
-    return [
-        {**one, "seed": seed, **{name: float(array[p, s]) for name, array in values.items()}}
-        for p, one in enumerate(settings)
-        for s, seed in enumerate(seeds)
-    ]
+    for p, one in enumerate(settings):
+        for s, seed in enumerate(seeds):
+            yield {**one, "seed": seed, **{n: float(array[p, s]) for n, array in values.items()}}
 
 
 def summary_rows(

@@ -7,6 +7,7 @@ combination is done with every seed; tables and a figure go to a folder. See doc
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -66,11 +67,9 @@ def do_sweep(settings: argparse.Namespace, asked: Sweep, blocks: Path, ready: Pa
     from taichi_ants.analysis import sweeps
     from taichi_ants.studies.result_folder import REPORT
 
-    with progress_bar("sweep") as progress:
-        outcomes = asked.study.run(blocks, settings.threads, settings.arch, progress)
-    values = {name: measured(asked, outcomes, name) for name in asked.measures}
-    rows = sweeps.seed_rows(asked.settings, asked.study.seeds, values)
-    files.write_csv(ready / RUNS, rows, [*sweeps.columns_of(asked.settings), "seed", *values])
+    values = measured(asked, blocks, settings.threads, settings.arch)
+    of_seeds = sweeps.seed_rows(asked.settings, asked.study.seeds, values)
+    files.write_csv(ready / RUNS, of_seeds, [*sweeps.columns_of(asked.settings), "seed", *values])
     typical = [name for name in values if measures(asked.kind)[name].typical]
     rows = sweeps.summary_rows(asked.settings, values, typical)
     files.write_csv(ready / SUMMARY, rows, sweeps.columns_of(rows))
@@ -138,20 +137,38 @@ def measures(kind: str) -> dict[str, Any]:
     return {n: replace(one, episodes=max(one.episodes, least[n])) for n, one in OF_RUNS.items()}
 
 
-def measured(asked: Sweep, outcomes: dict[Any, Outcome], name: str) -> np.ndarray:
-    """A measure of each point and seed, as compare and colony have it, float64 (points, seeds)."""
+def measured(
+    asked: Sweep, blocks: Path, threads: int | None, arch: str | None
+) -> dict[str, np.ndarray]:
+    """Each measure of each point and seed, float64 (points, seeds): all that is kept in memory."""
     import numpy as np
 
+    study, order = asked.study, asked.study.in_order
+    values = {name: np.empty((len(order), len(study.seeds))) for name in asked.measures}
+    with progress_bar("sweep") as progress:
+        for some, at, outcome in study.in_blocks(blocks, threads, arch, progress):
+            found = measures_of_block(asked.kind, order[some], outcome, asked.measures)
+            for name, array in found.items():
+                values[name][some, at] = array
+    place = {point: number for number, point in enumerate(order)}
+    rows = [place[point] for point in study.points]  # some may be asked for twice
+    return {name: array[rows] for name, array in values.items()}
+
+
+def measures_of_block(
+    kind: str, points: Sequence[Any], outcome: Outcome, names: Sequence[str]
+) -> dict[str, np.ndarray]:
+    """Measures of points that were done together, as compare and colony have them."""
     from taichi_ants.analysis.colony.study import measures_of
     from taichi_ants.analysis.paper.measures import RunOutcomes
 
-    def of(point: Any, outcome: Outcome) -> np.ndarray:
-        if asked.kind == "colony":
-            return measures_of(outcome, point.ants, point.ticks)[name]
-        arrays = {key: array[None] for key, array in outcome.items() if array.ndim == 2}
-        return RunOutcomes(**arrays).measure(name)[0]
-
-    return np.stack([of(point, outcomes[point]) for point in asked.study.points])
+    if kind == "colony":
+        (point,) = points
+        arrays = {key: array[0] for key, array in outcome.items()}
+        found = measures_of(arrays, point.ants, point.ticks)
+        return {name: found[name][None] for name in names}
+    runs = RunOutcomes(**{key: array for key, array in outcome.items() if array.ndim == 3})
+    return {name: runs.measure(name) for name in names}
 
 
 def main(arguments: list[str] | None = None) -> None:

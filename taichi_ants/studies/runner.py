@@ -10,15 +10,15 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from taichi_ants import __version__, checks, files, learners
+from taichi_ants import __version__, archives, checks, files, learners
 from taichi_ants.errors import AntsError, check_one_of, checked_whole
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.blocks import Form, Outcome, kept
@@ -36,7 +36,6 @@ _RUN_ARRAYS = ("returns", "steps", "deliveries")
 _COLONY_ARRAYS = ("deliveries", "first_delivery", "moves", "blocked", "returns")
 
 Progress = Callable[[float], None]
-Piece = TypeVar("Piece")
 
 
 @dataclass(frozen=True)
@@ -249,6 +248,7 @@ class ColonyPoint:
 
 Point = RunPoint | ColonyPoint
 PointKind = TypeVar("PointKind", RunPoint, ColonyPoint)
+AnyPoint = TypeVar("AnyPoint", bound=Point)
 
 
 @dataclass(frozen=True)
@@ -285,14 +285,16 @@ class Study(Generic[PointKind]):
         """The points, each once, those that others go on from before these."""
         return _in_order(self.points)
 
-    def blocks(self) -> Iterator[tuple[Sequence[PointKind], Sequence[int]]]:
-        """The points and seeds of each block."""
+    def blocks(self) -> Iterator[tuple[slice, slice]]:
+        """Which of the points in order, and which seeds, are in each block."""
+        first = 0
         for _, group in itertools.groupby(self.in_order, lambda point: point.alike):
-            points = tuple(group)
-            size = points[0].runs_of_a_block
-            for some in _pieces(points, max(1, size // len(self.seeds))):
-                for seeds in _pieces(self.seeds, size):
+            points = list(group)
+            size, end = points[0].runs_of_a_block, first + len(points)
+            for some in _pieces(first, end, max(1, size // len(self.seeds))):
+                for seeds in _pieces(0, len(self.seeds), size):
                     yield some, seeds
+            first = end
 
     def settings(self) -> dict[str, Any]:
         """All that determines the numbers; equal settings give equal results."""
@@ -305,7 +307,29 @@ class Study(Generic[PointKind]):
         arch: str | None = None,
         progress: Progress = lambda share: None,
     ) -> dict[PointKind, Outcome]:
-        """Do the blocks that the folder does not hold yet; the outcome of each point.
+        """Do the blocks that the folder does not hold yet; the outcome of each point, in memory.
+
+        Arguments and errors are those of `in_blocks`.
+        """
+        points = self.in_order
+        pieces: dict[PointKind, list[Outcome]] = {point: [] for point in points}
+        for block in self.in_blocks(folder, threads, arch, progress):
+            for place, point in enumerate(points[block.points]):
+                part = {name: array[place] for name, array in block.outcome.items()}
+                pieces[point].append(part)
+        return {
+            point: {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+            for point, parts in pieces.items()
+        }
+
+    def in_blocks(
+        self,
+        folder: Path,
+        threads: int | None = None,
+        arch: str | None = None,
+        progress: Progress = lambda share: None,
+    ) -> Iterator[Block]:
+        """Do the blocks that the folder does not hold yet; all of them, one at a time in memory.
 
         Args:
             folder: Where finished blocks are kept; it must belong to this study alone.
@@ -315,29 +339,62 @@ class Study(Generic[PointKind]):
         Raises:
             AntsError: A block cannot be written, or an argument is not allowed.
         """
-        blocks = list(self.blocks())
-        weights = [sum(point.weight for point in points) * len(seeds) for points, seeds in blocks]
+        order, blocks = self.in_order, list(self.blocks())
+        weights = [sum(p.weight for p in order[some]) * len(self.seeds[at]) for some, at in blocks]
         begun, total = 0.0, sum(weights)
-        pieces: dict[PointKind, list[Outcome]] = {point: [] for point in self.in_order}
+        # What others go on from is kept; these points have one block each, with all seeds.
+        befores = {getattr(point, "after", None) for point in order}
+        tables: dict[Any, np.ndarray] = {}
         progress(0.0)
-        for number, ((points, seeds), weight) in enumerate(zip(blocks, weights, strict=True)):
+        for number, ((some, at), weight) in enumerate(zip(blocks, weights, strict=True)):
+            points, seeds = order[some], self.seeds[at]
             after = getattr(points[0], "after", None)
-            learned = pieces[after][0]["q_values"] if after else None
+            learned = tables[after] if after else None
             part = _part(progress, begun / total, weight / total)
             where = {"threads": threads, "arch": arch}
-            shape = len(points), len(seeds)
-            forms = {n: one._replace(shape=shape + one.shape) for n, one in points[0].forms.items()}
-            about = settings_of(points, seeds)
             do: Any = partial(points[0].do, points, seeds, learned, part, where)
-            block = kept(folder / f"{number:06d}.npz", about, forms, do)
-            for place, point in enumerate(points):
-                pieces[point].append({name: array[place] for name, array in block.items()})
+            about = settings_of(points, seeds)
+            outcome = kept(_path(folder, number), about, _forms(points, seeds), do)
+            if points[0] in befores:
+                tables[points[0]] = outcome["q_values"][0]
             begun += weight
             progress(begun / total)
-        return {
-            point: {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-            for point, parts in pieces.items()
-        }
+            yield Block(some, at, outcome)
+
+    def of_runs(
+        self, folder: Path, name: str, runs: Iterable[tuple[int, int]]
+    ) -> dict[tuple[int, int], np.ndarray]:
+        """An array of some runs, read from finished blocks; a run is told by point and seed.
+
+        Args:
+            folder: That of `in_blocks`, which has come to its end.
+            name: Of the array.
+            runs: Of each its place among the points in order, and among the seeds.
+
+        Raises:
+            AntsError: A block cannot be read any more.
+        """
+        found: dict[tuple[int, int], np.ndarray] = {}
+        for number, (some, at) in enumerate(self.blocks()):
+            inside = [(p, s) for p, s in runs if _holds(some, p) and _holds(at, s)]
+            if inside:
+                array = archives.read(_path(folder, number))[name]
+                found |= {(p, s): array[p - some.start, s - at.start].copy() for p, s in inside}
+        return found
+
+
+class Block(NamedTuple):
+    """A part of a study.
+
+    Attributes:
+        points: Which of the points in order.
+        seeds: Which of the seeds.
+        outcome: Theirs, arrays (points, seeds, ...).
+    """
+
+    points: slice
+    seeds: slice
+    outcome: Outcome
 
 
 def settings_of(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Any]:
@@ -364,7 +421,7 @@ def settings_of(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Any]
     }
 
 
-def _in_order(points: Sequence[Piece]) -> tuple[Piece, ...]:
+def _in_order(points: Sequence[AnyPoint]) -> tuple[AnyPoint, ...]:
     pairs = ((getattr(point, "after", None), point) for point in points)
     return tuple(dict.fromkeys(point for pair in pairs for point in pair if point))
 
@@ -374,9 +431,24 @@ def _part(progress: Progress, begin: float, share: float) -> Progress:
     return lambda done: progress(begin + share * done)
 
 
-def _pieces(whole: Sequence[Piece], size: int) -> Iterator[Sequence[Piece]]:
-    for first in range(0, len(whole), size):
-        yield whole[first : first + size]
+def _pieces(first: int, end: int, size: int) -> Iterator[slice]:
+    for begin in range(first, end, size):
+        yield slice(begin, min(begin + size, end))
+
+
+def _holds(some: slice, place: int) -> bool:
+    return some.start <= place < some.stop
+
+
+def _path(folder: Path, number: int) -> Path:
+    """The file of a block."""
+    return folder / f"{number:06d}.npz"
+
+
+def _forms(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Form]:
+    """Of the arrays of a block."""
+    shape = len(points), len(seeds)
+    return {n: one._replace(shape=shape + one.shape) for n, one in points[0].forms.items()}
 
 
 def _pool(point: Point) -> tuple[World, ...] | None:

@@ -31,7 +31,7 @@ from taichi_ants.errors import count
 
 def rows_of_seeds(measured: Measured, seeds: Sequence[int]) -> list[dict[str, Any]]:
     """The rows of seeds.csv: all measures of each seed under each condition."""
-    return seed_rows([one._asdict() for one in measured], seeds, _stacked(measured))
+    return list(seed_rows([one._asdict() for one in measured], seeds, _stacked(measured)))
 
 
 def _stacked(measured: Measured) -> dict[str, np.ndarray]:
