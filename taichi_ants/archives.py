@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from taichi_ants import files
 from taichi_ants.errors import AntsError, shown
+from taichi_ants.rows import Rows
 
 MOST_BYTES = 1 << 36  # of a file, unpacked
 _COMPRESSION = 2  # of 1 (quick) to 9 (small)
@@ -26,13 +27,15 @@ _MARK = b"taichi-ants sha256 "
 _SEAL_BYTES = len(_MARK) + 64  # with the digest, hexadecimal
 
 
-def write(path: files.PathLike, arrays: Mapping[str, npt.ArrayLike], compress: bool = True) -> None:
+def write(
+    path: files.PathLike, arrays: Mapping[str, npt.ArrayLike | Rows], compress: bool = True
+) -> None:
     """Write named arrays as a sealed .npz; raises as `files.write_atomically` does.
 
-    Equal arrays give equal bytes. ValueError if one holds Python objects, which a reader that is
-    careful refuses to load.
+    Equal arrays give equal bytes; `Rows` have the smallest type. ValueError if one holds Python
+    objects, which a reader that is careful refuses to load.
     """
-    converted = {name: np.asarray(array) for name, array in arrays.items()}
+    converted = {n: one if isinstance(one, Rows) else np.asarray(one) for n, one in arrays.items()}
     for name, array in converted.items():
         if array.dtype.hasobject:
             raise ValueError(f"array {name!r} holds Python objects")
@@ -43,7 +46,10 @@ def write(path: files.PathLike, arrays: Mapping[str, npt.ArrayLike], compress: b
         with zipfile.ZipFile(file, "w", how, compresslevel=_COMPRESSION) as archive:
             for name, array in converted.items():
                 with archive.open(f"{name}.npy", "w", force_zip64=True) as entry:
-                    np.lib.format.write_array(entry, array, allow_pickle=False)
+                    if isinstance(array, Rows):
+                        array.save(entry)
+                    else:
+                        np.lib.format.write_array(entry, array, allow_pickle=False)
         file.seek(-2, os.SEEK_END)  # an archive ends with the length of its comment
         file.write(_SEAL_BYTES.to_bytes(2, "little") + _MARK)
         file.flush()

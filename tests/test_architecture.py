@@ -20,7 +20,8 @@ import taichi_ants
 LAYERS = (
     {"errors", "environment"},
     {"files", "grid"},
-    {"archives", "task"},
+    {"rows", "task"},
+    {"archives"},
     {"runtime", "worlds", "learners"},
     {"checks"},
     {"baselines", "engines", "reference"},

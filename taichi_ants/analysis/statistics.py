@@ -28,7 +28,7 @@ RESAMPLES = 40_000
 RANDOM_SEED = 20_250_801
 # Differences of means of integers carry rounding errors of about 1e-15 of their size.
 TIE_TOLERANCE = 1e-9
-_BLOCK_ROWS = 64
+_BLOCK_ROWS, _PRODUCT_ROWS = 256, 64
 _BLOCK_DRAWS = 4096
 _BLOCK_WEIGHTS = 1 << 22  # as float 32 MB; a product of few wakes the threads for too little
 _MOST_KEPT = 1 << 26  # weights, of a byte each
@@ -246,7 +246,10 @@ def _resampled_means(deviations: np.ndarray, resamples: int, iqm: bool = False) 
     n = deviations.shape[1]
     draws = np.empty((len(deviations), resamples))
     for start, counts in _blocks_of_counts(n, resamples, iqm):
-        np.matmul(deviations, counts.astype(float).T, out=draws[:, start : start + len(counts)])
+        weights, some = counts.astype(float).T, slice(start, start + len(counts))
+        for first in range(0, len(draws), _PRODUCT_ROWS):
+            rows = slice(first, first + _PRODUCT_ROWS)
+            np.matmul(deviations[rows], weights, out=draws[rows, some])
     draws /= n
     return draws
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 import itertools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
@@ -43,6 +43,7 @@ EPISODES, BASELINES = "episodes.npz", "baselines.csv"
 FIGURES, POLICIES, RENDERS = "figures", "policies", "renders"
 _DEPTH = "planning_steps"  # the one hyperparameter that the paper varies
 _ARRAYS = ("returns", "steps", "deliveries", "greedy_returns", "greedy_steps", "greedy_deliveries")
+_TOLD = ("behaviours", "policy_returns")
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -156,22 +157,53 @@ def world_name(settings: argparse.Namespace, study: Study[RunPoint]) -> str:
     return Path(settings.world).name
 
 
-def what_policies_do(study: Study[RunPoint], q_values: np.ndarray) -> dict[str, np.ndarray]:
-    """What an ant does that follows each final policy, and what it earns; integer (C, S) both."""
+def what_policies_do(
+    point: RunPoint, seeds: Sequence[int], q_values: np.ndarray
+) -> dict[str, np.ndarray]:
+    """What an ant does that follows each final policy, and what it earns; integer (C, S) both.
+
+    The policies (C, S, n_states, 5) are of points that differ from this one in their learners.
+    """
     import numpy as np
 
     from taichi_ants.analysis.behaviour import classify
     from taichi_ants.engines.runs.traces import MAX_ROLLOUT_STEPS, trace_policies
     from taichi_ants.report.players import as_in_training
 
-    first, (n, seeds) = study.points[0], q_values.shape[:2]
     tables = q_values.reshape(-1, *q_values.shape[2:])
-    max_steps = min(first.max_steps, MAX_ROLLOUT_STEPS)
-    task = as_in_training(first.task)
-    traces = trace_policies(first.world, tables, study.seeds * n, max_steps, task)
+    max_steps = min(point.max_steps, MAX_ROLLOUT_STEPS)
+    task, several = as_in_training(point.task), [*seeds] * len(q_values)
+    traces = trace_policies(point.world, tables, several, max_steps, task)
     behaviours, returns = zip(*(classify(trace, max_steps) for trace in traces), strict=True)
     arrays = {"behaviours": behaviours, "policy_returns": returns}
-    return {name: np.concatenate(parts).reshape(n, seeds) for name, parts in arrays.items()}
+    return {n: np.concatenate(parts).reshape(q_values.shape[:2]) for n, parts in arrays.items()}
+
+
+def measured(
+    study: Study[RunPoint], folder: Path, threads: int | None, arch: str | None
+) -> dict[str, Any]:
+    """What the episodes gave, and what the final policies do, as a `Comparison` has it.
+
+    All runs together may not fit into memory: the episodes are `Rows` on the disk of the folder.
+    """
+    import numpy as np
+
+    from taichi_ants.rows import Rows
+
+    runs, forms = (len(study.points), len(study.seeds)), study.points[0].forms
+    episodes = {n: Rows(folder, (*runs, *forms[n].shape), forms[n].bounded) for n in _ARRAYS}
+    told: dict[str, np.ndarray] = {
+        "behaviours": np.empty(runs, np.int8),
+        "policy_returns": np.empty(runs, np.int64),
+    }
+    with progress_bar("training") as progress:
+        for some, at, outcome in study.in_blocks(folder, threads, arch, progress):
+            for name, rows in episodes.items():
+                rows.append(outcome[name])
+            done = what_policies_do(study.points[some][0], study.seeds[at], outcome["q_values"])
+            for name in told:
+                told[name][some, at] = done[name]
+    return {**episodes, **told}
 
 
 def write_tables(folder: Path, results: Results) -> None:
@@ -195,9 +227,9 @@ def write_policies(
     folder: Path,
     study: Study[RunPoint],
     comparison: Comparison,
-    tables: np.ndarray,
+    tables: Mapping[tuple[int, int], np.ndarray],
 ) -> None:
-    """Write the final Q-tables of some runs, with what an ant that follows them does."""
+    """Write the final Q-tables of the examples, with what an ant that follows them does."""
     from taichi_ants import files, save_policy
     from taichi_ants.analysis.behaviour import BEHAVIOURS
     from taichi_ants.analysis.paper.best_of import example_name, examples
@@ -252,7 +284,7 @@ def compare(settings: argparse.Namespace) -> None:
 
 
 def comparison_of(
-    settings: argparse.Namespace, study: Study[RunPoint], arrays: dict[str, np.ndarray]
+    settings: argparse.Namespace, study: Study[RunPoint], arrays: dict[str, Any]
 ) -> Comparison:
     """What the episodes gave, with what it was measured on."""
     from taichi_ants.analysis.paper.comparison import Comparison, Row
@@ -274,23 +306,16 @@ def do_comparison(
     """Do what is not done yet, and write all results."""
     from concurrent.futures import ThreadPoolExecutor
 
-    import numpy as np
-
     from taichi_ants import archives, files
     from taichi_ants.analysis import style
     from taichi_ants.analysis.bounds.baselines import BASELINE_COLUMNS, baseline_rows
+    from taichi_ants.analysis.paper.best_of import examples
     from taichi_ants.analysis.paper.figures import draw_all
     from taichi_ants.analysis.paper.results import Results
     from taichi_ants.engines.runs.training import evaluate
 
     where = {"threads": settings.threads, "arch": settings.arch}
-    with progress_bar("training") as progress:
-        outcomes = study.run(blocks, **where, progress=progress)
-    in_order = [outcomes[point] for point in study.points]
-    arrays = {name: np.stack([one[name] for one in in_order], dtype=np.int32) for name in _ARRAYS}
-    q_values = np.stack([one["q_values"] for one in in_order])
-    arrays |= what_policies_do(study, q_values)
-    small = {name: files.smallest(array) for name, array in arrays.items()}
+    arrays = measured(study, blocks, **where)
     first = study.points[0]
     baselines = baseline_rows(
         *(first.world, first.task, partial(evaluate, **where), study.seeds),
@@ -298,11 +323,13 @@ def do_comparison(
     )
     files.write_csv(ready / BASELINES, baselines, BASELINE_COLUMNS)
     comparison = comparison_of(settings, study, arrays)
+    tables = study.of_runs(blocks, "q_values", examples(comparison))
+    small = arrays | {name: files.smallest(arrays[name]) for name in _TOLD}
     # To pack and to resample is work of libraries, which leave Python to the thread that draws.
     with ThreadPoolExecutor() as beside:
         packed = beside.submit(archives.write, ready / EPISODES, small)
         found = beside.submit(Results.of, comparison, baselines)
-        write_policies(settings, ready, study, comparison, q_values)
+        write_policies(settings, ready, study, comparison, tables)
         if not settings.no_figures:
             style.save_all(draw_all(comparison, baselines), ready / FIGURES)
     packed.result()

@@ -31,6 +31,19 @@ class Form(NamedTuple):
     least: float = -math.inf
     most: float = math.inf
 
+    @property
+    def bounded(self) -> np.dtype:
+        """The smallest type that holds all that is allowed; of integers without an end int32."""
+        if self.dtype is not np.integer:
+            return np.dtype(self.dtype)
+        least, most = max(self.least, -(2**31)), min(self.most, 2**31 - 1)
+        return np.promote_types(*(np.min_scalar_type(int(end)) for end in (least, most)))
+
+    @property
+    def bytes(self) -> int:
+        """How many it takes at most, of such numbers."""
+        return math.prod(self.shape) * self.bounded.itemsize
+
     def fits(self, array: np.ndarray) -> bool:
         """Whether an array is so."""
         if not np.issubdtype(array.dtype, self.dtype) or array.shape != self.shape:

@@ -94,10 +94,12 @@ class RunPoint:
     @property
     def forms(self) -> dict[str, Form]:
         """Of the arrays of its outcome, for one seed."""
+        most = self.max_steps * self.task.rewards.largest
+        bounds = ((-most, most), (1, self.max_steps), (0, 1))
         forms = {
-            f"{of}{name}": Form(np.integer, (length,), *bounds)
+            f"{of}{name}": Form(np.integer, (length,), *ends)
             for of, length in (("", self.episodes), ("greedy_", self.rollouts))
-            for name, bounds in zip(_RUN_ARRAYS, ((), (1, self.max_steps), (0, 1)), strict=True)
+            for name, ends in zip(_RUN_ARRAYS, bounds, strict=True)
         }
         return {
             **forms,

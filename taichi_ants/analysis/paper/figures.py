@@ -136,7 +136,7 @@ def _curve(axis: Axes, runs: np.ndarray, share: bool, colour: str, label: str) -
     n, end = max(2, round(_PER_DECADE * np.log10(runs.shape[1] + 1)) + 1), runs.shape[1] + 1
     edges = np.unique(np.geomspace(1, end, n).round().astype(int)) - 1
     at = np.sqrt((edges[:-1] + 1) * edges[1:])  # the middle of a span on a logarithmic axis
-    means = np.add.reduceat(runs.astype(float), edges[:-1], axis=1) / np.diff(edges)
+    means = np.add.reduceat(runs, edges[:-1], axis=1, dtype=float) / np.diff(edges)
     # One run of an episode delivers or does not: there is no typical half to average.
     middle = means.mean(axis=0) if share else interquartile_mean(means.T)
     axis.plot(at, middle, marker="o" if len(at) == 1 else "", color=colour, label=label)

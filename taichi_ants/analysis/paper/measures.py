@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from taichi_ants.rows import Rows
+
 WINDOW = 50
 # What an episode gives: its array in `RunOutcomes`, words, unit.
 _GIVEN = {
@@ -29,7 +31,7 @@ _WINDOWS = {
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RunOutcomes:
-    """What each episode of some runs gave.
+    """What each episode of some runs gave: arrays, or `Rows` where they may not fit into memory.
 
     Attributes:
         returns: Sum of the rewards of each training episode, integer (rows, seeds, episodes).
@@ -39,12 +41,12 @@ class RunOutcomes:
             training, integer (rows, seeds, rollouts).
     """
 
-    returns: np.ndarray
-    steps: np.ndarray
-    deliveries: np.ndarray
-    greedy_returns: np.ndarray
-    greedy_steps: np.ndarray
-    greedy_deliveries: np.ndarray
+    returns: np.ndarray | Rows
+    steps: np.ndarray | Rows
+    deliveries: np.ndarray | Rows
+    greedy_returns: np.ndarray | Rows
+    greedy_steps: np.ndarray | Rows
+    greedy_deliveries: np.ndarray | Rows
     _measured: dict[str, np.ndarray] = field(init=False, repr=False, default_factory=dict)
 
     @property
@@ -55,10 +57,15 @@ class RunOutcomes:
     def measure(self, name: str) -> np.ndarray:
         """A number of `MEASURES` for each run, float64 (rows, seeds); nan with too little data."""
         if name not in self._measured:
-            measure, missing = MEASURES[name], np.full(self.returns.shape[:2], np.nan)
-            enough = self.episodes >= measure.episodes
-            self._measured[name] = measure.compute(self) if enough else missing
+            measure, values = MEASURES[name], np.full(self.returns.shape[:2], np.nan)
+            if self.episodes >= measure.episodes:
+                for row in range(len(values)):  # so that only one is in memory
+                    values[row] = measure.compute(self, row)
+            self._measured[name] = values
         return self._measured[name]
+
+
+Compute = Callable[[RunOutcomes, int], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -68,13 +75,13 @@ class Measure:
     Attributes:
         words: What it is, for readers.
         unit: Its unit.
-        compute: RunOutcomes -> float64 (rows, seeds).
+        compute: RunOutcomes, row -> float64 (seeds,).
         episodes: The fewest training episodes that it needs.
     """
 
     words: str
     unit: str
-    compute: Callable[[RunOutcomes], np.ndarray]
+    compute: Compute
     episodes: int = 1
 
     @property
@@ -83,40 +90,37 @@ class Measure:
         return self.unit in ("reward", "steps")
 
 
-def _mean(name: str, episodes: slice = slice(None)) -> Callable[[RunOutcomes], np.ndarray]:
-    return lambda runs: getattr(runs, name)[..., episodes].mean(axis=2, dtype=float)
+def _mean(name: str, episodes: slice = slice(None)) -> Compute:
+    return lambda runs, row: getattr(runs, name)[row][:, episodes].mean(axis=1, dtype=float)
 
 
-def _fluctuation(name: str, episodes: slice) -> Callable[[RunOutcomes], np.ndarray]:
+def _fluctuation(name: str, episodes: slice) -> Compute:
     """Root mean square change from one episode to the next, over the square root of two.
 
     Without a trend this is the standard deviation of independent episodes; unlike that one, it
     hardly feels the slow rise of a learning curve.
     """
 
-    def compute(runs: RunOutcomes) -> np.ndarray:
-        values = getattr(runs, name)[..., episodes]
-        squares = np.empty(values.shape[:2])
-        for row, of_row in enumerate(values):  # row by row, so that the differences stay small
-            changes = np.diff(of_row.astype(float), axis=1)
-            squares[row] = np.einsum("ij,ij->i", changes, changes) / changes.shape[1]
-        return np.sqrt(squares / 2)
+    def compute(runs: RunOutcomes, row: int) -> np.ndarray:
+        changes = np.diff(getattr(runs, name)[row][:, episodes].astype(float), axis=1)
+        return np.sqrt(np.einsum("ij,ij->i", changes, changes) / changes.shape[1] / 2)
 
     return compute
 
 
-def _shortest(runs: RunOutcomes) -> np.ndarray:
-    return runs.steps.min(axis=2).astype(float)
+def _shortest(runs: RunOutcomes, row: int) -> np.ndarray:
+    return runs.steps[row].min(axis=1).astype(float)
 
 
-def _repeats(runs: RunOutcomes) -> np.ndarray:
-    returns, steps = runs.greedy_returns, runs.greedy_steps
-    same = (returns == returns[..., :1]) & (steps == steps[..., :1])
-    return same.all(axis=2).astype(float)
+def _repeats(runs: RunOutcomes, row: int) -> np.ndarray:
+    returns, steps = runs.greedy_returns[row], runs.greedy_steps[row]
+    same = (returns == returns[:, :1]) & (steps == steps[:, :1])
+    return same.all(axis=1).astype(float)
 
 
-def _improved(runs: RunOutcomes) -> np.ndarray:
-    return (runs.measure("return_last50") > runs.measure("return_first50")).astype(float)
+def _improved(runs: RunOutcomes, row: int) -> np.ndarray:
+    late, early = runs.measure("return_last50"), runs.measure("return_first50")
+    return (late[row] > early[row]).astype(float)
 
 
 def _measures() -> Iterator[tuple[str, Measure]]:

@@ -1,0 +1,71 @@
+"""Arrays that can be larger than memory: they lie on disk, and are read a row at a time."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+import numpy.typing as npt
+
+from taichi_ants import files
+
+
+class Rows:
+    """An array on disk: `rows[i]`, all that has the first index i, is read only when it is used.
+
+    It is filled once, from its first number to its last. Its file has no name, so that it is gone
+    with the object, and with the process even if that is killed.
+
+    Args:
+        folder: A folder on whose disk it lies.
+        shape: Of the array, none of its numbers 0.
+        dtype: The type of its integers.
+
+    Raises:
+        AntsError: Nothing can be written there.
+    """
+
+    def __init__(self, folder: Path, shape: tuple[int, ...], dtype: npt.DTypeLike) -> None:
+        self.shape, self.dtype = shape, np.dtype(dtype)
+        self._folder = folder
+        self._ends = np.zeros(2, np.int64)
+        with files.writing(folder):
+            self._file = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115
+
+    @property
+    def size(self) -> int:
+        """How many numbers it has."""
+        return math.prod(self.shape)
+
+    def append(self, part: np.ndarray) -> None:
+        """Write the next numbers, of any shape.
+
+        Raises:
+            AntsError: They cannot be written.
+        """
+        self._ends = np.array([min(self._ends[0], part.min()), max(self._ends[1], part.max())])
+        with files.writing(self._folder):
+            self._file.write(np.ascontiguousarray(part, self.dtype).data)
+            self._file.flush()
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, row: int) -> np.ndarray:
+        at = row * math.prod(self.shape[1:]) * self.dtype.itemsize
+        return np.memmap(self._file, self.dtype, "r", at, self.shape[1:])
+
+    def __iter__(self) -> Iterator[np.ndarray]:
+        return (self[row] for row in range(len(self)))
+
+    def save(self, file: IO[bytes]) -> None:
+        """Write it as an .npy, as NumPy writes `files.smallest` of such an array."""
+        dtype = files.smallest(self._ends).dtype
+        facts = {"descr": dtype.str, "fortran_order": False, "shape": self.shape}
+        np.lib.format.write_array_header_1_0(file, facts)
+        for row in self:
+            file.write(row.astype(dtype).data)
