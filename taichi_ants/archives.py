@@ -10,9 +10,10 @@ from __future__ import annotations
 import io
 import os
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from typing import BinaryIO
+from pathlib import Path
+from typing import BinaryIO, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +26,8 @@ MOST_BYTES = 1 << 36  # of a file, unpacked
 _COMPRESSION = 2  # of 1 (quick) to 9 (small)
 _MARK = b"taichi-ants sha256 "
 _SEAL_BYTES = len(_MARK) + 64  # with the digest, hexadecimal
+
+Unpacked = TypeVar("Unpacked")
 
 
 def write(
@@ -77,6 +80,35 @@ def read(
     Raises:
         AntsError: The file is missing, unreadable, too large, damaged, or no .npz of plain arrays.
     """
+    return _read(path, content, most, foreign, _unpacked)
+
+
+def read_rows(path: files.PathLike, folder: Path) -> dict[str, np.ndarray | Rows]:
+    """As `read`, but integers of three axes or more may not fit into memory, and become `Rows`.
+
+    Args:
+        path: A file that `write` has written.
+        folder: A folder on whose disk these lie.
+
+    Raises:
+        AntsError: As `read` says, or the folder cannot be written to.
+    """
+
+    def unpack(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> np.ndarray | Rows:
+        with archive.open(member) as file:
+            return Rows.load(file, folder) or _unpacked(archive, member)
+
+    return _read(path, None, MOST_BYTES, False, unpack)
+
+
+def _read(
+    path: files.PathLike,
+    content: bytes | None,
+    most: int,
+    foreign: bool,
+    unpack: Callable[[zipfile.ZipFile, zipfile.ZipInfo], Unpacked],
+) -> dict[str, Unpacked]:
+    """What `read` says, each array as it is unpacked."""
     given = files.opened(path, most) if content is None else nullcontext(io.BytesIO(content))
     name, ours = shown(str(path), 400), "" if foreign else " that this version wrote"
     with given as file:
@@ -86,9 +118,7 @@ def read(
             with zipfile.ZipFile(file) as archive:
                 members = archive.infolist()
                 _check_size(members, most, name)
-                arrays = {
-                    one.filename: _unpacked(archive, one) for one in members if _is_array(one)
-                }
+                arrays = {one.filename: unpack(archive, one) for one in members if _is_array(one)}
         except (AntsError, OSError):
             raise
         except MemoryError as error:

@@ -279,6 +279,21 @@ def check_writable_folder(path: PathLike, named: PathLike | None = None) -> Path
     return folder
 
 
+def check_room(folder: PathLike, needed: int) -> None:
+    """Raises AntsError if a folder's disk has less room than so many bytes: before long work."""
+    with writing(folder):
+        free = shutil.disk_usage(folder).free
+    if needed > free:
+        raise AntsError(
+            f"this needs {_size(needed)} on the disk of {_named(folder)}, and {_size(free)} are "
+            "free; make room there, ask for less, or choose another place."
+        )
+
+
+def _size(n: int) -> str:
+    return f"{n / 1e9:.1f} GB" if n >= 1e9 else f"{n / 1e6:.1f} MB"
+
+
 @contextmanager
 def writing(path: PathLike) -> Iterator[None]:
     """What the system has against writing a file or a folder becomes an AntsError that names it."""

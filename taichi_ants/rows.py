@@ -41,22 +41,49 @@ class Rows:
         """How many numbers it has."""
         return math.prod(self.shape)
 
+    @property
+    def nbytes(self) -> int:
+        """How many bytes it takes on disk."""
+        return self.size * self.dtype.itemsize
+
     def append(self, part: np.ndarray) -> None:
         """Write the next numbers, of any shape.
 
         Raises:
             AntsError: They cannot be written.
+            ValueError: They do not fit into the type.
         """
         self._ends = np.array([min(self._ends[0], part.min()), max(self._ends[1], part.max())])
+        if (self._ends.astype(self.dtype) != self._ends).any():
+            raise ValueError(f"numbers from {self._ends[0]} to {self._ends[1]} are no {self.dtype}")
         with files.writing(self._folder):
             self._file.write(np.ascontiguousarray(part, self.dtype).data)
             self._file.flush()
+
+    @classmethod
+    def load(cls, file: IO[bytes], folder: Path) -> Rows | None:
+        """The integers of an .npy; None, and nothing read but its header, of fewer than three axes.
+
+        Raises:
+            ValueError: It is damaged.
+            AntsError: They cannot be written to the folder.
+        """
+        np.lib.format.read_magic(file)
+        shape, _, dtype = np.lib.format.read_array_header_1_0(file)
+        if len(shape) < 3:
+            return None
+        rows, length = cls(folder, shape, dtype), math.prod(shape[1:])
+        for _ in range(len(rows)):
+            rows.append(np.frombuffer(file.read(length * dtype.itemsize), dtype, length))
+        if file.read(1):
+            raise ValueError("an array is longer than it declares")
+        return rows
 
     def __len__(self) -> int:
         return self.shape[0]
 
     def __getitem__(self, row: int) -> np.ndarray:
-        at = row * math.prod(self.shape[1:]) * self.dtype.itemsize
+        at = range(len(self))[row] * math.prod(self.shape[1:]) * self.dtype.itemsize
         return np.memmap(self._file, self.dtype, "r", at, self.shape[1:])
 
     def __iter__(self) -> Iterator[np.ndarray]:

@@ -31,10 +31,10 @@ TIE_TOLERANCE = 1e-9
 _BLOCK_ROWS, _PRODUCT_ROWS = 256, 64
 _BLOCK_DRAWS = 4096
 _BLOCK_WEIGHTS = 1 << 22  # as float 32 MB; a product of few wakes the threads for too little
-_MOST_KEPT = 1 << 26  # weights, of a byte each
+_MOST_KEPT = 1 << 27  # weights, of a byte each
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=2)
 def resampling_counts(n: int, resamples: int = RESAMPLES, iqm: bool = False) -> np.ndarray:
     """How often each of n seeds occurs in each resample, uint8 (resamples, n), read-only.
 

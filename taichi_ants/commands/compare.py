@@ -43,6 +43,7 @@ EPISODES, BASELINES = "episodes.npz", "baselines.csv"
 FIGURES, POLICIES, RENDERS = "figures", "policies", "renders"
 _DEPTH = "planning_steps"  # the one hyperparameter that the paper varies
 _ARRAYS = ("returns", "steps", "deliveries", "greedy_returns", "greedy_steps", "greedy_deliveries")
+_PACKED = 0.4  # of the bytes of all episodes, those of the file with them, or a little less
 _TOLD = ("behaviours", "policy_returns")
 
 
@@ -197,7 +198,8 @@ def measured(
         "policy_returns": np.empty(runs, np.int64),
     }
     with progress_bar("training") as progress:
-        for some, at, outcome in study.in_blocks(folder, threads, arch, progress):
+        besides = int((1 + _PACKED) * sum(rows.nbytes for rows in episodes.values()))
+        for some, at, outcome in study.in_blocks(folder, threads, arch, progress, besides):
             for name, rows in episodes.items():
                 rows.append(outcome[name])
             done = what_policies_do(study.points[some][0], study.seeds[at], outcome["q_values"])
@@ -392,7 +394,7 @@ def make_page(
     from taichi_ants.studies.result_folder import MANIFEST
 
     if results is None:
-        told = comparison_of(settings, study, archives.read(folder / EPISODES))
+        told = comparison_of(settings, study, archives.read_rows(folder / EPISODES, folder))
         results = Results.of(told, files.read_csv(folder / BASELINES))
     comparison, shown = results.comparison, not settings.no_figures
     # Drawn anew: a figure that has been saved as a file is laid out a little otherwise.

@@ -40,7 +40,7 @@ class Form(NamedTuple):
         return np.promote_types(*(np.min_scalar_type(int(end)) for end in (least, most)))
 
     @property
-    def bytes(self) -> int:
+    def nbytes(self) -> int:
         """How many it takes at most, of such numbers."""
         return math.prod(self.shape) * self.bounded.itemsize
 

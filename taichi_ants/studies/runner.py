@@ -330,6 +330,7 @@ class Study(Generic[PointKind]):
         threads: int | None = None,
         arch: str | None = None,
         progress: Progress = lambda share: None,
+        besides: int = 0,
     ) -> Iterator[Block]:
         """Do the blocks that the folder does not hold yet; all of them, one at a time in memory.
 
@@ -337,10 +338,13 @@ class Study(Generic[PointKind]):
             folder: Where finished blocks are kept; it must belong to this study alone.
             threads, arch: As in `train`.
             progress: Called now and then with the share of the work that is done.
+            besides: How many bytes the caller will write to the same disk.
 
         Raises:
-            AntsError: A block cannot be written, or an argument is not allowed.
+            AntsError: The disk has no room for all of it, which is known at the beginning; a block
+                cannot be written, or an argument is not allowed.
         """
+        files.check_room(folder, self._bytes(folder) + besides)
         order, blocks = self.in_order, list(self.blocks())
         weights = [sum(p.weight for p in order[some]) * len(self.seeds[at]) for some, at in blocks]
         begun, total = 0.0, sum(weights)
@@ -362,6 +366,16 @@ class Study(Generic[PointKind]):
             begun += weight
             progress(begun / total)
             yield Block(some, at, outcome)
+
+    def _bytes(self, folder: Path) -> int:
+        """About how many bytes the blocks have at most that the folder does not hold yet."""
+        order = self.in_order
+        return sum(
+            form.nbytes
+            for number, (some, at) in enumerate(self.blocks())
+            if not _path(folder, number).exists()
+            for form in _forms(order[some], self.seeds[at]).values()
+        )
 
     def of_runs(
         self, folder: Path, name: str, runs: Iterable[tuple[int, int]]

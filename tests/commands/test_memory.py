@@ -1,0 +1,181 @@
+"""Sweeps and comparisons of many seeds: in how much memory, and that blocks change no result."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tracemalloc
+from collections import namedtuple
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_lines import assert_one_sentence, call, contents, load, start
+
+from taichi_ants.studies import runner
+from taichi_ants.studies.sweep_file import read_sweep
+
+SWEEP = """
+kind = "runs"
+measures = ["return_last50", "greedy_deliveries"]
+seeds = SEEDS
+episodes = 50
+max_steps = 20
+rollouts = 3
+[training]
+learner = "sarsa"
+discount = 0.9
+epsilon_decay = 0.99
+[vary]
+training.learning_rate = [0.01, 0.1]
+training.epsilon = [0.1, 0.5, 1.0]
+"""
+COMPARE = [
+    *("--episodes", 60, "--max-steps", 20, "--learners", "sarsa", "--learning-rates", 0.01),
+    *("--discounts", 0.9, "--epsilons", 0.3, 0.5, "--epsilon-decays", 0.99, "--no-figures"),
+]
+BLOCK = 50  # runs, at most
+Usage = namedtuple("Usage", "free")
+
+
+@pytest.fixture
+def small_blocks(monkeypatch):
+    monkeypatch.setattr(runner.RunPoint, "runs_of_a_block", BLOCK)
+
+
+def sweep_of(seeds, folder):
+    """A sweep of 6 points, all of which is measured, but nothing drawn or written."""
+    file = folder / f"{seeds}.toml"
+    file.write_text(SWEEP.replace("SEEDS", str(seeds)))
+    command = load("sweep")
+    asked = read_sweep(file, {kind: command.measures(kind) for kind in ("runs", "colony")})
+    return lambda blocks: command.measured(asked, blocks, None, None)
+
+
+def comparison_of(seeds, folder):
+    """A comparison of 4 configurations, all of which is measured, too."""
+    command = load("compare")
+    settings = command.parse_arguments([str(one) for one in (*COMPARE, "--seeds", seeds)])
+    study = command.build_study(settings)
+
+    def measure(blocks):
+        arrays = command.measured(study, blocks, None, None)
+        comparison = command.comparison_of(settings, study, arrays)
+        return {name: comparison.measure(name) for name in ("return_all", "greedy_steps")}
+
+    return measure
+
+
+MEASURED = {"sweep": sweep_of, "compare": comparison_of}
+BLOCKS_OF_SEEDS = {"sweep": 6, "compare": 4}  # of BLOCK seeds each
+
+
+def peak(measure, folder):
+    """The most bytes that Python and NumPy have held at once while this was measured."""
+    folder.mkdir()
+    tracemalloc.start()
+    measure(folder)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return most
+
+
+@pytest.mark.parametrize("name", MEASURED)
+def test_memory_does_not_grow_with_the_runs_but_for_what_is_measured(name, small_blocks, tmp_path):
+    MEASURED[name](1, tmp_path)(tmp_path)  # imports and compiles
+    few, many = (
+        peak(MEASURED[name](seeds, tmp_path), tmp_path / f"of {seeds}")
+        for seeds in (2 * BLOCK, 16 * BLOCK)
+    )
+    runs = 14 * BLOCK * BLOCKS_OF_SEEDS[name]
+    of_a_run = (many - few) / runs
+    assert of_a_run < 200  # bytes; its table alone has 2560
+
+
+@pytest.mark.parametrize("name", MEASURED)
+def test_memory_is_not_what_runs_take_on_disk(name, small_blocks, tmp_path):
+    folder = tmp_path / "blocks"
+    MEASURED[name](1, tmp_path)(tmp_path)
+    most = peak(MEASURED[name](16 * BLOCK, tmp_path), folder)
+    assert most < sum(path.stat().st_size for path in folder.iterdir()) / 2
+
+
+@pytest.mark.parametrize("name", MEASURED)
+@pytest.mark.parametrize("size", [1, 3, 7, 11])
+def test_blocks_of_any_size_give_the_same(name, size, tmp_path, capsys, monkeypatch):
+    """To the bytes of all files."""
+    monkeypatch.chdir(tmp_path)
+    Path("my.toml").write_text(SWEEP.replace("SEEDS", "7"))
+    arguments = ["my.toml", "--no-figures"] if name == "sweep" else [*COMPARE, "--seeds", 7]
+    found = []
+    for runs in (5000, size):
+        monkeypatch.setattr(runner.RunPoint, "runs_of_a_block", runs)
+        assert call(name, [*arguments, "--out", "out"], capsys)[0] == 0
+        files = contents(Path("out"))
+        found.append({n: one for n, one in files.items() if n.endswith((".csv", ".npz", ".txt"))})
+        shutil.rmtree("out")
+    assert found[0] == found[1]
+    assert len(found[0]) >= 3
+
+
+@pytest.mark.parametrize("name", MEASURED)
+def test_what_is_stopped_goes_on_to_the_same(name, small_blocks, tmp_path, monkeypatch):
+    first = tmp_path / "first"
+    first.mkdir()
+    expected = MEASURED[name](2 * BLOCK, tmp_path)(first)
+    second = tmp_path / "second"
+    second.mkdir()
+    done = sorted(first.iterdir())
+    for path in done[:3]:
+        shutil.copy(path, second)
+    damaged = second / done[1].name
+    damaged.write_bytes(damaged.read_bytes()[:-100])
+    calls, real = [], runner.RunPoint.do
+    counted = staticmethod(lambda *given: calls.append(given) or real(*given))
+    monkeypatch.setattr(runner.RunPoint, "do", counted)
+    found = MEASURED[name](2 * BLOCK, tmp_path)(second)
+    assert len(calls) == len(done) - 2
+    assert sorted(path.name for path in second.iterdir()) == [path.name for path in done]
+    for measure, array in expected.items():
+        np.testing.assert_array_equal(found[measure], array)
+
+
+def test_a_disk_without_room_is_told_before_the_work(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("my.toml").write_text(SWEEP.replace("SEEDS", "1000"))
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: Usage(10**6))
+    for name, arguments, needed in (
+        ("sweep", ["my.toml"], 6000 * (2560 + 8 + 53 * 4)),
+        ("compare", [*COMPARE, "--seeds", 1000], 4000 * (2560 + 8 + 110 * 4 * 2.4)),
+    ):
+        status, out, err = call(name, [*arguments, "--out", "out"], capsys)
+        assert (status, out) == (2, "")
+        assert_one_sentence(err)
+        assert f"needs {needed / 1e6:.1f} MB on the disk of 'out" in err
+        assert "1.0 MB are free; make room there" in err
+        assert not Path("out").exists()
+
+
+def test_blocks_that_are_done_need_no_more_room(tmp_path, small_blocks, monkeypatch):
+    measure = sweep_of(2 * BLOCK, tmp_path)
+    blocks = tmp_path / "blocks"
+    blocks.mkdir()
+    measure(blocks)
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: Usage(0))
+    measure(blocks)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "wait4"), reason="tells what one process has taken")
+@pytest.mark.parametrize("name", MEASURED)
+def test_a_process_with_many_seeds_stays_small(name, kernels, tmp_path):
+    """All of a command, with statistics: as much as with an eighth of the seeds, and a little."""
+    (tmp_path / "my.toml").write_text(SWEEP.replace("SEEDS", "5000"))
+    arguments = ["my.toml"] if name == "sweep" else [*COMPARE, "--seeds", 5000]
+    process = start(name, [*arguments, "--threads", 1, "--out", "out"], kernels, tmp_path)
+    out, err = process.stdout.read(), process.stderr.read()
+    _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    assert (process.returncode, err) == (0, "")
+    assert "everything is in out/" in out
+    assert used.ru_maxrss < 450_000  # KB; all runs and resamples at once take more than a GB
