@@ -59,7 +59,8 @@ def _drawn(n: int, resamples: int, iqm: bool) -> Iterator[tuple[int, np.ndarray]
         drawn = np.bincount(drawn.ravel(), minlength=drawn.size).reshape(shape)
         if iqm:
             cut = n // 4
-            drawn = np.diff(np.clip(drawn.cumsum(axis=1), cut, n - cut), axis=1, prepend=cut)
+            until = drawn.cumsum(axis=1, dtype=np.int32).clip(cut, n - cut)
+            drawn = np.diff(until, axis=1, prepend=np.int32(cut))
         yield start, drawn
 
 
