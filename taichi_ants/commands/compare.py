@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
@@ -33,11 +33,14 @@ if TYPE_CHECKING:
     from taichi_ants import World
     from taichi_ants.analysis.paper.comparison import Comparison
     from taichi_ants.analysis.paper.results import Results
+    from taichi_ants.report.players import Seen
+    from taichi_ants.studies.beside import Beside
     from taichi_ants.studies.runner import RunPoint, Study
 
 DELIVERIES = ("continuing", "absorbing")
 ROLLOUTS = 50
 QUICK_SEEDS = 10
+SIZE = 720, 480  # of animations
 MOST_SEEDS = 10_000
 EPISODES, BASELINES = "episodes.npz", "baselines.csv"
 FIGURES, POLICIES, RENDERS = "figures", "policies", "renders"
@@ -230,8 +233,13 @@ def write_policies(
     study: Study[RunPoint],
     comparison: Comparison,
     tables: Mapping[tuple[int, int], np.ndarray],
-) -> None:
-    """Write the final Q-tables of the examples, with what an ant that follows them does."""
+    beside: Beside,
+) -> list[Callable[[], None]]:
+    """Write the final Q-tables of the examples, with what an ant that follows them does.
+
+    Returns:
+        Of each animation of them that is being drawn beside, what waits for it.
+    """
     from taichi_ants import files, save_policy
     from taichi_ants.analysis.behaviour import BEHAVIOURS
     from taichi_ants.analysis.paper.best_of import example_name, examples
@@ -239,27 +247,27 @@ def write_policies(
     animates = not (settings.no_figures or settings.quick)
     for place in (POLICIES, RENDERS) if animates else (POLICIES,):
         files.check_writable_folder(folder / place)
-    chosen = examples(comparison)
-    with progress_bar("policies") as report_progress:
-        for done, (row, run) in enumerate(chosen, start=1):
-            point, variant = study.points[row], comparison.rows[row].variant
-            behaviour = comparison.behaviours[row, run]
-            metadata = {
-                "task": point.task.as_dict(),
-                "config": point.training.as_dict(),
-                "seed": study.seeds[run],
-                "episodes": point.episodes,
-                "max_steps": point.max_steps,
-                "return_last50": comparison.measure("return_last50")[row, run],
-                "behaviour": BEHAVIOURS[behaviour],
-            }
-            path = folder / POLICIES / f"{example_name(comparison, row, run)}.npz"
-            save_policy(path, tables[row, run], metadata)
-            if animates:
-                title = f"{variant.label}, {point.task.delivery}"
-                shown = folder / RENDERS / f"{path.stem}.gif"
-                render_policy(shown, point, tables[row, run], metadata, title)
-            report_progress(done / len(chosen))
+    drawn = []
+    for row, run in examples(comparison):
+        point, variant = study.points[row], comparison.rows[row].variant
+        behaviour = comparison.behaviours[row, run]
+        metadata = {
+            "task": point.task.as_dict(),
+            "config": point.training.as_dict(),
+            "seed": study.seeds[run],
+            "episodes": point.episodes,
+            "max_steps": point.max_steps,
+            "return_last50": comparison.measure("return_last50")[row, run],
+            "behaviour": BEHAVIOURS[behaviour],
+        }
+        path = folder / POLICIES / f"{example_name(comparison, row, run)}.npz"
+        save_policy(path, tables[row, run], metadata)
+        if animates:
+            title = f"{variant.label}, {point.task.delivery}"
+            shown = folder / RENDERS / f"{path.stem}.gif"
+            asked = shown, point, tables[row, run], metadata, title
+            drawn.append(beside.begin(render_policy, *asked))
+    return drawn
 
 
 def render_policy(
@@ -273,7 +281,7 @@ def render_policy(
 
     episode = played(point, q_values, metadata["seed"])
     episode = replace(episode, name=metadata["behaviour"])
-    save_animation(path, frames(episode.moments(), (720, 480), title=title), pause=PAUSE)
+    save_animation(path, frames(episode.moments(), SIZE, title=title), pause=PAUSE)
 
 
 def compare(settings: argparse.Namespace) -> None:
@@ -302,9 +310,26 @@ def comparison_of(
     )
 
 
+def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any]) -> None:
+    """Prepare a process for `render_policy` and `what_is_seen`, while there is nothing to draw."""
+    import numpy as np
+
+    from taichi_ants import runtime
+    from taichi_ants.rendering import frames
+    from taichi_ants.report.players import played, player
+    from taichi_ants.task.constants import N_ACTIONS
+
+    if plugin:
+        load_plugin(plugin)
+    runtime.start(**where)
+    nothing = np.zeros((point.task.n_states, N_ACTIONS), np.float32)
+    next(iter(frames(played(point, nothing, 0).moments(), SIZE)))
+    player(point, nothing, 0, "", "")
+
+
 def do_comparison(
     settings: argparse.Namespace, study: Study[RunPoint], blocks: Path, ready: Path
-) -> Results:
+) -> tuple[Results, Seen]:
     """Do what is not done yet, and write all results."""
     from concurrent.futures import ThreadPoolExecutor
 
@@ -315,29 +340,56 @@ def do_comparison(
     from taichi_ants.analysis.paper.figures import draw_all
     from taichi_ants.analysis.paper.results import Results
     from taichi_ants.engines.runs.training import evaluate
+    from taichi_ants.studies.beside import Beside
 
-    where = {"threads": settings.threads, "arch": settings.arch}
-    arrays = measured(study, blocks, **where)
-    first = study.points[0]
-    baselines = baseline_rows(
-        *(first.world, first.task, partial(evaluate, **where), study.seeds),
-        *(ROLLOUTS, tuple(dict.fromkeys(settings.discounts)), first.max_steps),
-    )
-    files.write_csv(ready / BASELINES, baselines, BASELINE_COLUMNS)
-    comparison = comparison_of(settings, study, arrays)
-    tables = study.of_runs(blocks, "q_values", examples(comparison))
-    small = arrays | {name: files.smallest(arrays[name]) for name in _TOLD}
-    # To pack and to resample is work of libraries, which leave Python to the thread that draws.
-    with ThreadPoolExecutor() as beside:
-        packed = beside.submit(archives.write, ready / EPISODES, small)
-        found = beside.submit(Results.of, comparison, baselines)
-        write_policies(settings, ready, study, comparison, tables)
+    where, first = {"threads": settings.threads, "arch": settings.arch}, study.points[0]
+    with Beside(second=not settings.no_figures) as beside, ThreadPoolExecutor() as threads:
+        beside.begin(rehearse, first, settings.plugin, where)
+        bounds = beside.begin(
+            baseline_rows,
+            first.world,
+            first.task,
+            partial(evaluate, **where),
+            study.seeds,
+            ROLLOUTS,
+            tuple(dict.fromkeys(settings.discounts)),
+            first.max_steps,
+        )
+        arrays = measured(study, blocks, **where)
+        comparison, baselines = comparison_of(settings, study, arrays), bounds()
+        tables = study.of_runs(blocks, "q_values", examples(comparison))
+        small = arrays | {name: files.smallest(arrays[name]) for name in _TOLD}
+        # To pack and to resample is work of libraries, which leave Python to the thread that draws.
+        packed = threads.submit(archives.write, ready / EPISODES, small)
+        results = threads.submit(Results.of, comparison, baselines)
+        files.write_csv(ready / BASELINES, baselines, BASELINE_COLUMNS)
+        animated = write_policies(settings, ready, study, comparison, tables, beside)
+        seen = see(settings, ready, study, comparison, baselines, beside.begin)
         if not settings.no_figures:
             style.save_all(draw_all(comparison, baselines), ready / FIGURES)
-    packed.result()
-    results = found.result()
-    write_tables(ready, results)
-    return results
+        with progress_bar("animations") as progress:
+            for number, wait in enumerate(animated, start=1):
+                wait()
+                progress(number / len(animated))
+        packed.result()
+        write_tables(ready, results.result())
+        return results.result(), seen()
+
+
+def see(
+    settings: argparse.Namespace,
+    folder: Path,
+    study: Study[RunPoint],
+    comparison: Comparison,
+    baselines: Sequence[Mapping],
+    begin: Callable[..., Callable[[], Any]] = partial,
+) -> Callable[[], Seen]:
+    """Begin the pictures of the page, see `what_is_seen`; there are none without figures."""
+    from taichi_ants.report.players import Seen, what_is_seen
+
+    if settings.no_figures:
+        return Seen
+    return what_is_seen(folder / POLICIES, study, comparison, baselines, begin)
 
 
 _PLAIN = str.maketrans("_=", "  ")  # "planning_steps=3" in words
@@ -380,31 +432,22 @@ def make_page(
     settings: argparse.Namespace,
     study: Study[RunPoint],
     folder: Path,
-    results: Results | None,
+    found: tuple[Results, Seen] | None,
     made: Mapping[str, Any],
 ) -> str:
     """The page of the results in a folder, which are read from there if they are not given."""
     from taichi_ants import archives, files
-    from taichi_ants.analysis.drawings import drawings
-    from taichi_ants.analysis.paper.figures import draw_all
     from taichi_ants.analysis.paper.results import Results
     from taichi_ants.report.comparison import comparison_page
     from taichi_ants.report.page import made_facts
-    from taichi_ants.report.players import what_is_seen
     from taichi_ants.studies.result_folder import MANIFEST
 
-    if results is None:
+    if found is None:
         told = comparison_of(settings, study, archives.read_rows(folder / EPISODES, folder))
         results = Results.of(told, files.read_csv(folder / BASELINES))
-    comparison, shown = results.comparison, not settings.no_figures
-    # Drawn anew: a figure that has been saved as a file is laid out a little otherwise.
-    drawn = draw_all(comparison, results.baselines) if shown else {}
-    players, sheet = what_is_seen(folder / POLICIES, study, comparison) if shown else ([], None)
+        found = results, see(settings, folder, study, told, results.baselines)()
     return comparison_page(
-        results,
-        drawings=drawings(drawn),
-        players=players,
-        sheet=sheet,
+        *found,
         facts={**facts(settings, study), **made_facts(made)},
         files=[path.name for path in folder.iterdir()] + [MANIFEST],
     )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from taichi_ants.analysis.drawings import Drawing
 from taichi_ants.analysis.paper.answer import temptation
 from taichi_ants.analysis.paper.published import (
     GREEDY_RETURN,
@@ -18,13 +17,12 @@ from taichi_ants.analysis.paper.results import Results
 from taichi_ants.analysis.tables import sentence, thousands
 from taichi_ants.errors import count
 from taichi_ants.report.page import (
-    Picture,
-    Player,
     Statement,
     Statements,
     fill,
     judged,
 )
+from taichi_ants.report.players import Seen
 
 DELIVERY = {
     "continuing": "With continuing delivery, its update at the delivery also counts, discounted, "
@@ -51,10 +49,8 @@ FILES = {
 
 def comparison_page(
     results: Results,
+    seen: Seen,
     *,
-    drawings: Sequence[Drawing],
-    players: Sequence[Player],
-    sheet: Picture | None,
     facts: Mapping[str, str],
     files: Sequence[str],
 ) -> str:
@@ -62,9 +58,7 @@ def comparison_page(
 
     Args:
         results: What was found.
-        drawings: The figures.
-        players: What the ants do, a recording of each behaviour.
-        sheet: A policy.
+        seen: Its pictures.
         facts: How it was done, names and words.
         files: The names of the files and folders beside the page.
     """
@@ -96,10 +90,8 @@ def comparison_page(
         more_tables=more,
         behaviours=behaviours,
         temptation=temptation(results.baselines),
-        drawings=drawings,
-        players=players,
-        sheet=sheet,
-        sheet_words=sheet.words if sheet else "",
+        **seen._asdict(),
+        sheet_words=seen.sheet.words if seen.sheet else "",
         facts=facts,
         files={name: words for name, words in FILES.items() if name in files},
     )

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS, DELIVERS, counts
 from taichi_ants.analysis.colony.study import ARENAS, JOINT, RULES
+from taichi_ants.analysis.drawings import Drawing, drawings
 from taichi_ants.analysis.paper.best_of import example_name, examples
 from taichi_ants.analysis.paper.comparison import Comparison
+from taichi_ants.analysis.paper.figures import draw_all
 from taichi_ants.analysis.tables import sentence, thousands
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.errors import count
@@ -25,6 +29,20 @@ from taichi_ants.viewer import record_colony, record_episode
 
 STEPS = 80  # of an episode, at most; a delivery takes 34, to and fro on the trail 38
 TICKS, MOST_ANTS = 240, 1000  # of a colony: how long, and how many ants are shown at most
+
+
+class Seen(NamedTuple):
+    """The pictures of a comparison's page.
+
+    Attributes:
+        drawings: The figures.
+        players: What the ants do, a recording of each behaviour.
+        sheet: A policy that delivers, if one does.
+    """
+
+    drawings: Sequence[Drawing] = ()
+    players: Sequence[Player] = ()
+    sheet: Picture | None = None
 
 
 def as_in_training(task: Task) -> Task:
@@ -42,29 +60,52 @@ def played(point: RunPoint, q_values: np.ndarray, seed: int) -> Episode:
 
 
 def what_is_seen(
-    policies: Path, study: Study[RunPoint], comparison: Comparison
-) -> tuple[list[Player], Picture | None]:
-    """A recording of each behaviour, and the sheet of a policy that delivers, if one does.
+    policies: Path,
+    study: Study[RunPoint],
+    comparison: Comparison,
+    baselines: Sequence[Mapping],
+    begin: Callable[..., Callable[[], Any]] = partial,
+) -> Callable[[], Seen]:
+    """Begin what shows the ants, and draw the figures meanwhile.
 
-    `policies` is the folder of the examples' policies; those that it lacks are left out.
+    Args:
+        policies: The folder of the examples' policies; those that it lacks are left out.
+        study, comparison, baselines: What was done, and what came of it.
+        begin: Begins a call and gives what waits for its end, as `Beside.begin`.
+
+    Returns:
+        What waits for all of it.
     """
     first: dict[int, tuple[int, int]] = {}
     for row, run in examples(comparison):
         if (policies / f"{example_name(comparison, row, run)}.npz").exists():
             first.setdefault(int(comparison.behaviours[row, run]), (row, run))
-    players, sheet, done = [], None, counts(comparison.behaviours)
+    done, recorded, sheets = counts(comparison.behaviours), [], []
     for code, (row, run) in sorted(first.items()):
         point, seed, variant = study.points[row], study.seeds[run], comparison.rows[row].variant
         policy = load_policy(policies / f"{example_name(comparison, row, run)}.npz")
         whose = f"{variant.label}, {point.task.delivery} delivery, seed {seed}"
         share = f"{thousands(done[code])} of {thousands(comparison.behaviours.size)}"
         words = f"{sentence(DEFINITIONS[code])}: {share} final policies. Here: {whose}."
-        recording = record_episode(played(point, policy.q_values, seed), BEHAVIOURS[code])
-        players.append(Player(sentence(BEHAVIOURS[code]), words, recording))
+        recorded.append(begin(player, point, policy.q_values, seed, BEHAVIOURS[code], words))
         if code == DELIVERS:
-            image = policy_sheet(policy.q_values, f"{variant.label}: what it does", task=point.task)
-            sheet = Picture(f"What an ant has learned: {whose}", image)
-    return players, sheet
+            title = f"{variant.label}: what it does"
+            words = f"What an ant has learned: {whose}"
+            sheets.append(begin(sheet, point.task, policy.q_values, title, words))
+    # Drawn anew: a figure that has been saved as a file is laid out a little otherwise.
+    drawn = drawings(draw_all(comparison, baselines))
+    return lambda: Seen(drawn, [one() for one in recorded], next((one() for one in sheets), None))
+
+
+def player(point: RunPoint, q_values: np.ndarray, seed: int, behaviour: str, words: str) -> Player:
+    """A recording of what a policy does."""
+    recording = record_episode(played(point, q_values, seed), behaviour)
+    return Player(sentence(behaviour), words, recording)
+
+
+def sheet(task: Task, q_values: np.ndarray, title: str, words: str) -> Picture:
+    """What a policy does in each state."""
+    return Picture(words, policy_sheet(q_values, title, task=task))
 
 
 def at_work(policies: Path, conditions: Plan, seeds: Sequence[int], arch: str) -> list[Player]:

@@ -14,6 +14,7 @@ from scipy import stats
 
 from taichi_ants.analysis import statistics
 from taichi_ants.analysis.statistics import (
+    _at_level,
     all_equal,
     bootstrap_interval,
     cautious_interval,
@@ -297,6 +298,21 @@ def test_many_rows_are_cut_into_blocks_without_a_seam() -> None:
     low, high = bootstrap_interval(values, resamples=500)
     backwards = bootstrap_interval(values[::-1], resamples=500)
     np.testing.assert_allclose([low, high], np.array(backwards)[:, ::-1], atol=1e-12)
+
+
+@pytest.mark.parametrize("shape", ["bell", "ties", "ascending", "nearly constant"])
+@pytest.mark.parametrize("levels", [(0.025, 0.975), (1e-5, 0.2), (0.45, 0.55), (0.0, 1.0)])
+def test_quantiles_are_those_of_the_sorted_rows(shape: str, levels: tuple[float, float]) -> None:
+    draws = np.random.default_rng(3).normal(size=(4, 5000))
+    if shape == "ties":
+        draws = np.round(draws)
+    elif shape == "ascending":  # a sample of every k-th tells it well
+        draws.sort(axis=1)
+    elif shape == "nearly constant":  # what the sample does not hold
+        draws = np.where(np.arange(5000) % 32 == 5, draws, 0.0)
+    quantiles = _at_level(draws, np.broadcast_to(levels, (4, 2)))
+    expected = np.quantile(draws, levels, axis=1, method="weibull").T
+    np.testing.assert_allclose(quantiles, expected, rtol=1e-12, atol=1e-12)
 
 
 def test_all_equal_by_hand() -> None:

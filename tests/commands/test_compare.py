@@ -27,6 +27,7 @@ from taichi_ants.analysis.behaviour import DELIVERS
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.commands import compare as commands
 from taichi_ants.rendering import PAUSE, Episode, frames, save_animation, text
+from taichi_ants.studies import beside
 
 GARDEN = EXPERIMENTS / "maps" / "garden.txt"
 SEEDS, EPISODES, MAX_STEPS, ROLLOUTS = (7, 8, 9), 60, 45, 50
@@ -317,11 +318,20 @@ def test_pictures_show_the_episode_that_told_the_behaviour(finished, tmp_path):
         assert (path.read_bytes() == shown) == (not evaporation)
 
 
-def test_pictures_name_learner_delivery_and_behaviour(tmp_path, monkeypatch):
+def test_one_process_alone_draws_the_same_and_names_what_is_shown(finished, tmp_path, monkeypatch):
+    monkeypatch.setattr(beside, "available_threads", lambda: 1)
     lines = []
-    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
+    write = text.write
+    monkeypatch.setattr(
+        text, "write", lambda *these, **how: (lines.append(these[1]), write(*these, **how))
+    )
     arguments = [*SMALL, "--out", tmp_path / "again"]
     commands.compare(commands.parse_arguments([str(one) for one in arguments]))
+    timed = ("manifest.json", "report.html")
+    before, after = contents(finished), contents(tmp_path / "again")
+    assert [name for name in FILES if before[name] != after[name]] == [
+        name for name in FILES if name in timed
+    ]
     for delivery in ("continuing", "absorbing"):
         assert {f"{name}, {delivery}" for name in ("SARSA", "Dyna-Q (p2)")} <= set(lines)
     assert {"delivers", "circles with food", "delivered"} <= set(lines)

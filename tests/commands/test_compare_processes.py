@@ -111,7 +111,7 @@ def test_an_interruption_of_the_pictures_keeps_the_runs(seconds, kernels, tmp_pa
     os.killpg(process.pid, signal.SIGINT)
     sent = time.perf_counter()
     out, err = process.communicate(timeout=60)
-    assert (process.returncode, out) == (130, "")
+    assert (process.returncode, out) == (130, ""), err
     assert err.startswith("Stopped")
     assert err.count("\n") == 1
     assert time.perf_counter() - sent < promptly()

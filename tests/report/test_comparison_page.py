@@ -17,8 +17,9 @@ from taichi_ants.analysis.paper.results import Results
 from taichi_ants.analysis.tables import number
 from taichi_ants.report.comparison import DELIVERY, comparison_page
 from taichi_ants.report.page import signed, span
+from taichi_ants.report.players import Seen
 
-BARE = {"drawings": [], "players": [], "sheet": None, "facts": {}, "files": []}
+BARE = {"seen": Seen(), "facts": {}, "files": []}
 
 
 @pytest.fixture(scope="module")

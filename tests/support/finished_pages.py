@@ -21,6 +21,7 @@ from taichi_ants.rendering import Episode
 from taichi_ants.report.colony import colony_page
 from taichi_ants.report.comparison import comparison_page
 from taichi_ants.report.page import Picture, Player
+from taichi_ants.report.players import Seen
 from taichi_ants.viewer import record_colony, record_episode
 
 FACTS = {"World": "the <paper's>", "Command": "compare.py --out 'a & b'"}
@@ -47,9 +48,11 @@ def comparison_html() -> str:
     sheet = Picture("a <policy>", np.full((20, 30, 3), 200, np.uint8))
     return comparison_page(
         results(),
-        drawings=drawings(draw_all(results().comparison, BASELINES)),
-        players=[Player(f"Delivers {n}", "As it <should>", recording) for n in (1, 2)],
-        sheet=sheet,
+        Seen(
+            drawings(draw_all(results().comparison, BASELINES)),
+            [Player(f"Delivers {n}", "As it <should>", recording) for n in (1, 2)],
+            sheet,
+        ),
         facts=FACTS,
         files=["claims.csv", "manifest.json", "mine.txt"],
     )

@@ -1,0 +1,114 @@
+"""A second process, which does calls while this one goes on: for what keeps Python itself busy.
+
+Drawing is such work; two threads of one process would only take turns at it.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from functools import partial
+from typing import Any, ParamSpec, TypeVar
+
+from taichi_ants.runtime import available_threads
+
+Given = ParamSpec("Given")
+Answer = TypeVar("Answer")
+
+_SERVE = "from taichi_ants.studies.beside import serve; serve()"
+
+
+class Beside:
+    """A process that does one call after the other, until the `with` block ends.
+
+    What it cannot do, this process does when the answer is wanted: where there is one processor
+    only, where no second process can be had, and where the call raises. So calls must be such that
+    they can be done twice.
+
+    Args:
+        second: Whether there is a second process at all.
+    """
+
+    def __init__(self, second: bool = True) -> None:
+        self._second = second and available_threads() > 1
+        self._process: subprocess.Popen[bytes] | None = None
+        self._turns = ThreadPoolExecutor(1)  # waits for answers
+
+    def __enter__(self) -> Beside:
+        return self
+
+    def __exit__(self, kind: object, *raised: object) -> None:
+        if self._process is not None and kind is not None:
+            self._process.kill()
+        self._turns.shutdown(cancel_futures=True)
+        if self._process is not None:
+            self._process.communicate()  # it ends, and keeps the kernels that it has compiled
+
+    def begin(
+        self, call: Callable[Given, Answer], *arguments: Given.args, **named: Given.kwargs
+    ) -> Callable[[], Answer]:
+        """Have a call done, of a function of a module, after those that have begun before.
+
+        Returns:
+            A function that waits for what the call returns; it raises what the call raises.
+        """
+        here = partial(call, *arguments, **named)
+        try:
+            asked = _packed(here)
+            if self._second and self._process is None:
+                self._process = _started()
+        except Exception:  # the call cannot be sent, or nobody be started
+            return here
+        coming = self._turns.submit(self._ask, asked)
+
+        def answer() -> Answer:
+            done, value = coming.result()
+            return value if done else here()
+
+        return answer
+
+    def _ask(self, call: bytes) -> tuple[bool, Any]:
+        """Whether the other process has done a call, and what that returns."""
+        try:
+            process: Any = self._process  # if there is none, that is caught as well
+            pickle.dump(call, process.stdin)
+            process.stdin.flush()
+            return pickle.loads(pickle.load(process.stdout))
+        except Exception:  # it has ended
+            return False, None
+
+
+def serve() -> None:
+    """Do the calls that come on standard input, and write what they return to standard output."""
+    with suppress(EOFError, BrokenPipeError), os.fdopen(os.dup(1), "wb") as answers:
+        os.dup2(2, 1)  # what is printed goes where errors go
+        while True:  # until nobody asks any more
+            pickle.dump(_done(pickle.load(sys.stdin.buffer)), answers)
+            answers.flush()
+
+
+def _started() -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [sys.executable, "-c", _SERVE],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,  # what it has to say is said here
+        start_new_session=True,  # Ctrl-C is for this process alone, which ends the other one
+    )
+
+
+def _done(call: bytes) -> bytes:
+    """What comes of a call, as `_ask` wants it."""
+    try:
+        return _packed((True, pickle.loads(call)()))
+    except Exception:
+        return _packed((False, None))
+
+
+def _packed(value: Any) -> bytes:
+    return pickle.dumps(value, pickle.HIGHEST_PROTOCOL)
