@@ -46,7 +46,7 @@ EPISODES, BASELINES = "episodes.npz", "baselines.csv"
 FIGURES, POLICIES, RENDERS = "figures", "policies", "renders"
 _DEPTH = "planning_steps"  # the one hyperparameter that the paper varies
 _ARRAYS = ("returns", "steps", "deliveries", "greedy_returns", "greedy_steps", "greedy_deliveries")
-_PACKED = 0.4  # of the bytes of all episodes, those of the file with them, or a little less
+_PACKED = 0.3  # of the bytes of all episodes, those of the file with them, or a little less
 _TOLD = ("behaviours", "policy_returns")
 
 

@@ -33,11 +33,11 @@ class Form(NamedTuple):
 
     @property
     def bounded(self) -> np.dtype:
-        """The smallest type that holds all that is allowed; of integers without an end int32."""
+        """The type of `files.smallest` that holds all of its numbers, where no end is 32 bits."""
         if self.dtype is not np.integer:
             return np.dtype(self.dtype)
-        least, most = max(self.least, -(2**31)), min(self.most, 2**31 - 1)
-        return np.promote_types(*(np.min_scalar_type(int(end)) for end in (least, most)))
+        ends = max(self.least, -(2**31)), min(self.most, 2**31 - 1)
+        return files.smallest(np.array(ends, np.int64)).dtype
 
     @property
     def nbytes(self) -> int:

@@ -288,7 +288,10 @@ class Study(Generic[PointKind]):
         return _in_order(self.points)
 
     def blocks(self) -> Iterator[tuple[slice, slice]]:
-        """Which of the points in order, and which seeds, are in each block."""
+        """Which of the points in order, and which seeds, are in each block.
+
+        Put after each other, the blocks are an array (points, seeds).
+        """
         first = 0
         for _, group in itertools.groupby(self.in_order, lambda point: point.alike):
             points = list(group)

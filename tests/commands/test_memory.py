@@ -146,7 +146,7 @@ def test_a_disk_without_room_is_told_before_the_work(tmp_path, capsys, monkeypat
     monkeypatch.setattr(shutil, "disk_usage", lambda folder: Usage(10**6))
     for name, arguments, needed in (
         ("sweep", ["my.toml"], 6000 * (2560 + 8 + 53 * 4)),
-        ("compare", [*COMPARE, "--seeds", 1000], 4000 * (2560 + 8 + 110 * 4 * 2.4)),
+        ("compare", [*COMPARE, "--seeds", 1000], 4000 * (2560 + 8 + 110 * 4 * 2.3)),
     ):
         status, out, err = call(name, [*arguments, "--out", "out"], capsys)
         assert (status, out) == (2, "")

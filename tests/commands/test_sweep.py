@@ -295,6 +295,16 @@ def test_each_grid_has_a_figure(sweep):
     assert {path.name for path in figures} == {"return_last50-1.png", "return_last50-2.png"}
 
 
+def test_what_is_asked_for_twice_is_done_once_and_shown_twice(sweep):
+    grids = "[[vary]]\ntask.rewards.lure = [1, 0]\n[[vary]]\ntask.rewards.lure = [2, 1]\n"
+    text = RUNS[: RUNS.index("[vary]")] + "learning_rate = 0.1\nepsilon = 0.3\n" + grids
+    assert sweep(text, "--no-figures")[0] == 0
+    rows = read_csv("results/sweep-my/runs.csv")
+    assert [row["task.rewards.lure"] for row in rows] == [*"111000222111"]
+    assert rows[:3] == rows[9:]
+    assert rows[0]["return_last50"] != rows[3]["return_last50"]
+
+
 def test_findings_compare_with_the_value_against_which_all_are_held(sweep):
     against = "margin = 1000\nagainst.training.epsilon = 0.5\n[task]"
     status, out, _ = sweep(RUNS.replace("[task]", against), "--no-figures")

@@ -106,3 +106,21 @@ def test_a_block_that_others_wrote_is_done_anew(tmp_path, capsys):
     np.savez(tmp_path / "0.npz", **archives.read(tmp_path / "0.npz"))
     assert block(tmp_path / "0.npz")
     assert capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("least", "most", "bounded"),
+    [
+        (0, 1, np.uint8),
+        (1, 256, np.uint16),
+        (-200, 200, np.int16),
+        (-6000, 6000, np.int32),
+        (0, np.inf, np.uint32),
+        (-np.inf, np.inf, np.int64),
+    ],
+)
+def test_a_form_tells_how_much_its_arrays_take_at_most(least, most, bounded):
+    form = Form(np.integer, (2, 3), least, most)
+    assert form.bounded == bounded
+    assert form.nbytes == 6 * np.dtype(bounded).itemsize
+    assert Form(np.float32, (4, 5)).nbytes == 80
