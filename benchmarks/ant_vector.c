@@ -1,8 +1,8 @@
 /* The same as ant.c with sixteen runs at a time, one in each lane of an AVX-512 vector.
  *
- * The lanes go in lockstep and know no branches. A lane whose episode ends begins the next one, and
- * the next run after the last. What lies in memory is loaded lane by lane, rows of the table as a
- * whole: that takes less time than the processor's own gathers and scatters.
+ * The lanes go in lockstep. A lane whose episode ends begins the next one, and after the last the
+ * next run. Rows of the table are loaded as a whole and transposed, and values are stored one by
+ * one, which takes less time than gathers and scatters; single values are gathered.
  */
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
 #include <immintrin.h>
@@ -12,11 +12,12 @@
 #include "ant.h"
 
 enum { LANES = 16, N_PAIRS = N_STATES * N_ACTIONS };
-/* Lanes are not a power of two apart, or they would share a few lines of the cache. */
+/* The tables of two lanes are so far apart; of each row eight floats are loaded, the last too. */
 enum { TABLE = N_PAIRS + 16 };
 /* A cell holds its `closer`, its level or what is on it above, and the sign if something is. */
-enum { ROW_AT = 11, OUTCOME_AT = 22, PLACE = 2047 }; /* of what was seen last of a pair */
 enum { LEVEL_AT = 6, CLOSER = 63, OCCUPIED = INT32_MIN };
+/* What was seen last of a pair: its place in a table, that of the next row, and the outcome. */
+enum { ROW_AT = 11, OUTCOME_AT = 22, PLACE = 2047 };
 
 #define INLINE static inline __attribute__((always_inline))
 
@@ -243,8 +244,8 @@ INLINE void judge(Ants *ants)
 
 INLINE void lay_trail(Memory *memory, Mask some, Ints cell, Ints packed)
 {
-    const Ints trail = _mm512_or_si512(_mm512_and_si512(packed, all(CLOSER)),
-                                       all(DEPOSIT << LEVEL_AT));
+    const Ints closer = _mm512_and_si512(packed, all(CLOSER));
+    const Ints trail = _mm512_or_si512(closer, all(DEPOSIT << LEVEL_AT));
     Ints place = _mm512_add_epi32(cell, times_lane(memory->stride));
     int32_t at[LANES] __attribute__((aligned(64)));
     int32_t value[LANES] __attribute__((aligned(64)));
@@ -289,8 +290,7 @@ INLINE void pick_up(const World *world, Memory *memory, Ants *ants, Mask some)
 }
 
 /* Act; the rewards, and which lanes have delivered. */
-INLINE Ints act(const World *world, Memory *memory, Ants *ants, Ints action,
-                       Mask *delivered)
+INLINE Ints act(const World *world, Memory *memory, Ants *ants, Ints action, Mask *delivered)
 {
     const Ints headings = _mm512_setr_epi32(5, 0, 1, 2, 3, 4, 5, 0, 0, 0, 0, 0, 0, 0, 0, 0);
     Ints shift = _mm512_sub_epi32(all(4), _mm512_slli_epi32(action, 1));
