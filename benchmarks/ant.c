@@ -1,26 +1,14 @@
-/* Q-learning ants in plain C, one after the other: the yardstick of throughput.py.
+/* Ants that learn, in plain C, one run after the other: the yardstick of throughput.py.
  *
- * The same world, rules, random numbers and arithmetic as the package's (docs of the rules: the
- * modules of taichi_ants/rules), written as one would by hand. It gives the same returns, to the
- * bit, if the compiler does not fuse multiplications and additions (-ffp-contract=off).
+ * Written as one would by hand, with branches; the rules are those that ant.h names. Threads, if
+ * there are several, take one run after the other.
  */
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { SEES_EMPTY, SEES_OBSTACLE, SEES_LURE, SEES_GOAL };
-enum { LEFT, FORWARD, RIGHT, PICK_UP, GIVE, N_ACTIONS };
-enum { N_STATES = 128, N_HEADINGS = 6, DEPOSIT = 250 };
+#include "ant.h"
 
-/* Cells lie in flat arrays; a neighbour is a fixed step away. */
-typedef struct {
-    int32_t size;
-    const uint8_t *ground;  /* how a cell looks: two bits without food, two bits with food */
-    const int32_t *trail;   /* levels at the start of an episode */
-    const uint8_t *closer;  /* bit h: the neighbour at heading h is nearer to the queen */
-    const int32_t *offsets; /* steps to the neighbours at headings 5, 0, 1, 2, 3, 4, 5, 0 */
-    int32_t cell, heading;  /* where the ant starts */
-} World;
+enum { N_PAIRS = N_STATES * N_ACTIONS };
 
 typedef struct {
     int cell, heading, carries, delivered;
@@ -29,18 +17,18 @@ typedef struct {
     int32_t *trail;
 } Ant;
 
-static uint64_t draw(uint64_t *state)
-{
-    uint64_t z = *state += 0x9E3779B97F4A7C15u;
-    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
-    z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
-    return z ^ (z >> 31);
-}
+/* What came of a pair of state and action when it was last taken. */
+typedef struct {
+    int32_t pair, next; /* places in the table */
+    float reward, discount;
+} Outcome;
 
-static int below(uint64_t word, int n)
-{
-    return (int)((word * (uint64_t)n) >> 32);
-}
+/* The outcomes of all visited pairs, in the order of first visits. */
+typedef struct {
+    int n;
+    int16_t place[N_PAIRS]; /* of a pair in this order, from 1 */
+    Outcome outcomes[N_PAIRS];
+} Model;
 
 /* The cell in view at position 0 (left), 1 (forward) or 2 (right). */
 static int in_view(const World *world, const Ant *ant, int position)
@@ -107,14 +95,11 @@ static int act(const World *world, Ant *ant, int state, int action)
     return 3;
 }
 
-static float best_of(const float *values)
+static float larger(float a, float b) { return a > b ? a : b; }
+static float best_of(const float *v)
 {
-    float best = values[0];
-    for (int a = 1; a < N_ACTIONS; a++)
-        best = values[a] > best ? values[a] : best;
-    return best;
+    return larger(larger(larger(v[0], v[1]), larger(v[2], v[3])), v[4]);
 }
-
 static int choose(const float *values, uint64_t bits, uint64_t explore_below)
 {
     if (bits >> 32 < explore_below)
@@ -130,43 +115,85 @@ static int choose(const float *values, uint64_t bits, uint64_t explore_below)
     return __builtin_ctz((unsigned)mask);
 }
 
-/* Train one run; returns and steps of each episode. Returns the number of steps, -1 if out of
- * memory. q holds 128 * 5 action values and must be 0. */
-int64_t train(World world, uint64_t random, float learning_rate, float discount, double epsilon,
-              double decay, double min_epsilon, int continuing, int episodes, int max_steps,
-              float *q, int32_t *returns, int32_t *steps)
+static void update(float *q, Outcome seen, float next_value, float learning_rate)
 {
-    int64_t total = 0;
-    Ant ant = {.random = random};
-    ant.ground = malloc((size_t)world.size);
-    ant.trail = malloc((size_t)world.size * sizeof(int32_t));
-    if (ant.ground == NULL || ant.trail == NULL)
-        total = -1;
-    for (int episode = 0; episode < episodes && total >= 0; episode++) {
-        memcpy(ant.ground, world.ground, (size_t)world.size);
-        memcpy(ant.trail, world.trail, (size_t)world.size * sizeof(int32_t));
-        ant.cell = world.cell;
-        ant.heading = world.heading;
-        ant.carries = ant.delivered = 0;
-        uint64_t explore_below = (uint64_t)(epsilon * 4294967296.0);
-        int state = observe(&world, &ant), step = 0, sum = 0;
-        for (; step < max_steps && !ant.delivered; step++) {
-            int action = choose(q + state * N_ACTIONS, draw(&ant.random), explore_below);
-            int reward = act(&world, &ant, state, action);
-            int seen = observe(&world, &ant);
-            float *value = q + state * N_ACTIONS + action;
-            float weight = ant.delivered && !continuing ? 0.0f : discount;
-            float error = (float)reward + weight * best_of(q + seen * N_ACTIONS) - *value;
-            *value += learning_rate * error;
-            sum += reward;
-            state = seen;
-        }
-        returns[episode] = sum;
-        steps[episode] = step;
-        total += step;
-        epsilon = epsilon * decay > min_epsilon ? epsilon * decay : min_epsilon;
+    float error = seen.reward + seen.discount * next_value - q[seen.pair];
+    q[seen.pair] += learning_rate * error;
+}
+
+static void plan(float *q, Model *model, Outcome seen, int steps, float learning_rate,
+                 uint64_t *random)
+{
+    if (model->place[seen.pair] == 0)
+        model->place[seen.pair] = (int16_t)++model->n;
+    model->outcomes[model->place[seen.pair] - 1] = seen;
+    for (int k = 0; k < steps; k++) {
+        Outcome drawn = model->outcomes[below(draw(random) >> 32, model->n)];
+        update(q, drawn, best_of(q + drawn.next), learning_rate);
     }
+}
+
+/* One run, for a learner that is known when this is compiled; 0 if out of memory. */
+static inline __attribute__((always_inline)) int train_run(const World *world, const Job *job,
+                                                           int number, Run run, int learner)
+{
+    float *q = job->q + (size_t)number * N_PAIRS;
+    Ant ant = {.random = run.random};
+    Model *model = learner == DYNA_Q ? calloc(1, sizeof(Model)) : NULL;
+    ant.ground = malloc((size_t)world->size);
+    ant.trail = malloc((size_t)world->size * sizeof(int32_t));
+    int enough = ant.ground != NULL && ant.trail != NULL && (learner != DYNA_Q || model != NULL);
+    for (int episode = 0; episode < job->episodes && enough; episode++) {
+        memcpy(ant.ground, world->ground, (size_t)world->size);
+        memcpy(ant.trail, world->trail, (size_t)world->size * sizeof(int32_t));
+        ant.cell = run.cell;
+        ant.heading = run.heading;
+        ant.carries = ant.delivered = 0;
+        uint64_t explore_below = (uint64_t)(run.epsilon * 4294967296.0);
+        int state = observe(world, &ant), step = 0, sum = 0, next_action = 0;
+        if (learner == SARSA)
+            next_action = choose(q + state * N_ACTIONS, draw(&ant.random), explore_below);
+        for (; step < job->max_steps && !ant.delivered; step++) {
+            int action = next_action;
+            if (learner != SARSA)
+                action = choose(q + state * N_ACTIONS, draw(&ant.random), explore_below);
+            int reward = act(world, &ant, state, action);
+            int next = observe(world, &ant), terminated = ant.delivered && !job->continuing;
+            const float *values = q + next * N_ACTIONS;
+            if (learner == SARSA && !terminated)
+                next_action = choose(values, draw(&ant.random), explore_below);
+            Outcome seen = {state * N_ACTIONS + action, next * N_ACTIONS, (float)reward,
+                            terminated ? 0.0f : run.discount};
+            float next_value = learner == SARSA ? values[next_action] : best_of(values);
+            update(q, seen, next_value, run.learning_rate);
+            if (learner == DYNA_Q)
+                plan(q, model, seen, job->planning_steps, run.learning_rate, &ant.random);
+            sum += reward;
+            state = next;
+        }
+        job->returns[(size_t)number * job->episodes + episode] = sum;
+        job->steps[(size_t)number * job->episodes + episode] = step;
+        double epsilon = run.epsilon * run.decay;
+        run.epsilon = epsilon > run.min_epsilon ? epsilon : run.min_epsilon;
+    }
+    free(model);
     free(ant.ground);
     free(ant.trail);
-    return total;
+    return enough;
+}
+
+/* Train all runs; 0 if out of memory. */
+int train(const World *world, const Job *job, const Run *runs)
+{
+    int enough = 1;
+#pragma omp parallel for schedule(dynamic) num_threads(job->threads) reduction(&& : enough)
+    for (int i = 0; i < job->n; i++) {
+        if (job->learner == Q_LEARNING)
+            enough = train_run(world, job, i, runs[i], Q_LEARNING) && enough;
+        else if (job->learner == SARSA)
+            enough = train_run(world, job, i, runs[i], SARSA) && enough;
+        else
+            enough = train_run(world, job, i, runs[i], DYNA_Q) && enough;
+    }
+    return enough;
 }

@@ -1,45 +1,92 @@
-"""How fast the paper's grid trains: environment steps per second, beside the same in plain C.
+"""How fast the paper's grid trains, beside the same in plain C.
 
-Trains 64 configurations with 100 seeds each, delivery continuing, after a short run that
-compiles. CPU time is that of all threads together, so other processes hardly disturb it. The
-yardstick is ant.c, one thread, compiled with -O3 for this processor; it learns by Q-learning only.
+Trains the 16 configurations of each learner with several seeds, delivery continuing. Two yardsticks
+do the same runs, and their results are equal to the bit: ant.c, one run after the other, with
+branches, as one would write it by hand; and ant_vector.c, sixteen runs at a time in the lanes of
+AVX-512 vectors. Both are compiled with -O3 for this processor. Ours and theirs are measured in
+turn, several times; the table has medians, and ratios of paces, more than 1 where ours is faster.
+One thread is measured by processor time, which other programs hardly disturb; several threads by
+the wall clock.
 """
 
 from __future__ import annotations
 
 import ctypes
-import itertools
 import os
 import shutil
 import subprocess
 import tempfile
 import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
+from measuring import PAGE, machine, publish
 
-from taichi_ants import Task, TrainingConfig, World, train, worlds
+from taichi_ants import Task, TrainingConfig, World, runtime, train, worlds
 from taichi_ants.analysis.paper.published import GRID
+from taichi_ants.analysis.tables import MISSING, Table, figure, plain_text, thousands
+from taichi_ants.engines.runs.results import TrainingResult
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.grid.randomness import stream_state
-from taichi_ants.studies.command_line import Parser, run_command, whole_number
+from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
 from taichi_ants.task.constants import EPISODE_STEPS, EPISODES
 
-SOURCE = Path(__file__).with_name("ant.c")
+SOURCES = [Path(__file__).with_name(name) for name in ("ant.c", "ant_vector.c")]
 FLAGS = ("-O3", "-march=native", "-std=c11", "-ffp-contract=off", "-shared", "-fPIC")
-LEARNERS = (("q_learning", 0), ("sarsa", 0), ("dyna_q", 3), ("dyna_q", 5))
-SEEDS_IN_C = 10  # as many of the seeds, since it runs on one thread
+LEARNERS = {
+    "Q-learning": ("q_learning", 0),
+    "SARSA": ("sarsa", 0),
+    "Dyna-Q (p3)": ("dyna_q", 3),
+    "Dyna-Q (p5)": ("dyna_q", 5),
+}
+YARDSTICKS = {"train": "C", "train_vector": "vector C"}  # functions in C
+_NUMBERS_IN_C = ("q_learning", "sarsa", "dyna_q")  # of learners
+
+_RUN = np.dtype(  # the struct Run of ant.h
+    [
+        ("random", np.uint64),
+        *((name, np.float64) for name in ("epsilon", "epsilon_decay", "min_epsilon")),
+        *((name, np.float32) for name in ("learning_rate", "discount")),
+        *((name, np.int32) for name in ("cell", "heading")),
+    ]
+)
 
 
 class CWorld(ctypes.Structure):
-    """The struct World of ant.c."""
+    """The struct World of ant.h."""
 
     _fields_ = (
         ("size", ctypes.c_int32),
         *((name, ctypes.c_void_p) for name in ("ground", "trail", "closer", "offsets")),
-        *((name, ctypes.c_int32) for name in ("cell", "heading")),
     )
+
+
+class CJob(ctypes.Structure):
+    """The struct Job of ant.h."""
+
+    _fields_ = (
+        *((name, ctypes.c_int32) for name in ("n", "learner", "planning_steps", "continuing")),
+        *((name, ctypes.c_int32) for name in ("episodes", "max_steps", "threads")),
+        *((name, ctypes.c_void_p) for name in ("q", "returns", "steps")),
+    )
+
+
+class Trained(NamedTuple):
+    """What C gives, by configuration and seed, and the seconds that it took.
+
+    `returns` and `steps` are int32 (c, s, episodes), `q_values` float32 (c, s, 128, 5).
+    """
+
+    returns: np.ndarray
+    steps: np.ndarray
+    q_values: np.ndarray
+    seconds: float
+
+
+Yardstick = Callable[[Any, Any, Any], int]  # a function of C
 
 
 def compiler() -> str | None:
@@ -48,46 +95,62 @@ def compiler() -> str | None:
     return next((found for name in names if name and (found := shutil.which(name))), None)
 
 
-def load_yardstick(command: str, folder: str) -> ctypes.CDLL:
-    """Compile ant.c in a folder and load it."""
+def load_yardsticks(command: str, folder: str | Path, threads: int) -> dict[str, Yardstick]:
+    """Compile both in a folder and load them, by name; one without AVX-512 is left out."""
     library = Path(folder) / "ant.so"
-    subprocess.run([command, *FLAGS, "-o", library, SOURCE], check=True, capture_output=True)
+    parallel = ["-fopenmp"] if threads > 1 else []
+    given = [command, *FLAGS, *parallel, "-o", library, *SOURCES]
+    subprocess.run(given, check=True, capture_output=True)
     loaded = ctypes.CDLL(str(library))
-    real, whole, pointer = ctypes.c_double, ctypes.c_int, ctypes.c_void_p
-    loaded.train.argtypes = (
-        *(CWorld, ctypes.c_uint64, ctypes.c_float, ctypes.c_float, real, real, real),
-        *(whole, whole, whole, pointer, pointer, pointer),
-    )
-    loaded.train.restype = ctypes.c_int64
-    return loaded
+    return {name: getattr(loaded, f) for f, name in YARDSTICKS.items() if hasattr(loaded, f)}
+
+
+def clock(threads: int) -> float:
+    """Seconds of the processor for one thread, of the wall clock for several."""
+    return time.process_time() if threads == 1 else time.perf_counter()
 
 
 def train_in_c(
-    yardstick: ctypes.CDLL,
+    yardstick: Yardstick,
     world: World,
-    config: TrainingConfig,
+    configs: Sequence[TrainingConfig],
+    seeds: Sequence[int],
     continuing: bool,
-    seed: int,
-    episodes: int,
-    max_steps: int,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """One run of Q-learning: returns, steps (episodes,), action values (128, 5), CPU seconds."""
-    cells, headings = world.start(seed)
+    episodes: int = EPISODES,
+    max_steps: int = EPISODE_STEPS,
+    threads: int = 1,
+) -> Trained:
+    """Train configurations of one learner, and one number of planning steps.
+
+    Raises:
+        AntsError: C has found too little memory.
+    """
     offsets = world.grid.offsets[(np.arange(8) - 1) % 6]
     arrays = (world.ground(), world.trail_levels(), world.closer(), offsets)
     kept = [np.ascontiguousarray(array) for array in arrays]
-    pointers = (array.ctypes.data for array in kept)
-    in_c = CWorld(world.grid.size, *pointers, int(cells[0]), int(headings[0]))
-    q_values = np.zeros((128, 5), np.float32)
-    returns, steps = np.zeros((2, episodes), np.int32)
-    began = time.process_time()
-    yardstick.train(
-        *(in_c, stream_state(seed, STREAM_ANT, 0), config.learning_rate, config.discount),
-        *(config.epsilon, config.epsilon_decay, config.min_epsilon),
-        *(continuing, episodes, max_steps),
+    runs = np.array([_run(world, config, seed) for config in configs for seed in seeds], _RUN)
+    shape = len(configs), len(seeds)
+    q_values = np.zeros((*shape, 128, 5), np.float32)
+    returns, steps = np.zeros((2, *shape, episodes), np.int32)
+    planning_steps = dict(configs[0].hyperparameters).get("planning_steps", 0)
+    job = CJob(
+        *(len(runs), _NUMBERS_IN_C.index(configs[0].learner), int(planning_steps), continuing),
+        *(episodes, max_steps, threads),
         *(array.ctypes.data for array in (q_values, returns, steps)),
     )
-    return returns, steps, q_values, time.process_time() - began
+    in_c = CWorld(world.grid.size, *(array.ctypes.data for array in kept))
+    began = clock(threads)
+    enough = yardstick(ctypes.byref(in_c), ctypes.byref(job), ctypes.c_void_p(runs.ctypes.data))
+    seconds = clock(threads) - began
+    if not enough:
+        raise AntsError(f"C finds no memory for {len(runs)} runs; take fewer seeds.")
+    return Trained(returns, steps, q_values, seconds)
+
+
+def _run(world: World, config: TrainingConfig, seed: int) -> tuple[float, ...]:
+    cells, headings = world.start(seed)
+    settings = (getattr(config, name) for name in _RUN.names[1:-2])
+    return (stream_state(seed, STREAM_ANT, 0), *settings, cells[0], headings[0])
 
 
 def grid(learner: str, planning_steps: int) -> list[TrainingConfig]:
@@ -96,60 +159,112 @@ def grid(learner: str, planning_steps: int) -> list[TrainingConfig]:
     return [TrainingConfig(learner, *point, hyperparameters=more) for point in GRID]
 
 
-def measure_c(command: str, seeds: int) -> float:
-    """CPU nanoseconds of a step of Q-learning in C."""
-    total, seconds = 0, 0.0
-    with tempfile.TemporaryDirectory() as folder:
-        yardstick = load_yardstick(command, folder)
-        for config, seed in itertools.product(grid("q_learning", 0), range(seeds)):
-            run = train_in_c(yardstick, worlds.paper(), config, True, seed, EPISODES, EPISODE_STEPS)
-            total += int(run[1].sum(dtype=np.int64))
-            seconds += run[3]
-    return seconds * 1e9 / total
-
-
-def measure(seeds: int, threads: int | None, least: float) -> None:
-    """Print a line for each learner, and for C.
+def check_same(trained: Trained, result: TrainingResult) -> None:
+    """Check that C has done the same.
 
     Raises:
-        AntsError: C is so much faster that the ratio is below `least`.
+        AntsError: It has not, so that its pace says nothing about ours.
     """
-    print(
-        f"{'':16}{'runs':>6}{'steps':>13}{'wall s':>9}{'CPU s':>9}{'M steps/s':>11}{'ns/step':>9}"
-    )
-    line = "{:16}{:6}{:13,}{:9.2f}{:9.2f}{:11.1f}{:9.1f}"
-    fastest, task = 0.0, Task(delivery="continuing")
-    for learner, planning_steps in LEARNERS:
-        configs = grid(learner, planning_steps)
-        train(worlds.paper(), configs, 0, 1, 1, threads=threads)
-        began = time.perf_counter()
-        result = train(worlds.paper(), configs, range(seeds), task=task)
-        wall, steps = time.perf_counter() - began, int(result.steps.sum(dtype=np.int64))
-        nanoseconds = result.seconds * 1e9 / steps
-        fastest = fastest or nanoseconds
-        label = learner + (f" (p{planning_steps})" if planning_steps else "")
-        counts = len(configs) * seeds, steps, wall, result.seconds
-        print(line.format(label, *counts, steps / wall / 1e6, nanoseconds))
-    if (command := compiler()) is None:
-        print("There is no C compiler (cc, gcc, clang or CC), so no comparison with plain C.")
+    for name in ("returns", "steps", "q_values"):
+        if not np.array_equal(getattr(trained, name), getattr(result, name)):
+            raise AntsError(f"C gives other {name} than the package; compare the two.")
+
+
+def measured(
+    yardsticks: dict[str, Yardstick], seeds: Sequence[int], rounds: int, threads: int
+) -> tuple[dict[str, int], dict[str, np.ndarray]]:
+    """By learner: the steps, and the seconds of ours and of the yardsticks, (rounds, 1 + n)."""
+    steps, seconds = {}, {}
+    world, task = worlds.paper(), Task(delivery="continuing")
+    with progress_bar("Measuring") as progress:
+        for label, learner in LEARNERS.items():
+            configs, found = grid(*learner), []
+            train(world, configs, 0, 1, 1, threads=threads)  # compiles
+            for number in range(rounds):
+                began = time.perf_counter()
+                result = train(world, configs, seeds, task=task, threads=threads)
+                wall = time.perf_counter() - began
+                steps[label] = int(result.steps.sum(dtype=np.int64))
+                found.append([result.seconds if threads == 1 else wall])
+                for yardstick in yardsticks.values():
+                    trained = train_in_c(yardstick, world, configs, seeds, True, threads=threads)
+                    found[-1].append(trained.seconds)
+                    if number == 0:
+                        check_same(trained, result)
+                progress((len(seconds) + len(found) / rounds) / len(LEARNERS))
+            seconds[label] = np.array(found)
+    return steps, seconds
+
+
+def table(
+    names: Sequence[str],
+    steps: dict[str, int],
+    seconds: dict[str, np.ndarray],
+    seeds: int,
+    threads: int,
+) -> Table:
+    """A row for each learner, and one for all: paces, and the ratios within the rounds."""
+    rows, missing = [], [MISSING] * (len(YARDSTICKS) - len(names))
+    for label in [*LEARNERS, "the grid"]:
+        parts = [label] if label in LEARNERS else list(LEARNERS)
+        done, taken = sum(steps[part] for part in parts), sum(seconds[part] for part in parts)
+        paces = [figure(done / one / 1e6) for one in np.median(taken, axis=0)]
+        ratios = [figure(one) for one in np.median(taken[:, 1:] / taken[:, :1], axis=0)]
+        rows.append([label, thousands(done), *paces, *missing, *ratios, *missing])
+    yardsticks = YARDSTICKS.values()
+    columns = ["learner", "steps", "ours", *yardsticks, *(f"ours to {name}" for name in yardsticks)]
+    what = "one thread, by processor time" if threads == 1 else f"{threads} threads, by wall clock"
+    about = f"Million steps a second of {what}; {seeds} seeds, medians of {len(taken)} rounds."
+    notes = [f"{about} {machine(('taichi', 'numpy'))}"]
+    if "C" in names and "vector C" not in names:
+        notes.append("No vector C: this processor or its compiler has no AVX-512.")
+    return Table("Training beside C", columns, rows, notes)
+
+
+def compare(seeds: int, rounds: int, threads: int, least: float, publishes: bool) -> None:
+    """Print the table.
+
+    Raises:
+        AntsError: With a learner, training is slower than `least` times the pace of ant.c; or
+            results differ.
+    """
+    threads = runtime.start(threads).threads
+    with tempfile.TemporaryDirectory() as folder:
+        command = compiler()
+        yardsticks = load_yardsticks(command, folder, threads) if command else {}
+        steps, seconds = measured(yardsticks, range(seeds), rounds, threads)
+    made = table(list(yardsticks), steps, seconds, seeds, threads)
+    print(plain_text([made], 120), end="")
+    if publishes:
+        publish("training", [made], PAGE)
+    if not yardsticks:
+        print("There is no C compiler (cc, gcc, clang or CC), so no comparison with C.")
         return
-    in_c = measure_c(command, min(seeds, SEEDS_IN_C))
-    print(f"Q-learning in plain C takes {in_c:.1f} ns a step: {in_c / fastest:.2f} times ours.")
-    if in_c / fastest < least:
+    ratios = {name: float(np.median(one[:, 1] / one[:, 0])) for name, one in seconds.items()}
+    worst = min(ratios, key=ratios.__getitem__)
+    if ratios[worst] < least:
         raise AntsError(
-            f"training goes at {in_c / fastest:.2f} of the pace of C; at least {least:g} is "
+            f"{worst} goes at {ratios[worst]:.2f} of the pace of C; at least {least:g} is "
             "expected, so look for what has made it slower."
         )
 
 
 def main(arguments: list[str] | None = None) -> None:
     """The command line."""
-    parser = Parser(__doc__)
+    parser = Parser(__doc__.split("\n", 1)[0], epilog=__doc__.split("\n", 1)[1])
     add = parser.add_argument
-    add("--seeds", type=whole_number(1), default=100, metavar="N", help="seeds of each setting")
-    add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
-    add("--least", type=float, default=0.0, metavar="RATIO", help="fail below this ratio to C")
-    run_command(lambda: measure(**vars(parser.parse_args(arguments))))
+    add("--seeds", type=whole_number(1), default=20, metavar="N", help="seeds of each setting")
+    add("--rounds", type=whole_number(1), default=5, metavar="N", help="measurements of each")
+    add("--threads", type=whole_number(1, 1024), default=1, metavar="N", help="CPU threads")
+    about = "fail if the slowest learner, beside ant.c, is below this ratio"
+    add("--least", type=float, default=0.0, metavar="RATIO", help=about)
+    add("--publish", action="store_true", help="put the table into docs/performance.md")
+
+    def command() -> None:
+        given = parser.parse_args(arguments)
+        compare(given.seeds, given.rounds, given.threads, given.least, given.publish)
+
+    run_command(command)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import taichi as ti
 
 from taichi_ants.learners.hyperparameters import Hyperparameters, number
-from taichi_ants.learners.memory import discount_of, values_of
+from taichi_ants.learners.memory import values_of
 from taichi_ants.learners.registry import Memory
 from taichi_ants.task.constants import N_ACTIONS, ROW
 from taichi_ants.task.rewards import MOST
@@ -18,6 +18,9 @@ from taichi_ants.task.rules.policy import best_value
 
 # An outcome packs the next row (20 bits), the reward (11 bits) and whether the step terminated.
 _REWARD_AT, _TERMINATED_AT = 20, 31
+# Pairs and slots lie below this. Masks tell the compiler that they are not negative: indices that
+# might be take it one more instruction each, and planning is made of little else.
+_PAIRS = (ROW << _REWARD_AT) - 1
 
 
 @dataclass(frozen=True)
@@ -68,7 +71,8 @@ def visited(memory: ti.template(), at):
 @ti.func
 def remember(memory: ti.template(), at, pair, outcome):
     """Store what was seen last of a pair, new pairs behind all others; the pair's slot."""
-    key = at.integers + 2 + 2 * N_ACTIONS * memory.n_states + pair // ROW * N_ACTIONS + pair % ROW
+    row, action = (pair & _PAIRS) // ROW, (pair & _PAIRS) % ROW
+    key = at.integers + 2 + (2 * memory.n_states + row) * N_ACTIONS + action
     place = memory.integers[key]
     if place == 0:
         place = memory.integers[at.integers] + 1
@@ -82,13 +86,15 @@ def remember(memory: ti.template(), at, pair, outcome):
 @ti.func
 def recall(memory: ti.template(), at, slot):
     """The pair in a slot, and its outcome."""
-    place = at.integers + 2 + 2 * slot
-    return memory.integers[place], memory.integers[place + 1]
+    place = at.integers + 2 + 2 * (slot & _PAIRS)
+    return memory.integers[place] & _PAIRS, memory.integers[place + 1]
 
 
 @ti.func
 def error_of(memory: ti.template(), at, rates, pair, outcome):
     """The TD error of Q-learning for an outcome of a pair."""
-    best = best_value(values_of(memory.q, at.table, next_state_of(outcome)))
-    discount = discount_of(rates, terminated_of(outcome))
-    return reward_of(outcome) + discount * best - memory.q[at.table + pair]
+    target = reward_of(outcome)
+    if terminated_of(outcome) == 0:
+        next_values = values_of(memory.q, at.table, next_state_of(outcome))
+        target += rates.discount * best_value(next_values)
+    return target - memory.q[at.table + pair]

@@ -1,71 +1,109 @@
-"""The benchmark, and its yardstick in C: a third writing of the rules, equal to the bit."""
+"""The benchmark, and its yardsticks in C: two more writings of the rules, equal to the bit."""
 
 from __future__ import annotations
-
-import re
 
 import numpy as np
 import pytest
 import throughput
 from random_worlds import random_world
 
-from taichi_ants import Task, TrainingConfig, train
+from taichi_ants import AntsError, Task, TrainingConfig, train
 from taichi_ants.worlds import paper
+
+needs_c = pytest.mark.skipif(throughput.compiler() is None, reason="there is no C compiler")
 
 
 @pytest.fixture(scope="module")
-def yardstick(tmp_path_factory):
+def yardsticks(tmp_path_factory):
     if throughput.compiler() is None:
         pytest.skip("there is no C compiler")
-    return throughput.load_yardstick(throughput.compiler(), tmp_path_factory.mktemp("c"))
+    return throughput.load_yardsticks(throughput.compiler(), tmp_path_factory.mktemp("c"), 2)
 
 
+def yardstick_of(yardsticks, name):
+    if name not in yardsticks:
+        pytest.skip("this processor or its compiler has no AVX-512")
+    return yardsticks[name]
+
+
+@pytest.mark.parametrize("name", throughput.YARDSTICKS.values())
 @pytest.mark.parametrize("delivery", ["continuing", "absorbing"])
-def test_c_gives_the_same_runs(delivery, yardstick):
-    configs = throughput.grid("q_learning", 0)[::5]
-    configs.append(TrainingConfig("q_learning", 1.0, 0.9, 0.7, 0.5, 0.2))
+@pytest.mark.parametrize("learner", throughput.LEARNERS)
+def test_c_gives_the_same_runs(learner, delivery, name, yardsticks):
+    yardstick = yardstick_of(yardsticks, name)
+    configs = throughput.grid(*throughput.LEARNERS[learner])[::5]
+    more = configs[0].hyperparameters
+    for numbers in ((1.0, 0.9, 0.7, 0.5, 0.2), (0.5, 0.9, 1.0, 0.2, 0.0)):
+        configs.append(TrainingConfig(configs[0].learner, *numbers, hyperparameters=more))
     deliveries = 0
     for world in (paper(), *(random_world(seed + 60, 6) for seed in range(12))):
         seeds = (0, 7, 2**63 + 5)
         result = train(world, configs, seeds, 25, 150, Task(delivery=delivery))
         deliveries += result.deliveries.sum()
-        for c, config in enumerate(configs):
-            for s, seed in enumerate(seeds):
-                given = (config, delivery == "continuing", seed, 25, 150)
-                run = throughput.train_in_c(yardstick, world, *given)
-                assert np.array_equal(run[0], result.returns[c, s])
-                assert np.array_equal(run[1], result.steps[c, s])
-                assert np.array_equal(run[2], result.q_values[c, s])
+        for threads in (1, 2):
+            given = (delivery == "continuing", 25, 150, threads)
+            trained = throughput.train_in_c(yardstick, world, configs, seeds, *given)
+            throughput.check_same(trained, result)
     assert deliveries > 100
 
 
-def printed_by(arguments, capsys):
+@pytest.mark.parametrize("name", throughput.YARDSTICKS.values())
+def test_fewer_runs_than_lanes(name, yardsticks):
+    yardstick, configs = yardstick_of(yardsticks, name), throughput.grid("dyna_q", 3)[:1]
+    result = train(paper(), configs, 3, 4, 600)
+    trained = throughput.train_in_c(yardstick, paper(), configs, [3], False, 4)
+    throughput.check_same(trained, result)
+    with pytest.raises(AntsError, match="other steps than the package"):
+        throughput.check_same(trained._replace(steps=trained.steps + 1), result)
+
+
+def said_by(arguments, capsys):
     with pytest.raises(SystemExit) as end:
         throughput.main(arguments)
-    assert end.value.code == 0
-    return capsys.readouterr().out
+    return end.value.code, capsys.readouterr()
 
 
-SMALL = ["--seeds", "1"]
+SMALL = ["--seeds", "1", "--rounds", "1"]
 
 
-def test_its_table(capsys):
-    lines = printed_by(SMALL, capsys).splitlines()
-    assert lines[0].split() == ["runs", "steps", "wall", "s", "CPU", "s", "M", "steps/s", "ns/step"]
-    labels = [line[:16].strip() for line in lines[1:5]]
-    assert labels == ["q_learning", "sarsa", "dyna_q (p3)", "dyna_q (p5)"]
-    assert [int(line[16:22]) for line in lines[1:5]] == [16, 16, 16, 16]
-    steps = [int(line[22:35].replace(",", "")) for line in lines[1:5]]
+def rows_of(said):
+    """The cells behind the label of each row, spaces within numbers removed."""
+    labels = [*throughput.LEARNERS, "the grid"]
+    lines = {line[:12].strip(): line[12:].split() for line in said.splitlines()}
+    return [["".join(lines[label][:-5]), *lines[label][-5:]] for label in labels]
+
+
+@needs_c
+def test_its_table_and_its_guard(capsys):
+    code, said = said_by(SMALL, capsys)
+    assert code == 0
+    rows = rows_of(said.out)
     expected = train(paper(), throughput.grid("sarsa", 0), 0, task=Task(delivery="continuing"))
-    assert steps[1] == expected.steps.sum()
-    if throughput.compiler() is not None:
-        assert re.fullmatch(
-            r"Q-learning in plain C takes [\d.]+ ns a step: [\d.]+ times ours\.", lines[5]
-        )
+    assert int(rows[1][0]) == expected.steps.sum()
+    assert int(rows[-1][0]) == sum(int(row[0]) for row in rows[:-1])
+    for row in rows:
+        ours, in_c, ratio = float(row[1]), float(row[2]), float(row[4])
+        assert ratio == pytest.approx(ours / in_c, rel=0.05)
+    code, said = said_by([*SMALL, "--least", "1000"], capsys)
+    assert code != 0
+    assert "at least 1000 is expected" in said.err
+
+
+@needs_c
+def test_without_vectors(tmp_path, monkeypatch):
+    monkeypatch.setattr(throughput, "FLAGS", (*throughput.FLAGS, "-U__AVX512F__"))
+    loaded = throughput.load_yardsticks(throughput.compiler(), tmp_path, 1)
+    assert list(loaded) == ["C"]
+    seconds = {label: np.ones((1, 2)) for label in throughput.LEARNERS}
+    made = throughput.table(["C"], dict.fromkeys(seconds, 10**6), seconds, 1, 1)
+    assert [row[4] for row in made.rows] == ["-"] * 5
+    assert made.notes[-1].startswith("No vector C")
 
 
 def test_without_a_compiler(capsys, monkeypatch):
     monkeypatch.setenv("PATH", "")
     monkeypatch.delenv("CC", raising=False)
-    lines = printed_by(SMALL, capsys).splitlines()
-    assert lines[-1].startswith("There is no C compiler")
+    code, said = said_by(SMALL, capsys)
+    assert code == 0
+    assert [row[2] for row in rows_of(said.out)] == ["-"] * 5
+    assert said.out.splitlines()[-1].startswith("There is no C compiler")

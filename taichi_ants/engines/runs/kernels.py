@@ -32,6 +32,10 @@ from taichi_ants.task.observations import Observation
 from taichi_ants.task.rules.policy import chance_of, choose
 from taichi_ants.task.rules.random_bits import advance, bits_of
 
+# Places in arrays lie below this, see `engine.size_of_launch`. To say so spares the compiler the
+# case that they are negative.
+_PLACES = 2**30 - 1
+
 
 @cache
 def run_kernel(
@@ -90,7 +94,11 @@ def run_kernel(
         ti.loop_config(block_dim=1)
         for i in range(a.n_runs):
             base, first = i * (a.size + EXTRA_CELLS), i * columns
-            at = At(i * a.tables * table, i * a.floats_by_8 * 8, i * a.integers_by_8 * 8)
+            at = At(
+                i * a.tables * table & _PLACES,
+                i * a.floats_by_8 * 8 & _PLACES,
+                i * a.integers_by_8 * 8 & _PLACES,
+            )
             discount = ti.cast(a.settings[first + DISCOUNT], ti.f32)
             restore(a, base, 0, 0, a.size - 1)
             rng, exploration, rate = a.random_states[i], a.epsilon[i], a.learning_rate[i]

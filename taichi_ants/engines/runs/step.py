@@ -99,8 +99,7 @@ def percept_of(half: ti.template(), a: ti.template(), base, ant, clock):
         nearer = nearer_from(a.closer[ant.origin + ant.cell], ant.heading)
         percept = percept_carrying(ground_of(left), ground_of(forward), ground_of(right), nearer)
     else:
-        trail_left, trail_forward = ti.max(left - clock, 0), ti.max(forward - clock, 0)
-        trail_right = ti.max(right - clock, 0)
+        trail_left, trail_forward, trail_right = left - clock, forward - clock, right - clock
         percept = percept_foraging(
             half,
             ground_of(left),

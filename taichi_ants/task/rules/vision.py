@@ -10,26 +10,22 @@ from taichi_ants.task.constants import EMPTY, SEES_LURE
 def see_foraging(half: ti.template(), ground, level, strongest):
     """The code of a cell for an ant without food.
 
-    `ground` is what the cell holds, `level` its trail if it is empty, else 0, and `strongest` the
-    largest level in view that counts. An empty cell is a trail if its level is at least 1 and, if
-    `half`, at least half of the strongest, else as much.
+    `ground` is what the cell holds, `level` its trail if it is empty, else 0 or less, and
+    `strongest` the largest level in view that counts. An empty cell is a trail if its level is at
+    least 1 and, if `half`, at least half of the strongest, else as much.
     """
-    code = ground & 3
+    lure = 0
     if ti.static(half):
-        if 2 * level >= ti.max(strongest, 2):
-            code = SEES_LURE
-    elif level >= ti.max(strongest, 1):
-        code = SEES_LURE
-    return code
+        lure = ti.cast(2 * level >= ti.max(strongest, 2), ti.i32)
+    else:
+        lure = ti.cast(level >= ti.max(strongest, 1), ti.i32)
+    return ground & 3 | lure * SEES_LURE  # what is empty looks 0
 
 
 @ti.func
 def see_carrying(ground, nearer):
     """The code of a cell for an ant with food; `nearer` is 1 if the cell is nearer to the queen."""
-    code = ground >> 2
-    if ground == EMPTY and nearer == 1:
-        code = SEES_LURE
-    return code
+    return ground >> 2 | (ti.cast(ground == EMPTY, ti.i32) & nearer) * SEES_LURE
 
 
 @ti.func
@@ -70,7 +66,7 @@ def nearer_from(closer, heading):
 @ti.func
 def state_index(carries, left, forward, right):
     """The index of a state, 0 to 127."""
-    return carries << 6 | left << 4 | forward << 2 | right
+    return ((carries << 2 | left) << 2 | forward) << 2 | right
 
 
 @ti.func

@@ -1,0 +1,50 @@
+/* What ant.c and ant_vector.c share: the world, a run, and what they draw.
+ *
+ * The world, rules, random numbers and arithmetic are the package's (taichi_ants/task/rules,
+ * taichi_ants/learners), so that results are equal to the bit, if the compiler does not fuse
+ * multiplications and additions (-ffp-contract=off).
+ */
+#include <stdint.h>
+
+enum { SEES_EMPTY, SEES_OBSTACLE, SEES_LURE, SEES_GOAL };
+enum { LEFT, FORWARD, RIGHT, PICK_UP, GIVE, N_ACTIONS };
+enum { Q_LEARNING, SARSA, DYNA_Q };
+enum { N_STATES = 128, N_HEADINGS = 6, DEPOSIT = 250 };
+
+/* Cells lie in flat arrays; a neighbour is a fixed step away. */
+typedef struct {
+    int32_t size;
+    const uint8_t *ground;  /* how a cell looks: two bits without food, two bits with food */
+    const int32_t *trail;   /* levels at the start of an episode */
+    const uint8_t *closer;  /* bit h: the neighbour at heading h is nearer to the queen */
+    const int32_t *offsets; /* steps to the neighbours at headings 5, 0, 1, 2, 3, 4, 5, 0 */
+} World;
+
+/* A run of some configuration with some seed. */
+typedef struct {
+    uint64_t random;
+    double epsilon, decay, min_epsilon;
+    float learning_rate, discount;
+    int32_t cell, heading; /* where the ant starts */
+} Run;
+
+/* What all runs of a call have in common, and where their results go. */
+typedef struct {
+    int32_t n, learner, planning_steps, continuing, episodes, max_steps, threads;
+    float *q;         /* (n, 128, 5), the values to begin with */
+    int32_t *returns; /* (n, episodes) */
+    int32_t *steps;   /* (n, episodes) */
+} Job;
+
+static inline uint64_t draw(uint64_t *state)
+{
+    uint64_t z = *state += 0x9E3779B97F4A7C15u;
+    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
+    z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
+    return z ^ (z >> 31);
+}
+
+static inline int below(uint64_t word, int n)
+{
+    return (int)((word * (uint64_t)n) >> 32);
+}
