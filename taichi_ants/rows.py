@@ -6,7 +6,7 @@ import math
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -88,6 +88,10 @@ class Rows:
 
     def __iter__(self) -> Iterator[np.ndarray]:
         return (self[row] for row in range(len(self)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """As the array, for another process; it must fit into memory then."""
+        return np.stack, ([*map(np.array, self)],)
 
     def save(self, file: IO[bytes]) -> None:
         """Write it as an .npy, as NumPy writes `files.smallest` of such an array."""

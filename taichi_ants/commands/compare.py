@@ -37,6 +37,9 @@ if TYPE_CHECKING:
     from taichi_ants.studies.beside import Beside
     from taichi_ants.studies.runner import RunPoint, Study
 
+# Begins a call, and gives what waits for its end.
+Begin = Callable[..., Callable[[], Any]]
+
 DELIVERIES = ("continuing", "absorbing")
 ROLLOUTS = 50
 QUICK_SEEDS = 10
@@ -310,11 +313,20 @@ def comparison_of(
     )
 
 
-def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any]) -> None:
-    """Prepare a process for `render_policy` and `what_is_seen`, while there is nothing to draw."""
+def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draws: bool) -> None:
+    """Prepare a process for what it will show, while there is nothing to show yet.
+
+    Args:
+        point: What is trained.
+        plugin, where: As on the command line.
+        draws: Whether it will draw figures, too.
+    """
+    import io
+
     import numpy as np
 
     from taichi_ants import runtime
+    from taichi_ants.analysis import style
     from taichi_ants.rendering import frames
     from taichi_ants.report.players import played, player
     from taichi_ants.task.constants import N_ACTIONS
@@ -325,6 +337,16 @@ def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any]) -> N
     nothing = np.zeros((point.task.n_states, N_ACTIONS), np.float32)
     next(iter(frames(played(point, nothing, 0).moments(), SIZE)))
     player(point, nothing, 0, "", "")
+    for kind in ("png", "svg") if draws else ():
+        style.new_figure(1.0).savefig(io.BytesIO(), format=kind)
+
+
+def draw_figures(comparison: Comparison, baselines: Sequence[Mapping], folder: Path) -> None:
+    """Write the figures as files."""
+    from taichi_ants.analysis import style
+    from taichi_ants.analysis.paper.figures import draw_all
+
+    style.save_all(draw_all(comparison, baselines), folder)
 
 
 def do_comparison(
@@ -334,17 +356,16 @@ def do_comparison(
     from concurrent.futures import ThreadPoolExecutor
 
     from taichi_ants import archives, files
-    from taichi_ants.analysis import style
     from taichi_ants.analysis.bounds.baselines import BASELINE_COLUMNS, baseline_rows
     from taichi_ants.analysis.paper.best_of import examples
-    from taichi_ants.analysis.paper.figures import draw_all
     from taichi_ants.analysis.paper.results import Results
     from taichi_ants.engines.runs.training import evaluate
     from taichi_ants.studies.beside import Beside
 
     where, first = {"threads": settings.threads, "arch": settings.arch}, study.points[0]
-    with Beside(second=not settings.no_figures) as beside, ThreadPoolExecutor() as threads:
-        beside.begin(rehearse, first, settings.plugin, where)
+    shows, quick = not settings.no_figures, settings.quick
+    with Beside(second=shows) as beside, ThreadPoolExecutor() as threads:
+        beside.begin(rehearse, first, settings.plugin, where, quick)
         bounds = beside.begin(
             baseline_rows,
             first.world,
@@ -359,21 +380,25 @@ def do_comparison(
         comparison, baselines = comparison_of(settings, study, arrays), bounds()
         tables = study.of_runs(blocks, "q_values", examples(comparison))
         small = arrays | {name: files.smallest(arrays[name]) for name in _TOLD}
-        # To pack and to resample is work of libraries, which leave Python to the thread that draws.
-        packed = threads.submit(archives.write, ready / EPISODES, small)
-        results = threads.submit(Results.of, comparison, baselines)
-        files.write_csv(ready / BASELINES, baselines, BASELINE_COLUMNS)
+        packed = threads.submit(archives.write, ready / EPISODES, small)  # does without Python
+        # Beside this process there is time for the figures, unless there are animations.
+        draw = beside.begin if quick else partial
         animated = write_policies(settings, ready, study, comparison, tables, beside)
-        seen = see(settings, ready, study, comparison, baselines, beside.begin)
-        if not settings.no_figures:
-            style.save_all(draw_all(comparison, baselines), ready / FIGURES)
+        drawn = draw(draw_figures, comparison, baselines, ready / FIGURES) if shows else None
+        seen = see(settings, ready, study, comparison, baselines, beside.begin, draw)
+        beside.finish()
+        files.write_csv(ready / BASELINES, baselines, BASELINE_COLUMNS)
+        results = Results.of(comparison, baselines)
+        write_tables(ready, results)
+        if drawn:
+            drawn()
+        shown = seen()
         with progress_bar("animations") as progress:
             for number, wait in enumerate(animated, start=1):
                 wait()
                 progress(number / len(animated))
         packed.result()
-        write_tables(ready, results.result())
-        return results.result(), seen()
+        return results, shown
 
 
 def see(
@@ -382,14 +407,25 @@ def see(
     study: Study[RunPoint],
     comparison: Comparison,
     baselines: Sequence[Mapping],
-    begin: Callable[..., Callable[[], Any]] = partial,
+    play: Begin = partial,
+    draw: Begin = partial,
 ) -> Callable[[], Seen]:
-    """Begin the pictures of the page, see `what_is_seen`; there are none without figures."""
-    from taichi_ants.report.players import Seen, what_is_seen
+    """The pictures of the page, of which there are none without figures.
+
+    Args:
+        settings, folder, study, comparison, baselines: What was done, and what came of it.
+        play, draw: Begin players and figures, as `Beside.begin`.
+
+    Returns:
+        What waits for them.
+    """
+    from taichi_ants.report.players import Seen, draw_all_for_page, what_is_seen
 
     if settings.no_figures:
         return Seen
-    return what_is_seen(folder / POLICIES, study, comparison, baselines, begin)
+    players = what_is_seen(folder / POLICIES, study, comparison, play)
+    drawings = draw(draw_all_for_page, comparison, baselines)
+    return lambda: Seen(drawings(), *players())
 
 
 _PLAIN = str.maketrans("_=", "  ")  # "planning_steps=3" in words

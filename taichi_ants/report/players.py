@@ -59,22 +59,26 @@ def played(point: RunPoint, q_values: np.ndarray, seed: int) -> Episode:
     return Episode.play(point.world, q_values, seed=seed, max_steps=steps, task=task)
 
 
+def draw_all_for_page(comparison: Comparison, baselines: Sequence[Mapping]) -> list[Drawing]:
+    """The figures. A figure that has been saved as a file is laid out a little otherwise."""
+    return drawings(draw_all(comparison, baselines))
+
+
 def what_is_seen(
     policies: Path,
     study: Study[RunPoint],
     comparison: Comparison,
-    baselines: Sequence[Mapping],
     begin: Callable[..., Callable[[], Any]] = partial,
-) -> Callable[[], Seen]:
-    """Begin what shows the ants, and draw the figures meanwhile.
+) -> Callable[[], tuple[list[Player], Picture | None]]:
+    """A recording of each behaviour, and the sheet of a policy that delivers, if one does.
 
     Args:
         policies: The folder of the examples' policies; those that it lacks are left out.
-        study, comparison, baselines: What was done, and what came of it.
+        study, comparison: What was done, and what came of it.
         begin: Begins a call and gives what waits for its end, as `Beside.begin`.
 
     Returns:
-        What waits for all of it.
+        What waits for them.
     """
     first: dict[int, tuple[int, int]] = {}
     for row, run in examples(comparison):
@@ -92,9 +96,7 @@ def what_is_seen(
             title = f"{variant.label}: what it does"
             words = f"What an ant has learned: {whose}"
             sheets.append(begin(sheet, point.task, policy.q_values, title, words))
-    # Drawn anew: a figure that has been saved as a file is laid out a little otherwise.
-    drawn = drawings(draw_all(comparison, baselines))
-    return lambda: Seen(drawn, [one() for one in recorded], next((one() for one in sheets), None))
+    return lambda: ([one() for one in recorded], next((one() for one in sheets), None))
 
 
 def player(point: RunPoint, q_values: np.ndarray, seed: int, behaviour: str, words: str) -> Player:

@@ -45,9 +45,10 @@ class Beside:
     def __exit__(self, kind: object, *raised: object) -> None:
         if self._process is not None and kind is not None:
             self._process.kill()
-        self._turns.shutdown(cancel_futures=True)
+        self.finish()
+        self._turns.shutdown()
         if self._process is not None:
-            self._process.communicate()  # it ends, and keeps the kernels that it has compiled
+            self._process.wait()  # it keeps the kernels that it has compiled
 
     def begin(
         self, call: Callable[Given, Answer], *arguments: Given.args, **named: Given.kwargs
@@ -71,6 +72,16 @@ class Beside:
             return value if done else here()
 
         return answer
+
+    def finish(self) -> None:
+        """Let the process end when it has done what has begun; later calls are done here."""
+        self._turns.submit(self._leave)
+
+    def _leave(self) -> None:
+        process: Any = self._process
+        for pipe in (process.stdin, process.stdout) if process else ():
+            with suppress(OSError):  # it has ended, with something still to be read
+                pipe.close()
 
     def _ask(self, call: bytes) -> tuple[bool, Any]:
         """Whether the other process has done a call, and what that returns."""

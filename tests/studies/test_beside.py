@@ -84,6 +84,17 @@ def test_a_process_that_ends_loses_no_call() -> None:
 
 
 @several
+def test_it_ends_when_nothing_more_will_begin() -> None:
+    with Beside() as beside:
+        other, late = beside.begin(os.getpid), beside.begin(time.sleep, 0.1)
+        beside.finish()
+        after = beside.begin(os.getpid)
+        assert other() != os.getpid()
+        assert late() is None
+        assert after() == os.getpid()
+
+
+@several
 def test_an_error_ends_it_at_once() -> None:
     others = []
 
