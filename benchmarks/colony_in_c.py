@@ -137,7 +137,7 @@ def measured(
     with progress_bar("Measuring") as progress:
         for rules, task in TASKS.items():
             for n in sizes:
-                colony, ticks, paces = scattered(task, n), max(8, 500_000 // n), []
+                colony, ticks, paces = scattered(task, n), max(64, 500_000 // n), []
                 check_same(library, colony, min(ticks, 100), threads)
 
                 def ours(colony: Colony = colony, ticks: int = ticks) -> int:

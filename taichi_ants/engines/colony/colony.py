@@ -626,7 +626,7 @@ class Colony:
         checks.check_finite(tables, [self.training], self.seeds)
 
     def _sort_ants(self) -> None:
-        """Store the ants of a world in the order of their cells, so that neighbours share caches.
+        """Store the ants of a world about in the order of their cells: neighbours share caches.
 
         Their order changes nothing but the speed: ants have numbers. Slots do matter where ants are
         born, have tables of their own or are given actions, and vacant ones stay behind the others;
@@ -635,9 +635,10 @@ class Colony:
         slots_matter = self.ants_change or self.one_a_slot or self.is_given_actions
         if slots_matter or self.arrays["worlds"][WorldRow.LIVING].min() < self.capacity:
             return
-        cells = self.ants_by_slot(AntRow.CELL)
+        # Cells to 16 bits, by which NumPy sorts in a tenth of the time.
+        near = self.ants_by_slot(AntRow.CELL) >> max(0, self.grid.size.bit_length() - 16)
         first = np.arange(len(self.seeds))[:, None] * self.capacity
-        order = (np.argsort(cells, axis=1) + first).ravel()
+        order = (np.argsort(near.astype(np.uint16), axis=1, kind="stable") + first).ravel()
         for row in (*self.arrays["ants"], *self.arrays["traits"]):
             row[:] = row[order]
         self.arrays["streams"][:] = self.arrays["streams"][order]
