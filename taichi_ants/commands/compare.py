@@ -364,7 +364,8 @@ def do_comparison(
 
     where, first = {"threads": settings.threads, "arch": settings.arch}, study.points[0]
     shows, quick = not settings.no_figures, settings.quick
-    with Beside(second=shows) as beside, ThreadPoolExecutor() as threads:
+    # Who asks for one thread wants the other processors for something else.
+    with Beside(shows and settings.threads != 1) as beside, ThreadPoolExecutor() as threads:
         beside.begin(rehearse, first, settings.plugin, where, quick)
         bounds = beside.begin(
             baseline_rows,

@@ -20,6 +20,7 @@ from taichi_ants import (
     continue_training,
     evaluate,
     load_policy,
+    runtime,
     train,
     worlds,
 )
@@ -336,6 +337,17 @@ def test_one_process_alone_draws_the_same_and_names_what_is_shown(finished, tmp_
         assert {f"{name}, {delivery}" for name in ("SARSA", "Dyna-Q (p2)")} <= set(lines)
     assert {"delivers", "circles with food", "delivered"} <= set(lines)
     assert not [line for line in lines if line.endswith("...")]
+
+
+def test_who_asks_for_one_thread_gets_one_process(compare, tmp_path, monkeypatch):
+    started, threads = [], beside.available_threads()
+    monkeypatch.setattr(beside, "_started", lambda: started.append("process"))
+    few = [option for option in TINY if option != "--no-figures"]
+    assert compare(*few, "--threads", 1, "--out", tmp_path / "one")[0] == 0
+    assert started == []
+    runtime.start(threads)
+    assert compare(*few, "--out", tmp_path / "all")[0] == 0
+    assert bool(started) == (threads > 1)
 
 
 def test_manifest(finished):
