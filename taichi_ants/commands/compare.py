@@ -385,21 +385,18 @@ def do_comparison(
         # Beside this process there is time for the figures, unless there are animations.
         draw = beside.begin if quick else partial
         animated = write_policies(settings, ready, study, comparison, tables, beside)
-        drawn = draw(draw_figures, comparison, baselines, ready / FIGURES) if shows else None
+        drawn = [draw(draw_figures, comparison, baselines, ready / FIGURES)] if shows else []
         seen = see(settings, ready, study, comparison, baselines, beside.begin, draw)
         beside.finish()
         files.write_csv(ready / BASELINES, baselines, BASELINE_COLUMNS)
-        results = Results.of(comparison, baselines)
-        write_tables(ready, results)
-        if drawn:
-            drawn()
-        shown = seen()
-        with progress_bar("animations") as progress:
-            for number, wait in enumerate(animated, start=1):
+        with progress_bar("statistics and pictures") as progress:
+            results = Results.of(comparison, baselines)
+            write_tables(ready, results)
+            waits = [*drawn, *animated, packed.result]
+            for number, wait in enumerate(waits, start=1):
+                progress(number / (len(waits) + 1))
                 wait()
-                progress(number / len(animated))
-        packed.result()
-        return results, shown
+            return results, seen()
 
 
 def see(

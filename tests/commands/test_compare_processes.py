@@ -271,3 +271,4 @@ def test_progress_on_a_terminal(kernels, tmp_path):
     )
     assert done.returncode == 0
     assert re.search(r"training.*0%", done.stdout)
+    assert re.search(r"statistics and pictures.*0%", done.stdout)
