@@ -50,9 +50,9 @@ _LARGE_COLONY = 16_384  # slots from which ants, not worlds, are handed to threa
 # Every chunk has sums of its own, which are to stay in a cache; and threads take turns.
 _CHUNKS_PER_THREAD, _ANTS_PER_CHUNK = 4, 32_768
 _MOST_CHUNKS = 256
-_TICKS_BETWEEN_SORTS = 16
+# Ants are sorted once they have taken so many steps together, but not too seldom nor too often.
+_STEPS_BETWEEN_SORTS, _FEWEST_TICKS, _MOST_TICKS = 2_500_000, 16, 256
 _PIECE_SECONDS = 0.4
-_WHOLE_TICKS = "whole ticks"  # instead of the name of phases: all of them, by world
 # Kernels count moves in 32 bits, which 10 000 ants fill in 200 000 ticks; so these counters begin
 # anew after so many, and what comes of a piece of ticks is far less.
 _LARGE = (WorldRow.MOVES, WorldRow.BLOCKED)
@@ -209,8 +209,7 @@ class Colony:
         self.schedule = usual if schedule is None else schedule
         check_one_of("schedule", self.schedule, ("by_world", "by_chunk"))
         by_chunk = self.schedule == "by_chunk"
-        chunks = max(_CHUNKS_PER_THREAD * running.threads, self.capacity // _ANTS_PER_CHUNK)
-        self.chunks = min(_MOST_CHUNKS, chunks) if by_chunk else 1
+        self.chunks = _CHUNKS_PER_THREAD * running.threads if by_chunk else 1
         self.arrays: dict[str, np.ndarray] = {}
         self._lay_out(_checked_worlds(world, len(self.seeds), learns))
         self.arrays |= (lasting := memory.lasting(self, table))
@@ -417,8 +416,10 @@ class Colony:
 
     def _advance(self, n: int) -> None:
         if self.schedule == "by_world":
-            self._launch(_WHOLE_TICKS, self._values(n))
+            self._launch("by_world", self._values(n))
             self.ticks += n
+        elif _has_team():
+            self._advance_by_team(n)
         else:
             self._advance_by_chunk(n)
         for rounds, row in zip(self.rounds, _LARGE, strict=True):
@@ -427,20 +428,22 @@ class Colony:
                 more, counter[:] = np.divmod(counter, _ROUND)
                 rounds += more
 
+    def _advance_by_team(self, n: int) -> None:
+        end = self.ticks + n
+        while self.ticks < end:
+            to_sort = self._sort_ants_at_times()
+            ticks = min(end - self.ticks, to_sort)
+            self.arrays["come"][:] = 0
+            self._launch("by_team", self._values(ticks))
+            self.ticks += ticks
+
     def _advance_by_chunk(self, n: int) -> None:
         rounds = self.training.planning_steps if self._plans_together else 0
         values = self._values()
         for _ in range(n):
-            if self.ticks % _TICKS_BETWEEN_SORTS == 0:
-                self._sort_ants()
-            worlds = self.arrays["worlds"]
-            running = worlds[WorldRow.RUNNING].copy()
-            self._launch("tick_phases", values)
-            for _ in range(rounds):
-                self._launch("planning_phases", values)
-            if self.ants_change or self.ends_at_delivery:
-                self._launch("last_phases", values)
-            worlds[WorldRow.TICKS] += running
+            self._sort_ants_at_times()
+            for phases in ("tick_phases", *["planning_phases"] * rounds, "last_phases"):
+                self._launch(phases, values)
             self.ticks += 1
 
     def end_episode(self) -> None:
@@ -625,6 +628,14 @@ class Colony:
         tables = self.arrays["q"].reshape(len(self.seeds), -1)
         checks.check_finite(tables, [self.training], self.seeds)
 
+    def _sort_ants_at_times(self) -> int:
+        """Sort the ants if it is time; the number of ticks until it is again."""
+        ticks = _STEPS_BETWEEN_SORTS // (len(self.seeds) * self.capacity)
+        ticks = max(_FEWEST_TICKS, min(_MOST_TICKS, ticks))
+        if self.ticks % ticks == 0:
+            self._sort_ants()
+        return ticks - self.ticks % ticks
+
     def _sort_ants(self) -> None:
         """Store the ants of a world about in the order of their cells: neighbours share caches.
 
@@ -644,7 +655,10 @@ class Colony:
         self.arrays["streams"][:] = self.arrays["streams"][order]
 
     def _launch(self, phases: str, values: dict[str, Any] | None = None) -> None:
-        """Do some phases of `kernels`, or whole ticks; `values` are those of `_values`."""
+        """Do some phases of `kernels`, or whole ticks "by_world" or "by_team".
+
+        `values` are those of `_values`.
+        """
         runtime.start()  # the caller may have reset Taichi, or forked
         values = self._values() if values is None else values
         if phases not in self._launches:
@@ -667,9 +681,13 @@ class Colony:
             self.food_changes,
         )
         kind = Arguments.type_of(values)
-        if phases == _WHOLE_TICKS:
-            return Launch(kernels.by_world(variant, kind))
+        if phases in ("by_world", "by_team"):
+            return Launch(getattr(kernels, phases)(variant, kind))
         return Launch(kernels.by_chunk(variant, getattr(kernels, phases), kind))
+
+    def _members(self) -> int:
+        """How many threads share the work of a tick now: those that run, and have a processor."""
+        return min(runtime.start().threads, runtime.available_threads(), self.chunks)
 
     def _values(self, n_ticks: int = 1) -> dict[str, Any]:
         """All arrays and numbers of the kernels, which pass `n_ticks` at a time by world."""
@@ -684,6 +702,7 @@ class Colony:
             "n_ants": self.ants,  # that start an episode
             "n_slots": self.capacity,
             "n_chunks": self.chunks,
+            "n_members": self._members(),
             "n_homes": self.n_homes,  # room for homes in each world
             "size": self.grid.size,
             "length": self.length,
@@ -714,6 +733,11 @@ class Colony:
             "floats_by_8": memory.floats // 8,  # see the runs' `engine`
             "integers_by_8": memory.integers // 8,
         }
+
+
+def _has_team() -> bool:
+    """Whether threads can wait for each other, see `kernels.by_team`."""
+    return runtime.start().arch == "cpu"
 
 
 def _checked_worlds(

@@ -1,13 +1,15 @@
-"""The kernels of a colony: the phases of a tick, in order, under two schedules.
+"""The kernels of a colony: the phases of a tick, in order, under three schedules.
 
-Many small worlds: one task a world, all ticks and phases in turn inside it. Few large worlds: each
-phase a parallel loop over chunks, which are ranges of the ants, or of the cells, of one world. Both
-do the same phases in the same order, so that they give the same numbers. The order is that of
-`taichi_ants.reference.ReferenceColony.tick`.
+Many small worlds: one task a world, all ticks and phases in turn inside it. Few large worlds: all
+threads share each phase by chunks, which are ranges of the ants, or of the cells, of one world. On
+the CPU they do so as a team, which stays together for some ticks; else each phase is a parallel
+loop. All schedules do the same phases in the same order, so that they give the same numbers. The
+order is that of `taichi_ants.reference.ReferenceColony.tick`.
 """
 
 from collections.abc import Callable, Iterator
 from functools import cache
+from itertools import chain
 from typing import Any, NamedTuple
 
 import taichi as ti
@@ -139,7 +141,7 @@ def last_phases(v: Variant) -> Iterator[Phase]:
     """What ends a tick."""
     if v.ants_change:
         yield Phase(ANTS, life.retire)
-    yield Phase(WORLD, life.stop_at_delivery)
+    yield Phase(WORLD, life.end_tick)
 
 
 @ti.func
@@ -171,20 +173,26 @@ def share_of(c: ti.template(), chunk, n):
     return first, ti.min(first + each, n)
 
 
+def shared_out(phases: Iterator[Phase]) -> list[tuple[Phase, ...]]:
+    """Phases in groups that threads can go through without waiting for each other.
+
+    Phases of whole worlds that follow each other are a group: one thread does all of a world's.
+    """
+    groups: list[tuple[Phase, ...]] = []
+    for phase in phases:
+        if groups and phase.of == groups[-1][0].of == WORLD:
+            groups[-1] += (phase,)
+        else:
+            groups.append((phase,))
+    return groups
+
+
 @cache
 def by_chunk(
     v: Variant, phases_of: Callable[[Variant], Iterator[Phase]], arguments: Any
 ) -> Callable[..., None]:
-    """A kernel of some phases, each a parallel loop over chunks or worlds.
-
-    Phases of whole worlds that follow each other share a loop, since loops take a while to begin.
-    """
-    loops: list[tuple[Phase, ...]] = []
-    for phase in phases_of(v):
-        if loops and phase.of == loops[-1][0].of == WORLD:
-            loops[-1] += (phase,)
-        else:
-            loops.append((phase,))
+    """A kernel of some phases, each a parallel loop over chunks or worlds."""
+    loops = shared_out(phases_of(v))
 
     @ti.kernel
     def advance_colony(c: arguments):
@@ -210,15 +218,58 @@ def by_world(v: Variant, arguments: Any) -> Callable[..., None]:
         ti.loop_config(block_dim=1)
         for w in range(c.n_worlds):
             for _ in range(c.n_ticks):
-                if c.worlds[WorldRow.RUNNING, w] == 1:
-                    for phase in ti.static(phases):
-                        do(phase, c, v, w)
-                    if ti.static(v.plans_together):
-                        for _round in range(c.planning_steps):
-                            for phase in ti.static(planning):
-                                do(phase, c, v, w)
-                    for phase in ti.static(last):
-                        do(phase, c, v, w)
-                    c.worlds[WorldRow.TICKS, w] = c.worlds[WorldRow.TICKS, w] + 1
+                for phase in ti.static(phases):
+                    do(phase, c, v, w)
+                if ti.static(v.plans_together):
+                    for _round in range(c.planning_steps):
+                        for phase in ti.static(planning):
+                            do(phase, c, v, w)
+                for phase in ti.static(last):
+                    do(phase, c, v, w)
+
+    return advance_colony
+
+
+@cache
+def by_team(v: Variant, arguments: Any) -> Callable[..., None]:
+    """A kernel of whole ticks, `n_ticks` of them, in which threads share the work of each phase.
+
+    To begin a parallel loop takes 20 to 200 microseconds, since threads are woken for it and put to
+    sleep behind it. Here there is one for all ticks. The threads are a team of `n_members`, each
+    with its share of the chunks, and a thread that is done with a phase looks again and again
+    whether the others are. There must be as many threads as members, or they wait for ever.
+    """
+    groups, planning = shared_out(tick_phases(v)), shared_out(planning_phases(v))
+    last = shared_out(last_phases(v))
+    if not v.plans_together:
+        groups, last = shared_out(chain(tick_phases(v), last_phases(v))), []
+
+    @ti.func
+    def share(group: ti.template(), c: ti.template(), member, meetings):
+        """Do a member's share of some phases, wait for the others, and count the meeting."""
+        n = c.n_worlds if ti.static(group[0].of == WORLD) else c.n_worlds * c.n_chunks
+        for chunk in range(n * member // c.n_members, n * (member + 1) // c.n_members):
+            for phase in ti.static(group):
+                do(phase, c, v, chunk)
+        if c.n_members > 1:
+            come = ti.atomic_add(c.come[0], 1) + 1
+            while come < (meetings + 1) * c.n_members:
+                come = ti.atomic_add(c.come[0], 0)  # a mere read could be done once for all
+        return meetings + 1
+
+    @ti.kernel
+    def advance_colony(c: arguments):
+        ti.loop_config(block_dim=1)
+        for member in range(c.n_members):
+            meetings = ti.cast(0, ti.i64)
+            for _ in range(c.n_ticks):
+                for group in ti.static(groups):
+                    meetings = share(group, c, member, meetings)
+                if ti.static(v.plans_together):
+                    for _round in range(c.planning_steps):
+                        for group in ti.static(planning):
+                            meetings = share(group, c, member, meetings)
+                for group in ti.static(last):
+                    meetings = share(group, c, member, meetings)
 
     return advance_colony

@@ -200,7 +200,8 @@ def retire(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 
 
 @ti.func
-def stop_at_delivery(c: ti.template(), v: ti.template(), w, tick):
-    """End the episode of a world, if it is one that ends so."""
+def end_tick(c: ti.template(), v: ti.template(), w, tick):
+    """Count the tick, and end the episode of a world at its delivery, if it is one that ends so."""
+    c.worlds[WorldRow.TICKS, w] = tick + 1
     if c.ends_at_delivery == 1 and c.worlds[WorldRow.DELIVERIES, w] > 0:
         c.worlds[WorldRow.RUNNING, w] = 0

@@ -353,14 +353,15 @@ def step_ahead(c: ti.template(), ant):
 def event_of(c: ti.template(), v: ti.template(), base, ant, clock):
     """The event of a move that succeeds; a cell with an ant is a lure if it is the better one."""
     action, percept = trait(c, AntRow.ACTION, ant), trait(c, AntRow.PERCEPT, ant)
+    event = move_event(code_in_view(percept, ti.min(action, RIGHT)))
     here = base + c.ants[AntRow.CELL, ant]
     ahead = here + step_ahead(c, ant)
-    rises = level_of(c, v, ahead, clock) > level_of(c, v, here, clock)
-    nearer = ti.cast(c.closer[here], ti.i32) >> trait(c, AntRow.HEADING, ant) & 1 == 1
-    better = ti.select(trait(c, AntRow.CARRIES, ant) == 1, nearer, rises)
-    onto_ant = ti.select(better, ENTERED_LURE, ENTERED_EMPTY)
-    onto_ground = move_event(code_in_view(percept, ti.min(action, RIGHT)))
-    return ti.select(had_ant(c, ahead), onto_ant, onto_ground)
+    if had_ant(c, ahead):  # seldom, so that few trails are read
+        rises = level_of(c, v, ahead, clock) > level_of(c, v, here, clock)
+        nearer = ti.cast(c.closer[here], ti.i32) >> trait(c, AntRow.HEADING, ant) & 1 == 1
+        better = ti.select(trait(c, AntRow.CARRIES, ant) == 1, nearer, rises)
+        event = ti.select(better, ENTERED_LURE, ENTERED_EMPTY)
+    return event
 
 
 @ti.func
@@ -370,25 +371,29 @@ def settle(c: ti.template(), v: ti.template(), base, ant, cell, wanted, carries,
     It moves on an empty way; or, with food, it changes places with the ant in its way; or it gives
     way to an ant with food that wins its cell; or it stays.
     """
-    enters, follower = False, entering(c, base, cell)
-    event, goes, filled = FAILED, cell, 0
-    if moves and wanted != cell:
+    # Conditions one inside the other: Taichi works out both sides of an `and`.
+    enters, event, goes, filled = False, FAILED, cell, 0
+    if moves & (wanted != cell):
         enters = way_is_free(c, v, base, cell, wanted)
         if ti.static(v.traffic.follow):
-            filled = ti.cast(enters and follower >= 0, ti.i32)
+            filled = ti.cast(enters and entering(c, base, cell) >= 0, ti.i32)
         if ti.static(v.traffic.swap):
-            if not enters and carries == 1 and gives_way(c, v, base, wanted):
-                enters, filled = True, 1
+            if not enters:
+                if carries == 1:
+                    if gives_way(c, v, base, wanted):
+                        enters, filled = True, 1
         if enters:
             goes, event = wanted, trait(c, AntRow.EVENT, ant)
     if ti.static(v.traffic.swap):
-        if not enters and follower >= 0:
-            if c.wants[base + follower] & HAS_FOOD != 0 and gives_way(c, v, base, cell):
-                goes, filled, event = follower, PUSHES, ENTERED_EMPTY
-                if ti.static(v.traffic.grant):
-                    if moves and cell + step_ahead(c, ant) == follower:
-                        enters, filled = True, 1
-                        event = trait(c, AntRow.EVENT, ant)
+        if not enters:
+            follower = entering(c, base, cell)
+            if follower >= 0:
+                if c.wants[base + follower] & HAS_FOOD != 0 and gives_way(c, v, base, cell):
+                    goes, filled, event = follower, PUSHES, ENTERED_EMPTY
+                    if ti.static(v.traffic.grant):
+                        if moves & (cell + step_ahead(c, ant) == follower):
+                            enters, filled = True, 1
+                            event = trait(c, AntRow.EVENT, ant)
     return goes, filled, event, enters
 
 
