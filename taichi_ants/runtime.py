@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import gc
 import io
+import math
 import os
 import threading
 from collections.abc import Iterator
@@ -21,6 +22,12 @@ from taichi_ants.errors import AntsError, check_one_of, checked_whole
 
 ARCHITECTURES = ("cpu", "cuda")
 MAX_THREADS = 1024
+
+# What tells a quota and the period that it is for: cgroups of version 2, or of version 1.
+_QUOTAS = (
+    ("/sys/fs/cgroup/cpu.max",),
+    ("/sys/fs/cgroup/cpu/cpu.cfs_quota_us", "/sys/fs/cgroup/cpu/cpu.cfs_period_us"),
+)
 
 # Taichi compiles and launches for one thread at a time; environments of several threads hold this.
 alone = threading.RLock()
@@ -37,10 +44,20 @@ class Runtime:
 
 
 def available_threads() -> int:
-    """The number of CPU threads that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    """The number of CPU threads that this process may use; in a container, how much time it has."""
+    n = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return min(n, _quota())
+
+
+def _quota() -> int:
+    """How many processors' time Linux grants to this container, at least 1."""
+    for files in _QUOTAS:
+        with contextlib.suppress(OSError, ValueError):
+            words = " ".join(Path(name).read_text() for name in files).split()
+            quota, period = map(float, words)
+            if quota > 0:
+                return max(1, math.ceil(quota / period))
+    return MAX_THREADS
 
 
 def start(threads: int | None = None, arch: str | None = None) -> Runtime:

@@ -357,10 +357,32 @@ def test_architectures():
         runtime.start(arch="metal")
 
 
-def test_threads_are_those_that_this_process_may_use():
+def test_threads_are_those_that_this_process_may_use(monkeypatch):
+    monkeypatch.setattr(runtime, "_QUOTAS", ())
     if hasattr(os, "sched_getaffinity"):
         assert runtime.available_threads() == len(os.sched_getaffinity(0))
     assert runtime.available_threads() >= 1
+
+
+@pytest.mark.parametrize(
+    ("contents", "threads"),
+    [
+        (["150000 100000\n"], 2),
+        (["100000 100000\n"], 1),
+        (["50000\n", "100000\n"], 1),  # half a processor
+        (["max 100000\n"], 64),  # no quota
+        (["-1\n", "100000\n"], 64),
+        (["?"], 64),
+        ([], 64),
+    ],
+)
+def test_a_container_grants_time(contents, threads, monkeypatch, tmp_path):
+    names = [str(tmp_path / str(k)) for k in range(max(1, len(contents)))]
+    for name, text in zip(names, contents, strict=False):
+        Path(name).write_text(text)
+    monkeypatch.setattr(runtime, "_QUOTAS", (names,))
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: range(64), raising=False)
+    assert runtime.available_threads() == threads
 
 
 def test_writable_folders(tmp_path):

@@ -101,9 +101,10 @@ def test_edits_keep_colony_and_reference_equal(kernel):
 
 
 def test_schedules_do_not_matter_to_edits(monkeypatch):
-    """Chunks of 7 ants; where no slot is vacant, these are sorted now and then."""
-    monkeypatch.setattr(colony_module, "_ANTS_PER_CHUNK", 7)
-    monkeypatch.setattr(colony_module, "_TICKS_BETWEEN_SORTS", 2)
+    """Many chunks; where no slot is vacant, ants are sorted now and then."""
+    monkeypatch.setattr(colony_module, "_CHUNKS_PER_THREAD", 8)
+    for name in ("_FEWEST_TICKS", "_MOST_TICKS"):  # between two sorts
+        monkeypatch.setattr(colony_module, name, 2)
     world, training = worlds.open_world(5, (9, 8, 7)), TrainingConfig("sarsa", 0.2, 0.9, 0.4, 0.9)
     hands = []
     for schedule in ("by_world", "by_chunk"):

@@ -46,13 +46,13 @@ Progress = Callable[[float], None]
 Sharing = Literal["shared", "own", "fixed"]
 SHARINGS: tuple[str, ...] = get_args(Sharing)
 
-_LARGE_COLONY = 16_384  # slots from which ants, not worlds, are handed to threads
-# Every chunk has sums of its own, which are to stay in a cache; and threads take turns.
-_CHUNKS_PER_THREAD, _ANTS_PER_CHUNK = 4, 32_768
-_MOST_CHUNKS = 256
+# Slots from which ants, not worlds, are handed to threads: of a single world, and of each of many.
+_LARGE_ALONE, _LARGE_COLONY = 2048, 16_384
+_CHUNKS_PER_THREAD = 2
 # Ants are sorted once they have taken so many steps together, but not too seldom nor too often.
 _STEPS_BETWEEN_SORTS, _FEWEST_TICKS, _MOST_TICKS = 2_500_000, 16, 256
 _PIECE_SECONDS = 0.4
+_ANTS = ("ants", "traits")  # the arrays that kernels know row by row
 # Kernels count moves in 32 bits, which 10 000 ants fill in 200 000 ticks; so these counters begin
 # anew after so many, and what comes of a piece of ticks is far less.
 _LARGE = (WorldRow.MOVES, WorldRow.BLOCKED)
@@ -205,7 +205,8 @@ class Colony:
         life = self.task.life
         self.ants_change = life.births or life.lifespan is not None
         self.food_changes = life.regrowth is not None or life.wander is not None
-        usual = "by_chunk" if self.capacity >= _LARGE_COLONY else "by_world"
+        large = self.capacity >= (_LARGE_ALONE if len(self.seeds) == 1 else _LARGE_COLONY)
+        usual = "by_chunk" if large else "by_world"
         self.schedule = usual if schedule is None else schedule
         check_one_of("schedule", self.schedule, ("by_world", "by_chunk"))
         by_chunk = self.schedule == "by_chunk"
@@ -216,6 +217,7 @@ class Colony:
         # The names of those that a file needs to hold.
         self.stored = (*self._changing, *lasting)
         self._launches: dict[str, Any] = {}  # of kernels, by their phases
+        self._known_rows: dict[str, np.ndarray] = {}
         self._piece = 1  # ticks that take less than _PIECE_SECONDS
         self.epsilon, self.learning_rate = self.training.epsilon, self.training.learning_rate
         self.length = 0  # of the episode in ticks, 0 if nobody has said
@@ -415,36 +417,28 @@ class Colony:
             yield
 
     def _advance(self, n: int) -> None:
+        end = self.ticks + n
         if self.schedule == "by_world":
             self._launch("by_world", self._values(n))
-            self.ticks += n
-        elif _has_team():
-            self._advance_by_team(n)
-        else:
-            self._advance_by_chunk(n)
+            self.ticks = end
+        while self.ticks < end:
+            self._advance_by_chunk(min(end - self.ticks, self._sort_ants_at_times()))
         for rounds, row in zip(self.rounds, _LARGE, strict=True):
             counter = self.arrays["worlds"][row]
             if counter.max() >= _ROUND:
                 more, counter[:] = np.divmod(counter, _ROUND)
                 rounds += more
 
-    def _advance_by_team(self, n: int) -> None:
-        end = self.ticks + n
-        while self.ticks < end:
-            to_sort = self._sort_ants_at_times()
-            ticks = min(end - self.ticks, to_sort)
-            self.arrays["come"][:] = 0
-            self._launch("by_team", self._values(ticks))
-            self.ticks += ticks
-
     def _advance_by_chunk(self, n: int) -> None:
-        rounds = self.training.planning_steps if self._plans_together else 0
-        values = self._values()
-        for _ in range(n):
-            self._sort_ants_at_times()
-            for phases in ("tick_phases", *["planning_phases"] * rounds, "last_phases"):
+        values = self._values(n)
+        if _has_team():
+            self.arrays["come"][:] = 0
+            self._launch("by_team", values)
+        else:
+            rounds = self.training.planning_steps if self._plans_together else 0
+            for phases in ("tick_phases", *["planning_phases"] * rounds, "last_phases") * n:
                 self._launch(phases, values)
-            self.ticks += 1
+        self.ticks += n
 
     def end_episode(self) -> None:
         """Keep the streams of the ants that start an episode; epsilon and learning rate decay.
@@ -581,7 +575,7 @@ class Colony:
 
     def __getstate__(self) -> dict[str, Any]:
         """All but what belongs to the Taichi that runs: copies and pickles go on alike."""
-        return {**vars(self), "_launches": {}, "_learner": None}
+        return {**vars(self), "_launches": {}, "_known_rows": {}, "_learner": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
@@ -691,7 +685,23 @@ class Colony:
 
     def _values(self, n_ticks: int = 1) -> dict[str, Any]:
         """All arrays and numbers of the kernels, which pass `n_ticks` at a time by world."""
-        return {**self._numbers(), "n_ticks": n_ticks, **self.arrays}
+        arrays = {name: one for name, one in self.arrays.items() if name not in _ANTS}
+        return {**self._numbers(), "n_ticks": n_ticks, **arrays, **self._rows()}
+
+    def _rows(self) -> dict[str, np.ndarray]:
+        """The rows of `AntRow` that there are, by the names that they have in kernels.
+
+        The same views for each launch, which has to tell Taichi of others.
+        """
+        tables = [self.arrays[name] for name in _ANTS]
+        if not self._known_rows or self._known_rows["cell"].base is not tables[0]:
+            firsts = (AntRow.CELL, FIRST_TRAIT)
+            self._known_rows = {
+                AntRow(first + row).name.lower(): table[row]
+                for table, first in zip(tables, firsts, strict=True)
+                for row in range(len(table))
+            }
+        return self._known_rows
 
     def _numbers(self) -> dict[str, Any]:
         """What kernels know besides arrays; -1 stands for an option that is off."""

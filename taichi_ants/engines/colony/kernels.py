@@ -16,7 +16,7 @@ import taichi as ti
 
 from taichi_ants.engines import looks
 from taichi_ants.engines.colony import learning, life, steps, trail
-from taichi_ants.engines.colony.layout import STANDS, AntRow, Stage, WorldRow
+from taichi_ants.engines.colony.layout import STANDS, Stage, WorldRow
 from taichi_ants.engines.trial import tried
 from taichi_ants.learners.memory import read_rates
 from taichi_ants.learners.registry import Learner
@@ -155,7 +155,7 @@ def do(phase: ti.template(), c: ti.template(), v: ti.template(), chunk):
         first, last = share_of(c, chunk, c.n_slots)
         last = ti.min(last, c.worlds[WorldRow.TOP, w]) * running
         for ant in range(w * c.n_slots + first, w * c.n_slots + last):
-            if steps.trait(c, AntRow.STAGE, ant) != Stage.VACANT:
+            if steps.trait(c.stage, ant) != Stage.VACANT:
                 phase.do(c, v, w, chunk, ant, tick)
     elif ti.static(phase.of == CELLS):
         first, last = share_of(c, chunk, c.size)

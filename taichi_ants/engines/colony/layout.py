@@ -11,7 +11,8 @@ class AntRow(IntEnum):
     """What is known of an ant: rows of `ants` (int32), then of `traits` (int8); columns are slots.
 
     What is small and used in each tick lies in `traits`, a quarter as much for memory to move. Rows
-    that a colony does not use, at the end of either table, are left out.
+    that a colony does not use, at the end of either table, are left out. Kernels know each row as
+    an array of its own, by its name in small letters.
     """
 
     CELL = 0
@@ -67,7 +68,7 @@ class WorldRow(IntEnum):
 
 
 class Tally(IntEnum):
-    """Columns of `tallies`, one row for each chunk: counted in a tick."""
+    """What is counted in a tick: `tallies` has TALLY_WIDTH numbers for each chunk, these first."""
 
     RETURNS = 0
     DELIVERIES = auto()
@@ -76,7 +77,7 @@ class Tally(IntEnum):
     DEATHS = auto()
 
 
-# Columns that there are, so that no two chunks share a line of a cache: threads would fight for it.
+# Wide enough that no two chunks share a line of a cache: threads would fight for it.
 TALLY_WIDTH = 16
 
 

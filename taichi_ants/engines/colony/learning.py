@@ -8,7 +8,7 @@ in turn towards one target would give. Every chunk of ants sums for itself; noth
 
 import taichi as ti
 
-from taichi_ants.engines.colony.layout import AntRow, Stage, SumRow
+from taichi_ants.engines.colony.layout import Stage, SumRow
 from taichi_ants.engines.colony.steps import (
     draw_action,
     observe,
@@ -43,9 +43,9 @@ def see_anew(c: ti.template(), v: ti.template(), w, ant, clock):
 @ti.func
 def note_look(c: ti.template(), v: ti.template(), ant, percept, row):
     """Note what an ant has seen."""
-    put(c, AntRow.PERCEPT, ant, percept)
+    put(c.percept, ant, percept)
     if ti.static(not v.sees_percept):
-        c.ants[AntRow.STATE, ant] = row
+        c.state[ant] = row
 
 
 @ti.func
@@ -59,8 +59,8 @@ def begin(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 @ti.func
 def look(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Between two ticks an ant sees what a hand has changed; one that it has put there begins."""
-    if trait(c, AntRow.STAGE, ant) == Stage.NEWBORN:
-        put(c, AntRow.STAGE, ant, Stage.LIVING)
+    if trait(c.stage, ant) == Stage.NEWBORN:
+        put(c.stage, ant, Stage.LIVING)
         if ti.static(v.alone):
             forget(c, v, ant)
     see_anew(c, v, w, ant, tick * c.evaporates)
@@ -71,10 +71,10 @@ def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Observe, choose the next action where the learner asks for it, and learn."""
     percept, row = observe(c, v, w, ant, (tick + 1) * c.evaporates)
     next_action = -1
-    if trait(c, AntRow.STAGE, ant) != Stage.NEWBORN:
-        c.wants[w * c.size + c.ants[AntRow.WANT, ant]] = 0
+    if trait(c.stage, ant) != Stage.NEWBORN:
+        c.wants[w * c.size + c.want[ant]] = 0
         if ti.static(v.draws_next_action):
-            if terminates(c, trait(c, AntRow.EVENT, ant)) == 0:
+            if terminates(c, trait(c.event, ant)) == 0:
                 c.streams[ant] = advance(c.streams[ant])
                 next_action = draw_action(c, v, w, ant, row, c.streams[ant])
         if ti.static(v.alone):
@@ -82,7 +82,7 @@ def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         elif ti.static(v.together):
             share_error(c, v, w, chunk, ant, row, next_action)
     note_look(c, v, ant, percept, row)
-    put(c, AntRow.ACTION, ant, next_action)
+    put(c.action, ant, next_action)
 
 
 @ti.func
@@ -122,13 +122,13 @@ def forget(c: ti.template(), v: ti.template(), ant):
 def learn_alone(c: ti.template(), v: ti.template(), ant, seen, next_action, tick):
     """Update the ant's own table, as an ant that is alone does."""
     memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
-    event = trait(c, AntRow.EVENT, ant)
+    event = trait(c.event, ant)
     terminated = terminates(c, event)
-    last = trait(c, AntRow.STAGE, ant) == Stage.DYING or tick + 1 == c.length
+    last = trait(c.stage, ant) == Stage.DYING or tick + 1 == c.length
     last = last or (c.ends_at_delivery == 1 and event == DELIVERED)
     step = Transition(
         state=row_seen(c, v, ant),
-        action=trait(c, AntRow.ACTION, ant),
+        action=trait(c.action, ant),
         reward=ti.cast(c.rewards[event], ti.f32),
         next_state=seen,
         next_action=next_action,
@@ -168,14 +168,14 @@ def error_of(
 @ti.func
 def share_error(c: ti.template(), v: ti.template(), w, chunk, ant, seen, next_action):
     """Add the TD error of an ant to the sums of its chunk, and what it saw."""
-    event = trait(c, AntRow.EVENT, ant)
+    event = trait(c.event, ant)
     reward, terminated = ti.cast(c.rewards[event], ti.f32), terminates(c, event)
-    pair = row_seen(c, v, ant) * ROW + trait(c, AntRow.ACTION, ant)
+    pair = row_seen(c, v, ant) * ROW + trait(c.action, ant)
     error = error_of(c, v, w, pair, reward, terminated, seen, next_action)
     add_to_sums(c, v, chunk, pair, error, fixed(error), 1)
     if ti.static(v.learner.plans):
         outcome = pack_outcome(seen, reward, terminated)
-        note_outcome(c, v.n_pairs * chunk + pair, c.ants[AntRow.NUMBER, ant], outcome)
+        note_outcome(c, v.n_pairs * chunk + pair, c.number[ant], outcome)
 
 
 @ti.func
@@ -281,7 +281,7 @@ def apply_sums(c: ti.template(), v: ti.template(), w):
 @ti.func
 def draw_pair(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """One planning draw of an ant: count an update of a visited pair."""
-    if trait(c, AntRow.STAGE, ant) != Stage.NEWBORN:
+    if trait(c.stage, ant) != Stage.NEWBORN:
         memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
         at = memory_of(c, v, w)
         drawn, c.streams[ant] = draw_below(c.streams[ant], visited(memory, at))

@@ -7,7 +7,14 @@ serially; there is little to do in a tick.
 import taichi as ti
 from taichi.math import popcnt
 
-from taichi_ants.engines.colony.layout import ANT_GROUND, AntRow, HomeRow, Stage, Tally, WorldRow
+from taichi_ants.engines.colony.layout import (
+    ANT_GROUND,
+    TALLY_WIDTH,
+    HomeRow,
+    Stage,
+    Tally,
+    WorldRow,
+)
 from taichi_ants.engines.colony.learning import forget
 from taichi_ants.engines.colony.steps import put, tally, trait
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_BORN
@@ -29,15 +36,16 @@ def count(c: ti.template(), v: ti.template(), w, tick):
     """Add up what the chunks have counted since this was done last."""
     gives = 0
     for chunk in range(w * c.n_chunks, (w + 1) * c.n_chunks):
-        c.returns[w] += c.tallies[chunk, Tally.RETURNS]
-        gives += ti.cast(c.tallies[chunk, Tally.DELIVERIES], ti.i32)
-        c.worlds[WorldRow.MOVES, w] += ti.cast(c.tallies[chunk, Tally.MOVES], ti.i32)
-        c.worlds[WorldRow.BLOCKED, w] += ti.cast(c.tallies[chunk, Tally.BLOCKED], ti.i32)
-        deaths = ti.cast(c.tallies[chunk, Tally.DEATHS], ti.i32)
+        first = chunk * TALLY_WIDTH
+        deaths = ti.cast(c.tallies[first + Tally.DEATHS], ti.i32)
+        gives += ti.cast(c.tallies[first + Tally.DELIVERIES], ti.i32)
+        c.returns[w] += c.tallies[first + Tally.RETURNS]
+        c.worlds[WorldRow.MOVES, w] += ti.cast(c.tallies[first + Tally.MOVES], ti.i32)
+        c.worlds[WorldRow.BLOCKED, w] += ti.cast(c.tallies[first + Tally.BLOCKED], ti.i32)
         c.worlds[WorldRow.DEATHS, w] += deaths
         c.worlds[WorldRow.LIVING, w] -= deaths
         for row in ti.static(range(len(Tally))):
-            c.tallies[chunk, row] = 0
+            c.tallies[first + row] = 0
     c.worlds[WorldRow.DELIVERIES, w] += gives
     c.worlds[WorldRow.STORE, w] += gives * c.births
     if gives > 0 and c.worlds[WorldRow.FIRST_DELIVERY, w] < 0:
@@ -65,7 +73,7 @@ def give_birth(c: ti.template(), v: ti.template(), w, tick):
         k, c.queen_streams[w] = draw_below(c.queen_streams[w], popcnt(free))
         heading = bit_number(free, k)
         slot = c.worlds[WorldRow.FIRST_VACANT, w]
-        while trait(c, AntRow.STAGE, w * c.n_slots + slot) != Stage.VACANT:
+        while trait(c.stage, w * c.n_slots + slot) != Stage.VACANT:
             slot += 1
         c.worlds[WorldRow.FIRST_VACANT, w] = slot + 1
         c.worlds[WorldRow.TOP, w] = ti.max(c.worlds[WorldRow.TOP, w], slot + 1)
@@ -80,13 +88,13 @@ def give_birth(c: ti.template(), v: ti.template(), w, tick):
 def place_newborn(c: ti.template(), w, ant, cell, heading):
     """Fill a slot and a cell with a new ant."""
     number = c.worlds[WorldRow.NEXT_NUMBER, w]
-    c.ants[AntRow.CELL, ant] = cell
-    put(c, AntRow.HEADING, ant, heading)
-    put(c, AntRow.CARRIES, ant, 0)
-    c.ants[AntRow.CARRIED, ant] = 0  # the last ant in the slot may have died with food
-    put(c, AntRow.STAGE, ant, Stage.NEWBORN)
-    c.ants[AntRow.AGE, ant] = 0
-    c.ants[AntRow.NUMBER, ant] = number
+    c.cell[ant] = cell
+    put(c.heading, ant, heading)
+    put(c.carries, ant, 0)
+    c.carried[ant] = 0  # the last ant in the slot may have died with food
+    put(c.stage, ant, Stage.NEWBORN)
+    c.age[ant] = 0
+    c.number[ant] = number
     born = ti.cast(c.episodes[w], ti.u64) << ti.u64(32) | ti.cast(number, ti.u64)
     c.streams[ant] = stream_of(c.seeds[w], STREAM_BORN, born)
     c.ground[w * c.size + cell] = ANT_GROUND
@@ -98,13 +106,13 @@ def place_newborn(c: ti.template(), w, ant, cell, heading):
 @ti.func
 def grow_old(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Age by one tick; at the end of its life an ant leaves its cell, and its food there."""
-    if c.lifespan > 0 and trait(c, AntRow.STAGE, ant) == Stage.LIVING:
-        c.ants[AntRow.AGE, ant] = c.ants[AntRow.AGE, ant] + 1
-        if c.ants[AntRow.AGE, ant] >= c.lifespan:
-            put(c, AntRow.STAGE, ant, Stage.DYING)
+    if c.lifespan > 0 and trait(c.stage, ant) == Stage.LIVING:
+        c.age[ant] = c.age[ant] + 1
+        if c.age[ant] >= c.lifespan:
+            put(c.stage, ant, Stage.DYING)
             tally(c, Tally.DEATHS, chunk, 1)
-            left_behind = ti.select(trait(c, AntRow.CARRIES, ant) == 1, FOOD, EMPTY)
-            c.ground[w * c.size + c.ants[AntRow.CELL, ant]] = ti.cast(left_behind, ti.u8)
+            left_behind = ti.select(trait(c.carries, ant) == 1, FOOD, EMPTY)
+            c.ground[w * c.size + c.cell[ant]] = ti.cast(left_behind, ti.u8)
 
 
 @ti.func
@@ -190,13 +198,13 @@ def can_move(c: ti.template(), w, home, step):
 @ti.func
 def retire(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """At the end of the tick the dead leave their slots, and the newborn are ants."""
-    if trait(c, AntRow.STAGE, ant) == Stage.NEWBORN:
-        put(c, AntRow.STAGE, ant, Stage.LIVING)
-    elif trait(c, AntRow.STAGE, ant) == Stage.DYING:
-        put(c, AntRow.STAGE, ant, Stage.VACANT)
+    if trait(c.stage, ant) == Stage.NEWBORN:
+        put(c.stage, ant, Stage.LIVING)
+    elif trait(c.stage, ant) == Stage.DYING:
+        put(c.stage, ant, Stage.VACANT)
         ti.atomic_min(c.worlds[WorldRow.FIRST_VACANT, w], ant - w * c.n_slots)
-        if c.ants[AntRow.NUMBER, ant] < c.n_ants:
-            c.first_streams[w * c.n_slots + c.ants[AntRow.NUMBER, ant]] = c.streams[ant]
+        if c.number[ant] < c.n_ants:
+            c.first_streams[w * c.n_slots + c.number[ant]] = c.streams[ant]
 
 
 @ti.func

@@ -245,7 +245,7 @@ def constants(colony: Colony) -> dict[str, np.ndarray]:
         "spare": np.zeros_like(colony.arrays["level"]),  # the next levels, with diffusion
         # How often threads have come to a meeting of their team.
         "come": np.zeros(1, np.int64),
-        "tallies": np.zeros((chunks, TALLY_WIDTH), np.int64),
+        "tallies": np.zeros(chunks * TALLY_WIDTH, np.int64),
         # By chunk and pair: fixed-point sums of TD errors, the last error, and see SumRow.
         "sums": np.zeros(sums, np.int64),
         "errors": np.zeros(sums, np.float32),

@@ -17,15 +17,14 @@ from taichi.math import popcnt
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
     ENTER,
-    FIRST_TRAIT,
     HAS_FOOD,
     MARK,
     PUSHES,
     STANDS,
     TAKE,
     TAKES_FOOD,
+    TALLY_WIDTH,
     WINS,
-    AntRow,
     HomeRow,
     Tally,
 )
@@ -73,21 +72,24 @@ from taichi_ants.task.rules.vision import (
 
 
 @ti.func
-def trait(c: ti.template(), row, ant):
+def trait(column: ti.template(), ant):
     """One of the small numbers of an ant, as i32."""
-    return ti.cast(c.traits[row - FIRST_TRAIT, ant], ti.i32)
+    return ti.cast(column[ant], ti.i32)
 
 
 @ti.func
-def put(c: ti.template(), row, ant, value):
+def put(column: ti.template(), ant, value):
     """Write down one of the small numbers of an ant."""
-    c.traits[row - FIRST_TRAIT, ant] = ti.cast(value, ti.i8)
+    column[ant] = ti.cast(value, ti.i8)
 
 
 @ti.func
 def row_seen(c: ti.template(), v: ti.template(), ant):
     """The row of its table that an ant looks at."""
-    return trait(c, AntRow.PERCEPT, ant) if ti.static(v.sees_percept) else c.ants[AntRow.STATE, ant]
+    row = trait(c.percept, ant)
+    if ti.static(not v.sees_percept):
+        row = c.state[ant]
+    return row
 
 
 @ti.func
@@ -107,14 +109,14 @@ def observe(c: ti.template(), v: ti.template(), w, ant, clock):
 @ti.func
 def see(c: ti.template(), v: ti.template(), w, ant, clock):
     """The percept alone, without what only other observations need."""
-    heading, here = trait(c, AntRow.HEADING, ant), w * c.size + c.ants[AntRow.CELL, ant]
+    heading, here = trait(c.heading, ant), w * c.size + c.cell[ant]
     left = here + step_towards(c.compass, heading, LEFT)
     forward = here + step_towards(c.compass, heading, FORWARD)
     right = here + step_towards(c.compass, heading, RIGHT)
     ground_left, ground_forward = looks_of(c.ground[left]), looks_of(c.ground[forward])
     ground_right = looks_of(c.ground[right])
     percept = 0
-    if trait(c, AntRow.CARRIES, ant) == 1:
+    if trait(c.carries, ant) == 1:
         nearer = nearer_from(c.closer[here], heading)
         percept = percept_carrying(ground_left, ground_forward, ground_right, nearer)
     else:
@@ -141,9 +143,9 @@ def strongest_of(c: ti.template(), v: ti.template(), left, forward, right, clock
 @ti.func
 def look_around(c: ti.template(), v: ti.template(), w, ant, clock):
     """All that the ant can look at."""
-    heading, here = trait(c, AntRow.HEADING, ant), w * c.size + c.ants[AntRow.CELL, ant]
+    heading, here = trait(c.heading, ant), w * c.size + c.cell[ant]
     nearer = nearer_from(c.closer[here], heading)
-    look = v.look_type(carries=trait(c, AntRow.CARRIES, ant), own_level=level_of(c, v, here, clock))
+    look = v.look_type(carries=trait(c.carries, ant), own_level=level_of(c, v, here, clock))
     cells = ti.static(v.observation.cells)
     for k in ti.static(range(len(cells))):
         place = here + step_around(c.compass, heading, cells[k])
@@ -200,13 +202,13 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 
     Hardly a branch: what the next ant does cannot be predicted from what this one did.
     """
-    action, percept = trait(c, AntRow.ACTION, ant), trait(c, AntRow.PERCEPT, ant)
-    cell, carries = c.ants[AntRow.CELL, ant], trait(c, AntRow.CARRIES, ant)
+    action, percept = trait(c.action, ant), trait(c.percept, ant)
+    cell, carries = c.cell[ant], trait(c.carries, ant)
     random_state = c.streams[ant]
     if action < 0:
         random_state = advance(random_state)
         action = draw_action(c, v, w, ant, row_seen(c, v, ant), random_state)
-    heading = turned_by(c.compass, trait(c, AntRow.HEADING, ant), action)
+    heading = turned_by(c.compass, trait(c.heading, ant), action)
     ahead = cell + step_towards(c.compass, heading, FORWARD)
     enters = is_open(code_in_view(percept, ti.min(action, RIGHT)))
     if ti.static(v.traffic.shared):
@@ -223,9 +225,9 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         wanted = cell + step_towards(c.compass, heading, position)
         mark = TAKE + (heading + position + N_HEADINGS - 1) % N_HEADINGS
     c.streams[ant] = random_state
-    put(c, AntRow.HEADING, ant, heading)
-    put(c, AntRow.ACTION, ant, action)
-    c.ants[AntRow.WANT, ant] = wanted
+    put(c.heading, ant, heading)
+    put(c.action, ant, action)
+    c.want[ant] = wanted
     if ti.static(v.traffic.shared):
         mark |= ti.select(carries == 1, HAS_FOOD, 0) | ti.select(mark >= TAKE, TAKES_FOOD, 0)
     c.wants[w * c.size + cell] = ti.cast(mark, ti.u8)
@@ -251,11 +253,11 @@ def resolve(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 
     A move is judged before any ant lays a trail.
     """
-    base, cell, wanted = w * c.size, c.ants[AntRow.CELL, ant], c.ants[AntRow.WANT, ant]
+    base, cell, wanted = w * c.size, c.cell[ant], c.want[ant]
     won = prevails(c, v, base, cell, wanted, tick)
     c.wants[base + cell] = c.wants[base + cell] | ti.cast(ti.select(won, WINS, 0), ti.u8)
-    c.ants[AntRow.WANT, ant] = ti.select(won, wanted, cell)
-    put(c, AntRow.EVENT, ant, event_of(c, v, base, ant, tick * c.evaporates))
+    c.want[ant] = ti.select(won, wanted, cell)
+    put(c.event, ant, event_of(c, v, base, ant, tick * c.evaporates))
 
 
 @ti.func
@@ -346,20 +348,20 @@ def gives_way(c: ti.template(), v: ti.template(), base, cell):
 @ti.func
 def step_ahead(c: ti.template(), ant):
     """The index step to the cell before an ant."""
-    return step_towards(c.compass, trait(c, AntRow.HEADING, ant), FORWARD)
+    return step_towards(c.compass, trait(c.heading, ant), FORWARD)
 
 
 @ti.func
 def event_of(c: ti.template(), v: ti.template(), base, ant, clock):
     """The event of a move that succeeds; a cell with an ant is a lure if it is the better one."""
-    action, percept = trait(c, AntRow.ACTION, ant), trait(c, AntRow.PERCEPT, ant)
+    action, percept = trait(c.action, ant), trait(c.percept, ant)
     event = move_event(code_in_view(percept, ti.min(action, RIGHT)))
-    here = base + c.ants[AntRow.CELL, ant]
+    here = base + c.cell[ant]
     ahead = here + step_ahead(c, ant)
     if had_ant(c, ahead):  # seldom, so that few trails are read
         rises = level_of(c, v, ahead, clock) > level_of(c, v, here, clock)
-        nearer = ti.cast(c.closer[here], ti.i32) >> trait(c, AntRow.HEADING, ant) & 1 == 1
-        better = ti.select(trait(c, AntRow.CARRIES, ant) == 1, nearer, rises)
+        nearer = ti.cast(c.closer[here], ti.i32) >> trait(c.heading, ant) & 1 == 1
+        better = ti.select(trait(c.carries, ant) == 1, nearer, rises)
         event = ti.select(better, ENTERED_LURE, ENTERED_EMPTY)
     return event
 
@@ -383,7 +385,7 @@ def settle(c: ti.template(), v: ti.template(), base, ant, cell, wanted, carries,
                     if gives_way(c, v, base, wanted):
                         enters, filled = True, 1
         if enters:
-            goes, event = wanted, trait(c, AntRow.EVENT, ant)
+            goes, event = wanted, trait(c.event, ant)
     if ti.static(v.traffic.swap):
         if not enters:
             follower = entering(c, base, cell)
@@ -393,7 +395,7 @@ def settle(c: ti.template(), v: ti.template(), base, ant, cell, wanted, carries,
                     if ti.static(v.traffic.grant):
                         if moves & (cell + step_ahead(c, ant) == follower):
                             enters, filled = True, 1
-                            event = trait(c, AntRow.EVENT, ant)
+                            event = trait(c.event, ant)
     return goes, filled, event, enters
 
 
@@ -401,16 +403,16 @@ def settle(c: ti.template(), v: ti.template(), base, ant, cell, wanted, carries,
 def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Do what is won: move, take, give, deposit."""
     base, clock = w * c.size, tick * c.evaporates
-    action, percept = trait(c, AntRow.ACTION, ant), trait(c, AntRow.PERCEPT, ant)
-    cell, wanted = c.ants[AntRow.CELL, ant], c.ants[AntRow.WANT, ant]
-    carries, heading = trait(c, AntRow.CARRIES, ant), trait(c, AntRow.HEADING, ant)
+    action, percept = trait(c.action, ant), trait(c.percept, ant)
+    cell, wanted = c.cell[ant], c.want[ant]
+    carries, heading = trait(c.carries, ant), trait(c.heading, ant)
     moves = action <= RIGHT
     goes, filled, event, enters = cell, 0, FAILED, False
     takes = False
     if ti.static(v.traffic.shared):
         goes, filled, event, enters = settle(c, v, base, ant, cell, wanted, carries, moves)
         takes = not moves and wanted != cell
-        put(c, AntRow.FILLED, ant, filled)
+        put(c.filled, ant, filled)
     else:
         won = prevails(c, v, base, cell, wanted, tick)
         enters, takes = won & moves, won & (not moves)
@@ -418,30 +420,30 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         event = ti.select(enters, move_event(code_in_view(percept, ti.min(action, RIGHT))), FAILED)
     if filled == 0:
         c.ground[base + cell] = EMPTY
-    c.ants[AntRow.WANT, ant] = cell  # where its mark is
+    c.want[ant] = cell  # where its mark is
     if carries == 1:
-        carried = c.ants[AntRow.CARRIED, ant]
+        carried = c.carried[ant]
         if goes != cell:
             deposit(c, v, base + goes, clock, carried)
         elif action == GIVE and goals_in_view(percept) != 0:
             event, carries, carried = DELIVERED, 0, -1
-            put(c, AntRow.CARRIES, ant, 0)
+            put(c.carries, ant, 0)
             if c.turns_at_queen == 1:
-                put(c, AntRow.HEADING, ant, turn_round(heading))
+                put(c.heading, ant, turn_round(heading))
             tally(c, Tally.DELIVERIES, chunk, 1)
-        c.ants[AntRow.CARRIED, ant] = carried + 1
+        c.carried[ant] = carried + 1
     elif takes:
         event, carries = PICKED_UP, 1
-        put(c, AntRow.CARRIES, ant, 1)
-        c.ants[AntRow.CARRIED, ant] = 1
+        put(c.carries, ant, 1)
+        c.carried[ant] = 1
         c.ground[base + wanted] = EMPTY
         take_from_home(c, base + wanted, tick)
         deposit(c, v, base + wanted, clock, 0)
         deposit(c, v, base + cell, clock, 0)
-        put(c, AntRow.HEADING, ant, turn_round(heading))
+        put(c.heading, ant, turn_round(heading))
     c.ground[base + goes] = ground_under(carries) if ti.static(v.sees_ants) else ANT_GROUND
-    c.ants[AntRow.CELL, ant] = goes
-    put(c, AntRow.EVENT, ant, event)
+    c.cell[ant] = goes
+    put(c.event, ant, event)
     tally(c, Tally.MOVES, chunk, ti.cast(moves, ti.i32))
     tally(c, Tally.BLOCKED, chunk, ti.cast(moves & (not enters), ti.i32))
     tally(c, Tally.RETURNS, chunk, c.rewards[event])
@@ -450,7 +452,7 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 @ti.func
 def tally(c: ti.template(), row, chunk, n):
     """Count in a chunk, whose ants one thread moves; `+=` would be atomic, which takes longer."""
-    c.tallies[chunk, row] = c.tallies[chunk, row] + n
+    c.tallies[chunk * TALLY_WIDTH + row] = c.tallies[chunk * TALLY_WIDTH + row] + n
 
 
 @ti.func

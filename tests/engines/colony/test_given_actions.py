@@ -57,8 +57,8 @@ def assert_same(one: Colony, other: Colony) -> None:
     "task", [pytest.param(LIVELY, marks=pytest.mark.slow), Task()], ids=["births", "paper"]
 )
 def test_threads_and_schedules_give_the_same(task, monkeypatch):
-    """Chunks of 7 ants; without births the ants of a chunk would be sorted."""
-    monkeypatch.setattr(colony_module, "_ANTS_PER_CHUNK", 7)
+    """Many chunks; without births ants would be sorted, if nobody gave their actions by slot."""
+    monkeypatch.setattr(colony_module, "_CHUNKS_PER_THREAD", 8)
     expected = pass_ticks(begun(threads=1, task=task))
     assert expected.arrays["worlds"][WorldRow.TICKS].tolist() == [40, 32, 28]
     assert expected.arrays["episodes"].tolist() == [0, 1, 0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from taichi_ants import Colony, TrainingConfig, train, worlds
+from taichi_ants import Colony, TrainingConfig, runtime, train, worlds
 from taichi_ants.engines.colony import colony
 from taichi_ants.engines.colony.layout import AntRow
 from taichi_ants.task import Life, Pheromone, Task
@@ -38,13 +38,45 @@ def assert_same(first: dict, second: dict) -> None:
 
 
 def test_threads_and_schedules_give_the_same(monkeypatch):
-    """Chunks of 7 ants, so that 16 chunks of a world compute sums that are joined."""
-    monkeypatch.setattr(colony, "_ANTS_PER_CHUNK", 7)
+    """Sixteen chunks of a world for two threads, so that their sums are joined."""
+    monkeypatch.setattr(colony, "_CHUNKS_PER_THREAD", 8)
     expected = history(threads=1)
     assert_same(expected, history(threads=1, schedule="by_chunk"))
     # Another number of threads starts Taichi anew.
     for schedule in ("by_world", "by_chunk"):
         assert_same(expected, history(threads=2, schedule=schedule))
+    monkeypatch.setattr(colony, "_has_team", lambda: False)  # as on a GPU
+    assert_same(expected, history(threads=2, schedule="by_chunk"))
+
+
+def test_a_team_has_no_more_members_than_there_are_threads():
+    """A member without a thread would be waited for without end."""
+    ants = Colony(meadow(), LIVELY, TRAINING, 3, ants=30, threads=2, schedule="by_chunk")
+    ants.begin_episode()
+    ants.tick(3)
+    for threads in (1, 8, 2):  # somebody starts Taichi anew; eight are more than processors
+        train(worlds.paper(), TRAINING, 1, episodes=1, max_steps=5, threads=threads)
+        assert ants._members() <= min(threads, runtime.available_threads())
+        ants.tick(3)
+    assert ants.ticks == 12
+
+
+def test_processors_that_are_taken_away_leave_the_team(monkeypatch):
+    ants = Colony(meadow(), LIVELY, TRAINING, 3, ants=30, threads=2, schedule="by_chunk")
+    monkeypatch.setattr(runtime, "available_threads", lambda: 1)
+    ants.begin_episode()
+    ants.tick(3)
+    assert ants._members() == 1
+
+
+def test_a_single_world_has_a_team_from_fewer_ants_on():
+    world = worlds.open_world(1, (35, 35, 35))
+    for n, seeds, schedule in (
+        (2047, 1, "by_world"),
+        (2048, 1, "by_chunk"),
+        (2048, (1, 2), "by_world"),
+    ):
+        assert Colony(world, None, TRAINING, seeds, ants=n).schedule == schedule
 
 
 def test_a_colony_does_not_feel_its_neighbours():
