@@ -23,6 +23,7 @@ from taichi_ants.engines.colony.layout import (
     Stage,
     WorldRow,
 )
+from taichi_ants.engines.colony.team import Team
 from taichi_ants.engines.packing import padded
 from taichi_ants.engines.records import Record
 from taichi_ants.errors import (
@@ -218,6 +219,7 @@ class Colony:
         self.stored = (*self._changing, *lasting)
         self._launches: dict[str, Any] = {}  # of kernels, by their phases
         self._known_rows: dict[str, np.ndarray] = {}
+        self._team = Team()
         self._piece = 1  # ticks that take less than _PIECE_SECONDS
         self.epsilon, self.learning_rate = self.training.epsilon, self.training.learning_rate
         self.length = 0  # of the episode in ticks, 0 if nobody has said
@@ -419,25 +421,36 @@ class Colony:
     def _advance(self, n: int) -> None:
         end = self.ticks + n
         if self.schedule == "by_world":
-            self._launch("by_world", self._values(n))
-            self.ticks = end
+            self._pass_in_kernel("by_world", n)
         while self.ticks < end:
-            self._advance_by_chunk(min(end - self.ticks, self._sort_ants_at_times()))
+            self._share_ticks(min(end - self.ticks, self._sort_ants_at_times()))
         for rounds, row in zip(self.rounds, _LARGE, strict=True):
             counter = self.arrays["worlds"][row]
             if counter.max() >= _ROUND:
                 more, counter[:] = np.divmod(counter, _ROUND)
                 rounds += more
 
-    def _advance_by_chunk(self, n: int) -> None:
-        values = self._values(n)
-        if _has_team():
-            self.arrays["come"][:] = 0
-            self._launch("by_team", values)
-        else:
+    def _share_ticks(self, n: int) -> None:
+        """Let up to n ticks pass, each shared by all threads."""
+        running = runtime.start()
+        if not _can_wait(running):
             rounds = self.training.planning_steps if self._plans_together else 0
-            for phases in ("tick_phases", *["planning_phases"] * rounds, "last_phases") * n:
-                self._launch(phases, values)
+            for phases in ("tick_phases", *["planning_phases"] * rounds, "last_phases"):
+                self._launch(phases)
+            self.ticks += 1
+            return
+        most = min(running.threads, runtime.available_threads(), self.chunks)
+        n, members = self._team.plan(n, most)
+        compiled, began = "by_team" in self._launches, time.perf_counter()
+        self._pass_in_kernel("by_team", n, members)
+        if compiled:
+            self._team.took(members, (time.perf_counter() - began) / n)
+
+    def _pass_in_kernel(self, name: str, n: int, members: int = 1) -> None:
+        """Let n ticks pass in a kernel of whole ticks."""
+        self.arrays["orders"][:] = n, members
+        self.arrays["come"][:] = 0
+        self._launch(name)
         self.ticks += n
 
     def end_episode(self) -> None:
@@ -648,13 +661,10 @@ class Colony:
             row[:] = row[order]
         self.arrays["streams"][:] = self.arrays["streams"][order]
 
-    def _launch(self, phases: str, values: dict[str, Any] | None = None) -> None:
-        """Do some phases of `kernels`, or whole ticks "by_world" or "by_team".
-
-        `values` are those of `_values`.
-        """
+    def _launch(self, phases: str) -> None:
+        """Do some phases of `kernels`, or whole ticks "by_world" or "by_team"."""
         runtime.start()  # the caller may have reset Taichi, or forked
-        values = self._values() if values is None else values
+        values = self._values()
         if phases not in self._launches:
             self._launches[phases] = self._prepared(phases, values)
         self._launches[phases](values)
@@ -679,14 +689,10 @@ class Colony:
             return Launch(getattr(kernels, phases)(variant, kind))
         return Launch(kernels.by_chunk(variant, getattr(kernels, phases), kind))
 
-    def _members(self) -> int:
-        """How many threads share the work of a tick now: those that run, and have a processor."""
-        return min(runtime.start().threads, runtime.available_threads(), self.chunks)
-
-    def _values(self, n_ticks: int = 1) -> dict[str, Any]:
-        """All arrays and numbers of the kernels, which pass `n_ticks` at a time by world."""
+    def _values(self) -> dict[str, Any]:
+        """All arrays and numbers of the kernels."""
         arrays = {name: one for name, one in self.arrays.items() if name not in _ANTS}
-        return {**self._numbers(), "n_ticks": n_ticks, **arrays, **self._rows()}
+        return {**self._numbers(), **arrays, **self._rows()}
 
     def _rows(self) -> dict[str, np.ndarray]:
         """The rows of `AntRow` that there are, by the names that they have in kernels.
@@ -712,7 +718,6 @@ class Colony:
             "n_ants": self.ants,  # that start an episode
             "n_slots": self.capacity,
             "n_chunks": self.chunks,
-            "n_members": self._members(),
             "n_homes": self.n_homes,  # room for homes in each world
             "size": self.grid.size,
             "length": self.length,
@@ -745,9 +750,9 @@ class Colony:
         }
 
 
-def _has_team() -> bool:
-    """Whether threads can wait for each other, see `kernels.by_team`."""
-    return runtime.start().arch == "cpu"
+def _can_wait(running: runtime.Runtime) -> bool:
+    """Whether threads can wait for each other, as in `kernels.by_team`: not on a GPU."""
+    return running.arch == "cpu"
 
 
 def _checked_worlds(

@@ -16,7 +16,7 @@ import taichi as ti
 
 from taichi_ants.engines import looks
 from taichi_ants.engines.colony import learning, life, steps, trail
-from taichi_ants.engines.colony.layout import STANDS, Stage, WorldRow
+from taichi_ants.engines.colony.layout import STANDS, Order, Stage, WorldRow
 from taichi_ants.engines.trial import tried
 from taichi_ants.learners.memory import read_rates
 from taichi_ants.learners.registry import Learner
@@ -209,7 +209,7 @@ def by_chunk(
 
 @cache
 def by_world(v: Variant, arguments: Any) -> Callable[..., None]:
-    """A kernel of whole ticks, `n_ticks` of them, of worlds with a single chunk each."""
+    """A kernel of whole ticks, as many as ordered, of worlds with a single chunk each."""
     phases, last = tuple(tick_phases(v)), tuple(last_phases(v))
     planning = tuple(planning_phases(v))
 
@@ -217,7 +217,7 @@ def by_world(v: Variant, arguments: Any) -> Callable[..., None]:
     def advance_colony(c: arguments):
         ti.loop_config(block_dim=1)
         for w in range(c.n_worlds):
-            for _ in range(c.n_ticks):
+            for _ in range(c.orders[Order.TICKS]):
                 for phase in ti.static(phases):
                     do(phase, c, v, w)
                 if ti.static(v.plans_together):
@@ -232,12 +232,12 @@ def by_world(v: Variant, arguments: Any) -> Callable[..., None]:
 
 @cache
 def by_team(v: Variant, arguments: Any) -> Callable[..., None]:
-    """A kernel of whole ticks, `n_ticks` of them, in which threads share the work of each phase.
+    """A kernel of whole ticks, as many as ordered, in which threads share the work of each phase.
 
     To begin a parallel loop takes 20 to 200 microseconds, since threads are woken for it and put to
-    sleep behind it. Here there is one for all ticks. The threads are a team of `n_members`, each
-    with its share of the chunks, and a thread that is done with a phase looks again and again
-    whether the others are. There must be as many threads as members, or they wait for ever.
+    sleep behind it. Here there is one for all ticks. Its threads are a team: each member has its
+    share of the chunks, and when it is done with a phase it looks again and again whether the
+    others are. There must be as many threads as members, or they wait for ever.
     """
     groups, planning = shared_out(tick_phases(v)), shared_out(planning_phases(v))
     last = shared_out(last_phases(v))
@@ -245,31 +245,31 @@ def by_team(v: Variant, arguments: Any) -> Callable[..., None]:
         groups, last = shared_out(chain(tick_phases(v), last_phases(v))), []
 
     @ti.func
-    def share(group: ti.template(), c: ti.template(), member, meetings):
+    def share(group: ti.template(), c: ti.template(), member, members, meetings):
         """Do a member's share of some phases, wait for the others, and count the meeting."""
         n = c.n_worlds if ti.static(group[0].of == WORLD) else c.n_worlds * c.n_chunks
-        for chunk in range(n * member // c.n_members, n * (member + 1) // c.n_members):
+        for chunk in range(n * member // members, n * (member + 1) // members):
             for phase in ti.static(group):
                 do(phase, c, v, chunk)
-        if c.n_members > 1:
+        if members > 1:
             come = ti.atomic_add(c.come[0], 1) + 1
-            while come < (meetings + 1) * c.n_members:
+            while come < (meetings + 1) * members:
                 come = ti.atomic_add(c.come[0], 0)  # a mere read could be done once for all
         return meetings + 1
 
     @ti.kernel
     def advance_colony(c: arguments):
         ti.loop_config(block_dim=1)
-        for member in range(c.n_members):
-            meetings = ti.cast(0, ti.i64)
-            for _ in range(c.n_ticks):
+        for member in range(c.orders[Order.MEMBERS]):
+            members, meetings = c.orders[Order.MEMBERS], ti.cast(0, ti.i64)
+            for _ in range(c.orders[Order.TICKS]):
                 for group in ti.static(groups):
-                    meetings = share(group, c, member, meetings)
+                    meetings = share(group, c, member, members, meetings)
                 if ti.static(v.plans_together):
                     for _round in range(c.planning_steps):
                         for group in ti.static(planning):
-                            meetings = share(group, c, member, meetings)
+                            meetings = share(group, c, member, members, meetings)
                 for group in ti.static(last):
-                    meetings = share(group, c, member, meetings)
+                    meetings = share(group, c, member, members, meetings)
 
     return advance_colony

@@ -81,6 +81,13 @@ class Tally(IntEnum):
 TALLY_WIDTH = 16
 
 
+class Order(IntEnum):
+    """Places in `orders`: what a launch is told."""
+
+    TICKS = 0  # how many are to pass
+    MEMBERS = auto()  # threads that share the work of a tick, see `kernels.by_team`
+
+
 class HomeRow(IntEnum):
     """Rows of `homes`, one column for each food of the start: where it lies, or grows back."""
 

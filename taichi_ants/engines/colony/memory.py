@@ -13,6 +13,7 @@ from taichi_ants.engines.colony.layout import (
     TALLY_WIDTH,
     AntRow,
     HomeRow,
+    Order,
     Stage,
     SumRow,
     WorldRow,
@@ -243,7 +244,8 @@ def constants(colony: Colony) -> dict[str, np.ndarray]:
         # What the ant on a cell wants, see `layout`.
         "wants": np.zeros(cells, np.uint8),
         "spare": np.zeros_like(colony.arrays["level"]),  # the next levels, with diffusion
-        # How often threads have come to a meeting of their team.
+        "orders": np.ones(len(Order), np.int32),
+        # How often members of a team have come to a meeting.
         "come": np.zeros(1, np.int64),
         "tallies": np.zeros(chunks * TALLY_WIDTH, np.int64),
         # By chunk and pair: fixed-point sums of TD errors, the last error, and see SumRow.

@@ -7,7 +7,8 @@ import pytest
 
 from taichi_ants import Colony, TrainingConfig, runtime, train, worlds
 from taichi_ants.engines.colony import colony
-from taichi_ants.engines.colony.layout import AntRow
+from taichi_ants.engines.colony.layout import AntRow, Order
+from taichi_ants.engines.colony.team import Team
 from taichi_ants.task import Life, Pheromone, Task
 
 LIVELY = Task(
@@ -16,6 +17,11 @@ LIVELY = Task(
     life=Life(births=True, lifespan=60, regrowth=2, wander=9),
 )
 TRAINING = TrainingConfig("dyna_q", 0.2, 0.9, 0.4, 0.9, planning_steps=2)
+
+
+def all_of_them(team: Team, ticks: int, most: int) -> tuple[int, int]:
+    """A plan in which as many threads as there may be share all ticks."""
+    return ticks, most
 
 
 def meadow(seed: int = 5):
@@ -40,33 +46,45 @@ def assert_same(first: dict, second: dict) -> None:
 def test_threads_and_schedules_give_the_same(monkeypatch):
     """Sixteen chunks of a world for two threads, so that their sums are joined."""
     monkeypatch.setattr(colony, "_CHUNKS_PER_THREAD", 8)
+    monkeypatch.setattr(Team, "plan", all_of_them)
     expected = history(threads=1)
     assert_same(expected, history(threads=1, schedule="by_chunk"))
     # Another number of threads starts Taichi anew.
     for schedule in ("by_world", "by_chunk"):
         assert_same(expected, history(threads=2, schedule=schedule))
-    monkeypatch.setattr(colony, "_has_team", lambda: False)  # as on a GPU
+    monkeypatch.setattr(colony, "_can_wait", lambda running: False)  # as on a GPU
     assert_same(expected, history(threads=2, schedule="by_chunk"))
 
 
-def test_a_team_has_no_more_members_than_there_are_threads():
+def test_a_team_has_no_more_members_than_there_are_threads(monkeypatch):
     """A member without a thread would be waited for without end."""
+    monkeypatch.setattr(Team, "plan", all_of_them)
     ants = Colony(meadow(), LIVELY, TRAINING, 3, ants=30, threads=2, schedule="by_chunk")
     ants.begin_episode()
-    ants.tick(3)
-    for threads in (1, 8, 2):  # somebody starts Taichi anew; eight are more than processors
+    for threads in (2, 1, 8):  # somebody starts Taichi anew; eight are more than processors
         train(worlds.paper(), TRAINING, 1, episodes=1, max_steps=5, threads=threads)
-        assert ants._members() <= min(threads, runtime.available_threads())
         ants.tick(3)
-    assert ants.ticks == 12
-
-
-def test_processors_that_are_taken_away_leave_the_team(monkeypatch):
-    ants = Colony(meadow(), LIVELY, TRAINING, 3, ants=30, threads=2, schedule="by_chunk")
+        assert ants.arrays["orders"][Order.MEMBERS] == min(threads, runtime.available_threads(), 4)
     monkeypatch.setattr(runtime, "available_threads", lambda: 1)
-    ants.begin_episode()
     ants.tick(3)
-    assert ants._members() == 1
+    assert ants.arrays["orders"][Order.MEMBERS] == 1
+
+
+def test_who_is_faster_goes_on():
+    """Others that use the processors delay a team more than one thread."""
+    team, ticks, alone = Team(), 0, []
+    paces = {4: 1.0, 1: 3.0}
+    for launch in range(90):
+        if launch == 40:  # the processors are busy from now on
+            paces[4] = 7.0
+        n, members = team.plan(80, 4)
+        assert (n, members) in ((80, 1), (10, 1), (80, 4), (10, 4))
+        team.took(members, paces[members])
+        alone.append(n if members == 1 else 0)
+        ticks += n
+    assert 0 < sum(alone[:40]) < 0.02 * 80 * 40
+    assert sum(alone[50:]) > 0.9 * 80 * 35
+    assert Team().plan(80, 1) == (80, 1)
 
 
 def test_a_single_world_has_a_team_from_fewer_ants_on():
@@ -156,4 +174,4 @@ def test_a_saved_colony_goes_on_bit_for_bit(tmp_path):
         one.end_episode()
         one.run(1, 30)
     assert again == ants
-    assert_same(ants.arrays, again.arrays)
+    assert_same({name: ants.arrays[name] for name in ants.stored}, again.arrays)
