@@ -10,7 +10,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import astuple, dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -25,6 +24,7 @@ from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.registry import Learner
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS
+from taichi_ants.worlds.starts import first_starts
 from taichi_ants.worlds.world import World
 
 Progress = Callable[[float], None]  # called with the share of the work that is done, 0 to 1
@@ -173,7 +173,9 @@ class Launcher:
         from taichi_ants.engines.runs.kernels import run_kernel
         from taichi_ants.engines.runs.step import EXTRA_CELLS
 
-        self._runs, self._start, self._arguments = runs, cache(world.start), Arguments()
+        self._runs, self._arguments = runs, Arguments()
+        words = np.array([seed % 2**64 for seed in runs.seeds.tolist()], dtype=np.uint64)
+        self._cells, self._headings = first_starts(world, words)
         self.cells_of_a_run = world.grid.size + EXTRA_CELLS
         learns, pheromone = runs.learner is not None, task.pheromone
         self._kernel = run_kernel(
@@ -188,17 +190,17 @@ class Launcher:
     def launch(self, some: slice, episodes: slice, **arrays: Any) -> None:
         """Do some episodes of some runs; what comes out is written into the arrays."""
         runs, state = self._runs, self._runs.state
-        starts = np.array([self._start(seed) for seed in runs.seeds[some].tolist()])
+        start_cells = self._cells[some]
         values = {
-            "n_runs": len(starts),
+            "n_runs": len(start_cells),
             "n_episodes": episodes.stop - episodes.start,
-            "start_cells": starts[:, 0, 0].astype(np.int32),
-            "start_headings": starts[:, 1, 0].astype(np.int32),
+            "start_cells": start_cells,
+            "start_headings": self._headings[some],
             "settings": runs.settings[some].reshape(-1),
             "tables": state.q.shape[1],
             "floats_by_8": state.floats.shape[1] // 8,
             "integers_by_8": state.integers.shape[1] // 8,
-            "cells": np.empty(len(starts) * self.cells_of_a_run, np.int32),
+            "cells": np.empty(len(start_cells) * self.cells_of_a_run, np.int32),
             **{name: array[some].reshape(-1) for name, array in vars(state).items()},
             **arrays,
         }
