@@ -281,7 +281,7 @@ def test_kernels_are_told_only_what_has_changed(monkeypatch):
     assert sorted(told) == ["epsilon", "explore_below"]
 
 
-@pytest.mark.parametrize(("task", "most"), [(Task(), 44), (foraging(), 52)])
+@pytest.mark.parametrize(("task", "most"), [(Task(), 44), (foraging(), 49)])
 def test_an_ant_and_a_cell_take_few_bytes(task, most):
     """Of all that a colony keeps, with the start of an episode."""
 
