@@ -13,6 +13,7 @@ import os
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -46,12 +47,13 @@ class Runtime:
 def available_threads() -> int:
     """The number of CPU threads that this process may use; in a container, how much time it has."""
     n = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return min(n, _quota())
+    return min(n, _quota(_QUOTAS))
 
 
-def _quota() -> int:
+@cache
+def _quota(places: tuple[tuple[str, ...], ...]) -> int:
     """How many processors' time Linux grants to this container, at least 1."""
-    for files in _QUOTAS:
+    for files in places:
         with contextlib.suppress(OSError, ValueError):
             words = " ".join(Path(name).read_text() for name in files).split()
             quota, period = map(float, words)

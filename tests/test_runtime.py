@@ -377,7 +377,7 @@ def test_threads_are_those_that_this_process_may_use(monkeypatch):
     ],
 )
 def test_a_container_grants_time(contents, threads, monkeypatch, tmp_path):
-    names = [str(tmp_path / str(k)) for k in range(max(1, len(contents)))]
+    names = tuple(str(tmp_path / str(k)) for k in range(max(1, len(contents))))
     for name, text in zip(names, contents, strict=False):
         Path(name).write_text(text)
     monkeypatch.setattr(runtime, "_QUOTAS", (names,))
