@@ -170,11 +170,11 @@ def table(found: dict[tuple[str, int], np.ndarray], threads: int) -> Table:
     for (rules, n), paces in found.items():
         ratios = paces[:, 0] / paces[:, 1]
         shown = [figure(one) for one in np.median(paces, axis=0)]
-        spread = interval(ratios.min(), ratios.max())
+        spread = interval(ratios.min(), ratios.max(), 2)
         rows.append([rules, thousands(n), *shown, figure(np.median(ratios)), spread])
     columns = ["rules", "ants", "ours, M steps/s", "C", "ours to C", "lowest, highest"]
     rounds = len(next(iter(found.values())))
-    about = f"Medians of {rounds} rounds, {threads} threads. {machine(('taichi', 'numpy'))}"
+    about = f"Medians of {rounds} rounds, with {threads} threads. {machine(('taichi', 'numpy'))}"
     return Table("A colony beside C", columns, rows, [about], text_columns=1)
 
 
@@ -210,7 +210,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = Parser(__doc__.split("\n", 1)[0], epilog=__doc__.split("\n", 1)[1])
     add = parser.add_argument
     sizes = [10_000, 100_000, 1_000_000]
-    add("--ants", type=whole_number(1), nargs="+", default=sizes, metavar="N")
+    several = {"type": whole_number(1), "nargs": "+", "default": sizes, "metavar": "N"}
+    add("--ants", **several, help="in one world (default: 10000 100000 1000000)")
     add("--rounds", type=whole_number(1), default=5, metavar="N", help="measurements of each")
     add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
     add("--least", type=float, default=0.0, metavar="RATIO", help="fail below this ratio to C")

@@ -85,7 +85,14 @@ def main(arguments: list[str] | None = None) -> None:
     """The command line."""
     parser = Parser(__doc__)
     add = parser.add_argument
-    add("--num-envs", type=whole_number(1), nargs="+", default=[256, 4096, 65536], metavar="N")
+    add(
+        "--num-envs",
+        type=whole_number(1),
+        nargs="+",
+        default=[256, 4096, 65536],
+        metavar="N",
+        help="environments of a step (default: 256 4096 65536)",
+    )
     add("--rounds", type=whole_number(1), default=5, metavar="N", help="measurements of each")
     add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
     run_command(lambda: measure(**vars(parser.parse_args(arguments))))

@@ -234,7 +234,7 @@ def tables(found: Paces, memories: Sequence[Memory], rounds: int) -> list[Table]
         [f"a {one.of}" if one.of != "ant" else "an ant", *map(_whole, one[1:])] for one in memories
     ]
     columns = ["bytes for", "arrays that are kept", "the process at most"]
-    note = "Of a run beyond its outcomes, which are 12 bytes an episode."
+    note = "A run is counted without its outcomes, which take 12 bytes an episode."
     return [paces, Table("How memory grows", columns, bytes_each, [note])]
 
 

@@ -22,10 +22,10 @@ Work = Callable[[], int]  # does a piece of work, and gives the steps in it
 
 
 def machine(packages: Sequence[str]) -> str:
-    """Processor, threads and versions, of packages those that are installed."""
+    """Kind and number of processors, and versions, of packages those that are installed."""
     versions = [f"{name} {version(name)}" for name in packages if find_spec(name) is not None]
     return (
-        f"{_processor()}, {runtime.available_threads()} threads, {platform.system()}, "
+        f"{_processor()}, {runtime.available_threads()} processors, {platform.system()}, "
         f"Python {platform.python_version()}, {', '.join(versions)}."
     )
 

@@ -143,7 +143,7 @@ class Colony:
         threads: CPU threads; None keeps what runs, or takes all.
         arch: "cpu" or "cuda"; None keeps what runs, or takes the CPU.
         schedule: "by_world" hands worlds to threads, "by_chunk" groups of ants; None chooses by
-            size. Both give the same numbers.
+            size. Both give the same numbers; by chunk, ants are stored in another order.
 
     Raises:
         AntsError: An argument is not allowed; the learner needs what a colony, or a shared table,
