@@ -72,7 +72,7 @@ def test_a_team_has_no_more_members_than_there_are_threads(monkeypatch):
 
 def test_who_is_faster_goes_on():
     """Others that use the processors delay a team more than one thread."""
-    team, ticks, alone = Team(), 0, []
+    team, alone = Team(), []
     paces = {4: 1.0, 1: 3.0}
     for launch in range(90):
         if launch == 40:  # the processors are busy from now on
@@ -81,7 +81,6 @@ def test_who_is_faster_goes_on():
         assert (n, members) in ((80, 1), (10, 1), (80, 4), (10, 4))
         team.took(members, paces[members])
         alone.append(n if members == 1 else 0)
-        ticks += n
     assert 0 < sum(alone[:40]) < 0.02 * 80 * 40
     assert sum(alone[50:]) > 0.9 * 80 * 35
     assert Team().plan(80, 1) == (80, 1)
