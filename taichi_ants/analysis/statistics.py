@@ -31,7 +31,7 @@ TIE_TOLERANCE = 1e-9
 _BLOCK_ROWS = 256
 _SAMPLED = 32  # one in so many numbers tells where about a quantile lies
 _BLOCK_DRAWS = 4096
-_BLOCK_WEIGHTS = 1 << 22  # as float 32 MB
+_BLOCK_WEIGHTS = 1 << 19  # as float 4 MB, which caches hold
 _MOST_KEPT = 1 << 27  # weights, of a byte each
 
 

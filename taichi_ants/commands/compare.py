@@ -9,8 +9,9 @@ from __future__ import annotations
 import argparse
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from taichi_ants import World
     from taichi_ants.analysis.paper.comparison import Comparison
     from taichi_ants.analysis.paper.results import Results
+    from taichi_ants.rendering import Episode
     from taichi_ants.report.players import Seen
     from taichi_ants.studies.beside import Beside
     from taichi_ants.studies.runner import RunPoint, Study
@@ -186,6 +188,17 @@ def what_policies_do(
     return {n: np.concatenate(parts).reshape(q_values.shape[:2]) for n, parts in arrays.items()}
 
 
+def compile_kernels(points: Sequence[RunPoint], where: Mapping[str, Any]) -> None:
+    """Have all kernels ready before the first of them trains.
+
+    One thread compiles, and another process has its own to compile beside it at that time.
+    """
+    for point in {point.training.learner: point for point in points}.values():
+        short = replace(point, episodes=1, max_steps=1, rollouts=1)
+        outcome = short.do((short,), (0,), None, lambda share: None, where)
+        what_policies_do(short, (0,), outcome["q_values"])
+
+
 def measured(
     study: Study[RunPoint], folder: Path, threads: int | None, arch: str | None
 ) -> dict[str, Any]:
@@ -204,6 +217,7 @@ def measured(
         "policy_returns": np.empty(runs, np.int64),
     }
     with progress_bar("training") as progress:
+        compile_kernels(study.points, {"threads": threads, "arch": arch})
         besides = int((1 + _PACKED) * sum(rows.nbytes for rows in episodes.values()))
         for some, at, outcome in study.in_blocks(folder, threads, arch, progress, besides):
             for name, rows in episodes.items():
@@ -246,6 +260,7 @@ def write_policies(
     from taichi_ants import files, save_policy
     from taichi_ants.analysis.behaviour import BEHAVIOURS
     from taichi_ants.analysis.paper.best_of import example_name, examples
+    from taichi_ants.report.players import played
 
     animates = not (settings.no_figures or settings.quick)
     for place in (POLICIES, RENDERS) if animates else (POLICIES,):
@@ -268,32 +283,34 @@ def write_policies(
         if animates:
             title = f"{variant.label}, {point.task.delivery}"
             shown = folder / RENDERS / f"{path.stem}.gif"
-            asked = shown, point, tables[row, run], metadata, title
-            drawn.append(beside.begin(render_policy, *asked))
+            # The first of the lines beside the world says in words what the policy does.
+            episode = played(point, tables[row, run], study.seeds[run])
+            episode = replace(episode, name=metadata["behaviour"])
+            drawn.append(beside.begin(render_policy, shown, episode, title))
     return drawn
 
 
-def render_policy(
-    path: Path, point: RunPoint, q_values: np.ndarray, metadata: dict[str, Any], title: str
-) -> None:
-    """Show what a policy does; the first of the lines beside the world says it in words."""
-    from dataclasses import replace
-
+def render_policy(path: Path, episode: Episode, title: str) -> None:
+    """Show what a policy does."""
     from taichi_ants.rendering import PAUSE, frames, save_animation
-    from taichi_ants.report.players import played
 
-    episode = played(point, q_values, metadata["seed"])
-    episode = replace(episode, name=metadata["behaviour"])
     save_animation(path, frames(episode.moments(), SIZE, title=title), pause=PAUSE)
 
 
 def compare(settings: argparse.Namespace) -> None:
     """Run the comparison, or show the finished one."""
-    from taichi_ants.studies.result_folder import work_or_show
+    from taichi_ants.studies.beside import Beside
+    from taichi_ants.studies.result_folder import MANIFEST, work_or_show
 
-    study = build_study(settings)
-    work, page = partial(do_comparison, settings, study), partial(make_page, settings, study)
-    work_or_show(settings, study.settings(), work, page=page)
+    shows = not settings.no_figures
+    # Who asks for one thread wants the other processors for something else.
+    with Beside(shows and settings.threads != 1) as beside:
+        if not (settings.out / MANIFEST).exists():
+            beside.begin(import_module, "taichi_ants.report.players")  # this takes a while
+        study = build_study(settings)
+        work = partial(do_comparison, settings, study, beside)
+        page = partial(make_page, settings, study)
+        work_or_show(settings, study.settings(), work, page=page)
 
 
 def comparison_of(
@@ -327,16 +344,18 @@ def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draw
 
     from taichi_ants import runtime
     from taichi_ants.analysis import style
-    from taichi_ants.rendering import frames
-    from taichi_ants.report.players import played, player
+    from taichi_ants.rendering import colony_moments, frames
+    from taichi_ants.rendering.moments import colony_of_rollout
     from taichi_ants.task.constants import N_ACTIONS
+    from taichi_ants.viewer import record_colony
 
     if plugin:
         load_plugin(plugin)
     runtime.start(**where)
     nothing = np.zeros((point.task.n_states, N_ACTIONS), np.float32)
-    next(iter(frames(played(point, nothing, 0).moments(), SIZE)))
-    player(point, nothing, 0, "", "")
+    colony = colony_of_rollout(point.world, point.task, nothing)
+    next(frames(colony_moments(colony), SIZE))
+    record_colony(colony, 1)
     for kind in ("png", "svg") if draws else ():
         style.new_figure(1.0).savefig(io.BytesIO(), format=kind)
 
@@ -350,41 +369,33 @@ def draw_figures(comparison: Comparison, baselines: Sequence[Mapping], folder: P
 
 
 def do_comparison(
-    settings: argparse.Namespace, study: Study[RunPoint], blocks: Path, ready: Path
+    settings: argparse.Namespace, study: Study[RunPoint], beside: Beside, blocks: Path, ready: Path
 ) -> tuple[Results, Seen]:
     """Do what is not done yet, and write all results."""
     from concurrent.futures import ThreadPoolExecutor
 
     from taichi_ants import archives, files
-    from taichi_ants.analysis.bounds.baselines import BASELINE_COLUMNS, baseline_rows
+    from taichi_ants.analysis.bounds.baselines import BASELINE_COLUMNS, bound_rows, policy_rows
     from taichi_ants.analysis.paper.best_of import examples
     from taichi_ants.analysis.paper.results import Results
     from taichi_ants.engines.runs.training import evaluate
-    from taichi_ants.studies.beside import Beside
 
     where, first = {"threads": settings.threads, "arch": settings.arch}, study.points[0]
-    shows, quick = not settings.no_figures, settings.quick
-    # Who asks for one thread wants the other processors for something else.
-    with Beside(shows and settings.threads != 1) as beside, ThreadPoolExecutor() as threads:
-        beside.begin(rehearse, first, settings.plugin, where, quick)
-        bounds = beside.begin(
-            baseline_rows,
-            first.world,
-            first.task,
-            partial(evaluate, **where),
-            study.seeds,
-            ROLLOUTS,
-            tuple(dict.fromkeys(settings.discounts)),
-            first.max_steps,
-        )
+    world, task, steps, shows = first.world, first.task, first.max_steps, not settings.no_figures
+    discounts = tuple(dict.fromkeys(settings.discounts))
+    with ThreadPoolExecutor() as threads:
+        beside.begin(rehearse, first, settings.plugin, where, settings.quick)
+        bounds = beside.begin(bound_rows, world, task, discounts, steps)
         arrays = measured(study, blocks, **where)
-        comparison, baselines = comparison_of(settings, study, arrays), bounds()
+        comparison = comparison_of(settings, study, arrays)
+        follow = partial(evaluate, **where)
+        baselines = bounds() + policy_rows(world, task, follow, study.seeds, ROLLOUTS, steps)
         tables = study.of_runs(blocks, "q_values", examples(comparison))
         small = arrays | {name: files.smallest(arrays[name]) for name in _TOLD}
         packed = threads.submit(archives.write, ready / EPISODES, small)  # does without Python
-        # Beside this process there is time for the figures, unless there are animations.
-        draw = beside.begin if quick else partial
         animated = write_policies(settings, ready, study, comparison, tables, beside)
+        # Beside this process there is time for the figures, unless there are animations.
+        draw = beside.begin if settings.quick else partial
         drawn = [draw(draw_figures, comparison, baselines, ready / FIGURES)] if shows else []
         seen = see(settings, ready, study, comparison, baselines, beside.begin, draw)
         beside.finish()
@@ -392,7 +403,7 @@ def do_comparison(
         with progress_bar("statistics and pictures") as progress:
             results = Results.of(comparison, baselines)
             write_tables(ready, results)
-            waits = [*drawn, *animated, packed.result]
+            waits: list[Callable[[], Any]] = [*drawn, *animated, packed.result]
             for number, wait in enumerate(waits, start=1):
                 progress(number / (len(waits) + 1))
                 wait()

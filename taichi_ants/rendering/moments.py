@@ -98,13 +98,7 @@ class Episode:
 
     def moments(self) -> Iterator[Moment]:
         """The world before each step with what the ant is about to do, and the world at the end."""
-        # A colony of one ant does what the rollout did, since it has the same stream.
-        steady = TrainingConfig("q_learning", 1.0, 0.0, self.epsilon, 1.0, min_epsilon=0.0)
-        colony = Colony(
-            self.world, self.task, steady, self.seed, sharing="fixed", q_values=self.q_values
-        )
-        colony.begin_episode()
-        colony.arrays["streams"][0] = stream_state(self.seed, STREAM_ROLLOUT, 0)
+        colony = colony_of_rollout(self.world, self.task, self.q_values, self.epsilon, self.seed)
         returns = np.concatenate([[0], np.cumsum(self.trace.rewards)]).tolist()
         for step, gained in enumerate(returns):
             if step:
@@ -127,6 +121,22 @@ class Episode:
         low, high = float(trace.q_values.min(initial=0)), float(trace.q_values.max(initial=0))
         q_range = (low, high) if low < high else (0.0, 1.0)
         return Status(tuple(lines), state, self.q_values[state], action, q_range, observation)
+
+
+def colony_of_rollout(
+    world: World,
+    task: Task,
+    q_values: np.ndarray,
+    epsilon: float = 0.0,
+    seed: int = 0,
+    number: int = 0,
+) -> Colony:
+    """A colony of one ant that will do what it does in `rollout`, since it has the same stream."""
+    steady = TrainingConfig("q_learning", 1.0, 0.0, epsilon, 1.0, min_epsilon=0.0)
+    colony = Colony(world, task, steady, seed, sharing="fixed", q_values=q_values)
+    colony.begin_episode()
+    colony.arrays["streams"][0] = stream_state(seed, STREAM_ROLLOUT, number)
+    return colony
 
 
 def colony_moments(

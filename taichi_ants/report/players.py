@@ -72,6 +72,8 @@ def what_is_seen(
 ) -> Callable[[], tuple[list[Player], Picture | None]]:
     """A recording of each behaviour, and the sheet of a policy that delivers, if one does.
 
+    Ants are followed here, where the kernel for that is known; `begin` is for drawing.
+
     Args:
         policies: The folder of the examples' policies; those that it lacks are left out.
         study, comparison: What was done, and what came of it.
@@ -91,7 +93,8 @@ def what_is_seen(
         whose = f"{variant.label}, {point.task.delivery} delivery, seed {seed}"
         share = f"{thousands(done[code])} of {thousands(comparison.behaviours.size)}"
         words = f"{sentence(DEFINITIONS[code])}: {share} final policies. Here: {whose}."
-        recorded.append(begin(player, point, policy.q_values, seed, BEHAVIOURS[code], words))
+        episode = played(point, policy.q_values, seed)
+        recorded.append(begin(player, episode, BEHAVIOURS[code], words))
         if code == DELIVERS:
             title = f"{variant.label}: what it does"
             words = f"What an ant has learned: {whose}"
@@ -99,10 +102,9 @@ def what_is_seen(
     return lambda: ([one() for one in recorded], next((one() for one in sheets), None))
 
 
-def player(point: RunPoint, q_values: np.ndarray, seed: int, behaviour: str, words: str) -> Player:
+def player(episode: Episode, behaviour: str, words: str) -> Player:
     """A recording of what a policy does."""
-    recording = record_episode(played(point, q_values, seed), behaviour)
-    return Player(sentence(behaviour), words, recording)
+    return Player(sentence(behaviour), words, record_episode(episode, behaviour))
 
 
 def sheet(task: Task, q_values: np.ndarray, title: str, words: str) -> Picture:

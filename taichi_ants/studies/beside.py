@@ -43,10 +43,11 @@ class Beside:
         return self
 
     def __exit__(self, kind: object, *raised: object) -> None:
-        if self._process is not None and kind is not None:
+        failed = kind is not None
+        if self._process is not None and failed:
             self._process.kill()
-        self.finish()
-        self._turns.shutdown()
+        self._turns.shutdown(cancel_futures=failed)
+        self._leave()
         if self._process is not None:
             self._process.wait()  # it keeps the kernels that it has compiled
 
@@ -59,13 +60,14 @@ class Beside:
             A function that waits for what the call returns; it raises what the call raises.
         """
         here = partial(call, *arguments, **named)
-        try:
-            asked = _packed(here)
-            if self._second and self._process is None:
-                self._process = _started()
-        except Exception:  # the call cannot be sent, or nobody be started
+        if not self._second:
             return here
-        coming = self._turns.submit(self._ask, asked)
+        if self._process is None:
+            try:
+                self._process = _started()
+            except Exception:  # nobody can be started
+                return here
+        coming = self._turns.submit(self._ask, here)
 
         def answer() -> Answer:
             done, value = coming.result()
@@ -83,14 +85,14 @@ class Beside:
             with suppress(OSError):  # it has ended, with something still to be read
                 pipe.close()
 
-    def _ask(self, call: bytes) -> tuple[bool, Any]:
+    def _ask(self, call: Callable[[], Any]) -> tuple[bool, Any]:
         """Whether the other process has done a call, and what that returns."""
         try:
-            process: Any = self._process  # if there is none, that is caught as well
-            pickle.dump(call, process.stdin)
+            process: Any = self._process
+            pickle.dump(_packed(call), process.stdin)
             process.stdin.flush()
             return pickle.loads(pickle.load(process.stdout))
-        except Exception:  # it has ended
+        except Exception:  # the call cannot be sent, or the process has ended
             return False, None
 
 

@@ -30,7 +30,7 @@ from taichi_ants.worlds.world import World
 # Seeds of a colony's evaluation are those of the training plus this, so that no random number
 # serves both.
 EVALUATION_SEEDS = 1 << 32
-_STEPS_OF_A_BLOCK = 100_000_000  # of runs, at most, if every episode used all its steps
+_STEPS_OF_A_BLOCK = 250_000_000  # of runs, at most, if every episode used all its steps
 _RUNS_OF_A_BLOCK = 5000  # at most, each needs about 20 KB while it is trained
 _RUN_ARRAYS = ("returns", "steps", "deliveries")
 _COLONY_ARRAYS = ("deliveries", "first_delivery", "moves", "blocked", "returns")

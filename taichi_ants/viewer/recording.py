@@ -19,10 +19,7 @@ from taichi_ants.checks import check_progress
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.traces import Trace
 from taichi_ants.errors import AntsError, checked_whole, expect
-from taichi_ants.grid.constants import STREAM_ROLLOUT
-from taichi_ants.grid.randomness import stream_state
-from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.rendering.moments import Episode
+from taichi_ants.rendering.moments import Episode, colony_of_rollout
 from taichi_ants.task import Task
 from taichi_ants.viewer.frames import unpack
 from taichi_ants.viewer.recorder import Recorder
@@ -160,8 +157,5 @@ def _record_rollout(
 ) -> Recording:
     """n ticks of one ant, played again by a colony of one, which has the same random stream."""
     expect("title", title, str)
-    steady = TrainingConfig("q_learning", 1.0, 0.0, epsilon, 1.0, min_epsilon=0.0)
-    colony = Colony(world, task, steady, seed, sharing="fixed", q_values=q_values)
-    colony.begin_episode()
-    colony.arrays["streams"][0] = stream_state(seed, STREAM_ROLLOUT, number)
+    colony = colony_of_rollout(world, task, q_values, epsilon, seed, number)
     return record_colony(colony, n, title=title or "One ant that follows a policy", follow=0)

@@ -339,6 +339,14 @@ def test_one_process_alone_draws_the_same_and_names_what_is_shown(finished, tmp_
     assert not [line for line in lines if line.endswith("...")]
 
 
+@pytest.mark.parametrize("draws", [False, True])
+def test_what_is_prepared_beside_can_be_done(draws):
+    """Nobody is told if it fails there: then all is ready later."""
+    settings = commands.parse_arguments(["--seeds", "1"])
+    point = commands.build_study(settings).points[0]
+    commands.rehearse(point, None, {"threads": None, "arch": None}, draws)
+
+
 def test_who_asks_for_one_thread_gets_one_process(compare, tmp_path, monkeypatch):
     started, threads = [], beside.available_threads()
     monkeypatch.setattr(beside, "_started", lambda: started.append("process"))

@@ -138,7 +138,8 @@ def test_what_is_stopped_goes_on_to_the_same(name, small_blocks, tmp_path, monke
     counted = staticmethod(lambda *given: calls.append(given) or real(*given))
     monkeypatch.setattr(runner.RunPoint, "do", counted)
     found = MEASURED[name](2 * BLOCK, tmp_path)(second)
-    assert len(calls) == len(done) - 2
+    blocks = [points for points, *_ in calls if points[0].episodes > 1]  # one compiles kernels
+    assert len(blocks) == len(done) - 2
     assert sorted(path.name for path in second.iterdir()) == [path.name for path in done]
     for measure, array in expected.items():
         np.testing.assert_array_equal(found[measure], array)

@@ -32,7 +32,7 @@ def remember(patch: pytest.MonkeyPatch) -> None:
     """Let the same work give the same at once, and let all results be made at the same time."""
     for owner, name in (
         *((runner.RunPoint, "do"), (runner.ColonyPoint, "do"), (compare, "what_policies_do")),
-        *((baselines, "baseline_rows"), (colony_study, "_pool")),
+        *((baselines, "bound_rows"), (baselines, "policy_rows"), (colony_study, "_pool")),
     ):
         known = _remembered(getattr(owner, name))
         patch.setattr(owner, name, staticmethod(known) if isinstance(owner, type) else known)

@@ -30,16 +30,15 @@ BASELINE_COLUMNS: tuple[str, ...] = (
 Evaluate = Callable[..., Any]
 
 
-def baseline_rows(
+def policy_rows(
     world: World,
     task: Task,
     evaluate: Evaluate,
     seeds: Sequence[int],
     rollouts: int = 50,
-    discounts: Sequence[float] = (0.9, 0.99),
     max_steps: int = EPISODE_STEPS,
 ) -> list[dict[str, Any]]:
-    """All baselines of a world, as rows with the columns BASELINE_COLUMNS.
+    """What the random policy and the trail follower bring, as rows of BASELINE_COLUMNS.
 
     Args:
         world: The world.
@@ -47,14 +46,9 @@ def baseline_rows(
         evaluate: What rolls out policies, such as `taichi_ants.evaluate`.
         seeds: The seeds of the rollouts.
         rollouts: Rollouts for each seed.
-        discounts: Discount factors whose optimal policies are wanted.
         max_steps: The step limit of an episode.
-
-    Returns:
-        The exact bounds, or a row whose note says why there are none; then the random policy and
-        the trail follower.
     """
-    rows = _bounds(world, task, discounts, max_steps)
+    rows = []
     # Both policies are tables of the paper's observation.
     as_trained = replace(
         task, observation="paper", evaporation_in_evaluation=task.evaporation_in_training
@@ -74,9 +68,20 @@ def baseline_rows(
     return rows
 
 
-def _bounds(
-    world: World, task: Task, discounts: Sequence[float], max_steps: int
+def bound_rows(
+    world: World,
+    task: Task,
+    discounts: Sequence[float] = (0.9, 0.99),
+    max_steps: int = EPISODE_STEPS,
 ) -> list[dict[str, Any]]:
+    """The exact bounds, as rows of BASELINE_COLUMNS, or one whose note says why there are none.
+
+    Args:
+        world: The world.
+        task: What is paid, and whether trails evaporate in training; so they do here.
+        discounts: Discount factors whose optimal policies are wanted.
+        max_steps: The step limit of an episode.
+    """
     try:
         bounds = EpisodeBounds(world, task)
     except AntsError as error:

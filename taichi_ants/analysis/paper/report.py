@@ -52,8 +52,7 @@ def all_tables(
 ) -> list[Table]:
     """All tables, but those of the claims, each with its notes.
 
-    What is given is from `table2.table2`, `summary.summarise_behaviours` and
-    `baselines.baseline_rows`.
+    What is given is from `table2.table2`, `summary.summarise_behaviours` and `bounds.baselines`.
     """
     return [
         *figure_tables(lines, comparison),

@@ -17,7 +17,7 @@ class Results(NamedTuple):
 
     Attributes:
         comparison: What was measured.
-        baselines: From `bounds.baselines.baseline_rows`.
+        baselines: Rows of `bounds.baselines`.
         summary, behaviours: See `summary`.
         lines: See `table2`.
         audit: See `audit`.

@@ -12,7 +12,8 @@ from plain_runs import rollout
 from taichi_ants.analysis.bounds import episodes
 from taichi_ants.analysis.bounds.baselines import (
     BASELINE_COLUMNS,
-    baseline_rows,
+    bound_rows,
+    policy_rows,
 )
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.task import Rewards, Task
@@ -44,7 +45,7 @@ def evaluate(world: World, q_values: np.ndarray, **options: Any) -> SimpleNamesp
 
 
 def test_the_rows_of_the_world_of_the_paper() -> None:
-    rows = baseline_rows(paper(), Task(), evaluate, seeds=[3, 4], rollouts=2)
+    rows = bound_rows(paper(), Task()) + policy_rows(paper(), Task(), evaluate, [3, 4], 2)
     assert all(tuple(row) == BASELINE_COLUMNS for row in rows)
     assert all(row["note"] for row in rows)
     figures = [
@@ -78,7 +79,7 @@ def test_policies_are_evaluated_as_in_training_with_one_table_for_each_seed() ->
         return SimpleNamespace(returns=returns, steps=np.full(shape, 9), deliveries=np.eye(3, 2))
 
     task = Task("five_cells", rewards=Rewards(give=77))
-    rows = baseline_rows(paper(), task, record, range(5, 8), rollouts=2, max_steps=77)[-2:]
+    rows = policy_rows(paper(), task, record, range(5, 8), rollouts=2, max_steps=77)
     for (q_values, options), policy in zip(calls, (random_policy(), trail_follower()), strict=True):
         np.testing.assert_array_equal(q_values, np.stack([policy] * 3))
         assert options == {
@@ -95,7 +96,7 @@ def test_policies_are_evaluated_as_in_training_with_one_table_for_each_seed() ->
 
 def test_all_baselines_are_paid_what_the_task_pays() -> None:
     task = Task(rewards=Rewards(empty=0, failed=-1, lure=2, pick_up=30, give=100))
-    rows = baseline_rows(paper(), task, evaluate, [0], 1, (0.9,))
+    rows = bound_rows(paper(), task, (0.9,)) + policy_rows(paper(), task, evaluate, [0], 1)
     returns = {row["return_mean"] for row in rows if row["baseline"] != "random policy"}
     assert returns == {32 * 2 + 30 + 100}
 
@@ -108,13 +109,14 @@ def test_trails_evaporate_as_in_training() -> None:
         return evaluate(*arguments, **options)
 
     task = Task(evaporation_in_training=True, evaporation_in_evaluation=False)
-    rows = baseline_rows(paper(), task, record, [0], 1, (0.9,), 40)
-    assert rows[0]["note"] == "exact bounds are known for worlds without evaporation only."
+    policy_rows(paper(), task, record, [0], 1, 40)
+    [row] = bound_rows(paper(), task, (0.9,), 40)
+    assert row["note"] == "exact bounds are known for worlds without evaporation only."
     assert calls == [True, True]
 
 
 def test_a_discount_of_one_has_no_figures_but_a_reason() -> None:
-    rows = baseline_rows(paper(), Task(), evaluate, [0], 1, [1.0, 0.5, 1], 40)[:-2]
+    rows = bound_rows(paper(), Task(), [1.0, 0.5, 1], 40)
     assert [row["discount"] for row in rows] == [None, 1.0, 0.5]
     assert rows[1]["return_mean"] is None
     assert "may grow without bound" in rows[1]["note"]
@@ -122,17 +124,14 @@ def test_a_discount_of_one_has_no_figures_but_a_reason() -> None:
 
 def test_a_world_without_a_delivery_says_so() -> None:
     world = World((3, 1, 1), (0, 0, 0), ants=[((1, 0, 0), 0)])
-    shortest = baseline_rows(world, Task(), evaluate, [0], 1, [], 10)[0]
+    [shortest] = bound_rows(world, Task(), [], 10)
     assert shortest["return_mean"] is None
     assert shortest["note"] == "no delivery is possible"
 
 
-def test_a_world_that_is_too_large_leaves_out_the_bounds_only(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_of_a_world_that_is_too_large_no_bounds_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(episodes, "MAX_STATES", 100)
-    first, *others = baseline_rows(paper(), Task(), evaluate, [0], rollouts=1, max_steps=40)
-    assert first["baseline"] == "exact bounds"
-    assert "choose a smaller world" in first["note"]
-    assert first["return_mean"] is None
-    assert [row["baseline"] for row in others] == ["random policy", "trail follower"]
+    [row] = bound_rows(paper(), Task(), max_steps=40)
+    assert row["baseline"] == "exact bounds"
+    assert "choose a smaller world" in row["note"]
+    assert row["return_mean"] is None
