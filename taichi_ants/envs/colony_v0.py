@@ -110,7 +110,9 @@ class HexColonyParallelEnv(ParallelEnv):
         n = colony.ants + most_births(life, foods, self._worlds.max_steps)
         self.possible_agents = [f"ant_{number}" for number in range(n)]
         self.observation_spaces = dict.fromkeys(self.possible_agents, self._worlds.shown.space)
-        self.action_spaces = {name: spaces.Discrete(N_ACTIONS) for name in self.possible_agents}
+        self.action_spaces: dict[str, spaces.Space] = {
+            name: spaces.Discrete(N_ACTIONS) for name in self.possible_agents
+        }
         form = (4, colony.grid.height, colony.grid.width)
         self.state_space = spaces.Box(0, 2**31 - 1, form, np.int32)
 

@@ -122,6 +122,7 @@ def record_trace(trace: Trace, title: str = "") -> Recording:
             "rollout or trace_training."
         )
     if made.config is None:
+        assert made.q_values is not None  # one of the two it has
         return _record_rollout(
             *(made.world, made.task, made.q_values, made.epsilon),
             *(made.seed, made.number, len(trace), title),
@@ -148,7 +149,7 @@ def record_trace(trace: Trace, title: str = "") -> Recording:
 def _record_rollout(
     world: World,
     task: Task,
-    q_values: np.ndarray | None,
+    q_values: np.ndarray,
     epsilon: float,
     seed: int,
     number: int,
