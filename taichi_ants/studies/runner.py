@@ -24,7 +24,7 @@ from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.blocks import Form, Outcome, kept
 from taichi_ants.studies.provenance import world_facts
 from taichi_ants.task import Task
-from taichi_ants.task.constants import EPISODE_STEPS, EPISODES, MAX_STEPS, N_ACTIONS
+from taichi_ants.task.constants import EPISODE_STEPS, EPISODES, MAX_STEPS, N_ACTIONS, ROW
 from taichi_ants.worlds.world import World
 
 # Seeds of a colony's evaluation are those of the training plus this, so that no random number
@@ -32,6 +32,8 @@ from taichi_ants.worlds.world import World
 EVALUATION_SEEDS = 1 << 32
 _STEPS_OF_A_BLOCK = 250_000_000  # of runs, at most, if every episode used all its steps
 _RUNS_OF_A_BLOCK = 5000  # at most, each needs about 20 KB while it is trained
+_NUMBERS_OF_A_BLOCK = 1 << 26  # of colonies, at most, unless one has more; four bytes each
+_NUMBERS_OF_AN_ANT, _NUMBERS_OF_A_CELL = 13, 4  # or a few less
 _RUN_ARRAYS = ("returns", "steps", "deliveries")
 _COLONY_ARRAYS = ("deliveries", "first_delivery", "moves", "blocked", "returns")
 
@@ -90,6 +92,10 @@ class RunPoint:
     def weight(self) -> float:
         """About how much work a seed is."""
         return self.episodes * self.max_steps
+
+    def of_seeds(self, some: slice) -> RunPoint:
+        """The point for some of its seeds."""
+        return self
 
     @property
     def forms(self) -> dict[str, Form]:
@@ -183,13 +189,27 @@ class ColonyPoint:
         if self.after and (self.after.sharing != "shared" or not self.after.episodes):
             raise AntsError("a colony can only go on from one that has learned into one table.")
 
-    alike = property(lambda self: self)  # each point is a block of its own
-    runs_of_a_block = property(lambda self: 1 << 32)  # all seeds of a point are one block
+    alike = property(lambda self: self)  # each point has blocks of its own
+
+    @property
+    def runs_of_a_block(self) -> int:
+        """How many seeds: their colonies are in memory together, and go faster so."""
+        world = self.world[0] if isinstance(self.world, tuple) else self.world
+        slots, states = self.capacity or self.ants, self.task.n_states
+        memory = learners.get(self.training.learner).memory_for(self.training, states)
+        table = (1 + memory.tables) * states * ROW + memory.floats + memory.integers
+        owners = slots if self.sharing == "own" else 1
+        ants, cells = slots * _NUMBERS_OF_AN_ANT, world.grid.size * _NUMBERS_OF_A_CELL
+        return max(1, _NUMBERS_OF_A_BLOCK // (ants + cells + owners * table))
 
     @property
     def weight(self) -> float:
         """About how much work a seed is."""
         return self.ants * self.ticks * (self.episodes + self.rollouts)
+
+    def of_seeds(self, some: slice) -> ColonyPoint:
+        """The point for some of its seeds."""
+        return replace(self, world=self.world[some]) if isinstance(self.world, tuple) else self
 
     @property
     def forms(self) -> dict[str, Form]:
@@ -351,21 +371,21 @@ class Study(Generic[PointKind]):
         order, blocks = self.in_order, list(self.blocks())
         weights = [sum(p.weight for p in order[some]) * len(self.seeds[at]) for some, at in blocks]
         begun, total = 0.0, sum(weights)
-        # What others go on from is kept; these points have one block each, with all seeds.
+        # What others go on from is kept, in as many pieces as these points have blocks.
         befores = {getattr(point, "after", None) for point in order}
-        tables: dict[Any, np.ndarray] = {}
+        tables: dict[Any, list[np.ndarray]] = {}
         progress(0.0)
         for number, ((some, at), weight) in enumerate(zip(blocks, weights, strict=True)):
-            points, seeds = order[some], self.seeds[at]
+            points, seeds = tuple(one.of_seeds(at) for one in order[some]), self.seeds[at]
             after = getattr(points[0], "after", None)
-            learned = tables[after] if after else None
+            learned = np.concatenate(tables[after])[at] if after else None
             part = _part(progress, begun / total, weight / total)
             where = {"threads": threads, "arch": arch}
             do: Any = partial(points[0].do, points, seeds, learned, part, where)
             about = settings_of(points, seeds)
             outcome = kept(_path(folder, number), about, _forms(points, seeds), do)
-            if points[0] in befores:
-                tables[points[0]] = outcome["q_values"][0]
+            if order[some.start] in befores:
+                tables.setdefault(order[some.start], []).append(outcome["q_values"][0])
             begun += weight
             progress(begun / total)
             yield Block(some, at, outcome)

@@ -129,6 +129,34 @@ def test_a_study_of_colonies_is_learning_and_evaluation(tmp_path):
     assert "q_values" not in outcomes[own]  # a table for each ant is not kept
 
 
+def test_colonies_in_blocks_of_some_seeds_give_the_same(tmp_path, monkeypatch):
+    """With worlds of their own, with one for all, from a pool, and going on from others."""
+    seeds = (3, 5, 8, 1, 0)
+    each = replace(ALONE, world=tuple(open_world(seed, (12, 12, 12)) for seed in seeds))
+    one = replace(ALONE, world=WORLDS[0])
+    points = (each, replace(each, ants=4, after=each), replace(one, ants=3, sharing="own"))
+    points += (replace(one, ants=4, episodes=0, after=one), replace(each, pool=WORLDS))
+    study, found = Study(points, seeds), []
+    for size in (runner._NUMBERS_OF_A_BLOCK, 8_000):
+        monkeypatch.setattr(runner, "_NUMBERS_OF_A_BLOCK", size)
+        blocks = [[at for some, at in study.blocks() if some.start == p] for p in range(6)]
+        folder = tmp_path / str(size)
+        folder.mkdir()
+        found.append(study.run(folder))
+        assert len(list(folder.iterdir())) == sum(map(len, blocks))
+    assert same(*found)
+    assert [len(of_point) for of_point in blocks] == [3, 3, 5, 3, 3, 3]
+
+
+def test_a_block_of_colonies_is_limited_in_memory(monkeypatch):
+    """To a quarter of a gigabyte, but it has one seed at least."""
+    many = replace(ALONE, world=WORLDS[0], ants=10_000, start="spread")
+    assert 100 < many.runs_of_a_block < 1000
+    tables = replace(many, sharing="own")
+    assert 1 <= tables.runs_of_a_block < many.runs_of_a_block / 10
+    assert replace(many, ants=16_000_000, capacity=16_000_000).runs_of_a_block == 1
+
+
 def test_copies_follow_what_another_point_has_learned_and_train_nothing(tmp_path):
     copies = replace(ALONE, ants=4, episodes=0, after=ALONE)
     outcomes = Study((copies,), (3, 5)).run(tmp_path)
