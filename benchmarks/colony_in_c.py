@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from measuring import PAGE, Work, machine, pace, publish
+from measuring import PAGE, Work, a_ratio, machine, pace, publish
 from throughput import FLAGS, compiler
 
 from taichi_ants import Task, TrainingConfig, runtime, worlds
@@ -214,7 +214,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     add("--ants", **several, help="in one world (default: 10000 100000 1000000)")
     add("--rounds", type=whole_number(1), default=5, metavar="N", help="measurements of each")
     add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
-    add("--least", type=float, default=0.0, metavar="RATIO", help="fail below this ratio to C")
+    add("--least", type=a_ratio, default=0.0, metavar="RATIO", help="fail below this ratio to C")
     add("--publish", action="store_true", help="put the table into docs/performance.md")
 
     def command() -> None:

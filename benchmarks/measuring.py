@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import platform
 import time
+from argparse import ArgumentTypeError
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from importlib.util import find_spec
@@ -19,6 +21,13 @@ PAGE = ROOT / "docs" / "performance.md"
 FIGURES = ROOT / "docs" / "figures"
 
 Work = Callable[[], int]  # does a piece of work, and gives the steps in it
+
+
+def a_ratio(text: str) -> float:
+    """The type of an option: a number from 0 on."""
+    if not 0 <= (value := float(text)) < math.inf:
+        raise ArgumentTypeError(f"{text} is not allowed, it must be a number from 0 on")
+    return value
 
 
 def machine(packages: Sequence[str]) -> str:

@@ -22,13 +22,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from measuring import PAGE, machine, publish
+from measuring import PAGE, a_ratio, machine, publish
 
 from taichi_ants import Task, TrainingConfig, World, runtime, train, worlds
 from taichi_ants.analysis.paper.published import GRID
 from taichi_ants.analysis.tables import MISSING, Table, figure, plain_text, thousands
 from taichi_ants.engines.runs.results import TrainingResult
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, count
 from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
@@ -214,8 +214,8 @@ def table(
     yardsticks = YARDSTICKS.values()
     columns = ["learner", "steps", "ours", *yardsticks, *(f"ours to {name}" for name in yardsticks)]
     what = "one thread, by processor time" if threads == 1 else f"{threads} threads, by wall clock"
-    about = f"Million steps a second of {what}; {seeds} seeds, medians of {len(taken)} rounds."
-    notes = [f"{about} {machine(('taichi', 'numpy'))}"]
+    taken_of = f"{count(seeds, 'seed')}, medians of {count(len(taken), 'round')}"
+    notes = [f"Million steps a second of {what}; {taken_of}. {machine(('taichi', 'numpy'))}"]
     if "C" in names and "vector C" not in names:
         notes.append("No vector C: this processor or its compiler has no AVX-512.")
     return Table("Training beside C", columns, rows, notes)
@@ -257,7 +257,7 @@ def main(arguments: list[str] | None = None) -> None:
     add("--rounds", type=whole_number(1), default=5, metavar="N", help="measurements of each")
     add("--threads", type=whole_number(1, 1024), default=1, metavar="N", help="CPU threads")
     about = "fail if the slowest learner, beside ant.c, is below this ratio"
-    add("--least", type=float, default=0.0, metavar="RATIO", help=about)
+    add("--least", type=a_ratio, default=0.0, metavar="RATIO", help=about)
     add("--publish", action="store_true", help="put the table into docs/performance.md")
 
     def command() -> None:

@@ -157,6 +157,7 @@ class ResultFolder:
         """
         self._listed()  # if it is damaged, it is so before the work
         manifest, blocks = self._unfinished / MANIFEST, self._unfinished / BLOCKS
+        begun = False
         new = [part for part in (self.path, *self.path.parents) if not part.exists()]
         try:
             # Without a manifest nobody knows whose blocks these are.
@@ -168,8 +169,16 @@ class ResultFolder:
             self.seconds_before = self._seconds_so_far()
             contents = {"settings": self._settings, "seconds": self.seconds_before}
             _write_manifest(self._unfinished, contents)
+            begun = True
             with tempfile.TemporaryDirectory(dir=self._unfinished / READY) as ready:
                 yield blocks, Path(ready)
+        except (AntsError, OSError) as error:
+            if not begun or (self._unfinished / READY).exists():
+                raise
+            raise AntsError(
+                f"another process has done the same work in {str(self.path)!r} and finished it, or "
+                "its folder was removed; give the command again to see, or to go on."
+            ) from error
         finally:
             if not any(blocks.rglob("*.npz")):
                 self._clear()

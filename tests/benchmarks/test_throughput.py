@@ -100,6 +100,13 @@ def test_without_vectors(tmp_path, monkeypatch):
     assert made.notes[-1].startswith("No vector C")
 
 
+@pytest.mark.parametrize("least", ["nan", "-1", "inf", "much"])
+def test_a_least_ratio_is_a_number_from_0_on(least, capsys):
+    code, said = said_by([*SMALL, "--least", least], capsys)
+    assert (code, said.out) == (2, "")
+    assert "--least" in said.err
+
+
 def test_without_a_compiler(capsys, monkeypatch):
     monkeypatch.setenv("PATH", "")
     monkeypatch.delenv("CC", raising=False)

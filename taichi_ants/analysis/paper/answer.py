@@ -51,8 +51,8 @@ def _told(holds: str, fails: str, claim: Claim, findings: Mapping[str, Finding])
         stays_open = f"{too_few(seeds)} {holds}{says}"
     words = {
         Verdict.SUPPORTED: f"{holds}, as the paper says",
-        Verdict.CONTRADICTED: f"{fails}, other than the paper says",
-        Verdict.EQUIVALENT: f"{fails}, other than the paper says",
+        Verdict.CONTRADICTED: f"{fails}, although the paper says so",
+        Verdict.EQUIVALENT: f"{fails}, although the paper says so",
         Verdict.UNDECIDED: stays_open,
         Verdict.NOT_TESTED: f"whether {holds}, as the paper says, is not tested",
     }

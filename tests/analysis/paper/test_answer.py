@@ -45,8 +45,8 @@ def test_the_opposite_is_said_where_it_is_so() -> None:
     worse = change(Q_LEARNING, late_return=-20)
     slow = change(SARSA, late_steps=90, early_steps=90)
     for edit, number, words in (
-        (worse, 0, "Q-learning does not return most, other than the paper says: "),
-        (slow, 1, "SARSA does not need the fewest, other than the paper says: "),
+        (worse, 0, "Q-learning does not return most, although the paper says so: "),
+        (slow, 1, "SARSA does not need the fewest, although the paper says so: "),
     ):
         sentence = told(build({"continuing": edit}, seeds=12))[number]
         assert sentence.startswith(words)
@@ -56,7 +56,7 @@ def test_the_opposite_is_said_where_it_is_so() -> None:
 def test_alike_and_open_are_two_things() -> None:
     level = build({"absorbing": unchanged}, seeds=12, truth=level_truth, shared=0.0)
     returns, steps, _ = told(level)
-    assert returns.startswith("Q-learning does not return most, other than the paper says: ")
+    assert returns.startswith("Q-learning does not return most, although the paper says so: ")
     assert returns.endswith(", too little to matter.")
     assert steps.endswith(", too little to matter.")
     noisy = build({"absorbing": unchanged}, seeds=100, truth=level_truth, noise=200)
@@ -108,7 +108,7 @@ def test_delivery_settings_that_disagree_are_told_apart(paper: Comparison) -> No
     returns, steps, _ = told(build(edits, seeds=12))
     first, second = returns.split("; ")
     assert first.startswith("With continuing delivery Q-learning returns most, as the paper says:")
-    assert second.startswith("with absorbing delivery Q-learning does not return most, other than")
+    assert second.startswith("with absorbing delivery Q-learning does not return most, although")
     assert "Q-learning minus Dyna-Q (p5) is -" in second
     assert steps.count("as the paper says") == 1  # both agree
     assert "delivery" not in steps  # even in the numbers
