@@ -238,17 +238,15 @@ def _gif(file: BinaryIO, frames: Iterable[np.ndarray], fps: float) -> None:
             file.write(part)
 
     before, change, place, shown, lasts = None, np.empty(0), (0, 0), 0, 0
-    drawn, picture = None, np.empty(0)
     for number, frame in enumerate(chain([first], waiting), start=1):
-        if frame is not drawn:  # the last one comes several times
-            image = Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
-            drawn, picture = frame, np.asarray(image)
+        drawn = Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
+        picture = np.asarray(drawn)
         # A GIF counts hundredths of a second; rounded so that their sum is right.
         until = 10 * round(100 * number / fps)
         duration, shown = until - shown, until
         if before is None:
             change, place, lasts = picture, (0, 0), duration
-        elif (picture is before or (picture == before).all()) and lasts + duration <= _LONGEST:
+        elif (picture == before).all() and lasts + duration <= _LONGEST:
             lasts += duration
         else:
             write(change, place, lasts)

@@ -137,6 +137,43 @@ def test_a_second_process_at_the_same_work_may_finish_it(kernels, tmp_path):
     assert contents(tmp_path / "out") == before
 
 
+REHEARSED = """
+import pathlib, numpy as np
+from taichi_ants.commands import compare
+from taichi_ants.report.players import played, player
+from taichi_ants.task.constants import N_ACTIONS
+
+point = compare.build_study(compare.parse_arguments(["--seeds", "1"])).points[0]
+episode = played(point, np.zeros((point.task.n_states, N_ACTIONS), np.float32), 0)
+compare.rehearse(point, None, {"threads": 1, "arch": None}, False)
+
+from taichi.lang.kernel_impl import Kernel
+materialize, late = Kernel.materialize, []
+
+def noted(self, key=None, **how):
+    if key not in self.compiled_kernels:
+        late.append(self.func.__name__)
+    return materialize(self, key, **how)
+
+Kernel.materialize = noted
+compare.render_policy(pathlib.Path("a.gif"), episode, "title")
+player(episode, "delivers", "words")
+print(late)
+"""
+
+
+def test_what_is_prepared_beside_has_all_kernels_that_drawing_needs(kernels, tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-c", REHEARSED],
+        cwd=tmp_path,
+        env=environment(kernels),
+        text=True,
+        capture_output=True,
+        check=True,
+    )
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
 def test_help_is_quick_and_needs_no_taichi(tmp_path):
     script = (
         "import runpy, sys\n"

@@ -55,6 +55,18 @@ def test_gif(tmp_path, frames) -> None:
     assert set(durations) == {120, 130}
 
 
+def test_frames_may_be_drawn_into_one_array(tmp_path) -> None:
+    def drawn() -> Iterator[np.ndarray]:
+        frame = np.zeros((64, 64, 3), np.uint8)
+        for row in range(4):
+            frame[row] = 255
+            yield frame
+
+    save_animation(tmp_path / "one.gif", drawn(), 8)
+    save_animation(tmp_path / "several.gif", map(np.copy, drawn()), 8)
+    assert (tmp_path / "one.gif").read_bytes() == (tmp_path / "several.gif").read_bytes()
+
+
 def test_mp4(tmp_path, frames) -> None:
     av = pytest.importorskip("av")
     odd = [frame[:, :-1] for frame in frames]
