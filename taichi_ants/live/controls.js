@@ -50,17 +50,12 @@ class Controls {
     on("policy", "change", () => this.showPolicy());
     on("chosen", "change", () => this.explain());
     on("map", "beforeinput", (event) => this.paste(event));
-    for (const [id, what] of [["restart", "restart"], ["undo", "undo"], ["go-back", "back"]]) {
-      on(id, "click", () => {
-        live.stand();
-        live.ask(what);
-      });
-    }
+    for (const [id, what] of [["restart", "restart"], ["undo", "undo"], ["go-back", "back"]]) on(id, "click", () => this.anew(what));
     document.addEventListener("keydown", (event) => {
       const fields = "textarea, input:not([type=range], [type=checkbox])"; // they undo what was typed
       if (event.key.toLowerCase() !== "z" || event.shiftKey || !(event.ctrlKey || event.metaKey) || event.target.closest(fields)) return;
       event.preventDefault();
-      byId("undo").click();
+      if (!this.holds && !this.ended) this.anew("undo"); // the page may not know yet what there is to undo, but the server does
     });
     on("next-episode", "click", () => live.edit({ kind: "episode" }, live.nextStroke()));
     on("files", "click", (event) => {
@@ -295,16 +290,32 @@ class Controls {
 
   slide(slider) {
     const { name } = slider.dataset, held = this.held.get(name) > performance.now() && this.sliding === name;
-    if (!held) this.stroke = this.live.nextStroke();
+    if (!held) {
+      this.slid(); // another slider
+      this.stroke = this.live.nextStroke();
+    }
     this.held.set(name, performance.now() + 500);
     if (slider.type === "range") this.showSlider(slider, slider.valueAsNumber);
     this.sliding = name;
     if (held && this.timer) return; // the last of several values is sent
-    this.timer = setTimeout(() => {
-      this.timer = null;
-      const value = slider.type === "range" ? slider.valueAsNumber : Number(slider.checked);
-      this.live.edit({ kind: "set", name, value }, this.stroke);
-    }, 40);
+    this.timer = setTimeout(() => this.slid(), 40);
+  }
+
+  /* Send where the slider stands that somebody moves, if that is not sent yet. */
+  slid() {
+    if (!this.timer) return;
+    clearTimeout(this.timer);
+    this.timer = null;
+    const slider = byId(`set-${this.sliding}`), value = slider.type === "range" ? slider.valueAsNumber : Number(slider.checked);
+    this.live.edit({ kind: "set", name: this.sliding, value }, this.stroke);
+  }
+
+  /* Another session, or this one as it was; what was done before is sent before. */
+  anew(what) {
+    this.slid();
+    this.live.tools.send();
+    this.live.stand();
+    this.live.ask(what);
   }
 
   async upload() {

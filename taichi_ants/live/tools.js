@@ -114,9 +114,10 @@ class Tools {
 
   /* Ask for what the new part of a stroke does. */
   send() {
-    const cells = [...this.fresh], { history } = this.live.viewer;
+    const cells = [...this.fresh];
     this.fresh.clear();
     if (!cells.length || this.name === "queen") return;
+    const { history } = this.live.viewer;
     const { ground, trail } = history.worldAt(history.length - 1);
     const taken = new Set(history.frames[history.length - 1].cells);
     const free = cells.filter((cell) => ground[cell] !== QUEEN && !taken.has(cell));

@@ -252,6 +252,24 @@ def test_a_change_is_undone_and_the_session_before_comes_back(page, room):
     wait(page, "!live.running")
 
 
+def test_undo_undoes_what_was_done_a_moment_ago(page, room):
+    """Before the page has sent the change, or been told that there is something to undo."""
+    undo = "dispatchEvent(new KeyboardEvent('keydown', {key: 'z', ctrlKey: true, bubbles: true}))"
+    slid = "(slider.value = 0.5, slider.dispatchEvent(new Event('input', {bubbles: true})))"
+    epsilon = room.session.colony.epsilon
+    page.read(f"(slider => ({slid}, slider.{undo}))(byId('set-epsilon'))")
+    wait(page, "!live.stands && live.state.values.epsilon.value !== 0.5")
+    assert room._former.edits == [(0, {"kind": "set", "name": "epsilon", "value": 0.5})]
+    assert room.session.colony.epsilon == epsilon
+    page.press("2")
+    page.read(f"live.tools.down({cell_of(room, 5, 5, 0)}), document.body.{undo}")
+    wait(page, "!live.stands")
+    assert [edit["kind"] for _, edit in room._former.edits] == ["ground"]
+    assert_same(page, room)
+    page.read(f"document.body.{undo}")
+    wait(page, "byId('toast').textContent.startsWith('There is nothing to undo')")
+
+
 def test_fields_and_sliders_are_those_of_the_session_that_comes_back(page, room):
     page.tab.fill("#set-epsilon", "0.5")
     edits(room, 1)
