@@ -60,7 +60,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     parser = Parser(__doc__)
     add = parser.add_argument
     seeds: dict[str, Any] = {"type": whole_number(1, MOST_SEEDS), "metavar": "N"}
-    add("--seeds", **seeds, default=100, help="how many seeds")
+    add("--seeds", **seeds, default=100, help=f"how many, at most {MOST_SEEDS}")
     add("--seed", type=whole_number(), default=0, metavar="BASE", help="the first of them")
     counts: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
     add("--episodes", **counts, default=500, help="training episodes of a run")

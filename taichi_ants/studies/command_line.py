@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import importlib.util
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -63,6 +64,8 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         text = without_middle(_on_one_line(message)).removeprefix("argument ").rstrip(".")
+        for kind, words in {"float": "number", "whole number": "whole number"}.items():
+            text = re.sub(f"invalid {kind} value: (.*)", rf"\1 is no {words}", text)
         self.exit(EXIT_BAD_INPUT, f"error: {text}; see --help.\n")
 
 

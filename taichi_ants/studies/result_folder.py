@@ -48,7 +48,7 @@ def work_or_show(
     A page that is gone from finished results is made again from the rest of them.
 
     Args:
-        settings: The command's `out`, `force`, `plugin` and `arch`.
+        settings: The command's `out`, `force`, `no_figures`, `plugin` and `arch`.
         determines: What determines the results besides these.
         work: Called with a folder for blocks and one for the results, among them the report.
         leading: Settings from which others follow, see `ResultFolder`.
@@ -68,6 +68,8 @@ def work_or_show(
             folder.add(PAGE, page(settings.out, None, _manifest_in(settings.out)))
         print(files.read_text(settings.out / REPORT))
         print(f"{settings.out}/ holds these results already; --force makes them again.")
+        if not (settings.no_figures or _manifest_in(settings.out).get("figures", True)):
+            print("They were made with --no-figures; to have figures, too, give --force.")
         if gone:
             print(f"{PAGE} was gone, and is written again from the other files.")
     else:
@@ -76,7 +78,8 @@ def work_or_show(
             results = work(blocks, ready)
             report = files.read_text(ready / REPORT)
             seconds = folder.seconds_before + time.perf_counter() - began
-            made = {**provenance(sys.argv), "seconds": seconds}
+            drawn = not settings.no_figures
+            made = {**provenance(sys.argv), "seconds": seconds, "figures": drawn}
             if page:
                 files.write_text(ready / PAGE, page(ready, results, made))
             folder.publish(ready, made)

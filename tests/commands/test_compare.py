@@ -409,6 +409,9 @@ def test_force_runs_again_and_leaves_no_old_pictures(copy, compare):
     ):
         assert after[name] == before[name], name
     assert after["manifest.json"] != before["manifest.json"]
+    left_out = "made with --no-figures; to have figures, too, give --force."
+    assert left_out in compare(*SMALL, "--out", copy)[1]
+    assert left_out not in compare(*SMALL, "--out", copy, "--no-figures")[1]
 
 
 GONE = [

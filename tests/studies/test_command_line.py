@@ -68,9 +68,9 @@ def test_what_was_given_is_told_even_where_it_is_the_default(parser):
     [
         (["--size", "0"], "--size: 0 is not allowed, it must be from 1 to 9"),
         (["--size", "10"], "--size: 10 is not allowed, it must be from 1 to 9"),
-        (["--size", "2.5"], "--size: invalid whole number value: '2.5'"),
+        (["--size", "2.5"], "--size: '2.5' is no whole number"),
         (["--count", "1"], "--count: 1 is not allowed, it must be at least 2"),
-        (["--rates", "1", "x"], "--rates: invalid float value: 'x'"),
+        (["--rates", "1", "x"], "--rates: 'x' is no number"),
         (["--rates"], "--rates: expected at least one argument"),
         (["--siz", "3"], "unrecognized arguments: --siz 3"),
         (["--size", ""], "--size is empty, leave it out"),

@@ -148,7 +148,7 @@ def test_blocks_without_a_manifest_are_not_trusted(tmp_path):
 
 
 def test_what_a_killed_clean_up_has_left_is_removed_with_the_next_look(tmp_path):
-    settings = Namespace(out=tmp_path, force=False, plugin=None, arch="cpu")
+    settings = Namespace(out=tmp_path, force=False, no_figures=False, plugin=None, arch="cpu")
     finish(tmp_path, {**SETTINGS, "arch": "cpu", "plugin": None})
     before = names(tmp_path)
     (tmp_path / "unfinished" / "blocks").mkdir(parents=True)
@@ -317,7 +317,9 @@ def test_a_manifest_of_an_older_version_has_no_seal(tmp_path):
 
 def test_a_page_that_is_gone_is_made_again(tmp_path, capsys):
     """And listed among the files; what is altered is not passed over."""
-    settings = Namespace(out=tmp_path / "out", force=False, plugin=None, arch="cpu")
+    settings = Namespace(
+        out=tmp_path / "out", force=False, no_figures=False, plugin=None, arch="cpu"
+    )
     made, again = [], []
 
     def work(blocks, ready):
