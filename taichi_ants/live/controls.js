@@ -55,7 +55,7 @@ class Controls {
       const fields = "textarea, input:not([type=range], [type=checkbox])"; // they undo what was typed
       if (event.key.toLowerCase() !== "z" || event.shiftKey || !(event.ctrlKey || event.metaKey) || event.target.closest(fields)) return;
       event.preventDefault();
-      if (!this.holds && !this.ended) this.anew("undo"); // the page may not know yet what there is to undo, but the server does
+      if (!this.holds && !this.ended) this.anew("undo"); // the server knows first whether there is something to undo
     });
     on("next-episode", "click", () => live.edit({ kind: "episode" }, live.nextStroke()));
     on("files", "click", (event) => {
@@ -289,14 +289,14 @@ class Controls {
   }
 
   slide(slider) {
-    const { name } = slider.dataset, held = this.held.get(name) > performance.now() && this.sliding === name;
+    const { name } = slider.dataset, held = this.held.get(name) > performance.now() && this.sliding === slider;
     if (!held) {
       this.slid(); // another slider
       this.stroke = this.live.nextStroke();
     }
     this.held.set(name, performance.now() + 500);
     if (slider.type === "range") this.showSlider(slider, slider.valueAsNumber);
-    this.sliding = name;
+    this.sliding = slider;
     if (held && this.timer) return; // the last of several values is sent
     this.timer = setTimeout(() => this.slid(), 40);
   }
@@ -306,8 +306,8 @@ class Controls {
     if (!this.timer) return;
     clearTimeout(this.timer);
     this.timer = null;
-    const slider = byId(`set-${this.sliding}`), value = slider.type === "range" ? slider.valueAsNumber : Number(slider.checked);
-    this.live.edit({ kind: "set", name: this.sliding, value }, this.stroke);
+    const { sliding } = this, value = sliding.type === "range" ? sliding.valueAsNumber : Number(sliding.checked);
+    this.live.edit({ kind: "set", name: sliding.dataset.name, value }, this.stroke);
   }
 
   /* Another session, or this one as it was; what was done before is sent before. */
