@@ -53,6 +53,7 @@ class Guest:
         self.room = room
         address = room.url.replace("http", "ws").replace("/?", "/socket?")
         usual = {"origin": f"http://127.0.0.1:{room.port}", "max_size": None, "proxy": None}
+        usual["close_timeout"] = 1  # so long it waits where it has not read all
         self.socket: ClientConnection = connect(address, **{**usual, **given}).__enter__()
         self.header: dict[str, Any] = {}
         self.chosen: dict[str, Any] = {}
