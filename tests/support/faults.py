@@ -20,7 +20,7 @@ from typing import Any, NoReturn
 import pytest
 from command_lines import assert_one_sentence, load
 
-from taichi_ants import files
+from taichi_ants import Task, files
 from taichi_ants.analysis.bounds import baselines
 from taichi_ants.commands import compare
 from taichi_ants.studies import colony_study, result_folder, runner
@@ -32,7 +32,8 @@ def remember(patch: pytest.MonkeyPatch) -> None:
     """Let the same work give the same at once, and let all results be made at the same time."""
     for owner, name in (
         *((runner.RunPoint, "do"), (runner.ColonyPoint, "do"), (compare, "what_policies_do")),
-        *((baselines, "bound_rows"), (baselines, "policy_rows"), (colony_study, "_pool")),
+        *((baselines, "bound_rows"), (baselines, "policy_rows")),
+        *((colony_study, "_pool"), (colony_study, "limits_of")),
     ):
         known = _remembered(getattr(owner, name))
         patch.setattr(owner, name, staticmethod(known) if isinstance(owner, type) else known)
@@ -47,7 +48,7 @@ def _remembered(function: Callable[..., Any]) -> Callable[..., Any]:
     known: dict[Any, Any] = {}
 
     def remembering(first: Any, *others: Any) -> Any:
-        what = first, others[0] if others and isinstance(others[0], tuple) else None
+        what = first, others[0] if others and isinstance(others[0], (tuple, Task)) else None
         if what not in known:
             known[what] = function(first, *others)
         return known[what]
