@@ -64,7 +64,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         text = without_middle(_on_one_line(message)).removeprefix("argument ").rstrip(".")
-        text = re.sub("invalid (whole )?(?:number|float) value: (.*)", r"\2 is no \1number", text)
+        text = re.sub(r"invalid (whole )?\S+ value: (.*)", r"\2 is no \1number", text)
         self.exit(EXIT_BAD_INPUT, f"error: {text}; see --help.\n")
 
 

@@ -100,11 +100,15 @@ def test_without_vectors(tmp_path, monkeypatch):
     assert made.notes[-1].startswith("No vector C")
 
 
-@pytest.mark.parametrize("least", ["nan", "-1", "inf", "much"])
-def test_a_least_ratio_is_a_number_from_0_on(least, capsys):
+@pytest.mark.parametrize(
+    ("least", "why"),
+    [*((one, f"{one} is not allowed") for one in ("nan", "-1", "inf")), ("much", "is no number")],
+)
+def test_a_least_ratio_is_a_number_from_0_on(least, why, capsys):
     code, said = said_by([*SMALL, "--least", least], capsys)
     assert (code, said.out) == (2, "")
-    assert "--least" in said.err
+    assert said.err.startswith("error: --least: ")
+    assert why in said.err
 
 
 def test_without_a_compiler(capsys, monkeypatch):

@@ -279,8 +279,14 @@ def test_undo_undoes_what_was_done_a_moment_ago(page, room):
     wait(page, BEGUN)
     assert [edit["kind"] for _, edit in room._former.edits] == ["ground"]
     assert_same(page, room)
+    page.tab.click("#play")
+    wait(page, "live.running")
     page.read(f"document.body.{undo}")
     wait(page, "byId('toast').textContent.startsWith('There is nothing to undo')")
+    wait(page, "live.running")  # time passes all the same
+    assert room.playing
+    page.tab.click("#play")
+    wait(page, "!live.running")
 
 
 def test_fields_and_sliders_are_those_of_the_session_that_comes_back(page, room):
