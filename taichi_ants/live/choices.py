@@ -80,7 +80,7 @@ def task_of(rules: Iterable[str], sees: str) -> Task:
     return Task(
         observation=sees,
         pheromone=Pheromone(**how),
-        traffic=Traffic.named(traffic),
+        traffic=Traffic.named()[traffic],
         turns_at_queen=queues,
         evaporation_in_training="falls" in chosen,
         life=Life(

@@ -178,9 +178,9 @@ WRONG = {
     ),
     "hyperparameter": ("discount = 0.9", "discount = 0.9\nplanning_steps = 3", ["planning_steps"]),
     "missing": ("discount = 0.9", "", ["training.discount is missing"]),
-    "value": ("discount = 0.9", "discount = 1.9", ["discount is 1.9"]),
+    "value": ("discount = 0.9", "discount = 1.9", ["discount` is 1.9"]),
     "text": ("episodes = 50", 'episodes = "12"', ["episodes is '12'"]),
-    "list": ("discount = 0.9", "discount = [0.9, 1]", ["discount is [0.9, 1]"]),
+    "list": ("discount = 0.9", "discount = [0.9, 1]", ["discount` is [0.9, 1]"]),
     "twice": (
         "discount = 0.9",
         "discount = 0.9\nepsilon = 0.1",
