@@ -36,7 +36,7 @@ def bridge_choices(
     stream = RandomStream(stream_state(seed, STREAM_BRIDGE, colony))
     marks = {(end, takes_short): 0 for end in (NEST, FOOD) for takes_short in (True, False)}
     arrivals: dict[int, list[tuple[int, bool]]] = {}  # by step: where, and by which branch
-    taken = []
+    taken: list[bool] = []
     for step in range(ants // 2):
         for arrived in arrivals.pop(step, []):
             marks[arrived] += 1
