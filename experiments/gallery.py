@@ -74,6 +74,7 @@ FIGURES = {
     "colony_elsewhere.png": "colony/figures/elsewhere.png",
     "million.png": "million.png",
     "bridge.png": "bridge/figures/bridge.png",
+    "bridge_late.png": "bridge/figures/late.png",
 }
 _QUEUEING = str(ROOT / "experiments" / "policies" / "queueing.npz")
 MILLION = [

@@ -20,11 +20,22 @@ def test_goss_prints_ours_beside_the_published(kernels: Path, tmp_path: Path) ->
     assert done.returncode == 0, done.stderr
     rows = [line.split() for line in done.stdout.splitlines() if "published" in line]
     assert rows[2] == ["2.0", "published", "15.0", "6.0", "6.0", "7.0", "66.0"]
+    assert rows[3][-6:] == ["published", "100.0", "0.0", "0.0", "0.0", "0.0"]
     ours = [line.split() for line in done.stdout.splitlines() if " ours " in line]
+    assert ours[3][:3] == ["2.0,", "opens", "late"]
     for row, said in zip(ours, rows, strict=True):
         assert abs(float(row[-1]) - float(said[-1])) < 10
-    assert all(abs(sum(map(float, row[2:])) - 100) < 0.3 for row in ours)
+    assert all(abs(sum(map(float, row[-5:])) - 100) < 0.3 for row in ours)
     assert "of 500 colonies for each r: their standard error is at most 2.2 points" in done.stdout
+
+
+def test_goss_compares_with_what_was_published_only_where_as_many_choose(
+    kernels: Path, tmp_path: Path
+) -> None:
+    done = run("goss", ["--colonies", 50, "--choices", 20], kernels, tmp_path)
+    assert "published" not in done.stdout
+    assert "of ants 11 to 20 on" in done.stdout
+    assert "of ants 31 to 40" in done.stdout
 
 
 def test_goss_says_that_one_colony_says_nothing(kernels: Path, tmp_path: Path) -> None:
@@ -62,6 +73,8 @@ def test_utility_prints_a_row_for_each_world_and_room(kernels: Path, tmp_path: P
         ("fixed_rules", ["--ants", 10**6], "1000000 ants"),
         ("utility", ["--discount", 1], "discount is 1.0"),
         ("goss", ["--colonies", 0], "0 is not allowed"),
+        ("goss", ["--choices", 401], "--choices is 401; it must be even"),
+        ("goss", ["--choices", 10**7], "2000 GB"),
     ],
 )
 def test_mistakes_end_in_a_sentence_and_nothing_else(
