@@ -22,8 +22,9 @@ class AntsError(ValueError):
     `ValueError`. Where a value makes it very long, its middle is left out.
     """
 
-    def __init__(self, message: str) -> None:
-        super().__init__(without_middle(message))
+    def __init__(self, message: object) -> None:
+        # Other libraries raise an exception anew from itself: `type(error)(error)`.
+        super().__init__(without_middle(str(message)))
 
 
 def without_middle(message: str, most: int = _MOST_CHARACTERS) -> str:
