@@ -105,6 +105,7 @@ def test_no_message_fills_a_screen(capsys: pytest.CaptureFixture[str]) -> None:
     assert str(error).startswith("the beginning xxx")
     assert str(error).endswith("xxx the end.")
     assert len(str(error)) <= 1000
+    assert str(AntsError(error)) == str(error)  # as libraries raise it anew
     notice(LONG)
     parser = Parser()
     parser.add_argument("--kind", choices=("a", "b"))
