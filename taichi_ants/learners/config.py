@@ -35,7 +35,8 @@ class TrainingConfig:
             what can be reached ("optimistic") make ants try all actions.
         hyperparameters: What this learner has besides, (name, number) pairs by name; given as a
             mapping, or as keywords: `TrainingConfig("dyna_q", ..., planning_steps=5)`. Those that
-            are left out have their usual values, see `taichi_ants.learners.get(name)`.
+            are left out have default values, see
+            `taichi_ants.learners.get(name).hyperparameters()`.
 
     Raises:
         AntsError: A value is outside its range. Whether the learner exists, and has these

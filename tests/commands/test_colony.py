@@ -271,7 +271,10 @@ def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
             ["live", "--half-life", 5, "--evaporation", "none"],
             "half_life is 5.0, but evaporation is 'none'",
         ),
-        (["live", "--sharing", "fixed"], "sharing is 'fixed', but q_values is None"),
+        (
+            ["live", "--sharing", "fixed"],
+            "--sharing fixed needs a table that the ants follow; give --policy FILE",
+        ),
         (["live", "--policy", "x.npz"], "cannot read 'x.npz'"),
         (
             ["live", "--policy", "x", "--observation", "paper"],
