@@ -12,8 +12,11 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+from command_lines import ROOT
 
-from taichi_ants import World, worlds
+from taichi_ants import Pheromone, World, worlds
+from taichi_ants.reference.random_stream import hash_of
+from taichi_ants.reference.world_state import WorldState
 
 STEPS = ((1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1), (1, 0, 1))
 EMPTY, ROCK, FOOD, QUEEN = range(4)
@@ -167,6 +170,21 @@ def test_the_page_has_all_rules() -> None:
 @pytest.mark.slow
 def test_the_page_has_all_rules_in_many_worlds() -> None:
     assert compare(160_000, 2) > 800
+
+
+def test_the_hash_on_the_page_of_colonies_decides_conflicts() -> None:
+    """It is that of the reference, which the kernels equal."""
+    page = (ROOT / "docs" / "colony.md").read_text("utf-8")
+    code = page[page.index("MASK = 2**64") :].split("```")[0]
+    names: dict[str, Any] = {}
+    exec(compile(code, "colony.md", "exec"), names)
+    assert f"# {names['conflict_hash']((0, 8, 8), 5, (10, 10, 10))}\n" in code
+    for seed in range(5):
+        world = garden(seed)
+        index = WorldState(world, Pheromone()).index
+        for cell in world.obstacles.tolist():
+            ours = names["conflict_hash"](cell, seed, world.ranges)
+            assert ours == hash_of(index(tuple(cell)), seed)
 
 
 def test_the_default_task_is_a_maze_that_a_list_solves() -> None:
