@@ -342,6 +342,11 @@ def new_colony(settings: argparse.Namespace) -> Colony:
     else:
         world = worlds.build(settings.world, settings.seed)
     policy = load_policy(settings.policy) if settings.policy else None
+    if settings.sharing == "fixed" and policy is None:
+        raise AntsError(
+            "--sharing fixed needs a table that the ants follow; give --policy FILE, or choose "
+            "another --sharing."
+        )
     colony = Colony(
         world,
         rules(settings, policy),

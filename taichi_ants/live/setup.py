@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import files, learners, worlds
-from taichi_ants.checks import checked_q_values, checked_seeds, checked_share
+from taichi_ants.checks import checked_seeds, checked_share, checked_table
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
 from taichi_ants.grid.hexgrid import AxialGrid
@@ -68,10 +68,7 @@ class Setup:
             check_one_of("sharing", self.sharing, ("shared", "own"))
             learners.get(self.policy.learner)
         else:
-            table = checked_q_values(self.policy, self.task)
-            if table.ndim != 2:
-                raise AntsError(f"policy has shape {table.shape}; give one table for all ants.")
-            object.__setattr__(self, "policy", table.copy())
+            object.__setattr__(self, "policy", checked_table(self.policy, self.task).copy())
         checked_whole("ants", self.ants, 1, MOST_ANTS)
         if self.capacity is None:
             object.__setattr__(self, "capacity", min(2 * self.ants + 64, MOST_ANTS))

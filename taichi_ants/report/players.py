@@ -127,7 +127,7 @@ def at_work(policies: Path, conditions: Plan, seeds: Sequence[int], arch: str) -
         point = conditions[condition]
         colony = Colony(
             *(point.world[0] if isinstance(point.world, tuple) else point.world, point.task),
-            replace(point.training, epsilon=point.training.min_epsilon),
+            replace(point.training, epsilon=point.training.least_epsilon),
             *(seeds[0], ants),
             sharing="fixed",
             q_values=load_policy(policies / f"{arena}_{rules}_{ants}.npz").q_values,

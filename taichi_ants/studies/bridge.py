@@ -127,7 +127,7 @@ def _followed(
 ) -> dict[str, np.ndarray]:
     from taichi_ants.engines.colony.colony import Colony
 
-    least = learned.training.min_epsilon
+    least = learned.training.least_epsilon
     calm = replace(learned.training, epsilon=least, epsilon_decay=1.0)
 
     def count(bridge: dict[str, Any], some: slice, n: int, opens: int = 0) -> np.ndarray:

@@ -159,7 +159,7 @@ def _pool(arena: str) -> tuple[World, ...] | None:
 def scheduled(training: TrainingConfig, episodes: int) -> TrainingConfig:
     """The same with an epsilon and a learning rate that fall geometrically while ants explore."""
     exploring = max(1, round(EXPLORING * episodes))
-    low = max(training.min_epsilon, 1e-6)
+    low = max(training.least_epsilon, 1e-6)
     return replace(
         training,
         epsilon_decay=min(1.0, (low / max(training.epsilon, low)) ** (1 / exploring)),

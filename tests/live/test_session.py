@@ -480,7 +480,7 @@ def test_setups_are_json(name):
     assert Session(again).hand.state() == Session(setup).hand.state()
 
 
-@pytest.mark.parametrize("table", [np.zeros((3, 5)), np.zeros((1, 128, 5)), "paper", None, [[1j]]])
+@pytest.mark.parametrize("table", [np.zeros((3, 5)), np.zeros((2, 128, 5)), "paper", None, [[1j]]])
 def test_a_policy_is_a_training_or_one_table(table):
     with pytest.raises(AntsError, match=r"^(policy|q_values) .*\.$"):
         Setup("paper", Task(), table)

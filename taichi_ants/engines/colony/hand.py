@@ -40,9 +40,17 @@ class Hand:
 
     Attributes:
         ants: How many start each later episode.
+
+    Raises:
+        AntsError: The colony has several worlds.
     """
 
     def __init__(self, colony: Colony) -> None:
+        if len(colony.worlds) != 1:
+            raise AntsError(
+                f"the colony has {len(colony.worlds)} worlds; a Hand changes a single one, so make "
+                "the colony with one seed."
+            )
         self.colony, self.ants = colony, colony.ants
         (self._first,) = colony.worlds
         self._start = self._first.ground()
