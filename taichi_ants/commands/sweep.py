@@ -37,7 +37,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     parser = Parser(__doc__)
     parser.add_argument("file", type=Path, metavar="FILE", help="what to do (.toml)")
     add_common(parser)
-    add_results(parser, "sweep-NAME, by the name of FILE")
+    add_results(parser, "sweep-NAME, by the name of FILE", quick=False)
     settings = parser.parse_args(arguments)
     settings.out = settings.out or Path("results", f"sweep-{settings.file.stem}")
     return settings
