@@ -79,7 +79,7 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Mapping] = ()) -
         words = (
             f"World: {comparison.world}. Line: interquartile mean of "
             f"{count(len(comparison.seeds), 'seed')} (of deliveries the mean), band: their middle "
-            "half.\nLater points are means over longer spans. If the legend does not say otherwise, "
+            "half.\nLater points are means over longer spans. If the legend does not name another, "
             f"the learning rate is {FIGURE_1.learning_rate:g},\nthe discount "
             f"{FIGURE_1.discount:g}, epsilon {FIGURE_1.epsilon:g} and its decay "
             f"{FIGURE_1.epsilon_decay:g}: the paper's figure 1 names no configuration; this one "
@@ -115,10 +115,10 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Mappin
         frame(
             figure,
             "Return against deliveries in training, and what the final policies do",
-            f"World: {comparison.world}. A mark is a run: {count(len(comparison.seeds), 'seed')} of "
-            f"each of {count(len(comparison.rows), 'configuration')}. Its shape and colour show\nthe "
-            "behaviour of an ant that follows the final policy greedily, with evaporation as in "
-            "training.",
+            f"World: {comparison.world}. A mark is a run: "
+            f"{count(len(comparison.rows), 'configuration')}, "
+            f"{count(len(comparison.seeds), 'seed')} each. Its shape and colour show\nthe behaviour "
+            "of an ant that follows the final policy greedily, with evaporation as in training.",
             legend_entries(axes),
         )
     return figure
