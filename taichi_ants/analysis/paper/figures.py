@@ -117,8 +117,9 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Mappin
             "Return against deliveries in training, and what the final policies do",
             f"World: {comparison.world}. A mark is a run: "
             f"{count(len(comparison.rows), 'configuration')}, "
-            f"{count(len(comparison.seeds), 'seed')} each. Its shape and colour show\nthe behaviour "
-            "of an ant that follows the final policy greedily, with evaporation as in training.",
+            f"{count(len(comparison.seeds), 'seed')} each. Its shape and colour show\nthe "
+            "behaviour of an ant that follows the final policy greedily, with evaporation as in "
+            "training.",
             legend_entries(axes),
         )
     return figure
