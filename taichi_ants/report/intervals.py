@@ -31,7 +31,7 @@ def interval_drawing(finding: Finding, label: str, unit: str = "") -> str:
         return ""
     criterion, contrast = finding.contrast.criterion, finding.contrast
     margin, wanted = criterion.margin, (criterion.low, criterion.high)
-    centre = "interquartile mean" if contrast.typical else "mean"
+    centre = "IQM" if contrast.typical else "mean"
     axis = f"{label}{f' ({unit})' if unit else ''}, {centre} of {count(contrast.seeds, 'seed')}"
     edges = [*wanted, *(() if margin is None else (-margin, margin))]
     shown = [finding.low, finding.high, *filter(math.isfinite, edges)]
