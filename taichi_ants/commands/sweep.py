@@ -41,7 +41,8 @@ def parse_arguments(
         parser.add_argument("file", type=Path, metavar="FILE", help="what to do (.toml)")
     parser.set_defaults(**({"file": file} if file else {}))
     add_common(parser)
-    add_results(parser, f"sweep-{file.stem}" if file else "sweep-NAME, by the name of FILE")
+    name = f"sweep-{file.stem}" if file else "sweep-NAME, by the name of FILE"
+    add_results(parser, name, quick=False)
     settings = parser.parse_args(arguments)
     settings.out = settings.out or Path("results", f"sweep-{settings.file.stem}")
     return settings

@@ -72,8 +72,8 @@ def _statements(findings: Judged) -> Statements:
     for (arena, series), by_sizes in findings.items():
         unit = MEASURES[series.measure]
         told = [
-            judged(count(n, "ant") if n == less else f"{n} against {less}", finding, "Difference")
-            for (n, less), finding in by_sizes.items()
+            judged(count(n, "ant") if n == less else f"{n} against {less}", one, "Difference", unit)
+            for (n, less), one in by_sizes.items()
         ]
         facts = {"Question": series.question, "Difference in": unit}
         verdicts = [of_largest(by_sizes).verdict]

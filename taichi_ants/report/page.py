@@ -120,18 +120,30 @@ class Judged(NamedTuple):
 
 
 def judged(setting: str, finding: Finding, label: str, unit: str = "") -> Judged:
-    """A finding as a page shows it: a label of its effect, the effect, and in what unit it is."""
-    words = label
-    if finding.verdict is not Verdict.NOT_TESTED:
-        digits = 1 if finding.contrast.typical or abs(finding.effect) >= 10 else 2
-        effect, low, high = (number(x, digits) for x in (finding.effect, finding.low, finding.high))
-        words += f": {effect} {unit}".rstrip()
-        known = math.isfinite(finding.low) and math.isfinite(finding.high)
-        words += f", between {low} and {high}" if known else ", without an interval"
-    by_mean = finding.by_mean
-    if by_mean and by_mean.verdict is not finding.verdict:
-        words += f"; by the mean {by_mean.verdict.value}, {number(by_mean.effect)}"
-    return Judged(setting, finding.verdict, words, interval_drawing(finding))
+    """Return a finding as a page shows it.
+
+    Args:
+        setting: The setting that it is of.
+        finding: The finding.
+        label: The name of its effect.
+        unit: The unit of its effect.
+    """
+    words, by_mean = _measured(finding, label, unit), finding.by_mean
+    if by_mean and by_mean.verdict is not finding.verdict:  # it may rest on another contrast
+        told = _measured(by_mean, by_mean.contrast.label, unit)
+        words += f"; by the mean {by_mean.verdict.value}: {told}"
+    return Judged(setting, finding.verdict, words, interval_drawing(finding, label, unit))
+
+
+def _measured(finding: Finding, label: str, unit: str) -> str:
+    """The effect and its interval in words, after its label."""
+    if finding.verdict is Verdict.NOT_TESTED:
+        return label
+    digits = 1 if finding.contrast.typical or abs(finding.effect) >= 10 else 2
+    effect, low, high = (number(x, digits) for x in (finding.effect, finding.low, finding.high))
+    known = math.isfinite(finding.low) and math.isfinite(finding.high)
+    ends = f"between {low} and {high}" if known else "without an interval"
+    return f"{label}: {f'{effect} {unit}'.rstrip()}, {ends}"
 
 
 @dataclass(frozen=True)

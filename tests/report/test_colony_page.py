@@ -77,7 +77,7 @@ def test_little_is_told_of_little() -> None:
 def test_what_has_no_interval_says_so() -> None:
     alike = build(seeds=3, noise=0, sizes=(1, 4))
     told = words_of(colony_page(*Results.of(alike, limits(alike)), **BARE))
-    assert "Difference: 0.00, without an interval." in told
+    assert "Difference: 0.00 deliveries per 1000 ticks, without an interval." in told
     assert "1 ant: " in told
     assert not re.search(r"\b(nan|inf)\b|\b1 ants", told)
 
