@@ -129,7 +129,8 @@ class Hand:
         arrays, grid = self.colony.arrays, self.colony.grid
         if arrays["ground"][cell] != EMPTY:
             raise AntsError(
-                f"cell {cell} is not empty, so the queen cannot stand there; choose an empty cell."
+                f"cell {tuple(grid.cells(cell).tolist())} is not empty, so the queen cannot move "
+                "there; choose an empty cell."
             )
         old = arrays["worlds"][WorldRow.QUEEN_CELL, 0]
         start = self._start.copy()
