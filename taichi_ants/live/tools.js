@@ -99,7 +99,7 @@ class Tools {
 
   /* The cells from where the stroke was to a cell. */
   draw(cell) {
-    if (cell < 0) return;
+    if (cell < 0 || !this.live.open) return;
     const { grid } = this.live.viewer.history, [x1, y1] = grid.centre(cell);
     const [x0, y0] = this.last < 0 ? [x1, y1] : grid.centre(this.last), n = Math.ceil(Math.hypot(x1 - x0, y1 - y0));
     for (let k = 0; k <= n; k++) {
