@@ -15,11 +15,11 @@ from taichi_ants.rendering.marks import DOT, DOTS_BELOW, Mark, ants, marks, thin
 from taichi_ants.rendering.snapshot import Snapshot
 from taichi_ants.task.constants import DEPOSIT_LEVEL, EMPTY, FOOD, OBSTACLE, QUEEN
 
-# From this size on, food and queen are drawings on a light floor. In smaller cells food is a dot with
-# a ring of that light colour, and the queen colours the whole cell.
+# From this size on, food and queen are drawings on a light floor. In smaller cells food is a dot
+# with a ring of that light colour, and the queen colours the whole cell.
 _SMALLEST_DRAWING = 6.0
 # The radius of the dot in sizes of a hexagon and at least in pixels; the ring's width in pixels.
-_CRUMB, _SMALLEST_CRUMB, _CRUMB_RING = 0.6, 1.4, 1.3
+_CRUMB, _SMALLEST_CRUMB, _CRUMB_RING = 0.6, 1.4, 1.8
 # Below, the outlines of three cells would bury the ant: one stands around it and what it sees.
 _SMALLEST_OUTLINE = 7.0
 _MARK = 2.7  # its radius in sizes of the hexagon, and in pixels at least

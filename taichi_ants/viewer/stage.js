@@ -8,7 +8,7 @@ const ANT = 0.83; // its radius in one of a cell
 const SEEN = 5.5; // pixels, of an ant that one sees at a glance
 const CROWDED = 0.06; // of the world, by ants that are larger than their cells
 const DRAWINGS_FROM = 6; // in smaller cells food is a dot; they are wholly coloured by the queen
-const CRUMB = 1.4, CRUMB_RING = 1.3; // pixels: the least radius of such a dot, and the width of its ring
+const CRUMB = 1.4, CRUMB_RING = 1.8; // pixels: the least radius of such a dot, and the width of its ring
 const MOST_PIXELS = 3e6; // of the cells; sharper screens get coarser ones
 const INSIDE = 7; // how much of a pixel its cell covers, in sevenths; the rest is a line
 const COLOURS = [
