@@ -128,6 +128,7 @@ class Room:
         self.port = self._socket.getsockname()[1]
         self.token = secrets.token_urlsafe(24)
         self.playing, self.speed = False, 12.0
+        self._shown = secrets.token_hex(8)  # by which pages that come back know the session
         self._pages: set[Page] = set()
         self._joined = 0  # sockets, a page or not yet
         self._requests: queue.Queue[tuple[Page, Any, asyncio.Future[None]]] = queue.Queue()
@@ -341,7 +342,7 @@ class Room:
         self._undone = (session.steps, len(session.edits)) if undoes else None
 
     def _show_session(self, session: Session) -> None:
-        self.session, self._undone = session, None
+        self.session, self._undone, self._shown = session, None, secrets.token_hex(8)
         self.playing, self._piece, self._stroke = False, 1.0, None
         self._compiles = False
         messages = [*self._about(), *self._moment()]
@@ -371,7 +372,7 @@ class Room:
         """What a page needs to know before the first frame of a session."""
         header, setup, choices = self.session.header(), self.session.setup, self.choices
         offered = {"choices": choices.as_dict(), "chosen": choices.chosen(setup)}
-        return [_say("begin", header=header, **offered), self._state()]
+        return [_say("begin", session=self._shown, header=header, **offered), self._state()]
 
     def _moment(self) -> list[str | bytes]:
         """All as it is now, for a page that knows nothing of it."""
