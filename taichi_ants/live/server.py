@@ -298,11 +298,11 @@ class Room:
             log = Log.from_bytes(content)
         except AntsError as error:
             raise _of_page(error) from error
-        self._replay = _Replay(log)
+        self._replay = _Replay(Session.replay(log), log.steps)
 
     def _undo(self, page: Page, request: dict[str, Any]) -> None:
         """Go back to the moment before the last change."""
-        self._replay = _Replay(self.session.undone(), undoes=True)
+        self._replay = _Replay(self.session.undone(), self.session.steps, undoes=True)
 
     def _go_back(self, page: Page, request: dict[str, Any]) -> None:
         """Go on with the session whose place the present one has taken."""
@@ -599,8 +599,8 @@ class _Replay:
         session: As far as it has come.
     """
 
-    def __init__(self, log: Log, undoes: bool = False) -> None:
-        self.pieces, self.steps, self.undoes = Session.replay(log), log.steps, undoes
+    def __init__(self, pieces: Iterator[Session], steps: int, undoes: bool = False) -> None:
+        self.pieces, self.steps, self.undoes = pieces, steps, undoes
         self.session: Session | None = None
 
 
