@@ -641,7 +641,7 @@ def _of_page(error: Exception) -> Exception:
     if not isinstance(error, AntsError):
         return error
     what = str(error).partition("; ")[0].replace("'the loaded file'", "the loaded file")
-    return AntsError(f"{what}; load one that Save has made.")
+    return AntsError(f"{what}; load a session that Save has made.")
 
 
 def _words(error: Exception) -> str:

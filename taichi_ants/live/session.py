@@ -17,7 +17,7 @@ from taichi_ants.engines.colony.hand import Hand
 from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.learners.policies import save_policy
 from taichi_ants.live import edits
-from taichi_ants.live.log import KIND, MOST_TICKS, Log
+from taichi_ants.live.log import KIND, MOST_TICKS, Log, cells_of, check_room
 from taichi_ants.live.setup import Setup
 from taichi_ants.viewer import Recorder
 
@@ -67,6 +67,7 @@ class Session:
         self.ticks = self.steps = 0
         self.edits: list[tuple[int, edits.Edit]] = []
         self.changes: list[int] = []
+        self._cells = 0  # that the edits name
         self._snapshots: list[_Snapshot] = []
         self._spent = 0.0  # seconds of simulation so far
         self.hand.begin_episode(self._length)
@@ -165,6 +166,7 @@ class Session:
 
     def _do(self, edit: object, goes_on: bool = False) -> None:
         plain = edits.checked(edit, self.hand)
+        check_room(len(self.edits) + 1, self._cells + cells_of(plain))
         begins = not (goes_on and self.changes)
         if begins:
             self._take_snapshot()
@@ -175,6 +177,7 @@ class Session:
         if begins:
             self.changes.append(len(self.edits))
         self.edits.append((self.steps, plain))
+        self._cells += cells_of(plain)
         self._spent += time.perf_counter() - began
 
     def _take_snapshot(self) -> None:
