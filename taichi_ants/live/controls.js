@@ -6,7 +6,7 @@ const SLIDERS = {
 };
 const FILE_TYPES = { html: "text/html", gif: "image/gif" };
 const WORKS = { page: "page", gif: "GIF" };
-const MOST_UPLOAD = 2 ** 24;
+const MOST_UPLOAD = 2 ** 22;
 const MAP = `; lines shift by two columns
           .
         .   F

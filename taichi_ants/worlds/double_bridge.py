@@ -75,11 +75,12 @@ def bridge_ranges(
 
 def _walked(
     short: int, long: int, mirrored: bool, aside: int
-) -> tuple[tuple[int, ...], tuple[int, ...], np.ndarray]:
+) -> tuple[tuple[int, int, int], tuple[int, int, int], np.ndarray]:
     """The queen's cell, the middle of the pile, and the cells (n, 3) of branches and junctions."""
     junctions = junction_cells(short, long, mirrored, aside)
     corridors = np.concatenate([*branch_cells(short, long, mirrored, aside), junctions])
-    return (0, 0, 0), tuple((junctions[1] + junctions[0]).tolist()), corridors
+    x, y, z = (junctions[1] + junctions[0]).tolist()
+    return (0, 0, 0), (x, y, z), corridors
 
 
 def junction_cells(

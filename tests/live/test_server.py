@@ -13,17 +13,20 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from attacks import ATTACKS, attack
+from command_lines import crowding
 from playback import played
 from rooms import CHOSEN, Guest, running
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from taichi_ants import Colony
+from taichi_ants import AntsError, Colony
 from taichi_ants.learners.policies import Policy, trail_follower
 from taichi_ants.live import server
 from taichi_ants.live.choices import Choices
 from taichi_ants.live.exports import QUICK, SLOW
 from taichi_ants.live.log import Log
+from taichi_ants.live.session import Session
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.viewer import Recording
 from taichi_ants.viewer.frames import unpack
@@ -407,7 +410,7 @@ def test_a_session_is_saved_and_loaded(room):
         guest.socket.send(saved[:-200] + b"\0" * 200)
         words = guest.until("error")["words"]
         assert words.startswith("the loaded file is damaged")
-        assert words.endswith("; load one that Save has made.")
+        assert words.endswith("; load a session that Save has made.")
         assert state_of(room) == before
 
 
@@ -533,6 +536,46 @@ def test_time_goes_on_while_a_file_is_made(room):
         guest.until("session.gif")
         guest.ask("export", kind="page")
         guest.until("session.html")
+
+
+@pytest.mark.parametrize("name", ATTACKS)
+def test_a_file_that_would_hold_the_server_is_refused_at_once(room, name, tmp_path):
+    content, before = attack(name, room.session, tmp_path), state_of(room)
+    with Guest(room) as guest:
+        began = time.monotonic()
+        guest.socket.send(content)
+        words = guest.until("error")["words"]
+        assert time.monotonic() - began < 1.0 * crowding()
+    assert ATTACKS[name][1] in words
+    assert words.endswith("; load a session that Save has made.")
+    assert "\n" not in words
+    assert state_of(room) == before
+    with pytest.raises(AntsError, match=ATTACKS[name][1]):  # as --session does
+        Session.load(tmp_path / "session.npz")
+
+
+def test_pages_are_answered_quickly_while_any_file_loads(room, tmp_path):
+    """While processes start, worlds are built and kernels compiled; and Cancel ends all that."""
+    chosen = {**CHOSEN, "world": "open", "size": 180, "ants": 5000, "sees": "six_cells"}
+    setup = room.choices.setup(chosen)
+    Log(setup, ((5, {"kind": "episode"}),), 10**6, 10**6, "0", changes=(0,)).write(
+        tmp_path / "large.npz"
+    )
+    with Guest(room) as guest:
+        guest.socket.send((tmp_path / "large.npz").read_bytes())
+        slowest, began = 0.0, time.monotonic()
+        working(guest, "load", 0)
+        while time.monotonic() - began < 3:
+            asked = time.monotonic()
+            guest.ask("speed", value=12)
+            guest.until("state")
+            slowest = max(slowest, time.monotonic() - asked)
+        assert slowest < 0.3 * crowding()
+        process = room._loading._process
+        guest.ask("cancel", kind="load")
+        guest.until("cancelled")
+        process.join(2)
+        assert not process.is_alive()
 
 
 @pytest.fixture
