@@ -558,9 +558,8 @@ def test_pages_are_answered_quickly_while_any_file_loads(room, tmp_path):
     """While processes start, worlds are built and kernels compiled; and Cancel ends all that."""
     chosen = {**CHOSEN, "world": "open", "size": 180, "ants": 5000, "sees": "six_cells"}
     setup = room.choices.setup(chosen)
-    Log(setup, ((5, {"kind": "episode"}),), 10**6, 10**6, "0", changes=(0,)).write(
-        tmp_path / "large.npz"
-    )
+    log = Log(setup, ((5, {"kind": "episode"}),), 10**6, 10**6, "0", changes=(0,))
+    log.write(tmp_path / "large.npz")
     with Guest(room) as guest:
         guest.socket.send((tmp_path / "large.npz").read_bytes())
         slowest, began = 0.0, time.monotonic()
