@@ -1,7 +1,7 @@
 """The room in which people watch a session: its pages, and the thread in which time passes.
 
 The room serves one page, and a socket for each page that is open. It listens on this machine alone,
-and answers only who knows its token and comes from its own page. A page asks for things in JSON,
+and only a page of its own that knows its token gets a socket. A page asks for things in JSON,
 see `REQUESTS`; it is told what happens in JSON and in frames, see `taichi_ants.viewer.frames`.
 
 Two threads: sockets live in one, the session in the other, the one that calls `Room.run`. What a
@@ -29,12 +29,14 @@ from taichi_ants.errors import AntsError
 from taichi_ants.live.choices import Choices
 from taichi_ants.live.exports import LOAD, QUICK, SLOW, Making
 from taichi_ants.live.log import Log
-from taichi_ants.live.page import live_page
+from taichi_ants.live.page import live_page, policy_of
 from taichi_ants.live.session import Session
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
     from websockets.http11 import Request, Response
+
+    from taichi_ants.live.methods import Connection
 
 HOST = "127.0.0.1"
 FRAMES_A_SECOND = 30
@@ -152,6 +154,11 @@ class Room:
     def url(self) -> str:
         """Where the page is, with the token."""
         return f"http://{HOST}:{self.port}/?token={self.token}"
+
+    @property
+    def watched(self) -> bool:
+        """Whether a page is open."""
+        return bool(self._pages)
 
     def end(self) -> None:
         """Let `run` return soon; for any thread."""
@@ -528,43 +535,47 @@ class Room:
     async def _listen(self) -> None:
         from websockets.asyncio.server import serve
 
+        from taichi_ants.live.methods import Connection
+
         settings: dict[str, Any] = {
             **{"max_size": _MOST_UPLOAD, "max_queue": 4, "compression": None},
             **{"open_timeout": 10, "ping_interval": 20, "ping_timeout": 20, "close_timeout": 0.3},
             **{"process_request": self._open, "logger": _QUIET},
+            "create_connection": Connection,
         }
         async with serve(self._hear, sock=self._socket, **settings):
             await self._leave.wait()
             for page in self._pages:
                 page.tell(_say("over"))
 
-    def _open(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Answer a request: with the page, with a refusal, or None, which opens a socket."""
-        from http import HTTPStatus
+    def _open(self, connection: Connection, request: Request) -> Response | None:
+        """Answer a request: with the page, with a refusal, or None, which opens a socket.
 
+        The page itself holds no secret; only who knows the token gets a socket.
+        """
         asked = urlsplit(request.path)
         hosts = {f"{name}:{self.port}" for name in (HOST, "localhost")}
         host, origins = request.headers.get_all("Host"), request.headers.get_all("Origin")
-        opens = asked.path == "/socket"
+        opens, tokens = asked.path == "/socket", parse_qs(asked.query).get("token", [])
         mine = len(host) == 1 and host[0] in hosts
         # A page of ours has the origin that it was asked for at; the page itself is asked for by
         # nobody's page.
         mine = mine and (origins == [f"http://{host[0]}"] or (not origins and not opens))
-        given = parse_qs(asked.query).get("token", [""])[0]
-        if not mine or not hmac.compare_digest(given.encode(), self.token.encode()):
-            return connection.respond(HTTPStatus.FORBIDDEN, "Open the address that was printed.\n")
+        first = tokens[0] if tokens else ""
+        knows = hmac.compare_digest(first.encode(), self.token.encode())
+        if not mine or not (knows or (asked.path == "/" and not tokens)):
+            return _respond(connection, 403, "Open the address that was printed.\n")
+        if opens and connection.head:
+            return _respond(connection, 405, "", Allow="GET")
         if opens and self._joined >= _MOST_PAGES:
-            return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "Too many pages are open.\n")
+            return _respond(connection, 503, "Too many pages are open.\n")
         if opens:
             return None
         if asked.path != "/":
-            return connection.respond(HTTPStatus.NOT_FOUND, "There is nothing here.\n")
-        response = connection.respond(HTTPStatus.OK, live_page(f"ws://{host[0]}"))
-        for name, value in _HEADERS.items():
-            with contextlib.suppress(KeyError):
-                del response.headers[name]
-            response.headers[name] = value
-        return response
+            return _respond(connection, 404, "There is nothing here.\n")
+        page = live_page(f"ws://{host[0]}")
+        rules = {"Content_Security_Policy": policy_of(page)}
+        return _respond(connection, 200, page, Content_Type="text/html; charset=utf-8", **rules)
 
     async def _hear(self, connection: ServerConnection) -> None:
         """All that one page says; what it asks for is done before it is heard further."""
@@ -653,13 +664,27 @@ _INWARD = ("join", "leave", "catch up", LOAD)
 _CHANGES = (LOAD, "play", "step", "edit", "undo", "back", "begin", "restart")
 
 _HEADERS = {
-    "Content-Type": "text/html; charset=utf-8",
     "Cache-Control": "no-store",
+    "Content-Security-Policy": "default-src 'none'; frame-ancestors 'none'",
+    "Cross-Origin-Opener-Policy": "same-origin",
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
     "Cross-Origin-Resource-Policy": "same-origin",
 }
+
+
+def _respond(connection: Connection, status: int, text: str, **headers: str) -> Response:
+    """An answer with the headers of all answers, and others; without the text if HEAD asked."""
+    response = connection.respond(status, text)
+    for name, value in {**_HEADERS, **headers}.items():
+        name = name.replace("_", "-")
+        with contextlib.suppress(KeyError):
+            del response.headers[name]
+        response.headers[name] = value
+    if connection.head:
+        response.body = b""
+    return response
 
 
 def _log_or_fault(content: bytes) -> Log | AntsError:

@@ -14,8 +14,7 @@ class Live {
     this.speedUntil = 0;
     this.strokes = 0;
     this.viewer = null;
-    const { host, search } = location;
-    this.socket = new WebSocket(`ws://${host}/socket${search}`);
+    this.socket = new WebSocket(`ws://${location.host}/socket?token=${encodeURIComponent(TOKEN)}`);
     this.socket.binaryType = "arraybuffer";
     this.socket.addEventListener("message", ({ data }) => (typeof data === "string" ? this.hear(JSON.parse(data)) : this.take(data)));
     this.socket.addEventListener("close", ({ code, reason }) => this.tell("over", { code, reason }));

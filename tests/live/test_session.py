@@ -487,7 +487,7 @@ def test_no_session_at_all(content):
         ({"world": "pyproject.toml"}, "no world named 'pyproject.toml'"),
         ({"world": 3}, "world is 3"),
         ({"world": "Q ?\n"}, "'?'"),
-        ({"world": "Q" + " " * 5000 + "F\n"}, "a world of ranges ("),
+        ({"world": "Q" + " " * 4999 + "F\n"}, "a world of ranges ("),
         ({"world": "open", "world_settings": {"ranges": [9000, 9000, 1]}}, "81036004 cells"),
         ({"world": "open", "world_settings": {"size": 3}}, "size is no setting"),
         ({"world": "open", "world_settings": {"ranges": "abc"}}, "ranges are 'abc'"),
