@@ -24,9 +24,8 @@ from taichi_ants.worlds.validation import parse_ranges
 from taichi_ants.worlds.world import World
 
 # The same for the form of the page, for files and for Python; small enough for any machine.
-MOST_CELLS = 200_000  # of the arrays of a world, see `AxialGrid.size`
-MOST_ANTS = 10_000  # that start an episode
-MOST_CAPACITY = 2 * MOST_ANTS + 64
+MOST_CELLS = 1_500_000  # of the arrays of a world, see `AxialGrid.size`
+MOST_ANTS = 100_000
 MOST_TEXT = 50_000  # characters of a map
 _MOST_NUMBERS = 1 << 27  # of tables of ants' own
 
@@ -78,8 +77,8 @@ class Setup:
             object.__setattr__(self, "policy", table.copy())
         checked_whole("ants", self.ants, 1, MOST_ANTS)
         if self.capacity is None:
-            object.__setattr__(self, "capacity", 2 * self.ants + 64)
-        checked_whole("capacity", self.capacity, 1, MOST_CAPACITY)
+            object.__setattr__(self, "capacity", min(2 * self.ants + 64, MOST_ANTS))
+        checked_whole("capacity", self.capacity, 1, MOST_ANTS)
         for seed in (self.seed, self.world_seed):
             checked_seeds([seed])
         checked_whole("ticks_per_episode", self.ticks_per_episode, 0, MAX_STEPS)

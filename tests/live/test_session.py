@@ -504,7 +504,7 @@ def test_no_session_at_all(content):
         ({"ants": 10**9}, "ants is"),
         ({"ants": 9, "capacity": 8}, "capacity is 8"),
         ({"ants": 9999}, "9999 ants"),
-        ({"capacity": 20_000, "sharing": "own", "task": {"observation": "six_cells"}}, "memory"),
+        ({"capacity": 100_000, "sharing": "own", "task": {"observation": "six_cells"}}, "memory"),
         ({"seed": 2**70}, "a seed"),
         ({"seed": 1.5}, "a seed"),
         ({"ticks_per_episode": -1}, "ticks_per_episode is -1"),

@@ -42,17 +42,17 @@ ATTACKS: dict[str, tuple[Callable[[dict[str, Any]], str], str]] = {
     ),
     "a map of far cells": (
         lambda facts: _setup(facts, world="Q" + "\n" * 24_000 + " " * 24_000 + "F\n"),
-        "at most 200000 are allowed",
+        "at most 1500000 are allowed",
     ),
     "a long bridge": (
         lambda facts: _setup(
             facts, world="double_bridge", world_settings={"short": 1000, "long": 1990}
         ),
-        "at most 200000 are allowed",
+        "at most 1500000 are allowed",
     ),
     "a narrow world": (
         lambda facts: _setup(facts, world="open", world_settings={"ranges": [1, 1, 15_000]}),
-        "at most 200000 are allowed",
+        "at most 1500000 are allowed",
     ),
 }
 
