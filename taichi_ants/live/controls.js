@@ -14,7 +14,7 @@ const LOST = {
   "cut off": ["The server has cut this page off", "Connect again"],
   another: ["The server is back with another session. This page still has the one before; the other one takes its place if you show it.", "Show the other session"],
 };
-const MOST_UPLOAD = 2 ** 24;
+const MOST_UPLOAD = 2 ** 22;
 const MAP = `; lines shift by two columns
           .
         .   F

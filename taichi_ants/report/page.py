@@ -17,7 +17,7 @@ import numpy as np
 from taichi_ants.analysis.findings import Finding, Verdict
 from taichi_ants.analysis.tables import number
 from taichi_ants.report.intervals import interval_drawing
-from taichi_ants.viewer.page import part
+from taichi_ants.viewer.page import content_policy, part
 from taichi_ants.viewer.recording import Recording
 
 if TYPE_CHECKING:
@@ -60,6 +60,7 @@ def fill(template: str, **parts: Any) -> str:
         "style": part("colours.css") + _text("report.css"),
         "script": "\n".join([*map(part, _PLAYING), _text("report.js")]),
     }
+    shared["policy"] = content_policy(f"\n{shared['script']}\n", f"\n{shared['style']}\n")
     marked = {name: Markup(text) for name, text in shared.items()}
     return _templates().get_template(template).render(**marked, **parts)
 

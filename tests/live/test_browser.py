@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from command_lines import crowding
 from rooms import CHOSEN, Guest, running
 
 from taichi_ants import Colony, load_policy
+from taichi_ants.commands import watch
 from taichi_ants.learners.expected_sarsa import EXPECTED_SARSA
 from taichi_ants.learners.policies import Policy, trail_follower
 from taichi_ants.live.choices import Choices
@@ -531,6 +533,38 @@ def test_a_page_that_waits_says_so(browser, room, monkeypatch):
     tab.wait_for_function("window.viewer")
     assert tab.is_hidden("#toast")
     assert not tab.evaluate("document.querySelector('.controls').inert")
+    context.close()
+
+
+def test_the_token_is_seen_in_no_command_line_and_no_address(browser, room, monkeypatch):
+    """A browser opens a private file that leads to the page, under the policy of the page."""
+    opened = []
+    monkeypatch.setattr(watch.webbrowser, "open", opened.append)
+    monkeypatch.setattr(watch.sys, "platform", "elsewhere")  # where a display is not asked for
+    context, faults = browser.new_context(), []
+    tab = context.new_page()
+    tab.on("console", lambda message: faults.append(message.text))
+    with watch._opened(room.url):
+        (address,) = opened
+        path = Path(address.removeprefix("file://"))
+        assert room.token not in address
+        assert path.stat().st_mode & 0o777 == 0o600
+        assert path.parent.stat().st_mode & 0o777 == 0o700
+        tab.goto(address)
+        tab.locator("#now dd").first.wait_for()
+    assert not path.parent.exists()
+    for again in (tab.reload, lambda: None):
+        assert tab.url == f"http://127.0.0.1:{room.port}/"
+        again()
+        tab.locator("#now dd").first.wait_for()
+    tab.locator("#theme").click()
+    assert context.cookies() == []
+    assert faults == []
+    tab.go_back()
+    assert room.token not in tab.url
+    other = context.new_page()  # another tab has no token
+    other.goto(f"http://127.0.0.1:{room.port}/")
+    other.locator("#toast.bad").wait_for()
     context.close()
 
 

@@ -547,6 +547,23 @@ def test_cells_have_the_colours_of_what_they_hold(crowd, colony):
         assert colour == [*expected, 255]
 
 
+def test_the_page_works_under_its_policy(browser, colony):
+    """And text that somebody has smuggled in as a script does not run."""
+    path, *_ = colony
+    text = path.read_text(encoding="utf-8")
+    evil = path.with_name("evil.html")
+    evil.write_text(text.replace("</main>", "<script>document.title = 'evil'</script></main>"))
+    for file, refused in ((path, 0), (evil, 1)):
+        faults, context = [], browser.new_context(offline=True)
+        tab = context.new_page()
+        tab.on("console", lambda message, faults=faults: faults.append(message.text))
+        tab.goto(file.as_uri())
+        tab.locator("#now dd").first.wait_for()
+        assert tab.title() != "evil"
+        context.close()
+        assert len(faults) == refused
+
+
 def test_a_source_can_be_live(browser, folder, colony):
     """Frames that come one by one; the page waits at the end, and goes on when there are more."""
     path, moments, recording = colony
