@@ -8,7 +8,7 @@ from html import unescape
 import pytest
 from finished_pages import colony_html, study_results
 from pages import addresses, tables
-from synthetic_colony_study import build, limits
+from synthetic_colony_study import build
 
 from taichi_ants.analysis.colony.results import Results
 from taichi_ants.analysis.colony.tables import difference_rows, rows_of_seeds
@@ -69,14 +69,14 @@ def test_it_asks_for_nothing(page: str) -> None:
 
 def test_little_is_told_of_little() -> None:
     measured = build(seeds=1, sizes=(1,), ways=("open",), arenas=("small",))
-    told = colony_page(*Results.of(measured, limits(measured)), **BARE)
+    told = colony_page(*Results.of(measured), **BARE)
     assert not re.search(r"\b(nan|inf)\b", words_of(told))
     assert "small worlds (15, 15, 15)" in told
 
 
 def test_what_has_no_interval_says_so() -> None:
     alike = build(seeds=3, noise=0, sizes=(1, 4))
-    told = words_of(colony_page(*Results.of(alike, limits(alike)), **BARE))
+    told = words_of(colony_page(*Results.of(alike), **BARE))
     assert "Difference: 0.00, without an interval." in told
     assert "1 ant: " in told
     assert not re.search(r"\b(nan|inf)\b|\b1 ants", told)

@@ -6,7 +6,6 @@ from functools import cache
 
 import numpy as np
 from synthetic_colony_study import build as build_study
-from synthetic_colony_study import limits
 from synthetic_comparison import build, change, unchanged
 
 from taichi_ants import Colony, Task, TrainingConfig, worlds
@@ -66,7 +65,7 @@ def study_results() -> StudyResults:
         return 20.0 * ants * (2 if rules in ("foraging", "queueing") and ants > 1 else 1)
 
     measured = build_study(truth, seeds=6, arenas=("paper", "open", "small"))
-    return StudyResults.of(measured, limits(measured))
+    return StudyResults.of(measured)
 
 
 @cache

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from synthetic_colony_study import Truth, build, limits, proportional
+from synthetic_colony_study import Truth, build, proportional
 
 from taichi_ants.analysis.colony.results import Results
 from taichi_ants.analysis.colony.study import ABC, ALONE, JOINT, PAPER, SILENT
@@ -12,7 +12,7 @@ from taichi_ants.analysis.tables import plain_text
 
 def told(truth: Truth = proportional, **settings: object) -> list[str]:
     study = build(truth, **settings)
-    return list(Results.of(study, limits(study)).answer)
+    return list(Results.of(study).answer)
 
 
 def times(factor: float, rules: str, way: str = JOINT) -> Truth:
@@ -49,7 +49,7 @@ def test_worlds_that_disagree_are_told_apart() -> None:
         if condition.rules == ABC and condition.arena != "piles":
             factor = 2.0 if condition.arena == "paper" else 0.5
             study[condition] = {**measures, "deliveries": measures["deliveries"] * factor}
-    sentence = Results.of(study, limits(study)).answer[0]
+    sentence = Results.of(study).answer[0]
     more, less, still = sentence.split("; ")
     assert more.startswith(
         "8 ants with all three rules deliver more than under the paper's rules: "
@@ -69,7 +69,7 @@ def test_few_seeds_say_that_they_cannot_tell() -> None:
     for condition, measures in study.items():
         if condition.arena == "open":
             study[condition] = {**measures, "deliveries": measures["deliveries"] * [0, 1, 5]}
-    known, open_one = Results.of(study, limits(study)).answer[0].split("; ")
+    known, open_one = Results.of(study).answer[0].split("; ")
     assert known.endswith(" in the paper's world")
     assert open_one.startswith("3 seeds leave it open: ")
 
@@ -82,7 +82,7 @@ def test_one_ant_alone_answers_nothing() -> None:
 
 def test_it_fits_on_one_screen() -> None:
     study = build(arenas=("paper", "open", "piles", "rocks"))
-    found = Results.of(study, limits(study))
+    found = Results.of(study)
     lines = plain_text(on_one_screen(found.rows, found.judged, found.answer), 79).splitlines()
     assert len(lines) <= 37
     assert max(map(len, lines)) <= 79
@@ -95,6 +95,6 @@ def test_it_fits_on_one_screen() -> None:
     assert row[5:] == [f"{mean:.0f}" for mean in means[:3]]
     assert any(line.startswith("  Do the trails help? ") for line in lines)
     elsewhere = build(ways=("open",), arenas=("rocks",))
-    found = Results.of(elsewhere, limits(elsewhere))
+    found = Results.of(elsewhere)
     text = plain_text(on_one_screen(found.rows, found.judged, found.answer), 79)
     assert "rocks" in text

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from PIL import Image
-from synthetic_colony_study import SIZES, build, limits
+from synthetic_colony_study import SIZES, build
 
 from taichi_ants.analysis.colony import figures
 from taichi_ants.analysis.colony.study import (
@@ -36,7 +36,7 @@ def rows() -> list[dict[str, Any]]:
         noise=10,
         arenas=ARENAS,
     )
-    return condition_rows(study, limits(study))
+    return condition_rows(study)
 
 
 def column(rows: list, name: str, arena: str, rules: str, way: str = JOINT) -> list[float]:
@@ -92,5 +92,5 @@ def test_files_are_wide_enough_to_read_and_little_data_can_be_drawn(rows, tmp_pa
     elsewhere = build(seeds=2, ways=(ABROAD,), arenas=("rocks",))
     for study, number in ((lonely, 3), (nothing, 3), (elsewhere, 1)):
         folder = tmp_path / str(len(study))
-        save_all(figures.draw_all(condition_rows(study, limits(study))), folder)
+        save_all(figures.draw_all(condition_rows(study)), folder)
         assert len(list(folder.iterdir())) == number

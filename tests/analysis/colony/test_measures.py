@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from synthetic_colony_study import SIZES, build, limits
+from synthetic_colony_study import SIZES, build
 
 from taichi_ants.analysis.colony.contrasts import ADDS, MORE, judge_all
 from taichi_ants.analysis.colony.study import (
@@ -59,7 +59,7 @@ def test_measures(measure: str, expected: list[float]) -> None:
 
 def test_every_measure_is_in_the_tables() -> None:
     study = build(seeds=7, noise=20)
-    rows = condition_rows(study, limits(study))
+    rows = condition_rows(study)
     assert len(rows) == len(WAYS) * len(RULES) * len(SIZES)
     (row,) = (row for row in rows if (row["rules"], row["way"], row["ants"]) == (SILENT, JOINT, 4))
     lines = rows_of_seeds(study, range(3, 10))
@@ -101,7 +101,7 @@ def test_means_at_a_glance() -> None:
     at_home = {condition: one for condition, one in at_home.items() if condition.way != ABROAD}
     abroad = {Condition("rocks", ABC, ABROAD, 8): study[Condition("rocks", ABC, ABROAD, 8)]}
     study = {**at_home, **abroad}
-    home, away = means(condition_rows(study, limits(study)))
+    home, away = means(condition_rows(study))
     assert home.title == "The paper's world, 12 seeds: deliveries per 1000 ticks"
     assert home.columns == ("ants", *map(str, SIZES), "limit")
     rows = {row[0]: row[1:] for row in home.rows}
