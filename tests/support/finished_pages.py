@@ -64,7 +64,7 @@ def study_results() -> StudyResults:
     def truth(rules: str, way: str, ants: int) -> float:
         return 20.0 * ants * (2 if rules in ("foraging", "queueing") and ants > 1 else 1)
 
-    measured = build_study(truth, seeds=6, arenas=("paper", "open", "small"))
+    measured = build_study(truth, seeds=12, arenas=("paper", "open", "small"))
     return StudyResults.of(measured)
 
 

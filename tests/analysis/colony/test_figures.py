@@ -66,10 +66,15 @@ def test_a_line_shows_the_largest_colony_of_a_design(rows, draw, designs) -> Non
             *_, low = column(rows, "deliveries_ci_low", arena, *design)
             *_, mean = column(rows, "deliveries_mean", arena, *design)
             assert means[place] == mean
-            ends = axis.collections[place].get_segments()[0]
-            assert ends.min(axis=0).tolist() == [low, place]
+            interval, spread, bounds = axis.collections[3 * place : 3 * place + 3]
+            assert interval.get_segments()[0].min(axis=0).tolist() == [low, place]
+            *_, worst = column(rows, "deliveries_min", arena, *design)
+            assert spread.get_segments()[0].min(axis=0).tolist() == [worst, place]
+            assert bounds.get_segments()[0][:, 0].tolist() == [200, 200]
             marks = [line for line in axis.lines if line.get_marker() == "|"]
             assert marks[place].get_xdata() == [200]
+    caption = " ".join(figure._supxlabel.get_text().split())
+    assert "means over 6 seeds, too few for a verdict. Exploration rate 0.01." in caption
     titles = [axis.get_title(loc="left") for axis in figure.axes]
     assert titles == ["The paper's world", "Open worlds (30, 30, 30)"]
 
