@@ -100,7 +100,7 @@ def plan(
         )
     training = scheduled(replace(training, min_epsilon=EVALUATION_EPSILON), episodes)
     places = {
-        arena: worlds.paper() if arena == "paper" else tuple(_place(arena, s) for s in seeds)
+        arena: worlds.paper() if arena == "paper" else tuple(place(arena, seed) for seed in seeds)
         for arena in dict.fromkeys([*arenas, OPEN])
     }
     pools = {arena: _pool(arena) for arena in places}
@@ -127,7 +127,7 @@ def plan(
             abroad = replace(
                 after,
                 world=places[arena],
-                task=replace(after.task, life=LIVES.get(arena, _LIVELY)),
+                task=task_in(arena, after.task),
                 pool=None,
                 ants=LARGE_SIZE if arena == "large" else sizes[-1],
                 episodes=0,
@@ -143,8 +143,15 @@ RANGES = {"small": (15, 15, 15), "wide": (60, 60, 60), "large": (100, 100, 100)}
 _PILES = {"piles": 3, "moving": 3, "one_pile": 1}  # and no other food
 
 
-def _place(arena: str, seed: int) -> World:
-    """The world of an arena, but the paper's, that a seed gives."""
+def task_in(arena: str, task: Task) -> Task:
+    """Return the task with the food of an arena."""
+    return replace(task, life=LIVES.get(arena, _LIVELY))
+
+
+def place(arena: str, seed: int) -> World:
+    """Return the world of an arena that a seed gives; the paper's is the only one of its kind."""
+    if arena == "paper":
+        return worlds.paper()
     ranges = RANGES.get(arena, (30, 30, 30))
     if arena in _PILES:
         return worlds.far_piles(seed, ranges, piles=_PILES[arena])
@@ -155,7 +162,7 @@ def _pool(arena: str) -> tuple[World, ...] | None:
     """Worlds for training, other ones than for evaluation; the paper's is the only one."""
     if arena not in ARENAS or arena == "paper":
         return None
-    return tuple(_place(arena, FIRST_OF_POOL + n) for n in range(POOL))
+    return tuple(place(arena, FIRST_OF_POOL + n) for n in range(POOL))
 
 
 def scheduled(training: TrainingConfig, episodes: int) -> TrainingConfig:
