@@ -106,7 +106,10 @@ def means(rows: Sequence[Mapping[str, Any]]) -> list[Table]:
         ]
         if cells:
             headers = ("ants", *map(str, sizes), "share of\nbound", "mean\nbound")
-            note = f"The last two columns are those of {count(sizes[-1], 'ant')}. {_OF_BOUNDS}"
+            note = (
+                f"Of {count(sizes[-1], 'ant')}: the mean share of each world's own bound, and the "
+                "mean of the bounds."
+            )
             title = f"{sentence(ARENAS[arena])}, {seeds}"
             tables.append(Table(title, headers, cells, [note]))
     abroad = [row for row in rows if row["way"] == ABROAD]
@@ -121,12 +124,6 @@ def means(rows: Sequence[Mapping[str, Any]]) -> list[Table]:
         note = "Mean, its 95 % interval, and the worst seed."
         tables.append(Table(title, headers, cells, [note]))
     return tables
-
-
-_OF_BOUNDS = (
-    "Each world has a bound that no colony exceeds: deliveries are divided by that of their world, "
-    "then averaged."
-)
 
 
 def _basis(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -166,7 +163,7 @@ def glance(rows: Sequence[Mapping[str, Any]]) -> Table:
         cells.append(["Mean of the worlds' bounds [range]", *map(_bounds, most)])
     headers = ("", *(sentence(ARENAS[arena]).replace(" (", "\n(") for arena in arenas))
     title = f"{sentence(MEASURES['deliveries'])} of {count(largest, 'ant')}, {_basis(rows)}"
-    note = f"In brackets: without exploration. Then the share of the bound. {_OF_BOUNDS}"
+    note = "(...): without exploration. %: mean share of each world's own bound."
     return Table(title, headers, cells, [note] if cells else [])
 
 

@@ -88,8 +88,8 @@ def test_it_fits_on_one_screen() -> None:
         for one in found.rows
         if (one["rules"], one["way"], one["ants"]) == (ABC, JOINT, 8)
     ]
-    assert row[5::3] == [f"{mean:.0f}" for mean in means[:3]]
-    assert row[6::3] == [f"({1.5 * mean:.0f})," for mean in means[:3]]
+    assert row[5::4] == [f"{mean:.0f}" for mean in means[:3]]
+    assert row[6::4] == [f"({1.5 * mean:.0f})," for mean in means[:3]]
     assert any(line.startswith("  Do the trails help? ") for line in lines)
     elsewhere = build(ways=("open",), arenas=("rocks",))
     found = Results.of(elsewhere)
