@@ -103,8 +103,8 @@ def _dots(rows: Rows, designs: Sequence[Design], title: str) -> Figure | None:
         ants = sorted({int(row["ants"]) for lines in panels.values() for row in lines.values()})
         sizes = f"{' or '.join(map(str, ants))} {'ant' if ants == [1] else 'ants'}"
         caption = (
-            f"{sizes}. {_spread(rows)} Thin line: from the worst seed to the best. Grey: bounds of "
-            "the worlds, from the lowest to the highest; bar: their mean."
+            f"{sizes}. {_spread(rows)} Thin line: from the worst seed to the best. Grey: the "
+            "bounds of the worlds, from the lowest to the highest; bar: their mean."
         )
         title = f"{title}: {MEASURES['deliveries']}"
         style.frame(figure, title, textwrap.fill(caption, 120), {})
@@ -115,7 +115,7 @@ def _dot(axis: Axes, place: int, row: Mapping) -> None:
     """The mean with its interval, value and range over seeds, and the bounds where known."""
     mean, low, high = (row[f"deliveries_{end}"] for end in ("mean", "ci_low", "ci_high"))
     colour = style.COLOURS[place % len(style.COLOURS)]
-    axis.hlines(place, low, high, color=colour)
+    axis.hlines(place, low, high, color=colour, lw=3)
     axis.plot(mean, place, "o", color=colour)
     axis.hlines(place, row["deliveries_min"], row["deliveries_max"], color=colour, lw=0.8)
     axis.hlines(place, row["bound_min"], row["bound_max"], color=style.GREY, lw=3, alpha=0.5)
@@ -151,8 +151,8 @@ def _lines(
 def _spread(rows: Rows) -> str:
     """The seeds, the intervals and the exploration rate, for a caption."""
     seeds = int(rows[0]["seeds"])
-    means = "95 % intervals of means over " if seeds > 1 else ""
-    return f"{sentence(means + seeds_in_words(seeds))}. Exploration rate {EVALUATION_EPSILON:g}."
+    means = f"Means over {seeds_in_words(seeds)}, with 95 % intervals" if seeds > 1 else "One seed"
+    return f"{means}. Exploration rate {EVALUATION_EPSILON:g}."
 
 
 def _points(rows: Rows, design: Design, measure: str) -> list[tuple[float, ...]]:

@@ -155,15 +155,15 @@ def glance(rows: Sequence[Mapping[str, Any]]) -> Table:
         for one in designs
         if any((arena, one) in by_place for arena in arenas)
     ]
-    if cells:  # of the rules under which most is possible
+    if cells:  # most is possible where ants with food have right of way
         most = [
             max((row for row in shown if row["arena"] == arena), key=lambda row: row["bound_mean"])
             for arena in arenas
         ]
-        cells.append(["Mean of the worlds' bounds [range]", *map(_bounds, most)])
+        cells.append(["Mean bound, right of way [range]", *map(_bounds, most)])
     headers = ("", *(sentence(ARENAS[arena]).replace(" (", "\n(") for arena in arenas))
     title = f"{sentence(MEASURES['deliveries'])} of {count(largest, 'ant')}, {_basis(rows)}"
-    note = "(...): without exploration. %: mean share of each world's own bound."
+    note = "(...): without exploration. %: of each world's own bound under the same rules."
     return Table(title, headers, cells, [note] if cells else [])
 
 

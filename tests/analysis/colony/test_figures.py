@@ -74,7 +74,10 @@ def test_a_line_shows_the_largest_colony_of_a_design(rows, draw, designs) -> Non
             marks = [line for line in axis.lines if line.get_marker() == "|"]
             assert marks[place].get_xdata() == [200]
     caption = " ".join(figure._supxlabel.get_text().split())
-    assert "means over 6 seeds, too few for a verdict. Exploration rate 0.01." in caption
+    assert (
+        "Means over 6 seeds, too few for a verdict, with 95 % intervals. Exploration rate 0.01."
+        in caption
+    )
     titles = [axis.get_title(loc="left") for axis in figure.axes]
     assert titles == ["The paper's world", "Open worlds (30, 30, 30)"]
 
