@@ -115,7 +115,7 @@ _WITHOUT_FOOD_IN_QUEUES: Rule = (
 _WITH_FOOD: Rule = (("Q", "take"), ("SP", "straight"), ("p", "stay"), ("EA", "any"))
 # The rule without food and that with food, by the observation.
 RULES: Mapping[str, tuple[Rule, Rule]] = {
-    "paper": (_WITHOUT_FOOD, _WITH_FOOD),
+    "paper": (_WITHOUT_FOOD, (("Q", "take"), ("S", "any"), ("E", "any"))),
     "ants": (_WITHOUT_FOOD, _WITH_FOOD),
     "queues": (_WITHOUT_FOOD_IN_QUEUES, _WITH_FOOD),
 }

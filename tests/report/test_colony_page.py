@@ -75,6 +75,15 @@ def test_little_is_told_of_little() -> None:
     assert "small worlds (15, 15, 15)" in told
 
 
+def test_few_seeds_are_said_and_give_no_verdict() -> None:
+    measured = build(seeds=8, sizes=(1, 4), arenas=("paper", "rocks"))
+    page = colony_page(*Results.of(measured), **BARE)
+    assert page.count("8 seeds, too few for a verdict") >= 5  # byline, lead, three tables
+    assert "too few seeds" in page
+    for verdict in ("supported", "contradicted", "undecided"):
+        assert f'class="v v-{verdict}"' not in page
+
+
 def test_what_has_no_interval_says_so() -> None:
     alike = build(seeds=3, noise=0, sizes=(1, 4))
     told = words_of(colony_page(*Results.of(alike), **BARE))
