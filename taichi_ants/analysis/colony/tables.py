@@ -162,8 +162,8 @@ def glance(rows: Sequence[Mapping[str, Any]]) -> Table:
         ]
         cells.append(["Mean bound, right of way [range]", *map(_bounds, most)])
     headers = ("", *(sentence(ARENAS[arena]).replace(" (", "\n(") for arena in arenas))
-    title = f"{sentence(MEASURES['deliveries'])} of {count(largest, 'ant')}, {_basis(rows)}"
-    note = "(...): without exploration. %: of each world's own bound under the same rules."
+    title = f"{sentence(MEASURES['deliveries'])} of {count(largest, 'ant')}"
+    note = f"{_basis(rows)}; in brackets: 0. %: of each world's own bound."
     return Table(title, headers, cells, [note] if cells else [])
 
 

@@ -135,7 +135,7 @@ def test_each_world_has_a_bound_of_its_own() -> None:
     assert (name, cell) == ("Mean bound, right of way [range]", "200 [100, 300]")
     shares = 160 / np.linspace(100, 300, 10)
     assert {row[1] for row in table.rows[:-1]} == {f"160 (240), {100 * shares.mean():.0f} %"}
-    assert "10 seeds, exploration rate 0.01" in table.title
+    assert "10 seeds, exploration rate 0.01" in table.notes[0]
 
 
 def test_findings_stand_under_their_questions() -> None:
