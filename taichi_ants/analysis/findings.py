@@ -38,6 +38,7 @@ class Verdict(str, Enum):
     """
 
     NOT_TESTED = "not tested"
+    TOO_FEW = "too few seeds"
     CONTRADICTED = "contradicted"
     EQUIVALENT = "equivalent"
     UNDECIDED = "undecided"
@@ -188,6 +189,14 @@ def judge(contrasts: Sequence[Contrast]) -> list[Finding]:
 def too_few(seeds: int) -> str:
     """How an answer begins that fewer than `LEAST_SEEDS` seeds leave open; what it asks follows."""
     return f"{count(seeds, 'seed')} {'is' if seeds == 1 else 'are'} too few to tell whether"
+
+
+def seeds_in_words(seeds: int) -> str:
+    """Return the number of seeds for a table, with a warning if they are fewer than `LEAST_SEEDS`.
+
+    For example "20 seeds", or "8 seeds, too few for a verdict".
+    """
+    return count(seeds, "seed") + (", too few for a verdict" if seeds < LEAST_SEEDS else "")
 
 
 def weakest(findings: Sequence[Finding]) -> Finding:

@@ -7,7 +7,7 @@
    session by itself; another one it shows only if asked to, since that takes the place of what it has. */
 
 const PAGE = document.documentElement.outerHTML; // before anything has changed it
-const LIVE_SCRIPT = "/* The token"; // where the scripts of the live page begin, in token.js
+const LIVE_SCRIPT = "/* The secret of the address"; // where the scripts of the live page begin, in token.js
 const FIRST_RETRY = 500, LAST_RETRY = 15_000; // milliseconds
 const CUT_OFF = 1008; // the server has closed the socket, since the page has sent something wrong
 

@@ -198,7 +198,7 @@ class Statements(NamedTuple):
 # In the order in which a reader wants them.
 KINDS = (
     *(Verdict.SUPPORTED, Verdict.EQUIVALENT, Verdict.UNDECIDED),
-    *(Verdict.CONTRADICTED, Verdict.NOT_TESTED),
+    *(Verdict.CONTRADICTED, Verdict.NOT_TESTED, Verdict.TOO_FEW),
 )
 
 

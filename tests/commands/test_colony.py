@@ -85,13 +85,17 @@ def test_all_files_are_there(finished):
     assert set(contents(folder)) == FILES
     report = (folder / "report.txt").read_text("utf-8")
     assert out.startswith(report)
-    assert len(out.splitlines()) <= 40
+    assert len(out.splitlines()) <= 42
     assert out.splitlines()[-1] == "out/report.html"
     assert "Deliveries per 1000 ticks of 3 ants" in report
+    assert "2 seeds, too few for a verdict, exploration rate 0.01; in brackets: 0." in report
     assert "What does each rule add?" in report
     page = (folder / "report.html").read_text("utf-8")
-    assert "The paper&#39;s world, 2 seeds: deliveries" in page
-    assert "Trained in open worlds, 3 ants, 2 seeds" in page
+    assert (
+        "The paper&#39;s world, 2 seeds, too few for a verdict, exploration rate 0.01: deliveries"
+        in page
+    )
+    assert "Trained in open worlds, 3 ants, 2 seeds, too few for a verdict" in page
     assert page.count('class="player"') == 3
     with open(folder / "conditions.csv", newline="") as file:
         rows = list(csv.DictReader(file))
