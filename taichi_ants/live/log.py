@@ -48,7 +48,7 @@ class Log:
         setup: How it begins.
         edits: (steps, edit) of each edit, in order, see `edits`.
         steps: How many steps time has made, see `Session`.
-        ticks: How many ticks have passed; None if that is not known, as of what was undone.
+        ticks: How many ticks have passed; None if that is not known.
         state: What `Hand.state` gives then; None if that is not known.
         name: What messages call it.
         changes: As in `Session`; in files without them each edit is a change of its own.

@@ -4,8 +4,9 @@ The room serves one page, and a socket for each page that is open. It listens on
 and only a page of its own that knows its token gets a socket. A page asks for things in JSON,
 see `REQUESTS`; it is told what happens in JSON and in frames, see `taichi_ants.viewer.frames`.
 
-Two threads: sockets live in one, the session in the other, the one that calls `Room.run`. What a
-page asks for is put into a queue; what it is told is handed back to the thread of the sockets.
+Two threads: one serves the sockets, the other, which calls `Room.run`, has the session. Requests
+of pages go through a queue; messages to pages go back to the thread of the sockets. Files that
+pages upload are checked in further threads and replayed by processes, see `exports.Making`.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ _FEW = 4  # frames of an episode, below which each shows another one
 _PHASES = 24  # frames that such episodes make one of
 _STATE_EVERY = 0.5  # seconds
 _PROGRESS_EVERY = 0.2  # seconds
-_SLICE = 0.05  # seconds of replaying, after which requests are answered
+_SLICE = 0.05  # seconds of undoing, after which requests are answered
 _BREATH = 0.004  # seconds after each frame, in which the thread of the sockets gets its turn
 _LONGEST_WAIT = 0.2  # seconds, for a request, before it looks whether it is to end
 _QUIET = logging.getLogger("taichi_ants.live")  # what strangers send is no news for the terminal
@@ -225,7 +226,7 @@ class Room:
         return self._replay is not None or self._loading is not None
 
     def _go_on(self, replay: _Replay) -> None:
-        """Replay for a moment; at its end, the session takes the place of the present one."""
+        """Undo for a moment; at the end, the new session takes the place of the present one."""
         until = time.monotonic() + _SLICE
         try:
             for session in replay.pieces:
@@ -238,7 +239,7 @@ class Room:
         else:
             self._replay = None
             assert replay.session is not None
-            self._begin(replay.session, replay.undoes)
+            self._begin(replay.session, undoes=True)
         self._tells = 0.0
 
     def _works(self) -> list[dict[str, Any]]:
@@ -332,7 +333,7 @@ class Room:
 
     def _undo(self, page: Page, request: dict[str, Any]) -> None:
         """Go back to the moment before the last change."""
-        self._replay = _Replay(self.session.undone(), self.session.steps, undoes=True)
+        self._replay = _Replay(self.session)
 
     def _go_back(self, page: Page, request: dict[str, Any]) -> None:
         """Go on with the session whose place the present one has taken."""
@@ -628,17 +629,17 @@ class Room:
 
 
 class _Replay:
-    """A session that is being made once more from its log.
+    """The present session, while it is made once more without its last change.
 
     Attributes:
-        pieces: What replays it.
-        steps: How many time has made at its end.
-        undoes: Whether it is the present one without its last change.
-        session: As far as it has come.
+        pieces: What makes it.
+        steps: How many steps time has made at its end.
+        session: The new session so far.
     """
 
-    def __init__(self, pieces: Iterator[Session], steps: int, undoes: bool = False) -> None:
-        self.pieces, self.steps, self.undoes = pieces, steps, undoes
+    def __init__(self, session: Session) -> None:
+        self.pieces = session.undone()
+        self.steps, _ = session.edits[session.changes[-1]]
         self.session: Session | None = None
 
 
