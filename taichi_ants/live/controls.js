@@ -8,6 +8,7 @@ const FILE_TYPES = { html: "text/html", gif: "image/gif" };
 const WORKS = { page: "page", gif: "GIF" };
 // What happened to the connection, and what the second button does then.
 const LOST = {
+  "no token": ["This page has no token, so the server does not let it in. Open the address that the server prints.", "Try again"],
   lost: ["The connection is lost. This page keeps what it has shown, and connects again by itself when the server is back. "
     + "A server that you start anew has a new address: open that one.", "Try now"],
   ended: ["The server has ended. This page keeps what it has shown.", "Try to connect"],

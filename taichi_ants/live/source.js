@@ -44,9 +44,9 @@ class Live {
     on("close", (event) => this.lose(event));
   }
 
-  /* Why there is no connection: "lost" or "ended", and it is tried again; "cut off", or "another" session. */
+  /* Why there is no connection: "lost" or "ended", and it is tried again; "no token", "cut off", or "another" session. */
   lose({ code, reason }) {
-    const why = code === CUT_OFF ? "cut off" : this.differs ? "another" : this.ended ? "ended" : "lost";
+    const why = TOKEN === "" ? "no token" : code === CUT_OFF ? "cut off" : this.differs ? "another" : this.ended ? "ended" : "lost";
     this.waiting = this.begins = null;
     this.arrived = 0;
     this.running = this.stands = false;

@@ -564,7 +564,8 @@ def test_the_token_is_seen_in_no_command_line_and_no_address(browser, room, monk
     assert room.token not in tab.url
     other = context.new_page()  # another tab has no token
     other.goto(f"http://127.0.0.1:{room.port}/")
-    other.locator("#toast.bad").wait_for()
+    other.locator("#lost").wait_for()
+    assert "Open the address that the server prints." in other.locator("#lost").inner_text()
     context.close()
 
 
