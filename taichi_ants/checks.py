@@ -189,7 +189,7 @@ def checked_table(q_values: Any, task: Task) -> np.ndarray:
 def checked_q_values(q_values: Any, task: Task) -> np.ndarray:
     """Action values as float32 (..., n_states, 5), finite.
 
-    What has them as its `q_values` can be given too: a `TrainingResult`, a `Policy` or a `Colony`.
+    Also accepts an object with `q_values`: a `TrainingResult`, a `Policy` or a `Colony`.
     """
     q_values = getattr(q_values, "q_values", q_values)
     try:

@@ -83,14 +83,14 @@ _MAKES: dict[str, Callable[[Log, Progress], bytes | Session]] = {
 
 
 class Making:
-    """A file of `SLOW` that a process of its own makes, or a session that it replays (`LOAD`).
+    """A file of `SLOW` that a worker process makes, or a session that it replays (`LOAD`).
 
     Args:
         kind: Of `SLOW`, or `LOAD`.
         content: The session, as its file holds it.
         total: The ticks that it is about.
         prepare: Called first in that process, as to load a plugin.
-        end: Called in a thread of its own with `made`; not if it was cancelled.
+        end: Called in a new thread with `made`; not if it was cancelled.
 
     Attributes:
         done: How many of the ticks have passed.

@@ -16,7 +16,7 @@ from taichi_ants.task.constants import N_ACTIONS
 MOST_TICKS = 1_000_000_000
 MOST_EDITS = 10_000
 MOST_CELLS = 400_000  # that edits name, all together
-# What sessions within these limits need; so reading a file takes little time and memory.
+# Sessions within these limits need no more, so reading a file takes little time and memory.
 KIND = FileKind(
     *("taichi-ants session 2", "session", "Session.save, or Save on its page,"),
     most=1 << 25,

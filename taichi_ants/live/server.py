@@ -315,7 +315,7 @@ class Room:
         self._tells = min(self._tells, time.monotonic() + 1 / FRAMES_A_SECOND)
 
     def _load(self, page: Page, request: dict[str, Any]) -> None:
-        """Replay a session in a process of its own, which can be ended at any time."""
+        """Replay a session in a worker process, which can be ended at any time."""
         log = request["log"]
         if isinstance(log, AntsError):
             raise _of_page(log) from log
