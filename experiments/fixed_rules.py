@@ -1,8 +1,10 @@
-"""Ants with a fixed rule: what a colony delivers that learns nothing.
+"""Ants with a fixed rule: deliveries of a colony that learns nothing.
 
-All ants follow `trail_follower`, a table written by hand, but with probability epsilon do anything.
-Prints deliveries per 1000 ticks with their 95 % interval over seeds, the tick of the first
-delivery, and the share of blocked moves, for some rules in three kinds of worlds. See
+All ants follow `trail_follower`, a rule that is written by hand, and explore with the rate of
+--epsilon. The script prints that rule, then deliveries per 1000 ticks with their 95 % interval over
+seeds, the worst seed, the tick of the first delivery, and the share of blocked moves. Worlds, seeds
+and random numbers are those of the evaluation in `colony.py study`. With --study, it also prints
+the deliveries of that study's ants, and the difference, learned minus fixed, paired by seed. See
 docs/baselines.md.
 """
 
@@ -13,27 +15,25 @@ from taichi_ants.studies.interruption import stoppable
 with stoppable():  # these imports take a moment, in which Ctrl-C shall be heard too
     import argparse
     import math
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from dataclasses import replace
     from itertools import product
+    from pathlib import Path
     from typing import TYPE_CHECKING
 
     import numpy as np
 
-    from taichi_ants import Colony, Life, Pheromone, Task, TrainingConfig, World, task, worlds
+    from taichi_ants import AntsError, Colony, Pheromone, Task, TrainingConfig, World, files, task
+    from taichi_ants.analysis.colony.study import ABROAD, ARENAS, EVALUATION_EPSILON, JOINT, WORLDS
     from taichi_ants.analysis.statistics import bootstrap_interval
-    from taichi_ants.learners.policies import trail_follower
+    from taichi_ants.learners.policies import FOLLOWED, RULES, trail_follower
+    from taichi_ants.studies.colony_study import LARGE_SIZE, place, task_in
     from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
+    from taichi_ants.studies.runner import EVALUATION_SEEDS
 
     if TYPE_CHECKING:
         from taichi_ants.engines.colony.colony import ColonyEpisodes
 
-SIZE = (30, 30, 30)
-WORLDS = {
-    "paper": lambda seed: worlds.paper(),
-    "open": lambda seed: worlds.open_world(seed, SIZE),
-    "piles": lambda seed: worlds.open_world(seed, SIZE, food_share=0.0),
-}
 # NetLogo's model Ants: in each tick 10 % of a trail evaporates and half of it spreads. An ant there
 # adds 60, and smells 0.05; here it smells 1.
 NETLOGO = Pheromone(
@@ -53,55 +53,106 @@ TASKS = {
     "netlogo, in queues": replace(task.queueing(), pheromone=NETLOGO),
 }
 TICKS, EPISODES = 1000, 4
-HEAD = "world  rules              epsilon  deliveries  interval      first  blocked"
+MEASURES = {EVALUATION_EPSILON: "deliveries", 0.0: "greedy"}  # of the study, by exploration rate
+HEAD = (
+    "world    rules              epsilon  deliveries  interval      worst  first  blocked"
+    "  learned  learned - fixed"
+)
+# Deliveries of each seed, by arena, rules, number of ants and measure.
+Learned = Mapping[tuple[str, str, int, str], Mapping[int, float]]
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
-    """The settings of the command line."""
+    """Return the settings of the command line."""
     parser = Parser(__doc__)
     add = parser.add_argument
+    worlds = {"nargs": "+", "choices": tuple(WORLDS), "metavar": "NAME", "default": tuple(ARENAS)}
+    add("--worlds", **worlds, help="kinds of world, as of colony.py study --arenas")
     add("--ants", type=whole_number(1), default=64, metavar="N", help="of each colony")
     add("--seeds", type=whole_number(2), default=20, metavar="N", help="how many, from 0 on")
-    add("--epsilon", type=float, nargs="+", default=[0.01, 0.1], metavar="X", help="one or more")
+    add("--epsilon", type=float, nargs="+", default=[0.0, 0.01], metavar="X", help="one or more")
+    add("--study", type=Path, metavar="FOLDER", help="results of colony.py study, for comparison")
     add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
     return parser.parse_args(arguments)
 
 
 def print_table(settings: argparse.Namespace) -> None:
-    """A row for each kind of world, task and epsilon, once all are known to be allowed."""
-    choices = list(product(WORLDS, TASKS, settings.epsilon))
-    places = {kind: [build(n) for n in range(settings.seeds)] for kind, build in WORLDS.items()}
+    """Print the rules, and a row for each kind of world, task and epsilon."""
+    learned = read_study(settings.study) if settings.study else {}
     rows: list[str] = []
+    choices = list(product(settings.worlds, TASKS, settings.epsilon))
     with progress_bar("Ants with a fixed rule") as progress:
         for kind, name, epsilon in choices:
-            outcome = evaluate(settings, places[kind], TASKS[name], epsilon)
-            rows.append(f"{kind:6} {name:18} {epsilon:7g} {row(outcome)}")
+            ants = LARGE_SIZE if kind == "large" else settings.ants
+            places = [place(kind, seed) for seed in range(settings.seeds)]
+            outcome = evaluate(settings, places, task_in(kind, TASKS[name]), epsilon, ants)
+            taught = learned.get((kind, name, ants, MEASURES.get(epsilon, "")), {})
+            rows.append(f"{kind:8} {name:18} {epsilon:7g} {row(outcome, taught)}")
             progress(len(rows) / len(choices))
-    print(HEAD, *rows, sep="\n")
+    print(*map(rule, FOLLOWED), HEAD, *rows, sep="\n")
 
 
-def row(outcome: ColonyEpisodes) -> str:
-    """What the ants do in one kind of world."""
+def rule(observation: str) -> str:
+    """Return the rule of an observation as text."""
+    without, with_food = (
+        ", ".join(f"{letters} {action}" for letters, action in one) for one in RULES[observation]
+    )
+    return f"{observation}: without food {without}, else left; with food {with_food}, else left"
+
+
+def read_study(folder: Path) -> Learned:
+    """Return the deliveries of the study's ants that were trained together, by seed.
+
+    They were trained in worlds of the same kind, or in open worlds if that kind has none.
+    """
+    learned: dict[tuple[str, str, int, str], dict[int, float]] = {}
+    for one in files.read_csv(folder / "seeds.csv"):
+        if one["way"] == (JOINT if one["arena"] in ARENAS else ABROAD):
+            for name in MEASURES.values():
+                key = one["arena"], one["rules"], int(one["ants"]), name
+                learned.setdefault(key, {})[int(one["seed"])] = one[name]
+    return learned
+
+
+def row(outcome: ColonyEpisodes, learned: Mapping[int, float]) -> str:
+    """Return what the ants of one kind of world do; `learned` has deliveries of others by seed."""
     deliveries = outcome.deliveries.mean(axis=0) * 1000 / TICKS
-    (low,), (high,) = bootstrap_interval(deliveries[None])
     # An episode without any delivery counts with all its ticks.
     first = np.where(outcome.first_delivery < 0, TICKS, outcome.first_delivery).mean()
     blocked = 100 * outcome.blocked.sum() / outcome.moves.sum()
-    return (
-        f"{deliveries.mean():11.0f}  {f'{low:.0f} to {high:.0f}':12} {first:6.0f} {blocked:6.0f} %"
+    text = (
+        f"{deliveries.mean():11.0f}  {interval(deliveries):12} {deliveries.min():6.0f} "
+        f"{first:6.0f} {blocked:6.0f} %"
     )
+    if not learned:
+        return text
+    missing = set(range(len(deliveries))) - learned.keys()
+    if missing:
+        raise AntsError(
+            f"the study lacks seed {min(missing)}; take its number of seeds with --seeds, or run "
+            "it with more."
+        )
+    taught = np.array([learned[seed] for seed in range(len(deliveries))])
+    more = taught - deliveries
+    return f"{text} {taught.mean():8.0f}  {more.mean():+.0f} [{interval(more)}]"
+
+
+def interval(values: np.ndarray) -> str:
+    """Return the 95 % interval of a mean over seeds as text."""
+    (low,), (high,) = bootstrap_interval(values[None])
+    return f"{low:.0f} to {high:.0f}"
 
 
 def evaluate(
-    settings: argparse.Namespace, places: Sequence[World], rules: Task, epsilon: float
+    settings: argparse.Namespace, places: Sequence[World], rules: Task, epsilon: float, ants: int
 ) -> ColonyEpisodes:
-    """Four episodes of 1000 ticks in each world; food grows back at once."""
+    """Return four episodes of 1000 ticks in each world."""
     colony = Colony(
         places,
-        replace(rules, life=Life(regrowth=0)),
-        TrainingConfig("sarsa", 0.1, 0.9, epsilon, 1.0),
-        range(settings.seeds),
-        settings.ants,
+        rules,
+        TrainingConfig("sarsa", 0.1, 0.9, epsilon, 1.0, min_epsilon=epsilon),
+        [seed + EVALUATION_SEEDS for seed in range(settings.seeds)],
+        ants,
         sharing="fixed",
         q_values=trail_follower(rules.observation),
         threads=settings.threads,

@@ -1,9 +1,9 @@
 """Makes all pictures of the README and the docs anew: those of `renders/` and of `docs/figures/`.
 
-Those of `renders/` are made by `render.py`; the arguments below can be given to it by hand as well.
-Those of `docs/figures/` are those of the finished studies in `results/compare`, `results/colony`
-and `results/bridge`; a study that is not there is run first, which takes about one minute for the
-comparison, six for the colony and five for the bridge on two cores. A million ants take another.
+`render.py` makes those of `renders/`, with the arguments below. Those of `docs/figures/` come from
+the finished studies in `results/compare`, `results/colony` and `results/bridge`, and from a run of
+a million ants. If a study is missing, the command runs it first: the comparison takes less than a
+minute on two cores; see docs/colony.md and docs/bridge.md for the other two.
 """
 
 from __future__ import annotations
@@ -43,13 +43,7 @@ GALLERY: dict[str, list[str]] = {
         *("episode", "--world", _MAP, "--size", "960x540", "--fps", "4"),
         *("--title", "SARSA in a garden"),
     ],
-    # Seed 7 is worth a look: after 10 episodes the ant has learned that steps towards the queen
-    # pay, but not yet to give the food away, and circles beside her.
-    "learning.gif": [
-        *("learning", "--seed", "7", "--max-steps", "100"),
-        *("--size", "1200x480", "--fps", "12"),
-        *("--title", "SARSA: the same ant before and after learning"),
-    ],
+    "learning.gif": ["learning", "--size", "1200x480", "--fps", "12"],
     "policy_sheet.png": [
         *("sheet", "--seed", "7"),
         *("--title", "What SARSA has learned in the world of the paper, after 500 episodes"),
@@ -74,6 +68,7 @@ FIGURES = {
     "colony_elsewhere.png": "colony/figures/elsewhere.png",
     "million.png": "million.png",
     "bridge.png": "bridge/figures/bridge.png",
+    "bridge_late.png": "bridge/figures/late.png",
 }
 _QUEUEING = str(ROOT / "experiments" / "policies" / "queueing.npz")
 MILLION = [
@@ -87,7 +82,11 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     parser = Parser(__doc__)
     add = parser.add_argument
     add("--folder", type=Path, default=ROOT, help="put renders/ and docs/figures/ there")
-    add("--no-figures", action="store_true", help="only renders/, which takes half a minute")
+    add(
+        "--no-figures",
+        action="store_true",
+        help="only renders/ and pictures of pages, half a minute",
+    )
     return parser.parse_args(arguments)
 
 

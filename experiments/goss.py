@@ -1,8 +1,8 @@
 """The double bridge of Goss and others: how often a colony's ants take the shorter branch.
 
-Prints the distribution of colonies by the share of their ants on the short branch, for branches
-whose lengths have the ratio r, beside the published one, and how exact so many colonies make it.
-See docs/baselines.md.
+Prints the distribution of colonies by the share of ants on the short branch, for branches whose
+lengths have the ratio r, beside the published one, and the standard error for so many colonies. In
+the last rows the short branch is missing at first and opens late. See docs/baselines.md.
 """
 
 from __future__ import annotations
@@ -12,34 +12,70 @@ from taichi_ants.studies.interruption import stoppable
 with stoppable():  # these imports take a moment, in which Ctrl-C shall be heard too
     import argparse
 
-    from taichi_ants.baselines.goss import PUBLISHED, choices, class_shares, crossing_steps
-    from taichi_ants.errors import count
+    from taichi_ants.baselines.goss import (
+        LATE_RATIO,
+        PUBLISHED,
+        PUBLISHED_LATE,
+        choices,
+        class_shares,
+        crossing_steps,
+    )
+    from taichi_ants.errors import AntsError, count
     from taichi_ants.studies.command_line import Parser, run_command, whole_number
+
+AS_PUBLISHED = 1000  # ants that choose
+MOST_CHOICES = 1 << 32  # of all colonies; each takes a byte
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
-    """The settings of the command line."""
+    """Return the settings of the command line."""
     parser = Parser(__doc__)
     add = parser.add_argument
     add("--colonies", type=whole_number(1, 10_000_000), default=100_000, help="for each ratio")
+    add(
+        "--choices",
+        type=whole_number(4, 10_000_000),
+        default=AS_PUBLISHED,
+        metavar="N",
+        help="ants that choose in each colony, an even number, of which the second half counts "
+        "(default: %(default)s, as published); where the short branch opens late, N choose before "
+        "and N after",
+    )
     add("--seed", type=whole_number(), default=0, help="of all colonies")
     add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
     return parser.parse_args(arguments)
 
 
 def print_table(settings: argparse.Namespace) -> None:
-    """A row for each ratio, ours and the published one."""
-    print("percent of colonies by the share of the 501st to 1000th ant on the short branch\n")
-    print("  r              0-20 %  20-40 %  40-60 %  60-80 %  80-100 %")
-    for ratio, published in PUBLISHED.items():
-        short, long = crossing_steps(ratio)
-        took = choices(short, long, settings.colonies, seed=settings.seed, threads=settings.threads)
-        for name, row in (("ours", class_shares(took)), ("published", published)):
-            print(f"  {ratio:3}  {name:9}" + "".join(f"{percent:9.1f}" for percent in row))
+    """Print a row for each ratio, and the published one if as many ants choose."""
+    n, colonies = settings.choices, settings.colonies
+    if n % 2:
+        raise AntsError(f"--choices is {n}; it must be even, as many leave the nest as the food.")
+    if 2 * n * colonies > MOST_CHOICES:
+        raise AntsError(
+            f"--choices {n} with --colonies {colonies} takes {2 * n * colonies / 1e9:.0f} GB; "
+            f"their product may be at most {MOST_CHOICES // 2}, so take fewer of either."
+        )
+    rows = [(str(r), r, 0, published) for r, published in PUBLISHED.items()]
+    rows += [(f"{LATE_RATIO}, opens late", LATE_RATIO, n, PUBLISHED_LATE)]
+    print(
+        f"percent of colonies by the share of ants {n // 2 + 1} to {n} on the short branch; where "
+        f"it opens after\nant {n}, of ants {n + n // 2 + 1} to {2 * n}\n"
+    )
+    classes = (f"{low}-{low + 20} %" for low in range(0, 100, 20))
+    print(f"  {'r':25}" + "".join(f"{one:>9}" for one in classes))
+    for name, ratio, opens, published in rows:
+        how = {"ants": opens + n, "opens": opens, "seed": settings.seed}
+        took = choices(*crossing_steps(ratio), colonies, **how, threads=settings.threads)
+        shown = {"ours": class_shares(took, opens + n // 2 + 1, opens + n)}
+        if n == AS_PUBLISHED:
+            shown["published"] = published
+        for kind, row in shown.items():
+            print(f"  {name:15} {kind:9}" + "".join(f"{percent:9.1f}" for percent in row))
     # A share p of N colonies has the standard error sqrt(p (1 - p) / N), most with p one half.
     print(
-        f"\nour shares are of {count(settings.colonies, 'colony')} for each r: their standard "
-        f"error is at most {50 / settings.colonies**0.5:.1f} points"
+        f"\nour shares are of {count(colonies, 'colony')} for each r: their standard error is at "
+        f"most {50 / colonies**0.5:.1f} points"
     )
 
 

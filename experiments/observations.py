@@ -1,9 +1,9 @@
 """What ants gain from seeing more: all observations with all learners, at equal numbers of ticks.
 
-python experiments/observations.py
+The sweep is experiments/sweeps/observations.toml; copy and change it for your own, which
+experiments/sweep.py runs. See docs/observations.md.
 """
 
-import sys
 from pathlib import Path
 
 from taichi_ants.commands import run
@@ -11,4 +11,4 @@ from taichi_ants.commands import run
 SWEEP = Path(__file__).parent / "sweeps" / "observations.toml"
 
 if __name__ == "__main__":
-    run("sweep", [str(SWEEP), *sys.argv[1:]])
+    run("sweep", file=SWEEP, about=__doc__)

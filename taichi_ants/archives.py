@@ -1,8 +1,8 @@
-"""Archives of arrays (.npz): sealed when they are written, and believed by nobody when read.
+"""Archives of arrays (.npz): written with a checksum, which is compared before anything is read.
 
-The comment of the archive is its seal: a hash of all bytes before it. So one flipped bit anywhere
-is noticed before anything is unpacked. Files of others have none: of these the sizes are checked
-that they declare, and the checksum of each array.
+The comment of the archive is a label and the hash of all bytes before the hash. A flipped bit in
+the label leaves a comment that is not a checksum, and such an archive is refused. Files of other
+programs have no comment: their declared sizes and the checksum of each array are compared.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ MOST_BYTES = 1 << 36  # of a file, unpacked
 _COMPRESSION = 2  # of 1 (quick) to 9 (small)
 _MARK = b"taichi-ants sha256 "
 _SEAL_BYTES = len(_MARK) + 64  # with the digest, hexadecimal
+_END = b"PK\5\6"  # begins the last 22 bytes of an archive without a comment
 
 Unpacked = TypeVar("Unpacked")
 
@@ -136,11 +137,17 @@ def _read(
 
 
 def _is_sealed(file: BinaryIO) -> bool:
-    """Whether a file ends with a seal; ValueError if that is not the one of its bytes."""
+    """Return whether an archive ends with the checksum of its bytes, or has no comment at all.
+
+    Raises:
+        ValueError: The checksum differs, or the archive ends with anything else.
+    """
     size = file.seek(0, os.SEEK_END)
     file.seek(max(0, size - _SEAL_BYTES))
     seal = file.read(_SEAL_BYTES)
     if not seal.startswith(_MARK):
+        if seal[-22:-18] != _END or seal[-2:] != bytes(2):
+            raise ValueError("it ends neither with a checksum nor without a comment")
         return False
     if seal[len(_MARK) :] != files.hash_of(file, size - 64).encode():
         raise ValueError("its bytes are not those that were written")

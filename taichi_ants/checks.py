@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -170,8 +171,27 @@ def check_finite(
         )
 
 
-def checked_q_values(q_values: np.ndarray, task: Task) -> np.ndarray:
-    """Action values as float32 (..., n_states, 5), finite."""
+def checked_table(q_values: Any, task: Task) -> np.ndarray:
+    """The only table of `checked_q_values`, float32 (n_states, 5)."""
+    tables = checked_q_values(q_values, task)
+    if tables.ndim == 2:
+        return tables
+    if math.prod(tables.shape[:-2]) > 1:
+        whose = "its " if hasattr(q_values, "q_values") else ""
+        places = ", ".join("0" * (tables.ndim - 2))
+        raise AntsError(
+            f"q_values has shape {tables.shape}, which is {math.prod(tables.shape[:-2])} tables; "
+            f"give one of them, such as {whose}q_values[{places}]."
+        )
+    return tables.reshape(tables.shape[-2:])
+
+
+def checked_q_values(q_values: Any, task: Task) -> np.ndarray:
+    """Action values as float32 (..., n_states, 5), finite.
+
+    Also accepts an object with `q_values`: a `TrainingResult`, a `Policy` or a `Colony`.
+    """
+    q_values = getattr(q_values, "q_values", q_values)
     try:
         if np.iscomplexobj(q_values):
             raise TypeError

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 import reprlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -22,8 +22,9 @@ class AntsError(ValueError):
     `ValueError`. Where a value makes it very long, its middle is left out.
     """
 
-    def __init__(self, message: str) -> None:
-        super().__init__(without_middle(message))
+    def __init__(self, message: object) -> None:
+        # Other libraries raise an exception anew from itself: `type(error)(error)`.
+        super().__init__(without_middle(str(message)))
 
 
 def without_middle(message: str, most: int = _MOST_CHARACTERS) -> str:
@@ -75,6 +76,20 @@ def check_one_of(name: str, value: object, allowed: Sequence[str]) -> None:
 def is_flag(value: object) -> bool:
     """Whether a value is a bool of Python or NumPy, which need not be imported for that."""
     return isinstance(value, bool) or type(value).__name__ in ("bool", "bool_")
+
+
+def check_new_name(kind: str, name: object, built_in: Iterable[str]) -> None:
+    """Raises AntsError unless you can register a learner or observation (`kind`) by this name."""
+    if not isinstance(name, str) or not name.isidentifier():
+        raise AntsError(
+            f"the name of the {kind} is {shown(name)}; it must be a word of letters, digits and _ "
+            "that does not start with a digit."
+        )
+    if name in built_in:
+        raise AntsError(
+            f"{name!r} is the name of a built-in {kind}, which cannot be replaced; choose another "
+            "name."
+        )
 
 
 def checked_flag(name: str, value: object) -> bool:

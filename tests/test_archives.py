@@ -185,3 +185,29 @@ def test_memory_that_there_is_not_is_no_damage(
     monkeypatch.setattr("numpy.lib.format.read_array", refuse)
     with pytest.raises(AntsError, match=r"a\.npz' takes more memory than there is; "):
         archives.read(tmp_path / "a.npz")
+
+
+@pytest.mark.parametrize("foreign", [False, True])
+def test_a_flipped_bit_or_a_cut_anywhere_in_our_own_file_is_noticed(
+    foreign: bool, tmp_path: Path
+) -> None:
+    """The label of the checksum and the length of the comment included."""
+    path = tmp_path / "a.npz"
+    archives.write(path, {"x": np.arange(40)})
+    content = path.read_bytes()
+    for damaged in (
+        *flipped(content, range(len(content))),
+        *(content[:length] for length in range(len(content))),
+    ):
+        with pytest.raises(AntsError, match="damaged"):
+            archives.read(path, damaged, foreign=foreign)
+
+
+def test_an_archive_of_others_has_no_comment(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    np.savez(path, x=np.arange(3))
+    assert archives.read(path, foreign=True)["x"].tolist() == [0, 1, 2]
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.comment = b"made by others"
+    with pytest.raises(AntsError, match="damaged"):
+        archives.read(path, foreign=True)

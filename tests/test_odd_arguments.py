@@ -21,7 +21,10 @@ from taichi_ants import (
     train,
 )
 from taichi_ants import worlds as places
+from taichi_ants.analysis import statistics
+from taichi_ants.engines.colony.hand import Hand
 from taichi_ants.errors import AntsError
+from taichi_ants.learners.policies import Policy
 from taichi_ants.rendering import learning_stages, policy_sheet, save_animation
 from taichi_ants.studies.command_line import Parser, notice
 from taichi_ants.viewer import frame, is_page, notebook, record_colony
@@ -80,6 +83,11 @@ ODD = {
     "a frame": lambda _: frame(SCALAR),
     "what a notebook shows": lambda _: notebook(RAGGED),
     "data of a model": lambda _: offline.EmpiricalModel.of(None, SCALAR),
+    "one dimension": lambda _: statistics.bootstrap_interval(np.arange(5.0)),
+    "one dimension of Student's": lambda _: statistics.student_interval(np.arange(5.0)),
+    "three worlds": lambda _: Hand(Colony(WORLD, None, None, range(3), 2, sharing="fixed")),
+    "two runs": lambda _: rollout(WORLD, train(WORLD, CONFIG, range(2), 1)),
+    "two policies": lambda _: policy_sheet(np.zeros((2, 128, 5))),
     "a world's name": lambda _: places.check_seed_counts(LONG),
 }
 
@@ -89,6 +97,22 @@ def test_what_is_odd_is_named(name: str, colony: Colony) -> None:
     with pytest.raises(AntsError) as caught:
         ODD[name](colony)
     assert len(str(caught.value)) < 400
+
+
+def test_results_and_policies_are_taken_for_their_tables() -> None:
+    result = train(WORLD, CONFIG, 5, 2)
+    assert "seed: 5 alone (give seeds=range(5) for five runs)" in repr(result)
+    table = result.q_values[0, 0]
+    policy = Policy(table, "paper", {})
+    for given in (result, policy):
+        assert rollout(WORLD, given) == rollout(WORLD, table)
+        assert (policy_sheet(given) == policy_sheet(table)).all()
+    assert evaluate(WORLD, result, 3).steps.tolist() == [[evaluate(WORLD, table, 3).steps.tolist()]]
+
+
+def test_several_tables_are_counted_where_one_is_wanted() -> None:
+    with pytest.raises(AntsError, match=r"which is 2 tables; .* its q_values\[0, 0\]"):
+        rollout(WORLD, train(WORLD, CONFIG, range(2), 1))
 
 
 def test_whole_numbers_of_numpy_are_whole_numbers() -> None:
@@ -105,6 +129,7 @@ def test_no_message_fills_a_screen(capsys: pytest.CaptureFixture[str]) -> None:
     assert str(error).startswith("the beginning xxx")
     assert str(error).endswith("xxx the end.")
     assert len(str(error)) <= 1000
+    assert str(AntsError(error)) == str(error)  # as libraries raise it anew
     notice(LONG)
     parser = Parser()
     parser.add_argument("--kind", choices=("a", "b"))

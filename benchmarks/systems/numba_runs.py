@@ -171,7 +171,7 @@ def train(
     return returns, steps
 
 
-_NUMBERS = ("learning_rate", "discount", "epsilon", "epsilon_decay", "min_epsilon")
+_NUMBERS = ("learning_rate", "discount", "epsilon", "epsilon_decay", "least_epsilon")
 
 
 def _training(parallel: bool) -> Callable[[], int]:

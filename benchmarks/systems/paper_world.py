@@ -70,7 +70,7 @@ class Settings(NamedTuple):
 def settings(configs: Sequence[TrainingConfig], each: int) -> Settings:
     """Every configuration so many times, one configuration after the other; float32."""
     rows = [
-        (one.learning_rate, one.discount, one.epsilon, one.epsilon_decay, one.min_epsilon)
+        (one.learning_rate, one.discount, one.epsilon, one.epsilon_decay, one.least_epsilon)
         for one in configs
     ]
     return Settings(*np.repeat(np.array(rows, np.float32), each, axis=0).T)

@@ -1,25 +1,29 @@
-"""The double bridge: which share of a colony's ants crosses by the short branch."""
+"""The double bridge: the share of a colony's ants that crosses by the short branch."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from taichi_ants.analysis import style
+from taichi_ants.analysis.findings import LEAST_SEEDS
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.analysis.sweeps import draw_lines
-from taichi_ants.analysis.tables import Table, interval, number, plain_text
+from taichi_ants.analysis.tables import Table, interval, number, plain_text, sentence
+from taichi_ants.errors import count
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SHORT_RIGHT, SHORT_LEFT, EQUAL = "23 and 36", "36 and 23", "23 and 23, food ahead"
 EQUAL_ASIDE = "23 and 23, food aside"
-BRIDGES = (SHORT_RIGHT, SHORT_LEFT, EQUAL, EQUAL_ASIDE)
+LATE = "36, later 23 too"  # the short branch opens when half of the time is over
+BRIDGES = (SHORT_RIGHT, SHORT_LEFT, EQUAL, EQUAL_ASIDE, LATE)
 LOADS = ("foragers", "carriers")
 WINDOWS = 10  # of an evaluation; the late share is that of the second half
 
@@ -57,8 +61,16 @@ DESIGNS = tuple(
     )
 )
 
+# Those whose colonies are also followed where the short branch opens late.
+LATE_DESIGNS = (Design(), *OTHERS, Design(evaporation="none"))
+
 # Crossings by design and bridge, int64 (windows, loads, branches, seeds), the short branch first.
 Crossings = Mapping[Design, Mapping[str, np.ndarray]]
+
+
+def length(bridge: str, ticks: int) -> int:
+    """Return for how many ticks colonies are followed on a bridge, of those that the study asks."""
+    return 2 * ticks if bridge == LATE else ticks
 
 
 def late_shares(crossed: np.ndarray) -> np.ndarray:
@@ -74,7 +86,7 @@ def rows(found: Crossings, seeds: Sequence[int], ticks: int) -> list[dict[str, A
             "bridge": bridge,
             "seed": seed,
             "load": load,
-            "from_tick": w * ticks // WINDOWS,
+            "from_tick": w * length(bridge, ticks) // WINDOWS,
             "short": int(crossed[w, number_of_load, 0, s]),
             "long": int(crossed[w, number_of_load, 1, s]),
         }
@@ -86,17 +98,61 @@ def rows(found: Crossings, seeds: Sequence[int], ticks: int) -> list[dict[str, A
     ]
 
 
-def report(found: Crossings) -> str:
-    """The late shares of all designs as a table for a terminal."""
-    lines = []
+def report(found: Crossings, ticks: int) -> str:
+    """Return the late shares of all designs, and those after a late opening, as tables of text."""
+    headers = [*asdict(Design())]
+    lines, late = [], []
     for design, bridges in found.items():
+        row = [*map(str, asdict(design).values())]
         for bridge, crossed in bridges.items():
-            centres = [_centre(values) for values in late_shares(crossed)]
-            cells = [f"{number(100 * m, 0)} {interval(100 * a, 100 * b, 0)}" for m, a, b in centres]
-            lines.append([*map(str, asdict(design).values()), bridge, *cells])
-    headers = [*asdict(Design()), "branches", *(f"{load}, %" for load in LOADS)]
-    title = "Who crosses by the short branch, second half: means over seeds with 95 % intervals"
-    return plain_text([Table(title, headers, lines, text_columns=len(headers))], 120)
+            if bridge == LATE:
+                late += [[*row, load, *cells] for load, cells in _since_opening(crossed)]
+            else:
+                lines.append([*row, bridge, *map(_cell, late_shares(crossed))])
+    n = next(iter(found[Design()].values())).shape[-1]
+    shares = Table(
+        f"Who crosses by the short branch, second half: {_means(n)}",
+        [*headers, "branches", *(f"{load}, %" for load in LOADS)],
+        lines,
+        text_columns=len(headers) + 1,
+    )
+    edges = [w * 2 * ticks // WINDOWS for w in range(WINDOWS // 2 + 1)]
+    since = Table(
+        f"Who crosses by the short branch that opens after {ticks} ticks, by ticks since then",
+        [*headers, "%", *(f"{a} to\n{b}" for a, b in pairwise(edges)), "colonies\nabove 50 %"],
+        late,
+        [f"{sentence(_means(n))}. Colonies: by the last column of ticks."],
+        text_columns=len(headers) + 1,
+    )
+    return plain_text([shares, since], 120)
+
+
+def _since_opening(crossed: np.ndarray) -> Iterator[tuple[str, list[str]]]:
+    """For each load, the shares since the opening, and how many colonies prefer the short branch.
+
+    The last share has an interval.
+    """
+    for k, load in enumerate(LOADS):
+        shares = _shares(crossed)[WINDOWS // 2 :, k]
+        *first, last = shares
+        there = last[np.isfinite(last)]
+        means = [number(100 * _centre(values)[0], 0) for values in first]
+        yield load, [*means, _cell(last), f"{np.count_nonzero(there > 0.5)} of {len(there)}"]
+
+
+def _cell(values: np.ndarray) -> str:
+    """A share of all seeds in percent, with its interval if they are enough for one."""
+    mean, low, high = _centre(values)
+    between = "" if np.isnan(low) else f" {interval(100 * low, 100 * high, 0)}"
+    return f"{number(100 * mean, 0)}{between}"
+
+
+def _means(seeds: int) -> str:
+    if seeds < LEAST_SEEDS:
+        return (
+            f"means over {count(seeds, 'seed')}, too few for intervals (take {LEAST_SEEDS} or more)"
+        )
+    return f"means over {seeds} seeds with 95 % intervals"
 
 
 def draw(path: Path, found: Crossings, ticks: int) -> None:
@@ -122,23 +178,58 @@ def draw(path: Path, found: Crossings, ticks: int) -> None:
             axes.set(ylabel="% by the short branch", ylim=(0, 103))
         seeds = found[Design()][SHORT_RIGHT].shape[-1]
         caption = (
-            f"Means over {seeds} seeds with 95 % intervals. Above: {Design().ants} ants. "
-            "Below, food aside: one setting varies; second half of the\ntime, mean of both mirror "
-            "images. Evaporation: none, 1 a tick (linear), or a half-life in ticks."
+            f"{sentence(_means(seeds))}. Above: {Design().ants} ants.\n"
+            "Below, food aside: one setting varies; second half of the time, mean of both mirror "
+            "images.\nEvaporation: none, 1 a tick (linear), or a half-life in ticks."
         )
         title = "Who crosses a double bridge by the short branch"
         style.frame(figure, title, caption, style.legend_entries(above))
     style.save(figure, path)
 
 
+def draw_late(path: Path, found: Crossings, ticks: int) -> None:
+    """Draw the shares before and after the short branch opens, for three designs.
+
+    Raises:
+        AntsError: The file cannot be written.
+    """
+    panels = {
+        "Food aside": Design(),
+        "Food ahead": Design(aside=0),
+        "Food aside, no evaporation": Design(evaporation="none"),
+    }
+    with style.styled():
+        figure = style.new_figure(3.2)
+        several = figure.subplots(1, len(panels), sharey=True)
+        for axes, (title, design) in zip(several, panels.items(), strict=True):
+            _draw_shares(axes, {"": found[design][LATE]}, 2 * ticks)
+            axes.axvline(ticks, color=style.GREY, linewidth=0.9)
+            axes.annotate("opens", (ticks, 95), (-4, 0), textcoords="offset points", ha="right")
+            axes.set(title=title, xlabel="tick", xticks=[0, ticks, 2 * ticks])
+        several[0].set(ylabel="% by the short branch", ylim=(0, 103))
+        caption = (
+            f"{sentence(_means(found[Design()][LATE].shape[-1]))}; {Design().ants} ants that have "
+            "learned with both branches open, and learn no more.\nIn the model of Goss and others "
+            "no colony goes over to a short branch that opens late."
+        )
+        title = "Who takes a short branch that opens late"
+        style.frame(figure, title, caption, style.legend_entries(several))
+    style.save(figure, path)
+
+
 def _draw_time(axes: Axes, found: Crossings, bridge: str, ticks: int) -> None:
-    middle = [(w + 0.5) * ticks / WINDOWS for w in range(WINDOWS)]
-    lines = {}
     shown = {"": Design(), ", food ahead": Design(aside=0)}
     if bridge == EQUAL:  # its food is never aside
         del shown[", food ahead"]
-    for words, design in shown.items():
-        shares = _shares(found[design][bridge])
+    _draw_shares(axes, {words: found[one][bridge] for words, one in shown.items()}, ticks)
+
+
+def _draw_shares(axes: Axes, crossed: Mapping[str, np.ndarray], ticks: int) -> None:
+    """Lines of the shares over time, by what is added to the names of the loads."""
+    middle = [(w + 0.5) * ticks / WINDOWS for w in range(WINDOWS)]
+    lines = {}
+    for words, counts in crossed.items():
+        shares = _shares(counts)
         for k, load in enumerate(LOADS):
             points = [(t, *_percent(_centre(shares[w, k]))) for w, t in enumerate(middle)]
             lines[f"{load}{words}"] = points
@@ -168,10 +259,13 @@ def _shares(crossed: np.ndarray) -> np.ndarray:
 
 
 def _centre(values: np.ndarray) -> tuple[float, float, float]:
-    """The mean over the seeds in which ants crossed, and the ends of its interval."""
+    """The mean over the seeds in which ants crossed, and the ends of its interval.
+
+    nan for what too few seeds do not give.
+    """
     there = values[np.isfinite(values)]
-    if not there.size:
-        return np.nan, np.nan, np.nan
+    if len(there) < LEAST_SEEDS:
+        return float(there.mean()) if there.size else np.nan, np.nan, np.nan
     low, high = bootstrap_interval(there[None])
     return float(there.mean()), float(low[0]), float(high[0])
 

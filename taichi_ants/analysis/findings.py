@@ -38,6 +38,7 @@ class Verdict(str, Enum):
     """
 
     NOT_TESTED = "not tested"
+    TOO_FEW = "too few seeds"
     CONTRADICTED = "contradicted"
     EQUIVALENT = "equivalent"
     UNDECIDED = "undecided"
@@ -46,15 +47,17 @@ class Verdict(str, Enum):
 
 @dataclass(frozen=True)
 class Criterion:
-    """The effect lies in a range.
+    """The range in which the effect must lie, and the differences that are too small to matter.
 
-    Supported if the interval lies in it, contradicted if it lies outside entirely. Of a difference,
-    equivalent if the interval lies within the margin on either side of 0.
+    A verdict is the region that holds the whole interval: the range (supported), the margin on
+    either side of 0 (equivalent), or what is neither (contradicted). If the interval reaches into
+    two of them, the contrast is undecided. So an effect that is too small to matter neither
+    supports nor contradicts a claim.
 
     Attributes:
-        low, high: The ends of the range.
-        margin: What difference is too small to matter; None if it is no difference. A difference
-            must be above `low` = 0.
+        low, high: The ends of the range. A difference must exceed `low`.
+        margin: The largest difference that is too small to matter, at most `low`; None if the
+            effect is not a difference.
     """
 
     low: float
@@ -62,20 +65,22 @@ class Criterion:
     margin: float | None = None
 
     def judge(self, low: float, high: float) -> Verdict:
-        """The verdict on an interval."""
-        if self.margin is not None and -self.margin <= low and high <= self.margin:
+        """Return the verdict on an interval."""
+        small = self.margin
+        if small is not None and -small <= low and high <= small:
             return Verdict.EQUIVALENT
-        if self.low <= low and high <= self.high and (self.margin is None or low > 0):
+        if self.low <= low and high <= self.high and (small is None or low > self.low):
             return Verdict.SUPPORTED
         outside = high < self.low or low > self.high
-        return Verdict.CONTRADICTED if outside else Verdict.UNDECIDED
+        reaches_margin = small is not None and -small <= high and low <= small
+        return Verdict.CONTRADICTED if outside and not reaches_margin else Verdict.UNDECIDED
 
     @property
     def words(self) -> str:
-        """What tables call it."""
+        """Its name in tables."""
         if self.margin is not None:
             limit = "" if self.high == np.inf else f" and at most {self.high:g}"
-            return f"above 0{limit}, margin {self.margin:g}"
+            return f"above {self.low:g}{limit}, margin {self.margin:g}"
         if self.low == -np.inf:
             return f"at most {self.high:g}"
         if self.high == np.inf:
@@ -83,9 +88,9 @@ class Criterion:
         return f"from {self.low:g} to {self.high:g}"
 
 
-def above(margin: float = 0.0, most: float = np.inf) -> Criterion:
-    """A difference is above 0, by an amount that matters, and at most a limit."""
-    return Criterion(0.0, most, margin)
+def above(margin: float = 0.0, least: float | None = None, most: float = np.inf) -> Criterion:
+    """Return the criterion of a difference: above `least` (the margin if None), at most `most`."""
+    return Criterion(margin if least is None else least, most, margin)
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,6 +189,14 @@ def judge(contrasts: Sequence[Contrast]) -> list[Finding]:
 def too_few(seeds: int) -> str:
     """How an answer begins that fewer than `LEAST_SEEDS` seeds leave open; what it asks follows."""
     return f"{count(seeds, 'seed')} {'is' if seeds == 1 else 'are'} too few to tell whether"
+
+
+def seeds_in_words(seeds: int) -> str:
+    """Return the number of seeds for a table, with a warning if they are fewer than `LEAST_SEEDS`.
+
+    For example "20 seeds", or "8 seeds, too few for a verdict".
+    """
+    return count(seeds, "seed") + (", too few for a verdict" if seeds < LEAST_SEEDS else "")
 
 
 def weakest(findings: Sequence[Finding]) -> Finding:

@@ -24,6 +24,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from taichi_ants.errors import AntsError
+
 RESAMPLES = 40_000
 RANDOM_SEED = 20_250_801
 # Differences of means of integers carry rounding errors of about 1e-15 of their size.
@@ -133,7 +135,7 @@ def bootstrap_interval(
         Lower and upper ends, float64 (rows,) each. nan for fewer than two seeds and for rows
         with a nan; a single point where all seeds agree.
     """
-    values = np.asarray(values, float)
+    values = _rows(values)
     rows, n = values.shape
     ends = np.full((rows, 2), np.nan)
     if n > 1:
@@ -144,13 +146,28 @@ def bootstrap_interval(
     return ends[:, 0], ends[:, 1]
 
 
+def _rows(values: np.ndarray) -> np.ndarray:
+    """Return the values as float64 (rows, seeds).
+
+    Raises:
+        AntsError: They do not have two axes.
+    """
+    rows = np.asarray(values, float)
+    if rows.ndim != 2:
+        raise AntsError(
+            f"values has shape {rows.shape}; it must be (rows, seeds), so give values[None] for a "
+            "single row."
+        )
+    return rows
+
+
 def student_interval(
     values: np.ndarray, level: float = 0.95, iqm: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
     """Student's t interval of the mean over seeds, or Tukey and McLaughlin's of the IQM."""
     from scipy.special import stdtrit
 
-    values = np.asarray(values, float)
+    values = _rows(values)
     rows, n = values.shape
     if n < 2:
         return np.full(rows, np.nan), np.full(rows, np.nan)

@@ -22,6 +22,7 @@ def cross(
     long: ti.i32,
     k: ti.f64,
     n: ti.i32,
+    opens: ti.i32,
 ):
     """Let the ants of all colonies choose.
 
@@ -33,6 +34,7 @@ def cross(
         long: Steps to cross the long one.
         k: Marks that every branch seems to have more.
         n: The exponent.
+        opens: Ants that choose while there is no short branch; they draw, and take the long one.
     """
     for colony in range(took.shape[0]):
         state = states[colony]
@@ -53,6 +55,8 @@ def cross(
                 takes_short = ti.cast(
                     ti.cast(word, ti.f64) * (to_short + to_long) < to_short * 4294967296.0, ti.i32
                 )
+                if 2 * step + end < opens:
+                    takes_short = 0
                 marks[2 * end] += takes_short
                 marks[2 * end + 1] += 1 - takes_short
                 took[colony, 2 * step + end] = ti.cast(takes_short, ti.u8)

@@ -20,10 +20,13 @@ COMMANDS = {  # modules beside this one, and what they do
 }
 
 
-def run(name: str, arguments: Sequence[str] | None = None, program: str | None = None) -> None:
+def run(
+    name: str, arguments: Sequence[str] | None = None, program: str | None = None, **more: object
+) -> None:
     """Run a command to its exit; it can be stopped while it is imported, too.
 
-    Its --help calls it `program`, by default the name of the script.
+    Its --help calls it `program`, by default the name of the script. `more` are further arguments
+    of its `main`.
     """
     # Commands share out the cores themselves; more threads of the library for matrices only get in
     # their way. It asks when NumPy is imported.
@@ -32,7 +35,7 @@ def run(name: str, arguments: Sequence[str] | None = None, program: str | None =
         from taichi_ants.studies.command_line import Parser
 
         Parser.program = program
-        import_module(f"{__name__}.{name}").main(arguments)
+        import_module(f"{__name__}.{name}").main(arguments, **more)
 
 
 def main() -> None:

@@ -1,8 +1,9 @@
 """Colonies on a double bridge: does the shorter branch win?
 
 Colonies learn on a bridge with branches of 23 and 36 steps and are then followed on it, on its
-mirror image and on one with equal branches. The table says which share of the ants crosses by the
-short branch, without food and with it; counts and a figure go to a folder. See docs/bridge.md.
+mirror image, on one with equal branches, and on one whose short branch opens late. The tables show
+the share of ants that cross by the short branch, without food and with it; counts and two figures
+go to a folder. See docs/bridge.md.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from taichi_ants.studies.runner import Study
 
 QUICK = {"seeds": 4, "episodes": 20, "ticks": 500, "evaluation_ticks": 1000}
-SHARES, FIGURE = "shares.csv", "figures/bridge.png"
+SHARES, FIGURE, LATE_FIGURE = "shares.csv", "figures/bridge.png", "figures/late.png"
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -40,7 +41,8 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--episodes", **counts, default=60, help="of training")
     add("--ticks", **counts, default=1000, help="of an episode of training")
     add("--evaluation-ticks", **counts, default=3000, help="for which colonies are followed")
-    add("--quick", action="store_true", help="fewer seeds, episodes and ticks")
+    quick = f"{QUICK['seeds']} seeds, too few for intervals, and fewer episodes and ticks"
+    add("--quick", action="store_true", help=quick)
     add_common(parser)
     add_results(parser, "bridge")
     settings, given = parser.parse_given(arguments)
@@ -83,10 +85,11 @@ def do_bridge(settings: argparse.Namespace, study: Study, blocks: Path, ready: P
             progress(0.6 + 0.4 * (number + 1) / len(analysis.DESIGNS))
     rows = analysis.rows(found, study.seeds, ticks)
     files.write_csv(ready / SHARES, rows, list(rows[0]))
-    files.write_text(ready / REPORT, analysis.report(found))
+    files.write_text(ready / REPORT, analysis.report(found, ticks))
     if not settings.no_figures:
         files.check_writable_folder((ready / FIGURE).parent)
         analysis.draw(ready / FIGURE, found, ticks)
+        analysis.draw_late(ready / LATE_FIGURE, found, ticks)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -53,7 +53,6 @@ QUICK = {
     "ticks": 500,
     "rollouts": 2,
 }
-EVALUATION_EPSILON = 0.01
 WIDTH = 79  # of the report, in columns
 COUNT: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
 SEEDS, CONDITIONS = "seeds.csv", "conditions.csv"
@@ -189,31 +188,32 @@ def _add_pheromone(parser: argparse.ArgumentParser) -> None:
     add("--view", choices=views, help="which trails ants without food see")
 
 
-def training_config(settings: argparse.Namespace, least: float) -> TrainingConfig:
-    """The learner; its epsilon does not decay, but for what a study makes of it."""
+def training_config(settings: argparse.Namespace) -> TrainingConfig:
+    """Return the learner; its epsilon does not decay, unless a study plans that."""
     from taichi_ants import TrainingConfig
 
     numbers = settings.learning_rate, settings.discount, settings.epsilon
-    return TrainingConfig(settings.learner, *numbers, 1.0, least, settings.hyperparameter)
+    return TrainingConfig(
+        settings.learner, *numbers, 1.0, settings.epsilon, settings.hyperparameter
+    )
 
 
 def study(settings: argparse.Namespace) -> None:
     """Run the study, or show the finished one."""
-    from taichi_ants.studies.colony_study import plan
+    from taichi_ants.studies.colony_study import plan, study_of
     from taichi_ants.studies.result_folder import work_or_show
-    from taichi_ants.studies.runner import Study
 
     seeds = tuple(range(settings.seed, settings.seed + settings.seeds))
     conditions = plan(
         settings.arenas,
         settings.sizes,
         seeds,
-        training_config(settings, EVALUATION_EPSILON),
+        training_config(settings),
         settings.episodes,
         settings.ticks,
         settings.rollouts,
     )
-    asked = Study(tuple(conditions.values()), seeds)
+    asked = study_of(conditions, seeds)
     words = {name: getattr(settings, name) for name in ("arenas", "sizes")}
     facts = {**words, **asked.settings()}
     work = partial(do_study, settings, conditions, asked)
@@ -231,13 +231,13 @@ def do_study(
     from taichi_ants.analysis.colony.figures import draw_all
     from taichi_ants.analysis.colony.results import Results
     from taichi_ants.analysis.tables import markdown, plain_text
-    from taichi_ants.studies.colony_study import measured, median_policies, most_deliveries
+    from taichi_ants.studies.colony_study import measured, median_policies
     from taichi_ants.studies.result_folder import REPORT
 
     with progress_bar("study") as progress:
         outcomes = asked.run(blocks, settings.threads, settings.arch, progress)
-    values = measured(conditions, outcomes)
-    results = Results.of(values, most_deliveries(conditions))
+    values = measured(conditions, outcomes, asked.seeds)
+    results = Results.of(values)
     for name, table in (
         (SEEDS, tables.rows_of_seeds(values, asked.seeds)),
         (CONDITIONS, results.rows),
@@ -274,9 +274,7 @@ def make_page(
     from taichi_ants.report.players import at_work
     from taichi_ants.studies.result_folder import MANIFEST
 
-    results = results or Results.read(
-        files.read_csv(folder / SEEDS), files.read_csv(folder / CONDITIONS)
-    )
+    results = results or Results.read(files.read_csv(folder / SEEDS))
     shown = not settings.no_figures
     return colony_page(
         results.rows,
@@ -291,7 +289,7 @@ def make_page(
 
 def study_facts(settings: argparse.Namespace) -> dict[str, str]:
     """How it was done, in words."""
-    from taichi_ants.analysis.colony.study import WORLDS
+    from taichi_ants.analysis.colony.study import EVALUATION_EPSILON, WORLDS
     from taichi_ants.errors import count
     from taichi_ants.report.page import span
 
@@ -300,8 +298,9 @@ def study_facts(settings: argparse.Namespace) -> dict[str, str]:
         "Worlds": "; ".join(WORLDS[arena] for arena in settings.arenas),
         "Ants": ", ".join(map(str, settings.sizes)),
         "Learner": f"{settings.learner}, learning rate {settings.learning_rate:g}, "
-        f"discount {settings.discount:g}, epsilon {settings.epsilon:g} at first, "
-        f"{EVALUATION_EPSILON:g} at last and in the evaluation",
+        f"discount {settings.discount:g}",
+        "Exploration rate": f"{settings.epsilon:g} at first, {EVALUATION_EPSILON:g} at the end of "
+        f"the training and in the evaluation; without exploration where that is said",
         "Seeds": span(settings.seed, settings.seeds),
         "Training": f"{count(settings.episodes, 'episode')} of {ticks}",
         "Evaluation": f"{count(settings.rollouts, 'episode')} of {ticks}",
@@ -342,10 +341,15 @@ def new_colony(settings: argparse.Namespace) -> Colony:
     else:
         world = worlds.build(settings.world, settings.seed)
     policy = load_policy(settings.policy) if settings.policy else None
+    if settings.sharing == "fixed" and policy is None:
+        raise AntsError(
+            "--sharing fixed needs a table that the ants follow; give --policy FILE, or choose "
+            "another --sharing."
+        )
     colony = Colony(
         world,
         rules(settings, policy),
-        training_config(settings, settings.epsilon),
+        training_config(settings),
         range(settings.seed, settings.seed + settings.colonies),
         ants=settings.ants,
         capacity=settings.capacity,

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 KINDS = {  # what each subcommand shows, and how it is called
     "episode": ("One ant that follows a policy", "--policy my.npz --epsilon 0.1 --out ant.mp4"),
     "colony": ("Many ants that follow one policy", "--ants 200 --out ants.gif"),
-    "learning": ("One ant before and after it learns, side by side", "--stages 0 20 500"),
+    "learning": ("One ant before and after it learns, side by side", "--stages 0 5 500"),
     "sheet": ("What a policy does in each state", "--policy my.npz --out sheet.png"),
 }
 
@@ -52,6 +52,7 @@ _SEED: dict[str, Any] = {"type": whole_number(), "default": 0, "metavar": "N"}
 _LENGTH: dict[str, Any] = {"type": whole_number(1, 100_000), "default": 600, "metavar": "N"}
 _COUNT: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
 _NUMBER: dict[str, Any] = {"type": float, "metavar": "X"}
+_SEEDS: dict[str, Any] = {"type": whole_number(1, 10_000), "default": 200, "metavar": "N"}
 _STAGES = {"nargs": "+", "type": whole_number(0), "metavar": "N"}
 
 # Each option: the kinds of pictures that it is for, by their first letters, what it does, and how
@@ -73,6 +74,7 @@ _OPTIONS = {
     "--world": ("ecls", WORLDS, {"default": "paper"}),
     "--world-seed": ("ecls", "seed of a world drawn at random", {**_SEED, "default": None}),
     "--seed": ("ecls", "seed of training and of what is shown", _SEED),
+    "--seeds": ("l", "train seeds 0 to N - 1, show the median run and count the others", _SEEDS),
     "--plugin": ("ecls", "a Python file with learners, worlds, observations", {"metavar": "FILE"}),
     "--ants": ("c", "how many", {**_COUNT, "default": 80}),
     "--follow": ("c", "number of an ant whose view is shown", {**_SEED, "default": None}),
@@ -95,7 +97,7 @@ _DEFAULTS: dict[str, dict[str, Any]] = {
     },
     "learning": {
         **{"out": "results/renders/learning.gif", "size": "1280x520"},
-        **{"max_steps": 150, "stages": (0, 10, 100, 500)},
+        **{"max_steps": 150, "stages": (0, 1, 2, 20), "seed": None},
     },
     "sheet": {"out": "results/renders/policy_sheet.png"},
 }
@@ -118,6 +120,10 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
             parser.error(f"{flag} is of training, but --policy is trained, so leave one out")
         if flag in ("--follow", "--title") and getattr(settings, "plain", False):
             parser.error(f"--plain leaves out what {flag} shows, so leave out one of them")
+        if flag == "--seeds" and settings.seed is not None:
+            parser.error(
+                "--seeds chooses the seed that is shown, but --seed names it; leave one out"
+            )
         if flag in ("--size", "--fps", "--plain") and is_page(settings):
             parser.error(f"{flag} is of pictures, but --out names a page, so leave {flag} out")
     if settings.kind == "colony" and settings.every is None:
@@ -205,16 +211,16 @@ def show_colony(settings: argparse.Namespace, world: World) -> None:
 def show_learning(settings: argparse.Namespace, world: World) -> None:
     """Write the same ant after more and more episodes, side by side."""
     from taichi_ants import learners
+    from taichi_ants.errors import count
     from taichi_ants.rendering import learning_frames
 
-    stages = noted_stages(settings, world)
-    title = (
-        settings.title
-        or f"{learners.label(settings.learner)}: the same ant before and after learning"
-    )
+    seed, stages = noted_stages(settings, world)
+    ant = "an ant" if settings.seed is not None else f"the median of {count(settings.seeds, 'ant')}"
+    title = settings.title or f"{learners.label(settings.learner)}: {ant} before and after learning"
     longest = max(len(stage.episode) for stage in stages)
     _save(settings, learning_frames(stages, settings.size, title), longest)
-    print(f"{settings.out}: {', '.join(stage.title for stage in stages)}")
+    told = [f"{one.title}{f' ({one.among})' if one.among else ''}" for one in stages]
+    print(f"{settings.out}: seed {seed}, {', '.join(told)}")
 
 
 def show_sheet(settings: argparse.Namespace, world: World) -> None:
@@ -262,28 +268,34 @@ def training_config(settings: argparse.Namespace) -> TrainingConfig:
     return TrainingConfig(settings.learner, *numbers, settings.epsilon_decay, **more)
 
 
-def noted_stages(settings: argparse.Namespace, world: World) -> list[Stage]:
-    """The stages of an ant that learns, each with what it does then in words."""
+def noted_stages(settings: argparse.Namespace, world: World) -> tuple[int, list[Stage]]:
+    """The seed, and the stages of its ant, each with its behaviour and those of other seeds."""
     from taichi_ants import Task
     from taichi_ants.analysis.behaviour import BEHAVIOURS, DELIVERS, OTHER, classify
-    from taichi_ants.rendering import learning_stages
+    from taichi_ants.rendering import learning_stages, typical_seed
 
+    seed, among = settings.seed, [""] * len(settings.stages)
+    what: dict[str, Any] = {
+        "stages": settings.stages,
+        "max_steps": settings.max_steps,
+        "task": Task(settings.observation),
+        "epsilon": settings.epsilon,
+    }
     with progress_bar("Training") as progress:
-        stages = learning_stages(
-            world,
-            training_config(settings),
-            seed=settings.seed,
-            stages=settings.stages,
-            max_steps=settings.max_steps,
-            task=Task(settings.observation),
-            epsilon=settings.epsilon,
-            progress=progress,
-        )
+        what |= {"progress": progress}
+        if seed is None:
+            several = range(settings.seeds)
+            seed, deliver = typical_seed(world, training_config(settings), seeds=several, **what)
+            if settings.seeds > 1:
+                among = [f"{n} of {settings.seeds} ants deliver{'s' * (n == 1)}" for n in deliver]
+        stages = learning_stages(world, training_config(settings), seed=seed, **what)
     numbers = [classify(stage.episode.trace, settings.max_steps)[0][0] for stage in stages]
-    return [
-        stage if number in (DELIVERS, OTHER) else replace(stage, note=BEHAVIOURS[number])
+    notes = [
+        stage.note if number in (DELIVERS, OTHER) else BEHAVIOURS[number]
         for stage, number in zip(stages, numbers, strict=True)
     ]
+    noted = zip(stages, notes, among, strict=True)
+    return seed, [replace(stage, note=note, among=other) for stage, note, other in noted]
 
 
 def _save_moments(

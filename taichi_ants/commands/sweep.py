@@ -32,12 +32,17 @@ FIGURES, RUNS, SUMMARY, FINDINGS = "figures", "runs.csv", "summary.csv", "findin
 _WORDS = {"supported": "more", "contradicted": "less", "equivalent": "equal"}
 
 
-def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
-    """The settings of the command line."""
-    parser = Parser(__doc__)
-    parser.add_argument("file", type=Path, metavar="FILE", help="what to do (.toml)")
+def parse_arguments(
+    arguments: list[str] | None = None, file: Path | None = None, about: str | None = None
+) -> argparse.Namespace:
+    """Return the settings of the command line; a script `about` one sweep gives its file."""
+    parser = Parser(about or __doc__)
+    if file is None:
+        parser.add_argument("file", type=Path, metavar="FILE", help="what to do (.toml)")
+    parser.set_defaults(**({"file": file} if file else {}))
     add_common(parser)
-    add_results(parser, "sweep-NAME, by the name of FILE")
+    name = f"sweep-{file.stem}" if file else "sweep-NAME, by the name of FILE"
+    add_results(parser, name, quick=False)
     settings = parser.parse_args(arguments)
     settings.out = settings.out or Path("results", f"sweep-{settings.file.stem}")
     return settings
@@ -171,7 +176,9 @@ def measures_of_block(
     return {name: runs.measure(name) for name in names}
 
 
-def main(arguments: list[str] | None = None) -> None:
-    """The command line."""
+def main(
+    arguments: list[str] | None = None, file: Path | None = None, about: str | None = None
+) -> None:
+    """Run the command line; the arguments are those of `parse_arguments`."""
     again = "Stopped; finished parts are kept, and the same command goes on from there."
-    run_command(lambda: sweep(parse_arguments(arguments)), again)
+    run_command(lambda: sweep(parse_arguments(arguments, file, about)), again)

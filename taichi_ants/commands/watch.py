@@ -11,8 +11,11 @@ import argparse
 import os
 import sys
 import webbrowser
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from taichi_ants.studies.command_line import (
@@ -28,6 +31,13 @@ if TYPE_CHECKING:
     from taichi_ants.learners.policies import Policy
 
 _POLICIES = Path(__file__).parents[2] / "experiments" / "policies"  # of a clone
+_LEADS = """<!doctype html>
+<meta charset="utf-8">
+<meta name="referrer" content="no-referrer">
+<meta http-equiv="refresh" content="0; url=ADDRESS">
+<title>Taichi Ants</title>
+<a href="ADDRESS">Open the live page</a>
+"""
 START: dict[str, Any] = {
     **{"world": "far_piles", "map": "", "world_seed": 3, "size": 30, "sees": "queues"},
     **{"rules": ["rising", "queues", "falls", "regrowth"], "policy": "learn sarsa"},
@@ -69,9 +79,16 @@ def watch(settings: argparse.Namespace) -> None:
     prepare = partial(load_plugin, settings.plugin) if settings.plugin else None
     room = Room(session, choices, settings.port, prepare)
     print(f"{room.url}\nOpen this address; Ctrl-C ends.", flush=True)
-    if not settings.no_browser and sys.stdout.isatty():
-        _open(room.url)
-    room.run(settings.seconds, stop_if_noted)
+    with ExitStack() as opened:
+        if not settings.no_browser and sys.stdout.isatty():
+            opened.enter_context(_opened(room.url))
+
+        def each_turn() -> None:
+            stop_if_noted()
+            if room.watched:
+                opened.close()
+
+        room.run(settings.seconds, each_turn)
     print("Ended.")
 
 
@@ -83,13 +100,24 @@ def policies(given: list[str]) -> dict[str, Policy]:
     return {path.stem: load_policy(path) for path in paths}
 
 
-def _open(url: str) -> None:
-    """Open a browser, if there is one; what it has to say is not for this terminal."""
+@contextmanager
+def _opened(url: str) -> Iterator[None]:
+    """Open a browser, if there is one, on a private file that leads to the address.
+
+    Other users of the machine can read the command line of the browser, but not this file. It is
+    deleted at the end.
+    """
     if sys.platform.startswith("linux") and not (
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     ):
+        yield
         return
-    webbrowser.open(url)
+    with TemporaryDirectory(prefix="taichi-ants-") as folder:  # which only this user can enter
+        path = Path(folder, "open.html")
+        path.touch(0o600)
+        path.write_text(_LEADS.replace("ADDRESS", url), encoding="utf-8")
+        webbrowser.open(path.as_uri())
+        yield
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -4,8 +4,8 @@ from enum import IntEnum, auto
 
 # The settings of a run, columns in front of the hyperparameters of its learner.
 SETTINGS = (
-    *("discount", "epsilon_decay", "min_epsilon"),
-    *("learning_rate_decay", "min_learning_rate"),
+    *("discount", "epsilon_decay", "least_epsilon"),
+    *("learning_rate_decay", "least_learning_rate"),
 )
 N_SETTINGS = len(SETTINGS)
 DISCOUNT, EPSILON_DECAY, MIN_EPSILON, LEARNING_RATE_DECAY, MIN_LEARNING_RATE = range(N_SETTINGS)

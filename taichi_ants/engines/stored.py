@@ -27,12 +27,16 @@ class FileKind:
         what: What it holds, for messages.
         writer: What writes it, for messages.
         most: How many bytes a file may have, unpacked.
+        most_text: How many characters its facts may have, as JSON.
+        most_lists: How many lists and objects these may hold.
     """
 
     mark: str
     what: str
     writer: str
     most: int = archives.MOST_BYTES
+    most_text: int = archives.MOST_BYTES
+    most_lists: int = archives.MOST_BYTES
 
     def write(
         self,
@@ -57,9 +61,13 @@ class FileKind:
         """
         stored = archives.read(path, content, self.most)
         try:
-            facts = json.loads(str(stored["facts"][()]))
+            text = str(stored["facts"][()])
+            self._check_room(path, text)
+            facts = json.loads(text)
             if facts["format"] != self.mark:
                 raise ValueError(facts["format"])
+        except AntsError:
+            raise
         except (KeyError, ValueError, TypeError, RecursionError) as error:
             raise AntsError(
                 f"{str(path)!r} holds no {self.what} of this version; name a file that "
@@ -73,6 +81,16 @@ class FileKind:
                 "registered; name the file that registers it with --plugin, or import it."
             )
         return stored, facts
+
+    def _check_room(self, path: files.PathLike, text: str) -> None:
+        """Refuse facts that would take much time and memory, before they are parsed."""
+        lists = text.count("[") + text.count("{")
+        if len(text) > self.most_text or lists > self.most_lists:
+            raise AntsError(
+                f"{str(path)!r} holds {len(text)} characters of facts with {lists} lists, and at "
+                f"most {self.most_text} characters with {self.most_lists} lists are allowed; name "
+                "a smaller file."
+            )
 
     @contextmanager
     def rebuilding(self, path: files.PathLike) -> Iterator[None]:

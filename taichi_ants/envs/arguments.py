@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import InvalidAction
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
 
 from taichi_ants import checks
-from taichi_ants.errors import AntsError, count, shown
+from taichi_ants.errors import AntsError, checked_whole, count, shown
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.worlds import World, build, from_text
@@ -38,6 +40,32 @@ def _built(world: Any) -> Any:
     if not isinstance(world, str):
         return world
     return from_text(world) if "\n" in world else build(world)
+
+
+class StepLimit:
+    """Base of environments whose `spec.max_episode_steps` is their own step limit.
+
+    Gymnasium leaves it out of the spec of an environment that it does not wrap in a `TimeLimit`.
+    """
+
+    max_steps: int
+    _spec: EnvSpec | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """The specification of an environment that Gymnasium has made, else None."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, given: EnvSpec | None) -> None:
+        self._spec = given and replace(given, max_episode_steps=self.max_steps)
+
+
+def lower_limit(max_steps: int, max_episode_steps: int | None) -> int:
+    """Return the lower one of two step limits; Gymnasium gives the second one, or None."""
+    if max_episode_steps is None:
+        return max_steps
+    return min(checked_whole("max_episode_steps", max_episode_steps), max_steps)
 
 
 def task_of(task: Any) -> Any:

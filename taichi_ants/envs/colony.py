@@ -12,6 +12,7 @@ from taichi_ants import checks
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.colony.layout import ANT_GROUND, PUSHES, AntRow, WorldRow
 from taichi_ants.envs.arguments import worlds_of
+from taichi_ants.envs.events import Event
 from taichi_ants.envs.forage import ACTION_MASKS
 from taichi_ants.envs.formats import ObservationFormat, Shown
 from taichi_ants.errors import check_one_of, checked_flag
@@ -25,11 +26,11 @@ METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
 
 
 def _events() -> np.ndarray:
-    """What came of an action, by action and event of the engine: object (5, 5) of text."""
-    table = np.full((N_ACTIONS, 5), "moved", dtype=object)
-    table[:, FAILED] = "failed"
-    table[: RIGHT + 1, FAILED] = "blocked"
-    table[:, PICKED_UP], table[:, DELIVERED] = "picked_up", "delivered"
+    """Return the `Event` by action and event of the engine, int64 (5, 5)."""
+    table = np.full((N_ACTIONS, 5), Event.MOVED, dtype=np.int64)
+    table[:, FAILED] = Event.FAILED
+    table[: RIGHT + 1, FAILED] = Event.BLOCKED
+    table[:, PICKED_UP], table[:, DELIVERED] = Event.PICKED_UP, Event.DELIVERED
     return table
 
 
@@ -45,8 +46,7 @@ class ColonyWorlds:
         max_steps: Ticks of an episode.
         acted: Which slots held an ant that acted in the last step.
         rewards: float64, what that paid.
-        events: What came of it, text: "moved", "blocked" (only turned), "pushed" (another ant
-            changed places with it), "picked_up", "delivered" or "failed".
+        events: The result, int64, an `Event`; NONE where no ant acted.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class ColonyWorlds:
         )
         shape = n_worlds, self.colony.capacity
         self.acted, self.rewards = np.zeros(shape, bool), np.zeros(shape)
-        self.events = np.full(shape, None, dtype=object)
+        self.events = np.full(shape, Event.NONE, np.int64)
         self._scene: Any = None
 
     def begin(self, which: np.ndarray, seeds: Sequence[int | None] | None = None) -> None:
@@ -123,7 +123,8 @@ class ColonyWorlds:
         self.rewards = np.where(self.acted, colony.arrays["rewards"][of_engine], 0.0)
         self.events = _EVENTS[actions, of_engine]
         if colony.task.traffic.swap:
-            self.events[colony.ants_by_slot(AntRow.FILLED) == PUSHES] = "pushed"
+            self.events[colony.ants_by_slot(AntRow.FILLED) == PUSHES] = Event.PUSHED
+        self.events[~self.acted] = Event.NONE
 
     @property
     def ended(self) -> np.ndarray:

@@ -10,6 +10,7 @@ from gymnasium.utils import seeding
 
 from taichi_ants.engines.colony.layout import AntRow
 from taichi_ants.envs.colony import MAX_STEPS, METADATA, ColonyWorlds
+from taichi_ants.envs.events import Event
 from taichi_ants.envs.formats import ObservationFormat
 from taichi_ants.errors import shown
 from taichi_ants.grid.constants import N_HEADINGS
@@ -56,15 +57,14 @@ class HexColonyParallelEnv(ParallelEnv):
     ## Episode End
     An ant that dies of age is terminated, and leaves `agents`; its number does not come back. After
     `max_steps` steps all are truncated. A delivery ends nothing, whatever the task's `delivery`
-    says: its ant goes on, and `info["event"]` tells.
+    says: its ant goes on, and `info["event"]` is DELIVERED.
 
     ## Info
-    - `state`: the state as a number.
+    - `state`: int64, the state as a number.
     - `action_mask`: int8 (5,), 1 for what can succeed if no other ant is faster; in a dead end for
       the moves, which turn the ant.
-    - `event`: what came of the action: "moved", "blocked" (only turned), "pushed" (another ant
-      changed places with it), "picked_up", "delivered" or "failed". Not in the first step of an
-      ant.
+    - `event`: int64, the result of the action, a `taichi_ants.envs.Event`; NONE after `reset` and
+      in the step of an ant's birth.
 
     ## Arguments
     world: A registered name, the path of a map, or a `World`.
@@ -144,7 +144,8 @@ class HexColonyParallelEnv(ParallelEnv):
         self._worlds.begin(np.ones(1, bool), [seed])
         self._slots = list(range(self._worlds.colony.ants))  # of the agents
         self.agents = self._names(self._slots)
-        return self._told(self.agents, self._slots, ())
+        self._worlds.events[:] = Event.NONE
+        return self._told(self.agents, self._slots)
 
     @property
     def _begun(self) -> bool:
@@ -190,7 +191,7 @@ class HexColonyParallelEnv(ParallelEnv):
             worlds.stop(worlds.ended)
         born = np.flatnonzero(living & ~worlds.acted[0] & (not ended)).tolist()
         told, seen = acting + self._names(born), slots + born
-        observations, infos = self._told(told, seen, acting)
+        observations, infos = self._told(told, seen)
         rewards = dict(zip(told, worlds.rewards[0, seen].tolist(), strict=True))
         terminated = dict(zip(told, (~living[seen]).tolist(), strict=True))
         truncated = dict.fromkeys(told, ended)
@@ -211,19 +212,18 @@ class HexColonyParallelEnv(ParallelEnv):
         return [f"ant_{number}" for number in numbers.tolist()]
 
     def _told(
-        self, names: list[str], slots: list[int], acted: Any
+        self, names: list[str], slots: list[int]
     ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
-        """Observations and infos of agents in these slots; the events of those that acted."""
+        """Return observations and infos of the agents in these slots."""
         worlds = self._worlds
         states = worlds.colony.states[0, slots]
         observations = dict(zip(names, worlds.shown.show(states), strict=True))
-        masks, acted = worlds.action_masks()[0, slots], set(acted)
-        infos: dict[str, dict[str, Any]] = {}
-        events = worlds.events[0, slots].tolist()
-        for name, state, mask, event in zip(names, states.tolist(), masks, events, strict=True):
-            infos[name] = {"state": state, "action_mask": mask}
-            if name in acted:
-                infos[name]["event"] = event
+        masks, events = worlds.action_masks()[0, slots], worlds.events[0, slots]
+        said = zip(names, states.astype(np.int64), masks, events, strict=True)
+        infos = {
+            name: {"state": state, "action_mask": mask, "event": event}
+            for name, state, mask, event in said
+        }
         return observations, infos
 
     def state(self) -> np.ndarray:

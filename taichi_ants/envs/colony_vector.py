@@ -12,22 +12,23 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from taichi_ants.envs.arguments import (
+    StepLimit,
     checked_actions,
     checked_autoreset,
     checked_reset_mask,
+    lower_limit,
     seeds_of,
 )
 from taichi_ants.envs.colony import MAX_STEPS, METADATA, ColonyWorlds
+from taichi_ants.envs.events import Event
 from taichi_ants.envs.formats import ObservationFormat
 from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.worlds import World
 
-NOTHING = np.array(None, dtype=object)
 
-
-class HexColonyVectorEnv(VectorEnv):
+class HexColonyVectorEnv(StepLimit, VectorEnv):
     """Ants of one or more worlds, each of them an environment of a `gymnasium.vector.VectorEnv`.
 
     ## Description
@@ -73,10 +74,9 @@ class HexColonyVectorEnv(VectorEnv):
     - `state`: int64, the state as a number.
     - `action_mask`: int8 (num_envs, 5), 1 for what can succeed if no other ant is faster; in a
       dead end for the moves, which turn the ant.
-    - `event`: what came of the action: "moved", "blocked" (only turned), "pushed" (another ant
-      changed places with it), "picked_up", "delivered" or "failed".
-    - `final_obs`, `final_info`: with `SAME_STEP`, what ants saw and did in the step that ended
-      their episode; `event` is in `final_info` then.
+    - `event`: int64, the result of the action, a `taichi_ants.envs.Event`; NONE after `reset`.
+    - `final_obs`, `final_info`: with `SAME_STEP`, the last observation and info of the ants whose
+      episode has ended in this step; `event` is in `final_info` then, and NONE outside of it.
 
     ## Arguments
     num_envs: How many ants there are in all worlds together, a multiple of `ants`.
@@ -90,6 +90,7 @@ class HexColonyVectorEnv(VectorEnv):
     evaporation: Whether trails fall; None: as the task says for training.
     autoreset_mode: `SAME_STEP`, `NEXT_STEP` or `DISABLED` of `gymnasium.vector.AutoresetMode`.
     render_mode: "rgb_array": `render` gives a picture of each world. None: it is not called.
+    max_episode_steps: Another step limit, which `gymnasium.make_vec` gives; the lower one counts.
 
     Raises:
         AntsError: An argument is not allowed.
@@ -107,7 +108,9 @@ class HexColonyVectorEnv(VectorEnv):
         evaporation: bool | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.SAME_STEP,
         render_mode: str | None = None,
+        max_episode_steps: int | None = None,
     ) -> None:
+        max_steps = lower_limit(max_steps, max_episode_steps)
         self.num_envs, ants = checked_whole("num_envs", num_envs), checked_whole("ants", ants)
         if self.num_envs % ants:
             raise AntsError(
@@ -119,6 +122,7 @@ class HexColonyVectorEnv(VectorEnv):
             *(world, self._n_worlds, task, ants, start, None, max_steps),
             *(observation_format, evaporation, render_mode),
         )
+        self.max_steps = self._worlds.max_steps
         rules = self._worlds.colony.task
         if rules.life.births or rules.life.lifespan is not None:
             raise AntsError(
@@ -166,7 +170,8 @@ class HexColonyVectorEnv(VectorEnv):
             seeds = [a if b is None else b for a, b in zip(drawn, seeds, strict=True)]
         self._worlds.begin(which, seeds)
         self._begun, self._ended = True, self._ended & ~which
-        return self._observations(), self._infos(self._by_ant(which))
+        nothing = np.full(self.num_envs, Event.NONE, np.int64)
+        return self._observations(), self._infos(self._by_ant(which), nothing)
 
     def _reset_worlds(self, options: dict[str, Any] | None) -> np.ndarray:
         """Which worlds the options of a reset name, bool (W,)."""
@@ -205,7 +210,7 @@ class HexColonyVectorEnv(VectorEnv):
         worlds.step(actions.reshape(self._n_worlds, -1))
         acted = worlds.acted.reshape(-1)
         rewards, events = worlds.rewards.reshape(-1), worlds.events.reshape(-1)
-        terminated = acted & (events == "delivered") & self._absorbing
+        terminated = acted & (events == Event.DELIVERED) & self._absorbing
         ended = worlds.ended & ~waited
         truncated = self._by_ant(ended)
         over, final = terminated | truncated, {}
@@ -216,15 +221,15 @@ class HexColonyVectorEnv(VectorEnv):
                 last = np.full(self.num_envs, None, dtype=object)
                 last[over] = np.fromiter(observations[over], dtype=object)
                 final = {"final_obs": last, "_final_obs": over}
-                final |= {"final_info": self._infos(over, events, over), "_final_info": over.copy()}
-                acted = acted & ~over
+                final |= {"final_info": self._infos(over, events), "_final_info": over.copy()}
+                events = np.where(over, Event.NONE, events)
         else:
             worlds.stop(ended)
             begins, self._ended = waited, ended
         if begins.any():
             worlds.begin(begins)
             observations = self._observations()
-        infos = self._infos(self._everyone, events, acted)
+        infos = self._infos(self._everyone, events)
         return observations, rewards, terminated, truncated, {**infos, **final}
 
     def render(self) -> tuple[np.ndarray, ...] | None:
@@ -242,18 +247,13 @@ class HexColonyVectorEnv(VectorEnv):
     def _observations(self) -> np.ndarray:
         return self._worlds.shown.show(self._worlds.colony.states.reshape(-1))
 
-    def _infos(
-        self, have: np.ndarray, events: np.ndarray | None = None, of: np.ndarray | None = None
-    ) -> dict[str, Any]:
-        """What is said of the ants that `have` it, and events `of` those of whom there are any."""
+    def _infos(self, have: np.ndarray, events: np.ndarray) -> dict[str, Any]:
+        """Return the infos of the ants that `have` them, bool (num_envs,); 0 for the others."""
         worlds = self._worlds
         masks = worlds.action_masks().reshape(self.num_envs, N_ACTIONS)
-        said = {
+        infos = {
             "state": worlds.colony.states.reshape(-1).astype(np.int64) * have,
-            "_state": have.copy(),
             "action_mask": masks * have[:, None],
-            "_action_mask": have.copy(),
+            "event": events * have,
         }
-        if events is not None and of is not None:
-            said |= {"event": np.where(of, events, NOTHING), "_event": of.copy()}
-        return said
+        return infos | {f"_{name}": have.copy() for name in infos}

@@ -16,14 +16,17 @@ from taichi_ants import checks
 from taichi_ants.engines.layout import Outcome
 from taichi_ants.engines.runs.lockstep import Lockstep
 from taichi_ants.envs.arguments import (
+    StepLimit,
     checked_actions,
     checked_autoreset,
     checked_reset_mask,
+    lower_limit,
     seeds_of,
     task_of,
     worlds_of,
 )
 from taichi_ants.envs.drawing import Drawing
+from taichi_ants.envs.events import Event, Reason
 from taichi_ants.envs.formats import ObservationFormat, Shown
 from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, shown
 from taichi_ants.task import Task
@@ -36,29 +39,21 @@ RENDER_MODES = ("rgb_array", "ansi")
 # Of all environments together, with room for some more: 4 GiB.
 _MOST_CELLS = (1 << 30) - (1 << 24)
 
-_EVENTS = {
-    Outcome.NONE: None,
-    Outcome.MOVED: "moved",
-    Outcome.PICKED_UP: "picked_up",
-    Outcome.DELIVERED: "delivered",
-    Outcome.ROCK_AHEAD: "blocked",
-    Outcome.FOOD_AHEAD: "blocked",
-    Outcome.QUEEN_AHEAD: "blocked",
+# The event and the reason of each outcome.
+_CODES = {
+    Outcome.NONE: (Event.NONE, Reason.NONE),
+    Outcome.MOVED: (Event.MOVED, Reason.NONE),
+    Outcome.PICKED_UP: (Event.PICKED_UP, Reason.NONE),
+    Outcome.DELIVERED: (Event.DELIVERED, Reason.NONE),
+    Outcome.ROCK_AHEAD: (Event.BLOCKED, Reason.ROCK_OR_EDGE_AHEAD),
+    Outcome.FOOD_AHEAD: (Event.BLOCKED, Reason.FOOD_AHEAD),
+    Outcome.QUEEN_AHEAD: (Event.BLOCKED, Reason.QUEEN_AHEAD),
+    Outcome.HAS_FOOD: (Event.FAILED, Reason.CARRIES_FOOD_ALREADY),
+    Outcome.SEES_NO_FOOD: (Event.FAILED, Reason.NO_FOOD_IN_VIEW),
+    Outcome.HAS_NO_FOOD: (Event.FAILED, Reason.CARRIES_NO_FOOD),
+    Outcome.SEES_NO_QUEEN: (Event.FAILED, Reason.NO_QUEEN_IN_VIEW),
 }
-_REASONS = {
-    Outcome.ROCK_AHEAD: "rock_or_edge_ahead",
-    Outcome.FOOD_AHEAD: "food_ahead",
-    Outcome.QUEEN_AHEAD: "queen_ahead",
-    Outcome.HAS_FOOD: "carries_food_already",
-    Outcome.SEES_NO_FOOD: "no_food_in_view",
-    Outcome.HAS_NO_FOOD: "carries_no_food",
-    Outcome.SEES_NO_QUEEN: "no_queen_in_view",
-}
-# The event and the reason by outcome, (outcomes, 2): NumPy takes rows three times as fast as it
-# takes from two arrays.
-_WORDS = np.array(
-    [(_EVENTS.get(outcome, "failed"), _REASONS.get(outcome)) for outcome in Outcome], dtype=object
-)
+_EVENTS, _REASONS = np.array([_CODES[outcome] for outcome in Outcome], np.int64).T.copy()
 
 
 def _action_masks() -> np.ndarray:
@@ -76,7 +71,6 @@ def _action_masks() -> np.ndarray:
 ACTION_MASKS = _action_masks()
 # Rows as single numbers of 8 bytes, which NumPy takes three times as fast.
 _PACKED_MASKS = np.pad(ACTION_MASKS, ((0, 0), (0, 8 - N_ACTIONS))).view(np.int64)[:, 0]
-_AT_RESET = ("state", "action_mask")
 
 
 class _Ants:
@@ -101,7 +95,7 @@ class _Ants:
             falls = checked_flag("evaporation", evaporation)
         if render_mode is not None:
             check_one_of("render_mode", render_mode, RENDER_MODES)
-        max_steps = checks.checked_max_steps(max_steps, self.task)
+        self.max_steps = max_steps = checks.checked_max_steps(max_steps, self.task)
         self.shown = Shown(self.task.sees, observation_format)
         worlds = worlds_of(world, n)
         most = _MOST_CELLS // worlds[0].grid.size
@@ -129,7 +123,7 @@ class _Ants:
         return self.shown.show(self.lockstep.arrays["states"])
 
 
-class HexForageEnv(gymnasium.Env[Any, Any]):
+class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
     """One ant on a hexagonal grid looks for food and carries it to its queen.
 
     ## Description
@@ -169,12 +163,11 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
     - `state`: int64, the state's index.
     - `action_mask`: int8 (5,), 1 for actions that can succeed; in a dead end for the moves, which
       turn the ant.
-    - `event`: what came of the action: "moved", "blocked", "picked_up", "delivered" or "failed".
-    - `reason`: why a move was blocked ("rock_or_edge_ahead", "food_ahead", "queen_ahead"), or a
-      pick-up or give failed ("carries_food_already", "no_food_in_view", "carries_no_food",
-      "no_queen_in_view").
+    - `event`: int64, the result of the action, a `taichi_ants.envs.Event`; NONE after `reset`.
+    - `reason`: int64, why the action was blocked or failed, a `taichi_ants.envs.Reason`; NONE if
+      it did not fail.
 
-    `reset` gives `state` and `action_mask`; `reason` is there when there is one.
+    `action_masks()` returns the mask as bool, as MaskablePPO of sb3-contrib asks for it.
 
     ## Arguments
     world: Name of a registered world, path of a text map, its text, or a World.
@@ -205,7 +198,7 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
         self._ants = _Ants(
             *(1, world, task, delivery, evaporation, max_steps, observation_format, render_mode)
         )
-        self.render_mode = render_mode
+        self.render_mode, self.max_steps = render_mode, self._ants.max_steps
         self.observation_space = self._ants.shown.space
         self.action_space = Discrete(N_ACTIONS)
         self._all, self._over, self._begun = np.ones(1, bool), True, False
@@ -240,12 +233,23 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
 
     def _info(self) -> dict[str, Any]:
         arrays = self._ants.lockstep.arrays
-        info = {
+        outcome = arrays["outcomes"][0]
+        return {
             "state": np.int64(arrays["states"][0]),
             "action_mask": ACTION_MASKS[arrays["percepts"][0]].copy(),
+            "event": _EVENTS[outcome],
+            "reason": _REASONS[outcome],
         }
-        more = zip(("event", "reason"), _WORDS[arrays["outcomes"][0]], strict=True)
-        return info | {name: value for name, value in more if value is not None}
+
+    def action_masks(self) -> np.ndarray:
+        """Return which actions can succeed now, bool (5,), as `info["action_mask"]` does.
+
+        Raises:
+            ResetNeeded: No episode has begun.
+        """
+        if not self._begun:
+            raise ResetNeeded("no episode is under way; call reset() before action_masks().")
+        return ACTION_MASKS[self._ants.lockstep.arrays["percepts"][0]].astype(bool)
 
     def render(self) -> Any:
         """A picture or a text map of the world as it is, see `render_mode`; None without one.
@@ -258,7 +262,7 @@ class HexForageEnv(gymnasium.Env[Any, Any]):
         return self._ants.drawing.draw(0)
 
 
-class HexForageVectorEnv(VectorEnv[Any, Any, Any]):
+class HexForageVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
     """Many ants, each alone in a world of its own: all of them do a step in one launch.
 
     Environment i is a `HexForageEnv` with seed `seed + i`, step by step. What it sees, is paid and
@@ -298,14 +302,13 @@ class HexForageVectorEnv(VectorEnv[Any, Any, Any]):
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         max_episode_steps: int | None = None,
     ) -> None:
-        if max_episode_steps is not None:
-            max_steps = min(checked_whole("max_episode_steps", max_episode_steps), max_steps)
+        max_steps = lower_limit(max_steps, max_episode_steps)
         self.num_envs = n = checked_whole("num_envs", num_envs)
         self.autoreset_mode = checked_autoreset(autoreset_mode)
         self._ants = _Ants(
             *(n, world, task, delivery, evaporation, max_steps, observation_format, render_mode)
         )
-        self.render_mode = render_mode
+        self.render_mode, self.max_steps = render_mode, self._ants.max_steps
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.single_observation_space = self._ants.shown.space
         self.observation_space = batch_space(self.single_observation_space, n)
@@ -341,7 +344,7 @@ class HexForageVectorEnv(VectorEnv[Any, Any, Any]):
         arrays = self._ants.lockstep.arrays
         nothing = np.zeros(self.num_envs, np.uint8)
         infos = _infos(arrays["states"], arrays["percepts"], nothing, which)
-        return self._ants.observations(), {k: infos[k] for k in infos if k.strip("_") in _AT_RESET}
+        return self._ants.observations(), infos
 
     def step(
         self, actions: Any
@@ -406,12 +409,10 @@ def _infos(
     if not which.all():
         states, masks = np.where(which, states, 0), masks * which[:, None]
         outcomes = np.where(which, outcomes, Outcome.NONE)
-    words = _WORDS.take(outcomes, axis=0, mode="clip")
-    told = {
-        "state": (states.astype(np.int64), which.copy()),
-        "action_mask": (masks, which.copy()),
-        "event": (words[:, 0], outcomes != Outcome.NONE),
-        "reason": (words[:, 1], outcomes >= Outcome.ROCK_AHEAD),
+    infos = {
+        "state": states.astype(np.int64),
+        "action_mask": masks,
+        "event": _EVENTS.take(outcomes, mode="clip"),
+        "reason": _REASONS.take(outcomes, mode="clip"),
     }
-    infos = {name: values for name, (values, _) in told.items()}
-    return infos | {f"_{name}": of for name, (_, of) in told.items()}
+    return infos | {f"_{name}": which.copy() for name in infos}

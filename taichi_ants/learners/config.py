@@ -29,14 +29,17 @@ class TrainingConfig(Settings, path="training"):
         discount: Discount factor gamma, in [0, 1].
         epsilon: Probability of a random action in the first episode, in [0, 1].
         epsilon_decay: Factor on epsilon after each episode, in (0, 1].
-        min_epsilon: Epsilon does not decay below this, in [0, 1].
+        min_epsilon: Lower bound of the decay of epsilon, in [0, 1]. It never raises epsilon: if it
+            is larger than `epsilon`, epsilon stays as it is.
         learning_rate_decay: Factor on the learning rate after each episode, in (0, 1].
-        min_learning_rate: The learning rate does not decay below this, in [0, 1].
+        min_learning_rate: Lower bound of the decay of the learning rate, in [0, 1]. If it is
+            larger than `learning_rate`, the learning rate stays as it is.
         initial_value: Of each action in each state before learning, from -1e6 to 1e6. Values above
             what can be reached ("optimistic") make ants try all actions.
         hyperparameters: What this learner has besides, (name, number) pairs by name; given as a
             mapping, or as keywords: `TrainingConfig("dyna_q", ..., planning_steps=5)`. Those that
-            are left out have their usual values, see `taichi_ants.learners.get(name)`.
+            are left out have default values, see
+            `taichi_ants.learners.get(name).hyperparameters()`.
 
     Raises:
         AntsError: A value is outside its range. Whether the learner exists, and has these
@@ -96,13 +99,23 @@ class TrainingConfig(Settings, path="training"):
         plain = {name: getattr(value, "item", lambda v=value: v)() for name, value in pairs.items()}
         object.__setattr__(self, "hyperparameters", tuple(sorted(plain.items())))
 
+    @property
+    def least_epsilon(self) -> float:
+        """The epsilon at which decay ends: the smaller one of `min_epsilon` and `epsilon`."""
+        return min(self.min_epsilon, self.epsilon)
+
+    @property
+    def least_learning_rate(self) -> float:
+        """The same for the learning rate."""
+        return min(self.min_learning_rate, self.learning_rate)
+
     def next_learning_rate(self, rate: float) -> float:
-        """That of the episode after one with this learning rate."""
-        return max(self.min_learning_rate, rate * self.learning_rate_decay)
+        """The learning rate of the episode that follows one with this learning rate."""
+        return max(self.least_learning_rate, rate * self.learning_rate_decay)
 
     def next_epsilon(self, epsilon: float) -> float:
-        """That of the episode after one with this epsilon."""
-        return max(self.min_epsilon, epsilon * self.epsilon_decay)
+        """The epsilon of the episode that follows one with this epsilon."""
+        return max(self.least_epsilon, epsilon * self.epsilon_decay)
 
     @property
     def planning_steps(self) -> int:

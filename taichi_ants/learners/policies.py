@@ -97,53 +97,80 @@ def action_probabilities(q_values: np.ndarray, epsilon: float = 0.0) -> np.ndarr
     return explores / N_ACTIONS + best * ((1.0 - explores) / best.sum(axis=-1, keepdims=True))
 
 
-# Observations whose states the trail follower reads, by their letters.
-FOLLOWED = ("paper", "ants", "queues")
+# The rule of the trail follower: what it looks for among the cells ahead, in order of priority, and
+# its action where it sees that. The letters are those of the names of states.
+#   take      pick up food, or give it to the queen
+#   ahead     move forward, if it is the cell straight ahead that shows one of the letters
+#   straight  move onto such a cell; forward if it is one of them, else any
+#   open      the same, but forward only if all three cells show them
+#   any       move onto any such cell
+#   stay      stay, with the same heading: the action is one that fails without a turn
+# In a dead end it turns left, which opens a way out after two turns.
+Rule = tuple[tuple[str, str], ...]
+_WITHOUT_FOOD: Rule = (("F", "take"), ("P", "stay"), ("T", "straight"), ("E", "open"))
+_WITHOUT_FOOD_IN_QUEUES: Rule = (
+    *(("F", "take"), ("P", "ahead"), ("T", "straight"), ("p", "stay")),
+    *(("P", "straight"), ("E", "open")),
+)
+_WITH_FOOD: Rule = (("Q", "take"), ("SP", "straight"), ("p", "stay"), ("EA", "any"))
+# The rule without food and that with food, by the observation.
+RULES: Mapping[str, tuple[Rule, Rule]] = {
+    "paper": (_WITHOUT_FOOD, (("Q", "take"), ("S", "any"), ("E", "any"))),
+    "ants": (_WITHOUT_FOOD, _WITH_FOOD),
+    "queues": (_WITHOUT_FOOD_IN_QUEUES, _WITH_FOOD),
+}
+FOLLOWED = tuple(RULES)
 
 
 def trail_follower(observation: str = "paper") -> ActionValues:
-    """A hand-written policy that forages well, of one of the observations in `FOLLOWED`.
+    """Return a policy that is written by hand, the table of one of the `RULES`.
 
-    Values are 1 for the actions that it takes, 0 for the others.
+    Without food, an ant picks up the food that it sees, follows a trail, and otherwise walks
+    straight over open ground and turns at random beside anything that blocks it. With food, it
+    gives it to the queen, moves nearer to her, pushes ants without food out of the way, and
+    otherwise walks at random until a nearer cell comes into view. An ant without food that sees
+    an ant with food on a stronger trail (P) waits to be pushed along that trail. In queues, it does
+    so only by moving against that ant, and it waits behind an ant that is further up the trail (p).
 
-    Without food it picks up what it sees, follows a trail (straight on where it can), then an ant
-    that is worth following (P, p), and otherwise walks straight over open ground and turns at
-    random beside anything that blocks. With food it gives it to the queen, moves nearer to her,
-    then towards an ant on a nearer cell (P, p), or wanders at random until a nearer cell comes into
-    view. In a dead end it turns left, which opens a way out after two turns.
+    Args:
+        observation: The observation whose states are the rows, one of `FOLLOWED`.
+
+    Returns:
+        Float32 (n_states, 5): 1 for the actions that it takes, 0 for the others.
 
     Raises:
-        AntsError: It does not know the observation.
+        AntsError: There is no rule for the observation.
     """
     check_one_of("observation", observation, FOLLOWED)
     name_of, q_values = observations.get(observation).name_of, random_policy(observation)
     for row, values in enumerate(q_values):
-        task, *view = name_of(row).split()
-        values[_choices(task == TASK_NAMES[1], view)] = 1.0
+        load, *view = name_of(row).split()
+        carries = load == TASK_NAMES[1]
+        values[_choices(RULES[observation][carries], carries, view)] = 1.0
     return q_values
 
 
-def _choices(carries: bool, view: Sequence[str]) -> list[int]:
-    """The actions among which the trail follower chooses at random.
+def _choices(rule: Rule, carries: bool, view: Sequence[str]) -> list[int]:
+    """The actions among which a rule chooses at random.
 
     `view` has the letters of the cells in the order of the moves: left, forward, right.
     """
-
-    def towards(letters: str) -> list[int]:
-        return [move for move in (LEFT, FORWARD, RIGHT) if view[move] in letters]
-
-    if towards("FQ"):
-        return [GIVE if carries else PICK_UP]
-    for better in (towards("TS"), towards("Pp")):
-        if better:
-            return [FORWARD] if FORWARD in better and not carries else better
-    empty = towards("E")
-    if not empty:
-        return [LEFT]
-    # Straight on only in the open: along a wall it would run round the world forever. With food,
-    # straight on would lead away from the queen, since no cell in view is nearer to her.
-    in_the_open = len(empty) == len(view)
-    return [FORWARD] if in_the_open and not carries else empty
+    takes, fails = (GIVE, PICK_UP) if carries else (PICK_UP, GIVE)
+    for letters, action in rule:
+        cells = [move for move in (LEFT, FORWARD, RIGHT) if view[move] in letters]
+        ahead = [move for move in cells if move == FORWARD]
+        if cells and action == "take":
+            return [takes]
+        if cells and action == "stay":
+            return [fails]
+        if action == "ahead":
+            cells = ahead
+        # Beside what blocks, straight on would lead along a wall round the world forever.
+        elif action == "straight" or (action == "open" and len(cells) == len(view)):
+            cells = ahead or cells
+        if cells:
+            return cells
+    return [LEFT]
 
 
 def save_policy(

@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass, replace
 from importlib import import_module
 from typing import Any
 
-from taichi_ants.errors import AntsError, checked_whole, expect, shown, unusable
+from taichi_ants.errors import AntsError, check_new_name, checked_whole, expect, shown, unusable
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.hyperparameters import Hyperparameters
 from taichi_ants.settings import declared
@@ -132,18 +132,17 @@ _LEARNERS: dict[str, Learner] = {}
 
 
 def register(learner: Learner) -> Learner:
-    """Make a learner known by its name.
+    """Make a learner known by its name; it replaces your own learner of the same name.
+
+    Results, colonies and kernels that exist keep the learner with which they were made.
 
     Raises:
-        AntsError: The name is taken or no identifier, or a field is not as `Learner` says. What the
-            functions compute is tried when the learner is first used.
+        AntsError: The name is that of a learner of the package or not an identifier, or a field is
+            not as `Learner` says. The functions are tried when the learner is first used.
     """
     expect("what is registered", learner, Learner)
     name = learner.name
-    if not isinstance(name, str) or not name.isidentifier() or name in names():
-        raise AntsError(
-            f"{shown(name)} cannot name a learner; use a new one of letters, digits and _."
-        )
+    check_new_name("learner", name, BUILT_IN)
     parts = ["memory", "at", "step", "rates", "random_state"]
     _check_arguments(f"the function learn of {name!r}", learner.learn, parts)
     if learner.begin is not None:

@@ -18,13 +18,12 @@ from taichi_ants import learners, task
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import FOLLOWED, Policy, trail_follower
-from taichi_ants.live.setup import Setup
+from taichi_ants.live.setup import MOST_ANTS, MOST_TEXT, Setup
 from taichi_ants.task import Life, Pheromone, Task, observations
 from taichi_ants.task.traffic import Traffic
 
 # Rules of what comes and goes, which stand beside those of any task.
 LIFE = ("births", "deaths", "regrowth", "wanders")
-MOST_ANTS, MOST_TEXT = 5000, 50_000
 WORLDS = {
     "paper": "the paper's world",
     "open": "an open world",

@@ -6,7 +6,16 @@ const SLIDERS = {
 };
 const FILE_TYPES = { html: "text/html", gif: "image/gif" };
 const WORKS = { page: "page", gif: "GIF" };
-const MOST_UPLOAD = 2 ** 24;
+// What happened to the connection, and what the second button does then.
+const LOST = {
+  "no token": ["This page has no token, so the server does not let it in. Open the address that the server prints.", "Try again"],
+  lost: ["The connection is lost. This page keeps what it has shown, and connects again by itself when the server is back. "
+    + "A server that you start anew has a new address: open that one.", "Try now"],
+  ended: ["The server has ended. This page keeps what it has shown.", "Try to connect"],
+  "cut off": ["The server has cut this page off", "Connect again"],
+  another: ["The server is back with another session. This page still has the one before; the other one takes its place if you show it.", "Show the other session"],
+};
+const MOST_UPLOAD = 2 ** 22;
 const MAP = `; lines shift by two columns
           .
         .   F
@@ -55,7 +64,7 @@ class Controls {
       const fields = "textarea, input:not([type=range], [type=checkbox])"; // they undo what was typed
       if (event.key.toLowerCase() !== "z" || event.shiftKey || !(event.ctrlKey || event.metaKey) || event.target.closest(fields)) return;
       event.preventDefault();
-      if (!this.holds && !this.ended) this.anew("undo"); // the server knows first whether there is something to undo
+      if (!this.holds && live.open) this.anew("undo"); // the server knows first whether there is something to undo
     });
     on("next-episode", "click", () => live.edit({ kind: "episode" }, live.nextStroke()));
     on("files", "click", (event) => {
@@ -74,7 +83,11 @@ class Controls {
     live.news.addEventListener("drawn", ({ detail }) => this.showRates(detail));
     live.news.addEventListener("file", ({ detail }) => this.download(detail));
     live.news.addEventListener("cancelled", () => this.say("Cancelled."));
-    live.news.addEventListener("over", ({ detail }) => this.end(detail));
+    live.news.addEventListener("lost", ({ detail }) => this.lose(detail));
+    live.news.addEventListener("back", () => this.connected(true));
+    on("keep", "click", () => this.keep());
+    on("again", "click", () => live.reconnect(this.lost === "another"));
+    addEventListener("beforeunload", (event) => this.lost && live.viewer && !this.kept && event.preventDefault());
     this.busy("Waiting for the simulation …");
     this.hold(true);
   }
@@ -107,6 +120,7 @@ class Controls {
     } else this.touched = false;
     if (this.begins && !this.roomy.matches) byId("new").open = false;
     this.begins = false;
+    this.connected(true);
     this.held.clear(); // sliders show what this session has, also the one that was pulled just now
     this.hold(false);
     this.hush();
@@ -210,7 +224,7 @@ class Controls {
   /* Show how things stand; sliders that somebody moves are left alone. */
   show({ values, pages, works, can_undo: canUndo, can_go_back: canGoBack }) {
     this.showWorks(works);
-    byId("undo").disabled = !canUndo || this.ended;
+    byId("undo").disabled = !canUndo;
     byId("go-back").hidden = !canGoBack;
     const box = byId("sliders"), names = Object.keys(values).join();
     if (box.dataset.names !== names) {
@@ -268,7 +282,7 @@ class Controls {
     if (this.holds === holds) return;
     this.holds = holds;
     if (holds) this.focused = document.activeElement;
-    for (const part of document.querySelectorAll(".controls, .palette, .buttons")) part.inert = holds;
+    for (const part of document.querySelectorAll(".controls, .palette, .buttons")) part.inert = holds || (this.lost && !part.matches(".buttons"));
     if (!holds && document.activeElement === document.body) this.focused?.focus(); // where the keyboard was
   }
 
@@ -350,16 +364,32 @@ class Controls {
     }, 4000);
   }
 
-  end({ code, reason }) {
-    if (this.ended) return;
-    this.ended = true;
+  /* Say why there is no connection, and what can be done; the page keeps what it has. */
+  lose({ why, reason }) {
+    const [words, button] = LOST[why];
+    if (this.lost === why || (this.lost === "ended" && why === "lost")) return; // it is still not back
     this.showWorks([]);
-    const why = { 1006: "The connection is lost", 1008: `The server has cut this page off (${reason})` }[code];
-    this.say(why ? `${why}; reload the page to go on.` : "The server has ended; this page shows what happened so far.", true);
-    clearTimeout(this.fading);
-    for (const one of document.querySelectorAll(".controls :is(button, input, select, textarea), .palette :is(button, input), #play, #speed")) one.disabled = true;
-    this.live.running = false;
-    this.live.viewer?.player.take();
+    this.hush();
+    this.connected(false);
+    this.lost = why;
+    byId("lost").querySelector("p").textContent = why === "cut off" ? `${words} (${reason}). This page keeps what it has shown.` : words;
+    byId("again").textContent = button;
+    byId("keep").hidden = !this.live.viewer;
+  }
+
+  /* Whether the server can be asked for anything; looking back is possible in any case. */
+  connected(is) {
+    if (is) [this.lost, this.kept] = ["", false];
+    byId("lost").hidden = is;
+    for (const part of document.querySelectorAll(".controls, .palette")) part.inert = !is || this.holds;
+    for (const id of ["play", "speed"]) byId(id).disabled = !is;
+  }
+
+  /* Save what this page has shown, as a page that plays it. */
+  async keep() {
+    this.busy("Making the file …");
+    this.download({ name: "recording.html", bytes: await this.live.recording() });
+    this.kept = true;
   }
 
   refuse(words) {

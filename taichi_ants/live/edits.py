@@ -9,8 +9,8 @@
     {"kind": "episode"}: the episode ends, the next one begins
 
 Cells are flat indices of cells of the world. Cells that cannot take what is put there are left as
-they are: the ground under ants and queen, trails on rocks, ants on anything but empty cells. What
-stays for later episodes, and what not, says `taichi_ants.engines.colony.hand`.
+they are: the ground under the queen, trails on rocks, ants on anything but empty cells. Rock and
+food move ants aside. See `taichi_ants.engines.colony.hand` for how, and for what lasts.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
-"""The files that a session gives, and how those that take long are made while time goes on."""
+"""The files that a session gives, and the processes that make or replay what takes long."""
 
 from __future__ import annotations
 
 import multiprocessing
+import os
 import signal
 import tempfile
 import threading
@@ -67,34 +68,50 @@ SLOW: dict[str, tuple[str, Callable[[Log, Progress], bytes]]] = {
 }
 
 
+def replayed(log: Log, progress: Progress) -> Session:
+    """The session of a file, as it is at its end."""
+    for session in Session.replay(log):
+        progress(session.steps)
+    return session
+
+
+LOAD = "load"
+_MAKES: dict[str, Callable[[Log, Progress], bytes | Session]] = {
+    **{kind: make for kind, (_, make) in SLOW.items()},
+    LOAD: replayed,
+}
+
+
 class Making:
-    """A file of `SLOW` that a process of its own makes.
+    """A file of `SLOW` that a worker process makes, or a session that it replays (`LOAD`).
 
     Args:
-        kind: Of `SLOW`.
-        session: Up to its present moment.
+        kind: Of `SLOW`, or `LOAD`.
+        content: The session, as its file holds it.
+        total: The ticks that it is about.
         prepare: Called first in that process, as to load a plugin.
-        end: Called in a thread of its own with what was made, or with why there is nothing; not if
-            it was cancelled.
+        end: Called in a new thread with `made`; not if it was cancelled.
 
     Attributes:
-        total: The ticks that it is about.
-        done: How many of them have passed.
+        done: How many of the ticks have passed.
         over: Whether it has ended.
+        made: What was made, or why there is nothing; None before the end.
     """
 
     def __init__(
         self,
         kind: str,
-        session: Session,
+        content: bytes,
+        total: int,
         prepare: Callable[[], None] | None,
-        end: Callable[[bytes | str], None],
+        end: Callable[[bytes | str | Session], None] = lambda made: None,
     ) -> None:
-        self.kind, self.done, self.total, self.over = kind, 0, session.ticks, False
+        self.kind, self.done, self.total, self.over = kind, 0, total, False
+        self.made: bytes | str | Session | None = None
         self._cancelled, self._end = False, end
         context = multiprocessing.get_context("spawn")
         self._answers, answers = context.Pipe(duplex=False)
-        given = (kind, session.to_bytes(), prepare, answers)
+        given = (kind, content, prepare, answers)
         self._process = context.Process(target=_make, args=given, daemon=True)
         threading.Thread(target=self._run, args=(answers,), daemon=True).start()
 
@@ -105,7 +122,7 @@ class Making:
             self._process.terminate()
 
     def _run(self, answers: Connection) -> None:
-        answer: bytes | str | int = 0
+        answer: bytes | str | int | Session = 0
         with self._answers, suppress(EOFError, OSError):  # as where there is no memory
             self._process.start()
             answers.close()  # so that the end of the process is the end of its answers
@@ -113,16 +130,20 @@ class Making:
                 self._process.terminate()
             while isinstance(answer := self._answers.recv(), int):
                 self.done = answer
-        self.over = True
+        if isinstance(answer, int):
+            answer = "the process that was to do this has ended early, as for lack of memory."
+        self.made, self.over = answer, True
         if not self._cancelled:
-            self._end("the file could not be made." if isinstance(answer, int) else answer)
+            self._end(answer)
 
 
 def _make(
     kind: str, content: bytes, prepare: Callable[[], None] | None, answers: Connection
 ) -> None:
-    """Answer with numbers of ticks, then with a file, or with why there is none."""
+    """Answer with numbers of ticks, then with what was made, or with why there is nothing."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends this one
+    if hasattr(os, "nice"):  # as on Windows it has not
+        os.nice(5)  # the server answers pages first
     told = 0.0
 
     def progress(ticks: int) -> None:
@@ -134,6 +155,6 @@ def _make(
     try:
         if prepare is not None:
             prepare()
-        answers.send(SLOW[kind][1](Log.from_bytes(content), progress))
+        answers.send(_MAKES[kind](Log.from_bytes(content), progress))
     except AntsError as error:
         answers.send(str(error))

@@ -9,14 +9,35 @@ import numpy as np
 
 from taichi_ants import files
 from taichi_ants.engines.stored import FileKind
-from taichi_ants.errors import checked_whole, expect
+from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.live.setup import Setup
 from taichi_ants.task.constants import N_ACTIONS
 
 MOST_TICKS = 1_000_000_000
+MOST_EDITS = 10_000
+MOST_CELLS = 400_000  # that edits name, all together
+# Sessions within these limits need no more, so reading a file takes little time and memory.
 KIND = FileKind(
-    "taichi-ants session 2", "session", "Session.save, or Save on its page,", most=1 << 28
+    *("taichi-ants session 2", "session", "Session.save, or Save on its page,"),
+    most=1 << 25,
+    most_text=1 << 22,
+    most_lists=100_000,
 )
+
+
+def cells_of(edit: Any) -> int:
+    """The number of cells that an edit names, which may be none."""
+    cells = edit.get("cells") if isinstance(edit, dict) else None
+    return len(cells) if isinstance(cells, list) else 0
+
+
+def check_room(n_edits: int, n_cells: int) -> None:
+    """Raises AntsError if a session has more edits, or cells in them, than one may have."""
+    if n_edits > MOST_EDITS or n_cells > MOST_CELLS:
+        raise AntsError(
+            f"the session has {n_edits} edits of {n_cells} cells, and at most {MOST_EDITS} edits "
+            f"of {MOST_CELLS} cells are allowed; begin another session."
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +48,7 @@ class Log:
         setup: How it begins.
         edits: (steps, edit) of each edit, in order, see `edits`.
         steps: How many steps time has made, see `Session`.
-        ticks: How many ticks have passed; None if that is not known, as of what was undone.
+        ticks: How many ticks have passed; None if that is not known.
         state: What `Hand.state` gives then; None if that is not known.
         name: What messages call it.
         changes: As in `Session`; in files without them each edit is a change of its own.
@@ -57,7 +78,7 @@ class Log:
         """The log in a file; arguments as of `archives.read`.
 
         Raises:
-            AntsError: The file is missing, damaged, or of another kind.
+            AntsError: The file is missing, damaged, too large, or of another kind.
         """
         stored, facts = KIND.read(path, content)
         with KIND.rebuilding(path):
@@ -74,11 +95,14 @@ class Log:
             ]
             if changes[:1] != [0][: len(edits)] or changes != sorted(set(changes)):
                 raise ValueError("changes")
-            return cls(
+            log = cls(
                 *(Setup.from_json(facts["setup"], stored["table"]), tuple(edits), steps),
                 checked_whole("ticks", facts["ticks"], 0, steps),
                 *(facts["state"], str(path), tuple(changes)),
             )
+        check_room(len(edits), sum(cells_of(edit) for _, edit in edits))
+        log.setup.check_size()
+        return log
 
     @classmethod
     def from_bytes(cls, content: bytes) -> Log:

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from importlib import resources
 
 from taichi_ants.viewer.page import assemble
 
-SCRIPTS = ("source.js", "tools.js", "controls.js")  # what a part uses stands in those before it
+SCRIPTS = (
+    "token.js",
+    "source.js",
+    "tools.js",
+    "controls.js",
+)  # what a part uses stands in those before it
 PARTS = ("controls.html", "live.css", *SCRIPTS)
 
 
@@ -30,3 +36,10 @@ def live_page(server: str) -> str:
         script="\n".join(map(_text, SCRIPTS)),
         connect=server,
     )
+
+
+def policy_of(page: str) -> str:
+    """Return the policy of a page as a header has it, which also keeps it out of frames."""
+    found = re.search('Content-Security-Policy" content="([^"]*)"', page)
+    assert found is not None
+    return f"{found[1]}; frame-ancestors 'none'"

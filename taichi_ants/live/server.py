@@ -1,11 +1,12 @@
 """The room in which people watch a session: its pages, and the thread in which time passes.
 
 The room serves one page, and a socket for each page that is open. It listens on this machine alone,
-and answers only who knows its token and comes from its own page. A page asks for things in JSON,
+and only a page of its own that knows its token gets a socket. A page asks for things in JSON,
 see `REQUESTS`; it is told what happens in JSON and in frames, see `taichi_ants.viewer.frames`.
 
-Two threads: sockets live in one, the session in the other, the one that calls `Room.run`. What a
-page asks for is put into a queue; what it is told is handed back to the thread of the sockets.
+Two threads: one serves the sockets, the other, which calls `Room.run`, has the session. Requests
+of pages go through a queue; messages to pages go back to the thread of the sockets. Files that
+pages upload are checked in further threads and replayed by processes, see `exports.Making`.
 """
 
 from __future__ import annotations
@@ -27,14 +28,16 @@ from urllib.parse import parse_qs, urlsplit
 
 from taichi_ants.errors import AntsError
 from taichi_ants.live.choices import Choices
-from taichi_ants.live.exports import QUICK, SLOW, Making
+from taichi_ants.live.exports import LOAD, QUICK, SLOW, Making
 from taichi_ants.live.log import Log
-from taichi_ants.live.page import live_page
+from taichi_ants.live.page import live_page, policy_of
 from taichi_ants.live.session import Session
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
     from websockets.http11 import Request, Response
+
+    from taichi_ants.live.methods import Connection
 
 HOST = "127.0.0.1"
 FRAMES_A_SECOND = 30
@@ -42,14 +45,14 @@ FASTEST = 1000.0  # ticks a second; a page that asks for these gets as many as t
 
 _MOST_PAGES = 24
 _MOST_TEXT = 2**18  # bytes of a request
-_MOST_UPLOAD = 2**24  # bytes of a session
+_MOST_UPLOAD = 2**22  # bytes of a session
 _MOST_UNSEEN = 12  # frames that a page is sent before it has drawn the first of them
 _MOST_WAITING = 2**27  # bytes that wait for a page that does not read
 _FEW = 4  # frames of an episode, below which each shows another one
 _PHASES = 24  # frames that such episodes make one of
 _STATE_EVERY = 0.5  # seconds
 _PROGRESS_EVERY = 0.2  # seconds
-_SLICE = 0.05  # seconds of replaying, after which requests are answered
+_SLICE = 0.05  # seconds of undoing, after which requests are answered
 _BREATH = 0.004  # seconds after each frame, in which the thread of the sockets gets its turn
 _LONGEST_WAIT = 0.2  # seconds, for a request, before it looks whether it is to end
 _QUIET = logging.getLogger("taichi_ants.live")  # what strangers send is no news for the terminal
@@ -128,6 +131,7 @@ class Room:
         self.port = self._socket.getsockname()[1]
         self.token = secrets.token_urlsafe(24)
         self.playing, self.speed = False, 12.0
+        self._shown = secrets.token_hex(8)  # by which pages that come back know the session
         self._pages: set[Page] = set()
         self._joined = 0  # sockets, a page or not yet
         self._requests: queue.Queue[tuple[Page, Any, asyncio.Future[None]]] = queue.Queue()
@@ -140,7 +144,9 @@ class Room:
             None  # steps and edits, where it is one in part undone
         )
         self._stroke: tuple[Page, float] | None = None  # by whom, and which, of the last edit
-        self._replay: _Replay | None = None  # of a session that is loaded, or in part undone
+        self._replay: _Replay | None = None  # of a session that is in part undone
+        self._loading: Making | None = None  # of a session that somebody has sent
+        self._loaded: Session | None = None  # which has not gone on yet
         self._making: Making | None = None
         self._compiles = False  # whether the first step of the session goes on
         self._for: Page | None = None  # who is given the file
@@ -150,6 +156,11 @@ class Room:
     def url(self) -> str:
         """Where the page is, with the token."""
         return f"http://{HOST}:{self.port}/?token={self.token}"
+
+    @property
+    def watched(self) -> bool:
+        """Whether a page is open."""
+        return bool(self._pages)
 
     def end(self) -> None:
         """Let `run` return soon; for any thread."""
@@ -175,8 +186,9 @@ class Room:
                 self._turn()
         finally:
             self._over.set()
-            if self._making is not None:
-                self._making.cancel()
+            for making in (self._making, self._loading):
+                if making is not None:
+                    making.cancel()
             with contextlib.suppress(RuntimeError):  # it has ended by itself
                 self._loop.call_soon_threadsafe(self._leave.set)
             sockets.join(2)
@@ -184,6 +196,8 @@ class Room:
     def _turn(self) -> None:
         """Let a frame's time pass if it is due, and do what a page asks for."""
         runs = self._runs and bool(self._pages)  # time stands still while nobody looks on
+        if self._loading is not None and self._loading.over:
+            self._end_loading(self._loading)
         if self._replay is not None:
             self._go_on(self._replay)
         elif runs and time.monotonic() >= self._due:
@@ -204,10 +218,15 @@ class Room:
     @property
     def _runs(self) -> bool:
         """Whether time passes: it stands still while another session is replayed."""
-        return self.playing and self._replay is None
+        return self.playing and not self._replays
+
+    @property
+    def _replays(self) -> bool:
+        """Whether another session is about to take the place of the present one."""
+        return self._replay is not None or self._loading is not None
 
     def _go_on(self, replay: _Replay) -> None:
-        """Replay for a moment; at its end, the session takes the place of the present one."""
+        """Undo for a moment; at the end, the new session takes the place of the present one."""
         until = time.monotonic() + _SLICE
         try:
             for session in replay.pieces:
@@ -216,19 +235,21 @@ class Room:
                     return
         except (AntsError, MemoryError) as error:
             self._replay = None
-            self._tell_all(_say("error", words=_words(_of_page(error))))
+            self._tell_all(_say("error", words=_words(error)))
         else:
             self._replay = None
             assert replay.session is not None
-            self._begin(replay.session, replay.undoes)
+            self._begin(replay.session, undoes=True)
         self._tells = 0.0
 
     def _works(self) -> list[dict[str, Any]]:
         """What goes on that takes long: what it is, and how many of its ticks are done."""
-        works, replay, making = [], self._replay, self._making
+        works, replay, loading, making = [], self._replay, self._loading, self._making
         if replay is not None:
             done = 0 if replay.session is None else replay.session.steps
-            works.append({"kind": "load", "done": done, "total": replay.steps})
+            works.append({"kind": LOAD, "done": done, "total": replay.steps})
+        if loading is not None:
+            works.append({"kind": LOAD, "done": loading.done, "total": loading.total})
         if self._compiles:
             works.append({"kind": "kernels", "done": 0, "total": 0})
         if making is not None and not making.over:
@@ -273,8 +294,8 @@ class Room:
         """Do what a page asks for, or tell it why not; all are told soon how things stand then."""
         refused = None
         try:
-            what = "load" if isinstance(request, bytes) else request["do"]
-            if self._replay is not None and what in _CHANGES:
+            what = request["do"]
+            if self._replays and what in _CHANGES:
                 raise AntsError("a session is being replayed; wait for its end, or cancel it.")
             REQUESTS[what](self, page, request)
         except Closed as error:
@@ -293,16 +314,26 @@ class Room:
         self._post(answer)
         self._tells = min(self._tells, time.monotonic() + 1 / FRAMES_A_SECOND)
 
-    def _load(self, page: Page, content: bytes) -> None:
-        try:
-            log = Log.from_bytes(content)
-        except AntsError as error:
-            raise _of_page(error) from error
-        self._replay = _Replay(log)
+    def _load(self, page: Page, request: dict[str, Any]) -> None:
+        """Replay a session in a worker process, which can be ended at any time."""
+        log = request["log"]
+        if isinstance(log, AntsError):
+            raise _of_page(log) from log
+        self._loading = Making(LOAD, request["content"], log.steps, self._prepare)
+
+    def _end_loading(self, loading: Making) -> None:
+        """Let a session that was replayed take the place of the present one."""
+        self._loading, made = None, loading.made
+        if isinstance(made, Session):
+            self._begin(made)
+            self._loaded = made
+        else:
+            self._tell_all(_say("error", words=str(_of_page(made))))
+        self._tells = 0.0
 
     def _undo(self, page: Page, request: dict[str, Any]) -> None:
         """Go back to the moment before the last change."""
-        self._replay = _Replay(self.session.undone(), undoes=True)
+        self._replay = _Replay(self.session)
 
     def _go_back(self, page: Page, request: dict[str, Any]) -> None:
         """Go on with the session whose place the present one has taken."""
@@ -316,8 +347,10 @@ class Room:
         kinds = [work["kind"] for work in self._works() if work["kind"] != "kernels"]
         if (kind := request.get("kind")) not in kinds:
             return  # it has ended meanwhile
-        if kind == "load":
-            self._replay = None
+        if kind == LOAD:
+            if self._loading is not None:
+                self._loading.cancel()
+            self._replay = self._loading = None
         elif self._making is not None:
             self._making.cancel()
         self._tell_all(_say("cancelled", kind=kind))
@@ -341,7 +374,7 @@ class Room:
         self._undone = (session.steps, len(session.edits)) if undoes else None
 
     def _show_session(self, session: Session) -> None:
-        self.session, self._undone = session, None
+        self.session, self._undone, self._shown = session, None, secrets.token_hex(8)
         self.playing, self._piece, self._stroke = False, 1.0, None
         self._compiles = False
         messages = [*self._about(), *self._moment()]
@@ -371,7 +404,7 @@ class Room:
         """What a page needs to know before the first frame of a session."""
         header, setup, choices = self.session.header(), self.session.setup, self.choices
         offered = {"choices": choices.as_dict(), "chosen": choices.chosen(setup)}
-        return [_say("begin", header=header, **offered), self._state()]
+        return [_say("begin", session=self._shown, header=header, **offered), self._state()]
 
     def _moment(self) -> list[str | bytes]:
         """All as it is now, for a page that knows nothing of it."""
@@ -383,8 +416,8 @@ class Room:
 
     def _prepare_first(self) -> None:
         """Tell pages that the first step of a session may take seconds: kernels are compiled."""
-        if self.session.steps == 0:
-            self._compiles = True
+        if self.session.steps == 0 or self.session is self._loaded:
+            self._compiles, self._loaded = True, None
             self._tell_all(self._state())
             time.sleep(_BREATH)  # in which the thread of the sockets tells it
 
@@ -438,13 +471,14 @@ class Room:
         if self._making is not None and not self._making.over:
             raise AntsError("another file is being made; wait for it, or cancel it.")
 
-        def end(made: bytes | str) -> None:
+        def end(made: Any) -> None:
             if isinstance(made, str):
                 self._tell(page, _say("error", words=made))
             else:
                 self._post(lambda: page.tell(_say("file", name=SLOW[kind][0]), made))
 
-        self._making, self._for = Making(kind, self.session, self._prepare, end), page
+        content, ticks = self.session.to_bytes(), self.session.ticks
+        self._making, self._for = Making(kind, content, ticks, self._prepare, end), page
 
     def _quit(self, page: Page, request: dict[str, Any]) -> None:
         self.end()
@@ -503,43 +537,47 @@ class Room:
     async def _listen(self) -> None:
         from websockets.asyncio.server import serve
 
+        from taichi_ants.live.methods import Connection
+
         settings: dict[str, Any] = {
             **{"max_size": _MOST_UPLOAD, "max_queue": 4, "compression": None},
             **{"open_timeout": 10, "ping_interval": 20, "ping_timeout": 20, "close_timeout": 0.3},
             **{"process_request": self._open, "logger": _QUIET},
+            "create_connection": Connection,
         }
         async with serve(self._hear, sock=self._socket, **settings):
             await self._leave.wait()
             for page in self._pages:
                 page.tell(_say("over"))
 
-    def _open(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Answer a request: with the page, with a refusal, or None, which opens a socket."""
-        from http import HTTPStatus
+    def _open(self, connection: Connection, request: Request) -> Response | None:
+        """Answer a request: with the page, with a refusal, or None, which opens a socket.
 
+        The page itself holds no secret; only who knows the token gets a socket.
+        """
         asked = urlsplit(request.path)
         hosts = {f"{name}:{self.port}" for name in (HOST, "localhost")}
         host, origins = request.headers.get_all("Host"), request.headers.get_all("Origin")
-        opens = asked.path == "/socket"
+        opens, tokens = asked.path == "/socket", parse_qs(asked.query).get("token", [])
         mine = len(host) == 1 and host[0] in hosts
         # A page of ours has the origin that it was asked for at; the page itself is asked for by
         # nobody's page.
         mine = mine and (origins == [f"http://{host[0]}"] or (not origins and not opens))
-        given = parse_qs(asked.query).get("token", [""])[0]
-        if not mine or not hmac.compare_digest(given.encode(), self.token.encode()):
-            return connection.respond(HTTPStatus.FORBIDDEN, "Open the address that was printed.\n")
+        first = tokens[0] if tokens else ""
+        knows = hmac.compare_digest(first.encode(), self.token.encode())
+        if not mine or not (knows or (asked.path == "/" and not tokens)):
+            return _respond(connection, 403, "Open the address that was printed.\n")
+        if opens and connection.head:
+            return _respond(connection, 405, "", Allow="GET")
         if opens and self._joined >= _MOST_PAGES:
-            return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "Too many pages are open.\n")
+            return _respond(connection, 503, "Too many pages are open.\n")
         if opens:
             return None
         if asked.path != "/":
-            return connection.respond(HTTPStatus.NOT_FOUND, "There is nothing here.\n")
-        response = connection.respond(HTTPStatus.OK, live_page(f"ws://{host[0]}"))
-        for name, value in _HEADERS.items():
-            with contextlib.suppress(KeyError):
-                del response.headers[name]
-            response.headers[name] = value
-        return response
+            return _respond(connection, 404, "There is nothing here.\n")
+        page = live_page(f"ws://{host[0]}")
+        rules = {"Content_Security_Policy": policy_of(page)}
+        return _respond(connection, 200, page, Content_Type="text/html; charset=utf-8", **rules)
 
     async def _hear(self, connection: ServerConnection) -> None:
         """All that one page says; what it asks for is done before it is heard further."""
@@ -550,6 +588,10 @@ class Room:
         try:
             await self._ask(page, {"do": "join"})
             async for message in connection:
+                if isinstance(message, bytes):  # in a thread, while others are answered
+                    log = await asyncio.to_thread(_log_or_fault, message)
+                    await self._ask(page, {"do": LOAD, "log": log, "content": message})
+                    continue
                 for request in self._read(page, message):
                     await self._ask(page, request)
         except Closed as error:
@@ -561,11 +603,8 @@ class Room:
             self._pages.discard(page)
             self._requests.put((page, {"do": "leave"}, self._loop.create_future()))
 
-    def _read(self, page: Page, message: str | bytes) -> Iterator[Any]:
+    def _read(self, page: Page, message: str) -> Iterator[Any]:
         """The request in a message, if the session has to do with it."""
-        if isinstance(message, bytes):
-            yield message
-            return
         if len(message) > _MOST_TEXT:
             raise Closed("this is too long")
         try:
@@ -590,17 +629,17 @@ class Room:
 
 
 class _Replay:
-    """A session that is being made once more from its log.
+    """The present session, while it is made once more without its last change.
 
     Attributes:
-        pieces: What replays it.
-        steps: How many time has made at its end.
-        undoes: Whether it is the present one without its last change.
-        session: As far as it has come.
+        pieces: What makes it.
+        steps: How many steps time has made at its end.
+        session: The new session so far.
     """
 
-    def __init__(self, log: Log, undoes: bool = False) -> None:
-        self.pieces, self.steps, self.undoes = Session.replay(log), log.steps, undoes
+    def __init__(self, session: Session) -> None:
+        self.pieces = session.undone()
+        self.steps, _ = session.edits[session.changes[-1]]
         self.session: Session | None = None
 
 
@@ -608,7 +647,7 @@ REQUESTS: dict[str, Callable[[Room, Page, Any], None]] = {
     "join": Room._welcome,  # what a socket says by being opened
     "leave": Room._leave_room,  # what it says by being closed
     "catch up": Room._catch_up,  # what a page says by having seen all that it was sent
-    "load": Room._load,  # what it says by sending bytes
+    LOAD: Room._load,  # what it says by sending bytes
     "play": Room._play,
     "pause": Room._pause,
     "step": Room._step,  # {"ticks": 1 to 100}
@@ -622,13 +661,14 @@ REQUESTS: dict[str, Callable[[Room, Page, Any], None]] = {
     "cancel": Room._cancel,  # {"kind": of what takes long}
     "quit": Room._quit,
 }
-_INWARD = ("join", "leave", "catch up", "load")
+_INWARD = ("join", "leave", "catch up", LOAD)
 # What would be lost, or would take away the session that is to go on if a replay is cancelled.
-_CHANGES = ("load", "play", "step", "edit", "undo", "back", "begin", "restart")
+_CHANGES = (LOAD, "play", "step", "edit", "undo", "back", "begin", "restart")
 
 _HEADERS = {
-    "Content-Type": "text/html; charset=utf-8",
     "Cache-Control": "no-store",
+    "Content-Security-Policy": "default-src 'none'; frame-ancestors 'none'",
+    "Cross-Origin-Opener-Policy": "same-origin",
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
@@ -636,12 +676,31 @@ _HEADERS = {
 }
 
 
-def _of_page(error: Exception) -> Exception:
-    """What is wrong with a file, with the way out that a page has."""
-    if not isinstance(error, AntsError):
+def _respond(connection: Connection, status: int, text: str, **headers: str) -> Response:
+    """An answer with the headers of all answers, and others; without the text if HEAD asked."""
+    response = connection.respond(status, text)
+    for name, value in {**_HEADERS, **headers}.items():
+        name = name.replace("_", "-")
+        with contextlib.suppress(KeyError):
+            del response.headers[name]
+        response.headers[name] = value
+    if connection.head:
+        response.body = b""
+    return response
+
+
+def _log_or_fault(content: bytes) -> Log | AntsError:
+    """The session in a file that a page has sent, or what is wrong with it."""
+    try:
+        return Log.from_bytes(content)
+    except AntsError as error:
         return error
-    what = str(error).partition("; ")[0].replace("'the loaded file'", "the loaded file")
-    return AntsError(f"{what}; load one that Save has made.")
+
+
+def _of_page(fault: object) -> AntsError:
+    """What is wrong with a file, with the way out that a page has."""
+    what = str(fault).partition("; ")[0].rstrip(".").replace("'the loaded file'", "the loaded file")
+    return AntsError(f"{what}; load a session that Save has made.")
 
 
 def _words(error: Exception) -> str:

@@ -2,23 +2,43 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+import zlib
+from collections.abc import Callable, Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from taichi_ants import files
 from taichi_ants.engines.colony.hand import Hand
 from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.learners.policies import save_policy
 from taichi_ants.live import edits
-from taichi_ants.live.log import KIND, MOST_TICKS, Log
+from taichi_ants.live.log import KIND, MOST_TICKS, Log, cells_of, check_room
 from taichi_ants.live.setup import Setup
 from taichi_ants.viewer import Recorder
 
 _PIECE = 0.02  # seconds, of a session that is replayed
+_BETWEEN = 0.1  # seconds of simulation between two snapshots, which undoing has to replay at most
+_MOST_KEPT = 1 << 28  # bytes of snapshots
+_LARGEST = 1 << 26  # bytes of a colony of which snapshots are taken
+
+
+class _Snapshot(NamedTuple):
+    """A session as it was before one of its changes.
+
+    Attributes:
+        edits: How many edits it had.
+        spent: How many seconds of simulation it had taken.
+        content: The session without its edits, pickled and compressed.
+    """
+
+    edits: int
+    spent: float
+    content: bytes
 
 
 class Session:
@@ -47,6 +67,9 @@ class Session:
         self.ticks = self.steps = 0
         self.edits: list[tuple[int, edits.Edit]] = []
         self.changes: list[int] = []
+        self._cells = 0  # that the edits name
+        self._snapshots: list[_Snapshot] = []
+        self._spent = 0.0  # seconds of simulation so far
         self.hand.begin_episode(self._length)
         self.colony.look()  # changes nothing, but compiles what the first edit needs
         # A hand changes how many ants there are.
@@ -116,12 +139,13 @@ class Session:
         n = min(n, self._length - self.colony.ticks if self._length else n)
         if self.ticks + n > MOST_TICKS:
             raise AntsError(f"a session has at most {MOST_TICKS} ticks; begin another one.")
-        before = self.colony.ticks
+        before, began = self.colony.ticks, time.perf_counter()
         try:
             frame = tick(n)
         finally:  # even if somebody interrupts it
             self.ticks += self.colony.ticks - before
             self.steps += self.colony.ticks - before
+            self._spent += time.perf_counter() - began
         course.note()
         return frame
 
@@ -142,12 +166,39 @@ class Session:
 
     def _do(self, edit: object, goes_on: bool = False) -> None:
         plain = edits.checked(edit, self.hand)
+        check_room(len(self.edits) + 1, self._cells + cells_of(plain))
+        begins = not (goes_on and self.changes)
+        if begins:
+            self._take_snapshot()
+        began = time.perf_counter()
         if plain["kind"] == "episode":
             self._recorder.course.note(ended=True)
         edits.apply(plain, self.hand, self._length)
-        if not (goes_on and self.changes):
+        if begins:
             self.changes.append(len(self.edits))
         self.edits.append((self.steps, plain))
+        self._cells += cells_of(plain)
+        self._spent += time.perf_counter() - began
+
+    def _take_snapshot(self) -> None:
+        """Keep the session as it is now, unless it can be made quickly from the last snapshot.
+
+        If the snapshots take too much memory, drop the one that is missed least: its neighbours
+        are the nearest to each other in time.
+        """
+        kept = self._snapshots
+        if kept and self._spent - kept[-1].spent < _BETWEEN:
+            return
+        if sum(array.nbytes for array in self.colony.arrays.values()) > _LARGEST:
+            return
+        bare: Any = copy.copy(self)
+        bare.setup, bare.edits, bare.changes, bare._snapshots = None, [], [], []
+        content = zlib.compress(pickle.dumps(bare, pickle.HIGHEST_PROTOCOL), 1)
+        kept.append(_Snapshot(len(self.edits), self._spent, content))
+        while len(kept) > 1 and sum(len(one.content) for one in kept) > _MOST_KEPT:
+            spent = [0.0, *(one.spent for one in kept)]
+            gaps = [later - before for before, later in zip(spent, spent[2:], strict=False)]
+            del kept[gaps.index(min(gaps))]
 
     def values(self) -> dict[str, dict[str, float]]:
         """What the edit "set" can change, by name: value, least, most and step."""
@@ -199,34 +250,55 @@ class Session:
         """
         with KIND.rebuilding(log.name):
             session = cls(log.setup)
-            for steps, edit in log.edits:
-                for _ in session._pieces(steps):
-                    yield session
-                session._do(edit)
-            for _ in session._pieces(log.steps):
+            for _ in session._follow(log.edits, log.steps, log.changes):
                 yield session
             if log.state not in (None, session.hand.state()):
                 raise ValueError("replayed, it does not end as it did")
-            session.changes = list(log.changes)
-            session._recorder.moment()
         yield session
+
+    def _follow(
+        self, edits: Sequence[tuple[int, Any]], steps: int, changes: Sequence[int]
+    ) -> Iterator[None]:
+        """Let time pass until it has made so many steps, with these edits, in short pieces."""
+        for at, edit in edits:
+            yield from self._pieces(at)
+            self._do(edit)
+            yield
+        yield from self._pieces(steps)
+        self.changes = list(changes)
+        self._recorder.moment()
 
     def same(self, other: Session) -> bool:
         """Whether another one began alike, was changed alike, and stands where this one does."""
         one, two = ((it.steps, it.edits, it.setup.to_json()) for it in (self, other))
         return one == two and self.hand.state() == other.hand.state()
 
-    def undone(self) -> Log:
-        """The log up to the moment before the last change, from which it can be made once more.
+    def undone(self) -> Iterator[Session]:
+        """Make the session as it was before its last change, from the last snapshot before it.
+
+        Yields:
+            As `replay` does; this session stays as it is.
 
         Raises:
             AntsError: Nothing has been changed.
         """
         if not self.changes:
             raise AntsError("there is nothing to undo: nobody has changed this session by hand.")
+        return self._before_last_change()
+
+    def _before_last_change(self) -> Iterator[Session]:
         *changes, last = self.changes
+        kept = [one for one in self._snapshots if one.edits <= last]
+        if kept:
+            session = pickle.loads(zlib.decompress(kept[-1].content))
+            session.setup, session._snapshots = self.setup, kept
+            session.edits = self.edits[: kept[-1].edits]
+        else:
+            session = Session(self.setup)
         steps, _ = self.edits[last]
-        return Log(self.setup, tuple(self.edits[:last]), steps, None, None, changes=tuple(changes))
+        for _ in session._follow(self.edits[len(session.edits) : last], steps, changes):
+            yield session
+        yield session
 
     @classmethod
     def moments(cls, log: Log, most: int = 1000) -> Iterator[tuple[Session, bytes]]:

@@ -10,20 +10,23 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import files, learners, worlds
-from taichi_ants.checks import checked_q_values, checked_seeds, checked_share
+from taichi_ants.checks import checked_seeds, checked_share, checked_table
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS, ROW
+from taichi_ants.worlds import text_map
+from taichi_ants.worlds.double_bridge import SETTINGS as BRIDGE
+from taichi_ants.worlds.double_bridge import bridge_ranges
 from taichi_ants.worlds.validation import parse_ranges
 from taichi_ants.worlds.world import World
 
-# What pages may ask for is small enough for any machine.
-MOST_CELLS = 1_000_000
+# The same for the form of the page, for files and for Python; small enough for any machine.
+MOST_CELLS = 1_500_000  # of the arrays of a world, see `AxialGrid.size`
 MOST_ANTS = 100_000
-_MOST_LINES = 4000  # of a map, and characters of each
+MOST_TEXT = 50_000  # characters of a map
 _MOST_NUMBERS = 1 << 27  # of tables of ants' own
 
 
@@ -68,10 +71,7 @@ class Setup:
             check_one_of("sharing", self.sharing, ("shared", "own"))
             learners.get(self.policy.learner)
         else:
-            table = checked_q_values(self.policy, self.task)
-            if table.ndim != 2:
-                raise AntsError(f"policy has shape {table.shape}; give one table for all ants.")
-            object.__setattr__(self, "policy", table.copy())
+            object.__setattr__(self, "policy", checked_table(self.policy, self.task).copy())
         checked_whole("ants", self.ants, 1, MOST_ANTS)
         if self.capacity is None:
             object.__setattr__(self, "capacity", min(2 * self.ants + 64, MOST_ANTS))
@@ -94,24 +94,34 @@ class Setup:
         """Whether ants learn, not follow action values."""
         return isinstance(self.policy, TrainingConfig)
 
-    def build_world(self) -> World:
-        """The world; raises AntsError if there is none of that name, or the map is damaged."""
-        lines = self.world.split("\n")
-        if len(lines) > 1:
-            if max(len(lines), *map(len, lines)) > _MOST_LINES:
+    def check_size(self) -> None:
+        """Raise AntsError if the world is too large, as far as is known before it is built."""
+        settings = self.world_settings
+        if "\n" in self.world:
+            if len(self.world) > MOST_TEXT:
                 raise AntsError(
-                    f"the map has more than {_MOST_LINES} lines, or characters in one; draw a "
-                    "smaller one."
+                    f"the map has {len(self.world)} characters, and at most {MOST_TEXT} are "
+                    "allowed; draw a smaller one."
                 )
-            return _small_enough(worlds.from_text(self.world))
+            _check_cells(text_map.ranges_of(self.world))
+        elif settings.get("ranges") is not None:
+            _check_cells(parse_ranges(settings["ranges"]))
+        elif self.world == "double_bridge":
+            _check_cells(bridge_ranges(**{n: settings[n] for n in BRIDGE if n in settings}))
+
+    def build_world(self) -> World:
+        """The world; raises AntsError if there is none of that name, or it cannot be built."""
+        self.check_size()
+        if "\n" in self.world:
+            return worlds.from_text(self.world)
         if self.world not in worlds.names():  # never a path
             raise AntsError(
                 f"there is no world named {shown(self.world)}; choose one of "
                 f"{', '.join(worlds.names())}, or give the text of a map."
             )
-        if self.world_settings.get("ranges") is not None:  # before it takes memory
-            _small_enough(AxialGrid(parse_ranges(self.world_settings["ranges"])))
-        return _small_enough(worlds.build(self.world, self.world_seed, **self.world_settings))
+        world = worlds.build(self.world, self.world_seed, **self.world_settings)
+        _check_cells(world.ranges)
+        return world
 
     def build_colony(self) -> Colony:
         """The colony, before its first episode; raises AntsError if it cannot be."""
@@ -169,9 +179,10 @@ class Setup:
         return cls(**given)
 
 
-def _small_enough(world: Any) -> Any:
-    """A world or a grid, if it has few enough cells."""
-    cells = world.count if isinstance(world, AxialGrid) else world.grid.count
+def _check_cells(ranges: tuple[int, int, int]) -> None:
+    cells = AxialGrid(ranges).size
     if cells > MOST_CELLS:
-        raise AntsError(f"the world has {cells} cells; take one of at most {MOST_CELLS}.")
-    return world
+        raise AntsError(
+            f"a world of ranges {ranges} takes arrays of {cells} cells, and at most {MOST_CELLS} "
+            "are allowed; choose a smaller world."
+        )

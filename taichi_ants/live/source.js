@@ -1,11 +1,19 @@
 /* The simulation that runs now, as a source of the viewer: one socket, see live/server.py.
 
    What has arrived is drawn before the server is told that it was seen; a page that is slow, or that
-   nobody looks at, is then sent less, and later a whole frame from which to go on. */
+   nobody looks at, is then sent less, and later a whole frame from which to go on.
+
+   Where the connection is lost, the page keeps what it has and tries again. It goes on with the same
+   session by itself; another one it shows only if asked to, since that takes the place of what it has. */
+
+const PAGE = document.documentElement.outerHTML; // before anything has changed it
+const LIVE_SCRIPT = "/* The secret of the address"; // where the scripts of the live page begin, in token.js
+const FIRST_RETRY = 500, LAST_RETRY = 15_000; // milliseconds
+const CUT_OFF = 1008; // the server has closed the socket, since the page has sent something wrong
 
 class Live {
   constructor() {
-    this.news = new EventTarget(); // "state", "error", "drawn", "file", "cancelled", "over"
+    this.news = new EventTarget(); // "state", "error", "drawn", "file", "cancelled", "lost", "back"
     this.waiting = null; // what the next bytes are, if no frame
     this.arrived = 0; // frames since the server was told
     this.running = false;
@@ -14,15 +22,52 @@ class Live {
     this.speedUntil = 0;
     this.strokes = 0;
     this.viewer = null;
-    const { host, search } = location;
-    this.socket = new WebSocket(`ws://${host}/socket${search}`);
-    this.socket.binaryType = "arraybuffer";
-    this.socket.addEventListener("message", ({ data }) => (typeof data === "string" ? this.hear(JSON.parse(data)) : this.take(data)));
-    this.socket.addEventListener("close", ({ code, reason }) => this.tell("over", { code, reason }));
+    this.session = null; // which one the page shows
+    this.retry = FIRST_RETRY;
+    this.connect();
+  }
+
+  get open() {
+    return this.socket.readyState === WebSocket.OPEN;
+  }
+
+  connect() {
+    clearTimeout(this.timer);
+    const socket = new WebSocket(`ws://${location.host}/socket?token=${encodeURIComponent(TOKEN)}`);
+    const on = (kind, act) => socket.addEventListener(kind, (event) => this.socket === socket && act(event));
+    this.socket?.close();
+    this.socket = socket;
+    this.joins = true; // until it is told which session there is
+    this.ended = false;
+    socket.binaryType = "arraybuffer";
+    on("message", ({ data }) => (typeof data === "string" ? this.hear(JSON.parse(data)) : this.take(data)));
+    on("close", (event) => this.lose(event));
+  }
+
+  /* Why there is no connection: "lost" or "ended", and it is tried again; "no token", "cut off", or "another" session. */
+  lose({ code, reason }) {
+    const why = TOKEN === "" ? "no token" : code === CUT_OFF ? "cut off" : this.differs ? "another" : this.ended ? "ended" : "lost";
+    this.waiting = this.begins = null;
+    this.arrived = 0;
+    this.running = this.stands = false;
+    if (why === "lost" || why === "ended") {
+      this.timer = setTimeout(() => this.connect(), this.retry);
+      this.retry = Math.min(2 * this.retry, LAST_RETRY);
+    }
+    this.tell("lost", { why, reason });
+    this.viewer?.player.take();
+  }
+
+  /* Try at once, and show whatever session there is if `any`. */
+  reconnect(any) {
+    if (any) this.session = null;
+    this.differs = false;
+    this.retry = FIRST_RETRY;
+    this.connect();
   }
 
   ask(what, more = {}) {
-    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify({ do: what, ...more }));
+    if (this.open) this.socket.send(JSON.stringify({ do: what, ...more }));
   }
 
   /* Edits of one stroke are undone together. */
@@ -45,12 +90,11 @@ class Live {
   }
 
   hear(message) {
+    if (this.differs) return;
     if (["begin", "error", "cancelled"].includes(message.say)) this.stands = false;
-    if (message.say === "begin") {
-      this.begins = message.header;
-      this.choices = message.choices;
-      this.chosen = message.chosen;
-    } else if (message.say === "names") Object.assign(this.viewer.history.header.names, message.names);
+    if (message.say === "begin") this.meet(message);
+    else if (message.say === "over") this.ended = true; // the socket closes next
+    else if (message.say === "names") Object.assign(this.viewer.history.header.names, message.names);
     else if (message.say === "moment" || message.say === "file") this.waiting = message;
     else {
       if (message.say === "state") {
@@ -62,8 +106,42 @@ class Live {
     }
   }
 
+  /* A session is announced. A page that comes back goes on with the one that it has. */
+  meet({ session, header, choices, chosen }) {
+    const comesBack = this.joins && this.session !== null;
+    this.joins = false;
+    if (comesBack && session !== this.session) {
+      this.differs = true;
+      this.socket.close();
+      return;
+    }
+    this.retry = FIRST_RETRY;
+    if (comesBack) {
+      Object.assign(this.viewer.history.header.names, header.names);
+      this.tell("back");
+      return;
+    }
+    Object.assign(this, { session, choices, chosen, begins: header });
+  }
+
+  /* A page that plays what this one has, by itself; it holds the script of the viewer alone. */
+  async recording() {
+    const { history } = this.viewer, page = new DOMParser().parseFromString(PAGE, "text/html");
+    const reader = new FileReader(), script = page.querySelector("script:not([type])");
+    reader.readAsDataURL(await history.packed());
+    await new Promise((done) => reader.addEventListener("load", done));
+    for (const part of page.querySelectorAll(".controls, .palette, .notices, meta[http-equiv]")) part.remove();
+    page.querySelector("[name=color-scheme]").insertAdjacentHTML("afterend", '<meta http-equiv="Content-Security-Policy"'
+      + ` content="default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:">`);
+    page.title = history.header.title;
+    page.querySelector("#recording").textContent = reader.result.split(",")[1];
+    script.textContent = script.textContent.slice(0, script.textContent.indexOf(LIVE_SCRIPT));
+    return new Blob([`<!doctype html>\n${page.documentElement.outerHTML}`]).arrayBuffer();
+  }
+
   take(bytes) {
     const { waiting } = this;
+    if (this.differs) return;
     this.waiting = null;
     if (waiting?.say === "file") {
       this.tell("file", { ...waiting, bytes });
@@ -141,6 +219,7 @@ class LivePlayer extends Player {
     this.live.ask("speed", { value: speed });
   }
   play() {
+    if (!this.live.open) return;
     this.back = false;
     this.wish(true);
     this.live.ask("play");
@@ -163,8 +242,7 @@ class LivePlayer extends Player {
     this.go(moment);
   }
   step(n) {
-    if (n === 1 && !this.back) this.live.ask("step", { ticks: 1 });
-    else if (Number.isFinite(n) && n > 1 && !this.back) this.live.ask("step", { ticks: n });
+    if (Number.isFinite(n) && n > 0 && !this.back) this.live.ask("step", { ticks: n });
     else this.go(this.moment + n);
   }
   /* Between two ticks ants glide, so the picture is up to a tick behind. */

@@ -2,8 +2,8 @@
 
 const TOOLS = {
   look: ["Look", "follow an ant, choose a cell, move the view", '<path d="M4.5 3 15 9.2l-4.7 1.1L8 15z"/>'],
-  rock: ["Rock", "draw rock", '<path class="fill-rock" d="M16.5 10l-3.2 5.6H6.7L3.5 10l3.2-5.6h6.6z"/>'],
-  food: ["Food", "draw food", '<g class="fill-food"><circle cx="10" cy="6.4" r="2.9"/><circle cx="6.6" cy="12.6" r="2.9"/><circle cx="13.4" cy="12.6" r="2.9"/></g>'],
+  rock: ["Rock", "draw rock; ants in the way move aside", '<path class="fill-rock" d="M16.5 10l-3.2 5.6H6.7L3.5 10l3.2-5.6h6.6z"/>'],
+  food: ["Food", "draw food; ants in the way move aside", '<g class="fill-food"><circle cx="10" cy="6.4" r="2.9"/><circle cx="6.6" cy="12.6" r="2.9"/><circle cx="13.4" cy="12.6" r="2.9"/></g>'],
   trail: ["Trail", "draw a trail", '<path class="line-trail" d="M3.5 15.5c5 0 1.5-7 6.5-7s2 6 6.5-4"/>'],
   ants: ["Ants", "set ants", '<g class="fill-ant"><ellipse cx="10" cy="5.2" rx="1.9" ry="1.7"/><ellipse cx="10" cy="8.8" rx="1.4" ry="2"/><ellipse cx="10" cy="13.8" rx="2.6" ry="3.6"/></g><path d="m7 4-2.2-1.6M13 4l2.2-1.6M8.4 8.6 4.6 8M11.6 8.6l3.8-.6M7.6 12 4 14.5M12.4 12l3.6 2.5"/>'],
   erase: ["Erase", "take rock, food, trail and ants away", '<path d="m8 16.2-4-4 7.6-7.6a1.4 1.4 0 0 1 2 0l2.3 2.3a1.4 1.4 0 0 1 0 2L8.6 16.2H16M7.2 8.9l4.5 4.5"/>'],
@@ -79,6 +79,7 @@ class Tools {
 
   down(cell) {
     this.stroke.clear();
+    this.aside = 0; // ants that the stroke has moved
     this.number = this.live.nextStroke();
     this.last = -1;
     this.draw(cell);
@@ -93,11 +94,12 @@ class Tools {
     if (this.name === "queen" && this.last >= 0) this.edit({ kind: "queen", cell: this.last });
     this.send();
     this.last = -1;
+    if (this.aside) this.live.controls.say(`${this.aside} ${this.aside > 1 ? "ants move" : "ant moves"} aside.`);
   }
 
   /* The cells from where the stroke was to a cell. */
   draw(cell) {
-    if (cell < 0) return;
+    if (cell < 0 || !this.live.open) return;
     const { grid } = this.live.viewer.history, [x1, y1] = grid.centre(cell);
     const [x0, y0] = this.last < 0 ? [x1, y1] : grid.centre(this.last), n = Math.ceil(Math.hypot(x1 - x0, y1 - y0));
     for (let k = 0; k <= n; k++) {
@@ -121,8 +123,10 @@ class Tools {
     const { ground, trail } = history.worldAt(history.length - 1);
     const taken = new Set(history.frames[history.length - 1].cells);
     const free = cells.filter((cell) => ground[cell] !== QUEEN && !taken.has(cell));
-    if (this.name === "rock" || this.name === "food") this.edit({ kind: "ground", what: this.name }, free);
-    else if (this.name === "trail") {
+    if (this.name === "rock" || this.name === "food") {
+      this.aside += cells.filter((cell) => taken.has(cell)).length;
+      this.edit({ kind: "ground", what: this.name }, cells.filter((cell) => ground[cell] !== QUEEN));
+    } else if (this.name === "trail") {
       this.edit({ kind: "trail", level: history.header.trail.strongest }, cells.filter((cell) => ground[cell] !== OBSTACLE));
     } else if (this.name === "ants") this.edit({ kind: "add_ants", heading: null }, free.filter((cell) => ground[cell] === EMPTY));
     else {

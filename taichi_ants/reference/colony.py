@@ -180,10 +180,10 @@ class ReferenceColony:
     def end_episode(self) -> None:
         """End the episode: epsilon and the learning rate decay."""
         training = self._training
-        self.epsilon = max(training.min_epsilon, self.epsilon * training.epsilon_decay)
-        self.learning_rate = max(
-            training.min_learning_rate, self.learning_rate * training.learning_rate_decay
-        )
+        least = min(training.min_epsilon, training.epsilon)  # a bound never raises what it bounds
+        self.epsilon = max(least, self.epsilon * training.epsilon_decay)
+        least = min(training.min_learning_rate, training.learning_rate)
+        self.learning_rate = max(least, self.learning_rate * training.learning_rate_decay)
         self.minds.pace(self.learning_rate)
         self.records.append(self.record)
 

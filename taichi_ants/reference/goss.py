@@ -12,9 +12,16 @@ NEST, FOOD = 0, 1
 
 
 def bridge_choices(
-    short: int, long: int, seed: int, colony: int, ants: int, k: float = 20.0, n: int = 2
+    short: int,
+    long: int,
+    seed: int,
+    colony: int,
+    ants: int,
+    k: float = 20.0,
+    n: int = 2,
+    opens: int = 0,
 ) -> list[bool]:
-    """Whether each ant takes the short branch; ants choose in turn at the nest and at the food.
+    """Return for each ant if it takes the short branch; ants choose in turn at nest and food.
 
     Args:
         short: Steps to cross the short branch.
@@ -24,11 +31,12 @@ def bridge_choices(
         ants: How many choose, an even number.
         k: Marks that every branch seems to have more.
         n: The exponent.
+        opens: Number of ants that choose while only the long branch exists.
     """
     stream = RandomStream(stream_state(seed, STREAM_BRIDGE, colony))
     marks = {(end, takes_short): 0 for end in (NEST, FOOD) for takes_short in (True, False)}
     arrivals: dict[int, list[tuple[int, bool]]] = {}  # by step: where, and by which branch
-    taken = []
+    taken: list[bool] = []
     for step in range(ants // 2):
         for arrived in arrivals.pop(step, []):
             marks[arrived] += 1
@@ -39,6 +47,8 @@ def bridge_choices(
                 for _ in range(n):
                     attraction[branch] *= k + marks[end, branch]
             takes_short = words[end] / 2**32 * sum(attraction.values()) < attraction[True]
+            if len(taken) < opens:
+                takes_short = False
             marks[end, takes_short] += 1
             arrivals.setdefault(step + (short if takes_short else long), []).append(
                 (other, takes_short)

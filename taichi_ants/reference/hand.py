@@ -8,11 +8,19 @@ from typing import Any
 
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_ANT, STREAM_HAND, STREAM_START_CELL
 from taichi_ants.reference.colony import ReferenceColony
-from taichi_ants.reference.geometry import Cell, distance, existing_cells, listed_cells
+from taichi_ants.reference.geometry import (
+    Cell,
+    distance,
+    existing_cells,
+    listed_cells,
+    normal_form,
+)
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.reference.trail import Trail
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 from taichi_ants.worlds.world import World
+
+REACH = 8  # cells that an ant is moved aside at most
 
 
 class Hand:
@@ -45,8 +53,13 @@ class Hand:
             self.colony.look(ant)
 
     def put(self, cells: Sequence[Cell], what: int) -> None:
-        """Make cells EMPTY, OBSTACLE or FOOD, now and later, but none with an ant or the queen."""
+        """Make cells EMPTY, OBSTACLE or FOOD, now and later, but none with an ant or the queen.
+
+        Rock and food move the ants in their way aside first.
+        """
         world = self.colony.world
+        if what != EMPTY:
+            self._move_aside(cells)
         for cell in cells:
             if cell in world.ants or cell == world.queen:
                 continue
@@ -57,6 +70,18 @@ class Hand:
                 self.colony.homes.end(cell)
         self._new_trail()
         self._look()
+
+    def _move_aside(self, cells: Sequence[Cell]) -> None:
+        """Move the ants on cells to empty ones next to them, where there are any."""
+        world = self.colony.world
+        for x, y, z in sorted(existing_cells((REACH + 1,) * 3)[1:], key=max):
+            for cell in cells:
+                there = normal_form(cell[0] + x, cell[1] + y, cell[2] + z)
+                if cell not in world.ants or there in cells or there not in world.ground:
+                    continue
+                if world.content(there) == EMPTY:
+                    ant = world.ants[there] = world.ants.pop(cell)
+                    ant.cell = there
 
     def move_queen(self, cell: Cell) -> None:
         """Let the queen stand on an empty cell, now and later."""

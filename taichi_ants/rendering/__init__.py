@@ -3,12 +3,13 @@
 - A moment is a `Snapshot` of a world, as `Colony.snapshot` or `at_start` give it, with a `Status`,
   what is said of it. `Episode.moments` and `colony_moments` yield them.
 - `frames` draws moments as arrays, one at a time; `Scene` does so with one.
-- `learning_stages` and `learning_frames` show one ant after more and more episodes, side by side.
+- `learning_stages` and `learning_frames` show one ant after more and more episodes, side by side;
+  `typical_seed` returns the seed of the median ant.
 - `policy_sheet` shows what a policy does in each state.
 - `save_picture` and `save_animation` write arrays; a file appears when it is whole.
 """
 
-from taichi_ants.rendering.learning import Stage, learning_frames, learning_stages
+from taichi_ants.rendering.learning import Stage, learning_frames, learning_stages, typical_seed
 from taichi_ants.rendering.moments import Episode, colony_moments, frames
 from taichi_ants.rendering.panel import Status
 from taichi_ants.rendering.scene import Scene
@@ -39,4 +40,5 @@ __all__ = [
     "policy_sheet",
     "save_animation",
     "save_picture",
+    "typical_seed",
 ]

@@ -10,7 +10,7 @@ from itertools import islice
 import numpy as np
 
 from taichi_ants import checks
-from taichi_ants.engines.runs.training import train
+from taichi_ants.engines.runs.training import evaluate, train
 from taichi_ants.errors import AntsError, count, entries_of, expect, shown, whole
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.rendering import colours, text
@@ -22,10 +22,11 @@ from taichi_ants.task import Rewards, Task
 from taichi_ants.task.constants import DELIVERED, FAILED, N_ACTIONS, PICKED_UP
 from taichi_ants.worlds.world import World
 
-STAGES = (0, 10, 100, 500)
+STAGES = (0, 1, 2, 20)  # in the world of the paper, ants differ at these most
+SEEDS = 200
 DEFAULT_SIZE = (1280, 520)  # four worlds in a row fill it
-# In sizes of the text: the title of a tile, all its text, and the legend.
-_TITLE_LINES, _TILE_LINES, _LEGEND_LINES = 1.7, 5.6, 2.6
+# In sizes of the text: the title of a tile, one more line below it, all other text, the legend.
+_TITLE_LINES, _MORE_LINES, _TILE_LINES, _LEGEND_LINES = 1.7, 1.4, 5.6, 2.6
 # What earns or costs reward: its letter, that of a cell, its words, and which reward it is.
 _SOURCES = (
     ("T", "T", "onto a trail", "lure"),
@@ -43,12 +44,14 @@ class Stage:
     Attributes:
         episodes: How many.
         episode: What it does then.
-        note: What is said of it at its end.
+        note: The words beside its return at its end.
+        among: A line below its title: the outcome of other seeds.
     """
 
     episodes: int
     episode: Episode
     note: str = ""
+    among: str = ""
 
     @property
     def title(self) -> str:
@@ -98,18 +101,10 @@ def learning_stages(
         AntsError: An argument is not allowed; the message names it.
     """
     checks.check_progress(progress)
-    task = checks.checked_task(Task() if task is None else task)
-    listed = entries_of(stages)
-    if listed is None:
-        raise AntsError(f"stages is {shown(stages)}; it must be numbers of episodes.")
-    stages = [whole("a stage", stage) for stage in listed]
-    if not stages or stages != sorted(set(stages)) or stages[0] < 0:
-        raise AntsError(f"stages are {shown(tuple(stages))}; they must ascend, from 0 or more.")
+    task, stages = checks.checked_task(Task() if task is None else task), _checked_stages(stages)
     played = []
     for n in stages:
-        table = np.zeros((task.n_states, N_ACTIONS), dtype=np.float32)
-        if n:
-            table = train(world, config, seed, n, task=task).q_values[0, 0]
+        table = _tables(world, config, [seed], n, task)[0]
         episode = Episode.play(
             world, table, seed=seed, max_steps=max_steps, task=task, epsilon=epsilon
         )
@@ -117,6 +112,68 @@ def learning_stages(
         if progress is not None:
             progress(len(played) / len(stages))
     return played
+
+
+def typical_seed(
+    world: World,
+    config: TrainingConfig,
+    *,
+    seeds: int | Sequence[int] = range(SEEDS),
+    stages: Sequence[int] = STAGES,
+    max_steps: int = 150,
+    task: Task | None = None,
+    epsilon: float = 0.0,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[int, list[int]]:
+    """Return the seed of the run that is nearest to the median run, and how many seeds deliver.
+
+    Each run is ranked among all seeds by the return and by the steps of its rollout at each stage;
+    equal values share the middle rank. The typical run is the one whose largest distance from the
+    middle rank is smallest; of several, the first.
+
+    Args:
+        world, config, stages, max_steps, task, epsilon, progress: As in `learning_stages`.
+        seeds: The seeds to choose from.
+
+    Returns:
+        The seed, and for each stage the number of seeds that deliver within `max_steps`.
+
+    Raises:
+        AntsError: An argument is not allowed; the message names it.
+    """
+    checks.check_progress(progress)
+    task, stages = checks.checked_task(Task() if task is None else task), _checked_stages(stages)
+    chosen = checks.checked_seeds(seeds)
+    distances, deliver = np.zeros(len(chosen)), []
+    for done, n in enumerate(stages, start=1):
+        tables = _tables(world, config, chosen, n, task)
+        outcome = evaluate(world, tables, 1, chosen, max_steps, task, epsilon)
+        for values in (outcome.returns[:, 0], outcome.steps[:, 0]):
+            above = np.sign(values[:, None] - values).sum(axis=1)  # 0 at the middle rank
+            distances = np.maximum(distances, np.abs(above) / len(chosen))
+        deliver.append(int((outcome.deliveries[:, 0] > 0).sum()))
+        if progress is not None:
+            progress(done / len(stages))
+    return int(chosen[distances.argmin()]), deliver
+
+
+def _checked_stages(stages: Sequence[int]) -> list[int]:
+    listed = entries_of(stages)
+    if listed is None:
+        raise AntsError(f"stages is {shown(stages)}; it must be numbers of episodes.")
+    stages = [whole("a stage", stage) for stage in listed]
+    if not stages or stages != sorted(set(stages)) or stages[0] < 0:
+        raise AntsError(f"stages are {shown(tuple(stages))}; they must ascend, from 0 or more.")
+    return stages
+
+
+def _tables(
+    world: World, config: TrainingConfig, seeds: Sequence[int], episodes: int, task: Task
+) -> np.ndarray:
+    """Action values after so many episodes, float32 (seeds, n_states, 5)."""
+    if not episodes:
+        return np.zeros((len(seeds), task.n_states, N_ACTIONS), dtype=np.float32)
+    return train(world, config, seeds, episodes, task=task).q_values[0]
 
 
 def learning_frames(
@@ -150,14 +207,15 @@ def learning_frames(
     if letters:
         _draw_legend(canvas, bottom, letters, stages[0].episode.task.rewards)
     columns = math.ceil(len(stages) / max(1, math.isqrt(len(stages) * height // width)))
-    rows, lines = math.ceil(len(stages) / columns), round(_TILE_LINES * letters)
+    more = _MORE_LINES * any(stage.among for stage in stages)
+    rows, lines = math.ceil(len(stages) / columns), round((_TILE_LINES + more) * letters)
     w = width // columns
     # No higher than wide, so that a title stays near to what it speaks of.
     h = min((bottom - top) // rows, w + lines)
     top += (bottom - top - rows * h) // 2
     grid, margin = stages[0].episode.world.grid, max(2, round(min(w, h) / 60))
     rasteriser = Rasteriser(grid, w, max(1, h - lines), margin)
-    pictures = [_tile_pictures(stage, rasteriser, h, letters) for stage in stages]
+    pictures = [_tile_pictures(stage, rasteriser, h, letters, more) for stage in stages]
     for _ in range(max(len(stage.episode) for stage in stages)):
         for place, waiting in enumerate(pictures):
             x, y = place % columns * w, top + place // columns * h
@@ -167,18 +225,18 @@ def learning_frames(
 
 
 def _tile_pictures(
-    stage: Stage, rasteriser: Rasteriser, height: int, letters: int
+    stage: Stage, rasteriser: Rasteriser, height: int, letters: int, more: float
 ) -> Iterator[np.ndarray]:
     """One of the worlds, with a title above and how its ant does below."""
     account, width = stage.account(), rasteriser.width
-    above = round(_TITLE_LINES * letters)
+    above = round((_TITLE_LINES + more) * letters)
     tile = np.empty((height, width, 3), dtype=np.uint8)
     for step, (snapshot, _) in enumerate(stage.episode.moments()):
         tile[:] = colours.channels(colours.PAGE)
         tile[above : above + rasteriser.height] = rasteriser.draw(snapshot)
         result = f"step {step}, return {account[step].sum()}"
         if stage.note and step == len(stage.episode.trace):
-            result = f"return {account[step].sum()}: {stage.note}"
+            result += f": {stage.note}"
         parts = [
             f"{'+' if earned > 0 else '-'} {letter} {abs(earned)}"
             for (letter, *_), earned in zip(_SOURCES, account[step].tolist(), strict=True)
@@ -186,8 +244,13 @@ def _tile_pictures(
         ]
         sources = f"= {' '.join(parts).removeprefix('+ ')}" if parts else ""
         below = above + rasteriser.height + 1.2 * letters
-        baselines = 1.2 * letters, below, below + 1.4 * letters
-        for line, baseline in zip((stage.title, result, sources), baselines, strict=True):
+        lines = (
+            (stage.title, 1.2 * letters),
+            (stage.among, (1.2 + _MORE_LINES) * letters),
+            (result, below),
+            (sources, below + 1.4 * letters),
+        )
+        for line, baseline in lines:
             room = width - letters / 2
             text.write(tile, line, width / 2, baseline, letters, align="middle", room=room)
         yield tile

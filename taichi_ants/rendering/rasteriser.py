@@ -15,8 +15,11 @@ from taichi_ants.rendering.marks import DOT, DOTS_BELOW, Mark, ants, marks, thin
 from taichi_ants.rendering.snapshot import Snapshot
 from taichi_ants.task.constants import DEPOSIT_LEVEL, EMPTY, FOOD, OBSTACLE, QUEEN
 
-# From this size on, food and queen are drawings on a light floor, below the whole cell is coloured.
+# From this size on, food and queen are drawings on a light floor. In smaller cells food is a dot
+# with a ring of that light colour, and the queen colours the whole cell.
 _SMALLEST_DRAWING = 6.0
+# The radius of the dot in sizes of a hexagon and at least in pixels; the ring's width in pixels.
+_CRUMB, _SMALLEST_CRUMB, _CRUMB_RING = 0.6, 1.4, 1.8
 # Below, the outlines of three cells would bury the ant: one stands around it and what it sees.
 _SMALLEST_OUTLINE = 7.0
 _MARK = 2.7  # its radius in sizes of the hexagon, and in pixels at least
@@ -96,10 +99,14 @@ class Rasteriser:
         hexagon, tables = self.hexagon, []
         frame = self.draw_cells(self.cell_colours(snapshot))
         queens = self._places(np.flatnonzero(snapshot.ground == QUEEN))
+        foods = self._places(np.flatnonzero(snapshot.ground == FOOD))
         if hexagon < _SMALLEST_DRAWING:
+            # Some trails are as light as food, none is as light as both the dot and its ring.
+            radius = max(_CRUMB * hexagon, _SMALLEST_CRUMB)
+            tables.append(marks(foods, radius + _CRUMB_RING, Mark.DOT, colours.FLOOR_FOOD))
+            tables.append(marks(foods, radius, Mark.DOT, colours.CELL_FOOD))
             tables.append(marks(queens, max(hexagon, _QUEEN), Mark.DOT, colours.CELL_QUEEN))
         else:
-            foods = self._places(np.flatnonzero(snapshot.ground == FOOD))
             tables += [thing(foods, hexagon, Mark.FOOD), thing(queens, hexagon, Mark.QUEEN)]
         if in_view is not None:
             places, radius = self._places(in_view), 0.98 * hexagon
@@ -146,7 +153,7 @@ class Rasteriser:
         small = self.hexagon < _SMALLEST_DRAWING
         of_ground = np.full(16, colours.CELL_EMPTY, dtype=np.uint32)
         of_ground[OBSTACLE] = colours.CELL_OBSTACLE
-        of_ground[FOOD] = colours.CELL_FOOD if small else colours.FLOOR_FOOD
+        of_ground[FOOD] = colours.FLOOR_FOOD
         of_ground[QUEEN] = colours.CELL_QUEEN if small else colours.FLOOR_QUEEN
         of_cells = of_ground[snapshot.ground & 15]
         marked = np.flatnonzero((snapshot.ground == EMPTY) & (snapshot.trail >= 1))

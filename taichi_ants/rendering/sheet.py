@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from taichi_ants.checks import checked_q_values, checked_task
+from taichi_ants.checks import checked_table, checked_task
 from taichi_ants.errors import expect
 from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
 from taichi_ants.grid.hexgrid import centre_of
@@ -83,7 +83,8 @@ def policy_sheet(
     """The sheet of a policy, uint8 (height, 1280, 3).
 
     Args:
-        q_values: float (n_states, 5), finite action values.
+        q_values: float (n_states, 5), finite action values; or the `TrainingResult` of a single
+            run, or a `Policy`.
         title: Stands above it, in ASCII.
         task: Whose states they are; None is the paper's.
 
@@ -91,7 +92,7 @@ def policy_sheet(
         AntsError: The table is no policy of the task, or the title no text.
     """
     task = checked_task(Task() if task is None else task)
-    table = checked_q_values(q_values, task)
+    table = checked_table(q_values, task)
     expect("title", title, str)
     observation, spread = task.sees, usual_spread(table, task.sees)
     picture = _Picture(observation)

@@ -312,6 +312,6 @@ def _import_av() -> ModuleType:
     except ImportError as error:
         raise AntsError(
             f"MP4 needs PyAV, which cannot be imported ({error}); install it with "
-            "pip install -e '.[video]' in the project's folder, or choose .gif."
+            "pip install 'taichi_ants[video]', or choose .gif."
         ) from error
     return av

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from taichi_ants.analysis.colony.contrasts import Judged
-from taichi_ants.analysis.colony.study import ARENAS, MEASURES, WORLDS
+from taichi_ants.analysis.colony.study import ARENAS, EVALUATION_EPSILON, MEASURES, WORLDS
 from taichi_ants.analysis.colony.tables import glance, means, of_largest
 from taichi_ants.analysis.drawings import Drawing
+from taichi_ants.analysis.findings import seeds_in_words
 from taichi_ants.analysis.tables import sentence
 from taichi_ants.errors import count
 from taichi_ants.report.page import Player, Statement, Statements, fill, judged
@@ -48,12 +49,13 @@ def colony_page(
     """
     arenas = list(dict.fromkeys(row["arena"] for row in rows))
     trained = [arena for arena in ARENAS if arena in arenas]
-    seeds = count(rows[0]["seeds"], "seed")
+    seeds = seeds_in_words(int(rows[0]["seeds"]))
     return fill(
         "colony.html",
         title="When does a colony do more than its ants?",
         byline=f"{seeds}, {count(len(rows), 'condition')}, {count(len(arenas), 'kind')} of world",
         seeds=seeds,
+        epsilon=f"{EVALUATION_EPSILON:g}",
         worlds=[ARENAS[arena] for arena in trained],
         answer=answer,
         findings=_statements(findings),
@@ -72,8 +74,8 @@ def _statements(findings: Judged) -> Statements:
     for (arena, series), by_sizes in findings.items():
         unit = MEASURES[series.measure]
         told = [
-            judged(count(n, "ant") if n == less else f"{n} against {less}", finding, "Difference")
-            for (n, less), finding in by_sizes.items()
+            judged(count(n, "ant") if n == less else f"{n} against {less}", one, "Difference", unit)
+            for (n, less), one in by_sizes.items()
         ]
         facts = {"Question": series.question, "Difference in": unit}
         verdicts = [of_largest(by_sizes).verdict]

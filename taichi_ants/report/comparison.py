@@ -82,6 +82,7 @@ def comparison_page(
         greedy_return=f"{GREEDY_RETURN:g}",
         greedy_steps=[f"{one:g}" for one in GREEDY_STEPS],
         deliveries=[DELIVERY[one] for one in comparison.delivery_settings],
+        world=comparison.world,
         in_paper_world=comparison.in_paper_world,
         answer=results.answer,
         claims=_claims(results),

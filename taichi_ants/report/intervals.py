@@ -1,27 +1,38 @@
-"""A finding drawn: its interval, and the range that it was to lie in."""
+"""Drawings of findings: the interval, and the regions that decide the verdict."""
 
 from __future__ import annotations
 
 import math
+from html import escape
+from textwrap import wrap
 
 from taichi_ants.analysis.findings import Finding, Verdict
 from taichi_ants.analysis.tables import figure
+from taichi_ants.errors import count
 
-WIDTH, _MIDDLE, _HEIGHT = 340.0, 15.0, 44.0
+WIDTH, _MIDDLE, _NUMBERS, _LINE = 340.0, 15.0, 39.0, 15.0
 _SIDE = 26.0  # room for the numbers at the ends
+_LETTERS = 58  # of a line that is as wide as the drawing
 
 
-def interval_drawing(finding: Finding) -> str:
-    """An SVG element; nothing where there are no numbers.
+def interval_drawing(finding: Finding, label: str, unit: str = "") -> str:
+    """Return an SVG element, or nothing if there are no numbers.
 
-    The band is what the criterion asks for, the line the interval, the dot the effect. Of a
-    difference, the hatched band is what is too small to matter.
+    The line is the interval, the dot the effect. One band is the range in which the criterion
+    wants the effect, another one the differences that are too small to matter: they are the regions
+    by which `Criterion.judge` decides. The text below names the axis.
+
+    Args:
+        finding: The finding.
+        label: The name of its effect.
+        unit: The unit of its effect.
     """
     if finding.verdict is Verdict.NOT_TESTED or not math.isfinite(finding.low + finding.high):
         return ""
-    criterion = finding.contrast.criterion
-    margin = criterion.margin
-    wanted = criterion.low if margin is None else 0.0, criterion.high
+    criterion, contrast = finding.contrast.criterion, finding.contrast
+    margin, wanted = criterion.margin, (criterion.low, criterion.high)
+    centre = "IQM" if contrast.typical else "mean"
+    axis = f"{label}{f' ({unit})' if unit else ''}, {centre} of {count(contrast.seeds, 'seed')}"
     edges = [*wanted, *(() if margin is None else (-margin, margin))]
     shown = [finding.low, finding.high, *filter(math.isfinite, edges)]
     room = 0.06 * (max(shown) - min(shown)) or 1.0
@@ -35,9 +46,8 @@ def interval_drawing(finding: Finding) -> str:
         size = f'x="{at(low)}" width="{at(high) - at(low):.1f}" y="{_MIDDLE - 9}" height="18"'
         return f'<rect class="{kind}" {size}/>'
 
-    def label(value: float, y: float, kind: str = "") -> str:
-        signed = figure(value).replace("-", "\N{MINUS SIGN}")
-        return f'<text x="{at(value)}" y="{y}" class="{kind}">{signed}</text>'
+    def text(words: str, x: float, y: float) -> str:
+        return f'<text x="{x:g}" y="{y:g}">{escape(words)}</text>'
 
     low, high = at(finding.low), at(finding.high)
     ends = sorted({one for one in edges if math.isfinite(one)})
@@ -47,10 +57,19 @@ def interval_drawing(finding: Finding) -> str:
         *(f'<path class="edge" d="M{at(one)} {_MIDDLE - 9}v18"/>' for one in ends),
         f'<path class="span" d="M{low} {_MIDDLE}H{high}"/>',
         f'<circle cx="{at(finding.effect)}" cy="{_MIDDLE}" r="4.5"/>',
-        *(label(one, 39) for one in _apart(ends, at)),
+        *(text(_signed(one), at(one), _NUMBERS) for one in _apart(ends, at)),
     ]
-    size = f'viewBox="0 0 {WIDTH:g} {_HEIGHT:g}" width="{WIDTH:g}" height="{_HEIGHT:g}"'
+    height = _NUMBERS
+    for line in wrap(axis, _LETTERS):
+        height += _LINE
+        parts.append(text(line, WIDTH / 2, height))
+    height += 5.0
+    size = f'viewBox="0 0 {WIDTH:g} {height:g}" width="{WIDTH:g}" height="{height:g}"'
     return f'<svg class="interval" {size} aria-hidden="true">{"".join(parts)}</svg>'
+
+
+def _signed(value: float) -> str:
+    return figure(value).replace("-", "\N{MINUS SIGN}")
 
 
 def _apart(values: list[float], at) -> list[float]:  # type: ignore[no-untyped-def]

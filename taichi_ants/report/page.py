@@ -17,7 +17,7 @@ import numpy as np
 from taichi_ants.analysis.findings import Finding, Verdict
 from taichi_ants.analysis.tables import number
 from taichi_ants.report.intervals import interval_drawing
-from taichi_ants.viewer.page import part
+from taichi_ants.viewer.page import content_policy, part
 from taichi_ants.viewer.recording import Recording
 
 if TYPE_CHECKING:
@@ -60,6 +60,7 @@ def fill(template: str, **parts: Any) -> str:
         "style": part("colours.css") + _text("report.css"),
         "script": "\n".join([*map(part, _PLAYING), _text("report.js")]),
     }
+    shared["policy"] = content_policy(f"\n{shared['script']}\n", f"\n{shared['style']}\n")
     marked = {name: Markup(text) for name, text in shared.items()}
     return _templates().get_template(template).render(**marked, **parts)
 
@@ -120,18 +121,30 @@ class Judged(NamedTuple):
 
 
 def judged(setting: str, finding: Finding, label: str, unit: str = "") -> Judged:
-    """A finding as a page shows it: a label of its effect, the effect, and in what unit it is."""
-    words = label
-    if finding.verdict is not Verdict.NOT_TESTED:
-        digits = 1 if finding.contrast.typical or abs(finding.effect) >= 10 else 2
-        effect, low, high = (number(x, digits) for x in (finding.effect, finding.low, finding.high))
-        words += f": {effect} {unit}".rstrip()
-        known = math.isfinite(finding.low) and math.isfinite(finding.high)
-        words += f", between {low} and {high}" if known else ", without an interval"
-    by_mean = finding.by_mean
-    if by_mean and by_mean.verdict is not finding.verdict:
-        words += f"; by the mean {by_mean.verdict.value}, {number(by_mean.effect)}"
-    return Judged(setting, finding.verdict, words, interval_drawing(finding))
+    """Return a finding as a page shows it.
+
+    Args:
+        setting: The setting that it is of.
+        finding: The finding.
+        label: The name of its effect.
+        unit: The unit of its effect.
+    """
+    words, by_mean = _measured(finding, label, unit), finding.by_mean
+    if by_mean and by_mean.verdict is not finding.verdict:  # it may rest on another contrast
+        told = _measured(by_mean, by_mean.contrast.label, unit)
+        words += f"; by the mean {by_mean.verdict.value}: {told}"
+    return Judged(setting, finding.verdict, words, interval_drawing(finding, label, unit))
+
+
+def _measured(finding: Finding, label: str, unit: str) -> str:
+    """The effect and its interval in words, after its label."""
+    if finding.verdict is Verdict.NOT_TESTED:
+        return label
+    digits = 1 if finding.contrast.typical or abs(finding.effect) >= 10 else 2
+    effect, low, high = (number(x, digits) for x in (finding.effect, finding.low, finding.high))
+    known = math.isfinite(finding.low) and math.isfinite(finding.high)
+    ends = f"between {low} and {high}" if known else "without an interval"
+    return f"{label}: {f'{effect} {unit}'.rstrip()}, {ends}"
 
 
 @dataclass(frozen=True)
@@ -185,7 +198,7 @@ class Statements(NamedTuple):
 # In the order in which a reader wants them.
 KINDS = (
     *(Verdict.SUPPORTED, Verdict.EQUIVALENT, Verdict.UNDECIDED),
-    *(Verdict.CONTRADICTED, Verdict.NOT_TESTED),
+    *(Verdict.CONTRADICTED, Verdict.NOT_TESTED, Verdict.TOO_FEW),
 )
 
 

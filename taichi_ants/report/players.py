@@ -88,9 +88,12 @@ def what_is_seen(
             first.setdefault(int(comparison.behaviours[row, run]), (row, run))
     done, recorded, sheets = counts(comparison.behaviours), [], []
     for code, (row, run) in sorted(first.items()):
-        point, seed, variant = study.points[row], study.seeds[run], comparison.rows[row].variant
+        point, seed, (_, variant, grid) = study.points[row], study.seeds[run], comparison.rows[row]
         policy = load_policy(policies / f"{example_name(comparison, row, run)}.npz")
-        whose = f"{variant.label}, {point.task.delivery} delivery, seed {seed}"
+        whose = (
+            f"{variant.label}, {point.task.delivery} delivery, seed {seed}, {grid.label} (learning "
+            "rate / discount / epsilon / decay)"
+        )
         share = f"{thousands(done[code])} of {thousands(comparison.behaviours.size)}"
         words = f"{sentence(DEFINITIONS[code])}: {share} final policies. Here: {whose}."
         episode = played(point, policy.q_values, seed)
@@ -127,7 +130,7 @@ def at_work(policies: Path, conditions: Plan, seeds: Sequence[int], arch: str) -
         point = conditions[condition]
         colony = Colony(
             *(point.world[0] if isinstance(point.world, tuple) else point.world, point.task),
-            replace(point.training, epsilon=point.training.min_epsilon),
+            replace(point.training, epsilon=point.training.least_epsilon),
             *(seeds[0], ants),
             sharing="fixed",
             q_values=load_policy(policies / f"{arena}_{rules}_{ants}.npz").q_values,

@@ -1,4 +1,4 @@
-"""Colonies on the double bridge: how they learn, and how crossings are counted."""
+"""Colonies on the double bridge: how they train, and how crossings are counted."""
 
 from __future__ import annotations
 
@@ -13,18 +13,23 @@ import numpy as np
 from taichi_ants.analysis.bridge import (
     EQUAL,
     EQUAL_ASIDE,
+    LATE,
+    LATE_DESIGNS,
     LOADS,
     SHORT_LEFT,
     SHORT_RIGHT,
     WINDOWS,
     Design,
+    length,
 )
+from taichi_ants.engines.colony.hand import Hand
 from taichi_ants.engines.colony.layout import AntRow
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.blocks import Form, kept
 from taichi_ants.studies.colony_study import scheduled
 from taichi_ants.studies.runner import EVALUATION_SEEDS, ColonyPoint, settings_of
 from taichi_ants.task import Life, Task, foraging, queueing
+from taichi_ants.task.constants import EMPTY, OBSTACLE
 from taichi_ants.worlds import double_bridge
 from taichi_ants.worlds.double_bridge import ROOM_RADIUS, branch_cells, junction_cells
 from taichi_ants.worlds.geometry import distances
@@ -49,7 +54,10 @@ def task(design: Design) -> Task:
 
 
 def bridges(design: Design) -> dict[str, dict[str, Any]]:
-    """The bridges on which its colonies are followed: the arguments of `double_bridge`."""
+    """Return the bridges on which its colonies are followed: the arguments of `double_bridge`.
+
+    On the bridge `LATE` the short branch is rock for the first half of the time.
+    """
     unequal: dict[str, Any] = {"short": 23, "long": 36, "aside": design.aside}
     equal = {"short": 23, "long": 23}
     found = {
@@ -57,8 +65,13 @@ def bridges(design: Design) -> dict[str, dict[str, Any]]:
         SHORT_LEFT: {**unequal, "mirrored": True},
         EQUAL: equal,
         EQUAL_ASIDE: {**equal, "aside": design.aside},
+        LATE: unequal,
     }
-    return {name: one for name, one in found.items() if name != EQUAL_ASIDE or design.aside}
+    if not design.aside:
+        del found[EQUAL_ASIDE]
+    if design not in LATE_DESIGNS:
+        del found[LATE]
+    return found
 
 
 def point(design: Design, episodes: int, ticks: int) -> ColonyPoint:
@@ -95,7 +108,7 @@ def followed(
         design, learned: The design, and the point that gave the tables.
         seeds: Of the training.
         q_values: The tables of these seeds, float32 (seeds, n_states, 5).
-        ticks: Length of the episode on each bridge.
+        ticks: Length of the episode on each bridge, and its half on `LATE`.
         where: Threads and arch, as of a `Colony`.
     """
     form = Form(np.integer, (WINDOWS, len(LOADS), 2, len(seeds)), 0)
@@ -114,26 +127,34 @@ def _followed(
 ) -> dict[str, np.ndarray]:
     from taichi_ants.engines.colony.colony import Colony
 
-    least = learned.training.min_epsilon
+    least = learned.training.least_epsilon
     calm = replace(learned.training, epsilon=least, epsilon_decay=1.0)
-    found = {}
-    for name, bridge in bridges(design).items():
+
+    def count(bridge: dict[str, Any], some: slice, n: int, opens: int = 0) -> np.ndarray:
         colony = Colony(
             *(double_bridge(**bridge), learned.task, calm),
-            [seed + EVALUATION_SEEDS for seed in seeds],
+            [seed + EVALUATION_SEEDS for seed in seeds[some]],
             ants=design.ants,
             sharing="fixed",
-            q_values=q_values,
+            q_values=q_values[some],
             threads=where[0],
             arch=where[1],
             schedule="by_world",
         )
-        found[name] = crossings(colony, bridge, ticks)
+        return crossings(colony, bridge, n, opens)
+
+    found, each = {}, [slice(s, s + 1) for s in range(len(seeds))]
+    for name, bridge in bridges(design).items():
+        n = length(name, ticks)
+        if name == LATE:  # interventions act on colonies of one world
+            found[name] = np.concatenate([count(bridge, one, n, ticks) for one in each], axis=-1)
+        else:
+            found[name] = count(bridge, slice(None), n)
     return found
 
 
-def crossings(colony: Colony, bridge: dict[str, Any], ticks: int) -> np.ndarray:
-    """Let an episode pass, and count who has crossed the bridge by which branch.
+def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0) -> np.ndarray:
+    """Run an episode, and count who has crossed the bridge by which branch.
 
     An ant has crossed when it comes to one room and was in the other one before; its branch is the
     one in which it was last. Foragers are ants without food that come to the food, carriers ants
@@ -144,6 +165,8 @@ def crossings(colony: Colony, bridge: dict[str, Any], ticks: int) -> np.ndarray:
             their slots.
         bridge: The arguments of `double_bridge`.
         ticks: Length of the episode.
+        opens: Tick after which the short branch can be entered; until then it is rock. Other than
+            0, the colony must have one world.
 
     Returns:
         int64 (WINDOWS, loads, branches, worlds): foragers then carriers, short branch then long.
@@ -154,9 +177,15 @@ def crossings(colony: Colony, bridge: dict[str, Any], ticks: int) -> np.ndarray:
     room = np.full(len(world), _QUEEN_ROOM)
     branch = np.full(len(world), _SHORT)
     colony.begin_episode(ticks)
+    if opens:
+        short, hand = colony.grid.index(branch_cells(**bridge)[0]), Hand(colony)
+        hand.put(short, OBSTACLE)
     while colony.ticks < ticks:
+        if opens and colony.ticks == opens:
+            hand.put(short, EMPTY)
         window = colony.ticks * WINDOWS // ticks
-        colony.tick(min(_LOOK_EVERY, ticks - colony.ticks))
+        until = opens if colony.ticks < opens else ticks
+        colony.tick(min(_LOOK_EVERY, until - colony.ticks))
         now = zone[colony.of_ants(AntRow.CELL)]
         carries = colony.of_ants(AntRow.CARRIES) == 1
         inside = now <= _FOOD_ROOM

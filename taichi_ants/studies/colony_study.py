@@ -22,6 +22,7 @@ from taichi_ants.analysis.colony.study import (
     ALONE,
     ARENAS,
     BC,
+    EVALUATION_EPSILON,
     FEW,
     JOINT,
     PAPER,
@@ -36,7 +37,7 @@ from taichi_ants.analysis.colony.study import (
 )
 from taichi_ants.errors import AntsError, check_one_of
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.studies.runner import ColonyPoint, Outcome
+from taichi_ants.studies.runner import ColonyPoint, Outcome, Study
 from taichi_ants.task import Life, Pheromone, Task, foraging, paper, queueing
 from taichi_ants.worlds.world import World
 
@@ -81,8 +82,9 @@ def plan(
         arenas: Names in `WORLDS`.
         sizes: Numbers of ants, ascending; ants that were trained elsewhere are as many as the last.
         seeds: A seed gives its world to all conditions of an arena.
-        training: The learner. Its epsilon is that of the first episode, its `min_epsilon` that of
-            the last 30 % and of the evaluation; its learning rate falls to a tenth meanwhile.
+        training: The learner. Its epsilon is that of the first episode; it decays to
+            `EVALUATION_EPSILON` while its learning rate decays to a tenth, and both stay there for
+            the last 30 % of the episodes.
         episodes, ticks, rollouts: As of a `ColonyPoint`.
 
     Raises:
@@ -96,9 +98,9 @@ def plan(
             f"learner {training.learner!r} has no TD error that can be summed over ants, and here "
             f"they learn together; choose one of {', '.join(able)}."
         )
-    training = scheduled(training, episodes)
+    training = scheduled(replace(training, min_epsilon=EVALUATION_EPSILON), episodes)
     places = {
-        arena: worlds.paper() if arena == "paper" else tuple(_place(arena, s) for s in seeds)
+        arena: worlds.paper() if arena == "paper" else tuple(place(arena, seed) for seed in seeds)
         for arena in dict.fromkeys([*arenas, OPEN])
     }
     pools = {arena: _pool(arena) for arena in places}
@@ -125,7 +127,7 @@ def plan(
             abroad = replace(
                 after,
                 world=places[arena],
-                task=replace(after.task, life=LIVES.get(arena, _LIVELY)),
+                task=task_in(arena, after.task),
                 pool=None,
                 ants=LARGE_SIZE if arena == "large" else sizes[-1],
                 episodes=0,
@@ -141,8 +143,15 @@ RANGES = {"small": (15, 15, 15), "wide": (60, 60, 60), "large": (100, 100, 100)}
 _PILES = {"piles": 3, "moving": 3, "one_pile": 1}  # and no other food
 
 
-def _place(arena: str, seed: int) -> World:
-    """The world of an arena, but the paper's, that a seed gives."""
+def task_in(arena: str, task: Task) -> Task:
+    """Return the task with the food of an arena."""
+    return replace(task, life=LIVES.get(arena, _LIVELY))
+
+
+def place(arena: str, seed: int) -> World:
+    """Return the world of an arena that a seed gives; the paper's is the only one of its kind."""
+    if arena == "paper":
+        return worlds.paper()
     ranges = RANGES.get(arena, (30, 30, 30))
     if arena in _PILES:
         return worlds.far_piles(seed, ranges, piles=_PILES[arena])
@@ -153,13 +162,13 @@ def _pool(arena: str) -> tuple[World, ...] | None:
     """Worlds for training, other ones than for evaluation; the paper's is the only one."""
     if arena not in ARENAS or arena == "paper":
         return None
-    return tuple(_place(arena, FIRST_OF_POOL + n) for n in range(POOL))
+    return tuple(place(arena, FIRST_OF_POOL + n) for n in range(POOL))
 
 
 def scheduled(training: TrainingConfig, episodes: int) -> TrainingConfig:
     """The same with an epsilon and a learning rate that fall geometrically while ants explore."""
     exploring = max(1, round(EXPLORING * episodes))
-    low = max(training.min_epsilon, 1e-6)
+    low = max(training.least_epsilon, 1e-6)
     return replace(
         training,
         epsilon_decay=min(1.0, (low / max(training.epsilon, low)) ** (1 / exploring)),
@@ -169,18 +178,39 @@ def scheduled(training: TrainingConfig, episodes: int) -> TrainingConfig:
     )
 
 
-def measured(conditions: Plan, outcomes: Mapping[Any, Outcome]) -> Measured:
-    """All measures of all conditions, from what their points gave."""
-    return {
-        condition: measures_of(outcomes[point], point.ants, point.ticks)
-        for condition, point in conditions.items()
-    }
+def greedy(point: ColonyPoint) -> ColonyPoint:
+    """Return the same ants, evaluated without exploration."""
+    calm = replace(point.training, min_epsilon=0.0)
+    if not point.episodes:
+        return replace(point, training=calm)
+    return replace(point, training=calm, pool=None, episodes=0, after=point)
 
 
-def most_deliveries(conditions: Plan) -> dict[Condition, float]:
-    """What no colony can deliver more per 1000 ticks: means over the worlds of a condition.
+def study_of(conditions: Plan, seeds: Sequence[int]) -> Study[ColonyPoint]:
+    """Return the work that a plan takes, over some seeds."""
+    return Study((*conditions.values(), *map(greedy, conditions.values())), tuple(seeds))
 
-    nan where food moves or takes time to grow back: there the limits do not hold.
+
+def measured(
+    conditions: Plan, outcomes: Mapping[Any, Outcome], seeds: Sequence[int]
+) -> dict[Condition, dict[str, np.ndarray]]:
+    """Return all measures of all conditions, from the outcomes of their points."""
+    bounds, found = bounds_of(conditions, len(seeds)), {}
+    for condition, point in conditions.items():
+        found[condition], without = (
+            measures_of(outcomes[one], one.ants, one.ticks) for one in (point, greedy(point))
+        )
+        bound, deliveries = bounds[condition], found[condition]["deliveries"]
+        possible = np.where(bound > 0, bound, np.nan)
+        besides = {"greedy": without["deliveries"], "bound": bound}
+        found[condition] |= {**besides, "of_bound": deliveries / possible}
+    return found
+
+
+def bounds_of(conditions: Plan, seeds: int) -> dict[Condition, np.ndarray]:
+    """Return the most deliveries per 1000 ticks in the world of each seed, float64 (seeds,).
+
+    They are nan where food moves or takes time to grow back: the limits do not hold there.
     """
     found = {}
     limits = {}
@@ -189,8 +219,9 @@ def most_deliveries(conditions: Plan) -> dict[Condition, float]:
         key = point.world, point.task.traffic, point.task.turns_at_queen
         if key not in limits:
             limits[key] = [limits_of(place, point.task) for place in places]
-        most = np.mean([one.deliveries(point.ants) for one in limits[key]])
-        found[condition] = float(most) if point.task.life == _LIVELY else np.nan
+        known = point.task.life == _LIVELY
+        most = [one.deliveries(point.ants) if known else np.nan for one in limits[key]]
+        found[condition] = np.broadcast_to(np.array(most), seeds)
     return found
 
 

@@ -76,16 +76,23 @@ def add_common(parser: argparse.ArgumentParser) -> None:
     add("--arch", choices=("cpu", "cuda"), default="cpu", help="where kernels run")
 
 
-def add_results(parser: argparse.ArgumentParser, name: str) -> None:
-    """The options of commands with a folder of results; `with_folder` chooses its place."""
-    add = parser.add_argument
-    add("--out", type=Path, metavar="FOLDER", help=f"for the results (default: results/{name})")
+def add_results(parser: argparse.ArgumentParser, name: str, quick: bool = True) -> None:
+    """Add the options of commands with a folder of results; `with_folder` chooses its place.
+
+    Args:
+        parser: The parser.
+        name: The name of the folder.
+        quick: Whether the command has --quick.
+    """
+    add, place = parser.add_argument, f"results/{name}"
+    default = f"{place}, with --quick {place}-quick" if quick else place
+    add("--out", type=Path, metavar="FOLDER", help=f"for the results (default: {default})")
     add("--force", action="store_true", help="replace what FOLDER holds")
     add("--no-figures", action="store_true", help="draw no figures and no animations")
 
 
 def with_folder(settings: argparse.Namespace, name: str) -> argparse.Namespace:
-    """The settings with a folder for the results; with --quick it is one of its own."""
+    """Return the settings with a folder for the results; --quick has its own."""
     settings.out = settings.out or Path("results", f"{name}-quick" if settings.quick else name)
     return settings
 

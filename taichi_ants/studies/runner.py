@@ -255,7 +255,7 @@ class ColonyPoint:
             )
             learning.run(point.episodes, point.ticks, _part(progress, 0.0, share), places)
             tables = learning.q_values
-        least = point.training.min_epsilon
+        least = point.training.least_epsilon
         calm = replace(point.training, epsilon=least, epsilon_decay=1.0)
         others = [seed + EVALUATION_SEEDS for seed in seeds]
         colony = Colony(

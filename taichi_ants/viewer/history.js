@@ -201,7 +201,7 @@ class History {
   read(bytes) {
     const view = ArrayBuffer.isView(bytes) ? bytes : new Uint8Array(bytes);
     const lengths = new Uint32Array(view.buffer, view.byteOffset, 1 + this.names.length);
-    const frame = { size: view.byteLength };
+    const frame = { size: view.byteLength, bytes: view };
     let at = view.byteOffset + this.headBytes;
     this.names.forEach((name, i) => {
       frame[name] = new this.kinds[i](view.buffer, at, lengths[i + 1]);
@@ -209,6 +209,43 @@ class History {
     });
     CLOCK.forEach((name, i) => (frame[name] = frame.clock[i]));
     return frame;
+  }
+
+  /* A frame that holds all of a moment, see `pack` in frames.py: it needs none before it. */
+  wholeFrame(moment) {
+    const frame = this.frames[moment], { ground, trail } = this.worldAt(moment);
+    const since = moment > this.first ? this.frames[moment - 1].ticks : -1;
+    const points = [...(moment > this.first ? [] : this.within), ...this.ends].filter(({ ticks }) => ticks > since && ticks <= frame.ticks);
+    const entries = [...this.values.keys()].filter((entry) => this.values.get(entry)[0][0] <= moment);
+    const sections = {
+      ...frame, acts: [], td_errors: [], ground_at: ground.keys(), ground, trail_at: trail.keys(), trail,
+      table_at: entries, table: entries.map((entry) => this.entry(moment, entry)),
+      course: points.flatMap((point) => POINT.map((name) => point[name])),
+    };
+    const arrays = this.names.map((name, i) => this.kinds[i].from(sections[name]));
+    const places = arrays.map(({ byteLength }) => 8 * Math.ceil(byteLength / 8));
+    const bytes = new Uint8Array(places.reduce((sum, length) => sum + length, this.headBytes));
+    new Uint32Array(bytes.buffer).set([bytes.length, ...arrays.map(({ length }) => length)]);
+    let at = this.headBytes;
+    arrays.forEach((array, i) => {
+      bytes.set(new Uint8Array(array.buffer), at);
+      at += places[i];
+    });
+    return bytes;
+  }
+
+  /* All that is still known, in the form that `recordingIn` reads: compressed, a Blob. */
+  async packed() {
+    const encoded = new TextEncoder().encode(JSON.stringify(this.header));
+    const head = new Uint8Array(8 * Math.ceil((4 + encoded.length) / 8)).fill(32); // spaces
+    new DataView(head.buffer).setUint32(0, head.length - 4, true);
+    head.set(encoded, 4);
+    const parts = [head];
+    for (let moment = this.first; moment < this.length; moment++) {
+      const { whole, bytes } = this.frames[moment];
+      parts.push(whole || moment === this.first ? this.wholeFrame(moment) : bytes);
+    }
+    return new Response(new Blob(parts).stream().pipeThrough(new CompressionStream("deflate"))).blob();
   }
 
   /* The world at a moment: {ground, trail}, levels of the trail. Good until the next call. */

@@ -16,6 +16,7 @@ const byId = (id) => document.getElementById(id);
 const safe = (text) => String(text).replace(/[&<>"]/g, (letter) => `&#${letter.charCodeAt(0)};`);
 const signed = (number, digits) => (number > 0 ? "+" : "") + plain(number, digits);
 const plain = (number, digits = 2) => (Number(number.toFixed(digits)) + 0).toFixed(digits).replace("-", "−");
+const grouped = (text) => String(text).replace(/\d{5,}/, (digits) => digits.replace(/\B(?=(\d{3})+$)/g, "\u202f"));
 const icon = (name) => `<svg viewBox="0 0 20 20" aria-hidden="true">${ICONS[name]}</svg>`;
 const button = (id, label, name, more = "") =>
   `<button type="button" class="icon" id="${id}" aria-label="${label}" title="${label}" ${more}>${icon(name)}</button>`;
@@ -68,8 +69,7 @@ class Panel {
       [`delivered${ofOne}`, frame.deliveries], [`return${ofOne}`, plain(frame.returns, 0)],
       ["epsilon", plain(frame.epsilon, frame.epsilon < 0.01 && frame.epsilon ? 4 : 2)],
     ];
-    byId("now").classList.toggle("many", facts.length > 6);
-    byId("now").innerHTML = facts.map(([name, value]) => `<div><dt>${name}</dt><dd>${value}</dd></div>`).join("");
+    byId("now").innerHTML = facts.map(([name, value]) => `<div><dt>${name}</dt><dd>${grouped(value)}</dd></div>`).join("");
   }
 
   showAnt(moment, followed, aims) {
@@ -99,17 +99,21 @@ class Panel {
   viewOf(ant) {
     const { header, world } = this.history;
     const { task, rest, letters } = this.history.stateName(ant.state);
+    let hides = false; // a trail that is there
     const shapes = header.view.map((turn, i) => {
       const angle = (turn * Math.PI) / 3, x = 1.732 * Math.sin(angle), y = -1.732 * Math.cos(angle);
-      const cell = ant.cell + this.history.grid.offsets[(ant.heading + turn + 6) % 6];
+      const cell = ant.cell + this.history.grid.offsets[(ant.heading + turn + 6) % 6], letter = letters[i] ?? "";
+      const hidden = letter === "E" || (ant.loaded && /^[A-SU-Z]/i.test(letter));
+      hides ||= hidden && world.trail[cell] >= 1;
       return `<g transform="translate(${x} ${y})">
-        <path d="${HEXAGON}" transform="scale(.93)" fill="${this.fillOf(cell, world)}"/>
-        <text font-size=".95" stroke="var(--halo)" stroke-width=".2" paint-order="stroke">${safe(letters[i] ?? "")}</text></g>`;
+        <path d="${HEXAGON}" transform="scale(.93)" fill="${letter === "O" ? "var(--rock)" : this.fillOf(cell, world, hidden)}"/>
+        <text font-size=".95" stroke="var(--halo)" stroke-width=".2" paint-order="stroke">${safe(letter)}</text></g>`;
     });
+    const blind = !hides ? "" : ant.loaded ? "an ant with food sees no trails" : "it sees the strongest trails only";
     const kinds = [...new Set(letters.map((letter) => letter[0]))], known = kinds.filter((kind) => LETTERS[kind]);
     const meanings = known.map((kind) => `${kind} ${LETTERS[kind]}`);
     const more = known.length < kinds.length || !kinds.length ? header.letters : "";
-    const meaning = [meanings.join(", "), more].filter(Boolean).join("; ");
+    const meaning = [meanings.join(", "), more, blind].filter(Boolean).join("; ");
     const around = header.view.some((turn) => Math.abs(turn) > 1);
     const box = around ? "-2.9 -2.9 5.8 5.8" : "-2.6 -2.65 5.2 3.65";
     return `<div class="sees"><svg viewBox="${box}" role="img" aria-label="It sees, from left to right: ${safe(rest)}">`
@@ -118,12 +122,13 @@ class Panel {
       + `<small>${safe(meaning)}</small></div></div>`;
   }
 
-  fillOf(cell, world) {
+  /* The colour of a cell, without the trail where an ant does not see that. */
+  fillOf(cell, world, hidden) {
     const held = world.ground[cell];
     if (held === FOOD) return "var(--food-floor)";
     if (held === QUEEN) return "var(--queen-floor)";
     if (held === OBSTACLE || !this.history.grid.exists(cell)) return "var(--rock)";
-    if (world.trail[cell] < 1) return "var(--empty)";
+    if (hidden || world.trail[cell] < 1) return "var(--empty)";
     return `rgb(${this.stage.ramp[this.stage.trailColour(world.trail[cell])].join(" ")})`;
   }
 
@@ -135,10 +140,8 @@ class Panel {
       const chosen = ant.act?.action === action ? "is-chosen" : "", value = values[action];
       const [from, to] = [Math.min(0, value), Math.max(0, value)].map(share);
       return `<span class="name ${chosen}">${chosen ? "▸ " : ""}${name}</span>
-        <span class="bar-of">
-          <span class="fill ${chosen}" style="left:${from}%;width:${Math.max(to - from, 0)}%"></span>
-          <span class="zero" style="left:${share(0)}%"></span>
-        </span>
+        <svg class="bar-of" aria-hidden="true"><rect class="fill ${chosen}" x="${from}%" width="${Math.max(to - from, 0)}%" height="100%" rx="3"/>
+          <line class="zero" x1="${share(0)}%" x2="${share(0)}%" y1="-3" y2="14"/></svg>
         <span class="value ${chosen}">${plain(value)}</span>`;
     });
     const when = ant.act?.ahead ? "action values when it chose, a tick ago" : "action values";
@@ -216,8 +219,9 @@ class Panel {
     byId("legend").innerHTML = [
       `${bodies[0]}ant`, `${bodies[1]}with food`, `${cell("var(--food-floor)", drawing("food", CRUMBS))}food`,
       `${cell("var(--queen-floor)", drawing("queen", CROWN))}queen`, `${cell("var(--rock)")}rock`,
-      `<span class="ramp" style="background:linear-gradient(to right,${samples.join()})"></span>trail`,
+      '<span class="ramp"></span>trail',
     ].map((item) => `<li>${item}</li>`).join("");
+    document.querySelector(".ramp").style.background = `linear-gradient(to right,${samples.join()})`;
   }
 }
 

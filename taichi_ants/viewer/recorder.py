@@ -16,7 +16,7 @@ from taichi_ants.errors import count, expect
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.randomness import GAMMA, choose, mix
 from taichi_ants.rendering.observed import name_parts
-from taichi_ants.task import Pheromone
+from taichi_ants.task import Observation, Pheromone
 from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS, OBSTACLE
 from taichi_ants.viewer.course import Course
 from taichi_ants.viewer.frames import pack, types_of
@@ -45,7 +45,7 @@ class Recorder:
         self.colony, self.world, self._title, self._follow = colony, world, title, follow
         start = colony.snapshot(world)
         self._pheromone = colony.pheromone  # by which pages expect trails to fall
-        self.grid, self.observation = start.grid, colony.task.sees
+        self.grid = start.grid
         self._size, self._n_states = self.grid.size, colony.task.n_states
         self.types = types_of(self._size, self._n_states, colony.pheromone.dense)
         self._state_row = AntRow.PERCEPT if is_percept(self.observation) else AntRow.STATE
@@ -66,6 +66,11 @@ class Recorder:
             self._fixed = self._tables()
         self._clock = (-1, 0)
         self.course = Course(colony, world)
+
+    @property
+    def observation(self) -> Observation:
+        """What the ants see."""
+        return self.colony.task.sees
 
     def header(self) -> dict[str, Any]:
         """What all frames are about.

@@ -7,7 +7,8 @@ const DOTS_BELOW = 2.1, DRAWN_FROM = 9; // pixels, of an ant; between them it is
 const ANT = 0.83; // its radius in one of a cell
 const SEEN = 5.5; // pixels, of an ant that one sees at a glance
 const CROWDED = 0.06; // of the world, by ants that are larger than their cells
-const DRAWINGS_FROM = 6; // smaller cells are wholly coloured by food and queen
+const DRAWINGS_FROM = 6; // in smaller cells food is a dot; they are wholly coloured by the queen
+const CRUMB = 1.4, CRUMB_RING = 1.8; // pixels: the least radius of such a dot, and the width of its ring
 const MOST_PIXELS = 3e6; // of the cells; sharper screens get coarser ones
 const INSIDE = 7; // how much of a pixel its cell covers, in sevenths; the rest is a line
 const COLOURS = [
@@ -182,7 +183,7 @@ class Stage {
   drawCells(moment) {
     const { grid, history, fills, exists, words, rampWords, cells, pixels } = this;
     const { ground, trail } = history.worldAt(moment), small = this.camera.scale < DRAWINGS_FROM;
-    const held = { [EMPTY]: words.empty, [OBSTACLE]: words.rock, [FOOD]: words[small ? "food" : "food-floor"],
+    const held = { [EMPTY]: words.empty, [OBSTACLE]: words.rock, [FOOD]: words["food-floor"],
       [QUEEN]: words[small ? "queen" : "queen-floor"] };
     this.foods = [];
     this.queens = [];
@@ -208,6 +209,25 @@ class Stage {
       }
     }
     this.context.putImageData(this.image, 0, 0);
+    if (small) this.drawCrumbs();
+  }
+
+  /* Food in small cells: dots with a ring. Some trails are as light as food, none is as light as both. */
+  drawCrumbs() {
+    const { context, camera, grid, ratio, colours } = this;
+    const radius = Math.max(0.6 * camera.scale, CRUMB);
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    for (const [colour, size] of [["food-floor", radius + CRUMB_RING], ["food", radius]]) {
+      const { canvas, half } = this.sprite(`crumb ${colour}`, size, (drawing) => {
+        drawing.fillStyle = colours[colour];
+        drawing.fill(circle(0, 0, 1));
+      });
+      for (const cell of this.foods) {
+        const [x, y] = this.toPage(grid.centre(cell));
+        if (this.sees([x, y])) context.drawImage(canvas, x - half, y - half, 2 * half, 2 * half);
+      }
+    }
+    context.setTransform(1, 0, 0, 1, 0, 0);
   }
 
   /* A drawing of a radius in pixels, made once; the same as a picture to copy. */

@@ -194,8 +194,8 @@ class Timeline {
     const end = history.frames[player.last];
     const episode = end.episode > (history.live ? 0 : history.frames[0].episode) ? `, episode ${frame.episode}` : "";
     this.time.setAttribute("aria-valuetext", `tick ${frame.tick}${episode}`);
-    const of = episode || history.live ? `<span>${episode}</span>` : ` <span>of ${end.tick}</span>`;
-    byId("place").innerHTML = `<span>tick</span> <b>${frame.tick}</b>${of}`;
+    const of = episode || history.live ? `<span>${episode}</span>` : ` <span>of ${grouped(end.tick)}</span>`;
+    byId("place").innerHTML = `<span>tick</span> <b>${grouped(frame.tick)}</b>${of}`;
     const main = byId("play");
     main.classList.toggle("playing", player.playing);
     main.setAttribute("aria-label", player.playing ? "Pause" : "Play");
@@ -205,7 +205,7 @@ class Timeline {
     this.curves.forEach((curve, number) => {
       const [, , key, digits] = CURVES[number], { ends } = history;
       const at = key === "returns" && ends.length ? ends.findLast(({ ticks }) => ticks <= frame.ticks) : frame;
-      curve.querySelector("b").textContent = at ? plain(at[key], digits) : "–";
+      curve.querySelector("b").textContent = at ? grouped(plain(at[key], digits)) : "–";
       const cursor = curve.querySelector(".cursor");
       cursor.setAttribute("x1", x);
       cursor.setAttribute("x2", x);

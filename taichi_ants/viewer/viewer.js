@@ -39,6 +39,20 @@ class Viewer {
     source.start((bytes, whole) => this.receive(bytes, whole));
   }
 
+  /* Whether the page is out of date. If so, it is drawn in the next frame of the screen: a page on
+     which nothing changes does nothing. */
+  get dirty() {
+    return this.asks;
+  }
+  set dirty(asks) {
+    this.asks = asks;
+    if (asks) this.wake();
+  }
+
+  wake() {
+    if (this.opened) this.due ??= requestAnimationFrame((now) => this.tick(now));
+  }
+
   receive(bytes, whole) {
     this.history.add(bytes, whole);
     this.dirty = true;
@@ -73,16 +87,18 @@ class Viewer {
     this.stage.resize();
     if (header.follow !== null) this.follow(header.follow);
     this.source.stand?.(this);
-    requestAnimationFrame((now) => this.tick(now));
+    this.opened = true;
+    this.wake();
   }
 
   tick(now) {
+    this.due = null;
     if (this.closing.signal.aborted) return;
     const passed = (now - (this.before ?? now)) / 1000;
-    this.before = now;
-    const moved = this.player.pass(passed);
+    const moved = this.player.pass(passed), goesOn = moved || this.player.playing;
+    this.before = goesOn ? now : null; // time stands still until the next change
     if (moved || this.dirty) this.draw(now, moved);
-    requestAnimationFrame((later) => this.tick(later));
+    if (goesOn) this.wake();
   }
 
   draw(now, moved) {
@@ -201,8 +217,12 @@ class Viewer {
   setTheme(theme) {
     this.theme = theme;
     const dark = theme ? theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
-    document.documentElement.dataset.theme = dark ? "dark" : "light";
     byId("theme").setAttribute("aria-label", `Theme: ${theme || "as the system's"}`);
+    this.wear(dark ? "dark" : "light");
+  }
+
+  wear(theme) {
+    document.documentElement.dataset.theme = theme;
     this.stage.readColours();
     this.panel.showLegend();
     this.dirty = true;
@@ -233,6 +253,13 @@ class Viewer {
     on(byId("zoom-in"), "click", change(() => stage.zoom(1.4)));
     on(byId("zoom-out"), "click", change(() => stage.zoom(1 / 1.4)));
     on(byId("fit"), "click", change(() => stage.fit()));
+    on(byId("skip"), "click", () => byId("play").focus());
+    // Paper is light, and shows what the page shows; a canvas does not follow the style sheet by itself.
+    on(window, "beforeprint", () => {
+      this.wear("light");
+      this.draw(performance.now(), false); // no frame of the screen comes before the print
+    });
+    on(window, "afterprint", () => this.setTheme(this.theme));
     on(byId("theme"), "click", () => this.switchTheme());
     on(byId("help-button"), "click", () => help.showModal());
     on(help, "click", (event) => event.target === help && help.close());

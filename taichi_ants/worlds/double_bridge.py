@@ -27,6 +27,7 @@ from taichi_ants.worlds.world import World
 ROOM_RADIUS = 5  # of the rooms around queen and food: room for 90 ants beside the queen
 PILE_RADIUS = 3  # of the food: 37 cells
 MIN_STEPS, MAX_STEPS = 4, 1000  # of the short branch
+SETTINGS = ("short", "long", "mirrored", "aside")
 _NEST_JUNCTION = ROOM_RADIUS + 1  # its x coordinate; the queen is at the origin
 _BULGE = 3  # steps of the short branch to the side, if the long one leaves the choice
 
@@ -49,13 +50,8 @@ def double_bridge(short: int = 23, long: int = 36, mirrored: bool = False, aside
     Raises:
         AntsError: A length is not whole or not allowed, or mirrored is not True or False.
     """
-    junctions = junction_cells(short, long, mirrored, aside)
-    queen, pile = (0, 0, 0), tuple((junctions[1] + junctions[0]).tolist())
-    corridors = np.concatenate([*branch_cells(short, long, mirrored, aside), junctions])
-    # A cell of rock around all that can be walked. A bridge and its mirror image have equal ranges.
-    widest = np.maximum(corridors.max(axis=0), np.array(pile) + ROOM_RADIUS) + 2
-    widest[1:] = widest[1:].max()
-    grid = AxialGrid(tuple(widest.tolist()))
+    grid = AxialGrid(bridge_ranges(short, long, mirrored, aside))
+    queen, pile, corridors = _walked(short, long, mirrored, aside)
     to_pile = geometry.distances(grid, pile)
     walled = np.minimum(geometry.distances(grid, queen), to_pile) > ROOM_RADIUS
     walled[grid.index(corridors)] = False
@@ -65,6 +61,26 @@ def double_bridge(short: int = 23, long: int = 36, mirrored: bool = False, aside
         foods=grid.cells(np.flatnonzero(grid.exists & (to_pile <= PILE_RADIUS))),
         obstacles=grid.cells(np.flatnonzero(grid.exists & walled)),
     )
+
+
+def bridge_ranges(
+    short: int = 23, long: int = 36, mirrored: bool = False, aside: int = 0
+) -> tuple[int, int, int]:
+    """Return the ranges of the world, before it is built; arguments and errors as the world's."""
+    _, pile, corridors = _walked(short, long, mirrored, aside)
+    # A cell of rock around all that can be walked. A bridge and its mirror image have equal ranges.
+    x, *others = (np.maximum(corridors.max(axis=0), np.array(pile) + ROOM_RADIUS) + 2).tolist()
+    return x, max(others), max(others)
+
+
+def _walked(
+    short: int, long: int, mirrored: bool, aside: int
+) -> tuple[tuple[int, int, int], tuple[int, int, int], np.ndarray]:
+    """The queen's cell, the middle of the pile, and the cells (n, 3) of branches and junctions."""
+    junctions = junction_cells(short, long, mirrored, aside)
+    corridors = np.concatenate([*branch_cells(short, long, mirrored, aside), junctions])
+    x, y, z = (junctions[1] + junctions[0]).tolist()
+    return (0, 0, 0), (x, y, z), corridors
 
 
 def junction_cells(

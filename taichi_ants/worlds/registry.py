@@ -17,20 +17,24 @@ _BUILDERS: dict[str, Builder] = {}
 
 
 def register(name: str, builder: Builder) -> None:
-    """Gives a world a name, under which `build` and the command lines find it.
+    """Give a world a name, by which `build` and the command lines find it.
 
     Args:
-        name: A new name.
+        name: A new name, or that of your own world, which it replaces.
         builder: Called with a seed (int), returns a `World`; the same seed must give the same.
             Further arguments, which need defaults, are settings of the world.
 
     Raises:
-        AntsError: The name is taken or no name, or the builder cannot be called.
+        AntsError: The name is that of a world of the package or not text, or the builder cannot be
+            called.
     """
     if not isinstance(name, str) or not name.strip():
         raise AntsError(f"the world name {shown(name)} is not allowed; it must be text.")
-    if name in _BUILDERS:
-        raise AntsError(f"a world named {shown(name)} is already registered; choose another name.")
+    if name in _BUILDERS and getattr(_BUILDERS[name], "__module__", "").startswith("taichi_ants."):
+        raise AntsError(
+            f"{name!r} is the name of a built-in world, which cannot be replaced; choose another "
+            "name."
+        )
     if not callable(builder):
         raise AntsError(
             f"the builder of {shown(name)} is {shown(builder)}; it must be a function of a seed."

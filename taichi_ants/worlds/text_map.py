@@ -85,6 +85,15 @@ def from_text(text: str, source: str = "the map") -> World:
     )
 
 
+def ranges_of(text: str, source: str = "the map") -> tuple[int, int, int]:
+    """Return the ranges of the world drawn in `text`, without the work and memory to build it.
+
+    Arguments and errors as of `from_text`.
+    """
+    _, drawn = _read(text, source)
+    return smallest_world(_axials(drawn, source))[0]
+
+
 @dataclass(slots=True)
 class _Drawn:
     """A character of the drawing: `line` counts all lines from 1, `row` those of the drawing."""

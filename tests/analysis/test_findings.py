@@ -26,14 +26,17 @@ EQUIVALENT, UNDECIDED = Verdict.EQUIVALENT, Verdict.UNDECIDED
     ("low", "high", "verdict"),
     [
         (1.5, 3.0, SUPPORTED),
-        (0.1, 1.1, SUPPORTED),
+        (0.1, 1.1, UNDECIDED),
         (0.1, 0.9, EQUIVALENT),
         (-0.9, 0.9, EQUIVALENT),
         (-0.9, -0.1, EQUIVALENT),
         (-0.5, 1.5, UNDECIDED),
         (-math.inf, math.inf, UNDECIDED),
         (0.0, 5.0, UNDECIDED),
-        (-1.1, -0.1, CONTRADICTED),
+        (1.0, 5.0, UNDECIDED),
+        (-1.1, -0.1, UNDECIDED),
+        (-3.0, 0.9, UNDECIDED),
+        (-3.0, -1.1, CONTRADICTED),
         (-3.0, -1.5, CONTRADICTED),
     ],
 )
@@ -45,8 +48,8 @@ def test_a_directed_claim(low: float, high: float, verdict: Verdict) -> None:
     ("low", "high", "verdict"),
     [
         (1.5, 9.0, SUPPORTED),
-        (0.1, 10.0, SUPPORTED),
-        (0.1, 10.1, UNDECIDED),
+        (1.1, 10.0, SUPPORTED),
+        (1.1, 10.1, UNDECIDED),
         (-0.1, 11.0, UNDECIDED),
         (10.1, 20.0, CONTRADICTED),
         (-9.0, -2.0, CONTRADICTED),
@@ -55,6 +58,22 @@ def test_a_directed_claim(low: float, high: float, verdict: Verdict) -> None:
 )
 def test_a_directed_claim_with_a_limit(low: float, high: float, verdict: Verdict) -> None:
     assert above(1.0, most=10.0).judge(low, high) is verdict
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "verdict"),
+    [
+        (10.5, 20.0, SUPPORTED),
+        (9.5, 20.0, UNDECIDED),
+        (3.0, 9.5, CONTRADICTED),
+        (1.5, 9.5, UNDECIDED),
+        (-1.5, 1.5, EQUIVALENT),
+        (-12.8, -4.7, CONTRADICTED),
+        (-12.8, -1.5, UNDECIDED),
+    ],
+)
+def test_a_directed_claim_of_a_large_difference(low: float, high: float, verdict: Verdict) -> None:
+    assert above(2.0, least=10.0).judge(low, high) is verdict
 
 
 @pytest.mark.parametrize(
@@ -75,8 +94,9 @@ def test_a_claim_of_a_range(low: float, high: float, verdict: Verdict) -> None:
 
 
 def test_criteria_say_what_they_are() -> None:
-    assert above(0.5).words == "above 0, margin 0.5"
-    assert above(0.5, most=3).words == "above 0 and at most 3, margin 0.5"
+    assert above().words == "above 0, margin 0"
+    assert above(0.5, most=3).words == "above 0.5 and at most 3, margin 0.5"
+    assert above(2, least=10).words == "above 10, margin 2"
     assert Criterion(2, 4).words == "from 2 to 4"
     assert Criterion(-np.inf, 4).words == "at most 4"
     assert Criterion(2, np.inf).words == "at least 2"

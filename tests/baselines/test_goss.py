@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from taichi_ants.baselines.goss import PUBLISHED, choices, class_shares, crossing_steps
+from taichi_ants.baselines.goss import (
+    LATE_RATIO,
+    PUBLISHED,
+    PUBLISHED_LATE,
+    choices,
+    class_shares,
+    crossing_steps,
+)
 from taichi_ants.errors import AntsError
 from taichi_ants.reference.goss import bridge_choices
 
@@ -19,6 +26,8 @@ from taichi_ants.reference.goss import bridge_choices
         (1, 1, {"k": 0.37, "n": 3}),
         (1, 7, {"k": 5, "n": 1}),
         (400, 600, {"k": 1e9, "n": 8}),
+        (9, 19, {"opens": 31, "k": 200}),
+        (3, 7, {"opens": 1000}),
     ],
 )
 def test_every_choice_equals_the_reference(short: int, long: int, settings: dict) -> None:
@@ -34,6 +43,13 @@ def test_colonies_divide_as_published(ratio: float) -> None:
     shares = class_shares(choices(*crossing_steps(ratio), 100_000))
     assert shares.sum() == pytest.approx(100)
     assert np.abs(shares - PUBLISHED[ratio]).max() < 3
+
+
+def test_colonies_stay_on_the_long_branch_if_the_short_one_opens_late() -> None:
+    took = choices(*crossing_steps(LATE_RATIO), 10_000, ants=2000, opens=1000)
+    assert not took[:, :1000].any()
+    assert 0 < took[:, 1000:].mean() < 0.01
+    assert np.abs(class_shares(took, 1501, 2000) - PUBLISHED_LATE).max() < 1
 
 
 def test_neither_threads_nor_other_colonies_change_a_choice(monkeypatch) -> None:
@@ -77,6 +93,7 @@ def test_steps_of_a_crossing() -> None:
         ({"k": float("nan")}, "k is nan"),
         ({"n": 2.5}, "n is 2.5; it must be a whole number"),
         ({"n": 9}, "n is 9; it must lie between 1 and 8"),
+        ({"opens": 1001}, "opens is 1001; it must lie between 0 and 1000"),
         ({"seed": None}, "seed is None"),
     ],
 )

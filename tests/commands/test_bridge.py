@@ -15,12 +15,13 @@ from taichi_ants.analysis import bridge as analysis
 def test_it_writes_counts_and_a_report_and_shows_them_again(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(analysis, "DESIGNS", (analysis.Design(ants=8),))
+    monkeypatch.setattr(analysis, "DESIGNS", (analysis.Design(),))
     arguments = ["--seeds", 2, "--seed", 5, "--episodes", 2, "--ticks", 20]
     arguments += ["--evaluation-ticks", 50, "--no-figures", "--out", tmp_path / "out"]
     status, said, _ = call("bridge", arguments, capsys)
     assert status == 0
-    assert said.count("queueing") == len(analysis.BRIDGES)
+    assert said.count("queueing") == len(analysis.BRIDGES) - 1 + len(analysis.LOADS)
+    assert "means over 2 seeds, too few for" in said
     with (tmp_path / "out" / "shares.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == len(analysis.BRIDGES) * 2 * len(analysis.LOADS) * analysis.WINDOWS

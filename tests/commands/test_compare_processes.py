@@ -202,6 +202,8 @@ def test_help_is_quick_and_needs_no_taichi(tmp_path):
         "--no-figures",
     ):
         assert f"  {flag}" in done.stdout
+    told = "".join(done.stdout.split())  # lines may break at hyphens
+    assert "(default:results/compare,with--quickresults/compare-quick)" in told
 
 
 def test_only_the_beginning_is_read(kernels, tmp_path):

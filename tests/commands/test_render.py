@@ -138,7 +138,7 @@ def test_what_is_trained_on_the_spot_sees_what_is_asked_for(shown, monkeypatch) 
     settings = render.parse_arguments([shown, *more, *chosen, *length])
     assert render.training_config(settings).planning_steps == 2
     if shown == "learning":
-        (stage,) = render.noted_stages(settings, paper())
+        _, (stage,) = render.noted_stages(settings, paper())
         table, task = stage.episode.q_values, stage.episode.task
     else:
         table, task, title = render.find_policy(settings, paper())
@@ -148,11 +148,11 @@ def test_what_is_trained_on_the_spot_sees_what_is_asked_for(shown, monkeypatch) 
 
 def test_learning_and_a_colony(tmp_path) -> None:
     done = run(
-        *("learning", "--stages", 0, 2, "--max-steps", 9, "--size", "300x200"),
+        *("learning", "--seed", 5, "--stages", 0, 2, "--max-steps", 9, "--size", "300x200"),
         *("--out", tmp_path / "a.gif"),
     )
     assert done.returncode == 0, done.stderr
-    assert done.stdout.endswith("a.gif: before learning, after 2 episodes\n")
+    assert done.stdout.endswith("a.gif: seed 5, before learning, after 2 episodes\n")
     with Image.open(tmp_path / "a.gif") as image:
         assert image.n_frames >= 5
     done = run(
@@ -318,22 +318,51 @@ def test_help_is_quick_and_needs_little() -> None:
     assert loaded.stdout == "set()\n"
 
 
-def test_an_ant_that_circles_earns_more_than_a_delivery_and_the_picture_says_why(
+def test_a_seed_that_is_named_is_not_chosen(capsys) -> None:
+    with pytest.raises(SystemExit):
+        render.parse_arguments(["learning", "--seed", "7", "--seeds", "20"])
+    assert "--seeds chooses the seed that is shown, but --seed names it" in capsys.readouterr().err
+
+
+def test_the_picture_of_learning_shows_stages_that_differ_and_the_median_of_many_ants(
     monkeypatch,
 ) -> None:
-    # What README says of the picture.
+    """The README says of it what the picture shows, and how many of 200 ants do so."""
     arguments = render.parse_arguments(gallery.GALLERY["learning.gif"])
-    stages = render.noted_stages(arguments, paper())
-    assert [stage.note for stage in stages] == [
-        *("", "circles with food", "delivered", "delivered"),
-    ]
-    returns = [int(stage.episode.trace.rewards.sum()) for stage in stages]
-    assert returns[1] == 57 > returns[3] == 45
+    assert render.parse_arguments(["learning"]).stages == arguments.stages
+    _, stages = render.noted_stages(arguments, paper())
+    steps = [len(stage.episode.trace) for stage in stages]
+    assert len({(n, stage.note) for n, stage in zip(steps, stages, strict=True)}) == len(stages)
+    readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").lower().split())
+    for n, stage in zip(steps[1:], stages[1:], strict=True):
+        assert stage.note == "delivered"
+        number, _, seeds = stage.among.split()[:3]
+        assert f"{stage.title} it delivers in {n} steps ({number} of {seeds} ants" in readme
     lines = []
     monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
     list(learning_frames(stages, arguments.size))
-    assert "return 57: circles with food" in lines
-    assert "= T 16 + S 38 + F 3" in lines
+    assert {stage.among for stage in stages} < set(lines)
+    assert f"step {steps[-1]}, return 45: delivered" in lines
+
+
+def test_an_ant_that_circles_earns_more_than_a_delivery_and_the_picture_says_why(
+    monkeypatch,
+) -> None:
+    """docs/rendering.md says so of this seed."""
+    arguments = render.parse_arguments(["learning", "--seed", "7", "--stages", "0", "10", "20"])
+    seed, stages = render.noted_stages(arguments, paper())
+    assert seed == 7
+    assert [(stage.note, stage.among) for stage in stages] == [
+        *(("", ""), ("circles with food", ""), ("delivered", "")),
+    ]
+    returns = [int(stage.episode.trace.rewards.sum()) for stage in stages]
+    assert returns[1] > returns[2] == 45
+    told = (ROOT / "docs" / "rendering.md").read_text(encoding="utf-8")
+    assert f"returns {returns[1]} after 10 episodes" in told
+    lines = []
+    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
+    list(learning_frames(stages, (1200, 480)))
+    assert f"step 150, return {returns[1]}: circles with food" in lines
     assert "= T 16 + S 16 + F 3 + Q 10" in lines
     assert "S nearer to the queen +1" in lines  # the legend
 

@@ -405,6 +405,8 @@ def test_the_script_of_observations_takes_the_options_of_a_sweep(tmp_path):
     done = subprocess.run(script, env=environment(tmp_path), capture_output=True, text=True)
     assert done.returncode == 0
     assert "--no-figures" in done.stdout
+    assert "FILE " not in done.stdout.replace("--plugin FILE ", "")
+    assert "results/sweep-observations)" in " ".join(done.stdout.split())
 
 
 def test_what_observations_gain_is_asked_of_all_of_them():

@@ -93,6 +93,20 @@ def test_policies_have_the_names_of_their_files(tmp_path: Path) -> None:
         load("watch").policies([str(tmp_path / "nothing.npz")])
 
 
+def test_a_browser_is_opened_on_a_private_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its command line, which all users of the machine can read, does not hold the token."""
+    watch, opened = load("watch"), []
+    monkeypatch.setattr(watch.webbrowser, "open", opened.append)
+    monkeypatch.setenv("DISPLAY", ":0")
+    with watch._opened("http://127.0.0.1:1/?token=secret"):
+        path = Path(urllib.request.url2pathname(opened[0].removeprefix("file://")))
+        assert "secret" not in opened[0]
+        assert 'url=http://127.0.0.1:1/?token=secret"' in path.read_text()
+        assert path.stat().st_mode & 0o777 == 0o600
+        assert path.parent.stat().st_mode & 0o777 == 0o700
+    assert not path.parent.exists()
+
+
 def test_without_the_library_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "websockets", None)
     session = Session(Choices({}).setup(load("watch").START))

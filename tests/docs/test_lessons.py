@@ -117,6 +117,34 @@ def test_questions_come_before_results_and_solutions_after_exercises(path):
     assert heading["metadata"]["jp-MarkdownHeadingCollapsed"]
 
 
+def test_a_class_edition_has_exercises_but_neither_results_nor_solutions(tmp_path, capsys):
+    execute = executor()
+    execute.main(["--class-edition", str(tmp_path / "class")])
+    for path in LESSONS:
+        whole, short = cells_of(path), cells_of(tmp_path / "class" / path.name)
+        sources = [cell["source"] for cell in whole]
+        kept = [cell["source"] for cell in short]
+        assert kept == sources[: sources.index("## Solutions")]
+        assert kept[-1].startswith("## Exercises")
+        codes = [cell for cell in short if cell["cell_type"] == "code"]
+        assert not any(cell["outputs"] or cell["execution_count"] for cell in codes)
+    with pytest.raises(SystemExit):
+        execute.main(["--class-edition", str(FOLDER)])
+    assert "would replace the lessons" in capsys.readouterr().err
+
+
+def test_lessons_tell_what_comes_after_a_delivery():
+    first, second = (
+        "\n".join(cell["source"] for cell in cells_of(path)).replace("\n", " ")
+        for path in LESSONS[:2]
+    )
+    assert "absorbing" in first
+    assert "absorbing" in second
+    counts = "\n".join(shown(cells_of(LESSONS[1])))
+    assert re.search("Dyna-Q +absorbing +{'delivers': 0,", counts)
+    assert re.search("Dyna-Q +continuing {'delivers': 40,", counts)
+
+
 @pytest.mark.slow
 @each_lesson
 def test_run_afresh_it_says_the_same(path, kernels, monkeypatch):

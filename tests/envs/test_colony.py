@@ -11,6 +11,7 @@ from random_colonies import RandomColony, random_colony
 from random_rewards import random_rewards
 from same_colonies import assert_equal
 
+from taichi_ants.envs import Event as Code
 from taichi_ants.envs.colony import ColonyWorlds
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.reference.ants import Event
@@ -52,7 +53,7 @@ def compare_step(worlds: ColonyWorlds, world: int, plain: ReferenceColony, actio
     assert np.flatnonzero(worlds.acted[world]).tolist() == slots
     for step in plain.transitions:
         assert worlds.rewards[world, step.slot] == step.reward
-        assert worlds.events[world, step.slot] == step.event.value.replace(" ", "_")
+        assert worlds.events[world, step.slot] == Code[step.event.value.replace(" ", "_").upper()]
     assert not worlds.rewards[world, ~worlds.acted[world]].any()
 
 
@@ -125,8 +126,8 @@ def test_what_the_mask_allows_succeeds_where_an_ant_is_alone():
         mask = worlds.action_masks()[0, 0]
         action = likely(rng, mask[None])[0]
         worlds.step(np.array([[action]]))
-        succeeds = worlds.events[0, 0] in ("moved", "picked_up", "delivered")
-        if worlds.events[0, 0] != "blocked" or not mask[:PICK_UP].all():  # no dead end
+        succeeds = worlds.events[0, 0] in (Code.MOVED, Code.PICKED_UP, Code.DELIVERED)
+        if worlds.events[0, 0] != Code.BLOCKED or not mask[:PICK_UP].all():  # no dead end
             assert succeeds == mask[action]
             seen[mask[action], action] += 1
     assert (seen[0] > 0).all()

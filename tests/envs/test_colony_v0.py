@@ -19,7 +19,7 @@ from pettingzoo.test import parallel_api_test, parallel_seed_test
 from same_colonies import assert_equal
 
 from taichi_ants import AntsError, Task, worlds
-from taichi_ants.envs import colony_v0
+from taichi_ants.envs import Event, colony_v0
 from taichi_ants.envs.colony_v0 import most_births
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.task import Life
@@ -94,12 +94,12 @@ def test_agents_are_the_ants_of_the_reference_by_number():
                 assert terminated[name] == (ants[name] not in plain.ants.values())
                 assert truncated[name] == (step == 90)
             for passed in plain.transitions:
-                event = passed.event.value.replace(" ", "_")
+                event = Event[passed.event.value.replace(" ", "_").upper()]
                 assert infos[f"ant_{passed.number}"]["event"] == event
             for name in set(observations) - set(acting):  # the newborn
                 assert name not in ever
                 assert (rewards[name], terminated[name], truncated[name]) == (0, False, False)
-                assert "event" not in infos[name]
+                assert infos[name]["event"] == Event.NONE
             ever |= set(observations)
         plain.end_episode()
         assert plain.record.births > 2

@@ -15,6 +15,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers.vector import DictInfoToList, RecordEpisodeStatistics
 
 from taichi_ants import AntsError, Task, worlds
+from taichi_ants.envs import Event
 from taichi_ants.envs.colony_v0 import parallel_env
 from taichi_ants.envs.colony_vector import HexColonyVectorEnv
 from taichi_ants.task import Life
@@ -70,8 +71,10 @@ def test_each_world_is_the_parallel_environment_of_its_seed(form):
             for i in range(ANTS):
                 assert_same(seen[w * ANTS + i], np.asarray(observations[f"ant_{i}"]))
                 assert seen[w * ANTS + i] in many.single_observation_space
-                for name in ("state", "action_mask"):
-                    assert np.array_equal(infos[name][w * ANTS + i], said[f"ant_{i}"][name])
+                assert said[f"ant_{i}"].keys() == {"state", "action_mask", "event"}
+                for name, value in said[f"ant_{i}"].items():
+                    assert_same(infos[name][w * ANTS + i], value)
+                    assert infos[f"_{name}"].all()
         actions = guided(infos["action_mask"], rng)
         seen, rewards, terminated, truncated, infos = many.step(actions)
         if "final_obs" in infos:
@@ -85,7 +88,6 @@ def test_each_world_is_the_parallel_environment_of_its_seed(form):
             for i in range(ANTS):
                 assert rewards[w * ANTS + i] == paid[f"ant_{i}"]
                 assert truncated[w * ANTS + i] == ends[f"ant_{i}"]
-                assert infos["event"][w * ANTS + i] == said[f"ant_{i}"]["event"]
     assert truncated.all()
 
 
@@ -130,7 +132,7 @@ def test_the_autoreset_modes_differ_in_when_they_begin_alone():
             else:
                 assert_same(ours[0], theirs[0])
             assert ("final_obs" in ours[-1]) == (step in (19, 39))
-            for name in ("state", "action_mask", "event", "_event"):
+            for name in ("state", "action_mask", "event"):
                 assert_same(final[name], theirs[-1][name])
 
 
@@ -143,7 +145,7 @@ def test_the_step_that_only_begins_the_next_episode_pays_nothing():
         assert not terminated.any()
         assert (truncated != begins).all()
         assert (rewards == (0 if begins else -1)).all()
-        assert (infos["_event"] != begins).all()
+        assert (infos["event"] == (Event.NONE if begins else Event.FAILED)).all()
 
 
 def test_single_worlds_begin_anew_while_others_go_on():
@@ -200,10 +202,10 @@ def test_an_ant_that_delivers_is_terminated_and_goes_on():
         seen, rewards, terminated, truncated, infos = env.step(guided(infos["action_mask"], rng))
         assert not truncated.any()
         assert ("final_obs" in infos) == terminated.any()
-        assert np.array_equal(infos["_event"], ~terminated)
-        assert "delivered" not in infos["event"]
+        assert np.array_equal(infos["event"] == Event.NONE, terminated)
+        assert Event.DELIVERED not in infos["event"]
         if terminated.any():
-            gave = infos["final_info"]["event"] == "delivered"
+            gave = infos["final_info"]["event"] == Event.DELIVERED
             assert np.array_equal(terminated, gave)
             delivered += gave.sum()
             assert (rewards[gave] == 10).all()
@@ -230,8 +232,10 @@ def test_what_users_register_and_wrap():
     for _ in range(5):
         *_, infos = listed.step(env.action_space.sample())
     assert len(infos) == 64
-    assert set(infos[0]) == {"state", "action_mask", "final_obs", "final_info", "episode"}
-    assert infos[0]["final_info"]["event"] in ("moved", "blocked", "failed")
+    assert set(infos[0]) == {
+        *("state", "action_mask", "event", "final_obs", "final_info", "episode")
+    }
+    assert infos[0]["final_info"]["event"] in (Event.MOVED, Event.BLOCKED, Event.FAILED)
     assert infos[3]["episode"]["l"] == 5
 
 

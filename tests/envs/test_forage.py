@@ -20,8 +20,10 @@ from command_lines import environment
 from gymnasium.error import InvalidAction, ResetNeeded
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
+from gymnasium.wrappers import TimeLimit
 
 from taichi_ants import AntsError, Life, Pheromone, Task, World, rollout, task, worlds
+from taichi_ants.envs import Event, Reason
 from taichi_ants.envs.forage import HexForageEnv, HexForageVectorEnv
 from taichi_ants.envs.formats import FORMATS
 from taichi_ants.learners.policies import trail_follower
@@ -47,15 +49,11 @@ def sensible(rng: np.random.Generator, masks: np.ndarray) -> np.ndarray:
 
 
 def assert_same(ours: Any, theirs: Any, where: str = "") -> None:
-    """Equal in values and types; names of which nothing is said may be missing."""
+    """Equal in names, values and types."""
     if isinstance(ours, dict):
-        for name in ours.keys() | theirs.keys():
-            if name in ours and name in theirs:
-                assert_same(ours[name], theirs[name], f"{where} {name}")
-            else:
-                there = ours.get(name, theirs.get(name))
-                assert name.strip("_") in ("event", "reason"), where
-                assert not any(there.tolist()), (where, name)
+        assert ours.keys() == theirs.keys(), where
+        for name in ours:
+            assert_same(ours[name], theirs[name], f"{where} {name}")
         return
     assert ours.dtype == theirs.dtype, where
     assert ours.shape == theirs.shape, where
@@ -86,9 +84,9 @@ def test_many_ants_equal_single_environments(mode, settings):
         for part in range(4):
             assert_same(now[part], then[part], f"step {step}, part {part}")
         assert_same(now[4], then[4], f"step {step}")
-        delivered += (now[4]["event"] == "delivered").sum()
+        delivered += (now[4]["event"] == Event.DELIVERED).sum()
         if "final_info" in now[4]:
-            delivered += (now[4]["final_info"]["event"] == "delivered").sum()
+            delivered += (now[4]["final_info"]["event"] == Event.DELIVERED).sum()
         masks, ended = now[4]["action_mask"], now[2] | now[3]
         if mode is AutoresetMode.DISABLED and ended.any():
             now, then = (env.reset(options={"reset_mask": ended.copy()}) for env in (ours, theirs))
@@ -165,7 +163,7 @@ def test_a_delivery_ends_an_episode_as_is_asked_for(delivery, ends):
         values = q_values[info["state"]]
         action = rng.choice(np.flatnonzero(values == values.max()))
         _, _, *ended, info = env.step(int(action))
-        if info["event"] == "delivered":
+        if info["event"] == Event.DELIVERED:
             delivered += 1
             assert tuple(ended) == ends
         elif step < 599:
@@ -181,6 +179,62 @@ def test_episodes_are_truncated_at_the_step_limit():
     env = gymnasium.make(ID, max_steps=3)
     env.reset(seed=0)
     assert [env.step(1)[2:4] for _ in range(3)] == [(False, False)] * 2 + [(False, True)]
+
+
+def test_infos_have_the_same_numbers_after_each_reset_and_step():
+    """A corridor with the queen behind the ant: each event, with the reason where there is one."""
+    world = World((5, 5, 1), (0, 0, 0), foods=[(3, 0, 0)], ants=[((1, 0, 0), 0)])
+    env = gymnasium.make(ID, world=world)
+    kinds = {"state": np.int64, "action_mask": np.ndarray, "event": np.int64, "reason": np.int64}
+    _, info = env.reset(seed=0)
+    codes = [(info["event"], info["reason"])]
+    for action in (3, 4, 1, 1, 3, 3, 4, 1, 1, 4):
+        *_, info = env.step(action)
+        assert {name: type(value) for name, value in info.items()} == kinds
+        codes.append((info["event"], info["reason"]))
+    assert codes == [
+        (Event.NONE, Reason.NONE),
+        (Event.FAILED, Reason.NO_FOOD_IN_VIEW),
+        (Event.FAILED, Reason.CARRIES_NO_FOOD),
+        (Event.MOVED, Reason.NONE),
+        (Event.BLOCKED, Reason.FOOD_AHEAD),
+        (Event.PICKED_UP, Reason.NONE),
+        (Event.FAILED, Reason.CARRIES_FOOD_ALREADY),
+        (Event.FAILED, Reason.NO_QUEEN_IN_VIEW),
+        (Event.MOVED, Reason.NONE),
+        (Event.BLOCKED, Reason.QUEEN_AHEAD),
+        (Event.DELIVERED, Reason.NONE),
+    ]
+
+
+@pytest.mark.parametrize("name", [ID, "taichi_ants/HexColony-v0"])
+def test_specs_have_the_step_limit(name):
+    """Read from the environment; made again from it, an environment is truncated as before."""
+    envs = gymnasium.make_vec(name, num_envs=64, max_steps=3)
+    twin = gymnasium.make_vec(envs.spec)
+    assert (envs.spec.max_episode_steps, twin.spec.max_episode_steps) == (3, 3)
+    twin.reset(seed=0)
+    assert [twin.step(np.ones(64, int))[3].all() for _ in range(3)] == [False, False, True]
+    if name == ID:
+        for env in (gymnasium.make(ID, max_steps=3), gymnasium.make(ID, max_episode_steps=3)):
+            assert env.spec.max_episode_steps == 3
+            again = gymnasium.make(env.spec)
+            again.reset(seed=0)
+            assert [again.step(1)[3] for _ in range(3)] == [False, False, True]
+        assert gymnasium.make(ID).spec.max_episode_steps == 600
+        assert not isinstance(gymnasium.make(ID, max_steps=700).env, TimeLimit)
+
+
+def test_action_masks_are_found_through_wrappers():
+    env = gymnasium.make(ID)
+    with pytest.raises(ResetNeeded, match="action_masks"):
+        env.get_wrapper_attr("action_masks")()
+    _, info = env.reset(seed=0)
+    for action in (1, 3, 0, 0):
+        masks = env.get_wrapper_attr("action_masks")()
+        assert masks.dtype == bool
+        np.testing.assert_array_equal(masks, info["action_mask"])
+        *_, info = env.step(action)
 
 
 def test_the_lower_step_limit_counts():
@@ -438,5 +492,8 @@ def test_workers_of_other_processes_step_environments(kernels, monkeypatch):
         for action in (1, 2, 0, 3, 4):
             actions = np.full(2, action)
             np.testing.assert_array_equal(env.step(actions)[0], here.step(actions)[0])
+        said = pytest.warns(UserWarning, match="Worker-0")
+        with said, pytest.raises(AntsError, match=r"no world named .nowhere"):
+            env.call("__init__", world="nowhere")
     finally:
         env.close()

@@ -130,21 +130,3 @@ def test_sb3_accepts_the_spaces_of_single_environments(form: str) -> None:
     from stable_baselines3.common.env_checker import check_env
 
     check_env(HexForageEnv(observation_format=form, max_steps=50))  # type: ignore[arg-type]
-
-
-@pytest.mark.long
-def test_agents_of_sb3_train_on_it() -> None:
-    """On-policy and off-policy, with SB3's monitor of episodes around it."""
-    envs = made(4)
-    from stable_baselines3 import DQN, PPO
-    from stable_baselines3.common.evaluation import evaluate_policy
-    from stable_baselines3.common.vec_env import VecMonitor
-
-    watched = VecMonitor(envs)
-    model = PPO("MlpPolicy", watched, n_steps=64, batch_size=64, n_epochs=1, device="cpu")
-    model.learn(256)
-    assert len(model.ep_info_buffer) == 4
-    assert all(info["l"] <= 60 for info in model.ep_info_buffer)
-    DQN("MlpPolicy", made(4), learning_starts=32, buffer_size=500, device="cpu").learn(128)
-    mean, _ = evaluate_policy(model, watched, n_eval_episodes=4)
-    assert np.isfinite(mean)

@@ -49,6 +49,14 @@ def test_bounds_are_allowed(name, value):
 NO_SHARES = [-1e-9, 1.0000001, float("nan"), float("inf"), 10**400, True, "0.5", None, [0.5], 1j]
 
 
+@pytest.mark.parametrize("decay", [0.5, 1.0])
+def test_a_lower_bound_never_raises_what_it_bounds(decay):
+    more = {"learning_rate_decay": decay, "min_learning_rate": 0.2}
+    config = TrainingConfig("sarsa", 0.1, 0.9, 0.0, decay, 0.01, **more)
+    assert (config.least_epsilon, config.next_epsilon(0.0)) == (0.0, 0.0)
+    assert (config.least_learning_rate, config.next_learning_rate(0.1)) == (0.1, 0.1)
+
+
 def test_rates_fall_by_their_factors_down_to_their_least():
     config = TrainingConfig("sarsa", 0.4, 0.9, 0.8, 0.5, 0.3, **FALLING)
     rates, epsilons = [config.learning_rate], [config.epsilon]

@@ -117,9 +117,27 @@ def test_it_learns_to_deliver_in_the_papers_world(name, delivery):
     assert untrained.deliveries.mean() < 0.5
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_a_taken_name_is_refused(name):
-    with pytest.raises(AntsError, match=f"'{name}' cannot name a learner; use a new one"):
+@ti.func
+def no_td_error(value, reward, discount, next_values, next_action, epsilon):
+    return 0.0 * reward
+
+
+def test_a_learner_of_ones_own_is_replaced():
+    """As in a cell of a notebook that is run again; the next training uses the new one."""
+    config = TrainingConfig("mine", 0.5, 0.9, 0.5, 1.0)
+    tables = []
+    for td_error in (no_td_error, clipped_td_error):
+        mine = learners.register(td_learner("mine", td_error, True))
+        assert learners.get("mine") is mine
+        tables.append(train(paper(), config, 0, 2).q_values)
+    assert not tables[0].any()
+    assert tables[1].any()
+    assert learners.names().count("mine") == 1
+
+
+@pytest.mark.parametrize("name", registry.BUILT_IN)
+def test_built_in_learners_are_not_replaced(name):
+    with pytest.raises(AntsError, match=f"^'{name}' is the name of a built-in learner, which"):
         learners.register(td_learner(name, clipped_td_error, True))
 
 
@@ -128,10 +146,10 @@ def test_a_taken_name_is_refused(name):
     [
         (None, "what is registered is None; it must be a Learner"),
         (clipped_td_error, "it must be a Learner"),
-        (replace(CLIPPED, name="two words"), "'two words' cannot name a learner"),
-        (replace(CLIPPED, name=""), "'' cannot name a learner"),
-        (replace(CLIPPED, name="a/b"), "'a/b' cannot name a learner"),
-        (replace(CLIPPED, name=3), "3 cannot name a learner"),
+        (replace(CLIPPED, name="two words"), "the name of the learner is 'two words'; it must"),
+        (replace(CLIPPED, name=""), "the name of the learner is ''; it must"),
+        (replace(CLIPPED, name="a/b"), "the name of the learner is 'a/b'; it must"),
+        (replace(CLIPPED, name=3), "the name of the learner is 3; it must"),
     ],
 )
 def test_what_cannot_be_registered(learner, says):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,14 +11,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from plain_runs import rollout
 
+from taichi_ants import Colony, Life, TrainingConfig
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.policies import load_policy, random_policy, save_policy, trail_follower
-from taichi_ants.task import Task, foraging, observations
+from taichi_ants.task import Task, foraging, observations, queueing
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT
 from taichi_ants.worlds.open_world import open_world
 from taichi_ants.worlds.paper import paper
-
-MOVES = {LEFT, FORWARD, RIGHT}
 
 
 def best_actions(q_values: np.ndarray, name: str, observation: str = "paper") -> set[int]:
@@ -63,18 +63,18 @@ def test_what_the_trail_follower_does(name: str, actions: set[int]) -> None:
     ("name", "actions"),
     [
         ("foraging F P T", {PICK_UP}),
-        ("foraging T P E", {LEFT}),
-        ("foraging E E P", {RIGHT}),
-        ("foraging P P P", {FORWARD}),
-        ("foraging P O P", {LEFT, RIGHT}),
         ("foraging A E O", {FORWARD}),
         ("foraging E A E", {LEFT, RIGHT}),
         ("foraging A A O", {LEFT}),
         ("carrying P Q A", {GIVE}),
         ("carrying P S O", {FORWARD}),
-        ("carrying E P P", {FORWARD, RIGHT}),
-        ("carrying E A E", {LEFT, RIGHT}),
-        ("carrying A A A", {LEFT}),
+        ("carrying S P E", {FORWARD}),
+        ("carrying S S O", {FORWARD}),
+        ("carrying E P P", {FORWARD}),
+        ("carrying P E S", {LEFT, RIGHT}),
+        ("carrying E A E", {LEFT, FORWARD, RIGHT}),
+        ("carrying A A O", {LEFT, FORWARD}),
+        ("carrying O O O", {LEFT}),
     ],
 )
 def test_what_the_trail_follower_does_about_ants(
@@ -84,43 +84,67 @@ def test_what_the_trail_follower_does_about_ants(
 
 
 @pytest.mark.parametrize(
-    ("name", "actions"),
+    ("observation", "name", "actions"),
     [
-        ("foraging p E E", {LEFT}),
-        ("foraging p P A", {FORWARD}),
-        ("foraging T p p", {LEFT}),
-        ("carrying p P E", {LEFT, FORWARD}),
-        ("carrying A E p", {RIGHT}),
-        ("carrying p p S", {RIGHT}),
+        # An ant without food waits to be pushed; giving fails, and does not turn it.
+        ("ants", "foraging T P E", {GIVE}),
+        ("ants", "foraging E E P", {GIVE}),
+        ("queues", "foraging T P E", {FORWARD}),
+        ("queues", "foraging T E P", {LEFT}),
+        ("queues", "foraging p E P", {GIVE}),
+        ("queues", "foraging E E P", {RIGHT}),
+        ("queues", "foraging P E P", {LEFT, RIGHT}),
+        ("queues", "foraging E p E", {GIVE}),
+        ("queues", "foraging T p p", {LEFT}),
+        # With food, picking up fails.
+        ("queues", "carrying p E A", {PICK_UP}),
+        ("queues", "carrying p P E", {FORWARD}),
+        ("queues", "carrying p p S", {RIGHT}),
     ],
 )
-def test_what_the_trail_follower_does_in_a_queue(name: str, actions: set[int]) -> None:
-    assert best_actions(trail_follower("queues"), name, "queues") == actions
-
-
-RANKS = {"T": 0, "S": 0, "P": 1, "p": 1, "E": 2, "O": 3, "A": 3}
+def test_where_the_trail_follower_waits_for_others(
+    observation: str, name: str, actions: set[int]
+) -> None:
+    assert best_actions(trail_follower(observation), name, observation) == actions
 
 
 @pytest.mark.parametrize("observation", ["paper", "ants", "queues"])
-def test_in_each_state_the_trail_follower_goes_where_it_is_best(observation: str) -> None:
-    """Never towards what blocks, but in a dead end, where it turns left."""
+def test_the_trail_follower_never_walks_into_what_blocks_unless_nothing_else_is_left(
+    observation: str,
+) -> None:
     policy, sees = trail_follower(observation), observations.get(observation)
     assert policy.shape == (sees.n_states, 5)
+    assert set(np.unique(policy)) == {0.0, 1.0}
     for row, values in enumerate(policy):
-        assert set(values.tolist()) <= {0.0, 1.0}
         actions = set(np.flatnonzero(values).tolist())
         load, *view = sees.name_of(row).split()
+        fails = PICK_UP if load == "carrying" else GIVE
         if {"F", "Q"} & set(view):
             assert actions == {GIVE if load == "carrying" else PICK_UP}
-        elif set(view) <= {"O", "A"}:
-            assert actions == {LEFT}
+        elif fails in actions:
+            assert actions == {fails}
+            assert {"P", "p"} & set(view)
         else:
-            ranks = [RANKS[letter] for letter in view]
-            best = {move for move in MOVES if ranks[move] == min(ranks)}
-            chosen = {FORWARD} if load == "foraging" and FORWARD in best else best
-            if min(ranks) == RANKS["E"] and len(best) < 3:  # beside what blocks
-                chosen = best
-            assert actions == chosen, sees.name_of(row)
+            blocked = {"O", "A"} if load == "foraging" else {"O"}
+            towards = {view[move] for move in actions}
+            assert not towards & blocked or (set(view) <= blocked and actions == {LEFT})
+
+
+# What 64 ants of the least seeds deliver, less a margin; learned tables give 565 and 906 there.
+@pytest.mark.parametrize(("task", "least"), [(foraging(), 700), (queueing(), 930)])
+def test_a_colony_of_trail_followers_delivers_more_than_learned_tables(
+    task: Task, least: int
+) -> None:
+    colony = Colony(
+        paper(),
+        replace(task, life=Life(regrowth=0)),
+        TrainingConfig("sarsa", 0.1, 0.9, 0.01, 1.0),
+        range(4),
+        ants=64,
+        sharing="fixed",
+        q_values=trail_follower(task.observation),
+    )
+    assert colony.run(1, 1000).deliveries.min() > least
 
 
 def test_the_trail_follower_of_another_observation_is_refused() -> None:

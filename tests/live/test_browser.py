@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,10 +14,14 @@ from command_lines import crowding
 from rooms import CHOSEN, Guest, running
 
 from taichi_ants import Colony, load_policy
+from taichi_ants.commands import watch
 from taichi_ants.learners.expected_sarsa import EXPECTED_SARSA
 from taichi_ants.learners.policies import Policy, trail_follower
 from taichi_ants.live.choices import Choices
 from taichi_ants.live.log import Log
+from taichi_ants.live.server import Room
+from taichi_ants.live.session import Session
+from taichi_ants.live.setup import MOST_ANTS
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
 pytestmark = pytest.mark.browser
@@ -530,11 +536,46 @@ def test_a_page_that_waits_says_so(browser, room, monkeypatch):
     context.close()
 
 
+def test_the_token_is_seen_in_no_command_line_and_no_address(browser, room, monkeypatch):
+    """A browser opens a private file that leads to the page, under the policy of the page."""
+    opened = []
+    monkeypatch.setattr(watch.webbrowser, "open", opened.append)
+    monkeypatch.setattr(watch.sys, "platform", "elsewhere")  # where a display is not asked for
+    context, faults = browser.new_context(), []
+    tab = context.new_page()
+    tab.on("console", lambda message: faults.append(message.text))
+    with watch._opened(room.url):
+        (address,) = opened
+        path = Path(address.removeprefix("file://"))
+        assert room.token not in address
+        assert path.stat().st_mode & 0o777 == 0o600
+        assert path.parent.stat().st_mode & 0o777 == 0o700
+        tab.goto(address)
+        tab.locator("#now dd").first.wait_for()
+    assert not path.parent.exists()
+    for again in (tab.reload, lambda: None):
+        assert tab.url == f"http://127.0.0.1:{room.port}/"
+        again()
+        tab.locator("#now dd").first.wait_for()
+    tab.locator("#theme").click()
+    assert context.cookies() == []
+    assert faults == []
+    tab.go_back()
+    assert room.token not in tab.url
+    other = context.new_page()  # another tab has no token
+    other.goto(f"http://127.0.0.1:{room.port}/")
+    other.locator("#lost").wait_for()
+    assert "Open the address that the server prints." in other.locator("#lost").inner_text()
+    context.close()
+
+
 def test_a_page_that_was_cut_off_says_why(browser, room):
     page = Page(browser, room.url)
     page.read("live.ask('edit')")
-    wait(page, "document.querySelector('#toast').innerText.includes('an edit has to be')")
+    wait(page, "document.querySelector('#lost').innerText.includes('an edit has to be')")
     assert page.tab.is_disabled("#play")
+    page.tab.click("#again")
+    wait(page, "live.open && byId('lost').hidden && !byId('play').disabled")
     page.close()
 
 
@@ -667,9 +708,99 @@ def test_the_page_ends_with_the_server(browser, shared):
         page = Page(browser, one.url)
         page.tab.click("#quit")
         page.tab.click("#quit")
-        wait(page, "document.querySelector('#toast').innerText.startsWith('The server has ended')")
+        wait(page, "document.querySelector('#lost').innerText.startsWith('The server has ended')")
         assert page.tab.is_disabled("#play")
+        page.faults.clear()  # it tries to connect again
         page.close()
+
+
+def test_a_page_whose_connection_was_lost_goes_on_by_itself(page, room):
+    page.press("Shift+ArrowRight")
+    wait(page, "viewer.history.frames.at(-1).tick === 10")
+    known = page.read("viewer.history.length")
+    page.read("live.socket.close()")
+    page.tab.wait_for_selector("#lost:not([hidden])")
+    assert page.tab.is_disabled("#play")
+    with Guest(room) as other:  # time passes meanwhile
+        other.ask("step", ticks=5)
+    wait(page, "live.open && byId('lost').hidden && viewer.history.frames.at(-1).tick === 15")
+    assert page.read("viewer.history.length") == known + 1
+    assert_same(page, room)
+    page.click("#forward")
+    wait(page, "viewer.history.frames.at(-1).tick === 16")
+    assert_same(page, room)
+
+
+def test_a_page_keeps_what_it_has_when_the_server_is_killed(browser, shared, tmp_path):
+    world = """moment => { const { ground, trail } = viewer.history.worldAt(moment);
+      const ant = viewer.history.ant(moment, 3);
+      return [[...ground], [...trail], [...viewer.history.frames[moment].cells], ant]; }"""
+    with running(shared.choices) as one:
+        port, token = one.port, one.token
+        page = Page(browser, one.url, accept_downloads=True)
+        for ticks in (11, 21, 31, 41):
+            page.press("Shift+ArrowRight")
+            wait(page, f"viewer.history.frames.at(-1).tick === {ticks}")
+        page.read("() => { viewer.history.bytes += 2 ** 27; }")  # it forgets its beginning
+        page.press("ArrowRight")
+        wait(page, "viewer.history.first > 0 && viewer.history.frames.at(-1).tick === 42")
+        page.read("live.socket.close()")  # so that a later moment is whole, too
+        page.tab.wait_for_selector("#lost:not([hidden])")
+        wait(page, "live.open && byId('lost').hidden")
+        page.press("ArrowRight")
+        wait(page, "viewer.history.frames.at(-1).tick === 43")
+    page.tab.wait_for_selector("#lost:not([hidden])")
+    with page.tab.expect_download() as got:
+        page.tab.click("#keep")
+    got.value.save_as(tmp_path / "kept.html")
+    first, length = page.read("[viewer.history.first, viewer.history.length]")
+    kept = Page(browser, tmp_path / "kept.html")
+    assert kept.read("viewer.history.length") == length - first
+    for moment in range(first, length):
+        one, other = kept.read(world, moment - first), page.read(world, moment)
+        if moment == first:  # what was drawn ahead, in a moment before, is not known any more
+            one[-1]["act"] = other[-1]["act"] = None
+        assert one == other, moment
+    assert kept.read("document.querySelector('.controls, .palette, #lost')") is None
+    kept.close()
+    other = Room(Session(shared.choices.setup(CHOSEN)), shared.choices, port)
+    other.token = token
+    thread = threading.Thread(target=other.run, daemon=True)
+    thread.start()
+    wait(page, "byId('lost').innerText.includes('another session')")
+    assert page.read("viewer.history.length") == length  # nothing is taken from it
+    page.tab.click("#again")
+    wait(page, "byId('lost').hidden && viewer.history.length === 1")
+    assert_same(page, other)
+    other.end()
+    thread.join()
+    page.faults.clear()  # Chromium tells of each attempt in vain
+    page.close()
+
+
+def test_the_page_says_that_ants_move_aside(page, room):
+    cells = room.session.colony.snapshot().ant_cells.tolist()
+    assert "ants in the way move aside" in page.tab.get_attribute('[data-tool="rock"]', "title")
+    page.press("2")
+    page.tab.mouse.click(*place(page, cells[3]))
+    wait(page, "byId('toast').innerText === '1 ant moves aside.'")
+    edits(room, 1)
+    assert room.session.colony.snapshot().ground[cells[3]] == OBSTACLE
+    assert len(room.session.colony.snapshot().ant_cells) == len(cells)
+    assert_same(page, room)
+
+
+def test_the_form_takes_as_many_ants_as_a_session_can_have(page):
+    assert page.tab.get_attribute("#ants", "max") == str(MOST_ANTS)
+
+
+def test_play_is_among_the_first_that_tab_reaches(page):
+    page.tab.reload()
+    page.tab.wait_for_function("window.viewer")
+    page.press("Tab")
+    assert page.read("document.activeElement.innerText") == "Skip to Play"
+    page.press("Enter")
+    assert page.read("document.activeElement.id") == "play"
 
 
 def test_it_stays_at_thirty_frames_a_second(page, room, record_property):

@@ -20,7 +20,7 @@ from taichi_ants.live import edits
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.reference.hand import Hand as PlainHand
 from taichi_ants.task import foraging
-from taichi_ants.task.constants import EMPTY, OBSTACLE, QUEEN
+from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
 # Each entry takes kernels of its own, see tests/engines/colony/test_against_reference.py.
 KERNELS = [
@@ -31,6 +31,7 @@ KERNELS = [
     ("dyna_q", "shared", "trail_levels", True, "blocking", "half"),
     ("n_step_sarsa", "own", "paper", False, "blocking", "half"),
 ]
+TRAINING = TrainingConfig("sarsa", 0.2, 0.9, 0.4, 0.9)
 MARKED = [*KERNELS[:4], *(pytest.param(one, marks=pytest.mark.slow) for one in KERNELS[4:])]
 
 
@@ -105,7 +106,7 @@ def test_schedules_do_not_matter_to_edits(monkeypatch):
     monkeypatch.setattr(colony_module, "_CHUNKS_PER_THREAD", 8)
     for name in ("_FEWEST_TICKS", "_MOST_TICKS"):  # between two sorts
         monkeypatch.setattr(colony_module, name, 2)
-    world, training = worlds.open_world(5, (9, 8, 7)), TrainingConfig("sarsa", 0.2, 0.9, 0.4, 0.9)
+    world, training = worlds.open_world(5, (9, 8, 7)), TRAINING
     hands = []
     for schedule in ("by_world", "by_chunk"):
         options = {"ants": 40, "capacity": 40, "schedule": schedule}
@@ -133,3 +134,31 @@ def test_schedules_do_not_matter_to_edits(monkeypatch):
             rows.append(ants[lasting][:, np.argsort(ants[AntRow.NUMBER])])
         assert np.array_equal(*rows)
     assert 0 < full < 60
+
+
+@pytest.mark.parametrize("what", [OBSTACLE, FOOD])
+def test_a_wall_across_a_road_of_ants_has_no_hole(what):
+    """Ants in the way are moved aside, to the nearest empty cells; nothing else of them changes."""
+    colony = Colony(worlds.paper(), foraging(), TRAINING, 2, ants=40)
+    colony.begin_episode()
+    colony.tick(200)
+    hand, before = Hand(colony), colony.ant_rows()
+    cells = np.sort(before[AntRow.CELL])[::2]
+    hand.put(cells, what)
+    after = colony.ant_rows()
+    assert (colony.snapshot().ground[cells] == what).all()
+    changed = {AntRow.CELL, AntRow.STATE, AntRow.PERCEPT}
+    kept = [row for row in AntRow if row < len(after) and row not in changed]
+    assert np.array_equal(after[kept], before[kept])
+    moved = before[AntRow.CELL] != after[AntRow.CELL]
+    assert np.array_equal(moved, np.isin(before[AntRow.CELL], cells))
+    assert_sound(hand)
+
+
+def test_an_ant_without_room_stays_where_it_is():
+    colony = Colony(worlds.from_text("Q   0   F\n"), foraging(), TRAINING, ants=1)
+    colony.begin_episode()
+    hand, (cell,) = Hand(colony), colony.snapshot().ant_cells
+    hand.put(np.array([cell]), OBSTACLE)
+    assert colony.snapshot().ground[cell] == EMPTY
+    assert colony.snapshot().ant_cells.tolist() == [cell]

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import http.client
 import json
+import re
 import socket
 import time
 from collections.abc import Callable
@@ -13,17 +16,20 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from attacks import ATTACKS, attack
+from command_lines import crowding
 from playback import played
 from rooms import CHOSEN, Guest, running
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from taichi_ants import Colony
+from taichi_ants import AntsError, Colony
 from taichi_ants.learners.policies import Policy, trail_follower
 from taichi_ants.live import server
 from taichi_ants.live.choices import Choices
 from taichi_ants.live.exports import QUICK, SLOW
 from taichi_ants.live.log import Log
+from taichi_ants.live.session import Session
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.viewer import Recording
 from taichi_ants.viewer.frames import unpack
@@ -51,14 +57,16 @@ def state_of(room) -> object:
     return session.hand.state(), session.ticks, list(session.edits)
 
 
-def get(room, path: str, **headers: str) -> tuple[int, dict[str, str], str]:
+def get(
+    room, path: str, method: str = "GET", body: str | None = None, **headers: str
+) -> tuple[int, dict[str, str], str]:
     with closing(http.client.HTTPConnection("127.0.0.1", room.port, timeout=30)) as line:
-        line.request("GET", path, headers=headers)
+        line.request(method, path, body, headers)
         answer = line.getresponse()
         return answer.status, dict(answer.headers), answer.read().decode()
 
 
-def test_the_page_is_for_those_who_know_the_token(room):
+def test_the_page_is_given_to_no_other_page_and_holds_no_secret(room):
     here = f"127.0.0.1:{room.port}"
     good = f"/?token={room.token}"
     status, headers, text = get(room, good)
@@ -66,28 +74,69 @@ def test_the_page_is_for_those_who_know_the_token(room):
     assert f"connect-src ws://{here}" in text
     assert headers["Content-Type"] == "text/html; charset=utf-8"
     assert headers["Referrer-Policy"] == "no-referrer"
+    assert "Set-Cookie" not in headers
     assert room.token not in text
+    assert get(room, "/")[::2] == (200, text)  # as where it is reloaded
     first, more = room.token[:-1], f"{room.token}x"
-    for query in ("", "token=", f"token={first}", f"token={more}", f"token=x&token={room.token}"):
+    for query in (f"token={first}", f"token={more}", f"token=x&token={room.token}"):
         assert get(room, f"/?{query}")[0] == 403, query
-    for query in ("token=%ff%00", f"Token={room.token}", room.token, "&" * 5000):
-        assert get(room, f"/?{query}")[0] == 403, query
+    for path in ("/socket", "/socket?token=%ff%00", f"/socket?Token={room.token}"):
+        assert get(room, path, Origin=f"http://{here}")[0] == 403, path
     assert get(room, good, Host=f"localhost:{room.port}")[0] == 200
     for host in ("evil.example", f"evil.example:{room.port}", "127.0.0.1", "", f"{here}, {here}"):
         assert get(room, good, Host=host)[0] == 403, host
-    assert get(room, good, Origin="http://evil.example")[0] == 403
+    for path in (good, "/"):
+        assert get(room, path, Origin="http://evil.example")[0] == 403
     for path in ("/etc/passwd", "/../../etc/passwd", "//", "/viewer.js", "/Socket"):
         assert get(room, f"{path}?token={room.token}")[0] in (403, 404), path
 
 
-@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "OPTIONS", "TRACE", "CONNECT"])
+def test_a_header_says_that_only_the_scripts_of_the_page_run(room):
+    _, headers, text = get(room, "/")
+    policy = dict(rule.split(" ", 1) for rule in headers["Content-Security-Policy"].split("; "))
+    (script,) = re.findall("<script>(.*?)</script>", text, re.DOTALL)
+    (style,) = re.findall("<style>(.*?)</style>", text, re.DOTALL)
+    for rule, element in (("script-src", script), ("style-src-elem", style)):
+        digest = base64.b64encode(hashlib.sha256(element.encode()).digest()).decode()
+        assert policy[rule] == f"'sha256-{digest}'"
+    for rule in ("default-src", "base-uri", "form-action", "frame-ancestors"):
+        assert policy[rule] == "'none'"
+    for path in ("/", "/?token=x", f"/none?token={room.token}"):
+        headers = get(room, path)[1]
+        assert "frame-ancestors 'none'" in headers["Content-Security-Policy"]
+        assert headers["X-Content-Type-Options"] == "nosniff"
+        assert headers["Cross-Origin-Opener-Policy"] == "same-origin"
+
+
+def test_head_gives_the_headers_of_get_without_the_body(room):
+    for path in ("/", f"/?token={room.token}", "/?token=x", f"/none?token={room.token}"):
+        status, headers, text = get(room, path)
+        headed = get(room, path, "HEAD")
+        assert headed[0] == status
+        assert headed[2] == ""
+        for name in headers.keys() - {"Date"}:
+            assert headed[1][name] == headers[name]
+        assert int(headed[1]["Content-Length"]) == len(text.encode())
+    socket_path = f"/socket?token={room.token}"
+    status, headers, _ = get(room, socket_path, "HEAD", Origin=f"http://127.0.0.1:{room.port}")
+    assert (status, headers["Allow"]) == (405, "GET")
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "OPTIONS", "PATCH"])
 def test_nothing_can_be_sent_but_over_the_socket(room, method):
     before = state_of(room)
-    line = http.client.HTTPConnection("127.0.0.1", room.port, timeout=30)
-    with closing(line), suppress(http.client.HTTPException, OSError):  # or it is cut off
-        line.request(method, f"/?token={room.token}", body="x" * 1000)
-        assert line.getresponse().status >= 400
+    for body in (None, "x" * 1000, "x" * 1_000_000):
+        status, headers, text = get(room, f"/?token={room.token}", method, body)
+        assert (status, headers["Allow"], text) == (405, "GET, HEAD", "")
     assert state_of(room) == before
+
+
+def test_a_method_may_arrive_letter_by_letter(room):
+    with socket.create_connection(("127.0.0.1", room.port), timeout=30) as line:
+        for letter in f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{room.port}\r\n\r\n":
+            line.sendall(letter.encode())
+            time.sleep(0.001)
+        assert line.recv(100).startswith(b"HTTP/1.1 200")
 
 
 def test_sockets_are_for_pages_of_its_own(room):
@@ -407,7 +456,7 @@ def test_a_session_is_saved_and_loaded(room):
         guest.socket.send(saved[:-200] + b"\0" * 200)
         words = guest.until("error")["words"]
         assert words.startswith("the loaded file is damaged")
-        assert words.endswith("; load one that Save has made.")
+        assert words.endswith("; load a session that Save has made.")
         assert state_of(room) == before
 
 
@@ -533,6 +582,45 @@ def test_time_goes_on_while_a_file_is_made(room):
         guest.until("session.gif")
         guest.ask("export", kind="page")
         guest.until("session.html")
+
+
+@pytest.mark.parametrize("name", ATTACKS)
+def test_a_file_that_would_hold_the_server_is_refused_at_once(room, name, tmp_path):
+    content, before = attack(name, room.session, tmp_path), state_of(room)
+    with Guest(room) as guest:
+        began = time.monotonic()
+        guest.socket.send(content)
+        words = guest.until("error")["words"]
+        assert time.monotonic() - began < 1.0 * crowding()
+    assert ATTACKS[name][1] in words
+    assert words.endswith("; load a session that Save has made.")
+    assert "\n" not in words
+    assert state_of(room) == before
+    with pytest.raises(AntsError, match=ATTACKS[name][1]):  # as --session does
+        Session.load(tmp_path / "session.npz")
+
+
+def test_pages_are_answered_quickly_while_any_file_loads(room, tmp_path):
+    """While processes start, worlds are built and kernels compiled; and Cancel ends all that."""
+    chosen = {**CHOSEN, "world": "open", "size": 180, "ants": 5000, "sees": "six_cells"}
+    setup = room.choices.setup(chosen)
+    log = Log(setup, ((5, {"kind": "episode"}),), 10**6, 10**6, "0", changes=(0,))
+    log.write(tmp_path / "large.npz")
+    with Guest(room) as guest:
+        guest.socket.send((tmp_path / "large.npz").read_bytes())
+        slowest, began = 0.0, time.monotonic()
+        working(guest, "load", 0)
+        while time.monotonic() - began < 3:
+            asked = time.monotonic()
+            guest.ask("speed", value=12)
+            guest.until("state")
+            slowest = max(slowest, time.monotonic() - asked)
+        assert slowest < 0.3 * crowding()
+        process = room._loading._process
+        guest.ask("cancel", kind="load")
+        guest.until("cancelled")
+        process.join(2)
+        assert not process.is_alive()
 
 
 @pytest.fixture

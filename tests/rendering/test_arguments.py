@@ -88,6 +88,10 @@ CALLS: dict[str, list[tuple[str, Callable[[object], object]]]] = {
         ("path", of(rendering.save_picture, FRAME)),
         ("a frame", lambda wrong: rendering.save_picture("a.png", wrong)),
     ],
+    "typical_seed": [
+        ("stages", lambda wrong: rendering.typical_seed(WORLD, CONFIG, stages=wrong)),
+        ("a seed", lambda wrong: rendering.typical_seed(WORLD, CONFIG, seeds=wrong)),
+    ],
 }
 
 

@@ -22,6 +22,7 @@ from taichi_ants.rendering import (
     policy_sheet,
     save_animation,
     text,
+    typical_seed,
 )
 from taichi_ants.rendering.colours import CELL_FOOD, CHOSEN
 from taichi_ants.rendering.observed import PAPER
@@ -69,10 +70,36 @@ def test_the_account_says_where_the_return_comes_from() -> None:
             assert (stage.account()[:, 4] <= 0).all()
 
 
+def test_the_typical_seed_is_the_one_nearest_to_the_middle_rank_at_every_stage() -> None:
+    seeds, stages, steps = (3, 14, 15, 92, 65, 35, 89, 79), (0, 1, 3), 80
+    chosen, deliver = typical_seed(paper(), CONFIG, seeds=seeds, stages=stages, max_steps=steps)
+    played = {
+        seed: learning_stages(paper(), CONFIG, seed=seed, stages=stages, max_steps=steps)
+        for seed in seeds
+    }
+    for n, told in enumerate(deliver):
+        assert told == sum(several[n].episode.delivered for several in played.values())
+    assert deliver[0] < deliver[-1]
+
+    def values(seed: int) -> list[int]:
+        traces = [stage.episode.trace for stage in played[seed]]
+        return [one for trace in traces for one in (int(trace.rewards.sum()), len(trace))]
+
+    def farthest(seed: int) -> int:
+        own = values(seed)
+        return max(
+            abs(sum((a > b) - (a < b) for b in others))
+            for a, *others in zip(own, *map(values, seeds), strict=True)
+        )
+
+    assert chosen == min(seeds, key=farthest)
+
+
 @pytest.mark.parametrize("stages", [(), (3, 2), (0, 5, 5), (-1, 5)])
 def test_stages_that_are_refused(stages) -> None:
-    with pytest.raises(AntsError, match="stages"):
-        learning_stages(paper(), CONFIG, stages=stages)
+    for function in (learning_stages, typical_seed):
+        with pytest.raises(AntsError, match="stages"):
+            function(paper(), CONFIG, stages=stages)
 
 
 def test_stages_of_several_worlds_are_refused() -> None:

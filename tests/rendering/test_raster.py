@@ -209,6 +209,17 @@ def test_ants_stay_visible_in_a_world_of_millions() -> None:
     assert 2.0 < darkness < 3.0
 
 
+def test_food_is_a_dot_with_a_ring_where_cells_are_small() -> None:
+    """A trail may be as light as food; the ring is lighter then."""
+    world = World(ranges=(60, 60, 60), queen=(0, 0, 0), foods=[(30, 0, 0)])
+    scene = Rasteriser(world.grid, 600, 600)
+    assert scene.hexagon < 6
+    x, y = scene.centres((30, 0, 0)).astype(int).tolist()
+    frame = scene.draw(at_start(world, n=1))[y - 6 : y + 7, x - 6 : x + 7]
+    for colour in (colours.CELL_FOOD, colours.FLOOR_FOOD):
+        assert (frame == colours.channels(colour)).all(axis=2).sum() >= 4
+
+
 def test_a_crowd_is_a_shade_that_grows_with_it() -> None:
     grid = AxialGrid((600, 600, 1))
     cells = np.flatnonzero(grid.exists)

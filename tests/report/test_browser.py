@@ -52,6 +52,20 @@ def opened(browser, paths):
     assert faults == []
 
 
+@pytest.mark.parametrize("name", ["comparison", "colony"])
+def test_the_page_works_under_its_policy(browser, paths, name):
+    faults, context = [], browser.new_context(offline=True)
+    tab = context.new_page()
+    tab.on("console", lambda message: faults.append(message.text))
+    tab.goto((paths / f"{name}.html").as_uri())
+    before = tab.get_attribute("html", "data-theme")
+    tab.click("#theme")
+    assert tab.get_attribute("html", "data-theme") != before
+    assert tab.evaluate("getComputedStyle(document.body).margin") == "0px"
+    context.close()
+    assert faults == []
+
+
 def own(url: str, address: str) -> bool:
     """Whether a request leaves the file."""
     return url.partition("#")[0] != address and not url.startswith("data:")

@@ -32,7 +32,28 @@ def test_the_answer_is_the_computed_one(page: str) -> None:
     assert told is not None
     sentences = re.findall(r"<li>(.*?)</li>", told[1])
     assert [unescape(one) for one in sentences] == [signed(one) for one in results().answer]
-    assert len(sentences) == 3
+    assert len(sentences) == 4
+
+
+def test_every_headline_of_a_claim_names_its_scope(page: str) -> None:
+    comparison = results().comparison
+    for one in results().answer[:3]:
+        assert "configurations of table 2" in one or "mean of all 16 configurations" in one
+        assert f"over {len(comparison.seeds)} seeds" in one
+        assert all(setting in one for setting in comparison.delivery_settings)
+    above = page[page.index('<section id="answer">') : page.index('<ol class="answer">')]
+    assert f"World: {comparison.world}." in unescape(above)
+
+
+def test_the_mean_is_told_with_its_own_difference(page: str) -> None:
+    """The contrast that decides by the mean may be another one than that by the IQM."""
+    told = 0
+    for findings in results().audit.values():
+        for one in findings.values():
+            if one.by_mean and one.by_mean.verdict is not one.verdict:
+                words = f"by the mean {one.by_mean.verdict.value}: {one.by_mean.contrast.label}: "
+                told += escape(words) in page
+    assert told > 0
 
 
 def test_both_deliveries_are_explained_before_the_answer(page: str) -> None:

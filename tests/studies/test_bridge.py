@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
+from taichi_ants import Colony, TrainingConfig
 from taichi_ants.analysis.bridge import (
     BRIDGES,
     DESIGNS,
     EQUAL,
+    LATE,
     SHORT_LEFT,
     SHORT_RIGHT,
     WINDOWS,
     Design,
 )
 from taichi_ants.engines.colony.layout import AntRow
+from taichi_ants.learners.policies import trail_follower
 from taichi_ants.studies.bridge import bridges, crossings, point, task
 from taichi_ants.worlds.double_bridge import branch_cells, double_bridge, junction_cells
 
@@ -70,6 +74,23 @@ def test_an_ant_crosses_when_it_comes_to_the_other_room_by_its_last_branch() -> 
     assert found.sum() == 3
 
 
+@pytest.mark.parametrize("opens", [0, 301])
+def test_nobody_takes_the_short_branch_before_it_opens(opens: int) -> None:
+    place, ticks = double_bridge(**BRIDGE), 602
+    training = TrainingConfig("sarsa", 0.1, 0.9, epsilon=0.02, epsilon_decay=1.0)
+    follow = {"sharing": "fixed", "q_values": trail_follower("queues"), "schedule": "by_world"}
+    colony = Colony(place, task(Design()), training, [3], 12, **follow)
+    found = crossings(colony, BRIDGE, ticks, opens)
+    before, after = found[: WINDOWS // 2].sum(axis=(0, 1, 3)), found[5:].sum(axis=(0, 1, 3))
+    assert colony.ticks == ticks
+    assert after[0] > 10
+    assert (before[0] == 0) == (opens > 0)
+    if opens:
+        assert before[1] > 10
+    short = place.grid.index(branch_cells(**BRIDGE)[0])
+    assert not (colony.arrays["walls"][short]).any()
+
+
 def test_colonies_learn_where_the_short_branch_lies_on_either_side() -> None:
     one = point(Design(), episodes=60, ticks=10)
     assert one.pool == (double_bridge(aside=1), double_bridge(mirrored=True, aside=1))
@@ -89,5 +110,6 @@ def test_a_design_is_a_task_and_bridges() -> None:
     assert task(Design(evaporation="20")).pheromone.half_life == 20
     assert task(Design(evaporation="none")).pheromone.evaporation == "none"
     assert tuple(bridges(Design())) == BRIDGES
-    assert tuple(bridges(Design(aside=0))) == (SHORT_RIGHT, SHORT_LEFT, EQUAL)
+    assert tuple(bridges(Design(aside=0))) == (SHORT_RIGHT, SHORT_LEFT, EQUAL, LATE)
+    assert LATE not in bridges(Design(ants=8))
     assert bridges(Design())[EQUAL].get("aside", 0) == 0

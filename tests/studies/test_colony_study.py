@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from taichi_ants import AntsError, TrainingConfig, worlds
+from taichi_ants.analysis.bounds.limits import limits_of
 from taichi_ants.analysis.colony.study import ARENAS, ELSEWHERES, Condition
-from taichi_ants.studies.colony_study import COMPARED, POOL, TASKS, plan
+from taichi_ants.studies.colony_study import (
+    COMPARED,
+    POOL,
+    TASKS,
+    bounds_of,
+    greedy,
+    measured,
+    plan,
+    study_of,
+)
 
 SARSA = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 1.0, 0.01)
 SEEDS = (3, 4)
@@ -52,6 +63,37 @@ def test_epsilon_and_learning_rate_fall_in_the_first_70_percent(planned) -> None
         epsilon, rate = training.next_epsilon(epsilon), training.next_learning_rate(rate)
     assert (epsilon, rate) == pytest.approx((0.01, 0.01))
     assert training.next_epsilon(epsilon) == pytest.approx(0.01)
+
+
+def test_every_condition_is_evaluated_without_exploration_too(planned) -> None:
+    points = set(study_of(planned, SEEDS).points)
+    for point in planned.values():
+        calm = greedy(point)
+        assert {point, calm} <= points
+        assert (calm.training.min_epsilon, calm.episodes) == (0, 0)
+        assert calm.after == (point.after or point)
+        assert (calm.world, calm.task, calm.ants) == (point.world, point.task, point.ants)
+
+
+def test_a_colony_is_held_against_the_bound_of_its_own_world(planned) -> None:
+    one = Condition("piles", "queueing", "joint", 64)
+    elsewhere = Condition("moving", "queueing", "open", 64)
+    conditions = {condition: planned[condition] for condition in (one, elsewhere)}
+    point = planned[one]
+    expected = [limits_of(world, point.task).deliveries(64) for world in point.world]
+    bounds = bounds_of(conditions, len(SEEDS))
+    assert bounds[one].tolist() == expected
+    assert expected[0] != expected[1]
+    assert np.isnan(bounds[elsewhere]).all()  # the limits do not hold where food moves
+    ones = np.ones((len(SEEDS), 1), np.int64)
+    names = ("deliveries", "first_delivery", "moves", "blocked", "returns")
+    counts = {which: dict.fromkeys(names, n * ones) for which, n in (("", 700), ("calm", 800))}
+    outcomes = dict.fromkeys(conditions.values(), counts[""])
+    outcomes |= {greedy(p): counts["calm"] for p in conditions.values()}
+    found = measured(conditions, outcomes, SEEDS)
+    assert found[one]["greedy"].tolist() == [800, 800]
+    assert found[one]["of_bound"] == pytest.approx(700 / np.array(expected))
+    assert np.isnan(found[elsewhere]["of_bound"]).all()
 
 
 def test_an_unknown_arena_is_named() -> None:

@@ -6,7 +6,6 @@ from functools import cache
 
 import numpy as np
 from synthetic_colony_study import build as build_study
-from synthetic_colony_study import limits
 from synthetic_comparison import build, change, unchanged
 
 from taichi_ants import Colony, Task, TrainingConfig, worlds
@@ -65,8 +64,8 @@ def study_results() -> StudyResults:
     def truth(rules: str, way: str, ants: int) -> float:
         return 20.0 * ants * (2 if rules in ("foraging", "queueing") and ants > 1 else 1)
 
-    measured = build_study(truth, seeds=6, arenas=("paper", "open", "small"))
-    return StudyResults.of(measured, limits(measured))
+    measured = build_study(truth, seeds=12, arenas=("paper", "open", "small"))
+    return StudyResults.of(measured)
 
 
 @cache

@@ -11,11 +11,6 @@ from taichi_ants.analysis.colony.study import RULES, WAYS, Condition, Measured
 SIZES = (1, 2, 4, 8)
 
 
-def limits(study: Measured) -> dict[Condition, float]:
-    """No colony delivers more than 25 for each ant."""
-    return {condition: 25.0 * condition.ants for condition in study}
-
-
 # (rules, way, ants) -> deliveries per 1000 ticks of the whole colony.
 Truth = Callable[[str, str, int], float]
 
@@ -39,6 +34,8 @@ def build(
 ) -> Measured:
     """A study in which all is as the truth says, but for noise of the given standard deviation.
 
+    No colony delivers more than 25 for each ant.
+
     Args:
         truth: Deliveries per 1000 ticks.
         seeds, sizes, ways, rules, arenas: The conditions.
@@ -56,6 +53,9 @@ def build(
                     deliveries = truth(one, way, ants) * spread
                     measured[Condition(arena, one, way, ants)] = {
                         "deliveries": deliveries,
+                        "greedy": 1.5 * deliveries,
+                        "bound": np.full(seeds, 25.0 * ants),
+                        "of_bound": deliveries / (25.0 * ants),
                         "per_ant": deliveries / ants,
                         "first_delivery": np.full(seeds, float(first(ants))),
                         "fruitless": np.zeros(seeds),

@@ -61,15 +61,19 @@ def test_an_observation_of_ones_own_is_known_by_its_name():
     mine = observations.register(Observation("mine", 1, always_zero))
     assert observations.get("mine") is mine
     assert Task("mine").n_states == 1
-    with pytest.raises(AntsError, match=r"'mine' cannot name an observation; use a new one"):
-        observations.register(mine)
+    again = observations.register(Observation("mine", 2, always_zero))  # one's own is replaced
+    assert (observations.get("mine"), Task("mine").n_states) == (again, 2)
+    assert observations.names().count("mine") == 1
 
 
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"name": "two words"}, "'two words' cannot name an observation"),
-        ({"name": "paper"}, "'paper' cannot name an observation; use a new one"),
+        ({"name": "two words"}, "the name of the observation is 'two words'; it must"),
+        (
+            {"name": "paper"},
+            "'paper' is the name of a built-in observation, which",
+        ),
         ({"n_states": 0}, "n_states of 'mine' is 0; it must lie between 1"),
         ({"row": 3}, "row of 'mine' is 3; it must be a function of one argument"),
         ({"row": lambda look, more: 0}, "it must be a function of one argument"),

@@ -409,6 +409,87 @@ def test_fingers_tap_and_pinch(browser, colony):
     phone.close()
 
 
+def test_a_page_on_which_nothing_changes_rests(ant):
+    frames = """() => { let n = 0; const next = window.requestAnimationFrame;
+      window.requestAnimationFrame = (act) => { n++; return next(act); };
+      return new Promise((done) => setTimeout(() => done(n), 300)); }"""
+    ant.settle()
+    assert ant.read(frames) == 0
+    ant.tab.keyboard.press("Space")
+    assert ant.read(frames) > 2
+    ant.tab.keyboard.press("Space")
+    ant.settle()
+
+
+def test_food_is_a_dot_with_a_ring_where_cells_are_small(browser, folder):
+    """A trail may be as light as food; the ring is lighter then."""
+    world = World((60, 60, 60), (0, 0, 0), foods=[(30, 0, 0)], trails=[((29, 0, 0), 250)])
+    many = Colony(world, Task(), TrainingConfig("sarsa", 0.1, 0.9, 0.1, 0.9), ants=1)
+    many.begin_episode()
+    page = Page(browser, written(folder, "small", record_colony(many)))
+    assert page.read("viewer.stage.camera.scale < 6")
+    names = page.read(
+        """cell => { const { stage } = viewer, { colours, ratio } = stage;
+          const [x, y] = stage.toPage(viewer.history.grid.centre(cell)), found = [];
+          for (let k = 0; k < 81; k++) {
+            const across = k % 9 - 4, up = Math.floor(k / 9) - 4;
+            const { data } = stage.context.getImageData(x * ratio + across, y * ratio + up, 1, 1);
+            const same = (colour) => bytesOf(colour).every((byte, i) => byte === data[i]);
+            found.push(Object.keys(colours).find((name) => same(colours[name])));
+          }
+          return found; }""",
+        int(world.grid.index((30, 0, 0))),
+    )
+    assert {"food", "food-floor"} <= set(names)
+    page.close()
+
+
+def test_large_numbers_keep_apart(ant):
+    ant.read("() => { viewer.history.frames[0].returns = 30779170; viewer.player.go(0); }")
+    ant.settle()
+    shown = ant.tab.inner_text("#now").replace("\N{NARROW NO-BREAK SPACE}", " ")
+    assert "30 779 170" in shown
+    boxes = ant.read(
+        """[...document.querySelectorAll("#now dd")].map((one) => {
+          const range = document.createRange();
+          range.selectNodeContents(one);
+          const { left, right, top } = range.getBoundingClientRect();
+          return [Math.round(top), left, right]; })"""
+    )
+    for (row, _, right), (other, left, _) in pairwise(boxes):
+        assert row != other or right + 6 < left
+
+
+def test_the_panel_shows_what_an_ant_with_food_sees(ant, episode):
+    """It sees no trails: the cells in its view look so, and the panel says why."""
+    fills = """[...document.querySelectorAll(".sees g text")].map((it) =>
+        it.previousElementSibling.getAttribute("fill"))"""
+    moment = int(np.flatnonzero(episode[1].states >= 64)[3])
+    ant.read("moment => viewer.player.go(moment)", moment)
+    ant.settle()
+    ant.read("() => { viewer.history.world.trail.fill(100); viewer.draw(0, false); }")
+    letters = ant.text("#ant b").split()[1:]
+    colours = {"E": "var(--empty)", "O": "var(--rock)", "S": "var(--empty)"}
+    assert ant.read(fills) == [colours[letter] for letter in letters]
+    assert "an ant with food sees no trails" in ant.text("#ant")
+    ant.read("() => { viewer.history.kept = []; viewer.history.world.moment = 1e9; }")
+
+
+def test_a_page_is_printed_light_and_without_controls(browser, episode):
+    dark = Page(browser, episode[0], color_scheme="dark")
+    dark.tab.emulate_media(media="print", color_scheme="dark")
+    dark.read("dispatchEvent(new Event('beforeprint'))")
+    assert dark.read("document.documentElement.dataset.theme") == "light"
+    assert dark.read("viewer.stage.colours.page") == "#ffffff"
+    for hidden in ("#play", "#time", "#theme", "#zoom-in", "#hint", "#ant-close"):
+        assert dark.tab.is_hidden(hidden), hidden
+    for shown in ("#world", "#now", "#ant", "#curves", "#legend"):
+        assert dark.tab.is_visible(shown), shown
+    dark.read("dispatchEvent(new Event('afterprint'))")
+    assert dark.read("document.documentElement.dataset.theme") == "dark"
+    dark.close()
+
+
 def test_light_and_dark(browser, episode):
     dark = Page(browser, episode[0], color_scheme="dark")
     look = "document.documentElement.dataset.theme"
@@ -464,6 +545,23 @@ def test_cells_have_the_colours_of_what_they_hold(crowd, colony):
         if true.ground[cell] == 0 and true.trail[cell] >= 1:
             expected = ramp[math.floor(min(float(true.trail[cell]) / 250, 1) * 255 + 0.5)]
         assert colour == [*expected, 255]
+
+
+def test_the_page_works_under_its_policy(browser, colony):
+    """And text that somebody has smuggled in as a script does not run."""
+    path, *_ = colony
+    text = path.read_text(encoding="utf-8")
+    evil = path.with_name("evil.html")
+    evil.write_text(text.replace("</main>", "<script>document.title = 'evil'</script></main>"))
+    for file, refused in ((path, 0), (evil, 1)):
+        faults, context = [], browser.new_context(offline=True)
+        tab = context.new_page()
+        tab.on("console", lambda message, faults=faults: faults.append(message.text))
+        tab.goto(file.as_uri())
+        tab.locator("#now dd").first.wait_for()
+        assert tab.title() != "evil"
+        context.close()
+        assert len(faults) == refused
 
 
 def test_a_source_can_be_live(browser, folder, colony):
@@ -570,7 +668,14 @@ def test_the_script_is_whole():
         assert f"class {name} " in whole or name in (
             *("Path2D", "Map", "Set", "Blob", "Response", "DataView", "TextDecoder"),
             *("DecompressionStream", "Uint8Array", "Uint32Array", "Int32Array", "Float32Array"),
-            *("ResizeObserver", "AbortController", "Promise", "Error"),
+            *(
+                "TextEncoder",
+                "CompressionStream",
+                "ResizeObserver",
+                "AbortController",
+                "Promise",
+                "Error",
+            ),
         )
 
 

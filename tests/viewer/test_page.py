@@ -86,6 +86,9 @@ def test_text_can_be_read_and_ants_stand_out(theme):
     for cell in (values["empty"], *values["trail"].split()):
         # Where the trail comes near the colour of ants, the edge around them sets them apart.
         assert max(contrast(values[name], cell) for name in ("ant", "halo")) > 3
+    for trail in values["trail"].split():  # food in small cells is a dot with a ring
+        assert max(contrast(values[name], trail) for name in ("food", "food-floor")) > 1.75
+    assert contrast(values["food"], values["food-floor"]) > 2.9
     levels = [luminance(colour) for colour in values["trail"].split()]
     assert levels == sorted(levels, reverse=theme == 0)
 

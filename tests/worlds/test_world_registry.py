@@ -38,11 +38,11 @@ def test_names_and_seeds() -> None:
     assert worlds.build("paper", 3) == worlds.paper()
 
 
-def test_a_name_is_given_once() -> None:
+def test_worlds_of_ones_own_are_replaced_and_built_in_ones_are_not() -> None:
+    worlds.register("tiny", lambda seed: worlds.paper())
     worlds.register("tiny", tiny)
-    with pytest.raises(AntsError, match="'tiny' is already registered"):
-        worlds.register("tiny", tiny)
-    with pytest.raises(AntsError, match="'paper' is already registered"):
+    assert worlds.build("tiny") == tiny(0)
+    with pytest.raises(AntsError, match="'paper' is the name of a built-in world, which cannot be"):
         worlds.register("paper", tiny)
 
 

@@ -13,7 +13,7 @@ from taichi_ants.analysis.colony.study import (
     Design,
     Measured,
 )
-from taichi_ants.analysis.findings import LEAST_SEEDS, Verdict, too_few
+from taichi_ants.analysis.findings import Verdict, too_few
 from taichi_ants.analysis.tables import figure, joined
 from taichi_ants.errors import count
 
@@ -35,7 +35,7 @@ _WHERE = {
     "piles": "with three far piles",
 }
 assert _WHERE.keys() == ARENAS.keys()
-_OPEN = (Verdict.UNDECIDED, Verdict.EQUIVALENT)
+_OPEN = (Verdict.UNDECIDED, Verdict.EQUIVALENT, Verdict.TOO_FEW)
 
 
 def answer(measured: Measured, judged: Judged) -> list[str]:
@@ -75,12 +75,10 @@ def _told(measured: Measured, judged: Judged, series: Series, who: str, than: st
         for verdict, more in ((Verdict.SUPPORTED, "more"), (Verdict.CONTRADICTED, "less"))
         if verdict in places
     ]
-    seeds = len(measured[next(iter(measured))][series.measure])
-    few = seeds < LEAST_SEEDS
-    if not known and few:
+    if Verdict.TOO_FEW in places:
+        seeds = len(measured[next(iter(measured))][series.measure])
         return f"{too_few(seeds)} {ants} deliver more {than}: {still}."
     if not known:
         return f"Whether {ants} deliver more {than} stays open: {still}."
-    stays_open = f"{count(seeds, 'seed')} leave it open" if few else "the difference stays open"
-    more = f"; {stays_open}: {still}" if still else ""
+    more = f"; the difference stays open: {still}" if still else ""
     return f"{ants} deliver {'; '.join(known)}{more}."

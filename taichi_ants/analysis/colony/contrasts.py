@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Literal
 
@@ -22,7 +22,7 @@ from taichi_ants.analysis.colony.study import (
     Design,
     Measured,
 )
-from taichi_ants.analysis.findings import Contrast, Finding, above, judge
+from taichi_ants.analysis.findings import LEAST_SEEDS, Contrast, Finding, Verdict, above, judge
 
 # Numbers of ants, of the first and of the second condition of a difference.
 Sizes = tuple[int, int]
@@ -121,7 +121,10 @@ Judged = dict[tuple[str, Series], dict[Sizes, Finding]]
 
 
 def judge_all(measured: Measured) -> Judged:
-    """The findings on all contrasts; those of one question in one arena are judged together."""
+    """Return the findings on all contrasts; those of one question in one arena are judged together.
+
+    With fewer than `LEAST_SEEDS` seeds none has a verdict.
+    """
     judged: Judged = {}
     for arena in dict.fromkeys(one.arena for one in measured):
         for question in QUESTIONS:
@@ -133,5 +136,7 @@ def judge_all(measured: Measured) -> Judged:
             }
             findings = judge(list(contrasts.values()))
             for (series, sizes), finding in zip(contrasts, findings, strict=True):
+                if finding.contrast.seeds < LEAST_SEEDS:
+                    finding = replace(finding, verdict=Verdict.TOO_FEW)
                 judged.setdefault((arena, series), {})[sizes] = finding
     return judged

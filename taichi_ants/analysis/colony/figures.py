@@ -13,6 +13,7 @@ from taichi_ants.analysis.colony.study import (
     ALONE,
     ARENAS,
     BC,
+    EVALUATION_EPSILON,
     FEW,
     JOINT,
     MEASURES,
@@ -24,6 +25,7 @@ from taichi_ants.analysis.colony.study import (
     A,
     Design,
 )
+from taichi_ants.analysis.findings import seeds_in_words
 from taichi_ants.analysis.sweeps import draw_lines
 from taichi_ants.analysis.tables import sentence
 
@@ -100,18 +102,24 @@ def _dots(rows: Rows, designs: Sequence[Design], title: str) -> Figure | None:
             axis.set_axis_off()
         ants = sorted({int(row["ants"]) for lines in panels.values() for row in lines.values()})
         sizes = f"{' or '.join(map(str, ants))} {'ant' if ants == [1] else 'ants'}"
-        caption = f"{sizes}. {_spread(rows)} Grey bar: no colony can deliver more."
-        style.frame(figure, f"{title}: {MEASURES['deliveries']}", caption, {})
+        caption = (
+            f"{sizes}. {_spread(rows)} Thin line: from the worst seed to the best. Grey: the "
+            "bounds of the worlds, from the lowest to the highest; bar: their mean."
+        )
+        title = f"{title}: {MEASURES['deliveries']}"
+        style.frame(figure, title, textwrap.fill(caption, 120), {})
     return figure
 
 
 def _dot(axis: Axes, place: int, row: Mapping) -> None:
-    """The mean with its interval and its value, and the most possible where it is known."""
+    """The mean with its interval, value and range over seeds, and the bounds where known."""
     mean, low, high = (row[f"deliveries_{end}"] for end in ("mean", "ci_low", "ci_high"))
     colour = style.COLOURS[place % len(style.COLOURS)]
-    axis.hlines(place, low, high, color=colour)
+    axis.hlines(place, low, high, color=colour, lw=3)
     axis.plot(mean, place, "o", color=colour)
-    axis.plot(row["deliveries_limit"], place, "|", color=style.GREY, ms=12, mew=2)
+    axis.hlines(place, row["deliveries_min"], row["deliveries_max"], color=colour, lw=0.8)
+    axis.hlines(place, row["bound_min"], row["bound_max"], color=style.GREY, lw=3, alpha=0.5)
+    axis.plot(row["bound_mean"], place, "|", color=style.GREY, ms=12, mew=2)
     axis.annotate(
         f"{mean:.0f}", (mean, place), (0, 5), textcoords="offset points", ha="center", fontsize=8
     )
@@ -141,8 +149,10 @@ def _lines(
 
 
 def _spread(rows: Rows) -> str:
-    seeds = rows[0]["seeds"]
-    return f"Means over {seeds:g} seeds with 95 % intervals." if seeds > 1 else "One seed."
+    """The seeds, the intervals and the exploration rate, for a caption."""
+    seeds = int(rows[0]["seeds"])
+    means = f"Means over {seeds_in_words(seeds)}, with 95 % intervals" if seeds > 1 else "One seed"
+    return f"{means}. Exploration rate {EVALUATION_EPSILON:g}."
 
 
 def _points(rows: Rows, design: Design, measure: str) -> list[tuple[float, ...]]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from taichi_ants.analysis.colony.answer import answer
 from taichi_ants.analysis.colony.contrasts import Judged, judge_all
-from taichi_ants.analysis.colony.study import MEASURES, Condition, Measured
+from taichi_ants.analysis.colony.study import OF_STUDY, Condition, Measured
 from taichi_ants.analysis.colony.tables import condition_rows
 
 
@@ -27,26 +27,24 @@ class Results(NamedTuple):
     answer: Sequence[str]
 
     @classmethod
-    def of(cls, measured: Measured, most: Mapping[Condition, float]) -> Results:
-        """The results of all measures, and of the most that colonies can deliver."""
+    def of(cls, measured: Measured) -> Results:
+        """Return the results that follow from all measures."""
         judged = judge_all(measured)
-        return cls(condition_rows(measured, most), judged, answer(measured, judged))
+        return cls(condition_rows(measured), judged, answer(measured, judged))
 
     @classmethod
-    def read(cls, seeds: Sequence[Mapping], conditions: Sequence[Mapping]) -> Results:
-        """The same from the rows of seeds.csv and of conditions.csv."""
+    def read(cls, seeds: Sequence[Mapping]) -> Results:
+        """Return the same from the rows of seeds.csv."""
         values: dict[Condition, dict[str, list[float]]] = {}
         for row in seeds:
-            of_seeds = values.setdefault(_condition(row), {name: [] for name in MEASURES})
-            for name in MEASURES:
+            of_seeds = values.setdefault(_condition(row), {name: [] for name in OF_STUDY})
+            for name in OF_STUDY:
                 of_seeds[name].append(row[name])
-        limits = {_condition(row): row["deliveries_limit"] for row in conditions}
-        most = {one: np.nan if limit is None else limit for one, limit in limits.items()}
-        measured = {
-            one: {name: np.array(numbers) for name, numbers in of_seeds.items()}
+        measured = {  # an empty field is None, which is nan as a float
+            one: {name: np.array(numbers, float) for name, numbers in of_seeds.items()}
             for one, of_seeds in values.items()
         }
-        return cls.of(measured, most)
+        return cls.of(measured)
 
 
 def _condition(row: Mapping) -> Condition:

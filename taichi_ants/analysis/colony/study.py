@@ -78,7 +78,8 @@ class Condition(NamedTuple):
     ants: int
 
 
-# What is measured, with the words of tables.
+EVALUATION_EPSILON = 0.01  # the exploration rate of the evaluation
+# Measures of a colony, with their names in tables.
 MEASURES: dict[str, str] = {
     "deliveries": "deliveries per 1000 ticks",
     "per_ant": "deliveries per ant and 1000 ticks",
@@ -87,12 +88,19 @@ MEASURES: dict[str, str] = {
     "blocked": "share of blocked moves",
     "reward": "reward per ant and 1000 ticks",
 }
-# Measures of each seed, float64 (seeds,), by their names in `MEASURES`.
+# Those of the study, which also evaluates without exploration and knows bounds of its worlds.
+OF_STUDY: dict[str, str] = {
+    **MEASURES,
+    "greedy": "deliveries per 1000 ticks without exploration",
+    "bound": "most deliveries per 1000 ticks that are possible in the world of the seed",
+    "of_bound": "deliveries as a share of that bound",
+}
+# Measures of each seed, float64 (seeds,), by their names in `OF_STUDY`.
 Measured = Mapping[Condition, Mapping[str, np.ndarray]]
 
 
 def measures_of(outcome: Mapping[str, np.ndarray], ants: int, ticks: int) -> dict[str, np.ndarray]:
-    """All measures of each seed, float64 (seeds,).
+    """Return the `MEASURES` of each seed, float64 (seeds,).
 
     An episode without a delivery counts with all its ticks for `first_delivery`: the mean is that
     of the time to the first delivery or the end, whichever comes first (the restricted mean of

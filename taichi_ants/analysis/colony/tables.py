@@ -14,7 +14,9 @@ from taichi_ants.analysis.colony.study import (
     ABROAD,
     ALONE,
     ARENAS,
+    EVALUATION_EPSILON,
     MEASURES,
+    OF_STUDY,
     PAPER,
     RULES,
     WAYS,
@@ -23,9 +25,18 @@ from taichi_ants.analysis.colony.study import (
     Design,
     Measured,
 )
-from taichi_ants.analysis.findings import Finding, Verdict, weakest
+from taichi_ants.analysis.findings import Finding, Verdict, seeds_in_words, weakest
 from taichi_ants.analysis.sweeps import seed_rows, summary_rows
-from taichi_ants.analysis.tables import MISSING, Block, Table, figure, number, sentence
+from taichi_ants.analysis.tables import (
+    MISSING,
+    Block,
+    Table,
+    figure,
+    interval,
+    number,
+    percent,
+    sentence,
+)
 from taichi_ants.errors import count
 
 
@@ -36,16 +47,19 @@ def rows_of_seeds(measured: Measured, seeds: Sequence[int]) -> list[dict[str, An
 
 def _stacked(measured: Measured) -> dict[str, np.ndarray]:
     """The measures as arrays (conditions, seeds)."""
-    return {name: np.stack([one[name] for one in measured.values()]) for name in MEASURES}
+    return {name: np.stack([one[name] for one in measured.values()]) for name in OF_STUDY}
 
 
-def condition_rows(measured: Measured, most: Mapping[Condition, float]) -> list[dict[str, Any]]:
-    """The rows of conditions.csv: means over seeds with 95 % intervals, and the most possible."""
+def condition_rows(measured: Measured) -> list[dict[str, Any]]:
+    """Return the rows of conditions.csv: means over seeds with 95 % intervals, and some ranges."""
     rows = summary_rows([one._asdict() for one in measured], _stacked(measured))
-    return [
-        {**row, "deliveries_limit": most[condition]}
-        for row, condition in zip(rows, measured, strict=True)
-    ]
+    for row, values in zip(rows, measured.values(), strict=True):
+        for name in ("deliveries", "bound"):
+            row |= {
+                f"{name}_min": float(values[name].min()),
+                f"{name}_max": float(values[name].max()),
+            }
+    return rows
 
 
 def difference_rows(judged: Judged) -> list[dict[str, Any]]:
@@ -69,39 +83,64 @@ def difference_rows(judged: Judged) -> list[dict[str, Any]]:
 
 
 def means(rows: Sequence[Mapping[str, Any]]) -> list[Table]:
-    """Mean deliveries, from `condition_rows`: a table for each arena in which ants were trained,
-    designs down, ants across; then one of the policies of open worlds in others.
+    """Return tables of mean deliveries, from `condition_rows`.
+
+    One for each arena in which ants were trained, designs down, ants across; then one of the
+    policies of open worlds in others, with intervals and the worst seed.
     """
-    tables, seeds = [], f"{count(rows[0]['seeds'], 'seed')}: {MEASURES['deliveries']}"
+    tables, seeds = [], f"{_basis(rows)}: {MEASURES['deliveries']}"
     for arena in ARENAS:
         at_home = [row for row in rows if row["arena"] == arena and row["way"] != ABROAD]
         sizes = sorted({row["ants"] for row in at_home})
         lines: dict[str, dict[Any, float]] = {}
         for row in at_home:
             line = lines.setdefault(Design(row["rules"], row["way"]).words, {})
-            line |= {row["ants"]: row["deliveries_mean"], "limit": row["deliveries_limit"]}
+            share = {"share": row["of_bound_mean"], "bound": row["bound_mean"]}
+            line |= {row["ants"]: row["deliveries_mean"], **share}  # of most ants, who come last
         cells = [
-            [who, *(figure(by.get(n, np.nan)) for n in (*sizes, "limit"))]
+            [
+                *(who, *(figure(by.get(n, np.nan)) for n in sizes)),
+                *(percent(by["share"]), figure(by["bound"])),
+            ]
             for who, by in lines.items()
         ]
-        headers = ("ants", *map(str, sizes), "limit")
         if cells:
-            tables.append(Table(f"{sentence(ARENAS[arena])}, {seeds}", headers, cells))
+            headers = ("ants", *map(str, sizes), "share of\nbound", "mean\nbound")
+            note = (
+                f"Of {count(sizes[-1], 'ant')}: the mean share of each world's own bound, and the "
+                "mean of the bounds."
+            )
+            title = f"{sentence(ARENAS[arena])}, {seeds}"
+            tables.append(Table(title, headers, cells, [note]))
     abroad = [row for row in rows if row["way"] == ABROAD]
     if abroad:
         rules = list(dict.fromkeys(row["rules"] for row in abroad))
-        there: dict[str, dict[str, float]] = {}
+        there: dict[str, dict[str, str]] = {}
         for row in abroad:
-            there.setdefault(row["arena"], {})[row["rules"]] = row["deliveries_mean"]
-        cells = [[WORLDS[a], *(figure(by[one]) for one in rules)] for a, by in there.items()]
+            there.setdefault(row["arena"], {})[row["rules"]] = _spread(row)
+        cells = [[WORLDS[a], *(by[one] for one in rules)] for a, by in there.items()]
         headers = ("world", *(RULES[one] for one in rules))
         title = f"{sentence(WAYS[ABROAD])}, {count(abroad[0]['ants'], 'ant')}, {seeds}"
-        tables.append(Table(title, headers, cells))
+        note = "Mean, its 95 % interval, and the worst seed."
+        tables.append(Table(title, headers, cells, [note]))
     return tables
 
 
+def _basis(rows: Sequence[Mapping[str, Any]]) -> str:
+    """The seeds and the exploration rate behind the numbers of a table."""
+    return f"{seeds_in_words(rows[0]['seeds'])}, exploration rate {EVALUATION_EPSILON:g}"
+
+
+def _spread(row: Mapping[str, Any]) -> str:
+    """A mean with its interval, and the worst seed."""
+    mean, *ends, worst = (
+        row[f"deliveries_{which}"] for which in ("mean", "ci_low", "ci_high", "min")
+    )
+    return f"{figure(mean)} {interval(ends[0], ends[1], 0)}, {figure(worst)}"
+
+
 def glance(rows: Sequence[Mapping[str, Any]]) -> Table:
-    """What the largest colonies deliver, from `condition_rows`: designs down, arenas across.
+    """Return what the largest colonies deliver, from `condition_rows`: designs down, arenas across.
 
     It has no rows where none are trained.
     """
@@ -116,18 +155,30 @@ def glance(rows: Sequence[Mapping[str, Any]]) -> Table:
         for one in designs
         if any((arena, one) in by_place for arena in arenas)
     ]
-    most = [
-        max(row["deliveries_limit"] for row in shown if row["arena"] == arena) for arena in arenas
-    ]
-    if cells:
-        cells.append(["No colony can deliver more than", *map(figure, most)])
+    if cells:  # most is possible where ants with food have right of way
+        most = [
+            max((row for row in shown if row["arena"] == arena), key=lambda row: row["bound_mean"])
+            for arena in arenas
+        ]
+        cells.append(["Mean bound, right of way [range]", *map(_bounds, most)])
     headers = ("", *(sentence(ARENAS[arena]).replace(" (", "\n(") for arena in arenas))
     title = f"{sentence(MEASURES['deliveries'])} of {count(largest, 'ant')}"
-    return Table(title, headers, cells)
+    note = f"{_basis(rows)}; in brackets: 0. %: of each world's own bound."
+    return Table(title, headers, cells, [note] if cells else [])
 
 
 def _delivered(row: Mapping[str, Any] | None, digits: int) -> str:
-    return MISSING if row is None else number(row["deliveries_mean"], digits)
+    """Deliveries with and without exploration, and the share of the bounds."""
+    if row is None:
+        return MISSING
+    with_, without = (number(row[f"{name}_mean"], digits) for name in ("deliveries", "greedy"))
+    return f"{with_} ({without}), {percent(row['of_bound_mean'])}"
+
+
+def _bounds(row: Mapping[str, Any]) -> str:
+    """The mean of the worlds' bounds, with their range where they differ."""
+    low, high = row["bound_min"], row["bound_max"]
+    return figure(row["bound_mean"]) + ("" if low == high else f" {interval(low, high, 0)}")
 
 
 def on_one_screen(
@@ -142,7 +193,7 @@ def on_one_screen(
 def _sizes(rows: Sequence[Mapping[str, Any]]) -> str:
     arenas = dict.fromkeys(row["arena"] for row in rows)
     conditions = f"{count(len(rows), 'condition')} in {count(len(arenas), 'kind')} of world"
-    return f"{conditions}, {count(rows[0]['seeds'], 'seed')}."
+    return f"{conditions}, {seeds_in_words(rows[0]['seeds'])}."
 
 
 def tallies(judged: Judged) -> str:
@@ -171,8 +222,10 @@ _HEADERS = ("World", "Statement", *(f"{sentence(one)}\nwith" for one in _SHOWN),
 
 
 def found(measured: Measured, judged: Judged) -> list[Block]:
-    """The findings: a table for each question, with a line for each series in each arena."""
+    """Return the findings: a table for each question, a line for each series in each arena."""
     blocks: list[Block] = []
+    seeds = len(measured[next(iter(measured))]["deliveries"])
+    basis = f"{seeds_in_words(seeds)}, exploration rate {EVALUATION_EPSILON:g}"
     for question in QUESTIONS:
         lines, units, shown = [], [], ""
         for (arena, series), findings in judged.items():
@@ -182,7 +235,8 @@ def found(measured: Measured, judged: Judged) -> list[Block]:
                 lines.append([world, sentence(series.statement), *verdicts])
                 units.append(MEASURES[series.measure])
                 shown = arena
-        notes = [f"{sentence(' or '.join(dict.fromkeys(units)))}, as the statement says."]
+        what = f"{sentence(' or '.join(dict.fromkeys(units)))}, as the statement says"
+        notes = [f"{what}; {basis}."]
         if lines:
             blocks.append(Table(question, _HEADERS, lines, notes, text_columns=len(_HEADERS)))
     return [

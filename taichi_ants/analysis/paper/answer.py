@@ -1,30 +1,57 @@
-"""The comparison in three sentences: who returns most, who needs the fewest steps, what ants do."""
+"""The comparison in a few sentences: who returns most, who needs the fewest steps, what ants do.
+
+Each sentence about a claim names its configurations, its deliveries and its number of seeds.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from taichi_ants.analysis.behaviour import CIRCLES, DELIVERS, OTHER, WALKS, counts
 from taichi_ants.analysis.findings import LEAST_SEEDS, Finding, Verdict, too_few
 from taichi_ants.analysis.paper.audit import Audit
 from taichi_ants.analysis.paper.claims import Claim
 from taichi_ants.analysis.paper.comparison import Comparison, Variant
+from taichi_ants.analysis.paper.published import GRID
 from taichi_ants.analysis.tables import figure, joined, number, percent, sentence, thousands
 from taichi_ants.errors import count
 
-# The claims that answer the question, each as said where it holds and where it does not.
+
+class _Headline(NamedTuple):
+    """A claim in few words: where it holds, where it does not, and its configurations."""
+
+    holds: str
+    fails: str
+    where: str
+
+
+_TABLE_2 = "at the configurations of table 2"
+# The claims that answer the question. Two of them are about steps, because they disagree.
 _CLAIMS = {
-    "q-return-highest": ("Q-learning returns most", "Q-learning does not return most"),
-    "overall-sarsa-length": ("SARSA needs the fewest steps", "SARSA does not need the fewest"),
+    "q-return-highest": _Headline(
+        "Q-learning returns most", "Q-learning does not return most", _TABLE_2
+    ),
+    "overall-sarsa-length": _Headline(
+        "SARSA needs the fewest steps",
+        "SARSA does not need the fewest steps",
+        f"in the mean of all {len(GRID)} configurations",
+    ),
+    "sarsa-much-shorter": _Headline(
+        "SARSA's episodes are much shorter than Q-learning's",
+        "SARSA's episodes are not much shorter than Q-learning's",
+        _TABLE_2,
+    ),
 }
+HEADLINES = tuple(_CLAIMS)
 USUAL_SEEDS = 100  # what `compare` takes unless told otherwise
 MORE = f"compare --seeds {USUAL_SEEDS} tells more"
 NEEDS = "that takes the paper's world, its configurations and 100 episodes"
 
 
 def answer(comparison: Comparison, lines: Sequence[Mapping], audit: Audit) -> list[str]:
-    """Three sentences, computed from the verdicts and from what the final policies do.
+    """Return sentences that are computed from the verdicts and from what the final policies do.
 
     `lines` are those of `table2.table2`.
     """
@@ -33,49 +60,56 @@ def answer(comparison: Comparison, lines: Sequence[Mapping], audit: Audit) -> li
     seeds = len(comparison.seeds)
     if verdicts == {Verdict.NOT_TESTED}:
         first = f"The paper's claims are not tested here: {NEEDS}."
-    elif verdicts == {Verdict.UNDECIDED} and seeds < LEAST_SEEDS:
-        claims = " or ".join(holds for holds, _ in _CLAIMS.values())
-        first = f"{too_few(seeds)} {claims}, as the paper says; {MORE}."
+    elif seeds < LEAST_SEEDS and verdicts <= {Verdict.UNDECIDED, Verdict.NOT_TESTED}:
+        first = f"{too_few(seeds)} the paper's claims hold; {MORE}."
     else:
-        told = [_told(*words, *by_id[name]) for name, words in _CLAIMS.items()]
+        told = [_told(words, *by_id[name]) for name, words in _CLAIMS.items()]
         return [*told, _doings(comparison)]
     return [first, _extremes(lines, seeds), _doings(comparison)]
 
 
-def _told(holds: str, fails: str, claim: Claim, findings: Mapping[str, Finding]) -> str:
+def _told(headline: _Headline, claim: Claim, findings: Mapping[str, Finding]) -> str:
     """What became of a claim, with the numbers; delivery settings that agree share the words."""
     seeds = max(one.contrast.seeds for one in findings.values())
+    holds, fails = (f"{words} {headline.where}" for words in headline[:2])
     stays_open = f"whether {holds}, as the paper says, stays open"
     if seeds < USUAL_SEEDS:
         says = "" if seeds < LEAST_SEEDS else ", as the paper says"
         stays_open = f"{too_few(seeds)} {holds}{says}"
     words = {
         Verdict.SUPPORTED: f"{holds}, as the paper says",
-        Verdict.CONTRADICTED: f"{fails}, although the paper says so",
-        Verdict.EQUIVALENT: f"{fails}, although the paper says so",
+        Verdict.CONTRADICTED: f"{fails}, contrary to the paper",
+        Verdict.EQUIVALENT: f"{fails}, contrary to the paper",
         Verdict.UNDECIDED: stays_open,
-        Verdict.NOT_TESTED: f"whether {holds}, as the paper says, is not tested",
+        Verdict.NOT_TESTED: f"whether {holds}, as the paper says, is not tested: {NEEDS}",
     }
-    alike: dict[str, dict[str, str]] = {}  # the numbers of settings, by the words
+    # The delivery settings, by the words and then by the numbers.
+    alike: dict[str, dict[str, list[str]]] = {}
     for setting, one in findings.items():
-        alike.setdefault(words[one.verdict], {})[setting] = _numbers(one, claim.quantity.unit)
-    parts = []
-    for said, numbers in alike.items():
-        same = len(set(numbers.values())) == 1
-        by_setting = [f"with {setting} delivery {one}" for setting, one in numbers.items()]
-        where = "" if len(alike) == 1 else f"with {joined(list(numbers))} delivery "
-        told = next(iter(numbers.values())) if same else "; ".join(by_setting)
-        parts.append(f"{where}{said}: {told}" if told else f"{where}{said}")
+        numbers = alike.setdefault(words[one.verdict], {})
+        numbers.setdefault(_numbers(one, claim.quantity.unit), []).append(setting)
+    over, parts = f"over {count(seeds, 'seed')}", []
+    for said, by_numbers in alike.items():
+        told = [
+            f"with {joined(settings)} delivery {numbers}"
+            for numbers, settings in by_numbers.items()
+            if numbers
+        ]
+        settings = [setting for several in by_numbers.values() for setting in several]
+        if len(alike) > 1:
+            said = f"with {joined(settings)} delivery {said}"
+            told = [*by_numbers] if len(by_numbers) == 1 and told else told
+        parts.append(f"{said}: {over}, {'; '.join(told)}" if told else said)
     if seeds < USUAL_SEEDS and any(one.verdict is Verdict.UNDECIDED for one in findings.values()):
         parts.append(MORE)
     return sentence(f"{'; '.join(parts)}.")
 
 
 def _numbers(finding: Finding, unit: str) -> str:
-    """The contrast that decided, its effect and its interval; nothing of what few seeds say."""
+    """The contrast that decided, its effect and its interval; nothing if they say nothing."""
     contrast = finding.contrast
     if finding.verdict is Verdict.NOT_TESTED:
-        return NEEDS
+        return ""
     if finding.verdict is Verdict.UNDECIDED and contrast.seeds < LEAST_SEEDS:
         return ""
     effect, low, high = map(number, (finding.effect, finding.low, finding.high))
@@ -86,6 +120,7 @@ def _numbers(finding: Finding, unit: str) -> str:
 def _extremes(lines: Sequence[Mapping], seeds: int) -> str:
     """The learners that return most and least in the typical run."""
     where = "In the typical run" if seeds >= LEAST_SEEDS else f"With {count(seeds, 'seed')}"
+    where += " at the configurations of the table below"
     ordered = sorted(lines, key=lambda line: line["return_last50_iqm"], reverse=True)
     told = [
         f"{Variant(line['learner'], line['hyperparameters']).label} with {line['delivery']} "
@@ -99,11 +134,12 @@ def _extremes(lines: Sequence[Mapping], seeds: int) -> str:
 
 def _doings(comparison: Comparison) -> str:
     """What the final policies do, and whose they mostly are that do not deliver."""
-    codes = comparison.behaviours
-    done, all_of_them = counts(codes), f"{thousands(codes.size)} final policies"
+    codes, (rows, seeds) = comparison.behaviours, comparison.behaviours.shape
+    grid = f"{count(rows, 'configuration')}, {count(seeds, 'seed')} each"
+    done, all_of_them = counts(codes), f"{thousands(codes.size)} final policies ({grid})"
     delivers = done.pop(DELIVERS, 0)
     if not done:
-        return f"All of {all_of_them} deliver." if codes.size > 1 else "The final policy delivers."
+        return f"All {all_of_them} deliver." if codes.size > 1 else "The final policy delivers."
     rest = joined([f"{thousands(n)} {_DOING[code]}" for code, n in done.items()])
     text = f"Of {all_of_them}, {thousands(delivers) if delivers else 'none'} deliver; {rest}"
     idle: Counter = Counter()

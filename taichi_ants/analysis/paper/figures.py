@@ -77,12 +77,13 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Mapping] = ()) -
             column[-1].set_xlabel("Episode")
             logarithmic(column[-1].xaxis, (1,) if comparison.episodes > 50 else (1, 2, 5))
         words = (
-            f"Line: interquartile mean of {count(len(comparison.seeds), 'seed')} (of deliveries "
-            "the mean), band: their middle half. Later points are means over longer spans.\n"
-            "Where the legend names nothing else, the learning rate is "
-            f"{FIGURE_1.learning_rate:g}, the discount {FIGURE_1.discount:g}, epsilon "
-            f"{FIGURE_1.epsilon:g}\nand its decay {FIGURE_1.epsilon_decay:g}: the paper's figure 1 "
-            "names no configuration, this one stands twice in its table 2."
+            f"World: {comparison.world}. Line: interquartile mean of "
+            f"{count(len(comparison.seeds), 'seed')} (of deliveries the mean), band: their middle "
+            "half.\nLater points are means over longer spans. If the legend does not name another, "
+            f"the learning rate is {FIGURE_1.learning_rate:g},\nthe discount "
+            f"{FIGURE_1.discount:g}, epsilon {FIGURE_1.epsilon:g} and its decay "
+            f"{FIGURE_1.epsilon_decay:g}: the paper's figure 1 names no configuration; this one "
+            "occurs\ntwice in its table 2."
         )
         frame(figure, "Learning", words, legend_entries(axes.flat))
     return figure
@@ -114,8 +115,11 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Mappin
         frame(
             figure,
             "Return against deliveries in training, and what the final policies do",
-            "A mark is a run. Its look tells what an ant does that follows the final policy "
-            "greedily, with evaporation as in training.",
+            f"World: {comparison.world}. A mark is a run: "
+            f"{count(len(comparison.rows), 'configuration')}, "
+            f"{count(len(comparison.seeds), 'seed')} each. Its shape and colour show\nthe "
+            "behaviour of an ant that follows the final policy greedily, with evaporation as in "
+            "training.",
             legend_entries(axes),
         )
     return figure

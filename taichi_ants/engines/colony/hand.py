@@ -3,6 +3,10 @@
 Rocks, food and the queen stay for the episodes that follow; trails, and ants that are added or
 removed one by one, are of this one. After each change the ants look around again. What an ant has
 drawn to do already, it still does.
+
+Rock and food move the ants in their way aside. The steps of at most `REACH` cells are tried in
+order of their length, then of their cube coordinates; an ant takes the first one that leads to an
+empty cell. If there is none, the ant and its cell stay as they are.
 """
 
 from __future__ import annotations
@@ -18,6 +22,7 @@ from taichi_ants.engines.colony.layout import ANT_GROUND, AntRow, HomeRow, Stage
 from taichi_ants.engines.colony.memory import homes_arrays, set_learning_rate
 from taichi_ants.errors import AntsError, count
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_BORN, STREAM_HAND, STREAM_START_CELL
+from taichi_ants.grid.hexgrid import AxialGrid, axial
 from taichi_ants.grid.randomness import Stream, choose, stream_state
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
@@ -26,6 +31,19 @@ from taichi_ants.worlds.world import World
 
 if TYPE_CHECKING:
     from taichi_ants.engines.colony.colony import Colony
+
+REACH = 8  # cells; twice the radius of the largest brush of the page
+
+
+def _steps() -> np.ndarray:
+    """The steps of 1 to `REACH` cells, in the order in which they are tried, axial (n, 2)."""
+    grid = AxialGrid((REACH + 1,) * 3)
+    cells = grid.cells(np.flatnonzero(grid.exists))
+    order = np.lexsort((*cells.T[::-1], cells.max(axis=1)))
+    return axial(cells[order[1:]])  # without the first, which leads nowhere
+
+
+_STEPS = _steps()
 
 
 class Hand:
@@ -40,9 +58,17 @@ class Hand:
 
     Attributes:
         ants: How many start each later episode.
+
+    Raises:
+        AntsError: The colony has several worlds.
     """
 
     def __init__(self, colony: Colony) -> None:
+        if len(colony.worlds) != 1:
+            raise AntsError(
+                f"the colony has {len(colony.worlds)} worlds; a Hand changes a single one, so make "
+                "the colony with one seed."
+            )
         self.colony, self.ants = colony, colony.ants
         (self._first,) = colony.worlds
         self._start = self._first.ground()
@@ -55,26 +81,52 @@ class Hand:
         return int(self.colony.arrays["worlds"][WorldRow.LIVING, 0])
 
     def put(self, cells: np.ndarray, what: int) -> None:
-        """Make cells EMPTY, OBSTACLE or FOOD, but none on which an ant or the queen stands.
+        """Make cells EMPTY, OBSTACLE or FOOD, except the queen's and those of ants that stay.
 
-        A food that is put somewhere has its home there: it grows back and wanders with the foods
-        beside it. Rocks hold no trail.
+        Ants stay where a cell is made EMPTY; rock and food move them aside. A food that is put
+        somewhere has its home there: it grows back and wanders with the foods next to it. Rocks
+        hold no trail.
 
         Raises:
             AntsError: Later episodes would have no room for the ants, or no food to learn from.
         """
         arrays = self.colony.arrays
         held = arrays["ground"][cells]
-        cells = cells[(held >> 4 == 0) & (held != QUEEN)]  # no ant, see `layout`
+        ants, to = self._aside(cells) if what != EMPTY else (cells[:0], cells[:0])
+        at = self.colony.of_ants(AntRow.CELL)[ants]
+        cells = cells[((held >> 4 == 0) | np.isin(cells, at)) & (held != QUEEN)]  # see `layout`
         start = self._start.copy()
         start[cells] = what
         self._begin_with(start)
+        self.colony.of_ants(AntRow.CELL)[ants] = to
+        arrays["ground"][to] = arrays["ground"][at]
         arrays["ground"][cells] = what
         arrays["walls"][cells] = what == OBSTACLE
         if what == OBSTACLE:
             self._lay(cells, 0)
         self._change_homes(cells, what)
         self.colony.look()
+
+    def _aside(self, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The slots of the ants on cells that can be moved aside, and the cells to move them to."""
+        colony, grid = self.colony, self.colony.grid
+        free = (colony.arrays["ground"] == EMPTY) & grid.exists
+        free[cells] = False
+        living = colony.of_ants(AntRow.STAGE) == Stage.LIVING
+        slots = np.flatnonzero(living & np.isin(colony.of_ants(AntRow.CELL), cells))
+        row, column = np.divmod(colony.of_ants(AntRow.CELL)[slots], grid.width)
+        to = np.full(len(slots), -1)
+        for q, r in _STEPS.tolist():
+            waiting = np.flatnonzero(to < 0)
+            if not len(waiting):
+                break
+            x, y = column[waiting] + q, row[waiting] + r
+            inside = (x >= 0) & (x < grid.width) & (y >= 0) & (y < grid.height)
+            waiting, there = waiting[inside], (y * grid.width + x)[inside]
+            goes = free[there]
+            to[waiting[goes]] = there[goes]
+            free[there[goes]] = False
+        return slots[to >= 0], to[to >= 0]
 
     def move_queen(self, cell: int) -> None:
         """Let the queen stand on an empty cell.
@@ -85,7 +137,8 @@ class Hand:
         arrays, grid = self.colony.arrays, self.colony.grid
         if arrays["ground"][cell] != EMPTY:
             raise AntsError(
-                f"cell {cell} is not empty, so the queen cannot stand there; choose an empty cell."
+                f"cell {tuple(grid.cells(cell).tolist())} is not empty, so the queen cannot move "
+                "there; choose an empty cell."
             )
         old = arrays["worlds"][WorldRow.QUEEN_CELL, 0]
         start = self._start.copy()

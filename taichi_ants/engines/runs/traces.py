@@ -115,18 +115,17 @@ def rollout(
 ) -> Trace:
     """One episode with one table (n_states, 5): rollout `number` of the seed, from 0.
 
-    Other arguments and errors are those of `evaluate`.
+    Instead of the table you can give the `TrainingResult` of a single run, or a `Policy`. Other
+    arguments and errors are those of `evaluate`.
     """
     task = checks.checked_runs_task(task)
     max_steps = checks.checked_max_steps(max_steps, task)
-    tables = checks.checked_q_values(q_values, task)
-    if tables.ndim != 2:
-        raise AntsError(f"q_values has shape {tables.shape}; a rollout follows one table.")
+    table = checks.checked_table(q_values, task)
     seeds = checks.checked_seeds_for(seed, ())
     numbers = np.array([checked_whole("number", number, least=0)])
     epsilon = checks.checked_share("epsilon", epsilon)
-    trace = _trace(world, task, Runs.following(tables[None], seeds, numbers, epsilon), max_steps)
-    made = Made(world, task, int(seeds[0]), max_steps, int(numbers[0]), tables.copy(), epsilon)
+    trace = _trace(world, task, Runs.following(table[None], seeds, numbers, epsilon), max_steps)
+    made = Made(world, task, int(seeds[0]), max_steps, int(numbers[0]), table.copy(), epsilon)
     return replace(trace, made=made)
 
 

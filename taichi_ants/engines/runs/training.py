@@ -52,7 +52,7 @@ def train(
     Args:
         world: The world; each episode starts from exactly this.
         configs: One configuration or several.
-        seeds: One seed or several different ones.
+        seeds: One seed or several different ones: 5 is the single seed 5, range(5) are five seeds.
         episodes: Episodes of each run, at least 1.
         max_steps: Steps after which an episode is truncated, 1 to 10 million.
         task: The rules of the game; None is the paper's.

@@ -18,7 +18,7 @@ from textwrap import dedent
 from types import SimpleNamespace
 from typing import Any
 
-from taichi_ants.errors import AntsError, checked_whole, expect, shown, unusable
+from taichi_ants.errors import AntsError, check_new_name, checked_whole, expect, shown, unusable
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN, SEES_LURE
 
 # Tables of this many rows hold 5 * 2**20 values; kernels index many of them by 32 bits.
@@ -84,18 +84,15 @@ _OBSERVATIONS: dict[str, Observation] = {}
 
 
 def register(observation: Observation) -> Observation:
-    """Make an observation known by its name.
+    """Make an observation known by its name; it replaces your own observation of the same name.
 
     Raises:
-        AntsError: The name is taken or not usable in files and on command lines, a field has not
-            the form that it must have, or a row lies outside of the table.
+        AntsError: The name is that of an observation of the package or not an identifier, a field
+            does not have the form that it must have, or a row lies outside of the table.
     """
     expect("what is registered", observation, Observation)
     name = observation.name
-    if not isinstance(name, str) or not name.isidentifier() or name in _OBSERVATIONS:
-        raise AntsError(
-            f"{shown(name)} cannot name an observation; use a new one of letters, digits and _."
-        )
+    check_new_name("observation", name, (one for one in _OBSERVATIONS if _is_built_in(one)))
     expect(f"letters of {name!r}", observation.letters, str)
     checked_whole(f"n_states of {name!r}", observation.n_states, 1, MAX_STATES)
     row, cells = observation.row, observation.cells
@@ -125,6 +122,10 @@ def register(observation: Observation) -> Observation:
         _try_functions(observation)
     _OBSERVATIONS[name] = observation
     return observation
+
+
+def _is_built_in(name: str) -> bool:
+    return _OBSERVATIONS[name].row.__module__.startswith("taichi_ants.")
 
 
 def get(name: str) -> Observation:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from PIL import Image
-from synthetic_colony_study import SIZES, build, limits
+from synthetic_colony_study import SIZES, build
 
 from taichi_ants.analysis.colony import figures
 from taichi_ants.analysis.colony.study import (
@@ -36,7 +36,7 @@ def rows() -> list[dict[str, Any]]:
         noise=10,
         arenas=ARENAS,
     )
-    return condition_rows(study, limits(study))
+    return condition_rows(study)
 
 
 def column(rows: list, name: str, arena: str, rules: str, way: str = JOINT) -> list[float]:
@@ -66,10 +66,18 @@ def test_a_line_shows_the_largest_colony_of_a_design(rows, draw, designs) -> Non
             *_, low = column(rows, "deliveries_ci_low", arena, *design)
             *_, mean = column(rows, "deliveries_mean", arena, *design)
             assert means[place] == mean
-            ends = axis.collections[place].get_segments()[0]
-            assert ends.min(axis=0).tolist() == [low, place]
+            interval, spread, bounds = axis.collections[3 * place : 3 * place + 3]
+            assert interval.get_segments()[0].min(axis=0).tolist() == [low, place]
+            *_, worst = column(rows, "deliveries_min", arena, *design)
+            assert spread.get_segments()[0].min(axis=0).tolist() == [worst, place]
+            assert bounds.get_segments()[0][:, 0].tolist() == [200, 200]
             marks = [line for line in axis.lines if line.get_marker() == "|"]
             assert marks[place].get_xdata() == [200]
+    caption = " ".join(figure._supxlabel.get_text().split())
+    assert (
+        "Means over 6 seeds, too few for a verdict, with 95 % intervals. Exploration rate 0.01."
+        in caption
+    )
     titles = [axis.get_title(loc="left") for axis in figure.axes]
     assert titles == ["The paper's world", "Open worlds (30, 30, 30)"]
 
@@ -92,5 +100,5 @@ def test_files_are_wide_enough_to_read_and_little_data_can_be_drawn(rows, tmp_pa
     elsewhere = build(seeds=2, ways=(ABROAD,), arenas=("rocks",))
     for study, number in ((lonely, 3), (nothing, 3), (elsewhere, 1)):
         folder = tmp_path / str(len(study))
-        save_all(figures.draw_all(condition_rows(study, limits(study))), folder)
+        save_all(figures.draw_all(condition_rows(study)), folder)
         assert len(list(folder.iterdir())) == number

@@ -149,8 +149,18 @@ def verdicts_of(judged: dict, question: str = "") -> set[Verdict]:
 def test_one_seed_tells_nothing() -> None:
     study = build(of_each({1: 20, 2: 15, 4: 10, 8: 5}), seeds=1)
     judged = judge_all(study)
-    assert verdicts_of(judged) == {Verdict.UNDECIDED}
+    assert verdicts_of(judged) == {Verdict.TOO_FEW}
     assert all(row[1] == row[2] == "-" for row in answer(MORE, seeds=1))
+
+
+@pytest.mark.parametrize(("seeds", "verdict"), [(9, Verdict.TOO_FEW), (10, Verdict.SUPPORTED)])
+def test_below_ten_seeds_no_difference_has_a_verdict(seeds: int, verdict: Verdict) -> None:
+    study = build(of_each({1: 20, 2: 20, 4: 20, 8: 20}), seeds=seeds, noise=0.1)
+    judged = judge_all(study)
+    assert verdicts_of(judged, MORE) >= {verdict}
+    assert (verdicts_of(judged) == {Verdict.TOO_FEW}) == (seeds < 10)
+    tables = [one for one in found(study, judged) if isinstance(one, Table)]
+    assert all((f"{seeds} seeds, too few" in one.notes[0]) == (seeds < 10) for one in tables)
 
 
 def test_without_differences_few_are_told() -> None:

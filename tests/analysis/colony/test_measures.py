@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from synthetic_colony_study import SIZES, build, limits
+from synthetic_colony_study import SIZES, build
 
 from taichi_ants.analysis.colony.contrasts import ADDS, MORE, judge_all
 from taichi_ants.analysis.colony.study import (
@@ -12,7 +12,7 @@ from taichi_ants.analysis.colony.study import (
     ABROAD,
     ALONE,
     JOINT,
-    MEASURES,
+    OF_STUDY,
     PAPER,
     RULES,
     SILENT,
@@ -24,6 +24,7 @@ from taichi_ants.analysis.colony.tables import (
     condition_rows,
     difference_rows,
     found,
+    glance,
     means,
     rows_of_seeds,
 )
@@ -59,11 +60,11 @@ def test_measures(measure: str, expected: list[float]) -> None:
 
 def test_every_measure_is_in_the_tables() -> None:
     study = build(seeds=7, noise=20)
-    rows = condition_rows(study, limits(study))
+    rows = condition_rows(study)
     assert len(rows) == len(WAYS) * len(RULES) * len(SIZES)
     (row,) = (row for row in rows if (row["rules"], row["way"], row["ants"]) == (SILENT, JOINT, 4))
     lines = rows_of_seeds(study, range(3, 10))
-    for measure in MEASURES:
+    for measure in OF_STUDY:
         values = study[Condition("paper", SILENT, JOINT, 4)][measure]
         low, high = bootstrap_interval(values[None])
         found = [row[f"{measure}_{end}"] for end in ("mean", "ci_low", "ci_high")]
@@ -71,7 +72,9 @@ def test_every_measure_is_in_the_tables() -> None:
         place = {"arena": "paper", "rules": SILENT, "way": JOINT, "ants": 4, "seed": 5}
         (line,) = (line for line in lines if line.items() >= place.items())
         assert line[measure] == values[2]
-    assert (row["deliveries_limit"], row["seeds"]) == (100, 7)
+    values = study[Condition("paper", SILENT, JOINT, 4)]["deliveries"]
+    assert (row["deliveries_min"], row["deliveries_max"]) == (values.min(), values.max())
+    assert (row["bound_min"], row["bound_max"], row["seeds"]) == (100, 100, 7)
 
 
 def test_the_table_of_differences_holds_what_verdicts_rest_on() -> None:
@@ -101,15 +104,38 @@ def test_means_at_a_glance() -> None:
     at_home = {condition: one for condition, one in at_home.items() if condition.way != ABROAD}
     abroad = {Condition("rocks", ABC, ABROAD, 8): study[Condition("rocks", ABC, ABROAD, 8)]}
     study = {**at_home, **abroad}
-    home, away = means(condition_rows(study, limits(study)))
-    assert home.title == "The paper's world, 12 seeds: deliveries per 1000 ticks"
-    assert home.columns == ("ants", *map(str, SIZES), "limit")
+    home, away = means(condition_rows(study))
+    basis = "12 seeds, exploration rate 0.01: deliveries per 1000 ticks"
+    assert home.title == f"The paper's world, {basis}"
+    assert home.columns == ("ants", *map(str, SIZES), "share of\nbound", "mean\nbound")
     rows = {row[0]: row[1:] for row in home.rows}
-    assert rows["paper's rules, no trails laid"] == ["20", "40", "80", "160", "200"]
-    assert rows["paper's rules, trained alone, copied"] == ["20", "40", "80", "-", "100"]
-    assert away.title == "Trained in open worlds, 8 ants, 12 seeds: deliveries per 1000 ticks"
+    assert rows["paper's rules, no trails laid"] == ["20", "40", "80", "160", "80 %", "200"]
+    assert rows["paper's rules, trained alone, copied"] == ["20", "40", "80", "-", "80 %", "100"]
+    assert away.title == f"Trained in open worlds, 8 ants, {basis}"
     assert away.columns == ("world", "A + B + C")
-    assert away.rows == [["twice the rocks", "160"]]
+    assert away.rows == [["twice the rocks", "160 [160, 160], 160"]]
+
+
+def test_the_worst_seed_stands_beside_the_mean_wherever_a_policy_is_carried() -> None:
+    study = build(noise=0, seeds=10, arenas=("rocks",), ways=(ABROAD,), rules=(ABC,), sizes=(8,))
+    study[Condition("rocks", ABC, ABROAD, 8)]["deliveries"][3] = 7.0
+    (away,) = means(condition_rows(study))
+    (_, cell) = away.rows[0]
+    assert cell.startswith("145 [")
+    assert cell.endswith("], 7")
+
+
+def test_each_world_has_a_bound_of_its_own() -> None:
+    study = build(noise=0, seeds=10, sizes=(8,))
+    for measures in study.values():
+        measures["bound"] = np.linspace(100, 300, 10)
+        measures["of_bound"] = measures["deliveries"] / measures["bound"]
+    table = glance(condition_rows(study))
+    name, cell = table.rows[-1]
+    assert (name, cell) == ("Mean bound, right of way [range]", "200 [100, 300]")
+    shares = 160 / np.linspace(100, 300, 10)
+    assert {row[1] for row in table.rows[:-1]} == {f"160 (240), {100 * shares.mean():.0f} %"}
+    assert "10 seeds, exploration rate 0.01" in table.notes[0]
 
 
 def test_findings_stand_under_their_questions() -> None:

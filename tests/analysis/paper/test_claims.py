@@ -291,7 +291,7 @@ def test_the_tables_hold_the_findings() -> None:
     assert [row["verdict"] for row in rows] == [finding.verdict.value for finding in found]
     row = rows[2 * list(BY_ID).index("sarsa-return-slightly-lower")]
     finding = audit[BY_ID["sarsa-return-slightly-lower"]]["continuing"]
-    assert (row["criterion"], row["effect"]) == ("above 0 and at most 10, margin 1", finding.effect)
+    assert (row["criterion"], row["effect"]) == ("above 1 and at most 10, margin 1", finding.effect)
     assert (row["centre"], row["mean_effect"]) == ("interquartile mean", finding.by_mean.effect)
     share = rows[2 * list(BY_ID).index("sarsa-consistently-direct")]
     assert (share["centre"], share["mean_verdict"]) == ("mean", None)
@@ -299,7 +299,7 @@ def test_the_tables_hold_the_findings() -> None:
     assert all(text.count(f"| {claim.id} |") == 1 for claim in CLAIMS)
     line = next(line for line in text.splitlines() if line.startswith("| sarsa-return-slightly"))
     cells = [cell.strip() for cell in line.strip("|").split("|")]
-    assert cells[4] == "interquartile mean above 0 and at most 10, margin 1 reward"
+    assert cells[4] == "interquartile mean above 1 and at most 10, margin 1 reward"
     assert cells[5].startswith("**supported** ")
     assert cells[6].startswith("**contradicted** ")
     line = next(line for line in text.splitlines() if line.startswith("| q-return-highest"))
@@ -310,7 +310,8 @@ def test_quantities_say_what_is_computed() -> None:
     by_id = {claim.id: claim.tested_on for claim in CLAIMS}
     assert by_id["sarsa-much-shorter"] == (
         "mean length of all episodes, at the configuration of table 2: Q-learning minus SARSA; the "
-        "configurations differ in more than the learner"
+        "configurations differ in more than the learner; 'substantially', 'much' is more than 10 "
+        "steps"
     )
     assert by_id["rate-q-small-best"] == (
         "mean return of the last 50 episodes, learning rate 0.001 minus 0.01, mean of 8 pairs: "

@@ -205,7 +205,8 @@ def test_tables(table, text):
 
 
 def test_one_table_for_a_rollout():
-    says("q_values has shape (1, 128, 5)", rollout, paper(), TABLE[None])
+    several = np.stack([TABLE, TABLE])
+    says("q_values has shape (2, 128, 5), which is 2 tables; give one", rollout, paper(), several)
 
 
 @pytest.mark.parametrize("world", [None, "paper", ((2, 2, 2), (0, 0, 0))])

@@ -1,0 +1,68 @@
+"""Small files of sessions that would take much time or memory if nobody measured them first."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from taichi_ants import archives
+from taichi_ants.live.session import Session
+
+_EDIT = [0, {"kind": "episode"}]
+
+
+def _edits(facts: dict[str, Any], n: int) -> str:
+    return json.dumps({**facts, "edits": [_EDIT] * n, "changes": [0]})
+
+
+def _setup(facts: dict[str, Any], **changes: Any) -> str:
+    return json.dumps({**facts, "setup": {**facts["setup"], **changes}})
+
+
+def _cells(facts: dict[str, Any]) -> str:
+    edit = {"kind": "trail", "level": 1, "cells": list(range(100, 300))}
+    return json.dumps({**facts, "edits": [[0, edit]] * 3000, "changes": [0]})
+
+
+# Name: its facts, from those of a session, and what the message says is allowed.
+ATTACKS: dict[str, tuple[Callable[[dict[str, Any]], str], str]] = {
+    "20 000 edits": (lambda facts: _edits(facts, 20_000), "at most 10000 edits"),
+    "400 000 edits": (lambda facts: _edits(facts, 400_000), "33554432 are allowed"),
+    "edits of many cells": (_cells, "of 400000 cells are allowed"),
+    "4 000 000 lists": (lambda _: "[" + "[]," * 4_000_000 + "[]]", "33554432 are allowed"),
+    "1 300 000 lists": (lambda _: "[" + "[]," * 1_300_000 + "[]]", "with 100000 lists are allowed"),
+    "deep lists": (lambda _: "[" * 60_000 + "]" * 60_000, "holds no session"),
+    "a large map": (
+        lambda facts: _setup(facts, world="\n".join(["." * 1000] * 1000)),
+        "at most 50000 are allowed",
+    ),
+    "a map of far cells": (
+        lambda facts: _setup(facts, world="Q" + "\n" * 24_000 + " " * 24_000 + "F\n"),
+        "at most 1500000 are allowed",
+    ),
+    "a long bridge": (
+        lambda facts: _setup(
+            facts, world="double_bridge", world_settings={"short": 1000, "long": 1990}
+        ),
+        "at most 1500000 are allowed",
+    ),
+    "a narrow world": (
+        lambda facts: _setup(facts, world="open", world_settings={"ranges": [1, 1, 15_000]}),
+        "at most 1500000 are allowed",
+    ),
+}
+
+
+def attack(name: str, session: Session, folder: Path) -> bytes:
+    """A file of `ATTACKS`, whose checksums are right."""
+    session.save(folder / "session.npz")
+    with np.load(folder / "session.npz") as archive:
+        arrays = dict(archive)
+    facts, _ = ATTACKS[name]
+    text = facts(json.loads(str(arrays["facts"][()])))
+    archives.write(folder / "session.npz", {**arrays, "facts": np.array(text)})
+    return (folder / "session.npz").read_bytes()
