@@ -24,8 +24,10 @@ from __future__ import annotations
 import difflib
 import math
 import operator
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, replace
+from functools import wraps
+from inspect import signature
 from numbers import Real
 from types import NoneType, UnionType
 from typing import (
@@ -41,9 +43,14 @@ from typing import (
     get_type_hints,
 )
 
-from taichi_ants.errors import AntsError, is_flag, shown
+from taichi_ants.errors import AntsError, entries_of, is_flag, shown
 
 Self = TypeVar("Self", bound="Settings")
+Function = TypeVar("Function", bound=Callable[..., Any])
+_KINDS: dict[type, str] = {
+    **{bool: "True or False", int: "a whole number", float: "a number"},
+    list: "a list of numbers",
+}
 
 
 @dataclass(frozen=True)
@@ -85,7 +92,7 @@ class Setting(NamedTuple):
     Attributes:
         name: Of the field.
         path: The full name, as sweep files have it, such as "task.pheromone.half_life".
-        kind: bool, int, float, str, or a class of settings.
+        kind: bool, int, float, str, list, or a class of settings.
         words: The words that are allowed, where they are fixed.
         optional: Whether it may be None.
         default: As in the class; MISSING if it has none.
@@ -115,14 +122,27 @@ class Setting(NamedTuple):
         """The values that are allowed, as messages and tables name them."""
         return self._kind_in_words + (f" {self._range}" if self._range else "")
 
+    def about(self, value: Any) -> str:
+        """The help of a command-line option for this setting with the default `value`."""
+        words = self._all_words or (self.is_group and self.kind.named())  # type: ignore[attr-defined]
+        allowed = ", ".join(words) if words else self._range
+        parts = [self.rule.help, *([f"in {self.rule.unit}"] if self.rule.unit else [])]
+        parts = [", ".join(parts), *([allowed] if allowed else [])]
+        if self.rule.only is not None:
+            other, *values = self.rule.only
+            parts.append(f"only with {other} {' or '.join(str(one).lower() for one in values)}")
+        usual = self.rule.usual if value is None else value
+        given = "" if usual in (None, MISSING) or self.is_group else f" (default: {usual})"
+        return "; ".join(parts) + (given.lower() if self.kind is bool else given)
+
     def checked(self, value: Any) -> Any:
         """A value as a Python object of the setting's kind.
 
         Raises:
             AntsError: The value is not allowed; names the setting by its path.
         """
-        if value is None and self.optional:
-            return None
+        if self.optional and (value is None or (value == "none" and self.kind is not str)):
+            return None  # files and command lines have no None, so they write "none"
         found = self._converted(value)
         if found is None:
             self._refuse(value, self.allowed)
@@ -151,6 +171,8 @@ class Setting(NamedTuple):
             allowed = self._all_words
             fits = isinstance(value, str) and (not allowed or value in allowed)
             return value if fits else None
+        if self.kind is list:  # what it must hold is checked where it is used
+            return entries_of(value)
         if issubclass(self.kind, Settings) and isinstance(value, str):
             value = self.kind.named().get(value)
         return value if isinstance(value, self.kind) else None
@@ -178,7 +200,7 @@ class Setting(NamedTuple):
         if self.is_group:
             words = ", ".join(self.kind.named())  # type: ignore[attr-defined]
             return f"a {self.kind.__name__}" + (f", or one of {words}" if words else "")
-        return {bool: "True or False", int: "a whole number", float: "a number"}[self.kind]
+        return _KINDS[self.kind]
 
     @property
     def _range(self) -> str:
@@ -244,16 +266,32 @@ class Settings:
     def but(self: Self, **changes: Any) -> Self:
         """The same with some changes; settings that mean nothing any more have their defaults.
 
+        A group can be changed by a mapping of its own settings, in which "" is the name of the
+        value to start from.
+
         Raises:
-            AntsError: As for the class.
+            AntsError: As for the class, or there is no such setting.
         """
-        after = {one.name: getattr(self, one.name) for one in declared(type(self))} | changes
-        for one in declared(type(self)):
-            if one.rule.only and one.name not in changes:
+        return self._changed(changes)
+
+    def _changed(self: Self, changes: Mapping[str, Any]) -> Self:
+        known = {one.name: one for one in declared(type(self))}
+        made: dict[str, Any] = {}
+        for name, value in changes.items():
+            if name not in known:
+                raise AntsError(f"`{_below(self.path, name)}` {not_a_setting(name, known)}")
+            one = known[name]
+            if one.is_group and isinstance(value, Mapping):
+                inner = dict(value)
+                start = one.checked(inner.pop("")) if "" in inner else getattr(self, name)
+                value = start._changed(inner)
+            made[name] = value
+        for one in known.values():
+            if one.rule.only and one.name not in made:
                 other, *values = one.rule.only
-                if after[other] not in values:
-                    changes[one.name] = one.default
-        return replace(self, **changes)  # type: ignore[type-var]
+                if made.get(other, getattr(self, other)) not in values:
+                    made[one.name] = one.default
+        return replace(self, **made)  # type: ignore[type-var]
 
     @classmethod
     def from_dict(cls: type[Self], facts: Any) -> Self:
@@ -264,52 +302,74 @@ class Settings:
         """
         if not isinstance(facts, Mapping):
             raise AntsError(f"`{cls.path}` is {shown(facts)}; it must be a table of settings.")
-        known = {one.name: one for one in declared(cls)}
-        given = {}
-        for name, value in facts.items():
-            if name not in known:
-                raise AntsError(
-                    f"`{_below(cls.path, name)}` is not a setting; {rather(name, known)}."
-                )
-            one = known[name]
-            if one.is_group and isinstance(value, Mapping):
-                value = one.kind.from_dict(value)  # type: ignore[attr-defined]
-            given[name] = value
-        return cls(**given)
+        return cls()._changed(facts)
 
 
-_DECLARED: dict[type, tuple[Setting, ...]] = {}
+_DECLARED: dict[Any, tuple[Setting, ...]] = {}
 
 
-def declared(cls: type) -> tuple[Setting, ...]:
-    """The settings of a class, in the order of its fields; other fields are left out."""
+def declared(cls: Any) -> tuple[Setting, ...]:
+    """The settings of a class, in the order of its fields, or of a function's arguments.
+
+    Fields and arguments that are not declared with an `Is` are left out.
+    """
     if cls not in _DECLARED:
         _DECLARED[cls] = tuple(_read(cls))
     return _DECLARED[cls]
 
 
-def _read(cls: type) -> Iterator[Setting]:
+def _read(cls: Any) -> Iterator[Setting]:
     hints = get_type_hints(cls, include_extras=True)
-    path = getattr(cls, "path", "")
-    for one in fields(cls):
-        hint = hints[one.name]
+    for name, default in _defaults(cls):
+        hint = hints.get(name)
         if get_origin(hint) is not Annotated:
             continue
         kind, *rules = get_args(hint)
         rule = Is()
         for more in rules:
             rule = rule.but(more)
-        default = one.default if one.default_factory is MISSING else one.default_factory()
         kind, words, optional = _kind_of(kind)
-        yield Setting(one.name, _below(path, one.name), kind, words, optional, default, rule)
+        path = _below(getattr(cls, "path", "world"), name)  # functions make worlds
+        yield Setting(name, path, kind, words, optional, default, rule)
 
 
-def setting(cls: type, name: str) -> Setting:
+def _defaults(cls: Any) -> Iterator[tuple[str, Any]]:
+    """The fields of a class or the arguments of a function, with their defaults or MISSING."""
+    if isinstance(cls, type):
+        for one in fields(cls):
+            usual = one.default if one.default_factory is MISSING else one.default_factory()
+            yield one.name, usual
+    else:
+        for name, argument in signature(cls).parameters.items():
+            yield name, MISSING if argument.default is argument.empty else argument.default
+
+
+def setting(cls: Any, name: str) -> Setting:
     """One setting of a class, for arguments of functions that are the same."""
     return next(one for one in declared(cls) if one.name == name)
 
 
-def all_of(cls: type) -> Iterator[Setting]:
+def checked(function: Function) -> Function:
+    """Check the arguments of a function that are declared, whenever it is called: a decorator.
+
+    The function makes a world, so that messages name its arguments `world.NAME`.
+    """
+    form = signature(function)
+
+    @wraps(function)
+    def calls(*positional: Any, **named: Any) -> Any:
+        given = form.bind(*positional, **named).arguments
+        given |= {
+            one.name: one.checked(given[one.name])
+            for one in declared(function)
+            if one.name in given
+        }
+        return function(**given)
+
+    return calls  # type: ignore[return-value]
+
+
+def all_of(cls: Any) -> Iterator[Setting]:
     """The settings of a class and of its groups, those of a group behind it."""
     for one in declared(cls):
         yield one
@@ -317,12 +377,12 @@ def all_of(cls: type) -> Iterator[Setting]:
             yield from all_of(one.kind)
 
 
-def table(cls: type) -> str:
+def table(cls: Any) -> str:
     """The settings of a class as a table in Markdown, for the documentation."""
     rows = ["| Setting | Values | Default | Meaning |", "|---|---|---|---|"]
     for one in all_of(cls):
         if not one.is_group:
-            unit = f" {one.rule.unit}" if one.rule.unit else ""
+            unit = f", in {one.rule.unit}" if one.rule.unit else ""
             rows.append(
                 f"| `{one.path}` | {one.allowed}{unit} | {_default(one)} | {_meaning(one)} |"
             )
@@ -344,12 +404,39 @@ def _meaning(one: Setting) -> str:
     return f"{one.rule.help}; only with `{other}` {' or '.join(map(repr, values))}"
 
 
-def rather(name: object, known: Any) -> str:
-    """What to write instead of a name that does not exist."""
-    near = difflib.get_close_matches(str(name), list(known), 3) or list(known)
-    return (
-        f"choose {' or '.join(near[-2:])}" if len(near) <= 2 else f"choose among {', '.join(near)}"
-    )
+def not_a_setting(name: object, known: Iterable[str], group: str = "") -> str:
+    """The end of a message about a name that does not exist, with the names that are near it."""
+    several = list(known)
+    # Names of some length are alike by chance.
+    near = difflib.get_close_matches(str(name), several, 3, 0.6 if len(str(name)) < 9 else 0.75)
+    near = near or several
+    of = f" of {group}" if group else ""
+    if not near:
+        return f"is not a setting{of}, which has none; leave it out."
+    choice = " or ".join(near) if len(near) <= 2 else f"one of {', '.join(near)}"
+    return f"is not a setting{of}; choose {choice}."
+
+
+def nested(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings by their full names as mappings in mappings, as `Settings.but` takes them.
+
+    {"task.traffic": "following", "task.traffic.grant": False} becomes
+    {"task": {"traffic": {"": "following", "grant": False}}}.
+    """
+    tree: dict[str, Any] = {}
+    for path, value in flat.items():
+        *outer, last = path.split(".")
+        branch = tree
+        for part in outer:
+            inner = branch.setdefault(part, {})
+            if not isinstance(inner, dict):
+                inner = branch[part] = {"": inner}
+            branch = inner
+        if isinstance(branch.get(last), dict):
+            branch[last][""] = value
+        else:
+            branch[last] = value
+    return tree
 
 
 def _kind_of(hint: Any) -> tuple[type, tuple[str, ...], bool]:
@@ -360,6 +447,8 @@ def _kind_of(hint: Any) -> tuple[type, tuple[str, ...], bool]:
         optional = True
     if get_origin(hint) is Literal:
         return str, get_args(hint), optional
+    if get_origin(hint) is Sequence:
+        return list, (), optional
     return hint, (), optional
 
 

@@ -7,6 +7,7 @@ import re
 from dataclasses import MISSING, dataclass, replace
 from decimal import Decimal
 from fractions import Fraction
+from operator import attrgetter
 from typing import Annotated, Literal
 
 import numpy as np
@@ -16,10 +17,12 @@ from command_lines import ROOT
 from taichi_ants import AntsError, TrainingConfig, learners
 from taichi_ants.settings import Is, Setting, Settings, all_of, declared, table
 from taichi_ants.task import Pheromone, Task, Traffic
+from taichi_ants.worlds import double_bridge, open_world
 
+KINDS = (Task, TrainingConfig, open_world, double_bridge)
 EVERY = {
     one.path: one
-    for kind in (Task, TrainingConfig, *(learners.get(n).hyperparameters for n in learners.names()))
+    for kind in (*KINDS, *(learners.get(n).hyperparameters for n in learners.names()))
     for one in all_of(kind)
 }
 WRONG = {
@@ -27,6 +30,7 @@ WRONG = {
     int: [True, np.True_, 2.0, "3", [4], 1j, Decimal(5)],
     float: [True, np.True_, "0.5", [0.5], 1j, math.nan, math.inf, -math.inf, 10**400, Decimal(1)],
     str: ["no such word", 5, ["set"], {}],
+    list: [3, "3", 0.5],
 }
 
 
@@ -46,7 +50,7 @@ def wrong_values(one: Setting) -> list:
 
 
 @pytest.mark.parametrize(
-    "one", [one for one in EVERY.values() if one.path != "training.learner"], ids=str
+    "one", [one for one in EVERY.values() if one.path != "training.learner"], ids=attrgetter("path")
 )
 def test_a_wrong_value_is_named_with_what_is_allowed(one):
     for value in wrong_values(one):
@@ -56,7 +60,7 @@ def test_a_wrong_value_is_named_with_what_is_allowed(one):
         assert re.fullmatch(rf"`{re.escape(one.path)}` is .+; it must be .+\.", message), message
 
 
-@pytest.mark.parametrize("one", EVERY.values(), ids=str)
+@pytest.mark.parametrize("one", EVERY.values(), ids=attrgetter("path"))
 def test_defaults_and_bounds_are_allowed_and_plain(one):
     """NumPy's numbers are taken, and kept as Python's, so that equal settings are equal."""
     rule = one.rule
@@ -64,7 +68,7 @@ def test_defaults_and_bounds_are_allowed_and_plain(one):
         if value not in (None, MISSING):
             assert type(one.checked(value)) is one.kind
     if one.kind is float and rule.least == 0:
-        for value in (Fraction(1, 2), np.float32(0.5), 1, np.int8(1)):
+        for value in (Fraction(1, 2), np.float32(0.5), 0, np.int8(0)):
             assert type(one.checked(value)) is float
     if one.kind is bool:
         assert one.checked(np.True_) is True
@@ -130,7 +134,7 @@ def test_the_rules_of_a_task_that_depend_on_each_other():
 
 def test_the_page_of_settings_is_made_from_the_declarations():
     page = (ROOT / "docs" / "settings.md").read_text()
-    for kind in (Task, TrainingConfig):
+    for kind in KINDS:
         assert table(kind) in page
     for name in learners.names():
         if declared(learners.get(name).hyperparameters):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from numbers import Real
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -108,6 +108,15 @@ class TrainingConfig(Settings, path="training"):
     def least_learning_rate(self) -> float:
         """The same for the learning rate."""
         return min(self.min_learning_rate, self.learning_rate)
+
+    def _changed(self, changes: Mapping[str, Any]) -> TrainingConfig:
+        """Besides: other names are hyperparameters; those of another learner are dropped."""
+        own = [one.name for one in declared(TrainingConfig)]
+        more = {name: value for name, value in changes.items() if name not in own}
+        same = changes.get("learner", self.learner) == self.learner
+        kept = dict(self.hyperparameters) if same else {}
+        changed = super()._changed({n: value for n, value in changes.items() if n in own})
+        return replace(changed, hyperparameters=tuple({**kept, **more}.items()))
 
     def next_learning_rate(self, rate: float) -> float:
         """The learning rate of the episode that follows one with this learning rate."""

@@ -18,7 +18,7 @@ from typing import Any
 from taichi_ants.errors import AntsError, check_new_name, checked_whole, expect, shown, unusable
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.hyperparameters import Hyperparameters
-from taichi_ants.settings import declared
+from taichi_ants.settings import declared, not_a_setting
 
 
 @dataclass(frozen=True)
@@ -239,13 +239,11 @@ def settle(config: TrainingConfig) -> TrainingConfig:
     """
     expect("the configuration", config, TrainingConfig)
     kind = get(config.learner).hyperparameters
-    known = [one.name for one in declared(kind)]
+    own_names = [one.name for one in declared(kind)]
     for name, _ in config.hyperparameters:
-        if name not in known:
-            allowed = f"it has {', '.join(known)}" if known else "it has none"
-            raise AntsError(
-                f"{shown(name)} is not a hyperparameter of {config.learner!r}; {allowed}."
-            )
+        if name not in own_names:
+            known = [*own_names, *(one.name for one in declared(TrainingConfig))]
+            raise AntsError(f"`training.{name}` {not_a_setting(name, known, config.learner)}")
     own = kind(**dict(config.hyperparameters))
     return replace(config, hyperparameters=tuple(asdict(own).items()))
 

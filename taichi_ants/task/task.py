@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Annotated, Any, Literal, get_args
 
@@ -58,6 +59,11 @@ class Task(Settings, path="task"):
     evaporation_in_training: Annotated[bool, Is("evaporate trails while ants learn")] = False
     evaporation_in_evaluation: Annotated[bool, Is("evaporate trails while nobody learns")] = True
     life: Annotated[Life, Is("what comes and goes (colonies only)")] = field(default_factory=Life)
+
+    @classmethod
+    def named(cls) -> Mapping[str, Task]:
+        """Tasks that have names: "paper", "foraging" and "queueing"."""
+        return {"paper": paper(), "foraging": foraging(), "queueing": queueing()}
 
     def __repr__(self) -> str:
         """What is not as in the paper."""

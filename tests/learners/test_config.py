@@ -87,9 +87,19 @@ def test_other_mistakes(changes, says):
 @pytest.mark.parametrize(
     ("learner", "name", "value", "says"),
     [
-        ("q_learning", "planning_steps", 3, "'planning_steps' is not a hyperparameter of"),
+        (
+            "q_learning",
+            "planning_steps",
+            3,
+            "is not a setting of q_learning",
+        ),
         ("dyna_q", "planning_steps", 2.0, "`training.planning_steps` is 2.0; it must be a whole"),
-        ("dyna_q", "trace_decay", 0.5, "dyna_q'; it has planning_steps."),
+        (
+            "dyna_q",
+            "trace_decay",
+            0.5,
+            "is not a setting of dyna_q; choose one of",
+        ),
         ("td_zero", "n_steps", 3, "there is no learner 'td_zero'; choose one of q_learning, "),
     ],
 )
