@@ -124,7 +124,7 @@ class Setting(NamedTuple):
 
     def about(self, value: Any) -> str:
         """The help of a command-line option for this setting with the default `value`."""
-        words = self._all_words or (self.is_group and self.kind.named())  # type: ignore[attr-defined]
+        words = self.allowed_words or (self.is_group and self.kind.named())  # type: ignore[attr-defined]
         allowed = ", ".join(words) if words else self._range
         parts = [self.rule.help, *([f"in {self.rule.unit}"] if self.rule.unit else [])]
         parts = [", ".join(parts), *([allowed] if allowed else [])]
@@ -168,7 +168,7 @@ class Setting(NamedTuple):
             except OverflowError:  # an integer beyond all floats
                 return None
         if self.kind is str:
-            allowed = self._all_words
+            allowed = self.allowed_words
             fits = isinstance(value, str) and (not allowed or value in allowed)
             return value if fits else None
         if self.kind is list:  # what it must hold is checked where it is used
@@ -190,13 +190,14 @@ class Setting(NamedTuple):
         raise AntsError(f"`{self.path}` is {shown(value)}; it must be {allowed}{or_none}.")
 
     @property
-    def _all_words(self) -> tuple[str, ...]:
+    def allowed_words(self) -> tuple[str, ...]:
+        """The words of which one has to be given; empty where others are allowed, too."""
         return self.rule.choices() if self.rule.choices else self.words
 
     @property
     def _kind_in_words(self) -> str:
         if self.kind is str:
-            return f"one of {', '.join(self._all_words)}" if self._all_words else "text"
+            return f"one of {', '.join(self.allowed_words)}" if self.allowed_words else "text"
         if self.is_group:
             words = ", ".join(self.kind.named())  # type: ignore[attr-defined]
             return f"a {self.kind.__name__}" + (f", or one of {words}" if words else "")
@@ -417,14 +418,23 @@ def not_a_setting(name: object, known: Iterable[str], group: str = "") -> str:
     return f"is not a setting{of}; choose {choice}."
 
 
-def nested(flat: Mapping[str, Any]) -> dict[str, Any]:
+def flat(tree: Mapping[str, Any], before: str = "") -> dict[str, Any]:
+    """Mappings in mappings as settings by their full names; `before` stands before all."""
+    named: dict[str, Any] = {}
+    for name, value in tree.items():
+        path = _below(before, name)
+        named |= flat(value, path) if isinstance(value, Mapping) else {path: value}
+    return named
+
+
+def nested(named: Mapping[str, Any]) -> dict[str, Any]:
     """Settings by their full names as mappings in mappings, as `Settings.but` takes them.
 
     {"task.traffic": "following", "task.traffic.grant": False} becomes
     {"task": {"traffic": {"": "following", "grant": False}}}.
     """
     tree: dict[str, Any] = {}
-    for path, value in flat.items():
+    for path, value in named.items():
         *outer, last = path.split(".")
         branch = tree
         for part in outer:

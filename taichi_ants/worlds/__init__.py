@@ -3,7 +3,14 @@
 from taichi_ants.worlds.double_bridge import double_bridge
 from taichi_ants.worlds.open_world import far_piles, open_world
 from taichi_ants.worlds.paper import paper
-from taichi_ants.worlds.registry import build, check_seed_counts, is_drawn, names, register
+from taichi_ants.worlds.registry import (
+    build,
+    check_seed_counts,
+    is_drawn,
+    names,
+    register,
+    settings_of,
+)
 from taichi_ants.worlds.text_map import from_text, load_map, to_text
 from taichi_ants.worlds.world import World
 
@@ -20,6 +27,7 @@ __all__ = [
     "open_world",
     "paper",
     "register",
+    "settings_of",
     "to_text",
 ]
 

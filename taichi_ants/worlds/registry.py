@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from taichi_ants.errors import AntsError, expect, shown, whole
-from taichi_ants.settings import not_a_setting
+from taichi_ants.settings import Setting, declared, not_a_setting
 from taichi_ants.worlds.text_map import load_map
 from taichi_ants.worlds.world import World
 
@@ -59,6 +59,11 @@ def is_drawn(name_or_path: str | os.PathLike[str]) -> bool:
     """Whether a world depends on a seed; the paper's, a bridge and a map file do not."""
     builder = _BUILDERS.get(name_or_path) if isinstance(name_or_path, str) else None
     return builder is not None and "seed" in inspect.signature(builder).parameters
+
+
+def settings_of(name: str) -> tuple[Setting, ...]:
+    """The declared settings of a registered world; arguments that are not declared are left out."""
+    return declared(_BUILDERS[name])
 
 
 def check_seed_counts(name_or_path: str, option: str = "--world.seed") -> None:
