@@ -56,7 +56,7 @@ def test_what_others_have_written_is_not_believed(kept, tmp_path) -> None:
     ("changes", "said"),
     [
         ({"task": None}, ""),
-        ({"task": {"delivery": "never"}}, "delivery is 'never'"),
+        ({"task": {"delivery": "never"}}, "`task.delivery` is 'never'"),
         ({"task": {"observation": "six_cells"}}, "another shape or type"),
         ({"ants": None}, "ants is None"),
         ({"training": {"learner": "sarsa"}}, ""),

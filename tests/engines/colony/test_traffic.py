@@ -208,7 +208,7 @@ def test_options_that_change_nothing_are_refused():
     from taichi_ants import AntsError
 
     for options, message in (
-        ({"grant": True}, "grant is True, but no ant is pushed"),
+        ({"grant": True}, "leave it out unless `swap` is True"),
         ({"carriers_first": True}, "carriers_first is True, but all cells with ants are closed"),
         ({"swap": "yes"}, "swap is 'yes'"),
     ):
