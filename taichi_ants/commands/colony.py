@@ -240,13 +240,13 @@ def do_study(
     results = Results.of(values)
     for name, table in (
         (SEEDS, tables.rows_of_seeds(values, asked.seeds)),
-        (CONDITIONS, results.rows),
+        (CONDITIONS, [one.columns() for one in results.rows]),
         ("differences.csv", tables.difference_rows(results.judged)),
     ):
         files.write_csv(ready / name, table, list(table[0]))
-    findings = tables.found(values, results.judged)
+    findings = tables.found(*results)
     files.write_text(ready / "findings.md", markdown(findings))
-    screen = tables.on_one_screen(results.rows, results.judged, results.answer)
+    screen = tables.on_one_screen(*results)
     files.write_text(ready / REPORT, plain_text(screen, WIDTH))
     policies = files.check_writable_folder(ready / POLICIES)
     for name, q, facts, seen in median_policies(conditions, asked.seeds, values, outcomes):
@@ -279,7 +279,6 @@ def make_page(
     return colony_page(
         results.rows,
         results.judged,
-        results.answer,
         drawings=drawings(draw_all(results.rows)) if shown else [],
         players=at_work(folder / POLICIES, conditions, asked.seeds, settings.arch) if shown else [],
         facts={**study_facts(settings), **made_facts(made)},

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from taichi_ants.analysis.paper.answer import temptation
+from taichi_ants.analysis.paper.audit import headlines
 from taichi_ants.analysis.paper.published import (
     GREEDY_RETURN,
     GREEDY_STEPS,
@@ -39,7 +39,7 @@ FILES = {
     "summary.csv": "every configuration, over all seeds",
     "behaviours.csv": "every configuration, over the runs that do the same",
     "baselines.csv": "exact bounds and simple policies",
-    "episodes.npz": "what every episode of every run gave",
+    "runs.npz": "every measure of every run, and the learning curves",
     "manifest.json": "settings, versions, and what each file holds to the bit",
     "policies": "a policy of each behaviour",
     "renders": "the same policies as animations",
@@ -74,7 +74,8 @@ def comparison_page(
         "comparison.html",
         title="Which learner makes the better ant?",
         byline=f"{seeds}, {count(len(comparison.rows), 'configuration')}, "
-        f"{thousands(comparison.returns.size)} episodes of training, world: {comparison.world}",
+        f"{thousands(comparison.behaviours.size * comparison.episodes)} episodes of training, "
+        f"world: {comparison.world}",
         seeds=f"{len(comparison.seeds)} runs" if len(comparison.seeds) > 1 else "a run",
         configurations=len(GRID),
         best=("Q-learning", TABLE_2[Q_LEARNING].reward),
@@ -84,13 +85,12 @@ def comparison_page(
         deliveries=[DELIVERY[one] for one in comparison.delivery_settings],
         world=comparison.world,
         in_paper_world=comparison.in_paper_world,
-        answer=results.answer,
+        headlines=headlines(results.audit),
         claims=_claims(results),
         first_table=first,
         table_notes=notes,
         more_tables=more,
         behaviours=behaviours,
-        temptation=temptation(results.baselines),
         **seen._asdict(),
         sheet_words=seen.sheet.words if seen.sheet else "",
         facts=facts,

@@ -14,7 +14,7 @@ from taichi_ants import archives, files
 from taichi_ants.studies.command_line import notice
 
 Outcome = dict[str, np.ndarray]  # by name
-_ABOUT = "about"
+ABOUT = "about"
 
 
 class Form(NamedTuple):
@@ -71,7 +71,7 @@ def kept(path: Path, about: Any, forms: Mapping[str, Form], make: Callable[[], O
             return block
         notice(f"{str(path)!r} is damaged or of other work, so it is done anew.")
     made = make()
-    archives.write(path, {**made, _ABOUT: np.array(digest)}, compress=False)
+    archives.write(path, {**made, ABOUT: np.array(digest)}, compress=False)
     return made
 
 
@@ -79,7 +79,7 @@ def _read(path: Path, digest: str, forms: Mapping[str, Form]) -> Outcome | None:
     """The arrays of a block, if it is of this work and each has its form."""
     try:
         block = archives.read(path)
-        ours = str(block.pop(_ABOUT, "")) == digest
+        ours = str(block.pop(ABOUT, "")) == digest
     except ValueError:  # of which AntsError is one
         return None
     fits = block.keys() == forms.keys() and all(forms[n].fits(one) for n, one in block.items())

@@ -21,7 +21,7 @@ import numpy as np
 from taichi_ants import __version__, archives, checks, files, learners
 from taichi_ants.errors import AntsError, check_one_of, checked_whole
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.studies.blocks import Form, Outcome, kept
+from taichi_ants.studies.blocks import ABOUT, Form, Outcome, kept
 from taichi_ants.studies.provenance import world_facts
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EPISODE_STEPS, EPISODES, MAX_STEPS, N_ACTIONS, ROW
@@ -336,16 +336,39 @@ class Study(Generic[PointKind]):
 
         Arguments and errors are those of `in_blocks`.
         """
-        points = self.in_order
-        pieces: dict[PointKind, list[Outcome]] = {point: [] for point in points}
+        order = self.in_order
+        parts: dict[PointKind, list[Outcome]] = {point: [] for point in order}
         for block in self.in_blocks(folder, threads, arch, progress):
-            for place, point in enumerate(points[block.points]):
-                part = {name: array[place] for name, array in block.outcome.items()}
-                pieces[point].append(part)
-        return {
-            point: {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-            for point, parts in pieces.items()
-        }
+            for place, point in enumerate(order[block.points]):
+                parts[point].append({name: one[place] for name, one in block.outcome.items()})
+        return {point: _joined(several) for point, several in parts.items()}
+
+    def reduced(
+        self,
+        folder: Path,
+        reduce: Callable[[Sequence[PointKind], Sequence[int], Outcome], Outcome],
+        threads: int | None = None,
+        arch: str | None = None,
+        progress: Progress = lambda share: None,
+    ) -> dict[str, np.ndarray]:
+        """Return numbers of each run, arrays (points, seeds) by name; only these stay in memory.
+
+        Args:
+            folder, threads, arch, progress: As of `in_blocks`, which also says what is raised.
+            reduce: Called with points, seeds and outcome of a block; returns such arrays of it.
+        """
+        order = self.in_order
+        found: dict[str, np.ndarray] = {}
+        for some, at, outcome in self.in_blocks(folder, threads, arch, progress):
+            for name, array in reduce(order[some], self.seeds[at], outcome).items():
+                shape = len(order), len(self.seeds)
+                found.setdefault(name, np.empty(shape, array.dtype))[some, at] = array
+        if order != self.points:  # some points occur twice, or in another order
+            place = {point: number for number, point in enumerate(order)}
+            rows = [place[point] for point in self.points]
+            for name, array in found.items():
+                found[name] = array[rows]
+        return found
 
     def in_blocks(
         self,
@@ -353,7 +376,6 @@ class Study(Generic[PointKind]):
         threads: int | None = None,
         arch: str | None = None,
         progress: Progress = lambda share: None,
-        besides: int = 0,
     ) -> Iterator[Block]:
         """Do the blocks that the folder does not hold yet; all of them, one at a time in memory.
 
@@ -361,13 +383,12 @@ class Study(Generic[PointKind]):
             folder: Where finished blocks are kept; it must belong to this study alone.
             threads, arch: As in `train`.
             progress: Called now and then with the share of the work that is done.
-            besides: How many bytes the caller will write to the same disk.
 
         Raises:
             AntsError: The disk has no room for all of it, which is known at the beginning; a block
                 cannot be written, or an argument is not allowed.
         """
-        files.check_room(folder, self._bytes(folder) + besides)
+        files.check_room(folder, self._bytes(folder))
         order, blocks = self.in_order, list(self.blocks())
         weights = [sum(p.weight for p in order[some]) * len(self.seeds[at]) for some, at in blocks]
         begun, total = 0.0, sum(weights)
@@ -400,26 +421,34 @@ class Study(Generic[PointKind]):
             for form in _forms(order[some], self.seeds[at]).values()
         )
 
-    def of_runs(
-        self, folder: Path, name: str, runs: Iterable[tuple[int, int]]
-    ) -> dict[tuple[int, int], np.ndarray]:
-        """An array of some runs, read from finished blocks; a run is told by point and seed.
+    def read(self, folder: Path, points: Iterable[int]) -> Iterator[tuple[int, Outcome]]:
+        """Read some points from finished blocks, one block at a time in memory.
 
         Args:
-            folder: That of `in_blocks`, which has come to its end.
-            name: Of the array.
-            runs: Of each its place among the points in order, and among the seeds.
+            folder: The folder of `in_blocks`, after all blocks are done.
+            points: Places among the points in order.
+
+        Yields:
+            The place of each point, in order, and its outcome.
 
         Raises:
             AntsError: A block cannot be read any more.
         """
-        found: dict[tuple[int, int], np.ndarray] = {}
+        wanted = sorted(set(points))
+        parts: dict[int, list[Outcome]] = {place: [] for place in wanted}
         for number, (some, at) in enumerate(self.blocks()):
-            inside = [(p, s) for p, s in runs if _holds(some, p) and _holds(at, s)]
-            if inside:
-                array = archives.read(_path(folder, number))[name]
-                found |= {(p, s): array[p - some.start, s - at.start].copy() for p, s in inside}
-        return found
+            inside = [place for place in wanted if some.start <= place < some.stop]
+            block = archives.read(_path(folder, number)) if inside else {}
+            block.pop(ABOUT, None)
+            for place in inside:
+                parts[place].append({n: array[place - some.start] for n, array in block.items()})
+                if at.stop == len(self.seeds):
+                    yield place, _joined(parts.pop(place))
+
+
+def _joined(parts: Sequence[Outcome]) -> Outcome:
+    """Concatenate the parts of a point's outcome over the seeds."""
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 class Block(NamedTuple):
@@ -473,10 +502,6 @@ def _part(progress: Progress, begin: float, share: float) -> Progress:
 def _pieces(first: int, end: int, size: int) -> Iterator[slice]:
     for begin in range(first, end, size):
         yield slice(begin, min(begin + size, end))
-
-
-def _holds(some: slice, place: int) -> bool:
-    return some.start <= place < some.stop
 
 
 def _path(folder: Path, number: int) -> Path:
