@@ -9,7 +9,6 @@ any order without changing anything.
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
@@ -18,10 +17,11 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from taichi_ants import __version__, archives, checks, files, learners
+from taichi_ants import __version__, checks, files, learners
 from taichi_ants.errors import AntsError, check_one_of, checked_whole
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.studies.blocks import ABOUT, Form, Outcome, kept
+from taichi_ants.studies import blocks
+from taichi_ants.studies.blocks import Outcome, kept
 from taichi_ants.studies.provenance import world_facts
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EPISODE_STEPS, EPISODES, MAX_STEPS, N_ACTIONS, ROW
@@ -98,20 +98,13 @@ class RunPoint:
         return self
 
     @property
-    def forms(self) -> dict[str, Form]:
-        """Of the arrays of its outcome, for one seed."""
+    def bytes_of_a_run(self) -> int:
+        """About how many bytes the outcome of one seed takes on disk, at most."""
         most = self.max_steps * self.task.rewards.largest
-        bounds = ((-most, most), (1, self.max_steps), (0, 1))
-        forms = {
-            f"{of}{name}": Form(np.integer, (length,), *ends)
-            for of, length in (("", self.episodes), ("greedy_", self.rollouts))
-            for name, ends in zip(_RUN_ARRAYS, bounds, strict=True)
-        }
-        return {
-            **forms,
-            "q_values": Form(np.float32, (self.task.n_states, N_ACTIONS)),
-            "seconds": Form(np.float64, (), 0),
-        }
+        ends = (-most, most), (0, self.max_steps), (0, 1)
+        of_an_episode = sum(files.smallest(np.array(one)).itemsize for one in ends)
+        numbers = (self.episodes + self.rollouts) * of_an_episode
+        return numbers + 4 * self.task.n_states * N_ACTIONS + 8
 
     @staticmethod
     def do(
@@ -212,15 +205,9 @@ class ColonyPoint:
         return replace(self, world=self.world[some]) if isinstance(self.world, tuple) else self
 
     @property
-    def forms(self) -> dict[str, Form]:
-        """Of the arrays of its outcome, for one seed."""
-        least = {"returns": -math.inf, "first_delivery": -1}
-        forms = {
-            name: Form(np.integer, (self.rollouts,), least.get(name, 0)) for name in _COLONY_ARRAYS
-        }
-        if self.episodes and self.sharing == "shared":
-            forms["q_values"] = Form(np.float32, (self.task.n_states, N_ACTIONS))
-        return forms
+    def bytes_of_a_run(self) -> int:
+        """About how many bytes the outcome of one seed takes on disk, at most."""
+        return 8 * len(_COLONY_ARRAYS) * self.rollouts + 4 * self.task.n_states * N_ACTIONS
 
     def places(self, seeds: Sequence[int]) -> list[list[World]] | None:
         """The world of each training episode and seed; None without a pool."""
@@ -389,14 +376,14 @@ class Study(Generic[PointKind]):
                 cannot be written, or an argument is not allowed.
         """
         files.check_room(folder, self._bytes(folder))
-        order, blocks = self.in_order, list(self.blocks())
-        weights = [sum(p.weight for p in order[some]) * len(self.seeds[at]) for some, at in blocks]
+        order, pieces = self.in_order, list(self.blocks())
+        weights = [sum(p.weight for p in order[some]) * len(self.seeds[at]) for some, at in pieces]
         begun, total = 0.0, sum(weights)
         # What others go on from is kept, in as many pieces as these points have blocks.
         befores = {getattr(point, "after", None) for point in order}
         tables: dict[Any, list[np.ndarray]] = {}
         progress(0.0)
-        for number, ((some, at), weight) in enumerate(zip(blocks, weights, strict=True)):
+        for number, ((some, at), weight) in enumerate(zip(pieces, weights, strict=True)):
             points, seeds = tuple(one.of_seeds(at) for one in order[some]), self.seeds[at]
             after = getattr(points[0], "after", None)
             learned = np.concatenate(tables[after])[at] if after else None
@@ -404,7 +391,7 @@ class Study(Generic[PointKind]):
             where = {"threads": threads, "arch": arch}
             do: Any = partial(points[0].do, points, seeds, learned, part, where)
             about = settings_of(points, seeds)
-            outcome = kept(_path(folder, number), about, _forms(points, seeds), do)
+            outcome = kept(_path(folder, number), about, do)
             if order[some.start] in befores:
                 tables.setdefault(order[some.start], []).append(outcome["q_values"][0])
             begun += weight
@@ -415,10 +402,9 @@ class Study(Generic[PointKind]):
         """About how many bytes the blocks have at most that the folder does not hold yet."""
         order = self.in_order
         return sum(
-            form.nbytes
+            len(order[some]) * len(self.seeds[at]) * order[some][0].bytes_of_a_run
             for number, (some, at) in enumerate(self.blocks())
             if not _path(folder, number).exists()
-            for form in _forms(order[some], self.seeds[at]).values()
         )
 
     def read(self, folder: Path, points: Iterable[int]) -> Iterator[tuple[int, Outcome]]:
@@ -438,8 +424,7 @@ class Study(Generic[PointKind]):
         parts: dict[int, list[Outcome]] = {place: [] for place in wanted}
         for number, (some, at) in enumerate(self.blocks()):
             inside = [place for place in wanted if some.start <= place < some.stop]
-            block = archives.read(_path(folder, number)) if inside else {}
-            block.pop(ABOUT, None)
+            block = blocks.read(_path(folder, number)) if inside else {}
             for place in inside:
                 parts[place].append({n: array[place - some.start] for n, array in block.items()})
                 if at.stop == len(self.seeds):
@@ -507,12 +492,6 @@ def _pieces(first: int, end: int, size: int) -> Iterator[slice]:
 def _path(folder: Path, number: int) -> Path:
     """The file of a block."""
     return folder / f"{number:06d}.npz"
-
-
-def _forms(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Form]:
-    """Of the arrays of a block."""
-    shape = len(points), len(seeds)
-    return {n: one._replace(shape=shape + one.shape) for n, one in points[0].forms.items()}
 
 
 def _pool(point: Point) -> tuple[World, ...] | None:
