@@ -63,6 +63,11 @@ class Centre(NamedTuple):
         return {f"{name}_{field}": getattr(self, field) for field in fields}
 
 
+def centre_columns(found: Mapping[str, Centre]) -> dict[str, float]:
+    """Return the columns of several measures."""
+    return {k: v for name, one in found.items() for k, v in one.columns(name).items()}
+
+
 def centres_of(
     values: Mapping[str, np.ndarray], typical: Sequence[str] = ()
 ) -> list[dict[str, Centre]]:
@@ -84,7 +89,7 @@ def summary_rows(
     """Return a row for each point: what varies, the number of seeds, and `centres_of` measures."""
     seeds = next(iter(values.values())).shape[1]
     return [
-        {**one, "seeds": seeds, **{k: x for n, c in found.items() for k, x in c.columns(n).items()}}
+        {**one, "seeds": seeds, **centre_columns(found)}
         for one, found in zip(settings, centres_of(values, typical), strict=True)
     ]
 

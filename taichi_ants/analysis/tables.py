@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -137,9 +137,3 @@ def _drawn(table: Table) -> RichTable:
     for row in table.rows:
         drawn.add_row(*row)
     return drawn
-
-
-def baseline_name(row: Mapping) -> str:
-    """A row of baselines.csv by name, for example "optimal policy, discount 0.9"."""
-    discount = row["discount"]
-    return row["baseline"] + ("" if discount is None else f", discount {discount:g}")

@@ -270,7 +270,7 @@ def make_page(
     from taichi_ants.analysis.colony.results import Results
     from taichi_ants.analysis.drawings import drawings
     from taichi_ants.report.colony import colony_page
-    from taichi_ants.report.page import made_facts
+    from taichi_ants.report.page import made_facts, setting_facts
     from taichi_ants.report.players import at_work
     from taichi_ants.studies.result_folder import MANIFEST
 
@@ -281,29 +281,9 @@ def make_page(
         results.judged,
         drawings=drawings(draw_all(results.rows)) if shown else [],
         players=at_work(folder / POLICIES, conditions, asked.seeds, settings.arch) if shown else [],
-        facts={**study_facts(settings), **made_facts(made)},
+        facts={**setting_facts(asked.settings()), **made_facts(made)},
         files=[path.name for path in folder.iterdir()] + [MANIFEST],
     )
-
-
-def study_facts(settings: argparse.Namespace) -> dict[str, str]:
-    """How it was done, in words."""
-    from taichi_ants.analysis.colony.study import EVALUATION_EPSILON, WORLDS
-    from taichi_ants.errors import count
-    from taichi_ants.report.page import span
-
-    ticks = count(settings.ticks, "tick")
-    return {
-        "Worlds": "; ".join(WORLDS[arena] for arena in settings.arenas),
-        "Ants": ", ".join(map(str, settings.sizes)),
-        "Learner": f"{settings.learner}, learning rate {settings.learning_rate:g}, "
-        f"discount {settings.discount:g}",
-        "Exploration rate": f"{settings.epsilon:g} at first, {EVALUATION_EPSILON:g} at the end of "
-        f"the training and in the evaluation; without exploration where that is said",
-        "Seeds": span(settings.seed, settings.seeds),
-        "Training": f"{count(settings.episodes, 'episode')} of {ticks}",
-        "Evaluation": f"{count(settings.rollouts, 'episode')} of {ticks}",
-    }
 
 
 def live(settings: argparse.Namespace) -> None:

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from taichi_ants import World
+    from taichi_ants.analysis.bounds.baselines import Baseline
     from taichi_ants.analysis.paper.comparison import Comparison
     from taichi_ants.analysis.paper.results import Results
     from taichi_ants.rendering import Episode
@@ -382,7 +383,7 @@ def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draw
         style.new_figure(1.0).savefig(io.BytesIO(), format=kind)
 
 
-def draw_figures(comparison: Comparison, baselines: Sequence[Mapping], folder: Path) -> None:
+def draw_figures(comparison: Comparison, baselines: Sequence[Baseline], folder: Path) -> None:
     """Write the figures as files."""
     from taichi_ants.analysis import style
     from taichi_ants.analysis.paper.figures import draw_all
@@ -395,7 +396,7 @@ def do_comparison(
 ) -> tuple[Results, Seen]:
     """Do what is not done yet, and write all results."""
     from taichi_ants import archives, files
-    from taichi_ants.analysis.bounds.baselines import BASELINE_COLUMNS, bound_rows, policy_rows
+    from taichi_ants.analysis.bounds.baselines import Baseline, bound_rows, policy_rows
     from taichi_ants.analysis.paper.results import Results
     from taichi_ants.engines.runs.training import evaluate
 
@@ -416,7 +417,8 @@ def do_comparison(
     drawn = [draw(draw_figures, comparison, baselines, ready / FIGURES)] if shows else []
     seen = see(settings, ready, study, comparison, baselines, beside.begin, draw)
     beside.finish()
-    files.write_csv(ready / BASELINES, baselines, BASELINE_COLUMNS)
+    rows = [one._asdict() for one in baselines]
+    files.write_csv(ready / BASELINES, rows, Baseline._fields)
     with progress_bar("statistics and pictures") as progress:
         results = Results.of(comparison, baselines)
         write_tables(ready, results)
@@ -432,7 +434,7 @@ def see(
     folder: Path,
     study: Study[RunPoint],
     comparison: Comparison,
-    baselines: Sequence[Mapping],
+    baselines: Sequence[Baseline],
     play: Begin = partial,
     draw: Begin = partial,
 ) -> Callable[[], Seen]:
@@ -454,42 +456,6 @@ def see(
     return lambda: Seen(drawings(), *players())
 
 
-_PLAIN = str.maketrans("_=", "  ")  # "planning_steps=3" in words
-
-
-def facts(settings: argparse.Namespace, study: Study[RunPoint]) -> dict[str, str]:
-    """How it was done, in words."""
-    from taichi_ants.analysis.paper.comparison import Row
-    from taichi_ants.errors import count
-    from taichi_ants.report.page import span
-
-    first, task = study.points[0], study.points[0].task
-    numbers = {
-        "learning rate": settings.learning_rates,
-        "discount": settings.discounts,
-        "epsilon": settings.epsilons,
-        "decay of epsilon": settings.epsilon_decays,
-    }
-    learners = dict.fromkeys(Row.of(one.task, one.training).variant for one in study.points)
-    named = [
-        ", ".join([one.label, *(pair.translate(_PLAIN) for pair in one.hyperparameters.split())])
-        for one in learners
-    ]
-    grid = [f"{name} {' or '.join(f'{x:g}' for x in few)}" for name, few in numbers.items()]
-    falls = {True: "evaporate", False: "do not evaporate"}
-    return {
-        "World": world_name(settings, study),
-        "Learners": "; ".join(named),
-        "Configurations": "; ".join(grid),
-        "Delivery": " and ".join(dict.fromkeys(point.task.delivery for point in study.points)),
-        "Seeds": span(settings.seed, settings.seeds),
-        "Episodes": f"{first.episodes} of at most {first.max_steps} steps, "
-        f"then {count(first.rollouts, 'greedy rollout')}",
-        "Trails": f"{falls[task.evaporation_in_training]} in training, "
-        f"{falls[task.evaporation_in_evaluation]} in the greedy evaluation",
-    }
-
-
 def make_page(
     settings: argparse.Namespace,
     study: Study[RunPoint],
@@ -499,18 +465,24 @@ def make_page(
 ) -> str:
     """The page of the results in a folder, which are read from there if they are not given."""
     from taichi_ants import archives, files
+    from taichi_ants.analysis.bounds.baselines import Baseline
     from taichi_ants.analysis.paper.results import Results
     from taichi_ants.report.comparison import comparison_page
-    from taichi_ants.report.page import made_facts
+    from taichi_ants.report.page import made_facts, setting_facts
     from taichi_ants.studies.result_folder import MANIFEST
 
     if found is None:
         told = comparison_of(settings, study, archives.read(folder / RUNS))
-        results = Results.of(told, files.read_csv(folder / BASELINES))
+        rows = files.read_csv(folder / BASELINES)
+        results = Results.of(told, [Baseline(**row) for row in rows])
         found = results, see(settings, folder, study, told, results.baselines)()
     return comparison_page(
         *found,
-        facts={**facts(settings, study), **made_facts(made)},
+        facts={
+            "World": world_name(settings, study),
+            **setting_facts(study.settings()),
+            **made_facts(made),
+        },
         files=[path.name for path in folder.iterdir()] + [MANIFEST],
     )
 

@@ -19,17 +19,6 @@ from taichi_ants.analysis.tables import sentence
 from taichi_ants.errors import count
 from taichi_ants.report.page import Player, Statement, Statements, fill, judged
 
-FILES = {
-    "report.txt": "what the command prints",
-    "conditions.csv": "every measure of every condition, with intervals",
-    "seeds.csv": "every measure of every seed",
-    "differences.csv": "the differences behind the findings, with intervals and verdicts",
-    "findings.md": "the findings to read",
-    "manifest.json": "settings, versions, and what each file holds to the bit",
-    "policies": "policies of median seeds",
-    "figures": "the figures as pictures",
-}
-
 
 def colony_page(
     rows: Sequence[ConditionRow],
@@ -67,7 +56,7 @@ def colony_page(
         drawings=drawings,
         players=players,
         facts=facts,
-        files={name: words for name, words in FILES.items() if name in files},
+        files=files,
     )
 
 

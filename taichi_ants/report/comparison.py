@@ -24,28 +24,6 @@ from taichi_ants.report.page import (
 )
 from taichi_ants.report.players import Seen
 
-DELIVERY = {
-    "continuing": "With continuing delivery, its update at the delivery also counts, discounted, "
-    "the value of what the ant then sees, as after every other step.",
-    "absorbing": "With absorbing delivery, nothing comes after the delivery: its update counts the "
-    "reward alone.",
-}
-FILES = {
-    "report.txt": "what the command prints",
-    "table2.csv": "the paper's table 2 beside ours, with all intervals",
-    "table2.md": "the same to read",
-    "claims.csv": "all claims with effects, intervals and verdicts",
-    "claims.md": "the same to read",
-    "summary.csv": "every configuration, over all seeds",
-    "behaviours.csv": "every configuration, over the runs that do the same",
-    "baselines.csv": "exact bounds and simple policies",
-    "runs.npz": "every measure of every run, and the learning curves",
-    "manifest.json": "settings, versions, and what each file holds to the bit",
-    "policies": "a policy of each behaviour",
-    "renders": "the same policies as animations",
-    "figures": "the figures as pictures",
-}
-
 
 def comparison_page(
     results: Results,
@@ -82,7 +60,7 @@ def comparison_page(
         others=(returns[0], returns[-1]),
         greedy_return=f"{GREEDY_RETURN:g}",
         greedy_steps=[f"{one:g}" for one in GREEDY_STEPS],
-        deliveries=[DELIVERY[one] for one in comparison.delivery_settings],
+        deliveries=comparison.delivery_settings,
         world=comparison.world,
         in_paper_world=comparison.in_paper_world,
         headlines=headlines(results.audit),
@@ -94,7 +72,7 @@ def comparison_page(
         **seen._asdict(),
         sheet_words=seen.sheet.words if seen.sheet else "",
         facts=facts,
-        files={name: words for name, words in FILES.items() if name in files},
+        files=files,
     )
 
 

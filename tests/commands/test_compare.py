@@ -453,14 +453,6 @@ def test_other_settings_do_not_mix_with_results(change, named, copy, compare):
     assert contents(copy) == before
 
 
-def test_learners_are_told_by_the_names_that_readers_know():
-    settings = commands.parse_arguments(["--seeds", "1"])
-    told = commands.facts(settings, commands.build_study(settings))
-    assert told["Learners"] == (
-        "Q-learning; SARSA; Dyna-Q (p3), planning steps 3; Dyna-Q (p5), planning steps 5"
-    )
-
-
 def test_lists_drop_what_is_said_twice(tmp_path, compare):
     lists = ["--discounts", "0.5", "0.9", "0.90", "--epsilons", "0.1", "0.2"]
     status, _, _ = compare(*TINY, *lists, "--out", tmp_path / "out")

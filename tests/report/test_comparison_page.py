@@ -15,8 +15,8 @@ from taichi_ants.analysis.paper.audit import HEADLINES, claims_rows
 from taichi_ants.analysis.paper.comparison import Variant
 from taichi_ants.analysis.paper.results import Results
 from taichi_ants.analysis.tables import number
-from taichi_ants.report.comparison import DELIVERY, comparison_page
-from taichi_ants.report.page import signed, span
+from taichi_ants.report.comparison import comparison_page
+from taichi_ants.report.page import setting_facts, signed
 from taichi_ants.report.players import Seen
 
 BARE = {"seen": Seen(), "facts": {}, "files": []}
@@ -55,8 +55,8 @@ def test_the_mean_is_told_with_its_own_difference(page: str) -> None:
 
 def test_both_deliveries_are_explained_before_the_answer(page: str) -> None:
     above = page[: page.index('<section id="answer">')]
-    for words in DELIVERY.values():
-        assert words in above
+    for setting in results().comparison.delivery_settings:
+        assert f"With {setting} delivery, " in above
 
 
 def test_table_2_stands_beside_the_papers(page: str) -> None:
@@ -106,9 +106,22 @@ def test_minus_signs_are_true_ones_wherever_a_number_stands(page: str) -> None:
     )
 
 
-def test_seeds_are_told_in_words() -> None:
-    assert span(0, 10) == "0 to 9"
-    assert span(7, 1) == "7"
+def test_settings_are_facts_with_each_value_once() -> None:
+    settings = {
+        "version": "1.0",
+        "seeds": [3, 4, 5],
+        "worlds": [{"food": 1}],
+        "training.learner": ["sarsa", "sarsa", "q_learning"],
+        "training.epsilon": 0.5,
+        "task.life.births": False,
+        "task.life.lifespan": None,
+        "ants": [16, 4, 16],
+    }
+    assert setting_facts(settings) == {
+        **{"Seeds": "3 to 5", "Learner": "sarsa, q_learning", "Epsilon": "0.5"},
+        **{"Life, births": "no", "Ants": "4, 16"},
+    }
+    assert setting_facts({"seeds": [7]}) == {"Seeds": "7"}
 
 
 def test_verdicts_are_counted(page: str) -> None:

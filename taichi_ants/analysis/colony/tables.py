@@ -26,7 +26,7 @@ from taichi_ants.analysis.colony.study import (
     Measured,
 )
 from taichi_ants.analysis.findings import Finding, Verdict, seeds_in_words, weakest
-from taichi_ants.analysis.sweeps import Centre, centres_of, seed_rows
+from taichi_ants.analysis.sweeps import Centre, centre_columns, centres_of, seed_rows
 from taichi_ants.analysis.tables import (
     MISSING,
     Block,
@@ -75,7 +75,7 @@ class ConditionRow(NamedTuple):
         return {
             **self.condition._asdict(),
             "seeds": self.seeds,
-            **{k: v for name, one in self.centres.items() for k, v in one.columns(name).items()},
+            **centre_columns(self.centres),
             **{
                 f"{name}_{end}": value
                 for name, ends in self.ranges.items()

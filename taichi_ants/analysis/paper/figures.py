@@ -7,13 +7,14 @@ needed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import cycle
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, counts
+from taichi_ants.analysis.bounds.baselines import Baseline
 from taichi_ants.analysis.paper.comparison import Comparison
 from taichi_ants.analysis.paper.curves import curve_row, spans
 from taichi_ants.analysis.paper.published import FIGURE_1
@@ -29,7 +30,6 @@ from taichi_ants.analysis.style import (
     new_figure,
     styled,
 )
-from taichi_ants.analysis.tables import baseline_name
 from taichi_ants.errors import count
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ _CURVES = {"returns": "Return", "steps": "Steps", "deliveries": "Deliveries"}
 BEHAVIOUR_LOOKS = ((BLUE, "o"), (ORANGE, "^"), (WINE, "s"), (INK, "x"))
 
 
-def learning_curves(comparison: Comparison, baselines: Sequence[Mapping] = ()) -> Figure:
+def learning_curves(comparison: Comparison, baselines: Sequence[Baseline] = ()) -> Figure:
     """Return, length and deliveries per episode, a column for each delivery setting.
 
     Learners are shown at the configuration that stands for the paper's figure 1, one that lacks it
@@ -90,7 +90,7 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Mapping] = ()) -
     return figure
 
 
-def return_against_deliveries(comparison: Comparison, baselines: Sequence[Mapping] = ()) -> Figure:
+def return_against_deliveries(comparison: Comparison, baselines: Sequence[Baseline] = ()) -> Figure:
     """Who earns reward by delivering, and what the others do instead: a mark for each run.
 
     Of the rows of baselines.csv the optimal policies, for which delivery is the end, are shown only
@@ -126,7 +126,7 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Mappin
     return figure
 
 
-def draw_all(comparison: Comparison, baselines: Sequence[Mapping]) -> dict[str, Figure]:
+def draw_all(comparison: Comparison, baselines: Sequence[Baseline]) -> dict[str, Figure]:
     """All figures, by their names."""
     return {draw.__name__: draw(comparison, baselines) for draw in FIGURES}
 
@@ -134,24 +134,25 @@ def draw_all(comparison: Comparison, baselines: Sequence[Mapping]) -> dict[str, 
 FIGURES = (learning_curves, return_against_deliveries)
 
 
-def _shortest_delivery(column: Sequence[Axes], baselines: Sequence[Mapping]) -> None:
+def _shortest_delivery(column: Sequence[Axes], baselines: Sequence[Baseline]) -> None:
     """Dotted lines at the return and the length of the shortest delivery, where it is known."""
     for row in baselines:
-        if row["baseline"] == "shortest delivery" and row["return_mean"] is not None:
+        if row.baseline == "shortest delivery" and row.return_mean is not None:
             for axis, name in zip(column, ("return_mean", "steps_mean"), strict=False):
-                axis.axhline(row[name], color=INK, lw=0.9, ls=":", label=row["baseline"])
+                axis.axhline(getattr(row, name), color=INK, lw=0.9, ls=":", label=row.baseline)
 
 
-def _baseline_marks(axis: Axes, baselines: Sequence[Mapping], setting: str) -> None:
+def _baseline_marks(axis: Axes, baselines: Sequence[Baseline], setting: str) -> None:
     """Hollow marks, larger than those of the data and above them."""
     for row, marker in zip(baselines, cycle("osD^vph")):
         # Optimal policies take delivery for the end; elsewhere they are no yardstick.
-        counts_here = setting == "absorbing" or row["baseline"] != "optimal policy"
-        if row["return_mean"] is not None and counts_here:
+        counts_here = setting == "absorbing" or row.baseline != "optimal policy"
+        x, y = row.deliveries_mean, row.return_mean
+        if x is not None and y is not None and counts_here:
             axis.plot(
-                *(row["deliveries_mean"], row["return_mean"], marker),
+                *(x, y, marker),
                 color=INK,
                 markerfacecolor="none",
                 markersize=11,
-                label=baseline_name(row),
+                label=row.label,
             )

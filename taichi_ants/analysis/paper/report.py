@@ -5,9 +5,10 @@ It shows what the other tables hold, and computes nothing.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS, counts
+from taichi_ants.analysis.bounds.baselines import Baseline
 from taichi_ants.analysis.paper.audit import Audit, claims_tallies, headlines
 from taichi_ants.analysis.paper.comparison import Comparison
 from taichi_ants.analysis.paper.published import GREEDY_RETURN, GREEDY_STEPS
@@ -16,7 +17,6 @@ from taichi_ants.analysis.paper.table2 import APART, Line, figure_tables
 from taichi_ants.analysis.tables import (
     Block,
     Table,
-    baseline_name,
     markdown,
     number,
     plain_text,
@@ -58,7 +58,7 @@ def all_tables(
     comparison: Comparison,
     lines: Sequence[Line],
     behaviours: Sequence[BehaviourMeans],
-    baselines: Sequence[Mapping] = (),
+    baselines: Sequence[Baseline] = (),
 ) -> list[Table]:
     """All tables, but those of the claims, each with its notes.
 
@@ -164,14 +164,13 @@ def behaviour_table(lines: Sequence[Line], behaviours: Sequence[BehaviourMeans])
     return Table("What they do, in the configurations above", headers, rows, notes, text_columns=3)
 
 
-def _baselines(baselines: Sequence[Mapping]) -> Table:
-    digits = {"return_mean": 1, "steps_mean": 1, "deliveries_mean": 2}
+def _baselines(baselines: Sequence[Baseline]) -> Table:
     rows, notes = [], []
-    for row in baselines:
-        if row["return_mean"] is None:
-            notes.append(f"{baseline_name(row)}: {row['note']}")
+    for one in baselines:
+        if one.return_mean is None:
+            notes.append(f"{one.label}: {one.note}")
         else:
-            figures = (number(row[name], places) for name, places in digits.items())
-            rows.append([baseline_name(row), *figures])
+            lengths = number(one.return_mean), number(one.steps_mean)
+            rows.append([one.label, *lengths, number(one.deliveries_mean, 2)])
     headers = ("Behaviour", "Return", "Steps", "Deliveries")
     return Table("Baselines, with evaporation as in training", headers, rows, notes)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
+from taichi_ants.analysis.bounds.baselines import Baseline
 from taichi_ants.analysis.paper.audit import Audit, assess
 from taichi_ants.analysis.paper.comparison import Comparison
 from taichi_ants.analysis.paper.summary import (
@@ -20,14 +21,14 @@ class Results(NamedTuple):
     """A comparison, the rows of `bounds.baselines`, and the tables that follow from them."""
 
     comparison: Comparison
-    baselines: Sequence[Mapping]
+    baselines: Sequence[Baseline]
     summaries: Sequence[Summary]
     behaviours: Sequence[BehaviourMeans]
     lines: Sequence[Line]
     audit: Audit
 
     @classmethod
-    def of(cls, comparison: Comparison, baselines: Sequence[Mapping]) -> Results:
+    def of(cls, comparison: Comparison, baselines: Sequence[Baseline]) -> Results:
         """Return the results of a comparison."""
         summaries = summarise(comparison)
         lines, behaviours = table2(comparison, summaries), summarise_behaviours(comparison)

@@ -10,7 +10,7 @@ import numpy as np
 from taichi_ants.analysis.behaviour import BEHAVIOURS, NAMES, counts
 from taichi_ants.analysis.paper.comparison import Comparison, Row
 from taichi_ants.analysis.paper.measures import MEASURES
-from taichi_ants.analysis.sweeps import Centre, centres_of
+from taichi_ants.analysis.sweeps import Centre, centre_columns, centres_of
 
 _GREEDY = ("greedy_return", "greedy_steps", "greedy_deliveries")
 _MEASURES = ("return_last50", "steps_last50", "steps_all", "deliveries_last50", *_GREEDY)
@@ -41,7 +41,7 @@ class Summary(NamedTuple):
         return {
             **self.row.columns(),
             "seeds": self.seeds,
-            **{k: v for name, one in self.centres.items() for k, v in one.columns(name).items()},
+            **centre_columns(self.centres),
             **{f"runs_{name}": self.runs.get(code, 0) for code, name in enumerate(NAMES)},
         }
 

@@ -24,6 +24,7 @@ from synthetic_comparison import (
 )
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, CIRCLES, OTHER
+from taichi_ants.analysis.bounds.baselines import Baseline
 from taichi_ants.analysis.paper.best_of import shown_position
 from taichi_ants.analysis.paper.comparison import Variant
 from taichi_ants.analysis.paper.figures import (
@@ -39,13 +40,7 @@ from taichi_ants.analysis.style import COLOURS, save_all
 SETTINGS = ("continuing", "absorbing")
 SARSA_AT = (SARSA, FIGURE_1)
 BASELINES = [
-    {
-        "baseline": name,
-        "discount": discount,
-        "return_mean": figure,
-        "steps_mean": None if figure is None else 34.0,
-        "deliveries_mean": deliveries,
-    }
+    Baseline(name, discount, figure, None if figure is None else 34.0, deliveries)
     for name, discount, figure, deliveries in (
         ("shortest delivery", None, 45.0, 1.0),
         ("optimal policy", 0.9, 45.0, 1.0),

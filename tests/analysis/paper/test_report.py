@@ -8,6 +8,7 @@ import pytest
 from synthetic_comparison import build, change, remeasured, subset, unchanged
 
 from taichi_ants.analysis.behaviour import CIRCLES, OTHER, WALKS
+from taichi_ants.analysis.bounds.baselines import Baseline
 from taichi_ants.analysis.paper.audit import HEADLINES, assess
 from taichi_ants.analysis.paper.best_of import shown_position
 from taichi_ants.analysis.paper.claims import CLAIMS
@@ -20,19 +21,8 @@ from taichi_ants.analysis.tables import plain_text
 from taichi_ants.task import Task
 
 BASELINES = [
-    {
-        "baseline": "optimal policy",
-        "discount": 0.99,
-        "return_mean": 476.0,
-        "steps_mean": 600.0,
-        "deliveries_mean": 0.0,
-    },
-    {
-        "baseline": "exact bounds",
-        "discount": None,
-        **dict.fromkeys(("return_mean", "steps_mean", "deliveries_mean")),
-        "note": "the world is too large",
-    },
+    Baseline("optimal policy", 0.99, 476.0, 600.0, 0.0),
+    Baseline("exact bounds", None, None, None, None, "the world is too large"),
 ]
 
 
