@@ -24,7 +24,7 @@ RULES = {
     "lively": Task(
         "queues",
         pheromone=Pheromone("exponential", 50.0, 0.1, "fading", 500, view="strongest"),
-        traffic=Traffic.named("following"),
+        traffic=Traffic.named()["following"],
         delivery="continuing",
         evaporation_in_training=True,
         life=Life(births=True, lifespan=40_000, regrowth=50, wander=100),

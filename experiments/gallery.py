@@ -30,7 +30,7 @@ _MAP = str(ROOT / "experiments" / "maps" / "garden.txt")
 # That of the study's median seed: 64 ants that queue, trained together in worlds of far piles.
 _POLICY = str(ROOT / "experiments" / "policies" / "far_piles.npz")
 _COLONY = [
-    *("colony", "--policy", _POLICY, "--world", "far_piles", "--world-seed", "3", "--ants", "64"),
+    *("colony", "--policy", _POLICY, "--world", "far_piles", "--world.seed", "3", "--ants", "64"),
     *("--epsilon", "0.01", "--title", "a colony that learned together"),
 ]
 GALLERY: dict[str, list[str]] = {
@@ -72,8 +72,8 @@ FIGURES = {
 }
 _QUEUEING = str(ROOT / "experiments" / "policies" / "queueing.npz")
 MILLION = [
-    *("live", "--policy", _QUEUEING, "--sharing", "fixed", "--epsilon", "0.01"),
-    *("--ants", "64", "--colonies", "15625", "--ranges", "30", "30", "30", "--ticks", "300"),
+    *("live", "--policy", _QUEUEING, "--sharing", "fixed", "--training.epsilon", "0.01"),
+    *("--ants", "64", "--colonies", "15625", "--world.ranges", "30", "30", "30", "--ticks", "300"),
 ]
 
 

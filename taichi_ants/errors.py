@@ -73,6 +73,11 @@ def check_one_of(name: str, value: object, allowed: Sequence[str]) -> None:
         raise AntsError(f"{name} is {shown(value)}; it must be one of {', '.join(allowed)}.")
 
 
+def is_flag(value: object) -> bool:
+    """Whether a value is a bool of Python or NumPy, which need not be imported for that."""
+    return isinstance(value, bool) or type(value).__name__ in ("bool", "bool_")
+
+
 def check_new_name(kind: str, name: object, built_in: Iterable[str]) -> None:
     """Raises AntsError unless you can register a learner or observation (`kind`) by this name."""
     if not isinstance(name, str) or not name.isidentifier():
@@ -93,9 +98,7 @@ def checked_flag(name: str, value: object) -> bool:
     Raises:
         AntsError: `value` is neither; names it `name`.
     """
-    import numpy as np  # not above: command lines show their help without it
-
-    if not isinstance(value, (bool, np.bool_)):
+    if not is_flag(value):
         raise AntsError(f"{name} is {shown(value)}; it must be True or False.")
     return bool(value)
 
@@ -107,10 +110,8 @@ def whole(name: str, value: object, otherwise: str = "") -> int:
         AntsError: `value` is not a whole number (booleans and floats are none); names it `name`,
             and adds what is allowed otherwise.
     """
-    import numpy as np
-
     try:
-        if isinstance(value, (bool, np.bool_)):
+        if is_flag(value):
             raise TypeError
         return operator.index(value)  # type: ignore[arg-type]
     except TypeError:

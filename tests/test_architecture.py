@@ -19,7 +19,7 @@ import taichi_ants
 # From the ground up: a part imports parts of lower layers only. Each part stands here.
 LAYERS = (
     {"errors", "environment"},
-    {"files", "grid"},
+    {"files", "grid", "settings"},
     {"rows", "task"},
     {"archives"},
     {"runtime", "worlds", "learners"},

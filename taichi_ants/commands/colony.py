@@ -9,18 +9,20 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.command_line import (
-    HYPERPARAMETER,
     WORLDS,
     Parser,
     add_common,
     add_results,
+    add_settings,
+    given_settings,
     load_plugin,
     progress_bar,
     run_command,
@@ -28,11 +30,11 @@ from taichi_ants.studies.command_line import (
     with_folder,
 )
 from taichi_ants.studies.interruption import held, stoppable
+from taichi_ants.task import Task
 
 if TYPE_CHECKING:
-    from taichi_ants import Colony, Task
+    from taichi_ants import Colony
     from taichi_ants.analysis.colony.results import Results
-    from taichi_ants.learners.config import TrainingConfig
     from taichi_ants.learners.policies import Policy
     from taichi_ants.studies.colony_study import Plan
     from taichi_ants.studies.runner import Study
@@ -53,18 +55,14 @@ QUICK = {
     "ticks": 500,
     "rollouts": 2,
 }
+# Settings of learning that the study chooses.
+PLANNED = ("training.epsilon_decay", "training.min_epsilon")
 WIDTH = 79  # of the report, in columns
 COUNT: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
 SEEDS, CONDITIONS = "seeds.csv", "conditions.csv"
 FIGURES, POLICIES = "figures", "policies"
 AGAIN = "Stopped; finished parts are kept, and the same command goes on from there."
 _OF_RESUMED = ("resume", "ticks", "save", "render", "every", "figure", "plugin", "threads", "arch")
-_OF_LEARNING = ("learner", "learning_rate", "discount", "hyperparameter")
-_OF_LIFE = ("births", "lifespan", "regrowth", "wander")
-_OF_PHEROMONE = (
-    *("evaporation", "half_life", "diffusion"),
-    *("deposit", "level", "slope", "cap", "view"),
-)
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -95,23 +93,15 @@ def _check_live(
     for name, flag in given.items():
         if settings.resume and name not in _OF_RESUMED:
             error(f"{flag} cannot change a colony that is resumed, leave it out")
-        if settings.sharing == "fixed" and name in _OF_LEARNING:
+        learns = name.startswith("training.") and name != "training.epsilon"
+        if settings.sharing == "fixed" and learns:
             error(
                 f"{flag} is of learning, but with --sharing fixed nobody learns, so leave one out"
             )
-    if settings.policy and settings.observation:
-        error("--observation is that of the policy, leave it out")
+    if settings.policy and "task.observation" in given:
+        error("--task.observation is that of the policy, leave it out")
     if "every" in given and (not settings.render or settings.render.lower().endswith(".png")):
         error("--every is of an animation, name one with --render, or leave it out")
-
-
-def _add_learning(parser: argparse.ArgumentParser, epsilon: float) -> None:
-    add = parser.add_argument_group("learning").add_argument
-    add("--learner", default="sarsa", metavar="NAME", help="name of a learner")
-    add("--learning-rate", type=float, default=0.1, metavar="X", help="in (0, 1]")
-    add("--discount", type=float, default=0.9, metavar="X", help="in [0, 1]")
-    add("--epsilon", type=float, default=epsilon, metavar="X", help="in the first episode")
-    add("--hyperparameter", **HYPERPARAMETER)
 
 
 def _add_study(parser: argparse.ArgumentParser) -> None:
@@ -128,7 +118,7 @@ def _add_study(parser: argparse.ArgumentParser) -> None:
     add("--ticks", **counts, default=1000, help="of an episode")
     add("--rollouts", **counts, default=4, help="evaluation episodes")
     add("--quick", action="store_true", help="fewer seeds, sizes and ticks, no other worlds")
-    _add_learning(parser, 0.3)
+    add_settings(parser, _learning(0.3), but=PLANNED)
     add_common(parser)
     add_results(parser, "colony")
 
@@ -142,12 +132,11 @@ def _add_live(parser: argparse.ArgumentParser) -> None:
     start = "of ants, by the queen or anywhere"
     add("--start", choices=("nest", "spread"), default="nest", help=start)
     add("--world", default="open", metavar="NAME", help=WORLDS)
-    add("--ranges", type=whole_number(1), nargs=3, metavar=("X", "Y", "Z"), help="of an open world")
     add("--sharing", choices=("shared", "own", "fixed"), default="shared", help="of tables")
     add("--policy", metavar="FILE", help="a policy file to start from (.npz)")
-    _add_learning(parser, 0.1)
-    _add_rules(parser)
-    _add_pheromone(parser)
+    add("--capacity", **COUNT, help="most ants at once, if births are on")
+    which = "rules to start from (default: those of --policy, else the paper's)"
+    add("--task", choices=("paper", "foraging", "queueing"), help=which)
     add = parser.add_argument_group("files").add_argument
     add("--save", metavar="FILE", help="keep the colony at the end (.npz)")
     add("--resume", metavar="FILE", help="go on with a colony that was saved")
@@ -157,45 +146,23 @@ def _add_live(parser: argparse.ArgumentParser) -> None:
     figure = "foods delivered per tick over time, of all colonies together (.png and .csv)"
     add("--figure", metavar="FILE.png", help=figure)
     add_common(parser)
+    add_settings(parser, _living(Task()))
+    add_settings(parser, _learning(0.1))
 
 
-def _add_rules(parser: argparse.ArgumentParser) -> None:
-    which = "All rules are those of --task; without it those for which --policy was made; else the "
-    which += "paper's. The options below change single ones."
-    add = parser.add_argument_group("rules", which).add_argument
-    add("--task", choices=("paper", "foraging", "queueing"), help="rules that go together")
-    add("--observation", metavar="NAME", help="what ants see; with --policy always the policy's")
-    traffic = "who may enter a cell with an ant on it"
-    add("--traffic", choices=("blocking", "right_of_way", "following"), help=traffic)
-    add = parser.add_argument_group("what comes and goes").add_argument
-    add("--births", action="store_true", help="the queen turns food into ants")
-    add("--capacity", **COUNT, help="most ants at once, with births")
-    add("--lifespan", **COUNT, help="ticks after which an ant dies")
-    add("--regrowth", type=whole_number(0), metavar="N", help="ticks until taken food is back")
-    add("--wander", **COUNT, help="ticks until a pile of food moves")
+def _learning(epsilon: float) -> TrainingConfig:
+    """The learner before options change it; its epsilon does not decay, unless a study plans it."""
+    return TrainingConfig("sarsa", 0.1, 0.9, epsilon, 1.0)
 
 
-def _add_pheromone(parser: argparse.ArgumentParser) -> None:
-    add = parser.add_argument_group("pheromone").add_argument
-    add("--evaporation", choices=("linear", "exponential", "none"), help="how trails fall")
-    add("--half-life", type=float, metavar="X", help="ticks; trails evaporate exponentially")
-    add("--diffusion", type=float, metavar="X", help="share of a trail that spreads per tick")
-    add("--deposit", choices=("set", "add", "fading", "none"), help="how ants with food lay them")
-    add("--level", **COUNT, help="what a deposit sets or adds, or from which it fades")
-    add("--slope", **COUNT, help="how much a deposit fades per tick (default: 10)")
-    add("--cap", **COUNT, help="most that deposits add up to (default: 1000)")
-    views = ("half", "strongest", "strongest_under_carriers")
-    add("--view", choices=views, help="which trails ants without food see")
+def _living(task: Task) -> Task:
+    """A task for colonies that live on after a delivery, while trails evaporate."""
+    return replace(task, delivery="continuing", evaporation_in_training=True)
 
 
-def training_config(settings: argparse.Namespace) -> TrainingConfig:
-    """Return the learner; its epsilon does not decay, unless a study plans that."""
-    from taichi_ants import TrainingConfig
-
-    numbers = settings.learning_rate, settings.discount, settings.epsilon
-    return TrainingConfig(
-        settings.learner, *numbers, 1.0, settings.epsilon, settings.hyperparameter
-    )
+def training_config(settings: argparse.Namespace, epsilon: float) -> TrainingConfig:
+    """Return the learner with what options change."""
+    return _learning(epsilon).but(**given_settings(settings).get("training", {}))
 
 
 def study(settings: argparse.Namespace) -> None:
@@ -208,7 +175,7 @@ def study(settings: argparse.Namespace) -> None:
         settings.arenas,
         settings.sizes,
         seeds,
-        training_config(settings),
+        training_config(settings, 0.3),
         settings.episodes,
         settings.ticks,
         settings.rollouts,
@@ -313,12 +280,8 @@ def new_colony(settings: argparse.Namespace) -> Colony:
     """A colony at the start of its episode; deliveries do not end it, so updates look beyond."""
     from taichi_ants import AntsError, Colony, load_policy, worlds
 
-    if settings.ranges and settings.world != "open":
-        raise AntsError(f"--ranges are those of an open world, not of {settings.world!r}.")
-    if settings.ranges:
-        world = worlds.open_world(settings.seed, settings.ranges)
-    else:
-        world = worlds.build(settings.world, settings.seed)
+    of_world = {"seed": settings.seed, **given_settings(settings).get("world", {})}
+    world = worlds.build(settings.world, **of_world)
     policy = load_policy(settings.policy) if settings.policy else None
     if settings.sharing == "fixed" and policy is None:
         raise AntsError(
@@ -328,7 +291,7 @@ def new_colony(settings: argparse.Namespace) -> Colony:
     colony = Colony(
         world,
         rules(settings, policy),
-        training_config(settings),
+        training_config(settings, 0.1),
         range(settings.seed, settings.seed + settings.colonies),
         ants=settings.ants,
         capacity=settings.capacity,
@@ -344,36 +307,11 @@ def new_colony(settings: argparse.Namespace) -> Colony:
 
 def rules(settings: argparse.Namespace, policy: Policy | None) -> Task:
     """The task that is named, else the policy's, else the paper's; with what options change."""
-    from taichi_ants import Pheromone, Task, task
-
-    named = getattr(task, settings.task)() if settings.task else None
-    base = named or (policy.task if policy else Task())
-    of_trails = _given(settings, _OF_PHEROMONE)
-    if "half_life" in of_trails:
-        of_trails.setdefault("evaporation", "exponential")
-    # Numbers that belong to another kind of evaporation or deposit go with it.
-    if "evaporation" in of_trails:
-        of_trails.setdefault("half_life", None)
-    if "deposit" in of_trails:
-        of_trails = {"slope": None, "cap": None, **of_trails}
-    if of_trails.get("deposit") == "none":
-        of_trails.setdefault("level", Pheromone().level)
-    seen = {"observation": policy.observation} if policy else _given(settings, ("observation",))
-    return replace(
-        base,
-        pheromone=replace(base.pheromone, **of_trails),
-        life=replace(base.life, **_given(settings, _OF_LIFE)),
-        delivery="continuing",
-        evaporation_in_training=True,
-        **_given(settings, ("traffic",)),
-        **seen,
-    )
-
-
-def _given(settings: argparse.Namespace, names: Iterable[str]) -> dict[str, Any]:
-    """Of some options those that are given; flags that are off are not."""
-    values = {name: getattr(settings, name) for name in names}
-    return {name: one for name, one in values.items() if one is not None and one is not False}
+    named = Task.named()[settings.task] if settings.task else None
+    base = _living(named or (policy.task if policy else Task()))
+    if policy:
+        base = replace(base, observation=policy.observation)
+    return base.but(**given_settings(settings).get("task", {}))
 
 
 def start(settings: argparse.Namespace) -> None:

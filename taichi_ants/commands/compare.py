@@ -143,7 +143,7 @@ def build_study(settings: argparse.Namespace) -> Study[RunPoint]:
     if settings.plugin:
         load_plugin(settings.plugin)
     if settings.world_seed is not None:
-        worlds.check_seed_counts(settings.world)
+        worlds.check_seed_counts(settings.world, "--world-seed")
     world = worlds.build(settings.world, settings.world_seed or 0)
     grid = points(settings, world)
     if not world.reachable_foods().any():

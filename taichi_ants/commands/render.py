@@ -15,24 +15,28 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.command_line import (
-    HYPERPARAMETER,
     WORLDS,
     Parser,
+    add_settings,
+    given_settings,
     load_plugin,
     progress_bar,
     run_command,
     whole_number,
 )
+from taichi_ants.task import Task
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from taichi_ants import Task, World
-    from taichi_ants.learners.config import TrainingConfig
+    from taichi_ants import World
     from taichi_ants.rendering import Stage
     from taichi_ants.rendering.moments import Moment
 
+# Without options that change them.
+TASK, TRAINING = Task(), TrainingConfig("sarsa", 0.001, 0.9, 0.3, 0.99)
 KINDS = {  # what each subcommand shows, and how it is called
     "episode": ("One ant that follows a policy", "--policy my.npz --epsilon 0.1 --out ant.mp4"),
     "colony": ("Many ants that follow one policy", "--ants 200 --out ants.gif"),
@@ -58,21 +62,13 @@ _STAGES = {"nargs": "+", "type": whole_number(0), "metavar": "N"}
 # Each option: the kinds of pictures that it is for, by their first letters, what it does, and how
 # it is read.
 _TRAINING: dict[str, tuple[str, str, dict[str, Any]]] = {  # of no use beside --policy
-    "--learner": ("ecls", "name of the learner to train", {"default": "sarsa", "metavar": "NAME"}),
     "--episodes": ("ecs", "of training", {**_COUNT, "default": 500}),
     "--stages": ("l", "looks at the ant after so many episodes of training", _STAGES),
-    "--learning-rate": ("ecls", "in (0, 1]", {**_NUMBER, "default": 0.001}),
-    "--discount": ("ecls", "in [0, 1]", {**_NUMBER, "default": 0.9}),
-    "--train-epsilon": ("ecls", "epsilon in the first episode", {**_NUMBER, "default": 0.3}),
-    "--epsilon-decay": ("ecls", "a factor after each episode", {**_NUMBER, "default": 0.99}),
-    "--hyperparameter": ("ecls", HYPERPARAMETER["help"], HYPERPARAMETER),
-    "--observation": ("ecls", "what ants see", {"default": "paper", "metavar": "NAME"}),
 }
 _OPTIONS = {
     "--out": ("ecls", "file or folder", {"metavar": "PATH"}),
     "--title": ("ecls", "a line above all", {"metavar": "TEXT"}),
     "--world": ("ecls", WORLDS, {"default": "paper"}),
-    "--world-seed": ("ecls", "seed of a world drawn at random", {**_SEED, "default": None}),
     "--seed": ("ecls", "seed of training and of what is shown", _SEED),
     "--seeds": ("l", "train seeds 0 to N - 1, show the median run and count the others", _SEEDS),
     "--plugin": ("ecls", "a Python file with learners, worlds, observations", {"metavar": "FILE"}),
@@ -114,9 +110,12 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
             if kind[0] in where:
                 one.add_argument(flag, **{"help": words, **reading})
         one.set_defaults(kind=kind, **_DEFAULTS[kind])
+        add_settings(one, TASK)
+        add_settings(one, TRAINING)
     settings, given = parser.parse_given(arguments)
     for flag in given.values():
-        if flag in _TRAINING and getattr(settings, "policy", None):
+        of_training = flag in _TRAINING or flag.startswith(("--training.", "--task."))
+        if of_training and getattr(settings, "policy", None):
             parser.error(f"{flag} is of training, but --policy is trained, so leave one out")
         if flag in ("--follow", "--title") and getattr(settings, "plain", False):
             parser.error(f"--plain leaves out what {flag} shows, so leave out one of them")
@@ -154,9 +153,10 @@ def show(settings: argparse.Namespace) -> None:
         check_size(settings.size)
     if settings.plugin:
         load_plugin(settings.plugin)
-    if settings.world_seed is not None:
+    of_world = given_settings(settings).get("world", {})
+    if "seed" in of_world:
         worlds.check_seed_counts(settings.world)
-    world = worlds.build(settings.world, settings.world_seed or 0)
+    world = worlds.build(settings.world, **of_world)
     kinds = (show_episode, show_colony, show_learning, show_sheet)
     dict(zip(KINDS, kinds, strict=True))[settings.kind](settings, world)
 
@@ -216,7 +216,8 @@ def show_learning(settings: argparse.Namespace, world: World) -> None:
 
     seed, stages = noted_stages(settings, world)
     ant = "an ant" if settings.seed is not None else f"the median of {count(settings.seeds, 'ant')}"
-    title = settings.title or f"{learners.label(settings.learner)}: {ant} before and after learning"
+    config = training_config(settings)
+    title = settings.title or f"{learners.label(config.learner)}: {ant} before and after learning"
     longest = max(len(stage.episode) for stage in stages)
     _save(settings, learning_frames(stages, settings.size, title), longest)
     told = [f"{one.title}{f' ({one.among})' if one.among else ''}" for one in stages]
@@ -234,7 +235,7 @@ def show_sheet(settings: argparse.Namespace, world: World) -> None:
 
 def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray, Task, str]:
     """The action values (n_states, 5) to follow, their task, and a title that says whence."""
-    from taichi_ants import Colony, Life, Task, learners, load_policy, train
+    from taichi_ants import Colony, Life, learners, load_policy, train
     from taichi_ants.errors import count
 
     if settings.policy:
@@ -245,32 +246,25 @@ def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray,
             task = replace(task, life=Life())
         return policy.q_values, task, title
     config, seed, episodes = training_config(settings), settings.seed, settings.episodes
-    title = (
-        settings.title or f"{learners.label(settings.learner)} after {count(episodes, 'episode')}"
-    )
+    title = settings.title or f"{learners.label(config.learner)} after {count(episodes, 'episode')}"
     with progress_bar("Training") as progress:
+        task = TASK.but(**given_settings(settings).get("task", {}))
         if settings.kind != "colony":
-            task = Task(settings.observation)
             result = train(world, config, seed, episodes, task=task, progress=progress)
             return result.q_values[0, 0], task, title
-        # Trails fall while it learns, too.
-        task = Task(settings.observation, evaporation_in_training=True)
+        task = replace(task, evaporation_in_training=True)
         colony = Colony(world, task, config, seed, settings.ants)
         colony.run(episodes, settings.ticks, progress)
     return colony.q_values[0], task, title
 
 
 def training_config(settings: argparse.Namespace) -> TrainingConfig:
-    from taichi_ants import TrainingConfig
-
-    numbers = settings.learning_rate, settings.discount, settings.train_epsilon
-    more = {"hyperparameters": settings.hyperparameter}
-    return TrainingConfig(settings.learner, *numbers, settings.epsilon_decay, **more)
+    """Return the learner with what options change."""
+    return TRAINING.but(**given_settings(settings).get("training", {}))
 
 
 def noted_stages(settings: argparse.Namespace, world: World) -> tuple[int, list[Stage]]:
     """The seed, and the stages of its ant, each with its behaviour and those of other seeds."""
-    from taichi_ants import Task
     from taichi_ants.analysis.behaviour import BEHAVIOURS, DELIVERS, OTHER, classify
     from taichi_ants.rendering import learning_stages, typical_seed
 
@@ -278,7 +272,7 @@ def noted_stages(settings: argparse.Namespace, world: World) -> tuple[int, list[
     what: dict[str, Any] = {
         "stages": settings.stages,
         "max_steps": settings.max_steps,
-        "task": Task(settings.observation),
+        "task": TASK.but(**given_settings(settings).get("task", {})),
         "epsilon": settings.epsilon,
     }
     with progress_bar("Training") as progress:

@@ -13,11 +13,13 @@ import sys
 import webbrowser
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from taichi_ants.settings import flat
 from taichi_ants.studies.command_line import (
     Parser,
     load_plugin,
@@ -26,6 +28,7 @@ from taichi_ants.studies.command_line import (
     whole_number,
 )
 from taichi_ants.studies.interruption import stop_if_noted
+from taichi_ants.task import Life, queueing
 
 if TYPE_CHECKING:
     from taichi_ants.learners.policies import Policy
@@ -39,9 +42,9 @@ _LEADS = """<!doctype html>
 <a href="ADDRESS">Open the live page</a>
 """
 START: dict[str, Any] = {
-    **{"world": "far_piles", "map": "", "world_seed": 3, "size": 30, "sees": "queues"},
-    **{"rules": ["rising", "queues", "falls", "regrowth"], "policy": "learn sarsa"},
+    **{"world": "far_piles", "map": "", "world_seed": 3, "size": 30, "policy": "learn sarsa"},
     **{"ants": 64, "seed": 0, "ticks": 1000},
+    "settings": flat(replace(queueing(), life=Life(regrowth=0)).as_dict(), "task"),
 }
 
 

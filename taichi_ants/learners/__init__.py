@@ -1,7 +1,7 @@
 """The learners: one file each, and policies that need no learning."""
 
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.learners.hyperparameters import Hyperparameters, number
+from taichi_ants.learners.hyperparameters import Hyperparameters
 from taichi_ants.learners.registry import (
     Learner,
     Memory,
@@ -12,16 +12,17 @@ from taichi_ants.learners.registry import (
     settle,
     td_learner,
 )
+from taichi_ants.settings import Is
 
 __all__ = [
     "Hyperparameters",
+    "Is",
     "Learner",
     "Memory",
     "TrainingConfig",
     "get",
     "label",
     "names",
-    "number",
     "register",
     "settle",
     "td_learner",

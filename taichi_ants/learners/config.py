@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from numbers import Real
-from typing import Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Annotated, Any
 
 from taichi_ants.errors import AntsError, shown
+from taichi_ants.settings import Is, Settings, declared, setting
 
-_LEAST_RATE = 1e-37
+if TYPE_CHECKING:
+    import numpy as np
+
+Share = Annotated[float, Is(least=0, most=1)]
+Factor = Annotated[float, Is(above=0, most=1)]
 MOST_VALUE = 1_000_000  # of an action before learning
 
 
 @dataclass(frozen=True, init=False)
-class TrainingConfig:
+class TrainingConfig(Settings, path="training"):
     """The settings of one learner.
 
     Attributes:
@@ -44,16 +47,25 @@ class TrainingConfig:
             written down before a learner is registered.
     """
 
-    learner: str
-    learning_rate: float
-    discount: float
-    epsilon: float
-    epsilon_decay: float
-    min_epsilon: float
-    learning_rate_decay: float
-    min_learning_rate: float
-    initial_value: float
-    hyperparameters: tuple[tuple[str, float], ...]
+    learner: Annotated[str, Is("name of a learner")]
+    # Below this the step size is nothing in the 32 bits of an action value.
+    learning_rate: Annotated[float, Is("step size of the first episode", least=1e-37, most=1)]
+    discount: Annotated[Share, Is("discount factor")]
+    epsilon: Annotated[Share, Is("exploration rate of the first episode")]
+    epsilon_decay: Annotated[Factor, Is("factor on epsilon after each episode")]
+    min_epsilon: Annotated[Share, Is("value below which epsilon does not decay")] = 0.01
+    learning_rate_decay: Annotated[Factor, Is("factor on the learning rate after each episode")] = (
+        1.0
+    )
+    min_learning_rate: Annotated[
+        Share, Is("value below which the learning rate does not decay")
+    ] = 0.0
+    initial_value: Annotated[
+        float,
+        Is("value of each action before learning; high ones make ants try every action"),
+        Is(least=-MOST_VALUE, most=MOST_VALUE),
+    ] = 0.0
+    hyperparameters: tuple[tuple[str, float], ...] = ()
 
     def __init__(
         self,
@@ -70,22 +82,10 @@ class TrainingConfig:
         initial_value: float = 0.0,
         **more: float,
     ) -> None:
-        if not isinstance(learner, str):
-            raise AntsError(f"learner is {shown(learner)}; it must be the name of a learner.")
-        object.__setattr__(self, "learner", learner)
-        self._set("learning_rate", learning_rate, "above 0 and at most 1")
-        if self.learning_rate < _LEAST_RATE:
-            raise AntsError(
-                f"learning_rate is {learning_rate}; in the 32 bits of an action value it is "
-                f"nothing, so it must be at least {_LEAST_RATE}."
-            )
-        self._set("discount", discount, "between 0 and 1")
-        self._set("epsilon", epsilon, "between 0 and 1")
-        self._set("epsilon_decay", epsilon_decay, "above 0 and at most 1")
-        self._set("min_epsilon", min_epsilon, "between 0 and 1")
-        self._set("learning_rate_decay", learning_rate_decay, "above 0 and at most 1")
-        self._set("min_learning_rate", min_learning_rate, "between 0 and 1")
-        object.__setattr__(self, "initial_value", checked_initial_value(initial_value))
+        given = locals()
+        for one in declared(TrainingConfig):
+            object.__setattr__(self, one.name, given[one.name])
+        self.check()
         try:
             pairs = {**dict(hyperparameters), **more}
         except (TypeError, ValueError):
@@ -99,12 +99,6 @@ class TrainingConfig:
         plain = {name: getattr(value, "item", lambda v=value: v)() for name, value in pairs.items()}
         object.__setattr__(self, "hyperparameters", tuple(sorted(plain.items())))
 
-    def _set(self, name: str, value: float, allowed: str) -> None:
-        """Store a number from 0 to 1 as a Python float, so that equal settings are equal."""
-        if not share_of_one(value) or (allowed.startswith("above") and value == 0):
-            raise AntsError(f"{name} is {shown(value)}; it must be a number {allowed}.")
-        object.__setattr__(self, name, float(value))
-
     @property
     def least_epsilon(self) -> float:
         """The epsilon at which decay ends: the smaller one of `min_epsilon` and `epsilon`."""
@@ -114,6 +108,15 @@ class TrainingConfig:
     def least_learning_rate(self) -> float:
         """The same for the learning rate."""
         return min(self.min_learning_rate, self.learning_rate)
+
+    def _changed(self, changes: Mapping[str, Any]) -> TrainingConfig:
+        """Besides: other names are hyperparameters; those of another learner are dropped."""
+        own = [one.name for one in declared(TrainingConfig)]
+        more = {name: value for name, value in changes.items() if name not in own}
+        same = changes.get("learner", self.learner) == self.learner
+        kept = dict(self.hyperparameters) if same else {}
+        changed = super()._changed({n: value for n, value in changes.items() if n in own})
+        return replace(changed, hyperparameters=tuple({**kept, **more}.items()))
 
     def next_learning_rate(self, rate: float) -> float:
         """The learning rate of the episode that follows one with this learning rate."""
@@ -133,15 +136,7 @@ class TrainingConfig:
         return {**asdict(self), "hyperparameters": dict(self.hyperparameters)}
 
 
-def checked_initial_value(value: Any) -> float:
-    """What actions are worth before learning, a number from -1e6 to 1e6."""
-    real = isinstance(value, Real) and not isinstance(value, bool)
-    if not (real and abs(value) <= MOST_VALUE):
-        raise AntsError(
-            f"initial_value is {shown(value)}; it must be a number from -{MOST_VALUE} to "
-            f"{MOST_VALUE}."
-        )
-    return float(value)
+INITIAL_VALUE = setting(TrainingConfig, "initial_value")
 
 
 def share_of_one(value: Any) -> bool:
@@ -158,6 +153,8 @@ def update_weights(alpha: float, most: int) -> np.ndarray:
     float32 (at most most + 1,); at 1 it is alpha itself, as float32. The last number is that of all
     larger n as well: from some n on they are 1, or 0 where 1 - alpha is 1.
     """
+    import numpy as np
+
     rate = np.float32(alpha)
     kept = 1.0 - np.float64(rate)
     # A power below 2^-26 is lost when the weight is rounded.

@@ -1,12 +1,12 @@
 """What the functions of a learner work on in kernels: its memory, a step, and its numbers."""
 
 from collections.abc import Callable
-from dataclasses import fields
 from typing import Any, NamedTuple
 
 import taichi as ti
 
 from taichi_ants.learners.hyperparameters import Hyperparameters
+from taichi_ants.settings import declared
 from taichi_ants.task.constants import N_ACTIONS, ROW
 
 
@@ -51,7 +51,7 @@ def read_rates(kind: type[Hyperparameters]) -> Callable[..., Any]:
     their names, whole ones as i32, others as f32. These are read from `numbers`, an f64 array that
     holds them from `begin` on, in the order of the dataclass.
     """
-    more = {one.name: ti.i32 if one.metadata["kind"] is int else ti.f32 for one in fields(kind)}
+    more = {one.name: ti.i32 if one.kind is int else ti.f32 for one in declared(kind)}
     rates_type = ti.types.struct(learning_rate=ti.f32, discount=ti.f32, epsilon=ti.f32, **more)
     kinds = tuple(more.values())
 

@@ -6,14 +6,15 @@ pairs, for each pair its place in this order plus 1, or 0.
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import taichi as ti
 
-from taichi_ants.learners.hyperparameters import Hyperparameters, number
+from taichi_ants.learners.hyperparameters import Hyperparameters
 from taichi_ants.learners.memory import values_of
 from taichi_ants.learners.registry import Memory
-from taichi_ants.task.constants import N_ACTIONS, ROW
-from taichi_ants.task.rewards import MOST
+from taichi_ants.settings import Is
+from taichi_ants.task.constants import MOST_REWARD, N_ACTIONS, ROW
 from taichi_ants.task.rules.policy import best_value
 
 # An outcome packs the next row (20 bits), the reward (11 bits) and whether the step terminated.
@@ -29,7 +30,9 @@ class Planning(Hyperparameters):
     planning_steps: Updates from the model after each step, at most.
     """
 
-    planning_steps: int = number(5, 1, 1000)
+    planning_steps: Annotated[
+        int, Is("updates from the model after each step", least=1, most=1000)
+    ] = 5
 
 
 def model_memory(n_states: int, floats: int = 0) -> Memory:
@@ -40,7 +43,7 @@ def model_memory(n_states: int, floats: int = 0) -> Memory:
 @ti.func
 def pack_outcome(next_state, reward, terminated):
     """An outcome as one i32; the reward is a whole number as f32."""
-    paid = ti.cast(reward, ti.i32) + MOST
+    paid = ti.cast(reward, ti.i32) + MOST_REWARD
     return next_state | paid << _REWARD_AT | terminated << _TERMINATED_AT
 
 
@@ -53,7 +56,7 @@ def next_state_of(outcome):
 @ti.func
 def reward_of(outcome):
     """The reward of an outcome, f32."""
-    return ti.cast((outcome >> _REWARD_AT & 2047) - MOST, ti.f32)
+    return ti.cast((outcome >> _REWARD_AT & 2047) - MOST_REWARD, ti.f32)
 
 
 @ti.func

@@ -1,12 +1,14 @@
 """n-step SARSA (Sutton and Barto, chapter 7): targets of n rewards and the value after them."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import taichi as ti
 
-from taichi_ants.learners.hyperparameters import Hyperparameters, number
+from taichi_ants.learners.hyperparameters import Hyperparameters
 from taichi_ants.learners.memory import discount_of
 from taichi_ants.learners.registry import Learner, Memory
+from taichi_ants.settings import Is
 from taichi_ants.task.constants import ROW
 
 
@@ -16,7 +18,7 @@ class Steps(Hyperparameters):
     n_steps: Rewards in a target, unless the episode ends before.
     """
 
-    n_steps: int = number(4, 1, 64)
+    n_steps: Annotated[int, Is("rewards in a target", least=1, most=64)] = 4
 
 
 @ti.func

@@ -1,10 +1,10 @@
 """Prioritized sweeping (Moore and Atkeson 1993): plans first where the error is largest."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import taichi as ti
 
-from taichi_ants.learners.hyperparameters import number
 from taichi_ants.learners.model import (
     Planning,
     error_of,
@@ -17,6 +17,7 @@ from taichi_ants.learners.model import (
     visited,
 )
 from taichi_ants.learners.registry import Learner
+from taichi_ants.settings import Is
 from taichi_ants.task.constants import N_ACTIONS, ROW
 
 
@@ -26,7 +27,9 @@ class Sweeping(Planning):
     threshold: Errors up to this size wait for no update.
     """
 
-    threshold: float = number(0.0001, 0, 1e9)
+    threshold: Annotated[float, Is("size of errors that wait for no update", least=0, most=1e9)] = (
+        0.0001
+    )
 
 
 @ti.func

@@ -11,13 +11,14 @@ import dis
 import inspect
 import math
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from importlib import import_module
 from typing import Any
 
 from taichi_ants.errors import AntsError, check_new_name, checked_whole, expect, shown, unusable
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.hyperparameters import Hyperparameters
+from taichi_ants.settings import declared, not_a_setting
 
 
 @dataclass(frozen=True)
@@ -56,8 +57,8 @@ class Learner:
         plans: The learner keeps `taichi_ants.learners.model` and has the hyperparameter
             `planning_steps`; ants that share a table share the model. Its updates from the model
             have no next action, so td_error may not look at it.
-        hyperparameters: What it has besides the settings of all learners: a dataclass whose fields
-            `number` of `taichi_ants.learners` makes, all with usual values.
+        hyperparameters: What it has besides the settings of all learners: a subclass of
+            `Hyperparameters` whose fields all have defaults.
         memory: A function (hyperparameters, n_states) -> Memory, where a table has n_states rows.
         cost: A function (hyperparameters) -> float: the time of a step of one ant, in that of
             Q-learning. Launches of kernels are cut by it.
@@ -150,8 +151,8 @@ def register(learner: Learner) -> Learner:
         drawn = learner.draws_next_action and not learner.plans
         _check_td_error(name, learner.td_error, drawn)
     _try_sizes(learner)
-    taken = {one.name for one in fields(TrainingConfig)}
-    for clash in taken & {one.name for one in fields(learner.hyperparameters)}:
+    taken = {one.name for one in declared(TrainingConfig)}
+    for clash in taken & {one.name for one in declared(learner.hyperparameters)}:
         raise AntsError(
             f"{clash!r} is a setting of all learners; call this hyperparameter of {name!r} "
             "something else."
@@ -238,14 +239,13 @@ def settle(config: TrainingConfig) -> TrainingConfig:
     """
     expect("the configuration", config, TrainingConfig)
     kind = get(config.learner).hyperparameters
-    given, known = dict(config.hyperparameters), [field.name for field in fields(kind)]
-    for name in given:
-        if name not in known:
-            allowed = f"it has {', '.join(known)}" if known else "it has none"
-            raise AntsError(
-                f"{shown(name)} is no hyperparameter of learner {config.learner!r}; {allowed}."
-            )
-    return replace(config, hyperparameters=tuple(asdict(kind(**given)).items()))
+    own_names = [one.name for one in declared(kind)]
+    for name, _ in config.hyperparameters:
+        if name not in own_names:
+            known = [*own_names, *(one.name for one in declared(TrainingConfig))]
+            raise AntsError(f"`training.{name}` {not_a_setting(name, known, config.learner)}")
+    own = kind(**dict(config.hyperparameters))
+    return replace(config, hyperparameters=tuple(asdict(own).items()))
 
 
 def names() -> tuple[str, ...]:

@@ -1,12 +1,14 @@
 """SARSA(lambda) with replacing traces (Singh and Sutton 1996), of which a short list is kept."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import taichi as ti
 
-from taichi_ants.learners.hyperparameters import Hyperparameters, number
+from taichi_ants.learners.hyperparameters import Hyperparameters
 from taichi_ants.learners.memory import discount_of
 from taichi_ants.learners.registry import Learner, Memory
+from taichi_ants.settings import Is
 from taichi_ants.task.constants import ROW
 
 
@@ -17,8 +19,8 @@ class Traces(Hyperparameters):
     trace_length: How many pairs have a trace; the oldest one gives way.
     """
 
-    trace_decay: float = number(0.9, 0, 1)
-    trace_length: int = number(32, 1, 256)
+    trace_decay: Annotated[float, Is("what a trace keeps per step", least=0, most=1)] = 0.9
+    trace_length: Annotated[int, Is("pairs that have a trace", least=1, most=256)] = 32
 
 
 @ti.func

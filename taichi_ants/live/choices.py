@@ -1,29 +1,26 @@
-"""What a page can choose from for a new session: worlds, rules, and who decides what ants do.
+"""The form of a page for a new session: worlds, settings, and how ants act.
 
 A choice is a small JSON-able dict of names and numbers; policies are those that the command was
-given, so no page ever names a file.
+given, so no page ever names a file. The fields of the form are made from the declarations of the
+settings, see `taichi_ants.settings`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from functools import cache
-from itertools import combinations
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from taichi_ants import learners, task
+from taichi_ants import learners, worlds
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import FOLLOWED, Policy, trail_follower
 from taichi_ants.live.setup import MOST_ANTS, MOST_TEXT, Setup
-from taichi_ants.task import Life, Pheromone, Task, observations
-from taichi_ants.task.traffic import Traffic
+from taichi_ants.settings import MISSING, Setting, all_of, declared, flat, nested
+from taichi_ants.task import Task, observations
 
-# Rules of what comes and goes, which stand beside those of any task.
-LIFE = ("births", "deaths", "regrowth", "wanders")
 WORLDS = {
     "paper": "the paper's world",
     "open": "an open world",
@@ -31,24 +28,8 @@ WORLDS = {
     "double_bridge": "a double bridge",
     "map": "a map of your own",
 }
-DRAWN = ("open", "far_piles")  # at random, with equal ranges of any size
-SIZE, SIZES = 30, (10, 180)  # the usual one; the least and the largest
-TASKS = {
-    "paper": ("the paper's", task.paper()),
-    "foraging": ("foraging", task.foraging()),
-    "queueing": ("queueing", task.queueing()),
-}
-RULES = {  # what each adds to the paper's rules, in words
-    "rising": "Trails rise towards food",
-    "right_of_way": "Ants with food have right of way",
-    "queues": "Queues move as one",
-    "falls": "Trails evaporate while ants learn",
-    "spreads": "Trails halve and spread instead",
-    "births": "Each delivery brings an ant",
-    "deaths": "Ants die after 3000 ticks",
-    "regrowth": "Food grows back at once",
-    "wanders": "Piles of food wander",
-}
+SIZE, SIZES = 30, (10, 180)  # of a drawn world: the usual range along each axis; the bounds
+TASKS = {"paper": "the paper's", "foraging": "foraging", "queueing": "queueing"}
 LEARNS, FOLLOWS = "learn ", "file "  # how the names of policies begin
 BY_HAND = "by hand"
 
@@ -59,46 +40,37 @@ _LEARNING: dict[str, Any] = {
 }
 
 
-def task_of(rules: Iterable[str], sees: str) -> Task:
-    """The paper's task with some of the `RULES`, and an observation.
+def fields() -> Iterator[dict[str, Any]]:
+    """The fields of the form, as JSON can hold them.
 
-    Raises:
-        AntsError: There is no such rule or observation.
+    Each has "path", "kind", "words", "least", "most", "above", "unit", "help", "optional",
+    "default"; "only" with a path and its values, "world" or "learner" where it counts with these
+    alone.
     """
-    chosen = set(rules)
-    for rule in chosen:
-        check_one_of("a rule", rule, tuple(RULES))
-    queues = "queues" in chosen
-    how: dict[str, Any] = {}
-    if "rising" in chosen:
-        view = "strongest_under_carriers" if queues else "strongest"
-        how = {"deposit": "fading", "level": 500, "view": view}
-    if "spreads" in chosen:
-        how |= {"evaporation": "exponential", "half_life": 100, "diffusion": 0.05}
-    traffic = "following" if queues else "right_of_way" if "right_of_way" in chosen else "blocking"
-    return Task(
-        observation=sees,
-        pheromone=Pheromone(**how),
-        traffic=Traffic.named(traffic),
-        turns_at_queen=queues,
-        evaporation_in_training="falls" in chosen,
-        life=Life(
-            births="births" in chosen,
-            lifespan=3000 if "deaths" in chosen else None,
-            regrowth=0 if "regrowth" in chosen else None,
-            wander=20 if "wanders" in chosen else None,
-        ),
-    )
+    for one in all_of(Task):
+        if not one.is_group:
+            yield _field(one)
+    for one in declared(TrainingConfig)[1:]:
+        yield {**_field(one), "default": _LEARNING.get(one.name, one.default), "learner": ""}
+    for name in learners.names():
+        for one in declared(learners.get(name).hyperparameters):
+            yield {**_field(one), "learner": name}
+    for name in WORLDS.keys() - {"map"}:
+        for one in worlds.settings_of(name):
+            if one.name != "ranges":
+                yield {**_field(one), "world": name}
 
 
-@cache
-def rules_of(rules: Task) -> tuple[str, ...] | None:
-    """The `RULES` that make a task, as few as possible; None if it has others."""
-    for n in range(len(RULES) + 1):
-        for chosen in combinations(RULES, n):
-            if task_of(chosen, rules.observation) == rules:
-                return chosen
-    return None
+def _field(one: Setting) -> dict[str, Any]:
+    rule, group = one.rule, one.path.rpartition(".")[0]
+    usual = one.default if rule.usual is None else rule.usual
+    return {
+        **{"path": one.path, "kind": one.kind.__name__, "words": one.allowed_words},
+        **{"least": rule.least, "most": rule.most, "above": rule.above},
+        **{"unit": rule.unit, "help": rule.help, "optional": one.optional and not rule.only},
+        "default": None if usual is MISSING else usual,
+        "only": rule.only and [f"{group}.{rule.only[0]}", *rule.only[1:]],
+    }
 
 
 @dataclass(frozen=True)
@@ -116,11 +88,10 @@ class Choices:
         return {
             "worlds": WORLDS,
             "tasks": {
-                name: {"words": words, "rules": rules_of(rules), "sees": rules.observation}
-                for name, (words, rules) in TASKS.items()
+                name: {"words": words, "settings": flat(Task.named()[name].as_dict(), "task")}
+                for name, words in TASKS.items()
             },
-            "rules": RULES,
-            "life": LIFE,
+            "settings": list(fields()),
             "sees": {name: observations.get(name).summary for name in observations.names()},
             "learners": {
                 name: {"words": learners.label(name), "summary": learners.get(name).summary}
@@ -128,10 +99,9 @@ class Choices:
             },
             "by_hand": list(FOLLOWED),
             "policies": {
-                name: {"sees": policy.observation, "rules": rules_of(policy.task)}
-                for name, policy in self.policies.items()
+                name: flat(policy.task.as_dict(), "task") for name, policy in self.policies.items()
             },
-            "drawn": DRAWN,
+            "drawn": [name for name in WORLDS if worlds.is_drawn(name)],
             "sizes": SIZES,
             "most": {"ants": MOST_ANTS, "text": MOST_TEXT},
         }
@@ -141,48 +111,67 @@ class Choices:
 
         Args:
             chosen: {"world": of `WORLDS`, "map": text, "world_seed", "size": of a world that is
-                drawn, "rules": list of `RULES`, or None for those of a policy, "sees": an
-                observation, "policy": "learn sarsa", "file NAME" or "by hand", "ants", "seed",
-                "ticks": of an episode, 0 for one without end}.
+                drawn, "settings": values by the paths of `fields`, "policy": "learn sarsa",
+                "file NAME" or "by hand", "ants", "seed", "ticks": of an episode, 0 for one without
+                end}.
 
         Raises:
             AntsError: Something is not allowed, or is not there.
         """
-        expect("what was chosen", chosen, dict)
-        known = ("world", "map", "world_seed", "size", "rules", "sees", "policy")
-        for name in {*known, "ants", "seed", "ticks"} - chosen.keys():
-            raise AntsError(f"{name} is not chosen; choose it.")
-        policy, table, name = chosen["policy"], None, ""
+        expect("the choice", chosen, dict)
+        known = (
+            "world",
+            "map",
+            "world_seed",
+            "size",
+            "settings",
+            "policy",
+            "ants",
+            "seed",
+            "ticks",
+        )
+        for name in (*known, "ants", "seed", "ticks"):
+            if name not in chosen:
+                raise AntsError(f"{name} is not chosen; choose it.")
+        world, policy, table, name = chosen["world"], chosen["policy"], None, ""
+        check_one_of("the world", world, tuple(WORLDS))
         expect("policy", policy, str)
-        rules = self._task(chosen)
         if policy.startswith(LEARNS):
             name = policy.removeprefix(LEARNS)
             check_one_of("the learner", name, learners.names())
-        elif policy == BY_HAND:
-            table = trail_follower(rules.observation)
-        else:
-            table = self._file(policy).q_values
-        world = chosen["world"]
-        check_one_of("the world", world, tuple(WORLDS))
+        settings = _settings(chosen["settings"], world, name)
+        task = Task.from_dict(settings.get("task", {}))
+        if policy == BY_HAND:
+            table = trail_follower(task.observation)
+        elif not name:
+            check_one_of("the policy", policy, [f"{FOLLOWS}{one}" for one in self.policies])
+            file = self.policies[policy.removeprefix(FOLLOWS)]
+            task, table = task.but(observation=file.observation), file.q_values
         size = checked_whole("the size", chosen["size"], *SIZES)
         shares = table is not None or learners.get(name).td_error is not None
+        training = {**_LEARNING, **settings.get("training", {})}
+        ranges = {"ranges": [size] * 3} if worlds.is_drawn(world) else {}
         return Setup(
             world=_map(chosen["map"]) if world == "map" else world,
-            task=rules,
-            policy=TrainingConfig(name, **_LEARNING) if table is None else table,
+            task=task,
+            policy=TrainingConfig(name, **training) if table is None else table,
             ants=checked_whole("how many ants", chosen["ants"], 1, MOST_ANTS),
             seed=checked_whole("the seed", chosen["seed"], 0),
             ticks_per_episode=checked_whole("ticks an episode", chosen["ticks"], 0, 1_000_000),
             sharing="shared" if shares else "own",
             world_seed=checked_whole("the seed of the world", chosen["world_seed"], 0),
-            world_settings={"ranges": [size] * 3} if world in DRAWN else {},
+            world_settings={**settings.get("world", {}), **ranges},
         )
 
     def chosen(self, setup: Setup) -> dict[str, Any]:
-        """What a page would have to choose for a session, as near as it can come."""
+        """The choice that gives a session, as near as the form can come."""
         table, is_map = setup.policy, setup.world not in WORLDS
+        settings = flat(setup.task.as_dict(), "task")
+        settings |= {f"world.{n}": v for n, v in setup.world_settings.items() if n != "ranges"}
         if isinstance(table, TrainingConfig):
-            policy = LEARNS + table.learner
+            policy, more = LEARNS + table.learner, dict(table.hyperparameters)
+            numbers = {**asdict(table), **more}
+            settings |= {f"training.{n}": v for n, v in numbers.items() if type(v) in (int, float)}
         else:
             named = self.policies.items()
             same = (name for name, one in named if np.array_equal(one.q_values, table))
@@ -192,31 +181,26 @@ class Choices:
             "map": setup.world if is_map else "",
             "world_seed": setup.world_seed,
             "size": setup.world_settings.get("ranges", [SIZE])[0],
-            "rules": rules_of(setup.task),
-            "sees": setup.task.observation,
+            "settings": settings,
             "policy": policy,
             "ants": setup.ants,
             "seed": setup.seed,
             "ticks": setup.ticks_per_episode,
         }
 
-    def _file(self, policy: str) -> Policy:
-        name = policy.removeprefix(FOLLOWS)
-        check_one_of("the policy", name, tuple(self.policies))
-        return self.policies[name]
 
-    def _task(self, chosen: dict[str, Any]) -> Task:
-        rules, sees = chosen["rules"], chosen["sees"]
-        if chosen["policy"].startswith(FOLLOWS):
-            policy = self._file(chosen["policy"])
-            sees = policy.observation
-            if rules is None:
-                return policy.task
-        expect("rules", rules, list)
-        for rule in rules:
-            expect("a rule", rule, str)
-        expect("sees", sees, str)
-        return task_of(rules, sees)
+def _settings(given: Any, world: str, learner: str) -> dict[str, Any]:
+    """The settings of a page by their groups; AntsError if the form does not have one of them."""
+    expect("settings", given, dict)
+    offered = {
+        one["path"]
+        for one in fields()
+        if one.get("world", world) == world and one.get("learner", "") in ("", learner)
+    }
+    for path in given:
+        if path not in offered:
+            raise AntsError(f"{shown(path)} is not a setting of this form; leave it out.")
+    return nested(given)
 
 
 def _map(text: Any) -> str:

@@ -54,8 +54,7 @@ class Controls {
     on("chosen", "input", () => (this.touched = true));
     on("world-name", "change", () => this.showWorld());
     on("task", "change", () => this.showTask());
-    on("rules", "change", () => this.nameTask());
-    on("sees", "change", () => this.nameTask());
+    on("settings", "change", () => this.nameTask());
     on("policy", "change", () => this.showPolicy());
     on("chosen", "change", () => this.explain());
     on("map", "beforeinput", (event) => this.paste(event));
@@ -99,10 +98,8 @@ class Controls {
     if (!this.filled) {
       this.filled = "yes";
       byId("world-name").innerHTML = options(Object.entries(choices.worlds));
-      byId("task").innerHTML = options([...Object.entries(choices.tasks).map(([name, { words }]) => [name, words]), ["", "single rules"]]);
-      byId("rules").innerHTML = Object.entries(choices.rules).map(([name, words]) =>
-        `<label class="rule"><input type="checkbox" value="${name}"> ${safe(words)}</label>`).join("");
-      byId("sees").innerHTML = options(Object.keys(choices.sees).map((name) => [name, name.replaceAll("_", " ")]));
+      byId("task").innerHTML = options([...Object.entries(choices.tasks).map(([name, { words }]) => [name, words]), ["", "other settings"]]);
+      byId("settings").innerHTML = this.fields();
       byId("policy").innerHTML = `<optgroup label="Learn now">${options(Object.entries(choices.learners).map(([name, { words }]) => [`learn ${name}`, words]))}</optgroup>
         <optgroup label="Follow a policy">${options([["by hand", "the trail, by hand"], ...Object.keys(choices.policies).map((name) => [`file ${name}`, name.replaceAll("_", " ")])])}</optgroup>`;
       byId("ants").max = choices.most.ants;
@@ -110,11 +107,10 @@ class Controls {
       byId("map").value = MAP;
       byId("map").maxLength = choices.most.text;
     }
-    const fields = [...byId("chosen").elements], typed = fields.map(({ value, checked }) => ({ value, checked })), { keepsRules } = this;
+    const fields = [...byId("chosen").elements], typed = fields.map(({ value, checked }) => ({ value, checked }));
     this.choose(chosen);
     if (this.touched && !this.begins) { // who fills the form goes on, whatever others begin
       fields.forEach((field, place) => (field.type === "checkbox" ? (field.checked = typed[place].checked) : (field.value = typed[place].value)));
-      this.keepsRules = keepsRules;
       this.showWorld();
       this.explain();
     } else this.touched = false;
@@ -135,8 +131,7 @@ class Controls {
     byId("ants").value = chosen.ants;
     byId("episode").value = chosen.ticks;
     byId("seed").value = chosen.seed;
-    this.setRules(chosen.rules ?? [], chosen.sees);
-    this.keepsRules = chosen.rules === null; // those of a policy, which have no names
+    this.set(chosen.settings);
     this.showWorld();
     this.nameTask();
     this.explain();
@@ -148,8 +143,17 @@ class Controls {
      of a file reads what its ants saw, so that nobody chooses it. */
   explain() {
     const { choices } = this.live, policy = byId("policy").value, name = policy.replace(/^(learn|file) /, "");
-    byId("sees").disabled = policy.startsWith("file ");
-    byId("sees-help").textContent = choices.sees[byId("sees").value] ?? "";
+    for (const [place, one] of choices.settings.entries()) {
+      const field = byId(`setting-${place}`), label = field.closest("label"), { world = byId("world-name").value, learner } = one;
+      const learns = learner === undefined || policy === `learn ${learner}` || (learner === "" && policy.startsWith("learn "));
+      const [other, ...values] = one.only ?? [], counts = !other || values.includes(this.settings()[other]);
+      label.hidden = field.disabled = !(learns && counts && world === byId("world-name").value);
+      if (one.path === "task.observation") {
+        field.disabled = policy.startsWith("file ");
+        label.title = choices.sees[field.value] ?? "";
+      }
+    }
+    for (const group of document.querySelectorAll("#settings fieldset")) group.hidden = !group.querySelector("label:not([hidden])");
     const follows = policy === "by hand" ? "They follow a trail, with values set by hand." : `They follow ${name}, and do not learn.`;
     byId("policy-help").textContent = policy.startsWith("learn ") ? `They learn: ${choices.learners[name]?.summary ?? ""}.` : follows;
   }
@@ -168,18 +172,42 @@ class Controls {
     const value = (id) => byId(id).value, usual = this.live.chosen;
     const number = (id, name = id) => (byId(id).disabled ? usual[name] : byId(id).valueAsNumber);
     return {
-      world: value("world-name"), map: value("map"), world_seed: number("world-seed", "world_seed"), size: number("size"), sees: value("sees"), policy: value("policy"),
-      rules: this.keepsRules ? null : this.rules(), ants: number("ants"), ticks: number("episode"), seed: number("seed"),
+      world: value("world-name"), map: value("map"), world_seed: number("world-seed", "world_seed"), size: number("size"), policy: value("policy"),
+      settings: this.settings(), ants: number("ants"), ticks: number("episode"), seed: number("seed"),
     };
   }
 
-  rules() {
-    return [...document.querySelectorAll("#rules input:checked")].map(({ value }) => value);
+  /* A field for each setting, as it was declared, in groups. */
+  fields() {
+    const html = {};
+    this.live.choices.settings.forEach((one, place) => {
+      const [, name] = one.path.match(/([^.]+)$/), group = one.path.slice(0, -name.length - 1), about = `id="setting-${place}" data-path="${one.path}"`;
+      const words = safe(name.replaceAll("_", " ")), step = one.kind === "int" ? 1 : "any";
+      const input = one.kind === "bool" ? `<input type="checkbox" ${about}>`
+        : one.words.length ? `<select ${about}>${one.words.map((word) => `<option value="${safe(word)}">${safe(word.replaceAll("_", " "))}</option>`).join("")}</select>`
+          : `<input type="number" ${about} step="${step}" min="${one.least ?? one.above ?? ""}" max="${one.most ?? ""}" ${one.optional ? 'placeholder="none"' : "required"}>`;
+      html[group] = (html[group] ?? "") + `<label class="setting" title="${safe(one.help + (one.unit ? `, in ${one.unit}` : ""))}">${input} ${words}</label>`;
+    });
+    return Object.entries(html).map(([group, inner]) => `<fieldset><legend>${safe(group.replaceAll("_", " "))}</legend>${inner}</fieldset>`).join("");
   }
 
-  setRules(rules, sees) {
-    for (const box of document.querySelectorAll("#rules input")) box.checked = rules.includes(box.value);
-    byId("sees").value = sees;
+  /* What the form has, by path; what does not count now is left out. */
+  settings() {
+    const given = {};
+    for (const field of document.querySelectorAll("#settings [data-path]")) {
+      if (field.closest("label").hidden || field.value === "") continue;
+      given[field.dataset.path] = field.type === "checkbox" ? field.checked : field.type === "number" ? field.valueAsNumber : field.value;
+    }
+    return given;
+  }
+
+  /* Put values into the form; others are as usual. */
+  set(values) {
+    for (const [place, one] of this.live.choices.settings.entries()) {
+      const field = byId(`setting-${place}`), value = values[one.path] ?? one.default;
+      if (field.type === "checkbox") field.checked = value;
+      else field.value = value ?? "";
+    }
   }
 
   showWorld() {
@@ -192,33 +220,30 @@ class Controls {
 
   showTask() {
     const task = this.live.choices.tasks[byId("task").value];
-    this.keepsRules = false;
-    if (task) this.setRules([...task.rules, ...this.rules().filter((rule) => this.live.choices.life.includes(rule))], task.sees);
-    else byId("rules-box").open = true;
+    const others = Object.entries(this.settings()).filter(([path]) => !/^task\.(?!life)/.test(path));
+    if (task) this.set({ ...task.settings, ...Object.fromEntries(others) });
+    else byId("settings-box").open = true;
     this.showPolicy(false);
   }
 
-  /* Name the rules by the task that they make. */
+  /* Name the task that has these settings; what comes and goes suits any task. */
   nameTask() {
-    const rules = this.rules().filter((rule) => !this.live.choices.life.includes(rule)).join(), sees = byId("sees").value;
-    const [name] = Object.entries(this.live.choices.tasks).find(([, task]) => task.rules.join() === rules && task.sees === sees) ?? [""];
+    this.explain();
+    const { settings, tasks } = this.live.choices, of = settings.filter(({ path }) => /^task\.(?!life)/.test(path));
+    const values = (given) => JSON.stringify(of.map(({ path, default: usual }) => given[path] ?? usual));
+    const now = values(this.settings()), [name] = Object.entries(tasks).find(([, task]) => values(task.settings) === now) ?? [""];
     byId("task").value = name;
-    this.keepsRules = false;
   }
 
-  /* A policy of a file has rules of its own, and reads what its ants saw. */
+  /* A policy of a file has a task of its own; one that was set by hand reads what it knows. */
   showPolicy(brings = true) {
-    const { policies, by_hand: known } = this.live.choices, value = byId("policy").value, policy = policies[value.replace(/^file /, "")];
-    const sees = byId("sees");
+    const { policies, by_hand: known, settings } = this.live.choices, value = byId("policy").value, policy = policies[value.replace(/^file /, "")];
+    const sees = byId(`setting-${settings.findIndex(({ path }) => path === "task.observation")}`);
     if (value.startsWith("file ") && policy) {
-      if (brings && policy.rules) this.setRules(policy.rules, policy.sees);
-      sees.value = policy.sees;
-      this.nameTask();
-      this.keepsRules = brings && policy.rules === null;
-    } else if (value === "by hand" && !known.includes(sees.value)) {
-      sees.value = known[0];
-      this.nameTask();
-    }
+      if (brings) this.set({ ...this.settings(), ...policy });
+      sees.value = policy["task.observation"];
+    } else if (value === "by hand" && !known.includes(sees.value)) sees.value = known[0];
+    this.nameTask();
   }
 
   /* Show how things stand; sliders that somebody moves are left alone. */

@@ -18,7 +18,6 @@ from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS, ROW
 from taichi_ants.worlds import text_map
-from taichi_ants.worlds.double_bridge import SETTINGS as BRIDGE
 from taichi_ants.worlds.double_bridge import bridge_ranges
 from taichi_ants.worlds.validation import parse_ranges
 from taichi_ants.worlds.world import World
@@ -107,7 +106,7 @@ class Setup:
         elif settings.get("ranges") is not None:
             _check_cells(parse_ranges(settings["ranges"]))
         elif self.world == "double_bridge":
-            _check_cells(bridge_ranges(**{n: settings[n] for n in BRIDGE if n in settings}))
+            _check_cells(bridge_ranges(**settings))
 
     def build_world(self) -> World:
         """The world; raises AntsError if there is none of that name, or it cannot be built."""

@@ -16,7 +16,7 @@ from taichi_ants.analysis.statistics import resampling_counts
 from taichi_ants.checks import checked_q_values, checked_share
 from taichi_ants.engines.records import Record
 from taichi_ants.errors import AntsError, checked_flag, checked_whole, expect
-from taichi_ants.learners.config import checked_initial_value
+from taichi_ants.learners.config import INITIAL_VALUE
 from taichi_ants.learners.policies import action_probabilities
 from taichi_ants.offline.dataset import Dataset
 from taichi_ants.offline.learners import EmpiricalModel
@@ -128,7 +128,7 @@ def model_based(
     """
     expect("data", data, Dataset)
     policies, shape = _policies(data, q_values, epsilon)
-    times, initial_value = _times(data, resamples), checked_initial_value(initial_value)
+    times, initial_value = _times(data, resamples), INITIAL_VALUE.checked(initial_value)
     model, first = EmpiricalModel.resampled(data, times), data.state[data.begins[:-1]]
     starts = times / times.sum(axis=1, keepdims=True, dtype=np.int64)  # of each episode
     outcomes = []

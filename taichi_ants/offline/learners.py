@@ -20,7 +20,7 @@ import numpy as np
 from taichi_ants import runtime
 from taichi_ants.checks import checked_share
 from taichi_ants.errors import AntsError, checked_flag, checked_whole, expect, shown
-from taichi_ants.learners.config import checked_initial_value
+from taichi_ants.learners.config import INITIAL_VALUE
 from taichi_ants.offline.dataset import Dataset
 from taichi_ants.task.constants import N_ACTIONS
 
@@ -57,7 +57,7 @@ def batch_q_learning(
     expect("data", data, Dataset)
     rates = checked_share("learning_rate", learning_rate), checked_share("discount", discount)
     sweeps, groups = checked_whole("sweeps", sweeps), _groups(data, by_run)
-    first = checked_initial_value(initial_value)
+    first = INITIAL_VALUE.checked(initial_value)
     q = np.full((len(groups) - 1, data.task.n_states, N_ACTIONS), first, np.float32)
     runtime.start(threads)
     from taichi_ants.offline.kernels import replay  # imports Taichi
@@ -83,7 +83,7 @@ def fitted_q_iteration(
     Pairs that the data lack keep `initial_value`. Arguments and errors are those of
     `batch_q_learning`, but the discount must be at most 0.9999.
     """
-    initial_value = checked_initial_value(initial_value)
+    initial_value = INITIAL_VALUE.checked(initial_value)
     model = EmpiricalModel.of(data, _groups(data, by_run))
     q = model.solve(discount, model.rewards, initial_value, threads=threads).astype(np.float32)
     return q if by_run else q[0]

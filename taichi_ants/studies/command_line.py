@@ -7,12 +7,13 @@ import importlib.util
 import os
 import re
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Container, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
 from taichi_ants.errors import AntsError, without_middle
+from taichi_ants.settings import Setting, Settings, declared, nested
 from taichi_ants.studies.interruption import stop_if_noted, stoppable
 
 EXIT_BAD_INPUT = 2
@@ -28,6 +29,13 @@ class _HelpFormatter(argparse.ArgumentDefaultsHelpFormatter):
         return action.help if silent else super()._get_help_string(action)
 
 
+class _OneOrList(argparse.Action):
+    """Store True without a value, one value as it is, and several as a list."""
+
+    def __call__(self, parser: Any, namespace: Any, values: Any, option: str | None = None) -> None:
+        setattr(namespace, self.dest, values if len(values) > 1 else values[0] if values else True)
+
+
 class Parser(argparse.ArgumentParser):
     """A parser whose errors are one sentence on standard error.
 
@@ -37,6 +45,7 @@ class Parser(argparse.ArgumentParser):
         settings: Those of `argparse.ArgumentParser`.
     """
 
+    open_settings = ("world", "task", "training")  # of which any --world.NAME is taken
     program: str | None = None  # what --help calls it; None: the name of the script
 
     def __init__(self, about: str | None = None, **settings: Any) -> None:
@@ -60,7 +69,18 @@ class Parser(argparse.ArgumentParser):
         for before, word in zip(["", *words], words, strict=False):
             if word == "" or (word.startswith("--") and word.endswith("=")):
                 self.error(f"{word or before or 'the first argument'} is empty, leave it out")
+            self._add_setting(word.partition("=")[0])
         return super().parse_known_args(words, namespace)
+
+    def _add_setting(self, flag: str) -> None:
+        """Take an option such as --world.piles, which depends on the world, or is misspelt.
+
+        Whether there is such a setting is known where it is used.
+        """
+        part = flag[2:].partition(".")[0]
+        if "." in flag and part in self.open_settings and flag not in self._option_string_actions:
+            path = flag[2:].replace("-", "_")
+            self.add_argument(flag, dest=path, type=_literal, nargs="*", action=_OneOrList)
 
     def error(self, message: str) -> NoReturn:
         text = without_middle(_on_one_line(message)).removeprefix("argument ").rstrip(".")
@@ -111,6 +131,13 @@ def whole_number(least: int | None = None, most: int | None = None) -> Callable[
     return parse
 
 
+# What --world takes. The names stand here since those of the registry come with NumPy.
+WORLDS = (
+    "paper, open, far_piles, double_bridge, or the path of a map file; --world.NAME gives a "
+    "setting of it"
+)
+
+
 def _named_number(text: str) -> tuple[str, float]:
     name, _, value = text.partition("=")
     try:
@@ -120,14 +147,58 @@ def _named_number(text: str) -> tuple[str, float]:
         raise argparse.ArgumentTypeError(words) from None
 
 
-# What --world takes. The names stand here since those of the registry come with NumPy.
-WORLDS = "paper, open, far_piles, double_bridge, or the path of a map file"
-
 # The option of commands that train one learner; `dict(settings.hyperparameter)` has its numbers.
 HYPERPARAMETER: dict[str, Any] = {
     **{"type": _named_number, "action": "extend", "nargs": 1, "default": []},
     **{"metavar": "NAME=VALUE", "help": "of the learner; may be given several times"},
 }
+
+
+def add_settings(parser: argparse.ArgumentParser, base: Settings, but: Container[str] = ()) -> None:
+    """Add an option for each setting of a class, named as in sweep files.
+
+    Args:
+        parser: The parser.
+        base: Settings whose values are the defaults.
+        but: Full names of settings that the command determines itself.
+    """
+    parser.usage = "%(prog)s [options]"  # there are too many to list them twice
+    group = parser.add_argument_group(f"{base.path} settings")
+    for one in declared(type(base)):
+        value = getattr(base, one.name)
+        if one.path not in but and (one.has_names or not one.is_group):
+            group.add_argument(_flag(one.path), **_reading(one, value))
+        if one.is_group:
+            add_settings(parser, value, but)
+
+
+def _flag(path: str) -> str:
+    return f"--{path.replace('_', '-')}"
+
+
+def _reading(one: Setting, value: Any) -> dict[str, Any]:
+    """Arguments of `add_argument` for a setting, whose value is checked where it is used."""
+    about = one.about(value).replace("%", "%%")
+    how = {"dest": one.path, "type": _literal, "default": argparse.SUPPRESS, "help": about}
+    if one.kind is bool:
+        return how | {"nargs": "?", "const": True, "metavar": "true|false"}
+    return how | {"metavar": {int: "N", float: "X"}.get(one.kind, "NAME")}
+
+
+def _literal(text: str) -> Any:
+    """The number or the flag that a text stands for, else the text."""
+    for read in (int, float):
+        with suppress(ValueError):
+            return read(text)
+    return {"true": True, "false": False}.get(text, text)
+
+
+def given_settings(settings: argparse.Namespace) -> dict[str, Any]:
+    """The settings that options have given, as mappings in mappings, see `settings.nested`.
+
+    The names of the world and the task, `--world` and `--task`, are left out.
+    """
+    return nested({path: value for path, value in vars(settings).items() if "." in path})
 
 
 def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> NoReturn:

@@ -20,6 +20,7 @@ import numpy as np
 from taichi_ants import __version__, checks, files, learners
 from taichi_ants.errors import AntsError, check_one_of, checked_whole
 from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.settings import flat
 from taichi_ants.studies import blocks
 from taichi_ants.studies.blocks import Outcome, kept
 from taichi_ants.studies.provenance import world_facts
@@ -507,12 +508,3 @@ def _facts(point: Point, worlds: list, points: Sequence[Point]) -> dict[str, Any
     if facts.get("after"):
         facts["after"] = points.index(facts["after"])
     return flat({**facts, "task": point.task.as_dict(), "training": point.training.as_dict()})
-
-
-def flat(facts: Mapping[str, Any], before: str = "") -> dict[str, Any]:
-    """Mappings in mappings as one, {"task": {"life": {"births": 1}}} as {"task.life.births": 1}."""
-    pairs: dict[str, Any] = {}
-    for name, value in facts.items():
-        inner = isinstance(value, Mapping)
-        pairs |= flat(value, f"{before}{name}.") if inner else {f"{before}{name}": value}
-    return pairs

@@ -15,7 +15,8 @@ from typing import Any
 from taichi_ants import checks, files, learners, worlds
 from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, shown
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.studies.runner import ColonyPoint, Point, RunPoint, Study, flat
+from taichi_ants.settings import all_of, declared, flat, nested
+from taichi_ants.studies.runner import ColonyPoint, Point, RunPoint, Study
 from taichi_ants.task import Task
 
 if sys.version_info >= (3, 11):
@@ -26,7 +27,7 @@ else:
 KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
 _OF_FILE = ("kind", "seeds", "measures", "margin", "against", "vary")
 _PARTS = ("world", "task", "training", "after", "pool")  # of a point; not settings themselves
-_OF_LEARNERS = [field.name for field in fields(TrainingConfig) if field.name != "hyperparameters"]
+_OF_LEARNERS = [one.name for one in declared(TrainingConfig)]
 
 Settings = dict[str, Any]  # by their full names, as "task.pheromone.half_life"
 
@@ -159,24 +160,19 @@ def _against(given: Any, rows: Iterable[Settings]) -> tuple[str, Any]:
 def _point(kind: str, settings: Settings, seeds: tuple[int, ...], built: dict[str, Any]) -> Point:
     """The point of some settings; a world stands in `built` once it was built."""
     learner = settings.get("training.learner")
-    more = fields(learners.get(str(learner)).hyperparameters) if learner else ()
+    more = declared(learners.get(str(learner)).hyperparameters) if learner else ()
     known = [
         *_own(kind),
-        *flat({"task": Task().as_dict()}),
-        "task.traffic",  # by its name
-        *(f"training.{name}" for name in [*_OF_LEARNERS, *(field.name for field in more)]),
+        # A group is written by a name, if it has names.
+        *(one.path for one in all_of(Task) if not one.is_group or one.has_names),
+        *(one.path for one in (*declared(TrainingConfig), *more)),
     ]
-    tree: dict[str, Any] = {"world": {}, "task": {}, "training": {}}
-    for name, value in settings.items():
+    for name in settings:
         # What settings a world has is known where it is made.
         if name not in known and not re.fullmatch(r"world\.[^.]*", name):
             raise AntsError(f"{shown(name)} is no setting {_rather(name, kind, known)}.")
-        *outer, last = name.split(".")
-        branch = tree
-        for part in outer:
-            branch = branch.setdefault(part, {})
-        branch[last] = value
-    world, task, training = (tree.pop(part) for part in _PARTS[:3])
+    tree = nested(settings)
+    world, task, training = (tree.pop(part, {}) for part in _PARTS[:3])
     for name in _OF_LEARNERS[:5]:  # the others have usual values
         if name not in training:
             raise AntsError(f"training.{name} is missing; write it, fixed or in [vary].")

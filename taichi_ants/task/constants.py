@@ -36,6 +36,9 @@ ENTERED_LURE = SEES_LURE
 PICKED_UP = 3
 DELIVERED = 4
 
+# The largest reward of an event, either way.
+MOST_REWARD = 1000
+
 # The trail level that a carrying ant sets.
 DEPOSIT_LEVEL = 250
 # Levels and steps share 32-bit integers (a trail stores the tick at which it has evaporated).

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from taichi_ants.errors import checked_flag, checked_whole
+from taichi_ants.settings import Is, Settings
 from taichi_ants.task.constants import MAX_STEPS
+
+Ticks = Annotated[int | None, Is(unit="ticks", least=1, most=MAX_STEPS)]
 
 
 @dataclass(frozen=True)
-class Life:
+class Life(Settings, path="task.life"):
     """What comes and goes; by default nothing does. Colonies only.
 
     Attributes:
@@ -24,17 +27,10 @@ class Life:
         AntsError: A value is outside its range.
     """
 
-    births: bool = False
-    lifespan: int | None = None
-    regrowth: int | None = None
-    wander: int | None = None
-
-    def __post_init__(self) -> None:
-        checked_flag("births", self.births)
-        for name, least in (("lifespan", 1), ("regrowth", 0), ("wander", 1)):
-            ticks = getattr(self, name)
-            if ticks is not None:
-                checked_whole(name, ticks, least, MAX_STEPS, ", or be left out")
+    births: Annotated[bool, Is("turn each food item that the queen is given into an ant")] = False
+    lifespan: Annotated[Ticks, Is("age at which an ant dies")] = None
+    regrowth: Annotated[Ticks, Is("time until food grows back where it was taken", least=0)] = None
+    wander: Annotated[Ticks, Is("interval at which each pile of food moves by one cell")] = None
 
     @property
     def changes(self) -> bool:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
-import numpy as np
-
-from taichi_ants.errors import AntsError, check_one_of, checked_whole, shown
+from taichi_ants.settings import Is, Settings
 from taichi_ants.task.constants import DEPOSIT_LEVEL
+
+if TYPE_CHECKING:
+    import numpy as np
 
 Evaporation = Literal["linear", "exponential", "none"]
 Deposit = Literal["set", "add", "fading", "none"]
@@ -19,9 +19,11 @@ DEPOSITS: tuple[str, ...] = get_args(Deposit)
 VIEWS: tuple[str, ...] = get_args(View)
 MAX_DEPOSIT = 1_000_000
 
+Level = Annotated[int | None, Is(unit="ticks of linear evaporation", least=1, most=MAX_DEPOSIT)]
+
 
 @dataclass(frozen=True)
-class Pheromone:
+class Pheromone(Settings, path="task.pheromone"):
     """How trails are laid, fall and spread.
 
     Attributes:
@@ -48,51 +50,28 @@ class Pheromone:
         AntsError: A value is outside its range, or would change nothing.
     """
 
-    evaporation: Evaporation = "linear"
-    half_life: float | None = None
-    diffusion: float = 0.0
-    deposit: Deposit = "set"
-    level: int = DEPOSIT_LEVEL
-    cap: int | None = None
-    slope: int | None = None
-    view: View = "half"
-
-    def __post_init__(self) -> None:
-        check_one_of("evaporation", self.evaporation, EVAPORATIONS)
-        if self.half_life is not None and not 0 < _number(self.half_life) < math.inf:
-            raise AntsError(
-                f"half_life is {shown(self.half_life)}; it must be a number of ticks above 0."
-            )
-        if not 0 <= _number(self.diffusion) <= 1:
-            raise AntsError(
-                f"diffusion is {shown(self.diffusion)}; it must be a number from 0 to 1."
-            )
-        check_one_of("deposit", self.deposit, DEPOSITS)
-        checked_whole("level", self.level, 1, MAX_DEPOSIT)
-        if self.cap is not None:
-            checked_whole("cap", self.cap, 1, MAX_DEPOSIT)
-        if self.slope is not None:
-            checked_whole("slope", self.slope, 1, MAX_DEPOSIT)
-        check_one_of("view", self.view, VIEWS)
-        if self.deposit == "none" and self.level != DEPOSIT_LEVEL:
-            raise AntsError(
-                f"level is {shown(self.level)}, but deposit is 'none'; make deposit another one, "
-                "or leave it out."
-            )
-        self._settle("half_life", 50.0, "evaporation", "exponential")
-        self._settle("cap", 1000, "deposit", "add")
-        self._settle("slope", 10, "deposit", "fading")
-
-    def _settle(self, name: str, usual: float, other: str, needed: str) -> None:
-        """Refuse an option where another one makes it mean nothing; fill it in where it is not."""
-        chosen = getattr(self, other)
-        if getattr(self, name) is None:
-            object.__setattr__(self, name, usual if chosen == needed else None)
-        elif chosen != needed:
-            raise AntsError(
-                f"{name} is {shown(getattr(self, name))}, but {other} is {chosen!r}; make "
-                f"{other} {needed!r}, or leave it out."
-            )
+    evaporation: Annotated[Evaporation, Is("how trails evaporate")] = "linear"
+    half_life: Annotated[
+        float | None,
+        Is("time in which a trail halves", unit="ticks", above=0, usual=50.0),
+        Is(only=("evaporation", "exponential")),
+    ] = None
+    diffusion: Annotated[
+        float, Is("share of a trail that spreads to the six neighbours per tick", least=0, most=1)
+    ] = 0.0
+    deposit: Annotated[Deposit, Is("how ants with food lay trails")] = "set"
+    level: Annotated[
+        int,
+        Is("trail that a deposit sets or adds, or from which it fades", least=1, most=MAX_DEPOSIT),
+        Is(unit="ticks of linear evaporation", only=("deposit", "set", "add", "fading")),
+    ] = DEPOSIT_LEVEL
+    cap: Annotated[
+        Level, Is("largest trail that deposits add up to", usual=1000, only=("deposit", "add"))
+    ] = None
+    slope: Annotated[
+        Level, Is("how much less is laid per tick with food", usual=10, only=("deposit", "fading"))
+    ] = None
+    view: Annotated[View, Is("which trails ants without food see as T")] = "half"
 
     @property
     def dense(self) -> bool:
@@ -107,24 +86,18 @@ class Pheromone:
     @property
     def lasting(self) -> Pheromone:
         """The same without evaporation."""
-        return replace(self, evaporation="none", half_life=None)
+        return self.but(evaporation="none")
 
     @property
     def decay(self) -> np.float32:
         """The factor on every level per tick of exponential evaporation, else 1."""
+        import numpy as np
+
         return np.float32(0.5 ** (1.0 / float(self.half_life)) if self.half_life else 1.0)
 
     @property
     def share(self) -> np.float32:
         """The part of its level that a cell gives to one neighbour per tick of diffusion."""
+        import numpy as np
+
         return np.float32(float(self.diffusion) / 6.0)
-
-
-def _number(value: object) -> float:
-    """A number as float; nan for what is none."""
-    if isinstance(value, (bool, str)):
-        return math.nan
-    try:
-        return float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError, OverflowError):
-        return math.nan

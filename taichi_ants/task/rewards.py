@@ -1,21 +1,24 @@
-"""What the outcome of an action pays."""
+"""The reward of each event."""
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass, fields
+from dataclasses import astuple, dataclass
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
+from taichi_ants.settings import Is, Settings
+from taichi_ants.task.constants import MOST_REWARD
 
-from taichi_ants.errors import checked_whole
+if TYPE_CHECKING:
+    import numpy as np
 
-MOST = 1000
+Reward = Annotated[int, Is(least=-MOST_REWARD, most=MOST_REWARD)]
 
 
 @dataclass(frozen=True)
-class Rewards:
+class Rewards(Settings, path="task.rewards"):
     """The reward of each event, whole numbers from -1000 to 1000; the paper's table 1 by default.
 
-    The fields stand in the order of the events, see `constants`.
+    The fields are in the order of the events, see `constants`.
 
     Attributes:
         empty: A move onto a cell that was seen as E.
@@ -25,20 +28,18 @@ class Rewards:
         give: A food given to the queen.
     """
 
-    empty: int = 0
-    failed: int = -1
-    lure: int = 1
-    pick_up: int = 3
-    give: int = 10
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            value = checked_whole(f"the reward {field.name}", value, -MOST, MOST)
-            object.__setattr__(self, field.name, value)
+    empty: Annotated[Reward, Is("of a move onto a cell seen as empty (E)")] = 0
+    failed: Annotated[Reward, Is("of a blocked move, or a pick-up or give that fails")] = -1
+    lure: Annotated[
+        Reward, Is("of a move onto a cell seen as T (trail) or S (nearer to the queen)")
+    ] = 1
+    pick_up: Annotated[Reward, Is("of picking up food")] = 3
+    give: Annotated[Reward, Is("of giving food to the queen")] = 10
 
     def by_event(self) -> np.ndarray:
         """The rewards by event, int32 (5,)."""
+        import numpy as np
+
         return np.array(astuple(self), dtype=np.int32)
 
     @property

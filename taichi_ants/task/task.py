@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
-from typing import Any, Literal, get_args
+from dataclasses import asdict, dataclass, field
+from typing import Annotated, Any, Literal, get_args
 
-from taichi_ants.errors import AntsError, check_one_of, checked_flag, expect, shown
+from taichi_ants.settings import Is, Settings
 from taichi_ants.task import observations
 from taichi_ants.task.life import Life
 from taichi_ants.task.observations import Observation
@@ -16,11 +16,10 @@ from taichi_ants.task.traffic import Traffic
 
 Delivery = Literal["absorbing", "continuing"]
 DELIVERIES: tuple[str, ...] = get_args(Delivery)
-_PARTS = {"rewards": Rewards, "pheromone": Pheromone, "traffic": Traffic, "life": Life}
 
 
 @dataclass(frozen=True, repr=False)
-class Task:
+class Task(Settings, path="task"):
     """What an ant perceives, may do and is paid for; the paper's by default.
 
     `observation` and what kind of pheromone there is are compiled into the kernels; all else is
@@ -47,25 +46,24 @@ class Task:
         AntsError: A value is not allowed; the message names it.
     """
 
-    observation: str = "paper"
-    rewards: Rewards = field(default_factory=Rewards)
-    pheromone: Pheromone = field(default_factory=Pheromone)
-    traffic: Traffic = field(default_factory=Traffic)
-    turns_at_queen: bool = False
-    delivery: Delivery = "absorbing"
-    evaporation_in_training: bool = False
-    evaporation_in_evaluation: bool = True
-    life: Life = field(default_factory=Life)
+    observation: Annotated[str, Is("what an ant sees", choices=observations.names)] = "paper"
+    rewards: Annotated[Rewards, Is("reward of each event")] = field(default_factory=Rewards)
+    pheromone: Annotated[Pheromone, Is("how trails are laid, evaporate and spread")] = field(
+        default_factory=Pheromone
+    )
+    traffic: Annotated[Traffic, Is("who may enter a cell with an ant on it")] = field(
+        default_factory=Traffic
+    )
+    turns_at_queen: Annotated[bool, Is("turn ants round when they have given their food")] = False
+    delivery: Annotated[Delivery, Is("whether the update at a delivery bootstraps")] = "absorbing"
+    evaporation_in_training: Annotated[bool, Is("evaporate trails while ants learn")] = False
+    evaporation_in_evaluation: Annotated[bool, Is("evaporate trails while nobody learns")] = True
+    life: Annotated[Life, Is("what comes and goes (colonies only)")] = field(default_factory=Life)
 
-    def __post_init__(self) -> None:
-        observations.get(self.observation)
-        if isinstance(self.traffic, str):
-            object.__setattr__(self, "traffic", Traffic.named(self.traffic))
-        for name, kind in _PARTS.items():
-            expect(name, getattr(self, name), kind)
-        check_one_of("delivery", self.delivery, DELIVERIES)
-        for name in ("turns_at_queen", "evaporation_in_training", "evaporation_in_evaluation"):
-            object.__setattr__(self, name, checked_flag(name, getattr(self, name)))
+    @classmethod
+    def named(cls) -> Mapping[str, Task]:
+        """Tasks that have names: "paper", "foraging" and "queueing"."""
+        return {"paper": paper(), "foraging": foraging(), "queueing": queueing()}
 
     def __repr__(self) -> str:
         """What is not as in the paper."""
@@ -92,22 +90,6 @@ class Task:
         """The task as names and numbers, for files; `from_dict` reads it."""
         return asdict(self)
 
-    @classmethod
-    def from_dict(cls, facts: Mapping[str, Any]) -> Task:
-        """The task of `as_dict`.
-
-        Raises:
-            AntsError: A value is not allowed, or there is no such field.
-        """
-        given = dict(_known("a task", cls, facts))
-        for name, kind in _PARTS.items():
-            if name in given and not (kind is Traffic and isinstance(given[name], str)):
-                part = dict(_known(name, kind, given[name]))
-                if part.get("deposit") == "none":  # older files have a level beside it
-                    part.pop("level", None)
-                given[name] = kind(**part)
-        return cls(**given)
-
 
 def foraging() -> Task:
     """A task in which the trails of a colony help.
@@ -117,7 +99,7 @@ def foraging() -> Task:
     return Task(
         observation="ants",
         pheromone=Pheromone(deposit="fading", level=500, view="strongest"),
-        traffic=Traffic.named("right_of_way"),
+        traffic=Traffic.named()["right_of_way"],
         evaporation_in_training=True,
     )
 
@@ -131,7 +113,7 @@ def queueing() -> Task:
     return Task(
         observation="queues",
         pheromone=Pheromone(deposit="fading", level=500, view="strongest_under_carriers"),
-        traffic=Traffic.named("following"),
+        traffic=Traffic.named()["following"],
         turns_at_queen=True,
         evaporation_in_training=True,
     )
@@ -140,13 +122,3 @@ def queueing() -> Task:
 def paper() -> Task:
     """The paper's task, which is the default everywhere."""
     return Task()
-
-
-def _known(what: str, kind: type, facts: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The facts, if each is a field of that kind."""
-    expect(what, facts, Mapping)
-    known = sorted(one.name for one in fields(kind))
-    for name in facts:
-        if name not in known:
-            raise AntsError(f"{what} has no {shown(name)}; choose among {', '.join(known)}.")
-    return facts

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated
 
-from taichi_ants.errors import AntsError, check_one_of, checked_flag
+from taichi_ants.errors import AntsError
+from taichi_ants.settings import Is, Settings
 
 
 @dataclass(frozen=True)
-class Traffic:
+class Traffic(Settings, path="task.traffic"):
     """Who may enter a cell on which another ant stands; nobody by default, as in the paper.
 
     Where somebody may, every ant that tries to move claims the cell ahead of it, unless a rock,
@@ -29,40 +32,35 @@ class Traffic:
         AntsError: A value is no flag, or would change nothing.
     """
 
-    swap: bool = False
-    follow: bool = False
-    carriers_first: bool = False
-    grant: bool = False
+    swap: Annotated[bool, Is("let ants with food change places with ants without")] = False
+    follow: Annotated[bool, Is("let ants enter a cell that its ant leaves in the same tick")] = (
+        False
+    )
+    carriers_first: Annotated[bool, Is("let ants with food win a cell against ants without")] = (
+        False
+    )
+    grant: Annotated[
+        bool, Is("pay a pushed ant for the move that it wanted, if it got it", only=("swap", True))
+    ] = False
 
     def __post_init__(self) -> None:
-        for one in fields(self):
-            object.__setattr__(self, one.name, checked_flag(one.name, getattr(self, one.name)))
-        if self.grant and not self.swap:
-            raise AntsError("grant is True, but no ant is pushed; give swap=True with it.")
+        self.check()
         if self.carriers_first and not self.shared:
             raise AntsError(
-                "carriers_first is True, but all cells with ants are closed; give swap=True or "
-                "follow=True with it."
+                "`task.traffic.carriers_first` is True; leave it out unless `swap` or `follow` is "
+                "True."
             )
 
     @classmethod
-    def named(cls, name: str) -> Traffic:
-        """The traffic of a name: "blocking", "right_of_way" or "following".
-
-        Raises:
-            AntsError: There is no such name.
-        """
-        check_one_of("traffic", name, tuple(_NAMED))
-        return _NAMED[name]
+    def named(cls) -> Mapping[str, Traffic]:
+        """Values that have names."""
+        return {
+            "blocking": cls(),
+            "right_of_way": cls(swap=True),
+            "following": cls(swap=True, follow=True, carriers_first=True, grant=True),
+        }
 
     @property
     def shared(self) -> bool:
         """Whether any ant may enter a cell on which another one stands."""
         return self.swap or self.follow
-
-
-_NAMED = {
-    "blocking": Traffic(),
-    "right_of_way": Traffic(swap=True),
-    "following": Traffic(swap=True, follow=True, carriers_first=True, grant=True),
-}

@@ -17,22 +17,41 @@ around the first, so that no way over it is shorter.
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
 
-from taichi_ants.errors import AntsError, checked_flag, checked_whole
+from taichi_ants.errors import AntsError
 from taichi_ants.grid.hexgrid import AxialGrid, normal_form
+from taichi_ants.settings import Is, checked
 from taichi_ants.worlds import geometry
 from taichi_ants.worlds.world import World
 
 ROOM_RADIUS = 5  # of the rooms around queen and food: room for 90 ants beside the queen
 PILE_RADIUS = 3  # of the food: 37 cells
 MIN_STEPS, MAX_STEPS = 4, 1000  # of the short branch
-SETTINGS = ("short", "long", "mirrored", "aside")
 _NEST_JUNCTION = ROOM_RADIUS + 1  # its x coordinate; the queen is at the origin
 _BULGE = 3  # steps of the short branch to the side, if the long one leaves the choice
 
 
-def double_bridge(short: int = 23, long: int = 36, mirrored: bool = False, aside: int = 0) -> World:
+Short = Annotated[
+    int, Is("length of the short branch", unit="steps", least=MIN_STEPS, most=MAX_STEPS)
+]
+Long = Annotated[
+    int, Is("length of the long branch", unit="steps", least=MIN_STEPS, most=2 * MAX_STEPS)
+]
+Mirrored = Annotated[bool, Is("put the short branch to the left of ants that leave the nest")]
+Aside = Annotated[
+    int,
+    Is("shift of the food to the side of the long branch", unit="steps"),
+    Is(least=0, most=MAX_STEPS - MIN_STEPS),
+]
+
+
+@checked
+def double_bridge(
+    short: Short = 23, long: Long = 36, mirrored: Mirrored = False, aside: Aside = 0
+) -> World:
     """A short and a long branch between nest and food, walled by rocks.
 
     The queen is at the origin, in the middle of a room; the food is a pile in the middle of another
@@ -63,8 +82,9 @@ def double_bridge(short: int = 23, long: int = 36, mirrored: bool = False, aside
     )
 
 
+@checked
 def bridge_ranges(
-    short: int = 23, long: int = 36, mirrored: bool = False, aside: int = 0
+    short: Short = 23, long: Long = 36, mirrored: Mirrored = False, aside: Aside = 0
 ) -> tuple[int, int, int]:
     """Return the ranges of the world, before it is built; arguments and errors as the world's."""
     _, pile, corridors = _walked(short, long, mirrored, aside)
@@ -83,23 +103,25 @@ def _walked(
     return (0, 0, 0), (x, y, z), corridors
 
 
+@checked
 def junction_cells(
-    short: int = 23, long: int = 36, mirrored: bool = False, aside: int = 0
+    short: Short = 23, long: Long = 36, mirrored: Mirrored = False, aside: Aside = 0
 ) -> np.ndarray:
     """The junction at the nest and the one at the food, int64 (2, 3); arguments as the world's."""
     ahead = _ahead(short, long, aside)
     cells = np.array([(_NEST_JUNCTION, 0, 0), (_NEST_JUNCTION + ahead, -aside, 0)])
-    return _placed(cells, checked_flag("mirrored", mirrored))
+    return _placed(cells, mirrored)
 
 
+@checked
 def branch_cells(
-    short: int = 23, long: int = 36, mirrored: bool = False, aside: int = 0
+    short: Short = 23, long: Long = 36, mirrored: Mirrored = False, aside: Aside = 0
 ) -> tuple[np.ndarray, np.ndarray]:
     """The cells of the short and of the long branch, int64 (n, 3) each, junctions left out.
 
     With them, one can count who takes which branch. Arguments and errors are those of the world.
     """
-    ahead, mirrored = _ahead(short, long, aside), checked_flag("mirrored", mirrored)
+    ahead = _ahead(short, long, aside)
     right = _corridor(short - ahead - aside, ahead, -aside)
     left = _corridor(long - ahead, ahead + aside, aside)
     return _placed(right, mirrored), _placed(left, not mirrored)
@@ -107,14 +129,16 @@ def branch_cells(
 
 def _ahead(short: int, long: int, aside: int) -> int:
     """Steps ahead from junction to junction, on the way of the short branch."""
-    checked_whole("short", short, MIN_STEPS, MAX_STEPS)
-    checked_whole("long", long)
-    checked_whole("aside", aside, least=0, most=short - MIN_STEPS)
+    if aside > short - MIN_STEPS:
+        raise AntsError(
+            f"`world.aside` is {aside}; with `short` {short} it must be at most "
+            f"{short - MIN_STEPS}."
+        )
     most = 2 * short - 3 - aside
     if not short <= long <= most:
         raise AntsError(
-            f"long is {long} with short {short} and aside {aside}; it must lie between short and "
-            f"{most}, twice short less 3 and aside."
+            f"`world.long` is {long}; with `short` {short} and `aside` {aside} it must be between "
+            f"{short} and {most} (2 * short - 3 - aside)."
         )
     # A branch that went as far to the side as ahead would have a corner that can be cut.
     return max(short - _BULGE - aside, (long - aside) // 2 + 1)

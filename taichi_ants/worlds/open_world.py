@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from numbers import Real
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, checked_whole, shown, whole
+from taichi_ants.errors import AntsError, whole
 from taichi_ants.grid.hexgrid import AxialGrid, axial, cube
 from taichi_ants.grid.randomness import Stream, choose
+from taichi_ants.settings import Is, checked
 from taichi_ants.worlds.validation import parse_ranges
 from taichi_ants.worlds.world import World
 
@@ -26,13 +26,20 @@ _STREAM_ROCKS = int.from_bytes(b"rocks", "big")
 _STREAM_FOOD = int.from_bytes(b"food", "big")
 _BATCH_CELLS = 1 << 22  # covered by the hexagons that are placed at once; bounds the memory
 
+Ranges = Annotated[Sequence[int] | None, Is("size of the world along x, y and z", unit="cells")]
+RockShare = Annotated[float, Is("share of the cells under rocks", least=0, most=MAX_SHARE)]
+Piles = Annotated[int, Is("number of piles of food", most=3)]
 
+
+@checked
 def open_world(
     seed: int = 0,
-    ranges: Sequence[int] | None = None,
-    rock_share: float = 0.15,
-    food_share: float = 0.03,
-    piles: int = 3,
+    ranges: Ranges = None,
+    rock_share: RockShare = 0.15,
+    food_share: Annotated[
+        float, Is("single food items as a share of the cells", least=0, most=MAX_SHARE)
+    ] = 0.03,
+    piles: Annotated[Piles, Is(least=0)] = 3,
 ) -> World:
     """A random world: the queen at the origin, rocks, single foods and up to three piles of food.
 
@@ -54,9 +61,6 @@ def open_world(
             piles are not allowed; or no food could be reached from the queen in 100 worlds drawn.
     """
     seed = whole("seed", seed)
-    rock_share = _share("rock_share", rock_share)
-    food_share = _share("food_share", food_share)
-    piles = checked_whole("piles", piles, least=0, most=3)
     if rock_share + food_share > MAX_SHARE:
         raise AntsError(
             f"rock_share {rock_share} and food_share {food_share} add up to more than {MAX_SHARE}; "
@@ -76,24 +80,18 @@ def open_world(
     )
 
 
+@checked
 def far_piles(
     seed: int = 0,
-    ranges: Sequence[int] | None = (30, 30, 30),
-    rock_share: float = 0.15,
-    piles: int = 3,
+    ranges: Ranges = (30, 30, 30),
+    rock_share: RockShare = 0.15,
+    piles: Annotated[Piles, Is(least=1)] = 3,
 ) -> World:
     """An open world without single foods: all food lies in piles far from the queen.
 
     Arguments and errors as of `open_world`; with at least one pile.
     """
-    return open_world(seed, ranges, rock_share, 0.0, checked_whole("piles", piles, most=3))
-
-
-def _share(name: str, value: Any) -> float:
-    number = isinstance(value, Real) and not isinstance(value, bool)
-    if not (number and 0 <= value <= MAX_SHARE):
-        raise AntsError(f"{name} is {shown(value)}; it must be a number between 0 and {MAX_SHARE}.")
-    return float(value)
+    return open_world(seed, ranges, rock_share, 0.0, piles)
 
 
 def _draw(

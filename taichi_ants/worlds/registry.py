@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from taichi_ants.errors import AntsError, expect, shown, whole
+from taichi_ants.settings import Setting, declared, not_a_setting
 from taichi_ants.worlds.text_map import load_map
 from taichi_ants.worlds.world import World
 
@@ -21,12 +22,13 @@ def register(name: str, builder: Builder) -> None:
 
     Args:
         name: A new name, or that of your own world, which it replaces.
-        builder: Called with a seed (int), returns a `World`; the same seed must give the same.
-            Further arguments, which need defaults, are settings of the world.
+        builder: Called with settings of the world by name, returns a `World`. Its arguments need
+            defaults, except `seed`: a builder with such an argument gets a whole number, and must
+            return the same world for the same number.
 
     Raises:
         AntsError: The name is that of a world of the package or not text, or the builder cannot be
-            called.
+            called so.
     """
     if not isinstance(name, str) or not name.strip():
         raise AntsError(f"the world name {shown(name)} is not allowed; it must be text.")
@@ -39,6 +41,12 @@ def register(name: str, builder: Builder) -> None:
         raise AntsError(
             f"the builder of {shown(name)} is {shown(builder)}; it must be a function of a seed."
         )
+    for one in inspect.signature(builder).parameters.values():
+        if one.default is one.empty and one.name != "seed":
+            raise AntsError(
+                f"the argument {one.name} of the builder of {name!r} has no default; give it one, "
+                "or call it seed."
+            )
     _BUILDERS[name] = builder
 
 
@@ -47,13 +55,24 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(_BUILDERS))
 
 
-def check_seed_counts(name_or_path: str, option: str = "--world-seed") -> None:
+def is_drawn(name_or_path: str | os.PathLike[str]) -> bool:
+    """Whether a world depends on a seed; the paper's, a bridge and a map file do not."""
+    builder = _BUILDERS.get(name_or_path) if isinstance(name_or_path, str) else None
+    return builder is not None and "seed" in inspect.signature(builder).parameters
+
+
+def settings_of(name: str) -> tuple[Setting, ...]:
+    """The declared settings of a registered world; arguments that are not declared are left out."""
+    return declared(_BUILDERS[name])
+
+
+def check_seed_counts(name_or_path: str, option: str = "--world.seed") -> None:
     """Make sure that a seed can change the world; AntsError if nothing is drawn, as in a map."""
-    drawn = [name for name in names() if name not in ("paper", "double_bridge")]
-    if name_or_path not in drawn:
+    if not is_drawn(name_or_path):
+        drawn = ", ".join(filter(is_drawn, names()))
         raise AntsError(
             f"{option} is for a world drawn at random, not for {shown(name_or_path)}; leave it "
-            f"out, or choose a world of {', '.join(drawn)}."
+            f"out, or choose a world of {drawn}."
         )
 
 
@@ -71,11 +90,11 @@ def build(name_or_path: str | os.PathLike[str], seed: int = 0, **given: Any) -> 
     seed = whole("seed", seed)
     expect("the world", name_or_path, str, os.PathLike)
     builder = _BUILDERS.get(name_or_path) if isinstance(name_or_path, str) else None
-    allowed = tuple(inspect.signature(builder).parameters)[1:] if builder else ()  # a map has none
+    allowed = {*inspect.signature(builder).parameters} - {"seed"} if builder else set()
     for name in given:
         if name not in allowed:
-            has = f"it has {', '.join(allowed)}" if allowed else "it has none"
-            raise AntsError(f"{name} is no setting of the world {shown(name_or_path)}; {has}.")
+            of = f"the world {shown(name_or_path)}"
+            raise AntsError(f"`world.{name}` {not_a_setting(name, sorted(allowed), of)}")
     if builder is None:
         if os.path.exists(name_or_path):
             return load_map(name_or_path)
@@ -85,7 +104,7 @@ def build(name_or_path: str | os.PathLike[str], seed: int = 0, **given: Any) -> 
             f"one of {known}, or give the path of a map file."
         )
     try:
-        world = builder(seed, **given)
+        world = builder(**given, **({"seed": seed} if is_drawn(name_or_path) else {}))
     except AntsError:
         raise
     except Exception as error:

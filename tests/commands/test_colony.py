@@ -183,7 +183,7 @@ def test_a_finished_study_is_shown_and_nothing_is_lost(finished, capsys):
     assert status == 0
     assert out.startswith((folder / "report.txt").read_text("utf-8"))
     assert "holds these results already" in out
-    other = [*SMALL, "--out", folder, "--learner", "q_learning"]
+    other = [*SMALL, "--out", folder, "--training.learner", "q_learning"]
     status, _, err = call("colony", other, capsys)
     assert status == 2
     assert_one_sentence(err)
@@ -211,7 +211,7 @@ def test_other_arenas_are_the_only_difference_and_their_order_is_none(
         assert call("colony", [*small, *arenas], capsys)[0] == 130
     _, _, err = call("colony", [*small, "paper"], capsys)
     assert "(arenas differ)" in err
-    _, _, err = call("colony", [*small, "paper", "small", "--discount", 0.8], capsys)
+    _, _, err = call("colony", [*small, "paper", "small", "--training.discount", 0.8], capsys)
     assert "(training.discount differ)" in err
 
 
@@ -232,36 +232,63 @@ def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
         (["--ants", 2], "invalid choice: '2'"),
         (["live", "--quick"], "unrecognized arguments: --quick"),
         (["study", "--save", "x"], "unrecognized arguments: --save x"),
-        (["live", "--resume", "x", "--regrowth", 0], "--regrowth cannot change a colony that is"),
-        (["live", "--resume", "x", "--discount", 0.5], "--discount cannot change a colony"),
+        (
+            ["live", "--resume", "x", "--task.life.regrowth", 0],
+            "--task.life.regrowth cannot change a colony that is",
+        ),
+        (
+            ["live", "--resume", "x", "--training.discount", 0.5],
+            "--training.discount cannot change a colony",
+        ),
         (["live", "--resume", "x", "--seed", 0], "--seed cannot change a colony that is resumed"),
-        (["live", "--resume", "x", "--learner", "sarsa"], "--learner cannot change a colony"),
-        (["live", "--resume", "x", "--births"], "--births cannot change a colony"),
+        (
+            ["live", "--resume", "x", "--training.learner", "sarsa"],
+            "--training.learner cannot change a colony",
+        ),
+        (
+            ["live", "--resume", "x", "--task.life.births"],
+            "--task.life.births cannot change a colony",
+        ),
         (["live", "--resume", "x", "--task", "paper"], "--task cannot change a colony that is"),
-        (["live", "--deposit", "none", "--level", 3], "level is 3, but deposit is 'none'"),
-        (["live", "--sharing", "fixed", "--discount", 0.9], "--discount is of learning, but with"),
+        (
+            ["live", "--task.pheromone.deposit", "none", "--task.pheromone.level", 3],
+            "`task.pheromone.level` is 3; leave it out",
+        ),
+        (
+            ["live", "--sharing", "fixed", "--training.discount", 0.9],
+            "--training.discount is of learning, but with",
+        ),
         (["live", "--every", 2], "--every is of an animation, name one with --render"),
         (["live", "--render", "a.PNG", "--every", 2], "--every is of an animation"),
-        (["live", "--cap", 5], "cap is 5, but deposit is 'set'"),
-        (["live", "--slope", 5], "slope is 5, but deposit is 'set'"),
-        (["live", "--task", "foraging", "--cap", 5], "cap is 5, but deposit is 'fading'"),
+        (
+            ["live", "--task.pheromone.cap", 5],
+            "`task.pheromone.cap` is 5; leave it out unless `deposit` is 'add'",
+        ),
+        (["live", "--task.pheromone.slope", 5], "`task.pheromone.slope` is 5; leave it out"),
+        (
+            ["live", "--task", "foraging", "--task.pheromone.cap", 5],
+            "`task.pheromone.cap` is 5; leave it out",
+        ),
         (["live", "--task", "running"], "invalid choice: 'running'"),
         (["live", "--figure", "a.gif"], "'a.gif' is to hold one picture"),
         (["live", "--figure", "/proc/x/a.png"], "cannot write '/proc/x/a.png'"),
         (["live", "--resume", "x"], "cannot read 'x'"),
         (["study", "--arenas", "moon"], "--arenas: invalid choice: 'moon' (choose from"),
         (
-            ["study", "--learner", "sarsa_lambda"],
+            ["study", "--training.learner", "sarsa_lambda"],
             "learn together; choose one of q_learning, sarsa,",
         ),
         (["study", "--sizes", "300", "8", "--arenas", "paper"], "300 ants are asked for"),
-        (["study", "--learner", "none"], "there is no learner 'none'"),
-        (["study", "--epsilon", 2], "epsilon is 2.0"),
+        (["study", "--training.learner", "none"], "there is no learner 'none'"),
+        (["study", "--training.epsilon", 2], "`training.epsilon` is 2; it must be between 0 and 1"),
         (["live", "--ants", 0], "0 is not allowed"),
-        (["live", "--ants", 500, "--ranges", 10, 10, 10], "500 ants are asked for"),
-        (["live", "--world", "paper", "--ranges", 9, 9, 9], "--ranges are those of an open"),
+        (["live", "--ants", 500, "--world.ranges", 10, 10, 10], "500 ants are asked for"),
+        (
+            ["live", "--world", "paper", "--world.ranges", 9, 9, 9],
+            "`world.ranges` is not a setting of the world 'paper'",
+        ),
         (["live", "--world", "nowhere"], "there is no world named 'nowhere'"),
-        (["live", "--births", "--capacity", 5], "capacity is 5, but 80 ants start"),
+        (["live", "--task.life.births", "--capacity", 5], "capacity is 5, but 80 ants start"),
         (["live", "--render", "x.bmp"], "'x.bmp' ends in '.bmp'"),
         (["live", "--save", "/proc/x/y"], "cannot write '/proc/x/y'"),
         (["live", "--save", "."], "'.' is not a regular file"),
@@ -270,10 +297,13 @@ def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
         (["live", "--save", "/dev/null", "--resume", "x"], "'/dev/null' is not a regular file"),
         (["live", "--render", "../a.png/", "--resume", "x"], "'../a.png/' is not a regular file"),
         (["live", "--render", ".", "--resume", "x"], "'.' exists already and is no empty folder"),
-        (["live", "--diffusion", 2], "diffusion is 2.0"),
         (
-            ["live", "--half-life", 5, "--evaporation", "none"],
-            "half_life is 5.0, but evaporation is 'none'",
+            ["live", "--task.pheromone.diffusion", 2],
+            "`task.pheromone.diffusion` is 2; it must be between 0 and 1",
+        ),
+        (
+            ["live", "--task.pheromone.half-life", 5, "--task.pheromone.evaporation", "none"],
+            "`task.pheromone.half_life` is 5.0; leave it out",
         ),
         (
             ["live", "--sharing", "fixed"],
@@ -281,12 +311,20 @@ def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
         ),
         (["live", "--policy", "x.npz"], "cannot read 'x.npz'"),
         (
-            ["live", "--policy", "x", "--observation", "paper"],
-            "--observation is that of the policy",
+            ["live", "--policy", "x", "--task.observation", "paper"],
+            "--task.observation is that of the policy",
         ),
-        (["live", "--observation", "nose"], "there is no observation 'nose'"),
-        (["live", "--hyperparameter", "threshold"], "'threshold' is no name and number"),
-        (["live", "--hyperparameter", "x=1"], "'x' is no hyperparameter of learner 'sarsa'"),
+        (
+            ["live", "--task.observation", "nose"],
+            "`task.observation` is 'nose'; it must be one of paper",
+        ),
+        (
+            ["live", "--training.epsilon", "much"],
+            "`training.epsilon` is 'much'; it must be a number",
+        ),
+        (["live", "--task.pheromone.half-live", 5], "is not a setting; choose half_life"),
+        (["live", "--task.life.births", "maybe"], "is 'maybe'; it must be True or False"),
+        (["live", "--training.x", "1"], "`training.x` is not a setting of sarsa"),
         (["live", "--plugin", "x.py"], "cannot read the plugin"),
     ],
 )
@@ -311,7 +349,17 @@ def test_a_learner_that_makes_no_numbers_is_named(capsys, tmp_path, monkeypatch)
         'register(td_learner("lost", td_error))',
     ]
     Path("lost.py").write_text("\n".join(lines), "utf-8")
-    arguments = ["live", "--ants", 10, "--plugin", "lost.py", "--learner", "lost", "--ticks", 100]
+    arguments = [
+        "live",
+        "--ants",
+        10,
+        "--plugin",
+        "lost.py",
+        "--training.learner",
+        "lost",
+        "--ticks",
+        100,
+    ]
     for more in ([], ["--save", "lost.npz"]):
         status, out, err = call("colony", [*arguments, *more], capsys)
         assert (status, out) == (2, "")
@@ -326,10 +374,36 @@ def test_a_learner_that_makes_no_numbers_is_named(capsys, tmp_path, monkeypatch)
 
 
 LIFE = [
-    *("live", "--ants", 40, "--ranges", 20, 20, 20, "--births", "--capacity", 60, "--lifespan", 90),
-    *("--regrowth", 3, "--wander", 20, "--half-life", 30, "--diffusion", 0.1, "--deposit", "add"),
-    *("--level", 90, "--cap", 170),
-    *("--learner", "q_learning", "--seed", 5),
+    *(
+        "live",
+        "--ants",
+        40,
+        "--world.ranges",
+        20,
+        20,
+        20,
+        "--task.life.births",
+        "--capacity",
+        60,
+        "--task.life.lifespan",
+        90,
+    ),
+    *(
+        "--task.life.regrowth",
+        3,
+        "--task.life.wander",
+        20,
+        "--task.pheromone.evaporation",
+        "exponential",
+        "--task.pheromone.half-life",
+        30,
+        "--task.pheromone.diffusion",
+        0.1,
+        "--task.pheromone.deposit",
+        "add",
+    ),
+    *("--task.pheromone.level", 90, "--task.pheromone.cap", 170),
+    *("--training.learner", "q_learning", "--seed", 5),
 ]
 
 
@@ -373,7 +447,17 @@ def test_a_colony_as_the_library_makes_it(capsys, tmp_path, monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize(("sent", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_stopped_a_colony_is_saved_at_a_whole_tick(sent, status, kernels, tmp_path, monkeypatch):
-    arguments = ["live", "--ants", 60, "--world", "paper", "--ticks", 10_000_000, "--regrowth", 0]
+    arguments = [
+        "live",
+        "--ants",
+        60,
+        "--world",
+        "paper",
+        "--ticks",
+        10_000_000,
+        "--task.life.regrowth",
+        0,
+    ]
     again = [*arguments, "--ticks", 1]
     assert run("colony", again, kernels, tmp_path).returncode == 0  # compiles the kernels
     process = start("colony", [*arguments, "--save", "colony.npz"], kernels, tmp_path)
@@ -415,7 +499,7 @@ def test_stopped_before_it_begins_it_promises_only_what_is_so(
 def test_a_colony_starts_from_a_policy(capsys):
     policy = EXPERIMENTS / "policies" / "foraging.npz"
     fixed = ["live", "--ants", 2, "--world", "paper", "--ticks", 60, "--sharing", "fixed"]
-    assert call("colony", [*fixed, "--policy", policy, "--regrowth", 0], capsys)[0] == 0
+    assert call("colony", [*fixed, "--policy", policy, "--task.life.regrowth", 0], capsys)[0] == 0
 
 
 LASTING = {"delivery": "continuing", "evaporation_in_training": True}
@@ -430,26 +514,48 @@ FOOD_IS_BACK = replace(queueing(), life=Life(regrowth=0))
         ([], FOOD_IS_BACK, FOOD_IS_BACK),
         (["--task", "queueing"], FOOD_IS_BACK, queueing()),
         (["--task", "foraging"], queueing(), replace(foraging(), observation="queues")),
-        (["--regrowth", 0, "--births"], queueing(), replace(queueing(), life=Life(True, None, 0))),
-        (["--lifespan", 9], FOOD_IS_BACK, replace(queueing(), life=Life(False, 9, 0))),
         (
-            ["--task", "foraging", "--deposit", "none"],
+            ["--task.life.regrowth", 0, "--task.life.births"],
+            queueing(),
+            replace(queueing(), life=Life(True, None, 0)),
+        ),
+        (["--task.life.lifespan", 9], FOOD_IS_BACK, replace(queueing(), life=Life(False, 9, 0))),
+        (
+            ["--task", "foraging", "--task.pheromone.deposit", "none"],
             None,
             replace(foraging(), pheromone=Pheromone(deposit="none", view="strongest")),
         ),
-        (["--traffic", "right_of_way"], None, Task(traffic=Traffic(swap=True))),
+        (["--task.traffic", "right_of_way"], None, Task(traffic=Traffic(swap=True))),
         (
-            ["--task", "foraging", "--observation", "paper", "--traffic", "blocking"],
+            ["--task", "foraging", "--task.observation", "paper", "--task.traffic", "blocking"],
             None,
             Task(pheromone=Pheromone(deposit="fading", level=500, view="strongest")),
         ),
         (
-            ["--deposit", "fading", "--slope", 7, "--view", "strongest", "--level", 90],
+            [
+                "--task.pheromone.deposit",
+                "fading",
+                "--task.pheromone.slope",
+                7,
+                "--task.pheromone.view",
+                "strongest",
+                "--task.pheromone.level",
+                90,
+            ],
             None,
             Task(pheromone=Pheromone(deposit="fading", slope=7, view="strongest", level=90)),
         ),
         (
-            ["--task", "foraging", "--deposit", "add", "--half-life", 20],
+            [
+                "--task",
+                "foraging",
+                "--task.pheromone.deposit",
+                "add",
+                "--task.pheromone.evaporation",
+                "exponential",
+                "--task.pheromone.half-life",
+                20,
+            ],
             None,
             replace(
                 foraging(),
@@ -457,7 +563,7 @@ FOOD_IS_BACK = replace(queueing(), life=Life(regrowth=0))
             ),
         ),
         (
-            ["--evaporation", "linear"],
+            ["--task.pheromone.evaporation", "linear"],
             replace(paper(), pheromone=Pheromone("exponential", 20)),
             paper(),
         ),
@@ -480,8 +586,8 @@ def test_rules_are_those_named_else_the_policys_else_the_papers(
 def test_a_figure_shows_what_all_colonies_deliver_by_tick(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     policy = EXPERIMENTS / "policies" / "queueing.npz"
-    fixed = ["--policy", policy, "--sharing", "fixed", "--epsilon", 0.01, "--ants", 16]
-    where = ["--ranges", 15, 15, 15, "--colonies", 2, "--seed", 3]
+    fixed = ["--policy", policy, "--sharing", "fixed", "--training.epsilon", 0.01, "--ants", 16]
+    where = ["--world.ranges", 15, 15, 15, "--colonies", 2, "--seed", 3]
     more = ["--ticks", 230, "--figure", "a.png", "--render", "a.gif", "--every", 4]
     status, out, err = call("colony", ["live", *fixed, *where, *more], capsys)
     assert (status, err) == (0, "")
@@ -521,8 +627,8 @@ def test_policies_are_kept_for_colonies_that_learn_nothing(name, observation):
 def test_a_colony_sees_what_its_policy_or_the_option_says(from_file, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     save_policy("five.npz", np.eye(2048, 5), {}, "five_cells")
-    sees = ["--policy", "five.npz"] if from_file else ["--observation", "five_cells"]
-    more = ["--learner", "dyna_q", "--hyperparameter", "planning_steps=3", "--save", "a.npz"]
+    sees = ["--policy", "five.npz"] if from_file else ["--task.observation", "five_cells"]
+    more = ["--training.learner", "dyna_q", "--training.planning-steps", "3", "--save", "a.npz"]
     assert call("colony", ["live", "--ants", 2, "--ticks", 9, *sees, *more], capsys)[0] == 0
     saved = Colony.load("a.npz")
     assert saved.task.observation == "five_cells"
@@ -533,7 +639,20 @@ def test_a_colony_sees_what_its_policy_or_the_option_says(from_file, capsys, tmp
 
 def test_colonies_live_side_by_side_and_can_start_spread(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    where = ["--ranges", 20, 20, 20, "--regrowth", 0, "--ticks", 60, "--seed", 3, "--save", "x.npz"]
+    where = [
+        "--world.ranges",
+        20,
+        20,
+        20,
+        "--task.life.regrowth",
+        0,
+        "--ticks",
+        60,
+        "--seed",
+        3,
+        "--save",
+        "x.npz",
+    ]
     for place in ("nest", "spread"):
         many = ["live", "--ants", 9, "--colonies", 5, "--start", place]
         status, out, err = call("colony", [*many, *where], capsys)
@@ -558,8 +677,11 @@ def test_colonies_live_side_by_side_and_can_start_spread(capsys, tmp_path, monke
     ("arguments", "expected"),
     [
         ("", ("study", "live")),
-        ("study", ("--quick", "--arenas", "--sizes", "--learner", "--force")),
-        ("live", ("--ants", "--ranges", "--save", "--resume", "--render", "--half-life")),
+        ("study", ("--quick", "--arenas", "--sizes", "--training.learner", "--force")),
+        (
+            "live",
+            ("--ants", "--world", "--save", "--resume", "--render", "--task.pheromone.half-life"),
+        ),
     ],
 )
 def test_help_is_quick_and_needs_no_taichi(arguments, expected, tmp_path):

@@ -50,8 +50,8 @@ def assert_refused(arguments, named, place, capsys):
         (["--learners", ""], ["--learners is empty"]),
         (["--discounts", " "], ["--discounts", "' '"]),
         (["--epsilons", "half"], ["--epsilons", "'half'"]),
-        (["--learning-rates", "-0.1"], ["learning_rate", "-0.1", "above 0"]),
-        (["--learning-rates", "0"], ["learning_rate", "0.0", "above 0"]),
+        (["--learning-rates", "-0.1"], ["learning_rate", "-0.1", "must be between"]),
+        (["--learning-rates", "0"], ["learning_rate", "0.0", "must be between"]),
         (["--discounts", "-0.5"], ["discount", "-0.5", "between 0 and 1"]),
         (["--discounts", "inf"], ["discount", "inf"]),
         (["--epsilons", "1.01"], ["epsilon", "1.01", "between 0 and 1"]),
@@ -214,5 +214,5 @@ def test_learners_that_do_not_compile(name, place, kernels):
 def test_a_bad_command_as_a_process(place, kernels):
     done = run("compare", ["--epsilons", 3, "--out", "new"], kernels, place)
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == "error: epsilon is 3.0; it must be a number between 0 and 1.\n"
+    assert done.stderr == "error: `training.epsilon` is 3.0; it must be between 0 and 1.\n"
     assert not (place / "new").exists()

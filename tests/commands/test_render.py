@@ -132,8 +132,8 @@ def test_a_wrong_size_is_refused_before_the_training(tmp_path, monkeypatch) -> N
 @pytest.mark.parametrize("shown", ["episode", "colony", "learning", "sheet"])
 def test_what_is_trained_on_the_spot_sees_what_is_asked_for(shown, monkeypatch) -> None:
     more = ["--stages", "1"] if shown == "learning" else ["--episodes", "1"]
-    chosen = ["--observation", "ants_seen", "--learner", "dyna_q"]
-    chosen += ["--hyperparameter", "planning_steps=2"]
+    chosen = ["--task.observation", "ants_seen", "--training.learner", "dyna_q"]
+    chosen += ["--training.planning-steps", "2"]
     length = ["--ticks", "5"] if shown == "colony" else []
     settings = render.parse_arguments([shown, *more, *chosen, *length])
     assert render.training_config(settings).planning_steps == 2
@@ -183,8 +183,8 @@ WRONG = {
     "policy and learning": (["learning", "--policy", "a.npz"], "--policy"),
     "episodes of learning": (["learning", "--episodes", "500"], "--episodes"),
     "world seed of the paper": (
-        ["episode", "--world-seed", "3"],
-        "--world-seed is for a world drawn at random",
+        ["episode", "--world.seed", "3"],
+        "--world.seed is for a world drawn at random",
     ),
     "ants of an episode": (["episode", "--ants", "80"], "--ants"),
     "plain learning": (["learning", "--plain"], "--plain"),
@@ -193,7 +193,7 @@ WRONG = {
         ["episode", "--policy", "{policy}", "--epsilon", "2", "--out", "{}/a.gif"],
         "epsilon",
     ),
-    "learner": (["episode", "--learner", "magic", "--out", "{}/a.gif"], "magic"),
+    "learner": (["episode", "--training.learner", "magic", "--out", "{}/a.gif"], "magic"),
     "stages": (["learning", "--stages", "5", "1", "--out", "{}/a.gif"], "ascend"),
     "order of stages": (
         ["learning", "--stages", "5", "2", "--out", "{}/a.gif"],
@@ -201,20 +201,26 @@ WRONG = {
     ),
     "steps": (["episode", "--max-steps", "0"], "from 1 to"),
     "training of a policy": (["sheet", "--policy", "a.npz", "--episodes", "5"], "--episodes is of"),
-    "learner of a policy": (["colony", "--learner=sarsa", "--policy", "a.npz"], "--learner is of"),
+    "learner of a policy": (
+        ["colony", "--training.learner=sarsa", "--policy", "a.npz"],
+        "--training.learner is of",
+    ),
     "observation of a policy": (
-        ["episode", "--policy", "a.npz", "--observation", "paper"],
-        "--observation is of training",
+        ["episode", "--policy", "a.npz", "--task.observation", "paper"],
+        "--task.observation is of training",
     ),
     "view of a plain picture": (
         ["colony", "--plain", "--follow", "0"],
         "--plain leaves out what --follow shows",
     ),
     "title of a plain picture": (["episode", "--plain", "--title", "a"], "what --title shows"),
-    "hyperparameter": (["sheet", "--hyperparameter", "x=y", "--out", "{}/a.png"], "'x=y' is no"),
+    "wrong number": (
+        ["sheet", "--training.discount", "y", "--out", "{}/a.png"],
+        "is 'y'; it must be",
+    ),
     "hyperparameter of another": (
-        ["episode", "--hyperparameter", "n_steps=2", "--out", "{}/a.gif"],
-        "'n_steps' is no hyperparameter of learner 'sarsa'",
+        ["episode", "--training.n-steps", "2", "--out", "{}/a.gif"],
+        "`training.n_steps` is not a setting of sarsa",
     ),
     "unknown option": (["episode", "--colour", "red"], "--colour"),
 }
@@ -292,7 +298,7 @@ def test_the_command_names_itself_as_it_is_called(capsys, monkeypatch) -> None:
     with pytest.raises(SystemExit):
         commands.main()
     shown = capsys.readouterr().out
-    assert shown.startswith("usage: taichi-ants render colony [-h]")
+    assert shown.startswith("usage: taichi-ants render colony [options]")
     assert "Example: taichi-ants render colony --ants 200 --out ants.gif" in shown
 
 
@@ -302,7 +308,7 @@ def test_help_is_quick_and_needs_little() -> None:
         began = time.perf_counter()
         done = run(kind, "--help")
         took.append(time.perf_counter() - began)
-        assert "--learner" in done.stdout
+        assert "--training.learner" in done.stdout
         example = re.search(r"Example: render.py (.*)", done.stdout)[1].split()
         assert render.parse_arguments(example).kind == kind
     assert min(took) < 1.0

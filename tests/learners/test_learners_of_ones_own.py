@@ -2,6 +2,7 @@
 
 import runpy
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 import pytest
@@ -20,9 +21,9 @@ from taichi_ants import (
 from taichi_ants.engines import trial
 from taichi_ants.learners import (
     Hyperparameters,
+    Is,
     Learner,
     Memory,
-    number,
     register,
     registry,
     td_learner,
@@ -314,7 +315,7 @@ def test_td_errors_that_are_refused_at_once(td_error, says):
 
 @dataclass(frozen=True)
 class Momentum(Hyperparameters):
-    momentum: float = number(0.5, 0, 1)
+    momentum: Annotated[float, Is("share of the last error", least=0, most=1)] = 0.5
 
 
 @ti.func
@@ -410,7 +411,7 @@ def test_memories_that_are_not_ones_own_are_refused(function, says):
 
 @dataclass(frozen=True)
 class Clashing(Hyperparameters):
-    discount: float = number(0.5, 0, 1)
+    discount: Annotated[float, Is(least=0, most=1)] = 0.5
 
 
 @dataclass(frozen=True)
@@ -420,7 +421,7 @@ class OfText(Hyperparameters):
 
 @dataclass(frozen=True)
 class OutOfRange(Hyperparameters):
-    depth: int = number(3, 1, 2)
+    depth: Annotated[int, Is(least=1, most=2)] = 3
 
 
 FAILS = "learner 'mine' cannot be used: "
@@ -434,8 +435,14 @@ FAILS = "learner 'mine' cannot be used: "
         ({"learn": plain_function}, "the function learn of 'mine' is no Taichi function"),
         ({"plans": True, "td_error": natural_sarsa}, "the TD error of 'mine' looks at next_action"),
         ({"hyperparameters": Clashing}, "'discount' is a setting of all learners"),
-        ({"hyperparameters": OfText}, f"{FAILS}hyperparameters fails (kind is no number; make"),
-        ({"hyperparameters": OutOfRange}, f"{FAILS}hyperparameters fails (depth is 3; it must lie"),
+        (
+            {"hyperparameters": OfText},
+            f"{FAILS}hyperparameters fails (the field kind has the type ",
+        ),
+        (
+            {"hyperparameters": OutOfRange},
+            f"{FAILS}hyperparameters fails (`training.depth` is 3; it must be",
+        ),
         ({"hyperparameters": 5}, f"{FAILS}hyperparameters fails"),
         ({"memory": lambda settings, n: None}, f"{FAILS}memory fails (what it gives is None; it"),
         ({"memory": lambda settings, n: Memory(floats=-3)}, f"{FAILS}memory fails (floats of a "),

@@ -305,13 +305,13 @@ def test_fields_and_sliders_are_those_of_the_session_that_comes_back(page, room)
     page.tab.select_option("#policy", "file mine")
     page.click("#begin")
     wait(page, "byId('now-chosen').textContent.endsWith('mine')")
-    assert page.tab.is_disabled("#sees")
+    assert page.tab.is_disabled('[data-path="task.observation"]')
     page.click("#go-back")
     wait(page, "byId('policy').value.startsWith('learn ')")
-    assert page.tab.is_enabled("#sees")
+    assert page.tab.is_enabled('[data-path="task.observation"]')
     page.click("#go-back")
     wait(page, "byId('policy').value === 'file mine'")
-    assert page.tab.is_disabled("#sees")
+    assert page.tab.is_disabled('[data-path="task.observation"]')
 
 
 def test_what_is_in_sight_stays_there_when_a_change_is_undone(page, room):
@@ -385,8 +385,8 @@ def test_a_new_session_is_what_was_chosen(page, room):
     page.tab.fill("#world-seed", "4")
     page.tab.fill("#size", "25")
     page.tab.select_option("#task", "foraging")
-    page.tab.click("#rules-box summary")
-    page.tab.check('#rules [value="births"]')
+    page.tab.click("#settings-box summary")
+    page.tab.check('[data-path="task.life.births"]')
     page.tab.fill("#ants", "30")
     page.tab.fill("#episode", "0")
     page.tab.fill("#seed", "9")
@@ -402,10 +402,10 @@ def test_a_new_session_is_what_was_chosen(page, room):
     assert page.text("#now-chosen") == "three far piles · foraging · Expected SARSA"
     open_new(page)
     assert page.text("#policy-help") == f"They learn: {EXPECTED_SARSA.summary}."
-    page.tab.uncheck('#rules [value="right_of_way"]')
-    assert page.tab.input_value("#task") == ""  # single rules
+    page.tab.uncheck('[data-path="task.traffic.swap"]')
+    assert page.tab.input_value("#task") == ""  # other settings
     page.tab.select_option("#policy", "file mine")
-    assert page.tab.is_disabled("#sees")
+    assert page.tab.is_disabled('[data-path="task.observation"]')
     assert page.text("#policy-help") == "They follow mine, and do not learn."
     page.tab.select_option("#world-name", "map")
     page.tab.fill("#ants", "3")
@@ -431,8 +431,8 @@ def test_who_fills_the_form_goes_on_while_others_begin_a_session(page, room):
     open_new(page)
     page.tab.select_option("#world-name", "open")
     page.tab.fill("#size", "33")
-    page.tab.click("#rules-box summary")
-    page.tab.check('#rules [value="births"]')
+    page.tab.click("#settings-box summary")
+    page.tab.check('[data-path="task.life.births"]')
     with Guest(room) as other:
         other.ask("begin", chosen={**CHOSEN, "ants": 7})
         other.until("whole")
@@ -440,7 +440,7 @@ def test_who_fills_the_form_goes_on_while_others_begin_a_session(page, room):
     assert page.text("#now-chosen").startswith("the paper")
     assert page.tab.input_value("#world-name") == "open"
     assert page.tab.input_value("#size") == "33"
-    assert page.tab.is_checked('#rules [value="births"]')
+    assert page.tab.is_checked('[data-path="task.life.births"]')
     page.click("#begin")
     wait(page, "viewer.history.grid.ranges[0] === 33")
     assert room.session.setup.task.life.births

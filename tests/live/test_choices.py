@@ -1,42 +1,53 @@
-"""What pages can choose from: the rules make the tasks that have names."""
+"""The form of a new session has every setting, and makes the tasks that have names."""
 
 from __future__ import annotations
 
 import re
-from itertools import combinations
 
 import pytest
 from command_lines import ROOT
 
-from taichi_ants import task
+from taichi_ants import TrainingConfig
 from taichi_ants.commands import watch
-from taichi_ants.live.choices import LIFE, RULES, TASKS, Choices, rules_of, task_of
+from taichi_ants.live.choices import TASKS, Choices, fields
+from taichi_ants.settings import all_of
+from taichi_ants.task import Task
+from taichi_ants.worlds import double_bridge
 
 
 @pytest.mark.parametrize("name", TASKS)
-def test_rules_make_the_tasks_that_have_names(name):
-    rules = getattr(task, name)()
-    assert TASKS[name][1] == rules
-    assert task_of(rules_of(rules), rules.observation) == rules
+def test_the_form_makes_the_tasks_that_have_names(name):
+    settings = Choices({}).as_dict()["tasks"][name]["settings"]
+    setup = Choices({}).setup({**watch.START, "settings": settings})
+    assert setup.task == Task.named()[name]
 
 
-def test_every_set_of_rules_is_a_task_and_each_rule_changes_it():
-    for n in range(len(RULES) + 1):
-        for chosen in combinations(RULES, n):
-            made = task_of(chosen, "paper")
-            assert task_of(rules_of(made), "paper") == made
-    for rule in RULES:
-        assert task_of([rule], "paper") != task_of([], "paper")
-    assert set(LIFE) < set(RULES)
+def test_the_form_has_every_setting_with_its_bounds():
+    offered = {one["path"]: one for one in fields()}
+    declared = [*all_of(Task), *all_of(TrainingConfig), *all_of(double_bridge)]
+    paths = {one.path for one in declared if not one.is_group} - {"training.learner"}
+    assert paths < offered.keys()
+    half_life = offered["task.pheromone.half_life"]
+    assert (half_life["above"], half_life["default"], half_life["unit"]) == (0, 50.0, "ticks")
+    assert half_life["only"] == ["task.pheromone.evaporation", "exponential"]
+    assert offered["training.planning_steps"]["learner"] != ""
+    assert offered["world.aside"]["world"] == "double_bridge"
 
 
-def test_rules_of_others_have_no_names():
-    assert rules_of(task.Task(delivery="continuing")) is None
+def test_settings_of_the_form_reach_the_session():
+    given = {"task.life.lifespan": 70, "training.epsilon": 0.5, "training.planning_steps": 2}
+    chosen = {**watch.START, "policy": "learn dyna_q", "world": "double_bridge"}
+    setup = Choices({}).setup({**chosen, "settings": {**given, "world.long": 30}})
+    assert (setup.task.life.lifespan, setup.policy.epsilon) == (70, 0.5)
+    assert (setup.policy.planning_steps, setup.world_settings) == (2, {"long": 30})
+    assert given.items() <= Choices({}).chosen(setup)["settings"].items()
 
 
 def test_what_the_command_begins_with_can_be_chosen():
     setup = Choices({}).setup(watch.START)
-    assert Choices({}).chosen(setup) == {**watch.START, "rules": rules_of(setup.task)}
+    again = Choices({}).chosen(setup)
+    assert watch.START["settings"].items() <= again.pop("settings").items()
+    assert again.items() <= watch.START.items()
     assert setup.learns
 
 

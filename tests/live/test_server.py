@@ -324,12 +324,14 @@ def test_an_edit_that_is_not_allowed_is_refused_in_one_sentence(room, edit):
         {"policy": "file /etc/passwd"},
         {"policy": "learn nothing"},
         {"policy": 7},
-        {"rules": "rising"},
-        {"rules": ["explode"]},
-        {"rules": [[]]},
-        {"rules": None},
-        {"sees": "everything"},
-        {"sees": {}},
+        {"settings": "foraging"},
+        {"settings": {"task.explode": True}},
+        {"settings": {"world.seed": 3}},
+        {"settings": {"training.planning_steps": 3}},  # of another learner
+        {"settings": {"task.pheromone.half_life": 0}},
+        {"settings": {"task.observation": "everything"}},
+        {"settings": {"task.observation": {}}},
+        {"settings": None},
         {"size": 10**6},
         {"size": [30, 30, 30]},
         {"ants": 10**6},
@@ -602,7 +604,8 @@ def test_a_file_that_would_hold_the_server_is_refused_at_once(room, name, tmp_pa
 
 def test_pages_are_answered_quickly_while_any_file_loads(room, tmp_path):
     """While processes start, worlds are built and kernels compiled; and Cancel ends all that."""
-    chosen = {**CHOSEN, "world": "open", "size": 180, "ants": 5000, "sees": "six_cells"}
+    chosen = {**CHOSEN, "world": "open", "size": 180, "ants": 5000}
+    chosen["settings"] = {"task.observation": "six_cells"}
     setup = room.choices.setup(chosen)
     log = Log(setup, ((5, {"kind": "episode"}),), 10**6, 10**6, "0", changes=(0,))
     log.write(tmp_path / "large.npz")
@@ -756,7 +759,7 @@ def test_pages_that_are_gone_are_not_counted(room):
 def test_what_the_page_would_choose_is_the_session(room):
     with Guest(room) as guest:
         for chosen in [
-            {**CHOSEN, "policy": "file mine", "rules": None, "world": "double_bridge"},
+            {**CHOSEN, "policy": "file mine", "world": "double_bridge"},
             {**CHOSEN, "policy": "by hand", "world": "far_piles", "world_seed": 4, "size": 20},
             {**CHOSEN, "world": "map", "map": "  .\n0   F\n  .\n    Q\n", "ants": 1},
             {**CHOSEN, "policy": "learn double_q", "ticks": 0},
@@ -765,7 +768,7 @@ def test_what_the_page_would_choose_is_the_session(room):
             guest.until("begin")
             guest.until("whole")
             back = guest.chosen
-            wanted = {**chosen, "rules": [] if chosen["rules"] is None else chosen["rules"]}
+            wanted = {**chosen, "settings": {**back["settings"], **chosen["settings"]}}
             if chosen["policy"] == "by hand":
                 wanted["policy"] = "file mine"  # the same values
             assert back == wanted

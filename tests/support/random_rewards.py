@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from taichi_ants.task.rewards import MOST, Rewards
+from taichi_ants.task.constants import MOST_REWARD
+from taichi_ants.task.rewards import Rewards
 
 # Tables in which something that is recognised by its reward would be mistaken.
 TELLING = (
@@ -12,13 +13,13 @@ TELLING = (
     Rewards(failed=10, empty=10, lure=10),
     Rewards(give=0),
     Rewards(lure=7, empty=-3),
-    Rewards(*[MOST] * 5),
-    Rewards(*[-MOST] * 5),
+    Rewards(*[MOST_REWARD] * 5),
+    Rewards(*[-MOST_REWARD] * 5),
 )
 
 
 def random_rewards(seed: int) -> Rewards:
     """The paper's rewards, one of those above, or any whole numbers from -1000 to 1000."""
     rng = np.random.default_rng([seed, 5])
-    drawn = Rewards(*rng.integers(-MOST, MOST + 1, 5).tolist())
+    drawn = Rewards(*rng.integers(-MOST_REWARD, MOST_REWARD + 1, 5).tolist())
     return (Rewards(), TELLING[seed % len(TELLING)], drawn)[rng.integers(3)]

@@ -22,8 +22,13 @@ SECONDS = 60.0  # until a page that hears nothing gives up
 CHOSEN: dict[str, Any] = {
     **{"world": "paper", "map": "", "world_seed": 0, "size": 30},
     **{
-        "rules": ["rising", "falls"],
-        "sees": "ants",
+        "settings": {
+            "task.observation": "ants",
+            "task.pheromone.deposit": "fading",
+            "task.pheromone.level": 500,
+            "task.pheromone.view": "strongest",
+            "task.evaporation_in_training": True,
+        },
         "policy": "learn sarsa",
         "ants": 12,
         "seed": 5,

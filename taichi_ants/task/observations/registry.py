@@ -18,8 +18,6 @@ from textwrap import dedent
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
-
 from taichi_ants.errors import AntsError, check_new_name, checked_whole, expect, shown, unusable
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN, SEES_LURE
 
@@ -150,6 +148,8 @@ def names() -> tuple[str, ...]:
 
 def _try_functions(observation: Observation) -> None:
     """Compute and name many rows, in Python: a kernel would not notice what is wrong."""
+    import numpy as np  # not above: command lines show their help without it
+
     function, last = "row", observation.n_states - 1
     try:
         (source,) = ast.parse(dedent(inspect.getsource(observation.row))).body
@@ -170,6 +170,8 @@ def _try_functions(observation: Observation) -> None:
 
 def _drawn_looks(observation: Observation) -> Iterator[SimpleNamespace]:
     """What ants could look at, in numbers of the types that kernels have."""
+    import numpy as np
+
     rng, shape = np.random.default_rng(0), (_LOOKS, len(observation.cells))
     ahead = list(observation.ahead)
     ants = rng.integers(0, 3, shape, np.int32) * (rng.random(shape) < 0.3)

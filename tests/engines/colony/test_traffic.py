@@ -21,7 +21,7 @@ from taichi_ants.task.constants import FORWARD, GIVE, OBSTACLE, PICK_UP, RIGHT
 TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 0.0, 1.0)
 BEYOND = (9, 3, 0)  # the queen at the end of the row: +1 for each step along it with food
 BEHIND = (0, 3, 0)
-RIGHT_OF_WAY, FOLLOWING = Traffic.named("right_of_way"), Traffic.named("following")
+RIGHT_OF_WAY, FOLLOWING = Traffic.named()["right_of_way"], Traffic.named()["following"]
 QUEUES_ONLY = Traffic(follow=True)
 
 

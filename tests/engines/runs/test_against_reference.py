@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from itertools import cycle
 
 import numpy as np
@@ -22,6 +21,7 @@ from taichi_ants import (
     train,
 )
 from taichi_ants.reference.ants import Event, starts
+from taichi_ants.settings import declared
 from taichi_ants.task import Life, Pheromone, Task, observations
 from taichi_ants.task.constants import DEPOSIT_LEVEL
 from taichi_ants.worlds import World, paper
@@ -46,11 +46,11 @@ def random_config(seed: int, learner: str) -> TrainingConfig:
     """A configuration with values far from each other and from round ones."""
     rng = np.random.default_rng([seed, 1])
     hyperparameters = {}
-    for field in fields(learners.get(learner).hyperparameters):
-        if field.metadata["kind"] is int:
-            hyperparameters[field.name] = int(rng.choice([1, 2, 3, 5]))
+    for one in declared(learners.get(learner).hyperparameters):
+        if one.kind is int:
+            hyperparameters[one.name] = int(rng.choice([1, 2, 3, 5]))
         else:
-            hyperparameters[field.name] = float(rng.choice([0.0, 0.1, 0.9, 1.0]))
+            hyperparameters[one.name] = float(rng.choice([0.0, 0.1, 0.9, 1.0]))
     return TrainingConfig(
         learner=learner,
         learning_rate=float(rng.choice([0.001, 0.01, 0.37, 1.0])),

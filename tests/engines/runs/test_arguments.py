@@ -8,7 +8,6 @@ import pytest
 from taichi_ants import (
     AntsError,
     Colony,
-    Life,
     Task,
     TrainingConfig,
     continue_training,
@@ -51,14 +50,17 @@ def with_more(learner, **more):
         ("q_learning", "configs is 'q_learning'"),
         ([CONFIG, None], "a configuration is None"),
         (TrainingConfig("td_zero", 0.1, 0.9, 0.3, 0.99), "there is no learner 'td_zero'"),
-        (with_more("dyna_q", planning_steps=0), "planning_steps is 0; it must lie between 1 and"),
+        (
+            with_more("dyna_q", planning_steps=0),
+            "`training.planning_steps` is 0; it must be between 1 and",
+        ),
         (
             [CONFIG, with_more("sarsa", n=7)],
-            "'n' is no hyperparameter of learner 'sarsa'; it has none",
+            "`training.n` is not a setting of sarsa",
         ),
         (
             with_more("sarsa_lambda", trace_decay=1.5),
-            "trace_decay is 1.5; it must lie between 0 and 1",
+            "`training.trace_decay` is 1.5; it must be between 0 and 1",
         ),
     ],
 )
@@ -153,11 +155,8 @@ def test_counts_of_any_kind_of_integer():
 
 @pytest.mark.parametrize("value", ["none", "off", 0, 1, None, 0.5, [True]])
 def test_flags(value):
-    """Text such as "none" would turn evaporation on."""
+    """Text such as "none" would count as True."""
     text = f"is {value!r}; it must be True or False"
-    for name in ("evaporation_in_training", "evaporation_in_evaluation"):
-        says(f"{name} {text}", Task, **{name: value})
-    says(f"births {text}", Life, births=value)
     says(f"ends_at_delivery {text}", Colony, paper(), None, CONFIG, ends_at_delivery=value)
     says(f"plain is {value!r}", Scene, paper().grid, plain=value)
 

@@ -90,7 +90,7 @@ def test_damaged_arrays(stored, tmp_path, name, value, said):
         ({"seeds": [1]}, ""),
         ({"seeds": [1, 1, 2]}, "more than once"),
         ({"max_steps": 0}, "max_steps is 0"),
-        ({"task": {"delivery": "never"}}, "delivery is 'never'"),
+        ({"task": {"delivery": "never"}}, "`task.delivery` is 'never'"),
         ({"task": {"observation": "paper"}}, "of shape (2, 3, 1, 128, 8)"),
         ({"world": {"ranges": [0, 1, 2], "queen": [0, 0, 0]}}, "ranges are"),
         ({"world": None}, ""),

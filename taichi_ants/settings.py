@@ -1,0 +1,473 @@
+"""Settings, declared once.
+
+A class of settings is a frozen dataclass whose fields carry range, unit, condition and help as
+`Annotated[type, Is(...)]`. Checks, keys of sweep files, command-line options, controls of pages and
+the tables of the documentation are all made from these declarations.
+
+    @dataclass(frozen=True)
+    class Pheromone(Settings, path="task.pheromone"):
+        evaporation: Annotated[Literal["linear", "exponential"], Is("how ...")] = "linear"
+        half_life: Annotated[
+            float | None,
+            Is("time in which a trail halves", unit="ticks", above=0, usual=50.0,
+               only=("evaporation", "exponential")),
+        ] = None
+
+    >>> Pheromone("exponential", half_life=0)
+    AntsError: `task.pheromone.half_life` is 0; it must be above 0.
+
+Nothing here needs NumPy, so that command lines show their help quickly.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import operator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import MISSING, dataclass, fields, replace
+from functools import wraps
+from inspect import signature
+from numbers import Real
+from types import NoneType, UnionType
+from typing import (
+    Annotated,
+    Any,
+    ClassVar,
+    Literal,
+    NamedTuple,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
+
+from taichi_ants.errors import AntsError, entries_of, is_flag, shown
+
+Self = TypeVar("Self", bound="Settings")
+Function = TypeVar("Function", bound=Callable[..., Any])
+_KINDS: dict[type, str] = {
+    **{bool: "True or False", int: "a whole number", float: "a number"},
+    list: "a list of numbers",
+}
+
+
+@dataclass(frozen=True)
+class Is:
+    """What holds for a setting besides its type.
+
+    Several of them in one annotation add up: `Ticks = Annotated[int, Is(unit="ticks", least=1)]`.
+
+    Attributes:
+        help: A phrase or sentence that says what the setting does.
+        unit: Of the number, such as "ticks".
+        least, most: Bounds that are allowed themselves.
+        above: A bound that is not.
+        only: The name of another setting of the class, and the values of it with which this one
+            means something; with others it has its default.
+        usual: The value it takes where it means something and is None.
+        choices: Return the words that are allowed, for those that can be registered.
+    """
+
+    help: str = ""
+    unit: str = ""
+    least: float | None = None
+    most: float | None = None
+    above: float | None = None
+    only: tuple[Any, ...] | None = None
+    usual: Any = None
+    choices: Callable[[], tuple[str, ...]] | None = None
+
+    def but(self, other: Is) -> Is:
+        """Both, of which `other` counts where it says something."""
+        given = {one.name: getattr(other, one.name) for one in fields(other)}
+        usual = vars(Is())
+        return replace(self, **{k: v for k, v in given.items() if v is not usual[k] and v != ""})
+
+
+class Setting(NamedTuple):
+    """One setting as it was declared.
+
+    Attributes:
+        name: Of the field.
+        path: The full name, as sweep files have it, such as "task.pheromone.half_life".
+        kind: bool, int, float, str, list, or a class of settings.
+        words: The words that are allowed, where they are fixed.
+        optional: Whether it may be None.
+        default: As in the class; MISSING if it has none.
+        rule: All that was said of it.
+    """
+
+    name: str
+    path: str
+    kind: type
+    words: tuple[str, ...]
+    optional: bool
+    default: Any
+    rule: Is
+
+    @property
+    def is_group(self) -> bool:
+        """Whether it is a class of settings itself."""
+        return issubclass(self.kind, Settings)
+
+    @property
+    def has_names(self) -> bool:
+        """Whether it is a class of settings of which some values have names."""
+        return self.is_group and bool(self.kind.named())  # type: ignore[attr-defined]
+
+    @property
+    def allowed(self) -> str:
+        """The values that are allowed, as messages and tables name them."""
+        return self._kind_in_words + (f" {self._range}" if self._range else "")
+
+    def about(self, value: Any) -> str:
+        """The help of a command-line option for this setting with the default `value`."""
+        words = self.allowed_words or (self.is_group and self.kind.named())  # type: ignore[attr-defined]
+        allowed = ", ".join(words) if words else self._range
+        parts = [self.rule.help, *([f"in {self.rule.unit}"] if self.rule.unit else [])]
+        parts = [", ".join(parts), *([allowed] if allowed else [])]
+        if self.rule.only is not None:
+            other, *values = self.rule.only
+            parts.append(f"only with {other} {' or '.join(str(one).lower() for one in values)}")
+        usual = self.rule.usual if value is None else value
+        given = "" if usual in (None, MISSING) or self.is_group else f" (default: {usual})"
+        return "; ".join(parts) + (given.lower() if self.kind is bool else given)
+
+    def checked(self, value: Any) -> Any:
+        """A value as a Python object of the setting's kind.
+
+        Raises:
+            AntsError: The value is not allowed; names the setting by its path.
+        """
+        if self.optional and (value is None or (value == "none" and self.kind is not str)):
+            return None  # files and command lines have no None, so they write "none"
+        found = self._converted(value)
+        if found is None:
+            self._refuse(value, self.allowed)
+        if self.kind in (int, float) and not self._in_range(found):
+            self._refuse(value, self._range)
+        return found
+
+    def _converted(self, value: Any) -> Any:
+        """The value as one of the kind; None if it is of another one."""
+        flag = is_flag(value)
+        if self.kind is bool:
+            return bool(value) if flag else None
+        if self.kind is int:
+            try:
+                return None if flag else operator.index(value)
+            except TypeError:
+                return None
+        if self.kind is float:
+            if flag or not isinstance(value, Real):
+                return None
+            try:
+                return float(value) if math.isfinite(value) else None
+            except OverflowError:  # an integer beyond all floats
+                return None
+        if self.kind is str:
+            allowed = self.allowed_words
+            fits = isinstance(value, str) and (not allowed or value in allowed)
+            return value if fits else None
+        if self.kind is list:  # what it must hold is checked where it is used
+            return entries_of(value)
+        if issubclass(self.kind, Settings) and isinstance(value, str):
+            value = self.kind.named().get(value)
+        return value if isinstance(value, self.kind) else None
+
+    def _in_range(self, value: float) -> bool:
+        rule = self.rule
+        return (
+            (rule.least is None or value >= rule.least)
+            and (rule.most is None or value <= rule.most)
+            and (rule.above is None or value > rule.above)
+        )
+
+    def _refuse(self, value: Any, allowed: str) -> None:
+        or_none = ", or None" if self.optional and self.rule.only is None else ""
+        raise AntsError(f"`{self.path}` is {shown(value)}; it must be {allowed}{or_none}.")
+
+    @property
+    def allowed_words(self) -> tuple[str, ...]:
+        """The words of which one has to be given; empty where others are allowed, too."""
+        return self.rule.choices() if self.rule.choices else self.words
+
+    @property
+    def _kind_in_words(self) -> str:
+        if self.kind is str:
+            return f"one of {', '.join(self.allowed_words)}" if self.allowed_words else "text"
+        if self.is_group:
+            words = ", ".join(self.kind.named())  # type: ignore[attr-defined]
+            return f"a {self.kind.__name__}" + (f", or one of {words}" if words else "")
+        return _KINDS[self.kind]
+
+    @property
+    def _range(self) -> str:
+        rule = self.rule
+        if rule.above is not None:
+            upper = "" if rule.most is None else f" and at most {_plain(rule.most)}"
+            return f"above {_plain(rule.above)}{upper}"
+        if rule.least is not None and rule.most is not None:
+            return f"between {_plain(rule.least)} and {_plain(rule.most)}"
+        if rule.least is not None:
+            return f"at least {_plain(rule.least)}"
+        return "" if rule.most is None else f"at most {_plain(rule.most)}"
+
+
+class Settings:
+    """Base of the classes of settings, which are frozen dataclasses.
+
+    `path` is the full name of the settings, as in sweep files; messages name a setting by it.
+    A class whose common values have names returns them from `named`; a name is then taken for the
+    value wherever the class is a setting of another one.
+    """
+
+    path: ClassVar[str] = ""
+
+    def __init_subclass__(cls, path: str = "", **more: Any) -> None:
+        super().__init_subclass__(**more)
+        cls.path = path or cls.path
+
+    def __post_init__(self) -> None:
+        self.check()
+
+    @classmethod
+    def named(cls) -> Mapping[str, Any]:
+        """The values of this class that have names."""
+        return {}
+
+    def check(self) -> None:
+        """Take each value as one of its kind.
+
+        Raises:
+            AntsError: A value is not allowed, or would change nothing.
+        """
+        for one in declared(type(self)):
+            object.__setattr__(self, one.name, one.checked(getattr(self, one.name)))
+        for one in declared(type(self)):
+            if one.rule.only is not None:
+                self._settle(one)
+
+    def _settle(self, one: Setting) -> None:
+        """Refuse a setting that would change nothing; give it its usual value where it counts."""
+        assert one.rule.only is not None
+        other, *values = one.rule.only
+        value = getattr(self, one.name)
+        if getattr(self, other) in values:
+            if value is None and one.rule.usual is not None:
+                object.__setattr__(self, one.name, one.rule.usual)
+        elif value != one.default:
+            raise AntsError(
+                f"`{one.path}` is {shown(value)}; leave it out unless `{other}` is "
+                f"{' or '.join(map(repr, values))}."
+            )
+
+    def but(self: Self, **changes: Any) -> Self:
+        """The same with some changes; settings that mean nothing any more have their defaults.
+
+        A group can be changed by a mapping of its own settings, in which "" is the name of the
+        value to start from.
+
+        Raises:
+            AntsError: As for the class, or there is no such setting.
+        """
+        return self._changed(changes)
+
+    def _changed(self: Self, changes: Mapping[str, Any]) -> Self:
+        known = {one.name: one for one in declared(type(self))}
+        made: dict[str, Any] = {}
+        for name, value in changes.items():
+            if name not in known:
+                raise AntsError(f"`{_below(self.path, name)}` {not_a_setting(name, known)}")
+            one = known[name]
+            if one.is_group and isinstance(value, Mapping):
+                inner = dict(value)
+                start = one.checked(inner.pop("")) if "" in inner else getattr(self, name)
+                value = start._changed(inner)
+            made[name] = value
+        for one in known.values():
+            if one.rule.only and one.name not in made:
+                other, *values = one.rule.only
+                if made.get(other, getattr(self, other)) not in values:
+                    made[one.name] = one.default
+        return replace(self, **made)  # type: ignore[type-var]
+
+    @classmethod
+    def from_dict(cls: type[Self], facts: Any) -> Self:
+        """The settings of a mapping of names to values, with groups as mappings or names.
+
+        Raises:
+            AntsError: A value is not allowed, or there is no such setting.
+        """
+        if not isinstance(facts, Mapping):
+            raise AntsError(f"`{cls.path}` is {shown(facts)}; it must be a table of settings.")
+        return cls()._changed(facts)
+
+
+_DECLARED: dict[Any, tuple[Setting, ...]] = {}
+
+
+def declared(cls: Any) -> tuple[Setting, ...]:
+    """The settings of a class, in the order of its fields, or of a function's arguments.
+
+    Fields and arguments that are not declared with an `Is` are left out.
+    """
+    if cls not in _DECLARED:
+        _DECLARED[cls] = tuple(_read(cls))
+    return _DECLARED[cls]
+
+
+def _read(cls: Any) -> Iterator[Setting]:
+    hints = get_type_hints(cls, include_extras=True)
+    for name, default in _defaults(cls):
+        hint = hints.get(name)
+        if get_origin(hint) is not Annotated:
+            continue
+        kind, *rules = get_args(hint)
+        rule = Is()
+        for more in rules:
+            rule = rule.but(more)
+        kind, words, optional = _kind_of(kind)
+        path = _below(getattr(cls, "path", "world"), name)  # functions make worlds
+        yield Setting(name, path, kind, words, optional, default, rule)
+
+
+def _defaults(cls: Any) -> Iterator[tuple[str, Any]]:
+    """The fields of a class or the arguments of a function, with their defaults or MISSING."""
+    if isinstance(cls, type):
+        for one in fields(cls):
+            usual = one.default if one.default_factory is MISSING else one.default_factory()
+            yield one.name, usual
+    else:
+        for name, argument in signature(cls).parameters.items():
+            yield name, MISSING if argument.default is argument.empty else argument.default
+
+
+def setting(cls: Any, name: str) -> Setting:
+    """One setting of a class, for arguments of functions that are the same."""
+    return next(one for one in declared(cls) if one.name == name)
+
+
+def checked(function: Function) -> Function:
+    """Check the arguments of a function that are declared, whenever it is called: a decorator.
+
+    The function makes a world, so that messages name its arguments `world.NAME`.
+    """
+    form = signature(function)
+
+    @wraps(function)
+    def calls(*positional: Any, **named: Any) -> Any:
+        given = form.bind(*positional, **named).arguments
+        given |= {
+            one.name: one.checked(given[one.name])
+            for one in declared(function)
+            if one.name in given
+        }
+        return function(**given)
+
+    return calls  # type: ignore[return-value]
+
+
+def all_of(cls: Any) -> Iterator[Setting]:
+    """The settings of a class and of its groups, those of a group behind it."""
+    for one in declared(cls):
+        yield one
+        if one.is_group:
+            yield from all_of(one.kind)
+
+
+def table(cls: Any) -> str:
+    """The settings of a class as a table in Markdown, for the documentation."""
+    rows = ["| Setting | Values | Default | Meaning |", "|---|---|---|---|"]
+    for one in all_of(cls):
+        if not one.is_group:
+            unit = f", in {one.rule.unit}" if one.rule.unit else ""
+            rows.append(
+                f"| `{one.path}` | {one.allowed}{unit} | {_default(one)} | {_meaning(one)} |"
+            )
+    return "\n".join(rows)
+
+
+def _default(one: Setting) -> str:
+    if one.default is MISSING:
+        return "none"
+    if one.rule.usual is not None:
+        return f"`{one.rule.usual!r}`"
+    return f"`{one.default!r}`"
+
+
+def _meaning(one: Setting) -> str:
+    if one.rule.only is None:
+        return one.rule.help
+    other, *values = one.rule.only
+    return f"{one.rule.help}; only with `{other}` {' or '.join(map(repr, values))}"
+
+
+def not_a_setting(name: object, known: Iterable[str], group: str = "") -> str:
+    """The end of a message about a name that does not exist, with the names that are near it."""
+    several = list(known)
+    # Names of some length are alike by chance.
+    near = difflib.get_close_matches(str(name), several, 3, 0.6 if len(str(name)) < 9 else 0.75)
+    near = near or several
+    of = f" of {group}" if group else ""
+    if not near:
+        return f"is not a setting{of}, which has none; leave it out."
+    choice = " or ".join(near) if len(near) <= 2 else f"one of {', '.join(near)}"
+    return f"is not a setting{of}; choose {choice}."
+
+
+def flat(tree: Mapping[str, Any], before: str = "") -> dict[str, Any]:
+    """Mappings in mappings as settings by their full names; `before` stands before all."""
+    named: dict[str, Any] = {}
+    for name, value in tree.items():
+        path = _below(before, name)
+        named |= flat(value, path) if isinstance(value, Mapping) else {path: value}
+    return named
+
+
+def nested(named: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings by their full names as mappings in mappings, as `Settings.but` takes them.
+
+    {"task.traffic": "following", "task.traffic.grant": False} becomes
+    {"task": {"traffic": {"": "following", "grant": False}}}.
+    """
+    tree: dict[str, Any] = {}
+    for path, value in named.items():
+        *outer, last = path.split(".")
+        branch = tree
+        for part in outer:
+            inner = branch.setdefault(part, {})
+            if not isinstance(inner, dict):
+                inner = branch[part] = {"": inner}
+            branch = inner
+        if isinstance(branch.get(last), dict):
+            branch[last][""] = value
+        else:
+            branch[last] = value
+    return tree
+
+
+def _kind_of(hint: Any) -> tuple[type, tuple[str, ...], bool]:
+    """The kind, its words, and whether it may be None."""
+    optional = False
+    if get_origin(hint) in (Union, UnionType):
+        (hint,) = [one for one in get_args(hint) if one is not NoneType]
+        optional = True
+    if get_origin(hint) is Literal:
+        return str, get_args(hint), optional
+    if get_origin(hint) is Sequence:
+        return list, (), optional
+    return hint, (), optional
+
+
+def _below(path: str, name: object) -> str:
+    return f"{path}.{name}" if path else str(name)
+
+
+def _plain(bound: float) -> str:
+    """A bound as people write it: 1 000 000."""
+    if isinstance(bound, int) and abs(bound) >= 10_000:
+        return f"{bound:_}".replace("_", " ")
+    return f"{bound:g}"

@@ -1,0 +1,141 @@
+"""Settings as they are declared: what is taken, what is refused, and in which words."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import MISSING, dataclass, replace
+from decimal import Decimal
+from fractions import Fraction
+from operator import attrgetter
+from typing import Annotated, Literal
+
+import numpy as np
+import pytest
+from command_lines import ROOT
+
+from taichi_ants import AntsError, TrainingConfig, learners
+from taichi_ants.settings import Is, Setting, Settings, all_of, declared, table
+from taichi_ants.task import Pheromone, Task, Traffic
+from taichi_ants.worlds import double_bridge, open_world
+
+KINDS = (Task, TrainingConfig, open_world, double_bridge)
+EVERY = {
+    one.path: one
+    for kind in (*KINDS, *(learners.get(n).hyperparameters for n in learners.names()))
+    for one in all_of(kind)
+}
+WRONG = {
+    bool: [1, 0, "off", None],
+    int: [True, np.True_, 2.0, "3", [4], 1j, Decimal(5)],
+    float: [True, np.True_, "0.5", [0.5], 1j, math.nan, math.inf, -math.inf, 10**400, Decimal(1)],
+    str: ["no such word", 5, ["set"], {}],
+    list: [3, "3", 0.5],
+}
+
+
+def wrong_values(one: Setting) -> list:
+    """Values that are not allowed."""
+    if one.is_group:
+        return ["no such name", 3, {}]
+    rule, wrong = one.rule, list(WRONG[one.kind])
+    beyond = 1 if one.kind is int else 1e-9
+    if rule.least is not None:
+        wrong += [rule.least - beyond if rule.least != 1e-37 else 9e-38]
+    if rule.most is not None:
+        wrong += [rule.most + max(beyond, rule.most * 1e-9)]
+    if rule.above is not None:
+        wrong += [rule.above]
+    return wrong if one.optional else [*wrong, None]
+
+
+@pytest.mark.parametrize(
+    "one", [one for one in EVERY.values() if one.path != "training.learner"], ids=attrgetter("path")
+)
+def test_a_wrong_value_is_named_with_what_is_allowed(one):
+    for value in wrong_values(one):
+        with pytest.raises(AntsError) as caught:
+            one.checked(value)
+        message = str(caught.value)
+        assert re.fullmatch(rf"`{re.escape(one.path)}` is .+; it must be .+\.", message), message
+
+
+@pytest.mark.parametrize("one", EVERY.values(), ids=attrgetter("path"))
+def test_defaults_and_bounds_are_allowed_and_plain(one):
+    """NumPy's numbers are taken, and kept as Python's, so that equal settings are equal."""
+    rule = one.rule
+    for value in (one.default, rule.least, rule.most, rule.usual):
+        if value not in (None, MISSING):
+            assert type(one.checked(value)) is one.kind
+    if one.kind is float and rule.least == 0:
+        for value in (Fraction(1, 2), np.float32(0.5), 0, np.int8(0)):
+            assert type(one.checked(value)) is float
+    if one.kind is bool:
+        assert one.checked(np.True_) is True
+    assert one.rule.help
+    assert not one.rule.help.endswith(".")
+
+
+@dataclass(frozen=True)
+class Soup(Settings, path="kitchen.soup"):
+    """Settings of a test."""
+
+    kind: Annotated[Literal["thin", "thick"], Is("how thick it is")] = "thin"
+    flour: Annotated[
+        float | None, Is("of flour", unit="g", above=0, usual=20.0, only=("kind", "thick"))
+    ] = None
+    salt: Annotated[int, Is("of salt", unit="g", least=0, most=20_000), Is(most=50_000)] = 3
+    note: str = ""  # not a setting
+
+
+def refused(make) -> str:
+    with pytest.raises(AntsError) as caught:
+        make()
+    return str(caught.value)
+
+
+def test_sentences():
+    assert refused(lambda: Soup("thick", 0)) == "`kitchen.soup.flour` is 0; it must be above 0."
+    says = "`kitchen.soup.salt` is 60000; it must be between 0 and 50 000."
+    assert refused(lambda: Soup(salt=60_000)) == says
+    says = "`kitchen.soup.salt` is '3'; it must be a whole number between 0 and 50 000."
+    assert refused(lambda: Soup(salt="3")) == says
+    says = "`kitchen.soup.kind` is 'thik'; it must be one of thin, thick."
+    assert refused(lambda: Soup("thik")) == says
+    says = "`kitchen.soup.flour` is 5.0; leave it out unless `kind` is 'thick'."
+    assert refused(lambda: Soup(flour=5)) == says
+    says = "`kitchen.soup.flower` is not a setting; choose flour."
+    assert refused(lambda: Soup.from_dict({"flower": 5})) == says
+    assert refused(lambda: Soup.from_dict(3)).startswith("`kitchen.soup` is 3; it must be a table")
+
+
+def test_what_depends_on_another_setting():
+    assert Soup("thick").flour == 20
+    assert replace(Soup("thick", 7), salt=5) == Soup("thick", 7, 5)
+    assert Soup("thick", 7).but(kind="thin") == Soup()
+    assert refused(lambda: replace(Soup("thick"), kind="thin")).endswith(
+        "unless `kind` is 'thick'."
+    )
+
+
+def test_the_rules_of_a_task_that_depend_on_each_other():
+    for make in (
+        lambda: Pheromone(half_life=10),
+        lambda: Pheromone("none", half_life=10),
+        lambda: Pheromone(cap=10),
+        lambda: Pheromone(slope=10),
+        lambda: Pheromone(deposit="none", level=3),
+        lambda: Traffic(grant=True),
+        lambda: Traffic(carriers_first=True),
+    ):
+        assert re.fullmatch(r"`task\.\w+\.\w+` is .*; leave it out unless .*\.", refused(make))
+    assert Task(traffic="following").traffic == Traffic(True, True, True, True)
+
+
+def test_the_page_of_settings_is_made_from_the_declarations():
+    page = (ROOT / "docs" / "settings.md").read_text()
+    for kind in KINDS:
+        assert table(kind) in page
+    for name in learners.names():
+        if declared(learners.get(name).hyperparameters):
+            assert table(learners.get(name).hyperparameters) in page
