@@ -18,8 +18,9 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from taichi_ants import __version__, archives, checks, files, learners
+from taichi_ants import __version__, checks, files, learners
 from taichi_ants.errors import AntsError, check_one_of, checked_whole
+from taichi_ants.files import archives
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.blocks import Form, Outcome, kept
 from taichi_ants.studies.provenance import world_facts

@@ -119,7 +119,7 @@ def test_worlds(arguments, named, place, capsys):
 @pytest.mark.parametrize(
     ("out", "named"),
     [
-        ("file", ["'file'", "not a directory"]),
+        ("file", ["'file'", "file exists"]),
         ("file/below/it", ["'file/below/it'"]),
         ("/proc/results", ["'/proc/results'"]),
         ("x" * 300, ["too long"]),

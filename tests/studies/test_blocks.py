@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from taichi_ants import archives
+from taichi_ants.files import archives
 from taichi_ants.studies.blocks import Form, kept
 
 FORMS = {

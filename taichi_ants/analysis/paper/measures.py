@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from taichi_ants.rows import Rows
+from taichi_ants.files.rows import Rows
 
 WINDOW = 50
 # What an episode gives: its array in `RunOutcomes`, words, unit.

@@ -32,7 +32,6 @@ class Rows:
     def __init__(self, folder: Path, shape: tuple[int, ...], dtype: npt.DTypeLike) -> None:
         self.shape, self.dtype = shape, np.dtype(dtype)
         self._folder = folder
-        self._ends = np.zeros(2, np.int64)
         with files.writing(folder):
             self._file = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115
 
@@ -53,9 +52,10 @@ class Rows:
             AntsError: They cannot be written.
             ValueError: They do not fit into the type.
         """
-        self._ends = np.array([min(self._ends[0], part.min()), max(self._ends[1], part.max())])
-        if (self._ends.astype(self.dtype) != self._ends).any():
-            raise ValueError(f"numbers from {self._ends[0]} to {self._ends[1]} are no {self.dtype}")
+        if (
+            np.array([part.min(), part.max()]).astype(self.dtype) != [part.min(), part.max()]
+        ).any():
+            raise ValueError(f"numbers from {part.min()} to {part.max()} are no {self.dtype}")
         with files.writing(self._folder):
             self._file.write(np.ascontiguousarray(part, self.dtype).data)
             self._file.flush()
@@ -94,9 +94,8 @@ class Rows:
         return np.stack, ([*map(np.array, self)],)
 
     def save(self, file: IO[bytes]) -> None:
-        """Write it as an .npy, as NumPy writes `files.smallest` of such an array."""
-        dtype = files.smallest(self._ends).dtype
-        facts = {"descr": dtype.str, "fortran_order": False, "shape": self.shape}
+        """Write it as an .npy, as NumPy writes such an array."""
+        facts = {"descr": self.dtype.str, "fortran_order": False, "shape": self.shape}
         np.lib.format.write_array_header_1_0(file, facts)
         for row in self:
-            file.write(row.astype(dtype).data)
+            file.write(row.data)
