@@ -175,7 +175,8 @@ class Kind:
             kind = version = None
         if kind != self.name:
             raise AntsError(
-                f"{files.named(path)} holds no {self.name}; name a file that {self.writer} wrote."
+                f"{files.named(path)} holds no {self.name} of this version; name a file that "
+                f"{self.writer} wrote."
             )
         if version != self.version:
             raise AntsError(

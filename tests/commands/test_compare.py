@@ -27,6 +27,7 @@ from taichi_ants import (
 from taichi_ants.analysis.behaviour import DELIVERS
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.commands import compare as commands
+from taichi_ants.files import archives
 from taichi_ants.rendering import PAUSE, Episode, frames, save_animation, text
 from taichi_ants.studies import beside
 
@@ -160,8 +161,7 @@ def test_summary_lists_the_grid(finished):
 
 def test_episodes_are_what_the_library_gives_in_the_order_of_the_summary(finished):
     rows = read_csv(finished / "summary.csv")
-    with np.load(finished / "episodes.npz") as archive:
-        arrays = dict(archive)
+    arrays = archives.read(finished / "episodes.npz")
     runs = (len(rows), len(SEEDS))
     shapes = dict.fromkeys(("returns", "steps", "deliveries"), (*runs, EPISODES))
     shapes |= {f"greedy_{name}": (*runs, ROLLOUTS) for name in list(shapes)}
@@ -180,8 +180,8 @@ def test_episodes_are_what_the_library_gives_in_the_order_of_the_summary(finishe
 
 def test_summary_figures_are_those_of_the_episodes(finished):
     rows = read_csv(finished / "summary.csv")
-    with np.load(finished / "episodes.npz") as archive:
-        arrays = {name: archive[name].astype(float) for name in archive.files}
+    read = archives.read(finished / "episodes.npz")
+    arrays = {name: array.astype(float) for name, array in read.items()}
     last = {
         name: array[..., -50:].mean(axis=2) for name, array in arrays.items() if array.ndim == 3
     }

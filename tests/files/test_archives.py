@@ -234,11 +234,11 @@ def test_a_kind_of_file_holds_arrays_and_facts(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arrays", "said"),
     [
-        ({"x": 1}, "holds no thing; name a file that Thing.save wrote."),
-        ({"facts": "{}"}, "holds no thing"),
-        ({"facts": 3}, "holds no thing"),
-        ({"facts": "[" * 1000}, "holds no thing"),
-        ({"facts": '{"kind": "other", "version": 3}'}, "holds no thing"),
+        ({"x": 1}, "holds no thing of this version; name a file that Thing.save wrote."),
+        ({"facts": "{}"}, "holds no thing of this version"),
+        ({"facts": 3}, "holds no thing of this version"),
+        ({"facts": "[" * 1000}, "holds no thing of this version"),
+        ({"facts": '{"kind": "other", "version": 3}'}, "holds no thing of this version"),
         (
             {"facts": '{"kind": "thing", "version": 2}'},
             "holds a thing in version 2 of its format; only version 3 can be read, so make",

@@ -295,7 +295,7 @@ def test_metadata_that_is_no_object_is_refused(tmp_path: Path, metadata: object)
     ("arrays", "said"),
     [
         ({"q_values": random_policy(), "observation": "paper", "metadata": "{}"}, "no policy"),
-        ({"q_values": random_policy(), "facts": '{"a":' * 100_000}, "holds no policy"),
+        ({"q_values": random_policy(), "facts": '{"a":' * 100_000}, "no policy"),
         ({"facts": '{"kind": "policy", "version": 2}'}, "damaged"),
     ],
 )
