@@ -156,7 +156,7 @@ class Kind:
     ) -> None:
         """Write a file; raises as `archives.write` does."""
         text = files.to_json({"kind": self.name, "version": self.version, **facts})
-        write(path, {**arrays, "facts": np.array(text)}, compress)
+        write(path, {**arrays, "facts": np.array(text.encode())}, compress)
 
     @contextmanager
     def reading(
@@ -169,7 +169,7 @@ class Kind:
         """
         arrays = read(path, content, self.most, self.foreign)
         try:
-            facts = json.loads(str(arrays.pop("facts")))
+            facts = json.loads(arrays.pop("facts").item())  # text or its bytes
             kind, version = facts["kind"], facts["version"]
         except (KeyError, ValueError, TypeError, RecursionError):
             kind = version = None

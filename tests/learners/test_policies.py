@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 from plain_runs import rollout
 
 from taichi_ants import Colony, Life, TrainingConfig
@@ -338,33 +336,3 @@ def test_a_number_is_no_file_and_nothing_is_closed(capfd: pytest.CaptureFixture)
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(AntsError, match=r"none\.npz.*no such file"):
         load_policy(tmp_path / "none.npz")
-
-
-def outcome_of_loading(path: Path) -> tuple[np.ndarray, dict] | AntsError:
-    try:
-        return load_policy(path)
-    except AntsError as error:
-        return error
-
-
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(data=st.data())
-def test_a_damaged_file_gives_one_clear_error_or_the_same_policy(
-    tmp_path: Path, data: st.DataObject
-) -> None:
-    path = tmp_path / "policy.npz"
-    metadata = {"learner": "q_learning"}
-    save_policy(path, trail_follower(), metadata)
-    content = bytearray(path.read_bytes())
-    if data.draw(st.booleans(), label="cut"):
-        del content[data.draw(st.integers(0, len(content) - 1), label="length") :]
-    else:
-        place = data.draw(st.integers(0, len(content) - 1), label="place")
-        content[place] ^= data.draw(st.integers(1, 255), label="bits")
-    path.write_bytes(content)
-    outcome = outcome_of_loading(path)
-    if isinstance(outcome, AntsError):
-        assert str(path) in str(outcome)
-    else:
-        np.testing.assert_array_equal(outcome[0], trail_follower())
-        assert outcome[1:] == ("paper", metadata)

@@ -453,7 +453,7 @@ def test_files_that_were_altered_are_refused(edited, changes, said, tmp_path):
     path = tmp_path / "x.npz"
     edited["foraging"].save(path)
     arrays = archives.read(path)
-    facts = {**json.loads(str(arrays["facts"][()])), **changes}
+    facts = {**json.loads(arrays["facts"].item()), **changes}
     archives.write(path, {**arrays, "facts": np.array(json.dumps(facts))})
     with pytest.raises(
         AntsError, match=r"^the session in .* (is damaged|cannot be used).*\.$"

@@ -31,9 +31,9 @@ def _cells(facts: dict[str, Any]) -> str:
 # Name: its facts, from those of a session, and what the message says is allowed.
 ATTACKS: dict[str, tuple[Callable[[dict[str, Any]], str], str]] = {
     "20 000 edits": (lambda facts: _edits(facts, 20_000), "at most 10000 edits"),
-    "400 000 edits": (lambda facts: _edits(facts, 400_000), "20000000 are allowed"),
+    "400 000 edits": (lambda facts: _edits(facts, 400_000), "5000000 are allowed"),
     "edits of many cells": (_cells, "of 400000 cells are allowed"),
-    "4 000 000 lists": (lambda _: "[" + "[]," * 4_000_000 + "[]]", "20000000 are allowed"),
+    "4 000 000 lists": (lambda _: "[" + "[]," * 4_000_000 + "[]]", "5000000 are allowed"),
     "1 300 000 lists": (lambda _: "[" + "[]," * 1_300_000 + "[]]", "holds no session"),
     "deep lists": (lambda _: "[" * 60_000 + "]" * 60_000, "holds no session"),
     "a large map": (
@@ -62,6 +62,6 @@ def attack(name: str, session: Session, folder: Path) -> bytes:
     session.save(folder / "session.npz")
     arrays = archives.read(folder / "session.npz")
     facts, _ = ATTACKS[name]
-    text = facts(json.loads(str(arrays["facts"][()])))
-    archives.write(folder / "session.npz", {**arrays, "facts": np.array(text)})
+    text = facts(json.loads(arrays["facts"].item()))
+    archives.write(folder / "session.npz", {**arrays, "facts": np.array(text.encode())})
     return (folder / "session.npz").read_bytes()

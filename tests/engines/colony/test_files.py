@@ -70,7 +70,7 @@ def test_what_others_have_written_is_not_believed(kept, tmp_path) -> None:
     ],
 )
 def test_wrong_facts(kept, tmp_path, changes, said) -> None:
-    facts = {**json.loads(str(kept["facts"][()])), **changes}
+    facts = {**json.loads(kept["facts"].item()), **changes}
     assert said in refused({**kept, "facts": np.array(json.dumps(facts))}, tmp_path)
 
 
@@ -82,7 +82,7 @@ def test_wrong_facts(kept, tmp_path, changes, said) -> None:
     ],
 )
 def test_a_plugin_that_is_missing_is_asked_for(kept, tmp_path, changes, said) -> None:
-    facts = {**json.loads(str(kept["facts"][()])), **changes}
+    facts = {**json.loads(kept["facts"].item()), **changes}
     archives.write(tmp_path / "x.npz", {**kept, "facts": np.array(json.dumps(facts))})
     with pytest.raises(AntsError, match=f"{said}.*--plugin"):
         Colony.load(tmp_path / "x.npz")

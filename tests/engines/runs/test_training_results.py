@@ -103,7 +103,7 @@ def test_damaged_arrays(stored, tmp_path, name, value, said):
     ],
 )
 def test_damaged_facts(stored, tmp_path, changes, said):
-    facts = {**json.loads(str(stored["facts"][()])), **changes}
+    facts = {**json.loads(stored["facts"].item()), **changes}
     assert said in refused({**stored, "facts": np.array(json.dumps(facts))}, tmp_path)
 
 
