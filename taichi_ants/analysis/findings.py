@@ -25,7 +25,9 @@ from taichi_ants.analysis.statistics import (
 from taichi_ants.errors import count
 
 SIMULTANEOUS_LEVEL = 0.95
-LEAST_SEEDS = 10  # with fewer, the intervals of what stays open are too wide to be an answer
+# With fewer, intervals miss more often than they say, and are too wide to be an answer; see
+# docs/statistics.md.
+LEAST_SEEDS = 10
 UNBOUNDED = (-np.inf, np.inf)
 
 
@@ -184,11 +186,6 @@ def judge(contrasts: Sequence[Contrast]) -> list[Finding]:
         return Finding(contrast, verdict, effect, low, high, level, by_mean)
 
     return [finding(place, contrast.typical) for place, contrast in enumerate(contrasts)]
-
-
-def too_few(seeds: int) -> str:
-    """How an answer begins that fewer than `LEAST_SEEDS` seeds leave open; what it asks follows."""
-    return f"{count(seeds, 'seed')} {'is' if seeds == 1 else 'are'} too few to tell whether"
 
 
 def seeds_in_words(seeds: int) -> str:

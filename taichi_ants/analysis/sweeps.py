@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from taichi_ants.analysis import style
+from taichi_ants.analysis.findings import LEAST_SEEDS
 from taichi_ants.analysis.statistics import bootstrap_interval, centres
 from taichi_ants.analysis.tables import MISSING, Table, plain_text, sentence
 
@@ -18,7 +20,6 @@ if TYPE_CHECKING:
 
 Settings = Mapping[str, Any]
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")  # 7 with 10 colours: 70 lines look different
-_FEW_SEEDS = 10  # with fewer, intervals miss more often than they say, see docs/statistics.md
 _TERMINAL = 200  # columns, at most
 _WIDE = 20  # a ratio of numbers from which their axis is logarithmic
 
@@ -38,22 +39,58 @@ def seed_rows(
             yield {**one, "seed": seed, **{n: float(array[p, s]) for n, array in values.items()}}
 
 
+class Centre(NamedTuple):
+    """A measure over seeds: its mean, its IQM if it has a typical run, and 95 % intervals.
+
+    Intervals of one seed are nan.
+    """
+
+    mean: float
+    ci_low: float
+    ci_high: float
+    iqm: float | None = None
+    iqm_ci_low: float = math.nan
+    iqm_ci_high: float = math.nan
+
+    @property
+    def apart(self) -> bool:
+        """Whether the mean lies outside of the interval of the IQM."""
+        return self.mean < self.iqm_ci_low or self.mean > self.iqm_ci_high
+
+    def columns(self, name: str) -> dict[str, float]:
+        """Return the columns of a measure in a table."""
+        fields = self._fields if self.iqm is not None else self._fields[:3]
+        return {f"{name}_{field}": getattr(self, field) for field in fields}
+
+
+def centre_columns(found: Mapping[str, Centre]) -> dict[str, float]:
+    """Return the columns of several measures."""
+    return {k: v for name, one in found.items() for k, v in one.columns(name).items()}
+
+
+def centres_of(
+    values: Mapping[str, np.ndarray], typical: Sequence[str] = ()
+) -> list[dict[str, Centre]]:
+    """Return the measures of each point over its seeds, by name.
+
+    Args:
+        values: Measures by name, float64 (points, seeds).
+        typical: The measures that have an interquartile mean.
+    """
+    columns = {name: centres(array, name in typical).values() for name, array in values.items()}
+    rows = {name: np.transpose([*several]).tolist() for name, several in columns.items()}
+    points = len(next(iter(values.values())))
+    return [{name: Centre(*several[p]) for name, several in rows.items()} for p in range(points)]
+
+
 def summary_rows(
     settings: Sequence[Settings], values: Mapping[str, np.ndarray], typical: Sequence[str] = ()
 ) -> list[dict[str, Any]]:
-    """A row for each point: means over seeds with 95 % intervals, as in `statistics.centres`.
-
-    Settings and values are those of `seed_rows`; `typical` measures have an interquartile mean.
-    """
-    columns = {
-        f"{name}_{column}": numbers
-        for name, array in values.items()
-        for column, numbers in centres(array, name in typical).items()
-    }
+    """Return a row for each point: what varies, the number of seeds, and `centres_of` measures."""
     seeds = next(iter(values.values())).shape[1]
     return [
-        {**one, "seeds": seeds, **{name: float(column[p]) for name, column in columns.items()}}
-        for p, one in enumerate(settings)
+        {**one, "seeds": seeds, **centre_columns(found)}
+        for one, found in zip(settings, centres_of(values, typical), strict=True)
     ]
 
 
@@ -163,7 +200,7 @@ def _far_apart(numbers: Sequence[float]) -> bool:
 
 
 def _spread(seeds: int) -> str:
-    few = f" (too few for these: take {_FEW_SEEDS} or more)" if seeds < _FEW_SEEDS else ""
+    few = f" (too few for these: take {LEAST_SEEDS} or more)" if seeds < LEAST_SEEDS else ""
     return f"means over {seeds} seeds with 95 % intervals{few}" if seeds > 1 else "one seed"
 
 

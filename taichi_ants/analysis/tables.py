@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -14,17 +14,17 @@ if TYPE_CHECKING:
 MISSING = "-"
 
 
-def number(value: float, digits: int = 1) -> str:
-    """A number with fixed digits, "-" for nan; never "-0.0"."""
-    if math.isnan(value):
+def number(value: float | None, digits: int = 1) -> str:
+    """Return a number with fixed digits, "-" for nan and None; never "-0.0"."""
+    if value is None or math.isnan(value):
         return MISSING
     text = f"{value:.{digits}f}"
     return text.lstrip("-") if float(text) == 0 else text
 
 
-def figure(value: float) -> str:
-    """A number with about three digits, "-" where it is not finite."""
-    if not math.isfinite(value):
+def figure(value: float | None) -> str:
+    """Return a number with about three digits, "-" where it is None or not finite."""
+    if value is None or not math.isfinite(value):
         return MISSING
     whole = abs(value) >= 99.95 or value == int(value)
     return number(value, 0 if whole else 1 if abs(value) >= 9.995 else 2)
@@ -47,12 +47,6 @@ def percent(share: float) -> str:
 def thousands(number_of: int) -> str:
     """A large count as "12 800"."""
     return f"{number_of:,}".replace(",", " ")
-
-
-def joined(words: Sequence[str]) -> str:
-    """Words as "one, two and three"."""
-    *first, last = words
-    return f"{', '.join(first)} and {last}" if first else last
 
 
 def sentence(words: str) -> str:
@@ -143,9 +137,3 @@ def _drawn(table: Table) -> RichTable:
     for row in table.rows:
         drawn.add_row(*row)
     return drawn
-
-
-def baseline_name(row: Mapping) -> str:
-    """A row of baselines.csv by name, for example "optimal policy, discount 0.9"."""
-    discount = row["discount"]
-    return row["baseline"] + ("" if discount is None else f", discount {discount:g}")

@@ -240,13 +240,13 @@ def do_study(
     results = Results.of(values)
     for name, table in (
         (SEEDS, tables.rows_of_seeds(values, asked.seeds)),
-        (CONDITIONS, results.rows),
+        (CONDITIONS, [one.columns() for one in results.rows]),
         ("differences.csv", tables.difference_rows(results.judged)),
     ):
         files.write_csv(ready / name, table, list(table[0]))
-    findings = tables.found(values, results.judged)
+    findings = tables.found(*results)
     files.write_text(ready / "findings.md", markdown(findings))
-    screen = tables.on_one_screen(results.rows, results.judged, results.answer)
+    screen = tables.on_one_screen(*results)
     files.write_text(ready / REPORT, plain_text(screen, WIDTH))
     policies = files.check_writable_folder(ready / POLICIES)
     for name, q, facts, seen in median_policies(conditions, asked.seeds, values, outcomes):
@@ -271,7 +271,7 @@ def make_page(
     from taichi_ants.analysis.drawings import drawings
     from taichi_ants.files.results import MANIFEST
     from taichi_ants.report.colony import colony_page
-    from taichi_ants.report.page import made_facts
+    from taichi_ants.report.page import made_facts, setting_facts
     from taichi_ants.report.players import at_work
 
     results = results or Results.read(files.read_csv(folder / SEEDS))
@@ -279,32 +279,11 @@ def make_page(
     return colony_page(
         results.rows,
         results.judged,
-        results.answer,
         drawings=drawings(draw_all(results.rows)) if shown else [],
         players=at_work(folder / POLICIES, conditions, asked.seeds, settings.arch) if shown else [],
-        facts={**study_facts(settings), **made_facts(made)},
+        facts={**setting_facts(asked.settings()), **made_facts(made)},
         files=[path.name for path in folder.iterdir()] + [MANIFEST],
     )
-
-
-def study_facts(settings: argparse.Namespace) -> dict[str, str]:
-    """How it was done, in words."""
-    from taichi_ants.analysis.colony.study import EVALUATION_EPSILON, WORLDS
-    from taichi_ants.errors import count
-    from taichi_ants.report.page import span
-
-    ticks = count(settings.ticks, "tick")
-    return {
-        "Worlds": "; ".join(WORLDS[arena] for arena in settings.arenas),
-        "Ants": ", ".join(map(str, settings.sizes)),
-        "Learner": f"{settings.learner}, learning rate {settings.learning_rate:g}, "
-        f"discount {settings.discount:g}",
-        "Exploration rate": f"{settings.epsilon:g} at first, {EVALUATION_EPSILON:g} at the end of "
-        f"the training and in the evaluation; without exploration where that is said",
-        "Seeds": span(settings.seed, settings.seeds),
-        "Training": f"{count(settings.episodes, 'episode')} of {ticks}",
-        "Evaluation": f"{count(settings.rollouts, 'episode')} of {ticks}",
-    }
 
 
 def live(settings: argparse.Namespace) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import partial
 from importlib import import_module
@@ -32,11 +32,13 @@ if TYPE_CHECKING:
     import numpy as np
 
     from taichi_ants import World
+    from taichi_ants.analysis.bounds.baselines import Baseline
     from taichi_ants.analysis.paper.comparison import Comparison
     from taichi_ants.analysis.paper.results import Results
     from taichi_ants.rendering import Episode
     from taichi_ants.report.players import Seen
     from taichi_ants.studies.beside import Beside
+    from taichi_ants.studies.blocks import Outcome
     from taichi_ants.studies.runner import RunPoint, Study
 
 # Begins a call, and gives what waits for its end.
@@ -47,12 +49,10 @@ ROLLOUTS = 50
 QUICK_SEEDS = 10
 SIZE = 720, 480  # of animations
 MOST_SEEDS = 10_000
-EPISODES, BASELINES = "episodes.npz", "baselines.csv"
+RUNS, BASELINES = "runs.npz", "baselines.csv"
 FIGURES, POLICIES, RENDERS = "figures", "policies", "renders"
 _DEPTH = "planning_steps"  # the one hyperparameter that the paper varies
-_ARRAYS = ("returns", "steps", "deliveries", "greedy_returns", "greedy_steps", "greedy_deliveries")
-_PACKED = 0.3  # of the bytes of all episodes, those of the file with them, or a little less
-_TOLD = ("behaviours", "policy_returns")
+_CURVE = "curve_"  # begins the names of learning curves in RUNS
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -201,31 +201,19 @@ def compile_kernels(points: Sequence[RunPoint], where: Mapping[str, Any]) -> Non
 
 def measured(
     study: Study[RunPoint], folder: Path, threads: int | None, arch: str | None
-) -> dict[str, Any]:
-    """What the episodes gave, and what the final policies do, as a `Comparison` has it.
+) -> dict[str, np.ndarray]:
+    """Return all measures of the runs, and what the final policies do: arrays (points, seeds)."""
+    from taichi_ants.analysis.paper.measures import measures_of_runs
 
-    All runs together may not fit into memory: the episodes are `Rows` on the disk of the folder.
-    """
-    import numpy as np
+    def reduce(
+        points: Sequence[RunPoint], seeds: Sequence[int], outcome: Outcome
+    ) -> dict[str, np.ndarray]:
+        followed = what_policies_do(points[0], seeds, outcome["q_values"])
+        return {**measures_of_runs(outcome), **followed}
 
-    from taichi_ants.files.rows import Rows
-
-    runs, forms = (len(study.points), len(study.seeds)), study.points[0].forms
-    episodes = {n: Rows(folder, (*runs, *forms[n].shape), forms[n].bounded) for n in _ARRAYS}
-    told: dict[str, np.ndarray] = {
-        "behaviours": np.empty(runs, np.int8),
-        "policy_returns": np.empty(runs, np.int64),
-    }
     with progress_bar("training") as progress:
         compile_kernels(study.points, {"threads": threads, "arch": arch})
-        besides = int((1 + _PACKED) * sum(rows.nbytes for rows in episodes.values()))
-        for some, at, outcome in study.in_blocks(folder, threads, arch, progress, besides):
-            for name, rows in episodes.items():
-                rows.append(outcome[name])
-            done = what_policies_do(study.points[some][0], study.seeds[at], outcome["q_values"])
-            for name in told:
-                told[name][some, at] = done[name]
-    return {**episodes, **told}
+        return study.reduced(folder, reduce, threads, arch, progress)
 
 
 def write_tables(folder: Path, results: Results) -> None:
@@ -236,12 +224,17 @@ def write_tables(folder: Path, results: Results) -> None:
     from taichi_ants.files.results import REPORT
 
     comparison, lines, audit = results.comparison, results.lines, results.audit
-    tables = {"summary": results.summary, "behaviours": results.behaviours, "table2": lines}
-    for name, rows in {**tables, "claims": claims_rows(audit)}.items():
+    tables = {
+        "summary": [one.columns() for one in results.summaries],
+        "behaviours": [one.columns() for one in results.behaviours],
+        "table2": [one.columns() for one in lines],
+        "claims": claims_rows(audit),
+    }
+    for name, rows in tables.items():
         files.write_csv(folder / f"{name}.csv", rows, list(rows[0]))
     files.write_text(folder / "table2.md", table2_markdown(comparison, lines))
     files.write_text(folder / "claims.md", claims_markdown(audit, comparison.world))
-    files.write_text(folder / REPORT, report(comparison, lines, results.answer, audit))
+    files.write_text(folder / REPORT, report(comparison, lines, audit))
 
 
 def write_policies(
@@ -275,7 +268,7 @@ def write_policies(
             "seed": study.seeds[run],
             "episodes": point.episodes,
             "max_steps": point.max_steps,
-            "return_last50": comparison.measure("return_last50")[row, run],
+            "return_last50": comparison.measures["return_last50"][row, run],
             "behaviour": BEHAVIOURS[behaviour],
         }
         path = folder / POLICIES / f"{example_name(comparison, row, run)}.npz"
@@ -315,20 +308,50 @@ def compare(settings: argparse.Namespace) -> None:
 
 
 def comparison_of(
-    settings: argparse.Namespace, study: Study[RunPoint], arrays: dict[str, Any]
+    settings: argparse.Namespace, study: Study[RunPoint], arrays: Mapping[str, np.ndarray]
 ) -> Comparison:
-    """What the episodes gave, with what it was measured on."""
+    """Return the comparison of arrays from `measured`, with its curves if they are among them."""
     from taichi_ants.analysis.paper.comparison import Comparison, Row
+    from taichi_ants.analysis.paper.curves import CURVES
+    from taichi_ants.analysis.paper.measures import MEASURES
 
     first = study.points[0]
     return Comparison(
         rows=tuple(Row.of(point.task, point.training) for point in study.points),
         seeds=study.seeds,
-        **arrays,
+        measures={name: arrays[name] for name in MEASURES},
+        behaviours=arrays["behaviours"],
+        policy_returns=arrays["policy_returns"],
+        episodes=first.episodes,
+        rollouts=first.rollouts,
         max_steps=first.max_steps,
+        curves={name: arrays[_CURVE + name] for name in CURVES if _CURVE + name in arrays},
         task=first.task,
         world=world_name(settings, study),
     )
+
+
+def with_curves(
+    study: Study[RunPoint], blocks: Path, comparison: Comparison
+) -> tuple[Comparison, dict[tuple[int, int], np.ndarray]]:
+    """Read what is shown from finished blocks: learning curves, and tables of the examples.
+
+    Returns:
+        The comparison with its curves, and the final tables by row and place of the seed.
+    """
+    from taichi_ants.analysis.paper.best_of import examples
+    from taichi_ants.analysis.paper.curves import curve_row, learning_curves
+
+    shown, tables = examples(comparison), {}
+    rows = [row for row, _ in shown] + [curve_row(comparison, *one) for one in comparison.learners]
+
+    def outcomes() -> Iterator[tuple[int, Outcome]]:
+        for row, outcome in study.read(blocks, rows):
+            for run in (run for one, run in shown if one == row):
+                tables[row, run] = outcome["q_values"][run].copy()
+            yield row, outcome
+
+    return replace(comparison, curves=learning_curves(comparison, outcomes())), tables
 
 
 def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draws: bool) -> None:
@@ -361,7 +384,7 @@ def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draw
         style.new_figure(1.0).savefig(io.BytesIO(), format=kind)
 
 
-def draw_figures(comparison: Comparison, baselines: Sequence[Mapping], folder: Path) -> None:
+def draw_figures(comparison: Comparison, baselines: Sequence[Baseline], folder: Path) -> None:
     """Write the figures as files."""
     from taichi_ants.analysis import style
     from taichi_ants.analysis.paper.figures import draw_all
@@ -373,11 +396,8 @@ def do_comparison(
     settings: argparse.Namespace, study: Study[RunPoint], beside: Beside, blocks: Path, ready: Path
 ) -> tuple[Results, Seen]:
     """Do what is not done yet, and write all results."""
-    from concurrent.futures import ThreadPoolExecutor
-
     from taichi_ants import files
-    from taichi_ants.analysis.bounds.baselines import BASELINE_COLUMNS, bound_rows, policy_rows
-    from taichi_ants.analysis.paper.best_of import examples
+    from taichi_ants.analysis.bounds.baselines import Baseline, bound_rows, policy_rows
     from taichi_ants.analysis.paper.results import Results
     from taichi_ants.engines.runs.training import evaluate
     from taichi_ants.files import archives
@@ -385,31 +405,30 @@ def do_comparison(
     where, first = {"threads": settings.threads, "arch": settings.arch}, study.points[0]
     world, task, steps, shows = first.world, first.task, first.max_steps, not settings.no_figures
     discounts = tuple(dict.fromkeys(settings.discounts))
-    with ThreadPoolExecutor() as threads:
-        beside.begin(rehearse, first, settings.plugin, where, settings.quick)
-        bounds = beside.begin(bound_rows, world, task, discounts, steps)
-        arrays = measured(study, blocks, **where)
-        comparison = comparison_of(settings, study, arrays)
-        follow = partial(evaluate, **where)
-        baselines = bounds() + policy_rows(world, task, follow, study.seeds, ROLLOUTS, steps)
-        tables = study.of_runs(blocks, "q_values", examples(comparison))
-        small = arrays | {name: files.smallest(arrays[name]) for name in _TOLD}
-        packed = threads.submit(archives.write, ready / EPISODES, small)  # does without Python
-        animated = write_policies(settings, ready, study, comparison, tables, beside)
-        # Beside this process there is time for the figures, unless there are animations.
-        draw = beside.begin if settings.quick else partial
-        drawn = [draw(draw_figures, comparison, baselines, ready / FIGURES)] if shows else []
-        seen = see(settings, ready, study, comparison, baselines, beside.begin, draw)
-        beside.finish()
-        files.write_csv(ready / BASELINES, baselines, BASELINE_COLUMNS)
-        with progress_bar("statistics and pictures") as progress:
-            results = Results.of(comparison, baselines)
-            write_tables(ready, results)
-            waits: list[Callable[[], Any]] = [*drawn, *animated, packed.result]
-            for number, wait in enumerate(waits, start=1):
-                progress(number / (len(waits) + 1))
-                wait()
-            return results, seen()
+    beside.begin(rehearse, first, settings.plugin, where, settings.quick)
+    bounds = beside.begin(bound_rows, world, task, discounts, steps)
+    arrays = measured(study, blocks, **where)
+    comparison, tables = with_curves(study, blocks, comparison_of(settings, study, arrays))
+    arrays |= {_CURVE + name: curve for name, curve in comparison.curves.items()}
+    archives.write(ready / RUNS, arrays)
+    follow = partial(evaluate, **where)
+    baselines = bounds() + policy_rows(world, task, follow, study.seeds, ROLLOUTS, steps)
+    animated = write_policies(settings, ready, study, comparison, tables, beside)
+    # Beside this process there is time for the figures, unless there are animations.
+    draw = beside.begin if settings.quick else partial
+    drawn = [draw(draw_figures, comparison, baselines, ready / FIGURES)] if shows else []
+    seen = see(settings, ready, study, comparison, baselines, beside.begin, draw)
+    beside.finish()
+    rows = [one._asdict() for one in baselines]
+    files.write_csv(ready / BASELINES, rows, Baseline._fields)
+    with progress_bar("statistics and pictures") as progress:
+        results = Results.of(comparison, baselines)
+        write_tables(ready, results)
+        waits: list[Callable[[], Any]] = [*drawn, *animated]
+        for number, wait in enumerate(waits, start=1):
+            progress(number / (len(waits) + 1))
+            wait()
+        return results, seen()
 
 
 def see(
@@ -417,7 +436,7 @@ def see(
     folder: Path,
     study: Study[RunPoint],
     comparison: Comparison,
-    baselines: Sequence[Mapping],
+    baselines: Sequence[Baseline],
     play: Begin = partial,
     draw: Begin = partial,
 ) -> Callable[[], Seen]:
@@ -439,42 +458,6 @@ def see(
     return lambda: Seen(drawings(), *players())
 
 
-_PLAIN = str.maketrans("_=", "  ")  # "planning_steps=3" in words
-
-
-def facts(settings: argparse.Namespace, study: Study[RunPoint]) -> dict[str, str]:
-    """How it was done, in words."""
-    from taichi_ants.analysis.paper.comparison import Row
-    from taichi_ants.errors import count
-    from taichi_ants.report.page import span
-
-    first, task = study.points[0], study.points[0].task
-    numbers = {
-        "learning rate": settings.learning_rates,
-        "discount": settings.discounts,
-        "epsilon": settings.epsilons,
-        "decay of epsilon": settings.epsilon_decays,
-    }
-    learners = dict.fromkeys(Row.of(one.task, one.training).variant for one in study.points)
-    named = [
-        ", ".join([one.label, *(pair.translate(_PLAIN) for pair in one.hyperparameters.split())])
-        for one in learners
-    ]
-    grid = [f"{name} {' or '.join(f'{x:g}' for x in few)}" for name, few in numbers.items()]
-    falls = {True: "evaporate", False: "do not evaporate"}
-    return {
-        "World": world_name(settings, study),
-        "Learners": "; ".join(named),
-        "Configurations": "; ".join(grid),
-        "Delivery": " and ".join(dict.fromkeys(point.task.delivery for point in study.points)),
-        "Seeds": span(settings.seed, settings.seeds),
-        "Episodes": f"{first.episodes} of at most {first.max_steps} steps, "
-        f"then {count(first.rollouts, 'greedy rollout')}",
-        "Trails": f"{falls[task.evaporation_in_training]} in training, "
-        f"{falls[task.evaporation_in_evaluation]} in the greedy evaluation",
-    }
-
-
 def make_page(
     settings: argparse.Namespace,
     study: Study[RunPoint],
@@ -484,19 +467,25 @@ def make_page(
 ) -> str:
     """The page of the results in a folder, which are read from there if they are not given."""
     from taichi_ants import files
+    from taichi_ants.analysis.bounds.baselines import Baseline
     from taichi_ants.analysis.paper.results import Results
     from taichi_ants.files import archives
     from taichi_ants.files.results import MANIFEST
     from taichi_ants.report.comparison import comparison_page
-    from taichi_ants.report.page import made_facts
+    from taichi_ants.report.page import made_facts, setting_facts
 
     if found is None:
-        told = comparison_of(settings, study, archives.read(folder / EPISODES, rows_in=folder))
-        results = Results.of(told, files.read_csv(folder / BASELINES))
+        told = comparison_of(settings, study, archives.read(folder / RUNS))
+        rows = files.read_csv(folder / BASELINES)
+        results = Results.of(told, [Baseline(**row) for row in rows])
         found = results, see(settings, folder, study, told, results.baselines)()
     return comparison_page(
         *found,
-        facts={**facts(settings, study), **made_facts(made)},
+        facts={
+            "World": world_name(settings, study),
+            **setting_facts(study.settings()),
+            **made_facts(made),
+        },
         files=[path.name for path in folder.iterdir()] + [MANIFEST],
     )
 

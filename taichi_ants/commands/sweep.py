@@ -145,35 +145,29 @@ def measures(kind: str) -> dict[str, Any]:
 def measured(
     asked: Sweep, blocks: Path, threads: int | None, arch: str | None
 ) -> dict[str, np.ndarray]:
-    """Each measure of each point and seed, float64 (points, seeds): all that is kept in memory."""
-    import numpy as np
-
-    study, order = asked.study, asked.study.in_order
-    values = {name: np.empty((len(order), len(study.seeds))) for name in asked.measures}
+    """Return each measure of each point and seed, float64 (points, seeds)."""
+    reduce = partial(measures_of_block, asked.kind, asked.measures)
     with progress_bar("sweep") as progress:
-        for some, at, outcome in study.in_blocks(blocks, threads, arch, progress):
-            found = measures_of_block(asked.kind, order[some], outcome, asked.measures)
-            for name, array in found.items():
-                values[name][some, at] = array
-    place = {point: number for number, point in enumerate(order)}
-    rows = [place[point] for point in study.points]  # some may be asked for twice
-    return {name: array[rows] for name, array in values.items()}
+        return asked.study.reduced(blocks, reduce, threads, arch, progress)
 
 
 def measures_of_block(
-    kind: str, points: Sequence[Any], outcome: Outcome, names: Sequence[str]
+    kind: str,
+    names: Sequence[str],
+    points: Sequence[Any],
+    seeds: Sequence[int],
+    outcome: Outcome,
 ) -> dict[str, np.ndarray]:
-    """Measures of points that were done together, as compare and colony have them."""
+    """Return measures of points that were done together, float64 (points, seeds) by name."""
     from taichi_ants.analysis.colony.study import measures_of
-    from taichi_ants.analysis.paper.measures import RunOutcomes
+    from taichi_ants.analysis.paper.measures import measures_of_runs
 
-    if kind == "colony":
-        (point,) = points
-        arrays = {key: array[0] for key, array in outcome.items()}
-        found = measures_of(arrays, point.ants, point.ticks)
-        return {name: found[name][None] for name in names}
-    runs = RunOutcomes(**{key: array for key, array in outcome.items() if array.ndim == 3})
-    return {name: runs.measure(name) for name in names}
+    if kind == "runs":
+        return measures_of_runs(outcome, names)
+    (point,) = points
+    arrays = {key: array[0] for key, array in outcome.items()}
+    found = measures_of(arrays, point.ants, point.ticks)
+    return {name: found[name][None] for name in names}
 
 
 def main(

@@ -9,7 +9,6 @@ import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -17,25 +16,22 @@ import numpy.typing as npt
 
 from taichi_ants import files
 from taichi_ants.errors import AntsError, shown
-from taichi_ants.files.rows import Rows
 
 MOST_BYTES = 1 << 36  # of a file, unpacked
 _CHECKSUM = "checksum"  # the array that holds the checksum of all others
 _COMPRESSION = 2  # NumPy's level, 6, takes five times as long to save a tenth of the bytes
 
-Arrays = dict[str, Any]  # of NumPy, or `Rows` where they are asked for
+Arrays = dict[str, np.ndarray]
 
 
-def write(
-    path: files.PathLike, arrays: Mapping[str, npt.ArrayLike | Rows], compress: bool = True
-) -> None:
+def write(path: files.PathLike, arrays: Mapping[str, npt.ArrayLike], compress: bool = True) -> None:
     """Write named arrays and their checksum; equal arrays give equal bytes.
 
     Raises:
         AntsError: The file cannot be written.
         TypeError: An array holds Python objects.
     """
-    content: Arrays = {n: a if isinstance(a, Rows) else np.asarray(a) for n, a in arrays.items()}
+    content = {name: np.asarray(array) for name, array in arrays.items()}
     content[_CHECKSUM] = np.array(_checksum(content))
     how = zipfile.ZIP_DEFLATED if compress else zipfile.ZIP_STORED
 
@@ -43,10 +39,7 @@ def write(
         with zipfile.ZipFile(file, "w", how, compresslevel=_COMPRESSION) as archive:
             for name, array in content.items():
                 with archive.open(f"{name}.npy", "w", force_zip64=True) as entry:
-                    if isinstance(array, Rows):
-                        array.save(entry)
-                    else:
-                        np.lib.format.write_array(entry, array, allow_pickle=False)
+                    np.lib.format.write_array(entry, array, allow_pickle=False)
 
     files.write_atomically(path, save)
 
@@ -56,7 +49,6 @@ def read(
     content: bytes | None = None,
     most: int = MOST_BYTES,
     foreign: bool = False,
-    rows_in: Path | None = None,
 ) -> Arrays:
     """Read all arrays of an .npz file, without executing anything that it holds.
 
@@ -65,7 +57,6 @@ def read(
         content: The bytes of the file, if they are known; `path` is then its name in messages.
         most: The largest size of the file and of its arrays, in bytes.
         foreign: Whether to read a file without a checksum, too.
-        rows_in: A folder for integers of three axes or more, which are then `Rows`.
 
     Raises:
         AntsError: The file is missing, unreadable, too large, damaged, or not an .npz of arrays.
@@ -82,7 +73,7 @@ def read(
                         f"{name} unpacks to {size} bytes, and {most} are allowed; name another "
                         "file."
                     )
-                arrays = {one.filename[:-4]: _array(archive, one, rows_in) for one in members}
+                arrays = {one.filename[:-4]: _array(archive, one) for one in members}
             written = arrays.pop(_CHECKSUM, None)
             if not (foreign if written is None else str(written) == _checksum(arrays)):
                 raise ValueError("the checksum is missing, or another one")
@@ -100,18 +91,12 @@ def read(
             ) from error
 
 
-def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo, rows_in: Path | None) -> Any:
+def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> np.ndarray:
     """Return an array, read to the end of its member, where zipfile compares the CRC-32."""
     # Other kinds of compression need memory that no file declares.
     is_known = member.compress_type in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
     if not is_known or not member.filename.endswith(".npy"):
         raise ValueError("it is not an array as NumPy writes one")
-    rows = None
-    if rows_in is not None:
-        with archive.open(member) as file:
-            rows = Rows.load(file, rows_in)
-    if rows is not None:
-        return rows
     with archive.open(member) as file:
         array = np.lib.format.read_array(file, allow_pickle=False)
         if file.read(1):
@@ -124,8 +109,7 @@ def _checksum(arrays: Arrays) -> str:
     digest = hashlib.sha256()
     for name, array in sorted(arrays.items()):
         digest.update(f"{name} {array.dtype.str} {array.shape}\n".encode())
-        for part in array if isinstance(array, Rows) else (array,):
-            digest.update(np.ascontiguousarray(part).reshape(-1).view(np.uint8).data)
+        digest.update(np.ascontiguousarray(array).reshape(-1).view(np.uint8).data)
     return digest.hexdigest()
 
 
@@ -161,7 +145,7 @@ class Kind:
     @contextmanager
     def reading(
         self, path: files.PathLike, content: bytes | None = None
-    ) -> Iterator[tuple[dict[str, np.ndarray], dict[str, Any]]]:
+    ) -> Iterator[tuple[Arrays, dict[str, Any]]]:
         """Read a file, and build an object from its arrays and facts, as `building` does.
 
         Raises:

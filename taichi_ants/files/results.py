@@ -142,7 +142,11 @@ class ResultFolder:
         paths = sorted(path.relative_to(ready) for path in ready.rglob("*") if path.is_file())
         checksums = {path.as_posix(): checksum_of(ready / path) for path in paths}
         for name in self._listed():
-            self._remove(name)
+            file = self.path / name
+            if file.is_file() and file.resolve().is_relative_to(self.path.resolve()):
+                file.unlink()
+                with suppress(OSError):  # the folder holds other files
+                    file.parent.rmdir()
         for path in paths:
             (self.path / path).parent.mkdir(parents=True, exist_ok=True)
             (ready / path).replace(self.path / path)
@@ -194,14 +198,6 @@ class ResultFolder:
     def _listed(self) -> dict[str, str]:
         """Return the files of finished results, with their checksums."""
         return read_manifest(self.path)["files"] if (self.path / MANIFEST).exists() else {}
-
-    def _remove(self, name: str) -> None:
-        """Remove a file that an older manifest lists, unless it lies outside of the folder."""
-        file = self.path / name
-        if file.is_file() and file.resolve().is_relative_to(self.path.resolve()):
-            file.unlink()
-            with suppress(OSError):  # the folder holds other files
-                file.parent.rmdir()
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:

@@ -3,33 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from taichi_ants.analysis.colony.contrasts import Judged
 from taichi_ants.analysis.colony.study import ARENAS, EVALUATION_EPSILON, MEASURES, WORLDS
-from taichi_ants.analysis.colony.tables import glance, means, of_largest
+from taichi_ants.analysis.colony.tables import (
+    ConditionRow,
+    glance,
+    headlines,
+    means,
+    of_largest,
+)
 from taichi_ants.analysis.drawings import Drawing
 from taichi_ants.analysis.findings import seeds_in_words
 from taichi_ants.analysis.tables import sentence
 from taichi_ants.errors import count
 from taichi_ants.report.page import Player, Statement, Statements, fill, judged
 
-FILES = {
-    "report.txt": "what the command prints",
-    "conditions.csv": "every measure of every condition, with intervals",
-    "seeds.csv": "every measure of every seed",
-    "differences.csv": "the differences behind the findings, with intervals and verdicts",
-    "findings.md": "the findings to read",
-    "manifest.json": "settings, versions, and what each file holds to the bit",
-    "policies": "policies of median seeds",
-    "figures": "the figures as pictures",
-}
-
 
 def colony_page(
-    rows: Sequence[Mapping[str, Any]],
+    rows: Sequence[ConditionRow],
     findings: Judged,
-    answer: Sequence[str],
     *,
     drawings: Sequence[Drawing],
     players: Sequence[Player],
@@ -41,15 +34,14 @@ def colony_page(
     Args:
         rows: From `tables.condition_rows`.
         findings: From `contrasts.judge_all`.
-        answer: Three sentences.
         drawings: The figures.
         players: Colonies at work.
         facts: How it was done, names and words.
         files: The names of the files and folders beside the page.
     """
-    arenas = list(dict.fromkeys(row["arena"] for row in rows))
+    arenas = list(dict.fromkeys(row.condition.arena for row in rows))
     trained = [arena for arena in ARENAS if arena in arenas]
-    seeds = seeds_in_words(int(rows[0]["seeds"]))
+    seeds = seeds_in_words(rows[0].seeds)
     return fill(
         "colony.html",
         title="When does a colony do more than its ants?",
@@ -57,14 +49,14 @@ def colony_page(
         seeds=seeds,
         epsilon=f"{EVALUATION_EPSILON:g}",
         worlds=[ARENAS[arena] for arena in trained],
-        answer=answer,
+        headlines=headlines(rows, findings),
         findings=_statements(findings),
         glance=glance(rows),
         tables=means(rows),
         drawings=drawings,
         players=players,
         facts=facts,
-        files={name: words for name, words in FILES.items() if name in files},
+        files=files,
     )
 
 

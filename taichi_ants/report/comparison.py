@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from taichi_ants.analysis.paper.answer import temptation
+from taichi_ants.analysis.paper.audit import headlines
 from taichi_ants.analysis.paper.published import (
     GREEDY_RETURN,
     GREEDY_STEPS,
@@ -23,28 +23,6 @@ from taichi_ants.report.page import (
     judged,
 )
 from taichi_ants.report.players import Seen
-
-DELIVERY = {
-    "continuing": "With continuing delivery, its update at the delivery also counts, discounted, "
-    "the value of what the ant then sees, as after every other step.",
-    "absorbing": "With absorbing delivery, nothing comes after the delivery: its update counts the "
-    "reward alone.",
-}
-FILES = {
-    "report.txt": "what the command prints",
-    "table2.csv": "the paper's table 2 beside ours, with all intervals",
-    "table2.md": "the same to read",
-    "claims.csv": "all claims with effects, intervals and verdicts",
-    "claims.md": "the same to read",
-    "summary.csv": "every configuration, over all seeds",
-    "behaviours.csv": "every configuration, over the runs that do the same",
-    "baselines.csv": "exact bounds and simple policies",
-    "episodes.npz": "what every episode of every run gave",
-    "manifest.json": "settings, versions, and what each file holds to the bit",
-    "policies": "a policy of each behaviour",
-    "renders": "the same policies as animations",
-    "figures": "the figures as pictures",
-}
 
 
 def comparison_page(
@@ -74,27 +52,27 @@ def comparison_page(
         "comparison.html",
         title="Which learner makes the better ant?",
         byline=f"{seeds}, {count(len(comparison.rows), 'configuration')}, "
-        f"{thousands(comparison.returns.size)} episodes of training, world: {comparison.world}",
+        f"{thousands(comparison.behaviours.size * comparison.episodes)} episodes of training, "
+        f"world: {comparison.world}",
         seeds=f"{len(comparison.seeds)} runs" if len(comparison.seeds) > 1 else "a run",
         configurations=len(GRID),
         best=("Q-learning", TABLE_2[Q_LEARNING].reward),
         others=(returns[0], returns[-1]),
         greedy_return=f"{GREEDY_RETURN:g}",
         greedy_steps=[f"{one:g}" for one in GREEDY_STEPS],
-        deliveries=[DELIVERY[one] for one in comparison.delivery_settings],
+        deliveries=comparison.delivery_settings,
         world=comparison.world,
         in_paper_world=comparison.in_paper_world,
-        answer=results.answer,
+        headlines=headlines(results.audit),
         claims=_claims(results),
         first_table=first,
         table_notes=notes,
         more_tables=more,
         behaviours=behaviours,
-        temptation=temptation(results.baselines),
         **seen._asdict(),
         sheet_words=seen.sheet.words if seen.sheet else "",
         facts=facts,
-        files={name: words for name, words in FILES.items() if name in files},
+        files=files,
     )
 
 

@@ -202,9 +202,27 @@ KINDS = (
 )
 
 
-def span(first: int, n: int) -> str:
-    """Seeds in words: "0 to 9", or "0" if it is one."""
-    return str(first) if n == 1 else f"{first} to {first + n - 1}"
+def setting_facts(settings: Mapping[str, Any]) -> dict[str, str]:
+    """Return settings of a study as names and words; a list shows each of its values once."""
+    facts = {}
+    for name, value in settings.items():
+        several = value if isinstance(value, list) else [value]
+        several = [one for one in several if one is not None]
+        numbers = all(isinstance(one, int) and not isinstance(one, bool) for one in several)
+        if name == "seeds" and several[1:]:
+            facts["Seeds"] = f"{several[0]} to {several[-1]}"
+        elif name not in ("version", "worlds", "world", "pool", "after"):
+            values = sorted(set(several)) if numbers else dict.fromkeys(map(_plain, several))
+            words = name.split(".", 1)[-1].replace("_", " ").replace(".", ", ")
+            facts[words.capitalize()] = ", ".join(map(str, values))
+    return {name: words for name, words in facts.items() if words}
+
+
+def _plain(value: Any) -> str:
+    """A value as readers write it."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def made_facts(made: Mapping[str, Any]) -> dict[str, str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS, DELIVERS, counts
+from taichi_ants.analysis.bounds.baselines import Baseline
 from taichi_ants.analysis.colony.study import ARENAS, JOINT, RULES
 from taichi_ants.analysis.drawings import Drawing, drawings
 from taichi_ants.analysis.paper.best_of import example_name, examples
@@ -59,7 +60,7 @@ def played(point: RunPoint, q_values: np.ndarray, seed: int) -> Episode:
     return Episode.play(point.world, q_values, seed=seed, max_steps=steps, task=task)
 
 
-def draw_all_for_page(comparison: Comparison, baselines: Sequence[Mapping]) -> list[Drawing]:
+def draw_all_for_page(comparison: Comparison, baselines: Sequence[Baseline]) -> list[Drawing]:
     """The figures. A figure that has been saved as a file is laid out a little otherwise."""
     return drawings(draw_all(comparison, baselines))
 

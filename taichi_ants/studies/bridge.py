@@ -25,7 +25,7 @@ from taichi_ants.analysis.bridge import (
 from taichi_ants.engines.colony.hand import Hand
 from taichi_ants.engines.colony.layout import AntRow
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.studies.blocks import Form, kept
+from taichi_ants.studies.blocks import kept
 from taichi_ants.studies.colony_study import scheduled
 from taichi_ants.studies.runner import EVALUATION_SEEDS, ColonyPoint, settings_of
 from taichi_ants.task import Life, Task, foraging, queueing
@@ -111,10 +111,9 @@ def followed(
         ticks: Length of the episode on each bridge, and its half on `LATE`.
         where: Threads and arch, as of a `Colony`.
     """
-    form = Form(np.integer, (WINDOWS, len(LOADS), 2, len(seeds)), 0)
     about = {**settings_of([learned], seeds), "design": asdict(design), "ticks": ticks}
     make = partial(_followed, design, learned, seeds, q_values, ticks, where)
-    return kept(path, about, dict.fromkeys(bridges(design), form), make)
+    return kept(path, about, make)
 
 
 def _followed(

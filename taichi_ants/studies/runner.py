@@ -9,7 +9,6 @@ any order without changing anything.
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
@@ -20,9 +19,9 @@ import numpy as np
 
 from taichi_ants import __version__, checks, files, learners
 from taichi_ants.errors import AntsError, check_one_of, checked_whole
-from taichi_ants.files import archives
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.studies.blocks import Form, Outcome, kept
+from taichi_ants.studies import blocks
+from taichi_ants.studies.blocks import Outcome, kept
 from taichi_ants.studies.provenance import world_facts
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EPISODE_STEPS, EPISODES, MAX_STEPS, N_ACTIONS, ROW
@@ -99,20 +98,13 @@ class RunPoint:
         return self
 
     @property
-    def forms(self) -> dict[str, Form]:
-        """Of the arrays of its outcome, for one seed."""
+    def bytes_of_a_run(self) -> int:
+        """About how many bytes the outcome of one seed takes on disk, at most."""
         most = self.max_steps * self.task.rewards.largest
-        bounds = ((-most, most), (1, self.max_steps), (0, 1))
-        forms = {
-            f"{of}{name}": Form(np.integer, (length,), *ends)
-            for of, length in (("", self.episodes), ("greedy_", self.rollouts))
-            for name, ends in zip(_RUN_ARRAYS, bounds, strict=True)
-        }
-        return {
-            **forms,
-            "q_values": Form(np.float32, (self.task.n_states, N_ACTIONS)),
-            "seconds": Form(np.float64, (), 0),
-        }
+        ends = (-most, most), (0, self.max_steps), (0, 1)
+        of_an_episode = sum(files.smallest(np.array(one)).itemsize for one in ends)
+        numbers = (self.episodes + self.rollouts) * of_an_episode
+        return numbers + 4 * self.task.n_states * N_ACTIONS + 8
 
     @staticmethod
     def do(
@@ -213,15 +205,9 @@ class ColonyPoint:
         return replace(self, world=self.world[some]) if isinstance(self.world, tuple) else self
 
     @property
-    def forms(self) -> dict[str, Form]:
-        """Of the arrays of its outcome, for one seed."""
-        least = {"returns": -math.inf, "first_delivery": -1}
-        forms = {
-            name: Form(np.integer, (self.rollouts,), least.get(name, 0)) for name in _COLONY_ARRAYS
-        }
-        if self.episodes and self.sharing == "shared":
-            forms["q_values"] = Form(np.float32, (self.task.n_states, N_ACTIONS))
-        return forms
+    def bytes_of_a_run(self) -> int:
+        """About how many bytes the outcome of one seed takes on disk, at most."""
+        return 8 * len(_COLONY_ARRAYS) * self.rollouts + 4 * self.task.n_states * N_ACTIONS
 
     def places(self, seeds: Sequence[int]) -> list[list[World]] | None:
         """The world of each training episode and seed; None without a pool."""
@@ -337,16 +323,39 @@ class Study(Generic[PointKind]):
 
         Arguments and errors are those of `in_blocks`.
         """
-        points = self.in_order
-        pieces: dict[PointKind, list[Outcome]] = {point: [] for point in points}
+        order = self.in_order
+        parts: dict[PointKind, list[Outcome]] = {point: [] for point in order}
         for block in self.in_blocks(folder, threads, arch, progress):
-            for place, point in enumerate(points[block.points]):
-                part = {name: array[place] for name, array in block.outcome.items()}
-                pieces[point].append(part)
-        return {
-            point: {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-            for point, parts in pieces.items()
-        }
+            for place, point in enumerate(order[block.points]):
+                parts[point].append({name: one[place] for name, one in block.outcome.items()})
+        return {point: _joined(several) for point, several in parts.items()}
+
+    def reduced(
+        self,
+        folder: Path,
+        reduce: Callable[[Sequence[PointKind], Sequence[int], Outcome], Outcome],
+        threads: int | None = None,
+        arch: str | None = None,
+        progress: Progress = lambda share: None,
+    ) -> dict[str, np.ndarray]:
+        """Return numbers of each run, arrays (points, seeds) by name; only these stay in memory.
+
+        Args:
+            folder, threads, arch, progress: As of `in_blocks`, which also says what is raised.
+            reduce: Called with points, seeds and outcome of a block; returns such arrays of it.
+        """
+        order = self.in_order
+        found: dict[str, np.ndarray] = {}
+        for some, at, outcome in self.in_blocks(folder, threads, arch, progress):
+            for name, array in reduce(order[some], self.seeds[at], outcome).items():
+                shape = len(order), len(self.seeds)
+                found.setdefault(name, np.empty(shape, array.dtype))[some, at] = array
+        if order != self.points:  # some points occur twice, or in another order
+            place = {point: number for number, point in enumerate(order)}
+            rows = [place[point] for point in self.points]
+            for name, array in found.items():
+                found[name] = array[rows]
+        return found
 
     def in_blocks(
         self,
@@ -354,7 +363,6 @@ class Study(Generic[PointKind]):
         threads: int | None = None,
         arch: str | None = None,
         progress: Progress = lambda share: None,
-        besides: int = 0,
     ) -> Iterator[Block]:
         """Do the blocks that the folder does not hold yet; all of them, one at a time in memory.
 
@@ -362,21 +370,20 @@ class Study(Generic[PointKind]):
             folder: Where finished blocks are kept; it must belong to this study alone.
             threads, arch: As in `train`.
             progress: Called now and then with the share of the work that is done.
-            besides: How many bytes the caller will write to the same disk.
 
         Raises:
             AntsError: The disk has no room for all of it, which is known at the beginning; a block
                 cannot be written, or an argument is not allowed.
         """
-        files.check_room(folder, self._bytes(folder) + besides)
-        order, blocks = self.in_order, list(self.blocks())
-        weights = [sum(p.weight for p in order[some]) * len(self.seeds[at]) for some, at in blocks]
+        files.check_room(folder, self._bytes(folder))
+        order, pieces = self.in_order, list(self.blocks())
+        weights = [sum(p.weight for p in order[some]) * len(self.seeds[at]) for some, at in pieces]
         begun, total = 0.0, sum(weights)
         # What others go on from is kept, in as many pieces as these points have blocks.
         befores = {getattr(point, "after", None) for point in order}
         tables: dict[Any, list[np.ndarray]] = {}
         progress(0.0)
-        for number, ((some, at), weight) in enumerate(zip(blocks, weights, strict=True)):
+        for number, ((some, at), weight) in enumerate(zip(pieces, weights, strict=True)):
             points, seeds = tuple(one.of_seeds(at) for one in order[some]), self.seeds[at]
             after = getattr(points[0], "after", None)
             learned = np.concatenate(tables[after])[at] if after else None
@@ -384,7 +391,7 @@ class Study(Generic[PointKind]):
             where = {"threads": threads, "arch": arch}
             do: Any = partial(points[0].do, points, seeds, learned, part, where)
             about = settings_of(points, seeds)
-            outcome = kept(_path(folder, number), about, _forms(points, seeds), do)
+            outcome = kept(_path(folder, number), about, do)
             if order[some.start] in befores:
                 tables.setdefault(order[some.start], []).append(outcome["q_values"][0])
             begun += weight
@@ -395,32 +402,38 @@ class Study(Generic[PointKind]):
         """About how many bytes the blocks have at most that the folder does not hold yet."""
         order = self.in_order
         return sum(
-            form.nbytes
+            len(order[some]) * len(self.seeds[at]) * order[some][0].bytes_of_a_run
             for number, (some, at) in enumerate(self.blocks())
             if not _path(folder, number).exists()
-            for form in _forms(order[some], self.seeds[at]).values()
         )
 
-    def of_runs(
-        self, folder: Path, name: str, runs: Iterable[tuple[int, int]]
-    ) -> dict[tuple[int, int], np.ndarray]:
-        """An array of some runs, read from finished blocks; a run is told by point and seed.
+    def read(self, folder: Path, points: Iterable[int]) -> Iterator[tuple[int, Outcome]]:
+        """Read some points from finished blocks, one block at a time in memory.
 
         Args:
-            folder: That of `in_blocks`, which has come to its end.
-            name: Of the array.
-            runs: Of each its place among the points in order, and among the seeds.
+            folder: The folder of `in_blocks`, after all blocks are done.
+            points: Places among the points in order.
+
+        Yields:
+            The place of each point, in order, and its outcome.
 
         Raises:
             AntsError: A block cannot be read any more.
         """
-        found: dict[tuple[int, int], np.ndarray] = {}
+        wanted = sorted(set(points))
+        parts: dict[int, list[Outcome]] = {place: [] for place in wanted}
         for number, (some, at) in enumerate(self.blocks()):
-            inside = [(p, s) for p, s in runs if _holds(some, p) and _holds(at, s)]
-            if inside:
-                array = archives.read(_path(folder, number))[name]
-                found |= {(p, s): array[p - some.start, s - at.start].copy() for p, s in inside}
-        return found
+            inside = [place for place in wanted if some.start <= place < some.stop]
+            block = blocks.read(_path(folder, number)) if inside else {}
+            for place in inside:
+                parts[place].append({n: array[place - some.start] for n, array in block.items()})
+                if at.stop == len(self.seeds):
+                    yield place, _joined(parts.pop(place))
+
+
+def _joined(parts: Sequence[Outcome]) -> Outcome:
+    """Concatenate the parts of a point's outcome over the seeds."""
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 class Block(NamedTuple):
@@ -476,19 +489,9 @@ def _pieces(first: int, end: int, size: int) -> Iterator[slice]:
         yield slice(begin, min(begin + size, end))
 
 
-def _holds(some: slice, place: int) -> bool:
-    return some.start <= place < some.stop
-
-
 def _path(folder: Path, number: int) -> Path:
     """The file of a block."""
     return folder / f"{number:06d}.npz"
-
-
-def _forms(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Form]:
-    """Of the arrays of a block."""
-    shape = len(points), len(seeds)
-    return {n: one._replace(shape=shape + one.shape) for n, one in points[0].forms.items()}
 
 
 def _pool(point: Point) -> tuple[World, ...] | None:

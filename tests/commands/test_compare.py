@@ -17,7 +17,6 @@ from command_lines import EXPERIMENTS, assert_one_sentence, call, contents, load
 from taichi_ants import (
     Task,
     TrainingConfig,
-    continue_training,
     evaluate,
     load_policy,
     runtime,
@@ -25,6 +24,7 @@ from taichi_ants import (
     worlds,
 )
 from taichi_ants.analysis.behaviour import DELIVERS
+from taichi_ants.analysis.paper.measures import measures_of_runs
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.commands import compare as commands
 from taichi_ants.files import archives
@@ -75,7 +75,7 @@ SHOWN = [
 POLICY = f"policies/{SHOWN[0]}.npz"
 RENDERS = {f"renders/{name}.gif" for name in SHOWN}
 FILES = {
-    *("baselines.csv", "behaviours.csv", "claims.csv", "claims.md", "episodes.npz"),
+    *("baselines.csv", "behaviours.csv", "claims.csv", "claims.md", "runs.npz"),
     *("manifest.json", "report.html", "report.txt", "summary.csv", "table2.csv", "table2.md"),
     *(f"policies/{name}.npz" for name in SHOWN),
     *FIGURES,
@@ -159,53 +159,40 @@ def test_summary_lists_the_grid(finished):
     assert {row["seeds"] for row in rows} == {str(len(SEEDS))}
 
 
-def test_episodes_are_what_the_library_gives_in_the_order_of_the_summary(finished):
+def test_runs_are_what_the_library_gives_in_the_order_of_the_summary(finished):
     rows = read_csv(finished / "summary.csv")
-    arrays = archives.read(finished / "episodes.npz")
-    runs = (len(rows), len(SEEDS))
-    shapes = dict.fromkeys(("returns", "steps", "deliveries"), (*runs, EPISODES))
-    shapes |= {f"greedy_{name}": (*runs, ROLLOUTS) for name in list(shapes)}
-    shapes |= {"behaviours": runs, "policy_returns": runs}
-    assert {name: array.shape for name, array in arrays.items()} == shapes
-    assert all(array.dtype.kind in "iu" for array in arrays.values())
-
+    arrays = archives.read(finished / "runs.npz")
     trained = trained_as(rows, SEEDS, EPISODES, MAX_STEPS)
     greedy = evaluate(worlds.paper(), trained["q_values"], ROLLOUTS, SEEDS, MAX_STEPS)
-    for name in ("returns", "steps", "deliveries"):
-        assert np.array_equal(arrays[name], trained[name])
-        assert np.array_equal(arrays[f"greedy_{name}"], getattr(greedy, name))
-    assert arrays["deliveries"].any()
+    names = ("returns", "steps", "deliveries")
+    outcome = trained | {f"greedy_{name}": getattr(greedy, name) for name in names}
+    expected = measures_of_runs(outcome)
+    assert arrays["return_all"].shape == (len(rows), len(SEEDS))
+    for name, values in expected.items():
+        np.testing.assert_array_equal(arrays[name], values, err_msg=name)
+    assert set(arrays) - set(expected) == {
+        *("behaviours", "policy_returns"),
+        *(f"curve_{name}" for name in names),
+    }
+    assert {name: arrays[f"curve_{name}"].shape[:2] for name in names} == dict.fromkeys(
+        names, (6, 3)
+    )
+    assert arrays["deliveries_all"].any()
     assert arrays["greedy_deliveries"].any()
 
 
-def test_summary_figures_are_those_of_the_episodes(finished):
+def test_summary_figures_are_those_of_the_runs(finished):
     rows = read_csv(finished / "summary.csv")
-    read = archives.read(finished / "episodes.npz")
-    arrays = {name: array.astype(float) for name, array in read.items()}
-    last = {
-        name: array[..., -50:].mean(axis=2) for name, array in arrays.items() if array.ndim == 3
-    }
-    low, high = bootstrap_interval(last["returns"])
-    expected = {
-        "return_last50_mean": last["returns"].mean(axis=1),
-        "return_last50_ci_low": low,
-        "return_last50_ci_high": high,
-        "steps_last50_mean": last["steps"].mean(axis=1),
-        "steps_all_mean": arrays["steps"].mean(axis=(1, 2)),
-        "deliveries_last50_mean": last["deliveries"].mean(axis=1),
-        "greedy_return_mean": arrays["greedy_returns"].mean(axis=(1, 2)),
-        "greedy_steps_mean": arrays["greedy_steps"].mean(axis=(1, 2)),
-        "greedy_deliveries_mean": arrays["greedy_deliveries"].mean(axis=(1, 2)),
-    }
-    for name in ("returns", "steps"):  # of three seeds the IQM is the mean
-        stem = f"{name.removesuffix('s') if name == 'returns' else name}_last50"
-        expected[f"{stem}_iqm"] = expected[f"{stem}_mean"]
-    assert set(expected) <= set(COLUMNS)
-    for name, values in expected.items():
-        written = [float(row[name]) for row in rows]
-        np.testing.assert_allclose(written, values, rtol=1e-9, atol=1e-12, err_msg=name)
-    assert (low < expected["return_last50_mean"]).all()
-    assert (expected["return_last50_mean"] < high).all()
+    arrays = archives.read(finished / "runs.npz")
+    measures = [name.removesuffix("_mean") for name in COLUMNS if name.endswith("_mean")]
+    for name in measures:
+        low, high = bootstrap_interval(arrays[name])
+        columns = {"mean": arrays[name].mean(axis=1), "ci_low": low, "ci_high": high}
+        if f"{name}_iqm" in COLUMNS:  # of three seeds the IQM is the mean
+            columns["iqm"] = columns["mean"]
+        for column, values in columns.items():
+            written = [float(row[f"{name}_{column}"]) for row in rows]
+            np.testing.assert_allclose(written, values, rtol=1e-9, atol=1e-9, err_msg=name)
 
 
 def test_baselines(finished):
@@ -259,8 +246,8 @@ def test_policies_are_those_of_median_runs_of_each_behaviour(finished):
 
 def test_behaviours_are_those_of_the_policies(finished):
     rows = read_csv(finished / "summary.csv")
-    with np.load(finished / "episodes.npz") as archive:
-        behaviours, returns = archive["behaviours"], archive["policy_returns"]
+    archive = archives.read(finished / "runs.npz")
+    behaviours, returns = archive["behaviours"], archive["policy_returns"]
     trained = trained_as(rows, SEEDS, EPISODES, MAX_STEPS)
     once = evaluate(worlds.paper(), trained["q_values"], 1, SEEDS, MAX_STEPS, CALM)
     assert np.array_equal(returns, once.returns[..., 0])
@@ -286,10 +273,10 @@ def test_evaporation_is_chosen_told_and_kept_apart(training, greedy, tmp_path, c
     rollouts = evaluate(worlds.paper(), trained.q_values, ROLLOUTS, [0], 30, task)
     as_trained = replace(task, evaporation_in_evaluation=training == "on")
     once = evaluate(worlds.paper(), trained.q_values, 1, [0], 30, as_trained)
-    with np.load(out / "episodes.npz") as archive:
-        assert np.array_equal(archive["returns"], trained.returns)
-        assert np.array_equal(archive["greedy_returns"], rollouts.returns)
-        assert np.array_equal(archive["policy_returns"], once.returns[..., 0])
+    archive = archives.read(out / "runs.npz")
+    assert np.array_equal(archive["return_all"], trained.returns.mean(axis=2))
+    assert np.array_equal(archive["greedy_return"], rollouts.returns.mean(axis=2))
+    assert np.array_equal(archive["policy_returns"], once.returns[..., 0])
     manifest = json.loads((out / "manifest.json").read_text("utf-8"))
     assert manifest["settings"]["task.evaporation_in_training"] is (training == "on")
     assert manifest["settings"]["task.evaporation_in_evaluation"] is (greedy == "on")
@@ -403,7 +390,7 @@ def test_force_runs_again_and_leaves_no_old_pictures(copy, compare):
     assert b'class="player"' not in after["report.html"]
     for name in (
         "summary.csv",
-        "episodes.npz",
+        "runs.npz",
         "claims.csv",
         POLICY,
     ):
@@ -433,7 +420,7 @@ def test_results_that_are_gone_are_not_passed_over(name, content, copy, compare)
     assert "--force" in err
 
 
-@pytest.mark.parametrize("name", ["summary.csv", "episodes.npz", POLICY])
+@pytest.mark.parametrize("name", ["summary.csv", "runs.npz", POLICY])
 def test_altered_results_are_not_shown_as_if_whole(name, copy, compare):
     content = bytearray((copy / name).read_bytes())
     content[len(content) // 2] ^= 1
@@ -464,14 +451,6 @@ def test_other_settings_do_not_mix_with_results(change, named, copy, compare):
     assert re.search(rf"\(.*\b{named}\b.* differ\)", err)
     assert "--force" in err
     assert contents(copy) == before
-
-
-def test_learners_are_told_by_the_names_that_readers_know():
-    settings = commands.parse_arguments(["--seeds", "1"])
-    told = commands.facts(settings, commands.build_study(settings))
-    assert told["Learners"] == (
-        "Q-learning; SARSA; Dyna-Q (p3), planning steps 3; Dyna-Q (p5), planning steps 5"
-    )
 
 
 def test_lists_drop_what_is_said_twice(tmp_path, compare):
@@ -514,9 +493,9 @@ def test_other_worlds(world, tmp_path, compare):
     (row,) = read_csv(tmp_path / "out" / "summary.csv")
     built = worlds.load_map(GARDEN) if world == "garden" else worlds.open_world(5)
     expected = train(built, config_of(row), 0, 2, 30)
-    with np.load(tmp_path / "out" / "episodes.npz") as archive:
-        assert np.array_equal(archive["returns"], expected.returns)
-        assert np.array_equal(archive["steps"], expected.steps)
+    archive = archives.read(tmp_path / "out" / "runs.npz")
+    assert np.array_equal(archive["return_all"], expected.returns.mean(axis=2))
+    assert np.array_equal(archive["steps_all"], expected.steps.mean(axis=2))
 
 
 def test_a_learner_of_ones_own_and_a_discount_of_one_are_reported(tmp_path, compare):
@@ -525,10 +504,10 @@ def test_a_learner_of_ones_own_and_a_discount_of_one_are_reported(tmp_path, comp
     status, out, _ = compare(*TINY, *changes, "--out", tmp_path / "out")
     assert status == 0
     assert out.startswith("World: the paper's.\n")
-    with np.load(tmp_path / "out" / "episodes.npz") as archive:
-        returns = archive["returns"].mean(axis=2)[:, 0]
-        best = int(returns.argmax())
-        greedy = archive["greedy_returns"][best].mean()
+    archive = archives.read(tmp_path / "out" / "runs.npz")
+    returns = archive["return_all"][:, 0]
+    best = int(returns.argmax())
+    greedy = archive["greedy_return"][best].mean()
     cells = [line.split() for line in out.splitlines() if line.startswith("hysteretic *")]
     assert cells[0][3] == f"{returns[best]:.1f}"
     assert " paper " not in out.split("Learner")[1]  # it does not have such a learner
@@ -554,15 +533,6 @@ def test_all_learners_of_the_library_can_be_compared(tmp_path, compare):
     ]
     assert "Expected SARSA" in out
     assert "trace_decay=0.5" in " ".join(out.split())
-
-
-def test_training_of_the_comparison_can_be_continued(finished):
-    """A run of the comparison is the beginning of any longer one."""
-    row = read_csv(finished / "summary.csv")[0]
-    first = train(worlds.paper(), config_of(row), SEEDS, EPISODES, MAX_STEPS, task_of(row))
-    longer = continue_training(first, 5)
-    with np.load(finished / "episodes.npz") as archive:
-        assert np.array_equal(longer.returns[0, :, :EPISODES], archive["returns"][0])
 
 
 @pytest.mark.slow

@@ -9,6 +9,7 @@ from synthetic_colony_study import build as build_study
 from synthetic_comparison import build, change, unchanged
 
 from taichi_ants import Colony, Task, TrainingConfig, worlds
+from taichi_ants.analysis.bounds.baselines import Baseline
 from taichi_ants.analysis.colony.figures import draw_all as draw_study
 from taichi_ants.analysis.colony.results import Results as StudyResults
 from taichi_ants.analysis.drawings import drawings
@@ -24,13 +25,7 @@ from taichi_ants.report.players import Seen
 from taichi_ants.viewer import record_colony, record_episode
 
 FACTS = {"World": "the <paper's>", "Command": "compare.py --out 'a & b'"}
-BASELINES = [
-    {
-        "baseline": "shortest delivery",
-        "discount": None,
-        **{"return_mean": 45.0, "steps_mean": 34.0, "deliveries_mean": 1.0},
-    }
-]
+BASELINES = [Baseline("shortest delivery", None, 45.0, 34.0, 1.0)]
 
 
 @cache

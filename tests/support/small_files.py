@@ -27,7 +27,7 @@ from taichi_ants.files.results import ResultFolder
 from taichi_ants.live.session import Session
 from taichi_ants.live.setup import Setup
 from taichi_ants.offline.dataset import COLUMNS
-from taichi_ants.studies.blocks import Form, kept
+from taichi_ants.studies.blocks import kept
 from taichi_ants.studies.sweep_file import read_sweep
 from taichi_ants.worlds import World
 
@@ -151,14 +151,13 @@ def _dataset() -> Dataset:
 
 def _block(path: Path, first: bool = False) -> dict[str, np.ndarray]:
     """A block; AntsError where it would be made anew."""
-    forms = {"steps": Form(np.integer, (2, 3), 0, 9), "q_values": Form(np.float32, (2, 5))}
 
     def make() -> dict[str, np.ndarray]:
         if not first:
             raise AntsError(f"{str(path)!r} is done anew.")
         return {"steps": np.arange(6).reshape(2, 3), "q_values": Q_VALUES[:2]}
 
-    return kept(path, {"seeds": [0, 1]}, forms, make)
+    return kept(path, {"seeds": [0, 1]}, make)
 
 
 def _finished(folder: Path) -> dict[str, Any]:

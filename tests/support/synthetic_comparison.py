@@ -8,11 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from taichi_ants.analysis.behaviour import DELIVERS, WALKS
 from taichi_ants.analysis.paper.comparison import Comparison, GridPoint, Row, Variant
+from taichi_ants.analysis.paper.curves import learning_curves
+from taichi_ants.analysis.paper.measures import measures_of_runs
 from taichi_ants.analysis.paper.published import DYNA_P3, GRID, Q_LEARNING, SARSA, VARIANTS
 
 # What rows of baselines are held against, in the paper's protocol.
@@ -111,7 +114,7 @@ def build(
     shared: float = 3.0,
     truth: Callable[[Variant, GridPoint], Truth] = paper_truth,
     random_seed: int = 7,
-) -> Comparison:
+) -> Made:
     """A comparison drawn from the truth.
 
     Args:
@@ -135,15 +138,42 @@ def build(
                 greedy.append(_rollouts(row, seeds, rollouts))
     arrays = dict(zip(EPISODES, np.moveaxis(np.array(runs), 1, 0), strict=True))
     arrays |= dict(zip(ROLLOUTS, np.moveaxis(np.array(greedy), 1, 0), strict=True))
+    return comparison_of(arrays, tuple(rows))
+
+
+def comparison_of(arrays: dict[str, np.ndarray], rows: tuple[Row, ...], **fields: Any) -> Made:
+    """The comparison of these episodes and rollouts, arrays (rows, seeds, ...) by name."""
+    returns, greedy = arrays["returns"], arrays["greedy_returns"]
     delivers = arrays["greedy_deliveries"][..., 0] > 0
-    return Comparison(
-        rows=tuple(rows),
-        seeds=tuple(range(seeds)),
-        **arrays,
-        behaviours=np.where(delivers, DELIVERS, WALKS),
-        policy_returns=arrays["greedy_returns"][..., 0].copy(),
-        max_steps=600,
+    usual: dict[str, Any] = {
+        "seeds": tuple(range(returns.shape[1])),
+        "behaviours": np.where(delivers, DELIVERS, WALKS),
+        "policy_returns": greedy[..., 0].copy(),
+        "max_steps": 600,
+    }
+    made = Made(
+        rows=rows,
+        measures={},
+        episodes=returns.shape[2],
+        rollouts=greedy.shape[2],
+        arrays=arrays,
+        **{**usual, **fields},
     )
+    return remeasured(made)
+
+
+def remeasured(made: Made) -> Made:
+    """The same with the measures and learning curves of its episodes, which may have changed."""
+    made = replace(made, measures=measures_of_runs(made.arrays))
+    each = ({n: made.arrays[n][row] for n in EPISODES} for row in range(len(made.rows)))
+    return replace(made, curves=learning_curves(made, enumerate(each)))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Made(Comparison):
+    """A comparison that keeps its episodes."""
+
+    arrays: dict[str, np.ndarray]
 
 
 def _runs(
@@ -174,11 +204,18 @@ def _rollouts(row: Truth, seeds: int, rollouts: int) -> np.ndarray:
     return values.astype(np.int32)
 
 
-def subset(comparison: Comparison, rows: Sequence[int], seeds: int, episodes: int) -> Comparison:
+def subset(comparison: Made, rows: Sequence[int], seeds: int, episodes: int) -> Made:
     """Some rows, the first seeds and the first episodes of a comparison."""
     rows = list(rows)
-    arrays = {name: getattr(comparison, name)[rows, :seeds, :episodes] for name in EPISODES}
-    for name in (*ROLLOUTS, "behaviours", "policy_returns"):
-        arrays[name] = getattr(comparison, name)[rows, :seeds]
-    names = tuple(comparison.rows[row] for row in rows)
-    return replace(comparison, rows=names, seeds=comparison.seeds[:seeds], **arrays)
+    arrays = {name: comparison.arrays[name][rows, :seeds, :episodes] for name in EPISODES}
+    arrays |= {name: comparison.arrays[name][rows, :seeds] for name in ROLLOUTS}
+    return comparison_of(
+        arrays,
+        tuple(comparison.rows[row] for row in rows),
+        seeds=comparison.seeds[:seeds],
+        behaviours=comparison.behaviours[rows, :seeds],
+        policy_returns=comparison.policy_returns[rows, :seeds],
+        max_steps=comparison.max_steps,
+        task=comparison.task,
+        world=comparison.world,
+    )

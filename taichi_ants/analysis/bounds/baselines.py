@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import astuple, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,14 +15,30 @@ from taichi_ants.task import Task
 from taichi_ants.task.constants import EPISODE_STEPS
 from taichi_ants.worlds.world import World
 
-BASELINE_COLUMNS: tuple[str, ...] = (
-    "baseline",
-    "discount",
-    "return_mean",
-    "steps_mean",
-    "deliveries_mean",
-    "note",
-)
+
+class Baseline(NamedTuple):
+    """What a policy brings in an episode, a row of baselines.csv.
+
+    Attributes:
+        baseline: Its name.
+        discount: The discount factor for which it is optimal; None for other policies.
+        return_mean, steps_mean, deliveries_mean: Its outcome; None if it is not known.
+        note: How it was computed, or why it is not known.
+    """
+
+    baseline: str
+    discount: float | None = None
+    return_mean: float | None = None
+    steps_mean: float | None = None
+    deliveries_mean: float | None = None
+    note: str = ""
+
+    @property
+    def label(self) -> str:
+        """Its name and discount, for example "optimal policy, discount 0.9"."""
+        discount = "" if self.discount is None else f", discount {self.discount:g}"
+        return self.baseline + discount
+
 
 # Called as evaluate(world, q_values, rollouts=, max_steps=, task=, seeds=), with one table for
 # each seed: q_values (seeds, n_states, 5). What it returns has returns, steps and deliveries,
@@ -37,8 +53,8 @@ def policy_rows(
     seeds: Sequence[int],
     rollouts: int = 50,
     max_steps: int = EPISODE_STEPS,
-) -> list[dict[str, Any]]:
-    """What the random policy and the trail follower bring, as rows of BASELINE_COLUMNS.
+) -> list[Baseline]:
+    """Return what the random policy and the trail follower bring.
 
     Args:
         world: The world.
@@ -73,8 +89,8 @@ def bound_rows(
     task: Task,
     discounts: Sequence[float] = (0.9, 0.99),
     max_steps: int = EPISODE_STEPS,
-) -> list[dict[str, Any]]:
-    """The exact bounds, as rows of BASELINE_COLUMNS, or one whose note says why there are none.
+) -> list[Baseline]:
+    """Return the exact bounds, or one row whose note says why there are none.
 
     Args:
         world: The world.
@@ -104,7 +120,8 @@ def bound_rows(
 
 
 def _row(
-    baseline: str, note: str, outcome: Outcome | None = None, discount: float | None = None
-) -> dict[str, Any]:
-    means = astuple(outcome) if outcome else (None, None, None)
-    return dict(zip(BASELINE_COLUMNS, (baseline, discount, *means, note), strict=True))
+    name: str, note: str, found: Outcome | None = None, discount: float | None = None
+) -> Baseline:
+    if found is None:
+        return Baseline(name, discount, note=note)
+    return Baseline(name, discount, found.episode_return, found.steps, found.deliveries, note)

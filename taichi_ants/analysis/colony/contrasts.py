@@ -41,6 +41,7 @@ class Series:
             with the same number or with each smaller one.
         least: The smallest number of ants that is compared with the same. For one ant all ways are
             alike, and so are rules for several.
+        main: Whether it is one of the main findings.
     """
 
     question: str
@@ -50,6 +51,7 @@ class Series:
     measure: str = "deliveries"
     against: Literal["same", "smaller"] = "same"
     least: int = 2
+    main: bool = False
 
     def contrasts(self, measured: Measured, arena: str) -> dict[Sizes, Contrast]:
         """The contrasts of an arena; none where conditions are missing."""
@@ -79,7 +81,7 @@ ELSEWHERE = "Does a policy hold in other worlds?"
 # fmt: off
 SERIES: tuple[Series, ...] = (
     Series(ADDS, "ants with all three rules deliver more than under the paper's rules",
-           Design(ABC), Design(PAPER)),
+           Design(ABC), Design(PAPER), main=True),
     Series(ADDS, "ants with all three rules deliver more than with trails with a direction alone",
            Design(ABC), Design(A)),
     Series(ADDS, "ants with all three rules deliver more than with right of way and ants in view",
@@ -87,7 +89,7 @@ SERIES: tuple[Series, ...] = (
     Series(ADDS, "ants that queue deliver more than with the three rules",
            Design(QUEUES), Design(ABC)),
     Series(TRAIL, "under the paper's rules, ants deliver more if they lay trails",
-           Design(PAPER), Design(SILENT), least=1),
+           Design(PAPER), Design(SILENT), least=1, main=True),
     Series(TRAIL, "under the paper's rules, ants deliver more if trails have a direction",
            Design(A), Design(PAPER), least=1),
     Series(TRAIL, "with all three rules, ants deliver more if they lay trails",
@@ -101,7 +103,7 @@ SERIES: tuple[Series, ...] = (
     Series(TRAINING, "under the paper's rules, ants deliver more if all train, not only one",
            Design(PAPER), Design(PAPER, ALONE)),
     Series(TRAINING, "with all three rules, ants deliver more if all train, not only one",
-           Design(ABC), Design(ABC, ALONE)),
+           Design(ABC), Design(ABC, ALONE), main=True),
     Series(TRAINING, "with all three rules, ants deliver more if all train, not only 4",
            Design(ABC), Design(ABC, FEW)),
     Series(TRAINING, "with all three rules, ants deliver more if all train, not only 16",

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 from taichi_ants.analysis import style
 from taichi_ants.analysis.colony.study import (
@@ -25,6 +25,7 @@ from taichi_ants.analysis.colony.study import (
     A,
     Design,
 )
+from taichi_ants.analysis.colony.tables import ConditionRow
 from taichi_ants.analysis.findings import seeds_in_words
 from taichi_ants.analysis.sweeps import draw_lines
 from taichi_ants.analysis.tables import sentence
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Rows = Sequence[Mapping[str, Any]]
+Rows = Sequence[ConditionRow]
 
 
 def draw_all(rows: Rows) -> dict[str, Figure]:
@@ -76,11 +77,10 @@ FIGURES: dict[str, Callable[[Rows], Figure | None]] = {
 
 def _dots(rows: Rows, designs: Sequence[Design], title: str) -> Figure | None:
     """Deliveries of the largest colonies, a line for each design, a panel for each arena."""
-    panels: dict[str, dict[Design, Mapping]] = {}
-    for row in sorted(rows, key=lambda row: row["ants"]):
-        design = Design(row["rules"], row["way"])
-        if design in designs:  # larger colonies come later
-            panels.setdefault(row["arena"], {})[design] = row
+    panels: dict[str, dict[Design, ConditionRow]] = {}
+    for row in sorted(rows, key=lambda row: row.condition.ants):
+        if row.design in designs:  # larger colonies come later
+            panels.setdefault(row.condition.arena, {})[row.design] = row
     if not panels:
         return None
     across = min(3, len(panels))
@@ -100,7 +100,7 @@ def _dots(rows: Rows, designs: Sequence[Design], title: str) -> Figure | None:
             axis.set_yticks(range(len(designs)), names)
         for axis in axes.flat[len(panels) :]:
             axis.set_axis_off()
-        ants = sorted({int(row["ants"]) for lines in panels.values() for row in lines.values()})
+        ants = sorted({row.condition.ants for lines in panels.values() for row in lines.values()})
         sizes = f"{' or '.join(map(str, ants))} {'ant' if ants == [1] else 'ants'}"
         caption = (
             f"{sizes}. {_spread(rows)} Thin line: from the worst seed to the best. Grey: the "
@@ -111,15 +111,15 @@ def _dots(rows: Rows, designs: Sequence[Design], title: str) -> Figure | None:
     return figure
 
 
-def _dot(axis: Axes, place: int, row: Mapping) -> None:
+def _dot(axis: Axes, place: int, row: ConditionRow) -> None:
     """The mean with its interval, value and range over seeds, and the bounds where known."""
-    mean, low, high = (row[f"deliveries_{end}"] for end in ("mean", "ci_low", "ci_high"))
+    mean, low, high, *_ = row.centres["deliveries"]
     colour = style.COLOURS[place % len(style.COLOURS)]
     axis.hlines(place, low, high, color=colour, lw=3)
     axis.plot(mean, place, "o", color=colour)
-    axis.hlines(place, row["deliveries_min"], row["deliveries_max"], color=colour, lw=0.8)
-    axis.hlines(place, row["bound_min"], row["bound_max"], color=style.GREY, lw=3, alpha=0.5)
-    axis.plot(row["bound_mean"], place, "|", color=style.GREY, ms=12, mew=2)
+    axis.hlines(place, *row.ranges["deliveries"], color=colour, lw=0.8)
+    axis.hlines(place, *row.ranges["bound"], color=style.GREY, lw=3, alpha=0.5)
+    axis.plot(row.centres["bound"].mean, place, "|", color=style.GREY, ms=12, mew=2)
     axis.annotate(
         f"{mean:.0f}", (mean, place), (0, 5), textcoords="offset points", ha="center", fontsize=8
     )
@@ -129,7 +129,7 @@ def _lines(
     rows: Rows, designs: Sequence[Design], measures: Sequence[str], title: str
 ) -> Figure | None:
     """Measures against the number of ants, a column of panels for each arena."""
-    arenas = [one for one in ARENAS if any(row["arena"] == one for row in rows)]
+    arenas = [one for one in ARENAS if any(row.condition.arena == one for row in rows)]
     if not arenas:
         return None
     with style.styled():
@@ -139,7 +139,7 @@ def _lines(
         for line_of_axes, measure in zip(axes, measures, strict=True):
             line_of_axes[0].set_ylabel(textwrap.fill(sentence(MEASURES[measure]), 30))
             for axis, arena in zip(line_of_axes, arenas, strict=True):
-                of_arena = [row for row in rows if row["arena"] == arena]
+                of_arena = [row for row in rows if row.condition.arena == arena]
                 draw_lines(axis, {one.words: _points(of_arena, one, measure) for one in designs})
         for column, arena in zip(axes.T, arenas, strict=True):
             column[0].set_title(sentence(ARENAS[arena]), fontsize=9)
@@ -150,12 +150,11 @@ def _lines(
 
 def _spread(rows: Rows) -> str:
     """The seeds, the intervals and the exploration rate, for a caption."""
-    seeds = int(rows[0]["seeds"])
+    seeds = rows[0].seeds
     means = f"Means over {seeds_in_words(seeds)}, with 95 % intervals" if seeds > 1 else "One seed"
     return f"{means}. Exploration rate {EVALUATION_EPSILON:g}."
 
 
 def _points(rows: Rows, design: Design, measure: str) -> list[tuple[float, ...]]:
     """The number of ants, the mean and the ends of its interval, of each condition of a design."""
-    columns = ("ants", *(f"{measure}_{end}" for end in ("mean", "ci_low", "ci_high")))
-    return [tuple(row[n] for n in columns) for row in rows if (row["rules"], row["way"]) == design]
+    return [(row.condition.ants, *row.centres[measure][:3]) for row in rows if row.design == design]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from taichi_ants.analysis.colony.contrasts import QUESTIONS, Judged, Series, Sizes
+from taichi_ants.analysis.colony.contrasts import QUESTIONS, SERIES, Judged, Series, Sizes
 from taichi_ants.analysis.colony.study import (
     ABC,
     ABROAD,
@@ -26,7 +26,7 @@ from taichi_ants.analysis.colony.study import (
     Measured,
 )
 from taichi_ants.analysis.findings import Finding, Verdict, seeds_in_words, weakest
-from taichi_ants.analysis.sweeps import seed_rows, summary_rows
+from taichi_ants.analysis.sweeps import Centre, centre_columns, centres_of, seed_rows
 from taichi_ants.analysis.tables import (
     MISSING,
     Block,
@@ -50,16 +50,54 @@ def _stacked(measured: Measured) -> dict[str, np.ndarray]:
     return {name: np.stack([one[name] for one in measured.values()]) for name in OF_STUDY}
 
 
-def condition_rows(measured: Measured) -> list[dict[str, Any]]:
-    """Return the rows of conditions.csv: means over seeds with 95 % intervals, and some ranges."""
-    rows = summary_rows([one._asdict() for one in measured], _stacked(measured))
-    for row, values in zip(rows, measured.values(), strict=True):
-        for name in ("deliveries", "bound"):
-            row |= {
-                f"{name}_min": float(values[name].min()),
-                f"{name}_max": float(values[name].max()),
-            }
-    return rows
+class ConditionRow(NamedTuple):
+    """A condition over all seeds, a row of conditions.csv.
+
+    Attributes:
+        condition: The condition.
+        seeds: The number of seeds.
+        centres: The measures of `OF_STUDY` over seeds.
+        ranges: The least and the greatest value of deliveries and bounds over seeds.
+    """
+
+    condition: Condition
+    seeds: int
+    centres: Mapping[str, Centre]
+    ranges: Mapping[str, tuple[float, float]]
+
+    @property
+    def design(self) -> Design:
+        """Its rules and the way to its policy."""
+        return Design(self.condition.rules, self.condition.way)
+
+    def columns(self) -> dict[str, Any]:
+        """Return the columns of conditions.csv."""
+        return {
+            **self.condition._asdict(),
+            "seeds": self.seeds,
+            **centre_columns(self.centres),
+            **{
+                f"{name}_{end}": value
+                for name, ends in self.ranges.items()
+                for end, value in zip(("min", "max"), ends, strict=True)
+            },
+        }
+
+
+def condition_rows(measured: Measured) -> list[ConditionRow]:
+    """Return each condition over its seeds, with 95 % intervals."""
+    seeds = len(next(iter(measured.values()))["deliveries"])
+    return [
+        ConditionRow(
+            condition,
+            seeds,
+            centres,
+            {n: (float(one[n].min()), float(one[n].max())) for n in ("deliveries", "bound")},
+        )
+        for (condition, one), centres in zip(
+            measured.items(), centres_of(_stacked(measured)), strict=True
+        )
+    ]
 
 
 def difference_rows(judged: Judged) -> list[dict[str, Any]]:
@@ -82,28 +120,27 @@ def difference_rows(judged: Judged) -> list[dict[str, Any]]:
     ]
 
 
-def means(rows: Sequence[Mapping[str, Any]]) -> list[Table]:
-    """Return tables of mean deliveries, from `condition_rows`.
+def means(rows: Sequence[ConditionRow]) -> list[Table]:
+    """Return tables of mean deliveries.
 
     One for each arena in which ants were trained, designs down, ants across; then one of the
     policies of open worlds in others, with intervals and the worst seed.
     """
     tables, seeds = [], f"{_basis(rows)}: {MEASURES['deliveries']}"
     for arena in ARENAS:
-        at_home = [row for row in rows if row["arena"] == arena and row["way"] != ABROAD]
-        sizes = sorted({row["ants"] for row in at_home})
-        lines: dict[str, dict[Any, float]] = {}
-        for row in at_home:
-            line = lines.setdefault(Design(row["rules"], row["way"]).words, {})
-            share = {"share": row["of_bound_mean"], "bound": row["bound_mean"]}
-            line |= {row["ants"]: row["deliveries_mean"], **share}  # of most ants, who come last
-        cells = [
-            [
-                *(who, *(figure(by.get(n, np.nan)) for n in sizes)),
-                *(percent(by["share"]), figure(by["bound"])),
-            ]
-            for who, by in lines.items()
-        ]
+        here = [one for one in rows if one.condition.arena == arena and one.design.way != ABROAD]
+        sizes = sorted({one.condition.ants for one in here})
+        lines: dict[Design, dict[int, ConditionRow]] = {}
+        for one in here:
+            lines.setdefault(one.design, {})[one.condition.ants] = one
+        cells = []
+        for design, by_size in lines.items():
+            delivered = (
+                by_size[n].centres["deliveries"].mean if n in by_size else None for n in sizes
+            )
+            largest = list(by_size.values())[-1].centres
+            share, bound = (largest[name].mean for name in ("of_bound", "bound"))
+            cells.append([design.words, *map(figure, delivered), percent(share), figure(bound)])
         if cells:
             headers = ("ants", *map(str, sizes), "share of\nbound", "mean\nbound")
             note = (
@@ -112,88 +149,115 @@ def means(rows: Sequence[Mapping[str, Any]]) -> list[Table]:
             )
             title = f"{sentence(ARENAS[arena])}, {seeds}"
             tables.append(Table(title, headers, cells, [note]))
-    abroad = [row for row in rows if row["way"] == ABROAD]
+    abroad = [one for one in rows if one.design.way == ABROAD]
     if abroad:
-        rules = list(dict.fromkeys(row["rules"] for row in abroad))
+        rules = list(dict.fromkeys(one.condition.rules for one in abroad))
         there: dict[str, dict[str, str]] = {}
-        for row in abroad:
-            there.setdefault(row["arena"], {})[row["rules"]] = _spread(row)
-        cells = [[WORLDS[a], *(by[one] for one in rules)] for a, by in there.items()]
-        headers = ("world", *(RULES[one] for one in rules))
-        title = f"{sentence(WAYS[ABROAD])}, {count(abroad[0]['ants'], 'ant')}, {seeds}"
+        for one in abroad:
+            there.setdefault(one.condition.arena, {})[one.condition.rules] = _spread(one)
+        cells = [[WORLDS[a], *(by[name] for name in rules)] for a, by in there.items()]
+        headers = ("world", *(RULES[name] for name in rules))
+        title = f"{sentence(WAYS[ABROAD])}, {count(abroad[0].condition.ants, 'ant')}, {seeds}"
         note = "Mean, its 95 % interval, and the worst seed."
         tables.append(Table(title, headers, cells, [note]))
     return tables
 
 
-def _basis(rows: Sequence[Mapping[str, Any]]) -> str:
+def _basis(rows: Sequence[ConditionRow]) -> str:
     """The seeds and the exploration rate behind the numbers of a table."""
-    return f"{seeds_in_words(rows[0]['seeds'])}, exploration rate {EVALUATION_EPSILON:g}"
+    return f"{seeds_in_words(rows[0].seeds)}, exploration rate {EVALUATION_EPSILON:g}"
 
 
-def _spread(row: Mapping[str, Any]) -> str:
+def _spread(row: ConditionRow) -> str:
     """A mean with its interval, and the worst seed."""
-    mean, *ends, worst = (
-        row[f"deliveries_{which}"] for which in ("mean", "ci_low", "ci_high", "min")
-    )
-    return f"{figure(mean)} {interval(ends[0], ends[1], 0)}, {figure(worst)}"
+    mean, low, high, *_ = row.centres["deliveries"]
+    return f"{figure(mean)} {interval(low, high, 0)}, {figure(row.ranges['deliveries'][0])}"
 
 
-def glance(rows: Sequence[Mapping[str, Any]]) -> Table:
-    """Return what the largest colonies deliver, from `condition_rows`: designs down, arenas across.
+def glance(rows: Sequence[ConditionRow]) -> Table:
+    """Return what the largest colonies deliver: designs down, arenas across.
 
     It has no rows where none are trained.
     """
-    largest = max((row["ants"] for row in rows if row["way"] != ABROAD), default=0)
-    shown = [row for row in rows if row["ants"] == largest and row["arena"] in ARENAS]
+    largest = max((one.condition.ants for one in rows if one.design.way != ABROAD), default=0)
+    shown = {
+        (one.condition.arena, one.design): one
+        for one in rows
+        if one.condition.ants == largest and one.condition.arena in ARENAS
+    }
     designs = [Design(PAPER, ALONE), *(Design(rules) for rules in RULES), Design(ABC, ALONE)]
-    arenas = [arena for arena in ARENAS if any(row["arena"] == arena for row in shown)]
-    by_place = {(row["arena"], Design(row["rules"], row["way"])): row for row in shown}
-    digits = 0 if max((row["deliveries_mean"] for row in shown), default=0) >= 100 else 1
+    arenas = [arena for arena in ARENAS if any(place == arena for place, _ in shown)]
+    most = max((one.centres["deliveries"].mean for one in shown.values()), default=0)
+    digits = 0 if most >= 100 else 1
     cells = [
-        [sentence(one.words), *(_delivered(by_place.get((arena, one)), digits) for arena in arenas)]
+        [sentence(one.words), *(_delivered(shown.get((arena, one)), digits) for arena in arenas)]
         for one in designs
-        if any((arena, one) in by_place for arena in arenas)
+        if any((arena, one) in shown for arena in arenas)
     ]
     if cells:  # most is possible where ants with food have right of way
-        most = [
-            max((row for row in shown if row["arena"] == arena), key=lambda row: row["bound_mean"])
+        bounds = [
+            max(
+                (one for (place, _), one in shown.items() if place == arena),
+                key=lambda one: one.centres["bound"].mean,
+            )
             for arena in arenas
         ]
-        cells.append(["Mean bound, right of way [range]", *map(_bounds, most)])
+        cells.append(["Mean bound, right of way [range]", *map(_bounds, bounds)])
     headers = ("", *(sentence(ARENAS[arena]).replace(" (", "\n(") for arena in arenas))
     title = f"{sentence(MEASURES['deliveries'])} of {count(largest, 'ant')}"
     note = f"{_basis(rows)}; in brackets: 0. %: of each world's own bound."
     return Table(title, headers, cells, [note] if cells else [])
 
 
-def _delivered(row: Mapping[str, Any] | None, digits: int) -> str:
+def _delivered(row: ConditionRow | None, digits: int) -> str:
     """Deliveries with and without exploration, and the share of the bounds."""
     if row is None:
         return MISSING
-    with_, without = (number(row[f"{name}_mean"], digits) for name in ("deliveries", "greedy"))
-    return f"{with_} ({without}), {percent(row['of_bound_mean'])}"
+    with_, without = (number(row.centres[name].mean, digits) for name in ("deliveries", "greedy"))
+    return f"{with_} ({without}), {percent(row.centres['of_bound'].mean)}"
 
 
-def _bounds(row: Mapping[str, Any]) -> str:
+def _bounds(row: ConditionRow) -> str:
     """The mean of the worlds' bounds, with their range where they differ."""
-    low, high = row["bound_min"], row["bound_max"]
-    return figure(row["bound_mean"]) + ("" if low == high else f" {interval(low, high, 0)}")
+    low, high = row.ranges["bound"]
+    range_ = "" if low == high else f" {interval(low, high, 0)}"
+    return figure(row.centres["bound"].mean) + range_
 
 
-def on_one_screen(
-    rows: Sequence[Mapping[str, Any]], judged: Judged, answer: Sequence[str]
-) -> list[Block]:
-    """The answer, deliveries at a glance, and how many statements hold."""
+def headlines(rows: Sequence[ConditionRow], judged: Judged) -> Table:
+    """Return the main findings on the largest colonies: statements down, arenas across."""
+    by_condition = {one.condition: one.centres for one in rows}
+    arenas = [one for one in ARENAS if any(arena == one and s.main for arena, s in judged)]
+    cells = []
+    for series in [one for one in SERIES if one.main]:
+        line = []
+        for arena in arenas:
+            n = max((ants for ants, _ in judged.get((arena, series), {})), default=1)
+            if n > 1:
+                means = (
+                    figure(by_condition[Condition(arena, *design, n)][series.measure].mean)
+                    for design in (series.first, series.second)
+                )
+                verdict = judged[arena, series][n, n].verdict.value
+                line.append(f"{verdict}\n{n}: {' against '.join(means)}")
+        if len(line) == len(arenas) > 0:
+            cells.append([sentence(series.statement), *line])
+    headers = ("Statement", *(sentence(ARENAS[arena]).replace(" (", "\n(") for arena in arenas))
+    note = (
+        "Below the verdict: the number of ants, and the means compared, in "
+        f"{MEASURES['deliveries']}. {_basis(rows)}."
+    )
+    return Table("", headers, cells, [note] if cells else [], text_columns=len(headers))
+
+
+def on_one_screen(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
+    """Return deliveries at a glance, the main findings, and how many statements hold."""
     seen = glance(rows)
     tables = [seen] if seen.rows else means(rows)
-    return [_sizes(rows), "\n".join(answer), *tables, tallies(judged)]
-
-
-def _sizes(rows: Sequence[Mapping[str, Any]]) -> str:
-    arenas = dict.fromkeys(row["arena"] for row in rows)
+    arenas = {one.condition.arena for one in rows}
     conditions = f"{count(len(rows), 'condition')} in {count(len(arenas), 'kind')} of world"
-    return f"{conditions}, {seeds_in_words(rows[0]['seeds'])}."
+    sizes = f"{conditions}, {seeds_in_words(rows[0].seeds)}."
+    return [sizes, *tables, headlines(rows, judged), tallies(judged)]
 
 
 def tallies(judged: Judged) -> str:
@@ -221,22 +285,21 @@ _SHOWN = (Verdict.SUPPORTED, Verdict.CONTRADICTED, Verdict.UNDECIDED)
 _HEADERS = ("World", "Statement", *(f"{sentence(one)}\nwith" for one in _SHOWN), "Clearest")
 
 
-def found(measured: Measured, judged: Judged) -> list[Block]:
+def found(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
     """Return the findings: a table for each question, a line for each series in each arena."""
     blocks: list[Block] = []
-    seeds = len(measured[next(iter(measured))]["deliveries"])
-    basis = f"{seeds_in_words(seeds)}, exploration rate {EVALUATION_EPSILON:g}"
+    centres = {one.condition: one.centres for one in rows}
     for question in QUESTIONS:
         lines, units, shown = [], [], ""
         for (arena, series), findings in judged.items():
             if series.question == question:
                 world = "" if arena == shown else sentence(WORLDS[arena])
-                verdicts = _verdicts(measured, arena, series, findings)
+                verdicts = _verdicts(centres, arena, series, findings)
                 lines.append([world, sentence(series.statement), *verdicts])
                 units.append(MEASURES[series.measure])
                 shown = arena
         what = f"{sentence(' or '.join(dict.fromkeys(units)))}, as the statement says"
-        notes = [f"{what}; {basis}."]
+        notes = [f"{what}; {_basis(rows)}."]
         if lines:
             blocks.append(Table(question, _HEADERS, lines, notes, text_columns=len(_HEADERS)))
     return [
@@ -248,7 +311,10 @@ def found(measured: Measured, judged: Judged) -> list[Block]:
 
 
 def _verdicts(
-    measured: Measured, arena: str, series: Series, findings: Mapping[Sizes, Finding]
+    centres: Mapping[Condition, Mapping[str, Centre]],
+    arena: str,
+    series: Series,
+    findings: Mapping[Sizes, Finding],
 ) -> list[str]:
     """With how many ants a statement holds, and the two means that differ most."""
     by_verdict: dict[Verdict, list[int]] = {verdict: [] for verdict in Verdict}
@@ -259,9 +325,9 @@ def _verdicts(
     cells = [", ".join(map(str, sorted(by_verdict[one]))) or MISSING for one in _SHOWN]
 
     def both(n: int, other: int) -> tuple[float, float]:
-        first = measured[Condition(arena, *series.first, n)][series.measure]
-        second = measured[Condition(arena, *series.second, other)][series.measure]
-        return float(first.mean()), float(second.mean())
+        first = centres[Condition(arena, *series.first, n)][series.measure]
+        second = centres[Condition(arena, *series.second, other)][series.measure]
+        return first.mean, second.mean
 
     def distance(sizes: Sizes) -> float:
         one, other = both(*sizes)

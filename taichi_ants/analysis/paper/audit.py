@@ -9,10 +9,12 @@ from taichi_ants.analysis.findings import Contrast, Finding, Verdict, judge, wea
 from taichi_ants.analysis.paper.claims import CLAIMS, Claim
 from taichi_ants.analysis.paper.comparison import Comparison
 from taichi_ants.analysis.paper.quantities import Slice
-from taichi_ants.analysis.tables import Block, Table, interval, markdown, number
+from taichi_ants.analysis.tables import Block, Table, interval, markdown, number, sentence
 
 # By claim and delivery setting.
 Audit = dict[Claim, dict[str, Finding]]
+# The main claims. Two of them are about steps, because they disagree.
+HEADLINES = ("q-return-highest", "overall-sarsa-length", "sarsa-much-shorter")
 
 
 def assess(comparison: Comparison, claims: Sequence[Claim] = CLAIMS) -> Audit:
@@ -88,6 +90,29 @@ def claims_tallies(audit: Audit) -> str:
     """How many claims of the paper hold, in lines for a terminal."""
     lines = [f"The paper's {len(audit)} claims", *(f"  {line}" for line in _tallies(audit))]
     return "\n".join(lines)
+
+
+def headlines(audit: Audit) -> Table:
+    """Return a table of the findings on the main claims, a column for each delivery setting."""
+    claims = {claim.id: claim for claim in audit}
+    rows = [
+        [claims[name].statement, *map(_verdict_and_difference, audit[claims[name]].values())]
+        for name in HEADLINES
+    ]
+    note = (
+        "Below the verdict: the difference that decides, its interquartile mean (IQM) over seeds "
+        "in reward or steps, and its interval, which holds for all claims at once."
+    )
+    settings = next(iter(audit.values()))
+    headers = ("The paper's main claims", *map(sentence, settings))
+    return Table("", headers, rows, [note], text_columns=len(headers))
+
+
+def _verdict_and_difference(finding: Finding) -> str:
+    if finding.verdict is Verdict.NOT_TESTED:
+        return finding.verdict.value
+    numbers = f"{number(finding.effect)} {interval(finding.low, finding.high)}"
+    return f"{finding.verdict.value}\n{finding.contrast.label}\n{numbers}"
 
 
 def claims_markdown(audit: Audit, world: str) -> str:

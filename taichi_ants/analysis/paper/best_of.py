@@ -26,9 +26,9 @@ def best_of(
     rows = np.array(comparison.positions(delivery, variant))
     random = np.random.default_rng(RANDOM_SEED)
     seeds = random.integers(0, len(comparison.seeds), size=(draws, len(rows)))
-    winner = comparison.measure("return_last50")[rows, seeds].argmax(axis=1)
+    winner = comparison.measures["return_last50"][rows, seeds].argmax(axis=1)
     won = rows[winner], seeds[np.arange(draws), winner]
-    return {name: comparison.measure(name)[won] for name in FIGURES}
+    return {name: comparison.measures[name][won] for name in FIGURES}
 
 
 def percentile_of(figure: float, values: np.ndarray) -> float:
@@ -52,7 +52,7 @@ def shown_position(comparison: Comparison, delivery: str, variant: Variant) -> i
     if same is not None:
         return same
     positions = comparison.positions(delivery, variant)
-    returns = interquartile_mean(comparison.measure("return_last50")[positions])
+    returns = interquartile_mean(comparison.measures["return_last50"][positions])
     return positions[int(returns.argmax())]
 
 
@@ -81,5 +81,5 @@ def example_name(comparison: Comparison, row: int, run: int) -> str:
 def _median_run(comparison: Comparison, row: int, behaviour: int) -> int:
     """The seed, by its position, of the median return among the runs that behave so."""
     runs = np.flatnonzero(comparison.behaviours[row] == behaviour)
-    order = np.argsort(comparison.measure("return_last50")[row, runs], kind="stable")
+    order = np.argsort(comparison.measures["return_last50"][row, runs], kind="stable")
     return int(runs[order[(len(runs) - 1) // 2]])

@@ -1,19 +1,19 @@
-"""What the analysis reads: for every configuration and seed, what each episode gave.
+"""The data of a comparison: measures of each configuration and seed, and learning curves.
 
-Rows are configurations, the second axis is the seed, the third the episode (or the rollout of the
-greedy evaluation). The seed is the unit of all statistics, and because one seed drives every
-configuration with the same random numbers, differences of rows are taken seed by seed.
+Rows are configurations, the second axis is the seed. The seed is the unit of all statistics, and
+because one seed drives every configuration with the same random numbers, differences of rows are
+taken seed by seed.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
-from taichi_ants.analysis.paper.measures import RunOutcomes
 from taichi_ants.learners import TrainingConfig, label
 from taichi_ants.task import Task
 
@@ -76,25 +76,33 @@ class Row(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Comparison(RunOutcomes):
+class Comparison:
     """Configurations times seeds, trained and evaluated.
 
     Attributes:
         rows: The configurations, each once.
         seeds: The seeds, at least one.
+        measures: `MEASURES` of each run by name, float64 (rows, seeds).
         behaviours: What each final policy does, places in `behaviour.BEHAVIOURS`, integer
             (rows, seeds).
         policy_returns: What the ant earned in the episode that told so, integer (rows, seeds).
+        episodes: Training episodes of a run.
+        rollouts: Greedy rollouts of a run.
         max_steps: Limit of an episode in steps.
-        task: The rules of all rows, but for the delivery.
+        curves: Learning curves of the learners, see `curves.learning_curves`.
+        task: The rules of all rows, except the delivery.
         world: Name of the world; only in `PAPER_WORLD` ours can be held against the paper.
     """
 
     rows: tuple[Row, ...]
     seeds: tuple[int, ...]
+    measures: Mapping[str, np.ndarray]
     behaviours: np.ndarray
     policy_returns: np.ndarray
+    episodes: int
+    rollouts: int
     max_steps: int
+    curves: Mapping[str, np.ndarray] = field(default_factory=dict)
     task: Task = _PAPER_TASK
     world: str = PAPER_WORLD
 

@@ -7,17 +7,17 @@ needed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import cycle
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, counts
-from taichi_ants.analysis.paper.best_of import shown_position
+from taichi_ants.analysis.bounds.baselines import Baseline
 from taichi_ants.analysis.paper.comparison import Comparison
+from taichi_ants.analysis.paper.curves import curve_row, spans
 from taichi_ants.analysis.paper.published import FIGURE_1
-from taichi_ants.analysis.statistics import interquartile_mean
 from taichi_ants.analysis.style import (
     BLUE,
     COLOURS,
@@ -30,20 +30,18 @@ from taichi_ants.analysis.style import (
     new_figure,
     styled,
 )
-from taichi_ants.analysis.tables import baseline_name
 from taichi_ants.errors import count
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_PER_DECADE = 12  # points of a learning curve between two powers of ten
 _CURVES = {"returns": "Return", "steps": "Steps", "deliveries": "Deliveries"}
 # Colours and marks of behaviours, by their places in `BEHAVIOURS`.
 BEHAVIOUR_LOOKS = ((BLUE, "o"), (ORANGE, "^"), (WINE, "s"), (INK, "x"))
 
 
-def learning_curves(comparison: Comparison, baselines: Sequence[Mapping] = ()) -> Figure:
+def learning_curves(comparison: Comparison, baselines: Sequence[Baseline] = ()) -> Figure:
     """Return, length and deliveries per episode, a column for each delivery setting.
 
     Learners are shown at the configuration that stands for the paper's figure 1, one that lacks it
@@ -53,18 +51,21 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Mapping] = ()) -
     """
     colours = dict(zip(comparison.variants, cycle(COLOURS)))
     settings = comparison.delivery_settings
+    edges = spans(comparison.episodes)
+    at = np.sqrt((edges[:-1] + 1) * edges[1:])  # the middle of a span on a logarithmic axis
     with styled():
         figure = new_figure(6.5)
         shape = len(_CURVES), len(settings)
         axes = figure.subplots(*shape, sharex=True, sharey="row", squeeze=False)
-        for setting, variant in comparison.learners:
-            row, label = comparison.position(setting, variant, FIGURE_1), variant.label
-            if row is None:
-                row = shown_position(comparison, setting, variant)
-                label += f", {setting}: {comparison.rows[row].point.label}"
+        for place, (setting, variant) in enumerate(comparison.learners):
+            point = comparison.rows[curve_row(comparison, setting, variant)].point
+            label = variant.label + ("" if point == FIGURE_1 else f", {setting}: {point.label}")
             for axis, name in zip(axes[:, settings.index(setting)], _CURVES, strict=True):
-                runs = getattr(comparison, name)[row]
-                _curve(axis, runs, name == "deliveries", colours[variant], label)
+                middle, low, high = comparison.curves[name][place]
+                mark = "o" if len(at) == 1 else ""
+                axis.plot(at, middle, marker=mark, color=colours[variant], label=label)
+                if name != "deliveries":
+                    axis.fill_between(at, low, high, color=colours[variant], alpha=0.15, lw=0)
         for (axis, *_), (name, label) in zip(axes, _CURVES.items(), strict=True):
             axis.set_ylabel(f"{label} of an episode")
             if name == "steps":
@@ -89,15 +90,15 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Mapping] = ()) -
     return figure
 
 
-def return_against_deliveries(comparison: Comparison, baselines: Sequence[Mapping] = ()) -> Figure:
+def return_against_deliveries(comparison: Comparison, baselines: Sequence[Baseline] = ()) -> Figure:
     """Who earns reward by delivering, and what the others do instead: a mark for each run.
 
     Of the rows of baselines.csv the optimal policies, for which delivery is the end, are shown only
     in the panel of absorbing delivery.
     """
     settings = comparison.delivery_settings
-    returns = comparison.measure("return_last50")
-    deliveries = comparison.measure("deliveries_last50")
+    returns = comparison.measures["return_last50"]
+    deliveries = comparison.measures["deliveries_last50"]
     with styled():
         figure = new_figure(5.0)
         axes = figure.subplots(1, len(settings), sharex=True, sharey=True, squeeze=False)[0]
@@ -125,7 +126,7 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Mappin
     return figure
 
 
-def draw_all(comparison: Comparison, baselines: Sequence[Mapping]) -> dict[str, Figure]:
+def draw_all(comparison: Comparison, baselines: Sequence[Baseline]) -> dict[str, Figure]:
     """All figures, by their names."""
     return {draw.__name__: draw(comparison, baselines) for draw in FIGURES}
 
@@ -133,40 +134,25 @@ def draw_all(comparison: Comparison, baselines: Sequence[Mapping]) -> dict[str, 
 FIGURES = (learning_curves, return_against_deliveries)
 
 
-def _curve(axis: Axes, runs: np.ndarray, share: bool, colour: str, label: str) -> None:
-    """A learner's line with its band, of values (seeds, episodes); of a share the mean alone."""
-    # The first episodes, from 0, of spans that grow so that points are evenly spaced on a
-    # logarithmic axis, and the end; the first spans are single episodes.
-    n, end = max(2, round(_PER_DECADE * np.log10(runs.shape[1] + 1)) + 1), runs.shape[1] + 1
-    edges = np.unique(np.geomspace(1, end, n).round().astype(int)) - 1
-    at = np.sqrt((edges[:-1] + 1) * edges[1:])  # the middle of a span on a logarithmic axis
-    means = np.add.reduceat(runs, edges[:-1], axis=1, dtype=float) / np.diff(edges)
-    # One run of an episode delivers or does not: there is no typical half to average.
-    middle = means.mean(axis=0) if share else interquartile_mean(means.T)
-    axis.plot(at, middle, marker="o" if len(at) == 1 else "", color=colour, label=label)
-    if not share:
-        low, high = np.percentile(means, (25, 75), axis=0)
-        axis.fill_between(at, low, high, color=colour, alpha=0.15, lw=0)
-
-
-def _shortest_delivery(column: Sequence[Axes], baselines: Sequence[Mapping]) -> None:
+def _shortest_delivery(column: Sequence[Axes], baselines: Sequence[Baseline]) -> None:
     """Dotted lines at the return and the length of the shortest delivery, where it is known."""
     for row in baselines:
-        if row["baseline"] == "shortest delivery" and row["return_mean"] is not None:
+        if row.baseline == "shortest delivery" and row.return_mean is not None:
             for axis, name in zip(column, ("return_mean", "steps_mean"), strict=False):
-                axis.axhline(row[name], color=INK, lw=0.9, ls=":", label=row["baseline"])
+                axis.axhline(getattr(row, name), color=INK, lw=0.9, ls=":", label=row.baseline)
 
 
-def _baseline_marks(axis: Axes, baselines: Sequence[Mapping], setting: str) -> None:
+def _baseline_marks(axis: Axes, baselines: Sequence[Baseline], setting: str) -> None:
     """Hollow marks, larger than those of the data and above them."""
     for row, marker in zip(baselines, cycle("osD^vph")):
         # Optimal policies take delivery for the end; elsewhere they are no yardstick.
-        counts_here = setting == "absorbing" or row["baseline"] != "optimal policy"
-        if row["return_mean"] is not None and counts_here:
+        counts_here = setting == "absorbing" or row.baseline != "optimal policy"
+        x, y = row.deliveries_mean, row.return_mean
+        if x is not None and y is not None and counts_here:
             axis.plot(
-                *(row["deliveries_mean"], row["return_mean"], marker),
+                *(x, y, marker),
                 color=INK,
                 markerfacecolor="none",
                 markersize=11,
-                label=baseline_name(row),
+                label=row.label,
             )

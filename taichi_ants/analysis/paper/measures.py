@@ -6,15 +6,13 @@ episodes needs 100, so that early and late never share an episode.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_ants.files.rows import Rows
-
 WINDOW = 50
-# What an episode gives: its array in `RunOutcomes`, words, unit.
+# Quantities of an episode: the array of `RunPoint`'s outcome, words, unit.
 _GIVEN = {
     "return": ("returns", "return", "reward"),
     "steps": ("steps", "length", "steps"),
@@ -29,43 +27,9 @@ _WINDOWS = {
 }
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class RunOutcomes:
-    """What each episode of some runs gave: arrays, or `Rows` where they may not fit into memory.
-
-    Attributes:
-        returns: Sum of the rewards of each training episode, integer (rows, seeds, episodes).
-        steps: Length of each training episode in steps, of the same shape.
-        deliveries: Food given to the queen in each episode, of the same shape.
-        greedy_returns, greedy_steps, greedy_deliveries: The same for the greedy rollouts after
-            training, integer (rows, seeds, rollouts).
-    """
-
-    returns: np.ndarray | Rows
-    steps: np.ndarray | Rows
-    deliveries: np.ndarray | Rows
-    greedy_returns: np.ndarray | Rows
-    greedy_steps: np.ndarray | Rows
-    greedy_deliveries: np.ndarray | Rows
-    _measured: dict[str, np.ndarray] = field(init=False, repr=False, default_factory=dict)
-
-    @property
-    def episodes(self) -> int:
-        """Training episodes of a run."""
-        return self.returns.shape[2]
-
-    def measure(self, name: str) -> np.ndarray:
-        """A number of `MEASURES` for each run, float64 (rows, seeds); nan with too little data."""
-        if name not in self._measured:
-            measure, values = MEASURES[name], np.full(self.returns.shape[:2], np.nan)
-            if self.episodes >= measure.episodes:
-                for row in range(len(values)):  # so that only one is in memory
-                    values[row] = measure.compute(self, row)
-            self._measured[name] = values
-        return self._measured[name]
-
-
-Compute = Callable[[RunOutcomes, int], np.ndarray]
+# Arrays of a `RunPoint`'s outcome, integer (..., episodes) or (..., rollouts).
+Outcome = Mapping[str, np.ndarray]
+Compute = Callable[[Outcome], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -75,7 +39,7 @@ class Measure:
     Attributes:
         words: What it is, for readers.
         unit: Its unit.
-        compute: RunOutcomes, row -> float64 (seeds,).
+        compute: Outcome -> float64 (...).
         episodes: The fewest training episodes that it needs.
     """
 
@@ -90,37 +54,51 @@ class Measure:
         return self.unit in ("reward", "steps")
 
 
+def measures_of_runs(outcome: Outcome, names: Iterable[str] | None = None) -> dict[str, np.ndarray]:
+    """Return measures of runs by name, float64 (points, seeds).
+
+    They are nan where the runs have fewer episodes than a measure needs.
+
+    Args:
+        outcome: Arrays (points, seeds, episodes or rollouts) by name, as of a `RunPoint`.
+        names: Names in `MEASURES`; None: all of them.
+    """
+    *shape, episodes = outcome["returns"].shape
+    return {
+        name: MEASURES[name].compute(outcome)
+        if episodes >= MEASURES[name].episodes
+        else np.full(shape, np.nan)
+        for name in names or MEASURES
+    }
+
+
 def _mean(name: str, episodes: slice = slice(None)) -> Compute:
-    return lambda runs, row: getattr(runs, name)[row][:, episodes].mean(axis=1, dtype=float)
+    return lambda runs: runs[name][..., episodes].mean(axis=-1, dtype=float)
 
 
 def _fluctuation(name: str, episodes: slice) -> Compute:
     """Root mean square change from one episode to the next, over the square root of two.
 
-    Without a trend this is the standard deviation of independent episodes; unlike that one, it
-    hardly feels the slow rise of a learning curve.
+    Without a trend this is the standard deviation of independent episodes. Unlike that one, it
+    hardly depends on the slow rise of a learning curve.
     """
 
-    def compute(runs: RunOutcomes, row: int) -> np.ndarray:
-        changes = np.diff(getattr(runs, name)[row][:, episodes].astype(float), axis=1)
-        return np.sqrt(np.einsum("ij,ij->i", changes, changes) / changes.shape[1] / 2)
+    def compute(runs: Outcome) -> np.ndarray:
+        changes = np.diff(runs[name][..., episodes].astype(float))
+        return np.sqrt(np.einsum("...i,...i", changes, changes) / changes.shape[-1] / 2)
 
     return compute
 
 
-def _shortest(runs: RunOutcomes, row: int) -> np.ndarray:
-    return runs.steps[row].min(axis=1).astype(float)
+def _repeats(runs: Outcome) -> np.ndarray:
+    arrays = runs["greedy_returns"], runs["greedy_steps"]
+    same = [(array == array[..., :1]).all(axis=-1) for array in arrays]
+    return np.logical_and(*same).astype(float)
 
 
-def _repeats(runs: RunOutcomes, row: int) -> np.ndarray:
-    returns, steps = runs.greedy_returns[row], runs.greedy_steps[row]
-    same = (returns == returns[:, :1]) & (steps == steps[:, :1])
-    return same.all(axis=1).astype(float)
-
-
-def _improved(runs: RunOutcomes, row: int) -> np.ndarray:
-    late, early = runs.measure("return_last50"), runs.measure("return_first50")
-    return (late[row] > early[row]).astype(float)
+def _improved(runs: Outcome) -> np.ndarray:
+    late, early = (MEASURES[f"return_{when}50"].compute(runs) for when in ("last", "first"))
+    return (late > early).astype(float)
 
 
 def _measures() -> Iterator[tuple[str, Measure]]:
@@ -138,7 +116,11 @@ def _measures() -> Iterator[tuple[str, Measure]]:
 _SHARE = "share of runs"
 MEASURES: dict[str, Measure] = {
     **dict(_measures()),
-    "shortest_episode": Measure("length of the shortest training episode", "steps", _shortest),
+    "shortest_episode": Measure(
+        "length of the shortest training episode",
+        "steps",
+        lambda runs: runs["steps"].min(axis=-1).astype(float),
+    ),
     "improved": Measure(
         "whether the last 50 episodes return more than the first 50", _SHARE, _improved, 2 * WINDOW
     ),

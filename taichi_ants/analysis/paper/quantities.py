@@ -42,7 +42,7 @@ class Slice(NamedTuple):
         row = runs.position(self.delivery, variant, point)
         if row is None or not runs.in_paper_world or runs.episodes < WINDOW:
             return np.full(len(runs.seeds), np.nan)
-        return runs.measure(measure)[row]
+        return runs.measures[measure][row]
 
     def grid(self, measure: str, variant: Variant) -> np.ndarray:
         """All 16 configurations, float64 (2, 2, 2, 2, seeds), axes in the order of `FACTORS`."""

@@ -1,48 +1,104 @@
-"""Lines per configuration: the honest figures, over all seeds and over those that act alike."""
+"""Summaries of configurations: over all seeds, and over those whose policies do the same."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, NAMES, counts
-from taichi_ants.analysis.paper.comparison import Comparison
+from taichi_ants.analysis.paper.comparison import Comparison, Row
 from taichi_ants.analysis.paper.measures import MEASURES
-from taichi_ants.analysis.sweeps import summary_rows
+from taichi_ants.analysis.sweeps import Centre, centre_columns, centres_of
 
 _GREEDY = ("greedy_return", "greedy_steps", "greedy_deliveries")
 _MEASURES = ("return_last50", "steps_last50", "steps_all", "deliveries_last50", *_GREEDY)
 
 
-def summarise(comparison: Comparison) -> list[dict]:
-    """The rows of summary.csv, one for each configuration, in their order.
+class Summary(NamedTuple):
+    """A configuration over all seeds, a row of summary.csv.
 
-    Means and interquartile means over seeds with 95 % intervals (see `statistics`), then how many
-    final policies behave so. What cannot exist is nan: intervals of one seed, greedy figures
-    without rollouts.
+    Attributes:
+        row: The configuration.
+        seeds: The number of seeds.
+        centres: Measures over seeds, by name.
+        runs: The number of runs by what their final policies do, a place in `BEHAVIOURS`.
     """
-    values = {name: comparison.measure(name) for name in _MEASURES}
-    typical = [name for name in values if MEASURES[name].typical]
-    lines = summary_rows([row.columns() for row in comparison.rows], values, typical)
-    for line, behaviours in zip(lines, comparison.behaviours, strict=True):
-        done = counts(behaviours)
-        line |= {f"runs_{name}": done.get(code, 0) for code, name in enumerate(NAMES)}
-    return lines
+
+    row: Row
+    seeds: int
+    centres: Mapping[str, Centre]
+    runs: Mapping[int, int]
+
+    @property
+    def mixed(self) -> bool:
+        """Whether the runs do different things."""
+        return len(self.runs) > 1
+
+    def columns(self) -> dict[str, Any]:
+        """Return the columns of summary.csv."""
+        return {
+            **self.row.columns(),
+            "seeds": self.seeds,
+            **centre_columns(self.centres),
+            **{f"runs_{name}": self.runs.get(code, 0) for code, name in enumerate(NAMES)},
+        }
 
 
-def summarise_behaviours(comparison: Comparison) -> list[dict]:
-    """The rows of behaviours.csv: means over the runs of a configuration that do the same.
+class BehaviourMeans(NamedTuple):
+    """The runs of a configuration that do the same, a row of behaviours.csv.
 
-    A row for each configuration and behaviour that occurs in it. `policy_return` is what the
-    episode returned that told the behaviour.
+    Attributes:
+        row: The configuration.
+        behaviour: A place in `BEHAVIOURS`.
+        runs: The number of runs.
+        return_last50_mean: Return of the last 50 training episodes.
+        policy_return_mean: Return of the episode that told the behaviour.
+        greedy_return_mean, greedy_steps_mean, greedy_deliveries_mean: Means of greedy rollouts.
     """
-    figures = {"return_last50": comparison.measure("return_last50")}
-    figures["policy_return"] = comparison.policy_returns
-    figures |= {name: comparison.measure(name) for name in _GREEDY}
+
+    row: Row
+    behaviour: int
+    runs: int
+    return_last50_mean: float
+    policy_return_mean: float
+    greedy_return_mean: float
+    greedy_steps_mean: float
+    greedy_deliveries_mean: float
+
+    def columns(self) -> dict[str, Any]:
+        """Return the columns of behaviours.csv."""
+        names = self._fields[2:]
+        numbers = dict(zip(names, self[2:], strict=True))
+        return {**self.row.columns(), "behaviour": BEHAVIOURS[self.behaviour], **numbers}
+
+
+def summarise(comparison: Comparison) -> list[Summary]:
+    """Return a summary of each configuration, in their order."""
+    values = {name: comparison.measures[name] for name in _MEASURES}
+    centres = centres_of(values, [name for name in values if MEASURES[name].typical])
+    done = map(counts, comparison.behaviours)
+    seeds = len(comparison.seeds)
+    return [
+        Summary(row, seeds, found, runs)
+        for row, found, runs in zip(comparison.rows, centres, done, strict=True)
+    ]
+
+
+def summarise_behaviours(comparison: Comparison) -> list[BehaviourMeans]:
+    """Return means for each configuration and behaviour that occurs in it."""
+    figures = [
+        comparison.measures["return_last50"],
+        comparison.policy_returns,
+        *(comparison.measures[name] for name in _GREEDY),
+    ]
     lines = []
-    for number, row in enumerate(comparison.rows):
-        behaviours = comparison.behaviours[number]
+    for row, behaviours, *values in zip(
+        comparison.rows, comparison.behaviours, *figures, strict=True
+    ):
         for code, runs in counts(behaviours).items():
             alike = np.flatnonzero(behaviours == code)
-            means = {f"{name}_mean": float(a[number, alike].mean()) for name, a in figures.items()}
-            lines.append({**row.columns(), "behaviour": BEHAVIOURS[code], "runs": runs, **means})
+            means = (float(array[alike].mean()) for array in values)
+            lines.append(BehaviourMeans(row, code, runs, *means))
     return lines

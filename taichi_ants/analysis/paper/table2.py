@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from taichi_ants.analysis.behaviour import NAMES
 from taichi_ants.analysis.paper.best_of import (
     DRAWS,
     FIGURES,
@@ -21,8 +21,10 @@ from taichi_ants.analysis.paper.best_of import (
     percentile_of,
     shown_position,
 )
-from taichi_ants.analysis.paper.comparison import Comparison, GridPoint, Variant
+from taichi_ants.analysis.paper.comparison import Comparison
 from taichi_ants.analysis.paper.measures import WINDOW
+from taichi_ants.analysis.paper.published import PaperRow
+from taichi_ants.analysis.paper.summary import Summary
 from taichi_ants.analysis.tables import MISSING, Table, interval, number, percent
 from taichi_ants.errors import count
 
@@ -32,102 +34,123 @@ FEW_SEEDS = 50
 APART = "!"  # marks a mean that the interval of the IQM excludes
 
 
-def table2(comparison: Comparison, summary: Sequence[Mapping], draws: int = DRAWS) -> list[dict]:
-    """The rows of table2.csv, one for each delivery setting and learner.
+class BestRun(NamedTuple):
+    """A figure of the best run of all configurations, had each been trained once.
 
-    Each is the row of `summary.summarise` that stands for the learner (`best_of.shown_position`),
-    with what the best run reports beside it (ranges from 2.5 % to 97.5 %), and what the paper does:
-    nan of a learner that it does not have, and in another world.
+    Attributes:
+        median, low, high: Over repetitions with other seeds, and the range from 2.5 % to 97.5 %.
+        paper_percentile: The percentage of them below the paper's figure; nan without one.
     """
+
+    median: float
+    low: float
+    high: float
+    paper_percentile: float
+
+
+class Line(NamedTuple):
+    """A learner in one delivery setting, a row of table2.csv.
+
+    Attributes:
+        summary: The configuration that stands for it, see `best_of.shown_position`.
+        paper: The paper's row; None for a learner that it does not have, and in other worlds.
+        best_run_of: From how many configurations the best run is chosen.
+        best_run: By the names of `FIGURES`.
+    """
+
+    summary: Summary
+    paper: PaperRow | None
+    best_run_of: int
+    best_run: Mapping[str, BestRun]
+
+    @property
+    def delivery(self) -> str:
+        """The delivery setting."""
+        return self.summary.row.delivery
+
+    @property
+    def paper_configuration(self) -> bool:
+        """Whether the configuration is the paper's."""
+        return self.paper is not None and self.paper.point == self.summary.row.point
+
+    @property
+    def label(self) -> str:
+        """The learner, with * if its configuration is not the paper's, + if its runs differ."""
+        star = "" if self.paper_configuration else " *"
+        return self.summary.row.variant.label + star + (" +" if self.summary.mixed else "")
+
+    def of_paper(self, measure: str) -> float:
+        """Return the paper's figure of a measure, nan if it has none."""
+        return self.paper.figure(measure) if self.paper else math.nan
+
+    def columns(self) -> dict[str, Any]:
+        """Return the columns of table2.csv."""
+        return {
+            **self.summary.columns(),
+            "paper_configuration": self.paper_configuration,
+            **{f"paper_{name}": self.of_paper(name) for name in ("return", "steps", "deliveries")},
+            "best_run_of": self.best_run_of,
+            **{
+                f"best_run_{name}_{field}": value
+                for name, best in self.best_run.items()
+                for field, value in best._asdict().items()
+            },
+        }
+
+
+def table2(comparison: Comparison, summaries: Sequence[Summary], draws: int = DRAWS) -> list[Line]:
+    """Return a line for each delivery setting and learner, from `summary.summarise`."""
     lines = []
     for delivery, variant in comparison.learners:
-        position = shown_position(comparison, delivery, variant)
         paper = paper_row(comparison, variant)
-        best = best_of(comparison, delivery, variant, draws)
-        of_paper = paper is not None and paper.point == comparison.rows[position].point
-        line = {**summary[position], "paper_configuration": of_paper}
-        for name in ("return", "steps", "deliveries"):
-            line[f"paper_{name}"] = paper.figure(name) if paper else math.nan
-        line["best_run_of"] = len(comparison.positions(delivery, variant))
-        for name, values in best.items():
+        best = {}
+        for name, values in best_of(comparison, delivery, variant, draws).items():
             low, median, high = np.percentile(values, (2.5, 50, 97.5)).tolist()
-            line |= {
-                f"best_run_{name}_median": median,
-                f"best_run_{name}_low": low,
-                f"best_run_{name}_high": high,
-                f"best_run_{name}_paper_percentile": (
-                    percentile_of(paper.figure(name), values) if paper else math.nan
-                ),
-            }
-        lines.append(line)
+            percentile = percentile_of(paper.figure(name), values) if paper else math.nan
+            best[name] = BestRun(median, low, high, percentile)
+        shown = summaries[shown_position(comparison, delivery, variant)]
+        several = len(comparison.positions(delivery, variant))
+        lines.append(Line(shown, paper, several, best))
     return lines
 
 
-def mixed(line: Mapping) -> bool:
-    """Whether the runs of a configuration do different things."""
-    return sum(line[f"runs_{name}"] > 0 for name in NAMES) > 1
-
-
-def label(line: Mapping) -> str:
-    """The learner's name, with a star if it is not shown at the paper's, a + if it is mixed."""
-    star = "" if line["paper_configuration"] else " *"
-    name = Variant(line["learner"], line["hyperparameters"]).label
-    return name + star + (" +" if mixed(line) else "")
-
-
-def apart(line: Mapping, measure: str) -> bool:
-    """Whether the mean of a measure lies outside of the interval of its IQM."""
-    mean, low, high = (line[f"{measure}_{name}"] for name in ("mean", "iqm_ci_low", "iqm_ci_high"))
-    return mean < low or mean > high
-
-
-def _moved(line: Mapping, measure: str) -> bool:
-    """Whether it is so, of a measure that may have no IQM."""
-    return f"{measure}_iqm" in line and apart(line, measure)
-
-
-def _spread(line: Mapping, stem: str, *names: str, mark: str = "") -> str:
-    """A centre and below it its interval, of which one seed has none; "-" where it has none."""
-    if f"{stem}_{names[0]}" not in line:
+def _spread(measure: str, middle: float | None, low: float, high: float, mark: str = "") -> str:
+    """Return a centre and below it its interval, if it has one; "-" where there is no centre."""
+    if middle is None:
         return MISSING
-    middle, low, high = (line[f"{stem}_{name}"] for name in names)
     large = max(abs(middle), abs(high)) >= 100
-    digits = 2 if stem.startswith(("deliveries", "best_run_deliveries")) else 0 if large else 1
+    digits = 2 if measure.startswith("deliveries") else 0 if large else 1
     text = number(middle, digits) + mark
     return text if math.isnan(low) or low == high else f"{text}\n{interval(low, high, digits)}"
 
 
-def figure_tables(lines: Sequence[Mapping], comparison: Comparison) -> list[Table]:
+def figure_tables(lines: Sequence[Line], comparison: Comparison) -> list[Table]:
     """A table for each figure of a run, beside the paper's in its world, and what they mean."""
     runs = comparison.episodes
     late = f"last {WINDOW} episodes" if runs > WINDOW else f"all {count(runs, 'episode')}"
     titles = (f"Return, {late}", "Steps, all episodes", f"Steps, {late}", f"Deliveries, {late}")
     headers = ("Learner", "Delivery", "Mean", "IQM", "Best run", "Paper", "Below")
-    beside = not all(math.isnan(line["paper_return"]) for line in lines)
+    beside = any(line.paper for line in lines)
     width = len(headers) if beside else len(headers) - 2
     tables = []
     for name, title in zip(FIGURES, titles, strict=True):
-        best = f"best_run_{name}"
-        rows = [
-            [
-                label(line),
-                line["delivery"],
-                _spread(
-                    *(line, name, "mean", "ci_low", "ci_high"),
-                    mark=f" {APART}" if _moved(line, name) else "",
-                ),
-                _spread(line, name, "iqm", "iqm_ci_low", "iqm_ci_high"),
-                _spread(line, best, "median", "low", "high"),
-                number(line[f"paper_{name.partition('_')[0]}"], 2 if "deliver" in name else 1),
-                percent(line[f"{best}_paper_percentile"] / 100),
-            ][:width]
-            for line in lines
-        ]
+        rows = []
+        for line in lines:
+            centre, best = line.summary.centres[name], line.best_run[name]
+            cells = [
+                *(line.label, line.delivery),
+                _spread(name, *centre[:3], mark=f" {APART}" if centre.apart else ""),
+                _spread(name, *centre[3:]),
+                _spread(name, *best[:3]),
+                number(line.of_paper(name), 2 if "deliver" in name else 1),
+                percent(best.paper_percentile / 100),
+            ]
+            rows.append(cells[:width])
         tables.append(Table(title, headers[:width], rows, text_columns=2))
     return [*tables, Table("", (), (), _notes(lines, len(comparison.seeds), beside))]
 
 
-def _notes(lines: Sequence[Mapping], seeds: int, beside: bool) -> list[str]:
+def _notes(lines: Sequence[Line], seeds: int, beside: bool) -> list[str]:
     notes = [
         f"Mean, IQM: over {seeds} seeds, with intervals at 95 %."
         if seeds > 1
@@ -135,7 +158,7 @@ def _notes(lines: Sequence[Mapping], seeds: int, beside: bool) -> list[str]:
         "IQM: interquartile mean, of the middle half of the runs: the typical run.",
         "Best run: best by return of all configurations, one run each: median, [95 % range].",
     ]
-    if any(_moved(line, name) for line in lines for name in FIGURES):
+    if any(line.summary.centres[name].apart for line in lines for name in FIGURES):
         notes.append(f"{APART} the mean is outside of the IQM's interval: far runs have moved it.")
     if beside:
         notes += [
@@ -148,14 +171,13 @@ def _notes(lines: Sequence[Mapping], seeds: int, beside: bool) -> list[str]:
             "misses it more often than not. The IQM's holds from 10 seeds on (docs/statistics.md).",
         ]
     starred = [
-        f"  {label(line)}, {line['delivery']}: "
-        + GridPoint(*(line[name] for name in GridPoint._fields)).label
+        f"  {line.label}, {line.delivery}: {line.summary.row.point.label}"
         for line in lines
-        if not line["paper_configuration"]
+        if not line.paper_configuration
     ]
     if starred:
         best = "* its best by the IQM of the return, on these seeds, which flatters it"
         notes += [f"{best} (learning rate / discount / epsilon / decay):", *starred]
-    if any(map(mixed, lines)):
+    if any(line.summary.mixed for line in lines):
         notes.append("+ the runs do different things, and no run has their mean.")
     return notes

@@ -11,7 +11,6 @@ from plain_runs import rollout
 
 from taichi_ants.analysis.bounds import episodes
 from taichi_ants.analysis.bounds.baselines import (
-    BASELINE_COLUMNS,
     bound_rows,
     policy_rows,
 )
@@ -46,26 +45,15 @@ def evaluate(world: World, q_values: np.ndarray, **options: Any) -> SimpleNamesp
 
 def test_the_rows_of_the_world_of_the_paper() -> None:
     rows = bound_rows(paper(), Task()) + policy_rows(paper(), Task(), evaluate, [3, 4], 2)
-    assert all(tuple(row) == BASELINE_COLUMNS for row in rows)
-    assert all(row["note"] for row in rows)
-    figures = [
-        (
-            row["baseline"],
-            row["discount"],
-            row["return_mean"],
-            row["steps_mean"],
-            row["deliveries_mean"],
-        )
-        for row in rows
-        if row["baseline"] != "random policy"
-    ]
+    assert all(row.note for row in rows)
+    figures = [row[:5] for row in rows if row.baseline != "random policy"]
     assert figures == [
         ("shortest delivery", None, 45, 34, 1),
         ("optimal policy", 0.9, 45, 34, 1),
         ("optimal policy", 0.99, 476, 600, 0),
         ("trail follower", None, 45, 34, 1),
     ]
-    assert [row["baseline"] for row in rows].count("random policy") == 1
+    assert [row.baseline for row in rows].count("random policy") == 1
 
 
 def test_policies_are_evaluated_as_in_training_with_one_table_for_each_seed() -> None:
@@ -89,15 +77,15 @@ def test_policies_are_evaluated_as_in_training_with_one_table_for_each_seed() ->
             "seeds": [5, 6, 7],
         }
     for row in rows:
-        assert row["return_mean"] == 3
-        assert row["steps_mean"] == 9
-        assert row["deliveries_mean"] == pytest.approx(1 / 3)
+        assert row.return_mean == 3
+        assert row.steps_mean == 9
+        assert row.deliveries_mean == pytest.approx(1 / 3)
 
 
 def test_all_baselines_are_paid_what_the_task_pays() -> None:
     task = Task(rewards=Rewards(empty=0, failed=-1, lure=2, pick_up=30, give=100))
     rows = bound_rows(paper(), task, (0.9,)) + policy_rows(paper(), task, evaluate, [0], 1)
-    returns = {row["return_mean"] for row in rows if row["baseline"] != "random policy"}
+    returns = {row.return_mean for row in rows if row.baseline != "random policy"}
     assert returns == {32 * 2 + 30 + 100}
 
 
@@ -111,27 +99,27 @@ def test_trails_evaporate_as_in_training() -> None:
     task = Task(evaporation_in_training=True, evaporation_in_evaluation=False)
     policy_rows(paper(), task, record, [0], 1, 40)
     [row] = bound_rows(paper(), task, (0.9,), 40)
-    assert row["note"] == "exact bounds are known for worlds without evaporation only."
+    assert row.note == "exact bounds are known for worlds without evaporation only."
     assert calls == [True, True]
 
 
 def test_a_discount_of_one_has_no_figures_but_a_reason() -> None:
     rows = bound_rows(paper(), Task(), [1.0, 0.5, 1], 40)
-    assert [row["discount"] for row in rows] == [None, 1.0, 0.5]
-    assert rows[1]["return_mean"] is None
-    assert "may grow without bound" in rows[1]["note"]
+    assert [row.discount for row in rows] == [None, 1.0, 0.5]
+    assert rows[1].return_mean is None
+    assert "may grow without bound" in rows[1].note
 
 
 def test_a_world_without_a_delivery_says_so() -> None:
     world = World((3, 1, 1), (0, 0, 0), ants=[((1, 0, 0), 0)])
     [shortest] = bound_rows(world, Task(), [], 10)
-    assert shortest["return_mean"] is None
-    assert shortest["note"] == "no delivery is possible"
+    assert shortest.return_mean is None
+    assert shortest.note == "no delivery is possible"
 
 
 def test_of_a_world_that_is_too_large_no_bounds_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(episodes, "MAX_STATES", 100)
     [row] = bound_rows(paper(), Task(), max_steps=40)
-    assert row["baseline"] == "exact bounds"
-    assert "choose a smaller world" in row["note"]
-    assert row["return_mean"] is None
+    assert row.baseline == "exact bounds"
+    assert "choose a smaller world" in row.note
+    assert row.return_mean is None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -22,14 +21,14 @@ from taichi_ants.analysis.colony.study import (
     RULES,
     Design,
 )
-from taichi_ants.analysis.colony.tables import condition_rows
+from taichi_ants.analysis.colony.tables import ConditionRow, condition_rows
 from taichi_ants.analysis.style import save_all
 
 ARENAS = ("paper", "open")
 
 
 @pytest.fixture(scope="module")
-def rows() -> list[dict[str, Any]]:
+def rows() -> list[ConditionRow]:
     study = build(
         lambda rules, way, ants: 20.0 * ants * (1 + list(RULES).index(rules)),
         seeds=6,
@@ -40,7 +39,7 @@ def rows() -> list[dict[str, Any]]:
 
 
 def column(rows: list, name: str, arena: str, rules: str, way: str = JOINT) -> list[float]:
-    return [r[name] for r in rows if (r["arena"], r["rules"], r["way"]) == (arena, rules, way)]
+    return [r.columns()[name] for r in rows if r.condition[:3] == (arena, rules, way)]
 
 
 def dots(axis: Axes) -> dict[int, float]:

@@ -14,6 +14,7 @@ from taichi_ants.analysis.colony.contrasts import (
     TRAINING,
     judge_all,
 )
+from taichi_ants.analysis.colony.results import Results
 from taichi_ants.analysis.colony.study import (
     ABC,
     ABC_SILENT,
@@ -29,7 +30,7 @@ from taichi_ants.analysis.colony.study import (
     A,
     Design,
 )
-from taichi_ants.analysis.colony.tables import found
+from taichi_ants.analysis.colony.tables import condition_rows, found
 from taichi_ants.analysis.findings import Verdict
 from taichi_ants.analysis.tables import Table
 
@@ -37,7 +38,7 @@ from taichi_ants.analysis.tables import Table
 def answer(question: str, truth: Truth = proportional, **settings: object) -> list[list[str]]:
     """The lines of the table that answers a question, without the world."""
     study = build(truth, **settings)
-    tables = [table for table in found(study, judge_all(study)) if isinstance(table, Table)]
+    tables = [table for table in found(*Results.of(study)) if isinstance(table, Table)]
     (rows,) = [table.rows for table in tables if table.title == question]
     return [list(row[1:]) for row in rows]
 
@@ -159,7 +160,7 @@ def test_below_ten_seeds_no_difference_has_a_verdict(seeds: int, verdict: Verdic
     judged = judge_all(study)
     assert verdicts_of(judged, MORE) >= {verdict}
     assert (verdicts_of(judged) == {Verdict.TOO_FEW}) == (seeds < 10)
-    tables = [one for one in found(study, judged) if isinstance(one, Table)]
+    tables = [one for one in found(condition_rows(study), judged) if isinstance(one, Table)]
     assert all((f"{seeds} seeds, too few" in one.notes[0]) == (seeds < 10) for one in tables)
 
 

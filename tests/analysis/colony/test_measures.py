@@ -62,19 +62,20 @@ def test_every_measure_is_in_the_tables() -> None:
     study = build(seeds=7, noise=20)
     rows = condition_rows(study)
     assert len(rows) == len(WAYS) * len(RULES) * len(SIZES)
-    (row,) = (row for row in rows if (row["rules"], row["way"], row["ants"]) == (SILENT, JOINT, 4))
+    (row,) = (row for row in rows if row.condition[1:] == (SILENT, JOINT, 4))
     lines = rows_of_seeds(study, range(3, 10))
     for measure in OF_STUDY:
         values = study[Condition("paper", SILENT, JOINT, 4)][measure]
         low, high = bootstrap_interval(values[None])
-        found = [row[f"{measure}_{end}"] for end in ("mean", "ci_low", "ci_high")]
+        found = row.centres[measure][:3]
         np.testing.assert_allclose(found, [values.mean(), low[0], high[0]])
         place = {"arena": "paper", "rules": SILENT, "way": JOINT, "ants": 4, "seed": 5}
         (line,) = (line for line in lines if line.items() >= place.items())
         assert line[measure] == values[2]
     values = study[Condition("paper", SILENT, JOINT, 4)]["deliveries"]
-    assert (row["deliveries_min"], row["deliveries_max"]) == (values.min(), values.max())
-    assert (row["bound_min"], row["bound_max"], row["seeds"]) == (100, 100, 7)
+    assert row.ranges == {"deliveries": (values.min(), values.max()), "bound": (100, 100)}
+    assert row.seeds == 7
+    assert list(row.columns())[:6] == ["arena", "rules", "way", "ants", "seeds", "deliveries_mean"]
 
 
 def test_the_table_of_differences_holds_what_verdicts_rest_on() -> None:
@@ -140,7 +141,7 @@ def test_each_world_has_a_bound_of_its_own() -> None:
 
 def test_findings_stand_under_their_questions() -> None:
     study = build()
-    text = markdown(found(study, judge_all(study)))
+    text = markdown(found(condition_rows(study), judge_all(study)))
     assert text.count("**Do more ants help?**") == 1
     assert "| Ants with all three rules deliver more than under the paper's rules |" in text
     assert text.rstrip().endswith("hold at once with 95 %.")

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic_comparison import Edit, build, change, level_truth, subset, unchanged
+from synthetic_comparison import Edit, build, change, level_truth, remeasured, subset, unchanged
 
 from taichi_ants.analysis.findings import SIMULTANEOUS_LEVEL, UNBOUNDED, Finding, Verdict
 from taichi_ants.analysis.paper.audit import Audit, assess, claims_markdown, claims_rows
@@ -226,7 +226,8 @@ def test_seeds_pair_the_rows() -> None:
     assert paired.verdict is Verdict.SUPPORTED
     unpaired = build({"continuing": unchanged}, shared=30)
     rows = [n for n, row in enumerate(unpaired.rows) if row.variant == SARSA]
-    unpaired.returns[rows] = unpaired.returns[rows][:, ::-1]
+    unpaired.arrays["returns"][rows] = unpaired.arrays["returns"][rows][:, ::-1]
+    unpaired = remeasured(unpaired)
     blurred = only(unpaired, "sarsa-return-slightly-lower")
     assert blurred.by_mean.effect == pytest.approx(paired.by_mean.effect)
     assert blurred.verdict is Verdict.UNDECIDED
@@ -266,7 +267,8 @@ def test_in_another_world_nothing_is_tested() -> None:
 
 def test_intervals_of_shares_end_where_shares_do() -> None:
     comparison = build({"continuing": change(SARSA, deliveries=-0.2)}, seeds=4, episodes=101)
-    comparison.greedy_returns[:, 0, 0] += 1  # one seed's rollouts differ
+    comparison.arrays["greedy_returns"][:, 0, 0] += 1  # one seed's rollouts differ
+    comparison = remeasured(comparison)
     limits = {"share": (0, 1), "correlation": (-1, 1), "deliveries": (-1, 1)}
     cut = 0
     for claim, findings in assess(comparison).items():

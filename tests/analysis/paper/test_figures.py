@@ -14,16 +14,19 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from PIL import Image
 from synthetic_comparison import (
+    Made,
     build,
     change,
     level_truth,
+    remeasured,
     subset,
     unchanged,
 )
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, CIRCLES, OTHER
+from taichi_ants.analysis.bounds.baselines import Baseline
 from taichi_ants.analysis.paper.best_of import shown_position
-from taichi_ants.analysis.paper.comparison import Comparison, Variant
+from taichi_ants.analysis.paper.comparison import Variant
 from taichi_ants.analysis.paper.figures import (
     BEHAVIOUR_LOOKS,
     draw_all,
@@ -37,13 +40,7 @@ from taichi_ants.analysis.style import COLOURS, save_all
 SETTINGS = ("continuing", "absorbing")
 SARSA_AT = (SARSA, FIGURE_1)
 BASELINES = [
-    {
-        "baseline": name,
-        "discount": discount,
-        "return_mean": figure,
-        "steps_mean": None if figure is None else 34.0,
-        "deliveries_mean": deliveries,
-    }
+    Baseline(name, discount, figure, None if figure is None else 34.0, deliveries)
     for name, discount, figure, deliveries in (
         ("shortest delivery", None, 45.0, 1.0),
         ("optimal policy", 0.9, 45.0, 1.0),
@@ -55,7 +52,7 @@ BASELINES = [
 
 
 @pytest.fixture(scope="module")
-def comparison() -> Comparison:
+def comparison() -> Made:
     amounts = {"late_return": 200, "deliveries": -1, "greedy_deliveries": -1}
     circles = change(DYNA_P5, lambda point: point.discount == 0.99, **amounts)
     return build({"continuing": unchanged, "absorbing": circles}, seeds=6, noise=5.0)
@@ -80,7 +77,7 @@ def words_of(figure: Figure) -> str:
     return f"{figure.legends[0].get_title().get_text()} {figure.get_supxlabel()}"
 
 
-def test_learning_curves_are_interquartile_means_of_growing_spans(comparison: Comparison) -> None:
+def test_learning_curves_are_interquartile_means_of_growing_spans(comparison: Made) -> None:
     figure = learning_curves(comparison, BASELINES)
     axes = np.array(panels(figure)).reshape(3, 2)
     parts = spans(120)
@@ -89,7 +86,7 @@ def test_learning_curves_are_interquartile_means_of_growing_spans(comparison: Co
     for row, name in zip(axes, names, strict=True):
         for axis, setting in zip(row, SETTINGS, strict=True):
             for place, variant in enumerate(VARIANTS):
-                runs = getattr(comparison, name)[comparison.position(setting, variant, FIGURE_1)]
+                runs = comparison.arrays[name][comparison.position(setting, variant, FIGURE_1)]
                 means = np.array([runs[:, part].mean(axis=1) for part in parts])
                 line = labelled(axis)[variant.label]
                 middle = means.mean(axis=1) if name == "deliveries" else interquartile_mean(means)
@@ -113,7 +110,7 @@ def test_learning_curves_are_interquartile_means_of_growing_spans(comparison: Co
 
 
 def test_a_learner_without_the_shared_configuration_is_shown_at_its_own(
-    comparison: Comparison,
+    comparison: Made,
 ) -> None:
     """And the legend names what is shown."""
     rows = [n for n, row in enumerate(comparison.rows) if (row.variant, row.point) != SARSA_AT]
@@ -121,13 +118,16 @@ def test_a_learner_without_the_shared_configuration_is_shown_at_its_own(
     figure = learning_curves(some)
     for axis, setting in zip(panels(figure), SETTINGS, strict=False):
         best = shown_position(some, setting, SARSA)
-        parts = np.array([some.returns[best][:, part].mean(axis=1) for part in spans(120)])
+        parts = np.array(
+            [some.arrays["returns"][best][:, part].mean(axis=1) for part in spans(120)]
+        )
         line = labelled(axis)[f"SARSA, {setting}: {some.rows[best].point.label}"]
         np.testing.assert_allclose(line.get_ydata(), interquartile_mean(parts))
 
 
-def test_few_hundredths_of_deliveries_do_not_look_like_much(comparison: Comparison) -> None:
-    always = replace(comparison, deliveries=np.ones_like(comparison.deliveries))
+def test_few_hundredths_of_deliveries_do_not_look_like_much(comparison: Made) -> None:
+    ones = np.ones_like(comparison.arrays["deliveries"])
+    always = remeasured(replace(comparison, arrays={**comparison.arrays, "deliveries": ones}))
     figure = learning_curves(always, BASELINES)
     low, high = figure.axes[-1].get_ylim()
     assert figure.axes[-2].get_ylabel() == "Deliveries of an episode"
@@ -136,14 +136,14 @@ def test_few_hundredths_of_deliveries_do_not_look_like_much(comparison: Comparis
 
 
 def test_returns_against_deliveries_shows_what_runs_do_and_baselines(
-    comparison: Comparison,
+    comparison: Made,
 ) -> None:
     behaviours = comparison.behaviours.copy()
     behaviours[-1, :2], behaviours[3, 4] = CIRCLES, OTHER
     comparison = replace(comparison, behaviours=behaviours)
     axes = panels(return_against_deliveries(comparison, BASELINES))
-    returns = comparison.measure("return_last50")
-    deliveries = comparison.measure("deliveries_last50")
+    returns = comparison.measures["return_last50"]
+    deliveries = comparison.measures["deliveries_last50"]
     for axis, setting in zip(axes, SETTINGS, strict=True):
         lines = labelled(axis)
         of_setting = np.array([row.delivery == setting for row in comparison.rows])[:, None]
@@ -176,7 +176,7 @@ def test_behaviours_and_lines_look_different() -> None:
     assert len(set(COLOURS)) == len(COLOURS) == 10
 
 
-def test_all_figures_are_files(comparison: Comparison, tmp_path: Path) -> None:
+def test_all_figures_are_files(comparison: Made, tmp_path: Path) -> None:
     small = subset(comparison, range(64, 128, 8), 3, 60)
     save_all(draw_all(small, BASELINES), tmp_path / "new" / "folder")
     paths = sorted((tmp_path / "new" / "folder").iterdir())
@@ -189,7 +189,7 @@ def test_all_figures_are_files(comparison: Comparison, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("draw", [learning_curves, return_against_deliveries])
-def test_words_stand_apart(draw: Callable[..., Figure], comparison: Comparison) -> None:
+def test_words_stand_apart(draw: Callable[..., Figure], comparison: Made) -> None:
     assert_words_stand_apart(draw(comparison, BASELINES))
 
 
@@ -237,7 +237,8 @@ def test_subsets_and_unknown_learners_are_drawn(rows: list[int], tmp_path: Path)
         episodes=4,
         truth=level_truth,
     )
-    strange.returns[...] -= 75  # no logarithmic axis for negative returns
+    strange.arrays["returns"][...] -= 75  # no logarithmic axis for negative returns
+    strange = remeasured(strange)
     few = subset(strange, rows, 1 + len(rows) % 2, 4)
     save_all(draw_all(few, []), tmp_path)
     assert all(path.stat().st_size > 1000 for path in tmp_path.iterdir())

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic_comparison import build, subset, unchanged
+from synthetic_comparison import build, remeasured, subset, unchanged
 
 from taichi_ants.analysis.paper.published import FIGURE_1, Q_LEARNING, SARSA
 from taichi_ants.analysis.paper.quantities import (
@@ -25,7 +25,7 @@ def test_a_slice_reads_the_rows_it_is_asked_for() -> None:
     part = Slice(comparison, "absorbing")
     values = AT_FIGURE_1.values(part, "return_last50", SARSA)
     position = comparison.position("absorbing", SARSA, FIGURE_1)
-    np.testing.assert_array_equal(values, comparison.measure("return_last50")[position])
+    np.testing.assert_array_equal(values, comparison.measures["return_last50"][position])
     grid = part.grid("steps_all", Q_LEARNING)
     assert grid.shape == (2, 2, 2, 2, 4)
     # Learning rate 0.01, discount 0.9, epsilon 0.5, decay 0.99.
@@ -36,7 +36,7 @@ def test_a_slice_reads_the_rows_it_is_asked_for() -> None:
         and row.point == (0.01, 0.9, 0.5, 0.99)
         and row.delivery == "absorbing"
     )
-    np.testing.assert_array_equal(grid[1, 0, 1, 0], comparison.measure("steps_all")[row])
+    np.testing.assert_array_equal(grid[1, 0, 1, 0], comparison.measures["steps_all"][row])
     pairs = part.pairs("steps_all", Q_LEARNING, "epsilon")
     assert pairs.shape == (8, 4)
     np.testing.assert_allclose(
@@ -66,18 +66,20 @@ def test_what_is_missing_is_nan() -> None:
 def test_the_held_out_half_does_not_choose() -> None:
     """The configuration that shines on odd seeds only is not chosen for them."""
     comparison = build({"continuing": unchanged}, seeds=6, variants=[SARSA], noise=0.0, shared=0.0)
-    comparison.returns[...] = 10
-    comparison.returns[3, ::2] = 20  # best on the seeds that choose, poor on the others
-    comparison.returns[3, 1::2] = 0
-    comparison.returns[5, 1::2] = 99
+    comparison.arrays["returns"][...] = 10
+    comparison.arrays["returns"][3, ::2] = 20  # best on the seeds that choose, poor on the others
+    comparison.arrays["returns"][3, 1::2] = 0
+    comparison.arrays["returns"][5, 1::2] = 99
+    comparison = remeasured(comparison)
     values = Slice(comparison, "continuing").held_out("return_last50", SARSA)
     assert values.tolist() == [0.0, 0.0, 0.0]
 
 
 def test_shares_count_ties_by_half() -> None:
     comparison = build({"continuing": unchanged}, seeds=2, variants=[Q_LEARNING, SARSA])
-    comparison.returns[...] = 10
-    comparison.returns[:4, 0] = 20  # four of 16 pairs are above, the others tie
+    comparison.arrays["returns"][...] = 10
+    comparison.arrays["returns"][:4, 0] = 20  # four of 16 pairs are above, the others tie
+    comparison = remeasured(comparison)
     part = Slice(comparison, "continuing")
     for below, expected in ((False, [10 / 16, 0.5]), (True, [6 / 16, 0.5])):
         quantity = share_above("return_last50", Q_LEARNING, SARSA, below)
@@ -89,10 +91,11 @@ def test_the_rank_correlation_is_spearmans_within_each_seed() -> None:
     from scipy.stats import spearmanr
 
     comparison = build({"continuing": unchanged}, seeds=3, variants=[SARSA], noise=20.0)
-    comparison.steps[:, 2] = 50  # constant: no correlation
+    comparison.arrays["steps"][:, 2] = 50  # constant: no correlation
+    comparison = remeasured(comparison)
     quantity = rank_correlation("return_last50", "steps_last50", SARSA)
     (found,) = (effect(Slice(comparison, "continuing")) for effect in quantity.effects.values())
-    returns, steps = (comparison.measure(name) for name in ("return_last50", "steps_last50"))
+    returns, steps = (comparison.measures[name] for name in ("return_last50", "steps_last50"))
     for seed in (0, 1):
         assert found[seed] == pytest.approx(spearmanr(returns[:, seed], steps[:, seed])[0])
     assert found[2] == 0

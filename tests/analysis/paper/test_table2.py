@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic_comparison import build, subset, unchanged
+from synthetic_comparison import build, remeasured, subset, unchanged
 
 from taichi_ants.analysis.behaviour import CIRCLES, DELIVERS, OTHER
 from taichi_ants.analysis.paper.best_of import (
@@ -28,11 +28,11 @@ from taichi_ants.analysis.paper.published import (
 )
 from taichi_ants.analysis.paper.report import table2_markdown
 from taichi_ants.analysis.paper.summary import summarise
-from taichi_ants.analysis.paper.table2 import apart, table2
+from taichi_ants.analysis.paper.table2 import Line, table2
 from taichi_ants.analysis.statistics import interquartile_mean
 
 
-def lines_of(comparison: Comparison, draws: int = 50) -> list[dict]:
+def lines_of(comparison: Comparison, draws: int = 50) -> list[Line]:
     return table2(comparison, summarise(comparison), draws)
 
 
@@ -44,7 +44,7 @@ def comparison() -> Comparison:
 def exact_share_at_most(comparison: Comparison, variant: Variant, level: float) -> float:
     """The best of independent runs is at most a level if all are: the product of the shares."""
     rows = comparison.positions("continuing", variant)
-    return float((comparison.measure("return_last50")[rows] <= level).mean(axis=1).prod())
+    return float((comparison.measures["return_last50"][rows] <= level).mean(axis=1).prod())
 
 
 @pytest.mark.parametrize("variant", VARIANTS, ids=lambda variant: variant.label)
@@ -53,7 +53,7 @@ def test_best_of_16_has_the_distribution_of_the_maximum(
 ) -> None:
     best = best_of(comparison, "continuing", variant, draws=40_000)
     rows = comparison.positions("continuing", variant)
-    for level in np.unique(comparison.measure("return_last50")[rows])[-40::3]:
+    for level in np.unique(comparison.measures["return_last50"][rows])[-40::3]:
         share = (best["return_last50"] <= level).mean()
         assert share == pytest.approx(exact_share_at_most(comparison, variant, level), abs=0.01)
 
@@ -63,7 +63,7 @@ def test_the_winners_other_figures_belong_to_the_same_run(comparison: Comparison
     rows = comparison.positions("absorbing", DYNA_P3)
     runs = zip(
         *(
-            comparison.measure(name)[rows].ravel()
+            comparison.measures[name][rows].ravel()
             for name in ("return_last50", "steps_all", "steps_last50", "deliveries_last50")
         ),
         strict=True,
@@ -74,8 +74,9 @@ def test_the_winners_other_figures_belong_to_the_same_run(comparison: Comparison
 def test_seeds_of_the_configurations_are_independent() -> None:
     """Two configurations that are good on different seeds: together good with 3/4, not always."""
     two = subset(build({"continuing": unchanged}, seeds=2), [0, 1], 2, 120)
-    two.returns[...] = 0
-    two.returns[0, 0] = two.returns[1, 1] = 50
+    two.arrays["returns"][...] = 0
+    two.arrays["returns"][0, 0] = two.arrays["returns"][1, 1] = 50
+    two = remeasured(two)
     best = best_of(two, "continuing", Q_LEARNING, draws=20_000)
     assert (best["return_last50"] == 50).mean() == pytest.approx(0.75, abs=0.01)
 
@@ -90,12 +91,12 @@ def test_percentiles_count_ties_by_half() -> None:
 
 def test_table2_lines(comparison: Comparison) -> None:
     lines, summary = lines_of(comparison, 2000), summarise(comparison)
-    assert [(line["delivery"], line["learner"], line["hyperparameters"]) for line in lines] == [
-        (delivery, *variant) for delivery in ("continuing", "absorbing") for variant in VARIANTS
+    assert [(line.delivery, line.summary.row.variant) for line in lines] == [
+        (delivery, variant) for delivery in ("continuing", "absorbing") for variant in VARIANTS
     ]
-    line = lines[1]
+    line = lines[1].columns()
     position = comparison.position("continuing", SARSA, FIGURE_1)
-    assert summary[position].items() <= line.items()
+    assert summary[position].columns().items() <= line.items()
     assert line["paper_configuration"]
     assert (line["paper_return"], line["paper_steps"], line["paper_deliveries"]) == (47.3, 73, 1)
     best = best_of(comparison, "continuing", SARSA, draws=2000)
@@ -113,11 +114,11 @@ def test_what_the_paper_does_not_have_is_nan() -> None:
     rows = [n for n, row in enumerate(full.rows) if row.variant != SARSA or row.point != FIGURE_1]
     cut = subset(full, rows, 1, 120)
     sarsa, mine = lines = lines_of(cut)
-    assert (sarsa["paper_configuration"], sarsa["best_run_of"]) == (False, 15)
-    assert sarsa["paper_return"] == TABLE_2[SARSA].reward
-    assert math.isnan(mine["paper_return"])
-    assert math.isnan(mine["best_run_return_last50_paper_percentile"])
-    assert mine["best_run_of"] == 16
+    assert (sarsa.paper_configuration, sarsa.best_run_of) == (False, 15)
+    assert sarsa.of_paper("return") == TABLE_2[SARSA].reward
+    assert math.isnan(mine.of_paper("return"))
+    assert math.isnan(mine.best_run["return_last50"].paper_percentile)
+    assert mine.best_run_of == 16
     text = table2_markdown(cut, lines)
     (row, *_) = (line for line in text.splitlines() if line.startswith("| mine (d2) *"))
     assert row.endswith("| - | - |")
@@ -132,9 +133,9 @@ def test_another_world_has_nothing_of_the_paper(comparison: Comparison) -> None:
     garden = replace(comparison, world="garden.txt")
     lines = lines_of(garden)
     assert len(lines) == 8
-    assert not any(line["paper_configuration"] for line in lines)
-    assert all(math.isnan(line["paper_return"]) for line in lines)
-    assert all(math.isnan(line["best_run_steps_all_paper_percentile"]) for line in lines)
+    assert not any(line.paper_configuration for line in lines)
+    assert all(math.isnan(line.of_paper("return")) for line in lines)
+    assert all(math.isnan(line.best_run["steps_all"].paper_percentile) for line in lines)
     text = table2_markdown(garden, lines)
     assert text.startswith("World: garden.txt.\n")
     assert "| Learner | Delivery | Mean | IQM | Best run |" in text
@@ -146,10 +147,11 @@ def test_what_stands_for_a_learner(comparison: Comparison) -> None:
     garden = replace(comparison, world="garden.txt")
     rows = garden.positions("absorbing", SARSA)
     best = shown_position(garden, "absorbing", SARSA)
-    typical = interquartile_mean(garden.measure("return_last50")[rows])
+    typical = interquartile_mean(garden.measures["return_last50"][rows])
     assert best == rows[int(typical.argmax())]
-    lucky = replace(garden, returns=garden.returns.copy())
-    lucky.returns[rows[3], 0] = 4000  # one far run does not choose
+    lucky = replace(garden, arrays={name: one.copy() for name, one in garden.arrays.items()})
+    lucky.arrays["returns"][rows[3], 0] = 4000  # one far run does not choose
+    lucky = remeasured(lucky)
     assert shown_position(lucky, "absorbing", SARSA) != rows[3] or best == rows[3]
 
 
@@ -160,11 +162,11 @@ def test_the_markdown_holds_the_numbers(comparison: Comparison) -> None:
     assert "Training without evaporation of trails, greedy evaluation with it." in text
     row = next(line for line in text.splitlines() if line.startswith("| SARSA | continuing"))
     cells = [cell.strip() for cell in row.strip("|").split("|")]
-    line = lines[1]
+    centre = lines[1].summary.centres["return_last50"]
     assert cells[:2] == ["SARSA", "continuing"]
-    assert cells[2].startswith(f"{line['return_last50_mean']:.1f} [")
-    assert cells[3].startswith(f"{line['return_last50_iqm']:.1f} [")
-    assert cells[4].startswith(f"{line['best_run_return_last50_median']:.1f} [")
+    assert cells[2].startswith(f"{centre.mean:.1f} [")
+    assert cells[3].startswith(f"{centre.iqm:.1f} [")
+    assert cells[4].startswith(f"{lines[1].best_run['return_last50'].median:.1f} [")
     assert cells[5] == "47.3"
     assert "**Steps, all episodes**" in text
     assert "**Steps, last 50 episodes**" in text
@@ -176,17 +178,18 @@ def test_the_markdown_holds_the_numbers(comparison: Comparison) -> None:
 def test_a_mean_that_far_runs_have_moved_is_marked() -> None:
     comparison = build({"continuing": unchanged}, seeds=40)
     row = comparison.position("continuing", SARSA, FIGURE_1)
-    line = lines_of(comparison)[1]
-    assert not apart(line, "return_last50")
+    usual = lines_of(comparison)[1].summary.centres["return_last50"]
+    assert not usual.apart
     comparison = build({"continuing": unchanged}, seeds=40)
-    comparison.returns[row, 7] = 4000
+    comparison.arrays["returns"][row, 7] = 4000
+    comparison = remeasured(comparison)
     lines = lines_of(comparison)
-    assert apart(lines[1], "return_last50")
-    mean = f"{lines[1]['return_last50_mean']:.0f} ! ["
+    moved = lines[1].summary.centres["return_last50"]
+    assert moved.apart
+    mean = f"{moved.mean:.0f} ! ["
     text = table2_markdown(comparison, lines)
     assert mean in next(row for row in text.splitlines() if row.startswith("| SARSA"))
-    typical = lines[1]["return_last50_iqm"]
-    assert typical == pytest.approx(line["return_last50_iqm"], abs=0.5)
+    assert moved.iqm == pytest.approx(usual.iqm, abs=0.5)
 
 
 def some_circle(comparison: Comparison) -> Comparison:
@@ -208,7 +211,7 @@ def test_means_of_runs_that_do_different_things_are_marked(comparison: Compariso
 def test_examples_show_each_behaviour_by_its_median_run(comparison: Comparison) -> None:
     changed = some_circle(comparison)
     shown = shown_position(comparison, "absorbing", DYNA_P3)
-    returns = changed.measure("return_last50")
+    returns = changed.measures["return_last50"]
     found = examples(changed)
     whats = [(row, int(changed.behaviours[row, run])) for row, run in found]
     expected = []
@@ -243,6 +246,6 @@ def test_a_behaviour_that_no_shown_configuration_has_gets_an_example(
 def test_examples_of_learners_outside_of_the_paper(comparison: Comparison) -> None:
     few = subset(comparison, comparison.positions("absorbing", SARSA)[:2], 3, 120)
     ((row, run),) = examples(few)
-    means = few.measure("return_last50")
+    means = few.measures["return_last50"]
     assert row == shown_position(few, "absorbing", SARSA)
     assert means[row, run] == np.median(means[row])
