@@ -397,7 +397,7 @@ def do_comparison(
 ) -> tuple[Results, Seen]:
     """Do what is not done yet, and write all results."""
     from taichi_ants import files
-    from taichi_ants.analysis.bounds.baselines import Baseline, bound_rows, policy_rows
+    from taichi_ants.analysis.bounds.baselines import bound_rows, policy_rows
     from taichi_ants.analysis.paper.results import Results
     from taichi_ants.engines.runs.training import evaluate
     from taichi_ants.files import archives
@@ -420,7 +420,7 @@ def do_comparison(
     seen = see(settings, ready, study, comparison, baselines, beside.begin, draw)
     beside.finish()
     rows = [one._asdict() for one in baselines]
-    files.write_csv(ready / BASELINES, rows, Baseline._fields)
+    files.write_csv(ready / BASELINES, rows, list(rows[0]))
     with progress_bar("statistics and pictures") as progress:
         results = Results.of(comparison, baselines)
         write_tables(ready, results)
