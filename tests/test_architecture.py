@@ -20,8 +20,7 @@ import taichi_ants
 LAYERS = (
     {"errors", "environment"},
     {"files", "grid", "settings"},
-    {"rows", "task"},
-    {"archives"},
+    {"task"},
     {"runtime", "worlds", "learners"},
     {"checks"},
     {"baselines", "engines", "reference"},

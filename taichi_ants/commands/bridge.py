@@ -71,8 +71,8 @@ def do_bridge(settings: argparse.Namespace, study: Study, blocks: Path, ready: P
     """Do what is not done yet, and write all results."""
     from taichi_ants import files
     from taichi_ants.analysis import bridge as analysis
+    from taichi_ants.files.results import REPORT
     from taichi_ants.studies.bridge import followed
-    from taichi_ants.studies.result_folder import REPORT
 
     ticks, found = settings.evaluation_ticks, {}
     with progress_bar("bridge") as progress:

@@ -198,8 +198,8 @@ def do_study(
     from taichi_ants.analysis.colony.figures import draw_all
     from taichi_ants.analysis.colony.results import Results
     from taichi_ants.analysis.tables import markdown, plain_text
+    from taichi_ants.files.results import REPORT
     from taichi_ants.studies.colony_study import measured, median_policies
-    from taichi_ants.studies.result_folder import REPORT
 
     with progress_bar("study") as progress:
         outcomes = asked.run(blocks, settings.threads, settings.arch, progress)
@@ -236,10 +236,10 @@ def make_page(
     from taichi_ants.analysis.colony.figures import draw_all
     from taichi_ants.analysis.colony.results import Results
     from taichi_ants.analysis.drawings import drawings
+    from taichi_ants.files.results import MANIFEST
     from taichi_ants.report.colony import colony_page
     from taichi_ants.report.page import made_facts, setting_facts
     from taichi_ants.report.players import at_work
-    from taichi_ants.studies.result_folder import MANIFEST
 
     results = results or Results.read(files.read_csv(folder / SEEDS))
     shown = not settings.no_figures

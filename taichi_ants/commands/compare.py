@@ -221,7 +221,7 @@ def write_tables(folder: Path, results: Results) -> None:
     from taichi_ants import files
     from taichi_ants.analysis.paper.audit import claims_markdown, claims_rows
     from taichi_ants.analysis.paper.report import report, table2_markdown
-    from taichi_ants.studies.result_folder import REPORT
+    from taichi_ants.files.results import REPORT
 
     comparison, lines, audit = results.comparison, results.lines, results.audit
     tables = {
@@ -292,8 +292,9 @@ def render_policy(path: Path, episode: Episode, title: str) -> None:
 
 def compare(settings: argparse.Namespace) -> None:
     """Run the comparison, or show the finished one."""
+    from taichi_ants.files.results import MANIFEST
     from taichi_ants.studies.beside import Beside
-    from taichi_ants.studies.result_folder import MANIFEST, work_or_show
+    from taichi_ants.studies.result_folder import work_or_show
 
     shows = not settings.no_figures
     # Who asks for one thread wants the other processors for something else.
@@ -395,10 +396,11 @@ def do_comparison(
     settings: argparse.Namespace, study: Study[RunPoint], beside: Beside, blocks: Path, ready: Path
 ) -> tuple[Results, Seen]:
     """Do what is not done yet, and write all results."""
-    from taichi_ants import archives, files
+    from taichi_ants import files
     from taichi_ants.analysis.bounds.baselines import bound_rows, policy_rows
     from taichi_ants.analysis.paper.results import Results
     from taichi_ants.engines.runs.training import evaluate
+    from taichi_ants.files import archives
 
     where, first = {"threads": settings.threads, "arch": settings.arch}, study.points[0]
     world, task, steps, shows = first.world, first.task, first.max_steps, not settings.no_figures
@@ -464,12 +466,13 @@ def make_page(
     made: Mapping[str, Any],
 ) -> str:
     """The page of the results in a folder, which are read from there if they are not given."""
-    from taichi_ants import archives, files
+    from taichi_ants import files
     from taichi_ants.analysis.bounds.baselines import Baseline
     from taichi_ants.analysis.paper.results import Results
+    from taichi_ants.files import archives
+    from taichi_ants.files.results import MANIFEST
     from taichi_ants.report.comparison import comparison_page
     from taichi_ants.report.page import made_facts, setting_facts
-    from taichi_ants.studies.result_folder import MANIFEST
 
     if found is None:
         told = comparison_of(settings, study, archives.read(folder / RUNS))

@@ -70,7 +70,7 @@ def do_sweep(settings: argparse.Namespace, asked: Sweep, blocks: Path, ready: Pa
     """Do what is not done yet, and write all results."""
     from taichi_ants import files
     from taichi_ants.analysis import sweeps
-    from taichi_ants.studies.result_folder import REPORT
+    from taichi_ants.files.results import REPORT
 
     values = measured(asked, blocks, settings.threads, settings.arch)
     of_seeds = sweeps.seed_rows(asked.settings, asked.study.seeds, values)

@@ -16,7 +16,6 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.envs.registration import EnvSpec
 
-from taichi_ants.engines.stored import world_arrays, world_from
 from taichi_ants.envs.formats import ObservationFormat, Shown
 from taichi_ants.errors import AntsError, expect, shown
 from taichi_ants.files import to_json
@@ -77,7 +76,6 @@ def to_minari(
                 infos=infos,
             )
         )
-    world = {name: array.tolist() for name, array in world_arrays(data.world, "world").items()}
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # of all that could be told besides
@@ -96,7 +94,7 @@ def to_minari(
             f"Minari cannot write {shown(dataset_id)} ({' '.join(str(error).split())}); choose "
             'another name, such as "ants/random-v0".'
         ) from error
-    written.storage.update_metadata({_FACTS: to_json({**data.facts(), **world})})
+    written.storage.update_metadata({_FACTS: to_json(data.facts())})
     return written
 
 
@@ -141,12 +139,11 @@ def from_minari(
     with _reading(path):
         source = minari.load_dataset(dataset) if isinstance(dataset, str) else dataset
         facts = source.storage.metadata.get(_FACTS)
-        known: dict[str, Any] = {"task": task or Task(), "seeds": (0,)}
+        known: dict[str, Any] = {"world": world, "task": task or Task(), "seeds": (0,)}
+        known["behaviour"] = {"policy": "unknown"}
         if facts is not None:
-            described = json.loads(facts)
-            known = Dataset.described(described)
-            world = world_from(described, "world", described["world"])
-    if world is None:
+            known = Dataset.described(json.loads(facts))
+    if known["world"] is None:
         raise AntsError("the data set does not tell the world of its ants; give world and task.")
     form = Shown(known["task"].sees, _FORMATS.get(type(source.observation_space), "cells"))
     if (source.observation_space, source.action_space) != (form.space, spaces.Discrete(N_ACTIONS)):
@@ -160,7 +157,7 @@ def from_minari(
             name: np.concatenate([piece[name] for piece in pieces]).astype(dtype)
             for name, dtype in COLUMNS.items()
         }
-        return Dataset(world=world, **{"behaviour": {"policy": "unknown"}, **known}, **rows)
+        return Dataset(**known, **rows)
 
 
 @contextmanager

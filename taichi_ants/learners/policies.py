@@ -7,7 +7,6 @@ a random choice, but no other probabilities.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -15,15 +14,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from taichi_ants import archives
 from taichi_ants.errors import AntsError, check_one_of, expect, shown
 from taichi_ants.files import PathLike, to_json
+from taichi_ants.files.archives import Kind
 from taichi_ants.task import Task, observations
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, N_ACTIONS, PICK_UP, RIGHT
 from taichi_ants.task.states import TASK_NAMES
 
 ActionValues = npt.NDArray[np.float32]
-_MOST_BYTES = 1 << 26  # of a policy file, unpacked
+_KIND = Kind("policy", 2, "save_policy", most=1 << 26, foreign=True)
 
 
 class Policy(NamedTuple):
@@ -185,7 +184,7 @@ def save_policy(
         path: The file; the whole name, no ending is added.
         q_values: Action values of shape (n_states, 5), finite as float32.
         metadata: What made the policy (configuration, seed, world ...), anything that
-            `files.write_json` can write.
+            JSON can hold.
         observation: Name of the registered observation whose states are the rows.
 
     Raises:
@@ -196,15 +195,14 @@ def save_policy(
     if not isinstance(metadata, Mapping):
         raise AntsError(f"metadata is {shown(metadata)}; it must be a mapping of names to values.")
     try:
-        text = to_json(metadata)
+        to_json(metadata)
     except (TypeError, ValueError, RecursionError) as error:
         reason = str(error) or type(error).__name__
         raise AntsError(
             f"metadata is {shown(metadata)}, which JSON cannot hold ({reason}); use numbers, text, "
             "lists and mappings."
         ) from error
-    arrays = {"q_values": table, "observation": np.array(observation), "metadata": np.array(text)}
-    archives.write(path, arrays)
+    _KIND.write(path, {"observation": observation, "metadata": metadata}, {"q_values": table})
 
 
 def load_policy(path: PathLike) -> Policy:
@@ -214,30 +212,11 @@ def load_policy(path: PathLike) -> Policy:
         AntsError: The file is missing, damaged, no policy file, of an observation that is not
             registered, or its values are no policy of it.
     """
-    arrays = archives.read(path, most=_MOST_BYTES, foreign=True)
-    missing = [name for name in ("q_values", "observation", "metadata") if name not in arrays]
-    if missing:
-        raise AntsError(
-            f"{str(path)!r} holds no {' and no '.join(missing)}; name a policy file that "
-            "save_policy wrote."
-        )
-    try:
-        metadata = json.loads(str(arrays["metadata"][()]))
-    except (ValueError, RecursionError):
-        metadata = None
-    if not isinstance(metadata, dict):
-        raise AntsError(
-            f"the metadata in {str(path)!r} is not a JSON object; name a policy file that "
-            "save_policy wrote."
-        )
-    observation = str(arrays["observation"][()])
-    if observation not in observations.names():
-        raise AntsError(
-            f"{str(path)!r} holds a policy of the observation {shown(observation)}, which is not "
-            "registered; name the file that registers it with --plugin, or import it."
-        )
-    table = _checked(arrays["q_values"], observation, f"q_values in {str(path)!r}")
-    return Policy(table, observation, metadata)
+    with _KIND.reading(path) as (arrays, facts):
+        observation, metadata = facts["observation"], facts["metadata"]
+        expect("metadata", metadata, dict)
+        table = _checked(arrays["q_values"], observation, "q_values")
+        return Policy(table, observation, metadata)
 
 
 def _checked(q_values: npt.ArrayLike, observation: str, what: str) -> ActionValues:

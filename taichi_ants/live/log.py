@@ -8,21 +8,16 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import files
-from taichi_ants.engines.stored import FileKind
 from taichi_ants.errors import AntsError, checked_whole, expect
+from taichi_ants.files.archives import Kind
 from taichi_ants.live.setup import Setup
 from taichi_ants.task.constants import N_ACTIONS
 
 MOST_TICKS = 1_000_000_000
 MOST_EDITS = 10_000
 MOST_CELLS = 400_000  # that edits name, all together
-# Sessions within these limits need no more, so reading a file takes little time and memory.
-KIND = FileKind(
-    *("taichi-ants session 2", "session", "Session.save, or Save on its page,"),
-    most=1 << 25,
-    most_text=1 << 22,
-    most_lists=100_000,
-)
+# Sessions within these limits fit into `most`, so reading a file takes little time and memory.
+KIND = Kind("session", 3, "Session.save, or Save on its page,", most=5_000_000)
 
 
 def cells_of(edit: Any) -> int:
@@ -51,7 +46,7 @@ class Log:
         ticks: How many ticks have passed; None if that is not known.
         state: What `Hand.state` gives then; None if that is not known.
         name: What messages call it.
-        changes: As in `Session`; in files without them each edit is a change of its own.
+        changes: As in `Session`.
     """
 
     setup: Setup
@@ -71,7 +66,7 @@ class Log:
             **{"edits": self.edits, "changes": self.changes},
             **{"steps": self.steps, "ticks": self.ticks, "state": self.state},
         }
-        KIND.write(path, facts, {"table": np.asarray(table, np.float32)}, compress=True)
+        KIND.write(path, facts, {"table": np.asarray(table, np.float32)})
 
     @classmethod
     def read(cls, path: files.PathLike, content: bytes | None = None) -> Log:
@@ -80,23 +75,21 @@ class Log:
         Raises:
             AntsError: The file is missing, damaged, too large, or of another kind.
         """
-        stored, facts = KIND.read(path, content)
-        with KIND.rebuilding(path):
+        with KIND.reading(path, content) as (arrays, facts):
             expect("state", facts["state"], str)
             steps = checked_whole("steps", facts["steps"], 0, MOST_TICKS)
             edits, before = [], 0
             for at, edit in facts["edits"]:
                 before = checked_whole("steps", at, before, steps)
                 edits.append((before, edit))
-            # Files of a version before have none.
             changes = [
                 checked_whole("changes", first, 0, max(len(edits) - 1, 0))
-                for first in facts.get("changes", range(len(edits)))
+                for first in facts["changes"]
             ]
             if changes[:1] != [0][: len(edits)] or changes != sorted(set(changes)):
                 raise ValueError("changes")
             log = cls(
-                *(Setup.from_json(facts["setup"], stored["table"]), tuple(edits), steps),
+                *(Setup.from_json(facts["setup"], arrays["table"]), tuple(edits), steps),
                 checked_whole("ticks", facts["ticks"], 0, steps),
                 *(facts["state"], str(path), tuple(changes)),
             )

@@ -248,7 +248,7 @@ class Session:
         Raises:
             AntsError: The log is damaged, or its end is another one here.
         """
-        with KIND.rebuilding(log.name):
+        with KIND.building(log.name):
             session = cls(log.setup)
             for _ in session._follow(log.edits, log.steps, log.changes):
                 yield session

@@ -10,14 +10,14 @@ import numpy as np
 
 from taichi_ants.checks import checked_seeds, checked_share
 from taichi_ants.engines.records import Record
-from taichi_ants.engines.stored import FileKind, world_arrays, world_facts, world_from
 from taichi_ants.errors import AntsError, checked_whole, expect, shown
 from taichi_ants.files import PathLike, smallest
+from taichi_ants.files.archives import Kind
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.worlds.world import World
 
-_KIND = FileKind("taichi-ants data set 2", "data set", "Dataset.save")
+_KIND = Kind("data set", 3, "Dataset.save")
 
 
 # The arrays and their types, in order.
@@ -179,8 +179,7 @@ class Dataset(Record):
         """Write a .npz file; raises as `archives.write` does."""
         arrays = {name: getattr(self, name) for name in COLUMNS}
         arrays = {n: smallest(a) if a.dtype.kind == "i" else a for n, a in arrays.items()}
-        arrays |= world_arrays(self.world, "world")
-        _KIND.write(path, self.facts(), arrays, compress=True)
+        _KIND.write(path, self.facts(), arrays)
 
     @classmethod
     def load(cls, path: PathLike) -> Dataset:
@@ -189,16 +188,14 @@ class Dataset(Record):
         Raises:
             AntsError: The file is missing, damaged, of another kind, or its observation is unknown.
         """
-        stored, facts = _KIND.read(path)
-        with _KIND.rebuilding(path):
-            known = {"world": world_from(stored, "world", facts["world"]), **cls.described(facts)}
-            rows: dict[str, Any] = {n: stored[n].astype(kind) for n, kind in COLUMNS.items()}
-            return cls(**known, **rows)
+        with _KIND.reading(path) as (arrays, facts):
+            rows: dict[str, Any] = {n: arrays[n].astype(kind) for n, kind in COLUMNS.items()}
+            return cls(**cls.described(facts), **rows)
 
     def facts(self) -> dict[str, Any]:
-        """What the data are, for files, without the arrays of the world."""
+        """Return all except the transitions, for files; `described` reads it."""
         return {
-            "world": world_facts(self.world),
+            "world": self.world.as_dict(),
             "task": self.task.as_dict(),
             "seeds": self.seeds,
             "behaviour": dict(self.behaviour),
@@ -206,9 +203,10 @@ class Dataset(Record):
 
     @staticmethod
     def described(facts: Mapping[str, Any]) -> dict[str, Any]:
-        """Task, seeds and behaviour of such facts."""
+        """Return the fields of a data set that are in such facts."""
         expect("behaviour", facts["behaviour"], dict)
         return {
+            "world": World.from_dict(facts["world"]),
             "task": Task.from_dict(facts["task"]),
             "seeds": checked_seeds(facts["seeds"]),
             "behaviour": facts["behaviour"],

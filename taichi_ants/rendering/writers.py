@@ -159,7 +159,8 @@ def _folder_of(target: Path) -> Iterator[None]:
 
 def _write_folder(folder: Path, frames: Iterable[np.ndarray]) -> None:
     """Write numbered pictures to a folder that appears when all of them exist."""
-    with files.writing(folder), files.unfinished(folder, Path.mkdir) as whole:
+    with files.writing(folder), files.unfinished(folder) as whole:
+        whole.mkdir()
         for number, frame in enumerate(frames):
             (whole / f"frame_{number:06d}.png").write_bytes(_png(frame))
         if folder.exists():

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants import archives, files
+from taichi_ants import files
+from taichi_ants.files import archives
 from taichi_ants.studies.command_line import notice
 
 Outcome = dict[str, np.ndarray]  # by name

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,8 @@ import numpy.typing as npt
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 from taichi_ants.worlds import geometry, starts, validation
+
+_PARTS = ("foods", "obstacles", "trails", "ants")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -131,6 +133,20 @@ class World:
         """
         return starts.place(self, seed, n, where)
 
+    def as_dict(self) -> dict[str, Any]:
+        """Return the world as names and lists of numbers, for files; `from_dict` reads it."""
+        parts = {name: getattr(self, name).tolist() for name in _PARTS}
+        return {"ranges": [*self.ranges], "queen": [*self.queen], **parts}
+
+    @classmethod
+    def from_dict(cls, facts: Mapping[str, Any]) -> World:
+        """Return the world of `as_dict`.
+
+        Raises:
+            AntsError, KeyError, TypeError, ValueError: There is no such world.
+        """
+        return cls(facts["ranges"], facts["queen"], *(np.array(facts[n]) for n in _PARTS))
+
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, World):
             return NotImplemented
@@ -141,13 +157,11 @@ class World:
 
     @cached_property
     def _key(self) -> tuple:
-        arrays = (self.foods, self.obstacles, self.trails, self.ants)
-        return (self.ranges, self.queen, *(array.tobytes() for array in arrays))
+        return (self.ranges, self.queen, *(getattr(self, name).tobytes() for name in _PARTS))
 
     def __reduce__(self) -> tuple:
         # Copies and pickles are built anew, so that their arrays are read-only as well.
-        contents = (self.foods, self.obstacles, self.trails, self.ants)
-        return World, (self.ranges, self.queen, *contents)
+        return World, (self.ranges, self.queen, *(getattr(self, name) for name in _PARTS))
 
     def __repr__(self) -> str:
         return (

@@ -17,7 +17,6 @@ from command_lines import EXPERIMENTS, assert_one_sentence, call, contents, load
 from taichi_ants import (
     Task,
     TrainingConfig,
-    archives,
     evaluate,
     load_policy,
     runtime,
@@ -28,6 +27,7 @@ from taichi_ants.analysis.behaviour import DELIVERS
 from taichi_ants.analysis.paper.measures import measures_of_runs
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.commands import compare as commands
+from taichi_ants.files import archives
 from taichi_ants.rendering import PAUSE, Episode, frames, save_animation, text
 from taichi_ants.studies import beside
 

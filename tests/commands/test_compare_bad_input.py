@@ -104,7 +104,7 @@ def test_sizes_and_switches(arguments, named, place, capsys):
         (["--world", ""], ["--world is empty"]),
         (["--world", "damaged.txt"], ["damaged.txt", "line 2", "'x'"]),
         (["--world", "two_queens.txt"], ["two_queens.txt"]),
-        (["--world", "bytes.txt"], ["bytes.txt", "no text"]),
+        (["--world", "bytes.txt"], ["bytes.txt", "not text"]),
         (["--world", "no_way.txt"], ["no_way.txt", "reached"]),
         (["--world", "no_room.txt"], []),
         (["--world-seed", "0"], ["--world-seed", "'paper'", "open"]),
@@ -119,7 +119,7 @@ def test_worlds(arguments, named, place, capsys):
 @pytest.mark.parametrize(
     ("out", "named"),
     [
-        ("file", ["'file'", "not a directory"]),
+        ("file", ["'file'", "file exists"]),
         ("file/below/it", ["'file/below/it'"]),
         ("/proc/results", ["'/proc/results'"]),
         ("x" * 300, ["too long"]),

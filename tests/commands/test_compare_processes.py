@@ -133,7 +133,7 @@ def test_a_second_process_at_the_same_work_may_finish_it(kernels, tmp_path):
         _, err = process.communicate(timeout=60)
     assert process.returncode == 2
     assert_one_sentence(err)
-    assert "another process has done the same work in 'out'" in err
+    assert "another process has finished the same work in 'out'" in err
     assert contents(tmp_path / "out") == before
 
 

@@ -23,10 +23,10 @@ from taichi_ants import (
     Pheromone,
     Task,
     TrainingConfig,
-    archives,
     load_policy,
 )
 from taichi_ants import task as tasks
+from taichi_ants.files import archives
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.live import log as log_module
 from taichi_ants.live import session as session_module
@@ -179,11 +179,6 @@ def test_a_file_knows_what_was_one_change(tmp_path):
     assert again.changes == session.changes == [0, 2]
     *_, again = again.undone()
     assert len(again.edits) == 2
-    without = {name: np.array(value) for name, value in np.load(tmp_path / "session.npz").items()}
-    facts = json.loads(str(without["facts"][()]))
-    del facts["changes"]  # as a version before wrote it
-    archives.write(tmp_path / "old.npz", {**without, "facts": np.array(json.dumps(facts))})
-    assert Session.load(tmp_path / "old.npz").changes == [0, 1, 2, 3, 4]
 
 
 @pytest.mark.slow
@@ -442,27 +437,26 @@ def test_edits_without_room_change_nothing():
         ({"edits": [[0, {"kind": "explode"}]], "changes": [0]}, "explode"),
         ({"edits": [[5, {"kind": "episode"}], [4, {"kind": "episode"}]]}, "steps is 4"),
         ({"edits": 7}, "damaged"),
-        ({"edits": []}, "damaged"),
+        ({"edits": []}, "changes is "),
         ({"changes": 7}, "damaged"),
         ({"changes": [1]}, "damaged"),
         ({"changes": [0, 0]}, "damaged"),
-        ({"changes": [0, 1.0]}, "damaged"),
-        ({"changes": [0, 10**6]}, "damaged"),
-        ({"setup": {"world": "/etc/passwd"}}, "damaged"),
+        ({"changes": [0, 1.0]}, "changes is 1.0"),
+        ({"changes": [0, 10**6]}, "changes is 1000000"),
+        ({"setup": {"world": "/etc/passwd"}}, "policy is None"),
         ({"state": "0"}, "does not end as it did"),
         ({"state": None}, "state is None"),
-        ({"setup": None}, "damaged"),
+        ({"setup": None}, "setup is None"),
     ],
 )
 def test_files_that_were_altered_are_refused(edited, changes, said, tmp_path):
     path = tmp_path / "x.npz"
     edited["foraging"].save(path)
-    with np.load(path) as archive:
-        arrays = dict(archive)
-    facts = {**json.loads(str(arrays["facts"][()])), **changes}
+    arrays = archives.read(path)
+    facts = {**json.loads(arrays["facts"].item()), **changes}
     archives.write(path, {**arrays, "facts": np.array(json.dumps(facts))})
     with pytest.raises(
-        AntsError, match=r"^the session in .* is damaged .*; name a file that .* wrote\.$"
+        AntsError, match=r"^the session in .* (is damaged|cannot be used).*\.$"
     ) as e:
         Session.load(path)
     assert said in str(e.value)

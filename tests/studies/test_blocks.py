@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants import archives
+from taichi_ants.files import archives
 from taichi_ants.studies.blocks import kept
 
 MADE = {

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from taichi_ants import AntsError, Colony, TrainingConfig, archives, evaluate, train
+from taichi_ants import AntsError, Colony, TrainingConfig, evaluate, train
+from taichi_ants.files import archives
 from taichi_ants.studies import runner
 from taichi_ants.studies.provenance import commit, provenance, world_facts
 from taichi_ants.studies.runner import EVALUATION_SEEDS, ColonyPoint, RunPoint, Study

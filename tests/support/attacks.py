@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants import archives
+from taichi_ants.files import archives
 from taichi_ants.live.session import Session
 
 _EDIT = [0, {"kind": "episode"}]
@@ -31,10 +31,10 @@ def _cells(facts: dict[str, Any]) -> str:
 # Name: its facts, from those of a session, and what the message says is allowed.
 ATTACKS: dict[str, tuple[Callable[[dict[str, Any]], str], str]] = {
     "20 000 edits": (lambda facts: _edits(facts, 20_000), "at most 10000 edits"),
-    "400 000 edits": (lambda facts: _edits(facts, 400_000), "33554432 are allowed"),
+    "400 000 edits": (lambda facts: _edits(facts, 400_000), "5000000 are allowed"),
     "edits of many cells": (_cells, "of 400000 cells are allowed"),
-    "4 000 000 lists": (lambda _: "[" + "[]," * 4_000_000 + "[]]", "33554432 are allowed"),
-    "1 300 000 lists": (lambda _: "[" + "[]," * 1_300_000 + "[]]", "with 100000 lists are allowed"),
+    "4 000 000 lists": (lambda _: "[" + "[]," * 4_000_000 + "[]]", "5000000 are allowed"),
+    "1 300 000 lists": (lambda _: "[" + "[]," * 1_300_000 + "[]]", "holds no session"),
     "deep lists": (lambda _: "[" * 60_000 + "]" * 60_000, "holds no session"),
     "a large map": (
         lambda facts: _setup(facts, world="\n".join(["." * 1000] * 1000)),
@@ -60,9 +60,8 @@ ATTACKS: dict[str, tuple[Callable[[dict[str, Any]], str], str]] = {
 def attack(name: str, session: Session, folder: Path) -> bytes:
     """A file of `ATTACKS`, whose checksums are right."""
     session.save(folder / "session.npz")
-    with np.load(folder / "session.npz") as archive:
-        arrays = dict(archive)
+    arrays = archives.read(folder / "session.npz")
     facts, _ = ATTACKS[name]
-    text = facts(json.loads(str(arrays["facts"][()])))
-    archives.write(folder / "session.npz", {**arrays, "facts": np.array(text)})
+    text = facts(json.loads(arrays["facts"].item()))
+    archives.write(folder / "session.npz", {**arrays, "facts": np.array(text.encode())})
     return (folder / "session.npz").read_bytes()

@@ -23,6 +23,7 @@ from command_lines import assert_one_sentence, load
 from taichi_ants import Task, files
 from taichi_ants.analysis.bounds import baselines
 from taichi_ants.commands import compare
+from taichi_ants.files.results import ResultFolder
 from taichi_ants.studies import colony_study, result_folder, runner
 
 KILLED, WENT_ON = 77, 78  # how processes end
@@ -40,7 +41,7 @@ def remember(patch: pytest.MonkeyPatch) -> None:
     made = result_folder.provenance(["command"])
     patch.setattr(result_folder, "provenance", lambda arguments: made)
     patch.setattr(result_folder, "time", SimpleNamespace(perf_counter=lambda: 0.0))
-    patch.setattr(result_folder.ResultFolder, "_seconds_so_far", lambda folder: 0.0)
+    patch.setattr(ResultFolder, "_seconds_so_far", lambda folder: 0.0)
 
 
 def _remembered(function: Callable[..., Any]) -> Callable[..., Any]:

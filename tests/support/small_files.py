@@ -23,11 +23,11 @@ from taichi_ants import (
     worlds,
 )
 from taichi_ants.engines.runs.results import RunState
+from taichi_ants.files.results import ResultFolder
 from taichi_ants.live.session import Session
 from taichi_ants.live.setup import Setup
 from taichi_ants.offline.dataset import COLUMNS
 from taichi_ants.studies.blocks import kept
-from taichi_ants.studies.result_folder import ResultFolder
 from taichi_ants.studies.sweep_file import read_sweep
 from taichi_ants.worlds import World
 
@@ -55,12 +55,12 @@ class SmallFile(NamedTuple):
     Attributes:
         path: The file.
         read: What `path` holds.
-        sealed: Whether its reader notices all that was altered.
+        checked: Whether its reader notices everything that was altered.
     """
 
     path: Path
     read: Callable[[], Any]
-    sealed: bool = True
+    checked: bool = True
 
 
 def small_files(folder: Path) -> dict[str, SmallFile]:
@@ -79,13 +79,13 @@ def small_files(folder: Path) -> dict[str, SmallFile]:
         "block": of("block.npz", _block),
         "manifest": of("finished/manifest.json", lambda path: _finished(path.parent)),
         "table": of("finished/table.csv", lambda path: _finished(path.parent)),
-        "map": of("map.txt", worlds.load_map)._replace(sealed=False),
-        "sweep": of("sweep.toml", _sweep)._replace(sealed=False),
-        "table of others": of("other.csv", files.read_csv)._replace(sealed=False),
+        "map": of("map.txt", worlds.load_map)._replace(checked=False),
+        "sweep": of("sweep.toml", _sweep)._replace(checked=False),
+        "table of others": of("other.csv", files.read_csv)._replace(checked=False),
     }
     save_policy(found["policy"].path, Q_VALUES, {"seed": 3})
-    arrays = {"q_values": Q_VALUES, "observation": "paper", "metadata": '{"seed": 3}'}
-    np.savez(found["policy of others"].path, **arrays)
+    facts = {"kind": "policy", "version": 2, "observation": "paper", "metadata": {"seed": 3}}
+    np.savez(found["policy of others"].path, q_values=Q_VALUES, facts=json.dumps(facts))
     _training().save(found["training result"].path)
     _dataset().save(found["data set"].path)
     colony = Colony(WORLD, TASK, SARSA)
@@ -163,7 +163,7 @@ def _block(path: Path, first: bool = False) -> dict[str, np.ndarray]:
 def _finished(folder: Path) -> dict[str, Any]:
     results = ResultFolder(folder, {"seeds": (0, 1)})
     assert results.is_finished()
-    results.check_whole()
+    results.check()
     manifest = json.loads((folder / "manifest.json").read_text())
     told = {name: manifest[name] for name in ("files", "settings", "seconds")}
     return {"table": files.read_csv(folder / "table.csv"), **told}

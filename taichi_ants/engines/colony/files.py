@@ -9,16 +9,17 @@ import numpy as np
 from taichi_ants import checks, files, learners, runtime
 from taichi_ants.engines.colony.memory import set_learning_rate
 from taichi_ants.engines.records import same
-from taichi_ants.engines.stored import FileKind, world_arrays, world_facts, world_from
 from taichi_ants.errors import checked_whole
+from taichi_ants.files.archives import Kind
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS
+from taichi_ants.worlds.world import World
 
 if TYPE_CHECKING:
     from taichi_ants.engines.colony.colony import Colony
 
-_KIND = FileKind("taichi-ants colony 8", "colony", "Colony.save")
+_KIND = Kind("colony", 9, "Colony.save")
 _OPTIONS = ("seeds", "ants", "capacity", "start", "ends_at_delivery", "sharing", "schedule")
 _MOMENT = ("epsilon", "learning_rate", "length", "ticks")
 
@@ -43,12 +44,10 @@ def _contents(colony: Colony) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """All that a file of a colony holds: facts and arrays."""
     arrays = {f"array_{name}": colony.arrays[name] for name in colony.stored}
     numbers = {world: number for number, world in enumerate(dict.fromkeys(colony.worlds))}
-    for world, number in numbers.items():
-        arrays |= world_arrays(world, f"world{number}")
     facts = {
         "task": colony.task.as_dict(),
         "training": None if colony.is_given_actions else colony.training.as_dict(),
-        "worlds": [world_facts(world) for world in numbers],
+        "worlds": [world.as_dict() for world in numbers],
         "world_of": [numbers[world] for world in colony.worlds],
         "one_a_slot": colony.one_a_slot,
         "rounds": colony.rounds.tolist(),
@@ -67,17 +66,13 @@ def load_colony(
         AntsError: The file is missing, damaged, or holds no colony; or its learner or
             observation is not registered.
     """
-    stored, facts = _KIND.read(path)
-    runtime.start(threads, arch)  # what is wrong with these says nothing about the file
-    with _KIND.rebuilding(path):
+    runtime.start(threads, arch)  # its errors are not about the file
+    with _KIND.reading(path) as (arrays, facts):
         given = facts["training"]
         training = None if given is None else TrainingConfig(**given)
-    if training is not None:
-        learners.get(training.learner)
-    with _KIND.rebuilding(path):
-        worlds = [
-            world_from(stored, f"world{number}", one) for number, one in enumerate(facts["worlds"])
-        ]
+        if training is not None:
+            learners.get(training.learner)
+        worlds = [World.from_dict(one) for one in facts["worlds"]]
         task, options = Task.from_dict(facts["task"]), {name: facts[name] for name in _OPTIONS}
         if (
             options["sharing"] == "fixed" and training is not None
@@ -90,15 +85,15 @@ def load_colony(
         set_learning_rate(colony)
         colony.length = checked_whole("length", facts["length"], least=0)
         colony.ticks = checked_whole("ticks", facts["ticks"], least=0)
-        rounds = np.array(facts.get("rounds", colony.rounds), np.int64)  # files had none before
+        rounds = np.array(facts["rounds"], np.int64)
         if rounds.shape != colony.rounds.shape or rounds.min() < 0:
             raise ValueError("rounds has another shape, or is below 0")
         colony.rounds = rounds
-        if facts.get("homes", colony.n_homes) != colony.n_homes:
+        if facts["homes"] != colony.n_homes:
             colony.make_room_for_homes(facts["homes"])
         for name in colony.stored:
-            array, kept = colony.arrays[name], stored[f"array_{name}"]
+            array, kept = colony.arrays[name], arrays[f"array_{name}"]
             if kept.shape != array.shape or kept.dtype != array.dtype:
                 raise ValueError(f"{name} has another shape or type")
             array[:] = kept
-    return colony
+        return colony

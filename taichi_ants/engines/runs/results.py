@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants import files, learners
+from taichi_ants import learners
 from taichi_ants.checks import checked_max_steps, checked_seeds
 from taichi_ants.engines.layout import OUTCOMES
 from taichi_ants.engines.packing import padded
 from taichi_ants.engines.records import Record
-from taichi_ants.engines.stored import FileKind, world_arrays, world_facts, world_from
 from taichi_ants.errors import AntsError, shown
+from taichi_ants.files import PathLike
+from taichi_ants.files.archives import Kind
 from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.learners.config import TrainingConfig
@@ -23,7 +24,7 @@ from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS, ROW
 from taichi_ants.worlds.world import World
 
-_KIND = FileKind("taichi-ants training 6", "training result", "TrainingResult.save")
+_KIND = Kind("training result", 7, "TrainingResult.save")
 _SUMMED_UP, _LISTED = 50, 6  # episodes and configurations that a result shows
 
 
@@ -171,14 +172,14 @@ class TrainingResult(Record):
         """The action values at the end, float32 (C, S, n_states, 5), a copy."""
         return self.state.q[:, :, 0, :, :N_ACTIONS].copy()
 
-    def save(self, path: files.PathLike) -> None:
+    def save(self, path: PathLike) -> None:
         """Write the result; training goes on from what `load` reads, bit for bit.
 
         Raises:
             AntsError: The file cannot be written.
         """
         facts = {
-            "world": world_facts(self.world),
+            "world": self.world.as_dict(),
             "task": self.task.as_dict(),
             "configs": [config.as_dict() for config in self.configs],
             "seeds": self.seeds,
@@ -187,22 +188,21 @@ class TrainingResult(Record):
         }
         arrays = {name: getattr(self, name) for name in OUTCOMES}
         arrays |= {f"state_{name}": array for name, array in vars(self.state).items()}
-        _KIND.write(path, facts, {**arrays, **world_arrays(self.world, "world")}, compress=True)
+        _KIND.write(path, facts, arrays)
 
     @classmethod
-    def load(cls, path: files.PathLike) -> TrainingResult:
+    def load(cls, path: PathLike) -> TrainingResult:
         """Read a result that `save` wrote; its learners need not be registered.
 
         Raises:
             AntsError: The file is missing, damaged, of another kind, or its observation is unknown.
         """
-        stored, facts = _KIND.read(path)
-        with _KIND.rebuilding(path):
+        with _KIND.reading(path) as (arrays, facts):
             task = Task.from_dict(facts["task"])
-            outcomes: dict[str, Any] = {name: stored[name] for name in OUTCOMES}
-            state = {one.name: stored[f"state_{one.name}"] for one in fields(RunState)}
+            outcomes: dict[str, Any] = {name: arrays[name] for name in OUTCOMES}
+            state = {one.name: arrays[f"state_{one.name}"] for one in fields(RunState)}
             return cls(
-                world=world_from(stored, "world", facts["world"]),
+                world=World.from_dict(facts["world"]),
                 configs=tuple(TrainingConfig(**config) for config in facts["configs"]),
                 seeds=checked_seeds(facts["seeds"]),
                 max_steps=checked_max_steps(facts["max_steps"], task),

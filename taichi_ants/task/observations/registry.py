@@ -136,7 +136,8 @@ def get(name: str) -> Observation:
     """
     if not isinstance(name, str) or name not in _OBSERVATIONS:
         raise AntsError(
-            f"there is no observation {shown(name)}; choose one of {', '.join(names())}."
+            f"there is no observation {shown(name)}; choose one of {', '.join(names())}, or name "
+            "the file that registers it with --plugin."
         )
     return _OBSERVATIONS[name]
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from random_colonies import random_colony
 
-from taichi_ants import AntsError, Colony, TrainingConfig, archives, worlds
+from taichi_ants import AntsError, Colony, TrainingConfig, worlds
 from taichi_ants.engines.colony import colony as colony_module
 from taichi_ants.engines.colony.layout import WorldRow
+from taichi_ants.files import archives
 from taichi_ants.task import Life, Task
 
 PLANNING = TrainingConfig("dyna_q", 0.1, 0.9, 0.5, 1.0, planning_steps=2)
@@ -29,26 +30,21 @@ def kept(tmp_path_factory) -> dict[str, np.ndarray]:
     assert colony.outcome().births.sum() > 0
     colony.save(path)
     Colony.load(path).tick(5)
-    with np.load(path) as archive:
-        return dict(archive)
+    return archives.read(path)
 
 
 def refused(arrays: dict[str, np.ndarray], folder) -> str:
     path = folder / "x.npz"
     archives.write(path, arrays)
-    with pytest.raises(AntsError, match=r"[.]$") as caught:
+    with pytest.raises(AntsError, match=r"^the colony in '.*x.npz' .*[.]$") as caught:
         Colony.load(path)
-    text = str(caught.value)
-    assert text.startswith(f"the colony in {str(path)!r} is damaged (")
-    assert text.endswith("); name a file that Colony.save wrote.")
-    assert "\n" not in text
-    return text
+    return str(caught.value)
 
 
 def test_what_others_have_written_is_not_believed(kept, tmp_path) -> None:
     """Kernels would write where the cell of an ant or the memory of a learner points."""
     np.savez(tmp_path / "x.npz", **kept)
-    with pytest.raises(AntsError, match=r"is damaged or not an \.npz file that this version wrote"):
+    with pytest.raises(AntsError, match=r"is damaged, or not an \.npz file of this version"):
         Colony.load(tmp_path / "x.npz")
 
 
@@ -64,7 +60,7 @@ def test_what_others_have_written_is_not_believed(kept, tmp_path) -> None:
         ({"seeds": []}, ""),
         ({"seeds": [1]}, ""),
         ({"worlds": []}, ""),
-        ({"worlds": [{"ranges": [9, 9, 9], "queen": [0, 0, 0]}]}, ""),
+        ({"worlds": [{"ranges": [9, 9, 9], "queen": [0, 0, 0]}]}, "damaged (KeyError: 'foods')"),
         ({"world_of": [7, 7]}, ""),
         ({"sharing": "maybe"}, "sharing is 'maybe'"),
         ({"epsilon": 7}, "epsilon is 7"),
@@ -74,26 +70,26 @@ def test_what_others_have_written_is_not_believed(kept, tmp_path) -> None:
     ],
 )
 def test_wrong_facts(kept, tmp_path, changes, said) -> None:
-    facts = {**json.loads(str(kept["facts"][()])), **changes}
+    facts = {**json.loads(kept["facts"].item()), **changes}
     assert said in refused({**kept, "facts": np.array(json.dumps(facts))}, tmp_path)
 
 
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"rows": {"own": 128}}, "of the observation 'own' with 128 rows, which is not"),
+        ({"task": {"observation": "own"}}, "there is no observation 'own'; "),
         ({"training": {**PLANNING.as_dict(), "learner": "mine"}}, "there is no learner 'mine'; "),
     ],
 )
 def test_a_plugin_that_is_missing_is_asked_for(kept, tmp_path, changes, said) -> None:
-    facts = {**json.loads(str(kept["facts"][()])), **changes}
+    facts = {**json.loads(kept["facts"].item()), **changes}
     archives.write(tmp_path / "x.npz", {**kept, "facts": np.array(json.dumps(facts))})
     with pytest.raises(AntsError, match=f"{said}.*--plugin"):
         Colony.load(tmp_path / "x.npz")
 
 
 def test_other_shapes_and_missing_arrays(kept, tmp_path) -> None:
-    for name in ("array_ants", "array_q", "array_ground", "world0_foods"):
+    for name in ("array_ants", "array_q", "array_ground"):
         for other in (kept[name][..., :-1], kept[name].astype(float) / 2, np.zeros(())):
             refused({**kept, name: other}, tmp_path)
         refused({key: array for key, array in kept.items() if key != name}, tmp_path)

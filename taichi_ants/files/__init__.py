@@ -1,0 +1,289 @@
+"""Files: written whole or not at all, and read with limits. Errors name the file.
+
+`files.archives` writes arrays with the facts about them (.npz), `files.results` folders of results.
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import hashlib
+import io
+import json
+import math
+import os
+import secrets
+import shutil
+import stat
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from taichi_ants.errors import AntsError, expect, shown
+
+PathLike = str | os.PathLike[str]
+_ABANDONED = 3600.0  # seconds after which an unfinished file is that of a process that was killed
+
+
+def write_atomically(path: PathLike, writer: Callable[[BinaryIO], object]) -> None:
+    """Write a file so that readers see the old content or all of the new one, never a part.
+
+    Args:
+        path: The file. One that exists is replaced; a symbolic link is followed.
+        writer: Called once with a binary file to write to.
+
+    Raises:
+        AntsError: The file cannot be written. Other exceptions of the writer pass through.
+    """
+    with writing(path):
+        target = _target_of(path)
+        with unfinished(target) as place:
+            with open(place, "wb") as file:
+                writer(file)
+            os.replace(place, target)
+
+
+@contextmanager
+def unfinished(target: Path) -> Iterator[Path]:
+    """A free path in the target's folder, to write to and to move to the target when complete.
+
+    What is still there at the end is removed. If the process is killed, it stays, until the same
+    target is written an hour or more later.
+    """
+    # A hash, because the name itself can already have the greatest length that is allowed.
+    name = hashlib.sha256(os.fsencode(target.name)).hexdigest()[:16]
+    for left in target.parent.glob(f".{name}.*.tmp"):
+        with suppress(OSError):
+            if time.time() - left.stat().st_mtime > _ABANDONED:
+                _remove(left)
+    place = target.parent / f".{name}.{secrets.token_hex(8)}.tmp"
+    try:
+        yield place
+    finally:
+        with suppress(OSError):
+            _remove(place)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink()
+
+
+def check_writable_file(path: PathLike) -> Path:
+    """Check before long work that `write_atomically` can write a file; return its path.
+
+    Nothing is written. The folder of the file may be missing if it can be made; that of the target
+    of a symbolic link may not.
+
+    Raises:
+        AntsError: The path is that of a folder, a device or a pipe, or it cannot be written.
+    """
+    with writing(path):
+        target = _target_of(path)
+        folder = target.parent
+        if not os.path.islink(path):
+            folder = next(one for one in target.parents if one.exists())
+        _try_to_write(folder)
+    return Path(path)
+
+
+def write_text(path: PathLike, text: str) -> None:
+    """Write text as UTF-8, line ends unchanged; raises as `write_atomically` does."""
+    write_bytes(path, text.encode("utf-8"))
+
+
+def write_bytes(path: PathLike, content: bytes) -> None:
+    """Write a file; raises as `write_atomically` does."""
+    write_atomically(path, lambda file: file.write(content))
+
+
+def to_json(value: Any, indent: int | None = None) -> str:
+    """Return the JSON text of a value, which may hold NumPy scalars and arrays, and paths."""
+    return json.dumps(value, indent=indent, ensure_ascii=False, default=_plain)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, (np.generic, np.ndarray)):
+        return value.tolist()
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    raise TypeError(f"{type(value).__name__} has no form in JSON")
+
+
+def write_csv(path: PathLike, rows: Iterable[Mapping[str, Any]], columns: Sequence[str]) -> None:
+    """Write rows as comma-separated values with a header.
+
+    Args:
+        path: The file.
+        rows: Numbers and text by column, read one by one, so they need not fit into memory.
+            Floats are written so that they read back exactly. None, NaN and missing keys become
+            an empty field.
+        columns: The columns, in order.
+
+    Raises:
+        AntsError: As `write_atomically`.
+        ValueError: A row has a key that is not a column.
+    """
+
+    def write(file: BinaryIO) -> None:
+        text = codecs.getwriter("utf-8")(file)
+        table = csv.DictWriter(text, fieldnames=columns, restval="", lineterminator="\n")
+        table.writeheader()
+        for row in rows:
+            values = {n: v.item() if isinstance(v, np.generic) else v for n, v in row.items()}
+            table.writerow({n: None if v != v else v for n, v in values.items()})
+
+    write_atomically(path, write)
+
+
+@contextmanager
+def opened(path: PathLike, most: float = math.inf) -> Iterator[BinaryIO]:
+    """Open a regular file of at most `most` bytes to read from.
+
+    Pipes and devices are refused: a pipe could wait forever, and a device has no end.
+
+    Raises:
+        AntsError: The file is not such a file, or cannot be read, now or later.
+    """
+    expect("path", path, str, os.PathLike)
+    try:
+        if "\0" in os.fspath(path):
+            raise OSError("it contains a null character")
+        # Without O_NONBLOCK, opening a pipe would wait for somebody who writes to it.
+        no_wait = getattr(os, "O_NONBLOCK", 0)
+        with open(path, "rb", opener=lambda name, flags: os.open(name, flags | no_wait)) as file:
+            status = os.fstat(file.fileno())
+            if not stat.S_ISREG(status.st_mode):
+                raise OSError("it is a device or a pipe")
+            if status.st_size > most:
+                raise OSError(f"it has {status.st_size} bytes, and {most} are allowed")
+            yield file
+    except (OSError, UnicodeEncodeError) as error:
+        raise AntsError(
+            f"cannot read {named(path)}: {_reason(error)}; name another file."
+        ) from error
+
+
+def read_text(path: PathLike, most: int = 1 << 26) -> str:
+    """Return the text of a UTF-8 file, with line feeds as line ends.
+
+    Raises:
+        AntsError: The file cannot be read, has more than `most` bytes, or is not text.
+    """
+    with opened(path, most) as file:
+        content = file.read(os.fstat(file.fileno()).st_size)
+    try:
+        return content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
+    except UnicodeError as error:
+        raise AntsError(f"{named(path)} is not text in UTF-8; name another file.") from error
+
+
+def read_csv(path: PathLike) -> list[dict[str, Any]]:
+    """Return the rows of a file of `write_csv`: numbers as float, empty fields as None.
+
+    Raises:
+        AntsError: The file cannot be read, or is not a table.
+    """
+    try:
+        header, *lines = csv.reader(io.StringIO(read_text(path, 1 << 30)))
+        rows = [zip(header, line, strict=True) for line in lines if line]
+        return [{name: _number_in(text) for name, text in row} for row in rows]
+    except (csv.Error, ValueError) as error:
+        if isinstance(error, AntsError):
+            raise
+        raise AntsError(f"{named(path)} is not a table; name another file.") from error
+
+
+def smallest(array: np.ndarray) -> np.ndarray:
+    """Return integers in the smallest type that holds them."""
+    low, high = int(array.min(initial=0)), int(array.max(initial=0))
+    return array.astype(np.promote_types(np.min_scalar_type(low), np.min_scalar_type(high)))
+
+
+def check_writable_folder(path: PathLike) -> Path:
+    """Make a folder if it is missing, check that files can be written to it, and return its path.
+
+    Raises:
+        AntsError: The folder cannot be created or written to.
+    """
+    try:
+        folder = Path(path)
+        folder.mkdir(parents=True, exist_ok=True)
+        _try_to_write(folder)
+    except (OSError, ValueError) as error:
+        raise AntsError(
+            f"cannot write to the folder {named(path)}: {_reason(error)}; choose another folder."
+        ) from error
+    return folder
+
+
+def check_room(folder: PathLike, needed: int) -> None:
+    """Check before long work that the disk of a folder has `needed` bytes free.
+
+    Raises:
+        AntsError: It has fewer.
+    """
+    with writing(folder):
+        free = shutil.disk_usage(folder).free
+    if needed > free:
+        raise AntsError(
+            f"this needs {needed / 1e9:.3f} GB on the disk of {named(folder)}, and "
+            f"{free / 1e9:.3f} GB are free; make room there, ask for less, or choose another place."
+        )
+
+
+@contextmanager
+def writing(path: PathLike) -> Iterator[None]:
+    """Turn errors of the operating system into an AntsError that names the file or folder."""
+    try:
+        yield
+    except (OSError, UnicodeError) as error:
+        raise AntsError(
+            f"cannot write {named(path)}: {_reason(error)}; choose another place."
+        ) from error
+
+
+def _target_of(path: PathLike) -> Path:
+    """Return the regular file that a path names, links followed; it need not exist."""
+    expect("path", path, str, os.PathLike)
+    if "\0" in os.fspath(path):
+        raise AntsError(f"{named(path)} contains a null character; name a file to write to.")
+    target = Path(os.path.realpath(path))
+    # Replacing a device, a pipe or a folder would destroy it or fail.
+    if str(path).endswith(os.sep) or (target.exists() and not target.is_file()):
+        raise AntsError(f"{named(path)} is not a regular file; name a file to write to.")
+    return target
+
+
+def _try_to_write(folder: Path) -> None:
+    """Write to a folder, and leave nothing there.
+
+    Permission bits are not enough: root passes them, but not a read-only mount or a full disk.
+    """
+    with tempfile.TemporaryFile(dir=folder) as file:
+        file.write(bytes(4096))
+
+
+def named(path: PathLike) -> str:
+    """Return a path as messages name it."""
+    return shown(str(path), 400)
+
+
+def _reason(error: Exception) -> str:
+    """Return a reason in lower case, without the path and the number that OSError adds."""
+    text = getattr(error, "strerror", None) or str(error) or type(error).__name__
+    return text[:1].lower() + text[1:]
+
+
+def _number_in(text: str) -> float | str | None:
+    try:
+        return float(text)
+    except ValueError:
+        return text or None

@@ -1,0 +1,239 @@
+"""A folder of results: finished once, never mixed with others, never lost.
+
+While the work goes on, everything lies in the subfolder `unfinished`: finished blocks, results that
+are ready, and a manifest with the settings. At the end the results move up, the manifest last: the
+work is finished if the manifest lies in the folder itself.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from taichi_ants import files
+from taichi_ants.errors import AntsError
+
+MANIFEST = "manifest.json"
+REPORT = "report.txt"  # the text that commands print
+PAGE = "report.html"  # the whole result
+
+
+class ResultFolder:
+    """The folder of one piece of work.
+
+    Args:
+        path: The folder; it need not exist.
+        settings: All that determines the results, as `files.to_json` knows it.
+        leading: Settings from which others follow: where these differ, only they are named.
+
+    Attributes:
+        seconds_before: The time of earlier processes, each until its last block, known in `work`.
+    """
+
+    def __init__(
+        self, path: str | Path, settings: Mapping[str, Any], leading: Sequence[str] = ()
+    ) -> None:
+        self.path = Path(path)
+        self.seconds_before = 0.0
+        self._leading = leading
+        self._settings = json.loads(files.to_json(settings))
+        self._unfinished = self.path / "unfinished"
+        self._blocks, self._ready = self._unfinished / "blocks", self._unfinished / "ready"
+
+    def is_finished(self) -> bool:
+        """Return whether the folder holds finished results of these settings.
+
+        Raises:
+            AntsError: It holds something else than these, or the work on them.
+        """
+        for place, what in ((self._unfinished, "unfinished work"), (self.path, "results")):
+            if not (place / MANIFEST).exists():
+                continue
+            other = read_manifest(place)["settings"]
+            keys = dict.fromkeys([*self._settings, *other])
+            different = [key for key in keys if self._settings.get(key) != other.get(key)]
+            different = [key for key in different if key in self._leading] or different
+            if different:
+                raise AntsError(
+                    f"{str(self.path)!r} holds {what} of other settings ({', '.join(different)} "
+                    "differ); choose another --out, or give --force to replace them."
+                )
+            return place == self.path
+        if self.path.is_dir() and any(item != self._unfinished for item in self.path.iterdir()):
+            raise AntsError(
+                f"{str(self.path)!r} holds files, but no finished results; "
+                "choose another --out, or give --force to write among them."
+            )
+        return False
+
+    def check(self, may_lack: str | None = None) -> None:
+        """Check that no file of finished results is missing or altered.
+
+        Args:
+            may_lack: The name of a file that may be missing.
+
+        Raises:
+            AntsError: A file is missing or altered.
+        """
+        for name, checksum in self._listed().items():
+            path = self.path / name
+            if name == may_lack and not path.exists():
+                continue
+            if not path.is_file() or checksum_of(path) != checksum:
+                raise AntsError(
+                    f"{str(path)!r}, a part of the results, is missing or was altered since they "
+                    "were finished; restore it, or give --force to run everything again."
+                )
+
+    @contextmanager
+    def work(self, replace: bool = False) -> Iterator[tuple[Path, Path]]:
+        """Provide a folder for blocks of work, which survive an interruption, and one for results.
+
+        With `replace` the work starts over, whatever the folder holds; old results stay until the
+        new ones are complete. Two processes can do the same work at once: blocks appear whole,
+        each process has its own folder for results, and if that is removed, it ends with an error.
+
+        Raises:
+            AntsError: The folder cannot be written, or another process has finished the work.
+        """
+        self._listed()  # if the manifest is damaged, this raises before the work
+        new = [part for part in (self.path, *self.path.parents) if not part.exists()]
+        try:
+            # Without a manifest, nobody knows the settings of the blocks.
+            if replace or not (self._unfinished / MANIFEST).exists():
+                self._clear()
+            files.check_writable_folder(self.path)
+            with files.writing(self.path):
+                for folder in (self._blocks, self._ready):
+                    folder.mkdir(parents=True, exist_ok=True)
+            self.seconds_before = self._seconds_so_far()
+            with tempfile.TemporaryDirectory(dir=self._ready) as name:
+                ready = Path(name)
+                contents = {"settings": self._settings, "seconds": self.seconds_before}
+                _write_manifest(contents, ready).replace(self._unfinished / MANIFEST)
+                try:
+                    yield self._blocks, ready
+                except (AntsError, OSError) as error:
+                    if self._ready.exists():
+                        raise
+                    raise AntsError(
+                        f"another process has finished the same work in {str(self.path)!r}, or its "
+                        "folder was removed; run the command again to see the results, or to "
+                        "resume."
+                    ) from error
+        finally:
+            if not any(self._blocks.rglob("*.npz")):
+                self._clear()
+            for folder in new:
+                with suppress(OSError, ValueError):  # it holds something, or was never made
+                    folder.rmdir()
+
+    def publish(self, ready: Path, manifest: Mapping[str, Any]) -> None:
+        """Move the results that are ready into the folder, and then a manifest with the settings.
+
+        Files that an older manifest lists are removed; others stay unless they have the same name.
+        """
+        paths = sorted(path.relative_to(ready) for path in ready.rglob("*") if path.is_file())
+        checksums = {path.as_posix(): checksum_of(ready / path) for path in paths}
+        for name in self._listed():
+            file = self.path / name
+            if file.is_file() and file.resolve().is_relative_to(self.path.resolve()):
+                file.unlink()
+                with suppress(OSError):  # the folder holds other files
+                    file.parent.rmdir()
+        for path in paths:
+            (self.path / path).parent.mkdir(parents=True, exist_ok=True)
+            (ready / path).replace(self.path / path)
+        contents = {**manifest, "files": checksums, "settings": self._settings}
+        _write_manifest(contents, ready).replace(self.path / MANIFEST)
+        self._clear()  # now it is finished
+
+    def add(self, name: str, text: str) -> None:
+        """Add a file to finished results, or write it again."""
+        self._ready.mkdir(parents=True, exist_ok=True)
+        with files.writing(self.path), tempfile.TemporaryDirectory(dir=self._ready) as place:
+            file = Path(place, name)
+            files.write_text(file, text)
+            manifest = read_manifest(self.path)
+            manifest["files"][name] = checksum_of(file)
+            # The manifest first: the file can be missing, but never differ from the manifest.
+            _write_manifest(manifest, Path(place)).replace(self.path / MANIFEST)
+            file.replace(self.path / name)
+        self.tidy()
+
+    def tidy(self) -> None:
+        """Remove what is left by a process that was killed after it had finished."""
+        if not (self._unfinished / MANIFEST).exists():
+            self._clear()
+
+    def _seconds_so_far(self) -> float:
+        """Return the time of all processes that have worked here, even if they were killed.
+
+        Each process writes the manifest when it starts, with the time of those before it. Its own
+        time is from then to its last block.
+        """
+        manifest = self._unfinished / MANIFEST
+        if not manifest.exists():
+            return 0.0
+        started = manifest.stat().st_mtime
+        times = [block.stat().st_mtime for block in self._blocks.rglob("*.npz")]
+        return read_manifest(self._unfinished)["seconds"] + max([started, *times]) - started
+
+    def _clear(self) -> None:
+        """Remove our own files in `unfinished`, and the folder if nothing else is in it."""
+        if not self._unfinished.is_dir():
+            return
+        (self._unfinished / MANIFEST).unlink(missing_ok=True)
+        for folder in (self._blocks, self._ready):
+            shutil.rmtree(folder, ignore_errors=True)
+        with suppress(OSError):
+            self._unfinished.rmdir()
+
+    def _listed(self) -> dict[str, str]:
+        """Return the files of finished results, with their checksums."""
+        return read_manifest(self.path)["files"] if (self.path / MANIFEST).exists() else {}
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """Return the contents of the manifest in a folder.
+
+    Raises:
+        AntsError: The manifest is damaged.
+    """
+    try:
+        manifest = json.loads(files.read_text(folder / MANIFEST))
+        if manifest.pop("checksum") != _checksum_of_manifest(manifest):
+            raise ValueError("the checksum differs")
+        return manifest
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+        raise AntsError(
+            f"{str(folder / MANIFEST)!r} is damaged or of another version, so it is not known "
+            "which files here are results; choose another --out."
+        ) from error
+
+
+def _write_manifest(contents: Mapping[str, Any], folder: Path) -> Path:
+    """Write a manifest with its own checksum into a folder; return its path."""
+    plain = json.loads(files.to_json(contents))
+    text = files.to_json({**plain, "checksum": _checksum_of_manifest(plain)}, indent=2)
+    files.write_text(folder / MANIFEST, text + "\n")
+    return folder / MANIFEST
+
+
+def _checksum_of_manifest(manifest: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(manifest, sort_keys=True).encode()).hexdigest()
+
+
+def checksum_of(path: Path) -> str:
+    """Return the SHA-256 of a file, hexadecimal."""
+    digest = hashlib.sha256()
+    with files.opened(path) as file:
+        while chunk := file.read(1 << 20):
+            digest.update(chunk)
+    return digest.hexdigest()

@@ -1,0 +1,272 @@
+"""Writing and reading archives of arrays."""
+
+from __future__ import annotations
+
+import pickle
+import zipfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from taichi_ants.errors import AntsError
+from taichi_ants.files import archives
+
+
+def test_arrays_read_back(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    arrays = {"x": np.arange(6, dtype=np.int16).reshape(2, 3), "text": np.array("é")}
+    archives.write(path, arrays)
+    read = archives.read(path)
+    assert set(read) == {"x", "text"}
+    np.testing.assert_array_equal(read["x"], arrays["x"])
+    assert read["x"].dtype == np.int16
+    assert read["text"][()] == "é"
+
+
+def test_equal_arrays_give_equal_bytes(tmp_path: Path) -> None:
+    for name in ("a.npz", "b.npz"):
+        archives.write(tmp_path / name, {"x": np.arange(100)})
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+
+
+def test_python_objects_are_not_written(tmp_path: Path) -> None:
+    with pytest.raises(TypeError, match="array of references"):
+        archives.write(tmp_path / "a.npz", {"x": np.array([object()])})
+    assert list(tmp_path.iterdir()) == []
+
+
+class Trap:
+    """Unpickling it creates a file."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __reduce__(self) -> tuple:
+        return Path.touch, (self.path,)
+
+
+def test_reading_executes_nothing(tmp_path: Path) -> None:
+    sprung = tmp_path / "sprung"
+    path = tmp_path / "a.npz"
+    np.savez(path, x=np.array([Trap(sprung)], dtype=object))
+    with pytest.raises(AntsError, match=r"a\.npz"):
+        archives.read(path)
+    with pytest.raises(AntsError, match="damaged, or not"):
+        archives.read(path, foreign=True)
+    path.write_bytes(pickle.dumps(Trap(sprung)))
+    with pytest.raises(AntsError, match="damaged, or not"):
+        archives.read(path)
+    assert not sprung.exists()
+
+
+def write_npy(path: Path) -> None:
+    with open(path, "wb") as file:
+        np.save(file, np.zeros(3))
+
+
+def write_other_zip(path: Path) -> None:
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("readme.txt", "text")
+
+
+@pytest.mark.parametrize(
+    ("write", "message"),
+    [
+        (lambda path: None, "no such file"),
+        (Path.mkdir, "is a directory"),
+        (lambda path: path.write_bytes(b""), "damaged, or not"),
+        (lambda path: path.write_bytes(b"text"), "damaged, or not"),
+        (lambda path: path.write_bytes(b"PK\x03\x04" + bytes(100)), "damaged, or not"),
+        (write_npy, "damaged, or not"),
+        (write_other_zip, "damaged, or not"),
+    ],
+)
+def test_what_is_no_archive_is_refused(
+    tmp_path: Path, write: Callable[[Path], object], message: str
+) -> None:
+    path = tmp_path / "a.npz"
+    write(path)
+    with pytest.raises(AntsError, match=message) as raised:
+        archives.read(path, foreign=True)
+    assert str(path) in str(raised.value)
+
+
+def flips(content: bytes, n: int) -> Iterator[bytes]:
+    """The content with one bit flipped, at n places drawn at random."""
+    rng = np.random.default_rng(0)
+    for place, bit in zip(rng.integers(len(content), size=n), rng.integers(8, size=n), strict=True):
+        yield content[:place] + bytes([content[place] ^ 1 << bit]) + content[place + 1 :]
+
+
+def outcome(path: Path, content: bytes, foreign: bool) -> dict[str, np.ndarray] | None:
+    """The arrays; None if they are refused."""
+    try:
+        return archives.read(path, content, foreign=foreign)
+    except AntsError:
+        return None
+
+
+@pytest.mark.filterwarnings("ignore")  # of damaged types
+@pytest.mark.parametrize("foreign", [False, True])
+@pytest.mark.parametrize("compress", [False, True])
+def test_a_flipped_bit_or_a_cut_anywhere_is_noticed(
+    compress: bool, foreign: bool, tmp_path: Path
+) -> None:
+    """Unless it changes nothing, such as a date in the directory of the archive."""
+    path, numbers = tmp_path / "a.npz", np.random.default_rng(0).random(100)
+    archives.write(path, {"x": numbers}, compress)
+    content = path.read_bytes()
+    refused = 0
+    for damaged in flips(content, 1500):
+        read = outcome(path, damaged, foreign)
+        refused += read is None
+        assert read is None or (list(read) == ["x"] and np.array_equal(read["x"], numbers))
+    assert refused > 1000
+    for length in range(0, len(content), 7):
+        assert outcome(path, content[:length], foreign) is None
+
+
+@pytest.mark.filterwarnings("ignore")  # of damaged types
+@pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
+def test_a_flipped_bit_in_a_file_of_others_is_noticed(save: Callable, tmp_path: Path) -> None:
+    """One that makes a header shorter shifts the data, whose checksum stands at their end."""
+    path, numbers = tmp_path / "a.npz", np.random.default_rng(0).random(100)
+    save(path, x=numbers)
+    for damaged in flips(path.read_bytes(), 3000):
+        read = outcome(path, damaged, foreign=True)
+        assert read is None or (list(read) == ["x"] and np.array_equal(read["x"], numbers))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"x": np.arange(1, 4)}, {"x": np.arange(3.0)}, {"x": np.arange(3)[None]}, {"y": 1}, {"x": 0}],
+)
+def test_an_exchanged_array_is_noticed(change: dict, tmp_path: Path) -> None:
+    archives.write(tmp_path / "a.npz", {"x": np.arange(3)})
+    with np.load(tmp_path / "a.npz") as archive:
+        arrays = dict(archive)
+    np.savez(tmp_path / "a.npz", **arrays)
+    assert archives.read(tmp_path / "a.npz")["x"].tolist() == [0, 1, 2]
+    np.savez(tmp_path / "a.npz", **{**arrays, **change})
+    for foreign in (False, True):
+        with pytest.raises(AntsError, match="damaged"):
+            archives.read(tmp_path / "a.npz", foreign=foreign)
+
+
+def test_only_files_of_ours_are_read_unless_others_are_asked_for(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", x=1)
+    with pytest.raises(AntsError, match=r"not an \.npz file of this version; write it again"):
+        archives.read(tmp_path / "a.npz")
+    assert archives.read(tmp_path / "a.npz", foreign=True) == {"x": 1}
+
+
+def test_others_read_our_files(tmp_path: Path) -> None:
+    archives.write(tmp_path / "a.npz", {"x": np.arange(3)})
+    with np.load(tmp_path / "a.npz") as archive:
+        assert archive["x"].tolist() == [0, 1, 2]
+
+
+@pytest.fixture
+def no_array(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*arguments: object, **options: object) -> None:
+        raise AssertionError("an array was unpacked")
+
+    monkeypatch.setattr("numpy.lib.format.read_array", refuse)
+
+
+@pytest.mark.usefixtures("no_array")
+def test_what_would_take_too_much_memory_is_not_unpacked(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    archives.write(path, {"x": np.zeros(10**6)})
+    assert path.stat().st_size < 100_000
+    with pytest.raises(AntsError, match=r"a\.npz' unpacks to 8000512 bytes, and 7999999 are"):
+        archives.read(path, most=7_999_999)
+    with pytest.raises(AntsError, match=r"it has .* bytes, and 1000 are allowed"):
+        archives.read(path, most=1000)
+
+
+def test_an_array_that_is_larger_than_it_declares_is_refused(tmp_path: Path) -> None:
+    """And no more of it is unpacked than it declares."""
+    path = tmp_path / "a.npz"
+    np.savez_compressed(path, x=np.zeros(10**6))
+    content = path.read_bytes()
+    assert content.count((8_000_128).to_bytes(4, "little")) == 2
+    path.write_bytes(content.replace((8_000_128).to_bytes(4, "little"), bytes([0, 2, 0, 0])))
+    with pytest.raises(AntsError, match="damaged"):
+        archives.read(path, foreign=True)
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_only_what_numpy_packs_is_unpacked(method: int, tmp_path: Path) -> None:
+    """Others need memory that no file declares."""
+    path = tmp_path / "a.npz"
+    np.save(tmp_path / "x.npy", np.zeros(3))
+    with zipfile.ZipFile(path, "w", method) as archive:
+        archive.write(tmp_path / "x.npy", "x.npy")
+    with pytest.raises(AntsError, match="damaged"):
+        archives.read(path, foreign=True)
+
+
+def test_memory_that_there_is_not_is_no_damage(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*arguments: object, **options: object) -> None:
+        raise MemoryError
+
+    archives.write(tmp_path / "a.npz", {"x": np.zeros(3)})
+    monkeypatch.setattr("numpy.lib.format.read_array", refuse)
+    with pytest.raises(AntsError, match=r"a\.npz' takes more memory than there is; "):
+        archives.read(tmp_path / "a.npz")
+
+
+KIND = archives.Kind("thing", 3, "Thing.save", most=10_000)
+
+
+def test_a_kind_of_file_holds_arrays_and_facts(tmp_path: Path) -> None:
+    KIND.write(tmp_path / "a.npz", {"n": np.int32(3)}, {"x": np.arange(3)})
+    with KIND.reading(tmp_path / "a.npz") as (arrays, facts):
+        assert list(arrays) == ["x"]
+        assert facts == {"kind": "thing", "version": 3, "n": 3}
+
+
+@pytest.mark.parametrize(
+    ("arrays", "said"),
+    [
+        ({"x": 1}, "holds no thing of this version; name a file that Thing.save wrote."),
+        ({"facts": "{}"}, "holds no thing of this version"),
+        ({"facts": 3}, "holds no thing of this version"),
+        ({"facts": "[" * 1000}, "holds no thing of this version"),
+        ({"facts": '{"kind": "other", "version": 3}'}, "holds no thing of this version"),
+        (
+            {"facts": '{"kind": "thing", "version": 2}'},
+            "holds a thing in version 2 of its format; only version 3 can be read, so make",
+        ),
+        ({"x": np.zeros(10_000)}, "unpacks to 80"),
+    ],
+)
+def test_files_of_other_kinds_and_versions_are_refused(
+    arrays: dict, said: str, tmp_path: Path
+) -> None:
+    archives.write(tmp_path / "a.npz", arrays)
+    with pytest.raises(AntsError, match=r"a\.npz'") as raised, KIND.reading(tmp_path / "a.npz"):
+        pass
+    assert said in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (KeyError("x"), "is damaged (KeyError: 'x'); name a file that Thing.save wrote."),
+        (ValueError("a\nb."), "is damaged (ValueError: a b); name"),
+        (AntsError("n is 3; it must be 4."), "cannot be used: n is 3; it must be 4."),
+    ],
+)
+def test_errors_while_an_object_is_built_name_the_file(
+    error: Exception, said: str, tmp_path: Path
+) -> None:
+    KIND.write(tmp_path / "a.npz", {}, {})
+    with pytest.raises(AntsError) as raised, KIND.reading(tmp_path / "a.npz"):
+        raise error
+    assert str(raised.value).startswith(f"the thing in {str(tmp_path / 'a.npz')!r} {said}")
