@@ -9,7 +9,7 @@ import pytest
 from random_colonies import random_colony
 
 from taichi_ants import AntsError, Colony, TrainingConfig, archives, worlds
-from taichi_ants.engines.colony import colony as colony_module
+from taichi_ants.engines.colony import state as colony_state
 from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.task import Life, Task
 
@@ -144,7 +144,7 @@ def test_moves_are_counted_beyond_32_bits(tmp_path, monkeypatch) -> None:
     plain, rounded = (Colony(worlds.paper(), None, config, (0, 1), 20) for _ in range(2))
     plain.begin_episode()
     plain.tick(40)
-    monkeypatch.setattr(colony_module, "_ROUND", 50)
+    monkeypatch.setattr(colony_state, "_ROUND", 50)
     rounded.begin_episode()
     rounded.tick(25)
     rounded.save(tmp_path / "a.npz")
