@@ -244,14 +244,18 @@ def wait_for_all(c: ti.template(), part, parts, number):
 
 
 @cache
-def ticks(v: Variant, arguments: Any) -> Callable[..., None]:
+def ticks(v: Variant, waits: bool, arguments: Any) -> Callable[..., None]:
     """A kernel of whole ticks, as many as ordered, whose work is divided into parts.
 
-    Either each part is a world, and goes through all ticks by itself. Or the threads are the parts:
-    each has its share of the chunks, and when it is done with a group of phases it waits for the
-    others at a barrier. To begin a parallel loop for each group would take 20 to 200 microseconds,
-    since threads are put to sleep and woken. If a part does not come, all leave, and another
-    launch begins with the group of phases that follows, see `Order.FIRST`.
+    Args:
+        v: What is compiled into it.
+        waits: False: each part is a world of a single chunk, and goes through all ticks by itself.
+            True: each part has its share of the chunks, and when it is done with a group of phases
+            it waits for the others at a barrier. To begin a parallel loop for each group would take
+            20 to 200 microseconds, since threads are put to sleep and woken. If a part does not
+            come, all leave, and another launch begins with the group that follows, see
+            `Order.FIRST`.
+        arguments: The type of the argument pack.
     """
     groups, planning = shared_out(tick_phases(v)), shared_out(planning_phases(v))
     last = shared_out(last_phases(v))
@@ -259,21 +263,23 @@ def ticks(v: Variant, arguments: Any) -> Callable[..., None]:
         groups, last = shared_out(chain(tick_phases(v), last_phases(v))), []
 
     @ti.func
-    def share(group: ti.template(), c: ti.template(), part, share_of_it, number):
-        """Do a part's share of a group, and wait; returns the next number, negative to leave."""
-        following = number
-        if number >= 0:
-            first, last_one = share_of_it[0], share_of_it[1]
-            if ti.static(group[0].of == WORLD):
-                first, last_one = share_of_it[2], share_of_it[3]
-            if number >= c.orders[Order.FIRST]:
-                for chunk in range(first, last_one):
-                    for phase in ti.static(group):
-                        do(phase, c, v, chunk)
-            following = number + 1
-            if c.orders[Order.WAITS] == 1:
-                if wait_for_all(c, part, c.orders[Order.PARTS], number) == 0:
-                    following = -1
+    def share(group: ti.template(), c: ti.template(), part, parts, at):
+        """Do a part's share of group number `at`, and wait; returns the next, -1 to leave."""
+        following = at
+        if ti.static(not waits):
+            for phase in ti.static(group):
+                do(phase, c, v, part)
+        else:
+            if at >= 0:
+                if at >= c.orders[Order.FIRST]:
+                    n = c.n_worlds if ti.static(group[0].of == WORLD) else c.n_worlds * c.n_chunks
+                    for chunk in range(n * part // parts, n * (part + 1) // parts):
+                        for phase in ti.static(group):
+                            do(phase, c, v, chunk)
+                following = at + 1
+                if parts > 1:
+                    if wait_for_all(c, part, parts, at) == 0:
+                        following = -1
         return following
 
     @ti.kernel
@@ -281,25 +287,16 @@ def ticks(v: Variant, arguments: Any) -> Callable[..., None]:
         ti.loop_config(block_dim=1)
         for i in range(c.orders[Order.PARTS]):
             part, parts, at = i, c.orders[Order.PARTS], 0
-            if c.orders[Order.WAITS] == 1:
+            if ti.static(waits):
                 part = ti.cast(ti.atomic_add(c.barrier[Barrier.STARTED], 1), ti.i32)
-            chunks = c.n_worlds * c.n_chunks
-            mine = ti.Vector(
-                [
-                    chunks * part // parts,
-                    chunks * (part + 1) // parts,
-                    c.n_worlds * part // parts,
-                    c.n_worlds * (part + 1) // parts,
-                ]
-            )
             for _ in range(c.orders[Order.TICKS]):
                 for group in ti.static(groups):
-                    at = share(group, c, part, mine, at)
+                    at = share(group, c, part, parts, at)
                 if ti.static(v.plans_together):
                     for _round in range(c.planning_steps):
                         for group in ti.static(planning):
-                            at = share(group, c, part, mine, at)
+                            at = share(group, c, part, parts, at)
                 for group in ti.static(last):
-                    at = share(group, c, part, mine, at)
+                    at = share(group, c, part, parts, at)
 
     return advance_colony

@@ -80,7 +80,6 @@ class Order(IntEnum):
 
     TICKS = 0  # how many are to pass
     PARTS = auto()  # into how many the work is divided
-    WAITS = auto()  # 1 if the parts wait for each other after each group of phases
     FIRST = auto()  # the number of the first group to do; those before are done already
     SPINS = auto()  # how often the first part looks for the others before it gives up
 

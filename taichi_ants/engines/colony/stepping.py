@@ -129,21 +129,22 @@ class Stepper:
         most = min(running.threads, runtime.available_threads(), state.chunks)
         n, threads = self.threads.plan(n, most)
         compiled, began = "ticks" in self._launches, time.perf_counter()
-        self._launch_ticks(state, n, threads, waits=threads > 1)
+        self._launch_ticks(state, n, threads)
         if compiled:
             self.threads.took(threads, (time.perf_counter() - began) / n)
 
-    def _launch_ticks(self, state: ColonyState, n: int, parts: int, waits: bool = False) -> None:
+    def _launch_ticks(self, state: ColonyState, n: int, parts: int) -> None:
         """Let n ticks pass in one launch.
 
         If a thread gave up at the barrier, as there are fewer threads than it was told, all groups
         of phases up to there are done; a second launch does the rest on one thread.
         """
         orders, barrier = state.arrays["orders"], state.arrays["barrier"]
-        orders[:], barrier[:] = (n, parts, waits, 0, _SPINS), 0
+        orders[:], barrier[:] = (n, parts, 0, _SPINS), 0
         self.launch(state, "ticks")
         if (opened := int(barrier[Barrier.OPENED])) < 0:
-            orders[[Order.PARTS, Order.WAITS, Order.FIRST]] = 1, 0, opened - GAVE_UP + 1
+            orders[[Order.PARTS, Order.FIRST]] = 1, opened - GAVE_UP + 1
+            barrier[:] = 0
             self.launch(state, "ticks")
         state.ticks += n
 
@@ -165,7 +166,7 @@ class Stepper:
         )
         kind = Arguments.type_of(values)
         if name == "ticks":
-            return Launch(kernels.ticks(variant, kind))
+            return Launch(kernels.ticks(variant, state.schedule == "by_chunk", kind))
         return Launch(kernels.loops(variant, getattr(kernels, name), kind))
 
 

@@ -57,7 +57,7 @@ def test_what_others_have_written_is_not_believed(kept, tmp_path) -> None:
     [
         ({"task": None}, ""),
         ({"task": {"delivery": "never"}}, "delivery is 'never'"),
-        ({"task": {"observation": "six_cells"}}, "another shape or type"),
+        ({"task": {"observation": "six_cells"}}, "'array_state' is missing"),
         ({"ants": None}, "ants is None"),
         ({"training": {"learner": "sarsa"}}, ""),
         ({"training": None}, ""),
@@ -93,7 +93,7 @@ def test_a_plugin_that_is_missing_is_asked_for(kept, tmp_path, changes, said) ->
 
 
 def test_other_shapes_and_missing_arrays(kept, tmp_path) -> None:
-    for name in ("array_ants", "array_q", "array_ground", "world0_foods"):
+    for name in ("array_cell", "array_q", "array_ground", "world0_foods"):
         for other in (kept[name][..., :-1], kept[name].astype(float) / 2, np.zeros(())):
             refused({**kept, name: other}, tmp_path)
         refused({key: array for key, array in kept.items() if key != name}, tmp_path)
