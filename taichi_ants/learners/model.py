@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import taichi as ti
 
 from taichi_ants.learners.hyperparameters import Hyperparameters, number
+from taichi_ants.learners.learner import Memory
 from taichi_ants.learners.memory import values_of
-from taichi_ants.learners.registry import Memory
 from taichi_ants.task.constants import N_ACTIONS, ROW
 from taichi_ants.task.rewards import MOST
 from taichi_ants.task.rules.policy import best_value

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import taichi as ti
 
 from taichi_ants.learners.hyperparameters import Hyperparameters, number
+from taichi_ants.learners.learner import Learner, Memory
 from taichi_ants.learners.memory import discount_of
-from taichi_ants.learners.registry import Learner, Memory
 from taichi_ants.task.constants import ROW
 
 

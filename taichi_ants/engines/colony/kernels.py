@@ -25,8 +25,8 @@ from taichi_ants.engines.colony.layout import (
     WorldRow,
 )
 from taichi_ants.engines.trial import tried
+from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.memory import read_rates
-from taichi_ants.learners.registry import Learner
 from taichi_ants.learners.td_errors import guarded
 from taichi_ants.task.constants import ROW
 from taichi_ants.task.observations import Observation

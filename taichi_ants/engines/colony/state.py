@@ -32,7 +32,7 @@ from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.grid.constants import STREAM_ANT, STREAM_QUEEN
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.learners.config import TrainingConfig, update_weights
-from taichi_ants.learners.registry import Learner, Memory
+from taichi_ants.learners.learner import Learner, Memory
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, N_ACTIONS, OBSTACLE, ROW
 from taichi_ants.worlds.world import World
