@@ -23,7 +23,8 @@ from throughput import FLAGS, compiler
 from taichi_ants import Task, TrainingConfig, runtime, worlds
 from taichi_ants.analysis.tables import Table, figure, interval, plain_text, thousands
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.engines.colony.layout import AntRow, WorldRow
+from taichi_ants.engines.colony.layout import WorldRow
+from taichi_ants.engines.colony.stepping import kernel_numbers
 from taichi_ants.errors import AntsError
 from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
 from taichi_ants.task import foraging
@@ -84,16 +85,16 @@ def live_in_c(library: ctypes.CDLL, colony: Colony, ticks: int, threads: int) ->
 
     Only what the colonies of `scattered` have: one world, Q-learning into one table, no life.
     """
-    arrays, numbers = colony.arrays, colony._numbers()
+    arrays, numbers = colony.arrays, kernel_numbers(colony)
     ground, last = arrays["ground"] & 15, len(arrays["weights"]) - 1
-    ground[colony.of_ants(AntRow.CELL)] |= 1 << _ANT_SHIFT
+    ground[arrays["cell"]] |= 1 << _ANT_SHIFT
     kept = {
         "ground": ground,
         "trail": arrays["trail"].copy(),
         "closer": arrays["closer"],
         "steps": arrays["compass"][:8].copy(),
-        "cells": colony.of_ants(AntRow.CELL).copy(),
-        "headings": colony.of_ants(AntRow.HEADING).astype(np.uint8),
+        "cells": arrays["cell"].copy(),
+        "headings": arrays["heading"].astype(np.uint8),
         "random": arrays["streams"].copy(),
         "q": arrays["q"].copy(),
         "weights": arrays["weights"][np.minimum(np.arange(colony.ants + 1), last)],

@@ -14,7 +14,7 @@ import time
 import numpy as np
 
 from taichi_ants import AntsError, Colony, Life, Pheromone, Task, TrainingConfig, runtime, worlds
-from taichi_ants.engines.colony.layout import AntRow, HomeRow, Stage, WorldRow
+from taichi_ants.engines.colony.layout import HomeRow, Stage, WorldRow
 from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
 from taichi_ants.task import Traffic
 from taichi_ants.task.constants import EMPTY, FOOD, QUEEN
@@ -41,7 +41,7 @@ def new_colony(rules: str, ants: int) -> Colony:
     colony = Colony(world, RULES[rules], training, 1, ants, start="spread")
     colony.begin_episode()
     if (lifespan := colony.task.life.lifespan) is not None:  # not all of them shall die at once
-        colony.of_ants(AntRow.AGE)[:ants] = np.arange(ants) * lifespan // ants
+        colony.arrays["age"][:ants] = np.arange(ants) * lifespan // ants
     for array in colony.arrays.values():
         array[...] = array.copy()  # so that all memory that it will need is in use
     return colony
@@ -50,15 +50,15 @@ def new_colony(rules: str, ants: int) -> Colony:
 def faults(colony: Colony) -> list[str]:
     """What does not hold, in words, of what must hold at the end of every tick."""
     arrays, world = colony.arrays, colony.arrays["worlds"][:, 0]
-    ants = colony.ant_rows()
-    ants = ants[:, ants[AntRow.STAGE] != Stage.VACANT]
-    cells, numbers, ground = ants[AntRow.CELL], ants[AntRow.NUMBER], colony.snapshot().ground
+    taken = arrays["stage"] != Stage.VACANT
+    ants = {name: arrays[name][taken] for name in colony.columns()}
+    cells, numbers, ground = ants["cell"], ants["number"], colony.snapshot().ground
     stored = world[WorldRow.STORE] + world[WorldRow.BIRTHS]
-    foods = np.count_nonzero(ground == FOOD) + ants[AntRow.CARRIES].sum()
+    foods = np.count_nonzero(ground == FOOD) + ants["carries"].sum(dtype=int)
     came, walls = len(colony.worlds[0].foods) + world[WorldRow.REGROWN], arrays["walls"] != 0
     trails = arrays["level"] if colony.pheromone.dense else arrays["trail"]
     homes = arrays["homes"][:, : world[WorldRow.HOMES]]
-    ages, lifespan = ants[AntRow.AGE], colony.task.life.lifespan
+    ages, lifespan = ants.get("age", np.zeros(1)), colony.task.life.lifespan
     outcome = colony.outcome()  # which makes sure that action values are finite
     moves, blocked = outcome.moves[0, 0], outcome.blocked[0, 0]
     holds = {
@@ -67,14 +67,14 @@ def faults(colony: Colony) -> list[str]:
         or stored == world[WorldRow.DELIVERIES],
         "ants share a cell": len(np.unique(cells)) == len(cells),
         "ants share a number": len(np.unique(numbers)) == len(numbers),
-        "ants were lost": (ants[AntRow.STAGE] == Stage.LIVING).all()
+        "ants were lost": (ants["stage"] == Stage.LIVING).all()
         and len(cells) == world[WorldRow.LIVING]
         and len(cells) == colony.ants + world[WorldRow.BIRTHS] - world[WorldRow.DEATHS],
         "cells and ants disagree": (np.flatnonzero(arrays["ground"] > 15) == np.sort(cells)).all(),
         "an ant stands on something": not walls[cells].any() and (ground[cells] == EMPTY).all(),
         "the queen is gone": np.flatnonzero(ground == QUEEN).tolist()
         == [world[WorldRow.QUEEN_CELL]],
-        "an ant has no heading": ((ants[AntRow.HEADING] >= 0) & (ants[AntRow.HEADING] < 6)).all(),
+        "an ant has no heading": ((ants["heading"] >= 0) & (ants["heading"] < 6)).all(),
         "a trail is no number, below 0, or on rock": np.isfinite(trails).all()
         and trails.min() >= 0
         and not trails[walls].any(),

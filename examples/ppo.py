@@ -19,6 +19,7 @@ from torch import nn
 from torch.distributions import Categorical
 
 import taichi_ants
+import taichi_ants.envs  # registers the environments
 
 N_ENVS, N_STEPS = 64, 32  # environments, and steps of each between two updates
 EPOCHS, MINIBATCHES = 5, 4

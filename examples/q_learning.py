@@ -9,6 +9,7 @@ import gymnasium
 import numpy as np
 
 import taichi_ants
+import taichi_ants.envs  # registers the environments
 
 
 def learn(seed, steps, learning_rate=0.1, discount=0.9, epsilon=0.1):

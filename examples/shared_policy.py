@@ -19,6 +19,7 @@ import torch
 from gymnasium.vector import VectorEnv
 from ppo import Agent, table, train
 
+import taichi_ants.envs  # noqa: F401  # registers the environments
 from taichi_ants import Colony, Life, TrainingConfig, save_policy, task, worlds
 from taichi_ants.studies.colony_study import scheduled
 

@@ -4,11 +4,11 @@ The names below are imported when they are first used, so that `import taichi_an
 Taichi starts only where a kernel is needed.
 """
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 from taichi_ants.environment import prepare_for_taichi
-from taichi_ants.envs.registration import register_in_time
 
 if TYPE_CHECKING:
     from taichi_ants import analysis, learners, offline, reference, rendering, task, worlds
@@ -85,8 +85,26 @@ __all__ = [
     "worlds",
 ]
 
+
+def _show_pages_in_notebooks() -> None:
+    """Tell IPython, if it runs, to show colonies, traces and recordings as pages."""
+    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+    if shell is None:
+        return
+
+    def page_of(shown: object) -> str | None:
+        from taichi_ants.viewer import notebook
+
+        return notebook(shown)
+
+    formatter = shell.display_formatter.formatters["text/html"]
+    formatter.for_type_by_name("taichi_ants.engines.colony.colony", "Colony", page_of)
+    formatter.for_type_by_name("taichi_ants.engines.runs.traces", "Trace", page_of)
+    formatter.for_type_by_name("taichi_ants.viewer.recording", "Recording", page_of)
+
+
 prepare_for_taichi()
-register_in_time()
+_show_pages_in_notebooks()
 
 
 def __getattr__(name: str) -> object:

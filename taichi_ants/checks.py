@@ -26,7 +26,7 @@ from taichi_ants.worlds.starts import STARTS
 from taichi_ants.worlds.world import World
 
 if TYPE_CHECKING:
-    from taichi_ants.learners.registry import Learner
+    from taichi_ants.learners.learner import Learner
 
 MAX_ANTS = 1 << 24
 

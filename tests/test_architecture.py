@@ -53,13 +53,34 @@ def tree(path: Path) -> ast.Module:
 
 
 def imported(path: Path, types_too: bool = False) -> Iterator[str]:
-    """The full names of what a file imports; without what only type checkers see."""
+    """The full names of what a file imports; without what only type checkers see.
+
+    What it gives to `import_module` counts: a string names a module, and an f-string all modules of
+    the package in front of the first braces.
+    """
     for node in _running(tree(path), types_too):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.Call):
+            yield from _by_string(path, node)
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{name(path)} imports relatively"
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def _by_string(path: Path, call: ast.Call) -> Iterator[str]:
+    named = [ast.unparse(one).rpartition(".")[2] for one in (call.func, *call.args)]
+    if "import_module" not in named or module_of(path) == "taichi_ants":  # that names all parts
+        return
+    for text in call.args:
+        if isinstance(text, ast.Constant):
+            yield str(text.value)
+        elif isinstance(text, ast.JoinedStr):
+            prefix = "".join(
+                one.value if isinstance(one, ast.Constant) else module_of(path) + "."
+                for one in text.values[:-1]
+            ).replace("..", ".")
+            yield from (one for one in map(module_of, PACKAGE) if one.startswith(prefix))
 
 
 def _running(node: ast.AST, types_too: bool) -> Iterator[ast.AST]:
@@ -110,7 +131,7 @@ def test_imports_point_one_way(path):
 
 
 def test_no_imports_go_round_in_a_circle():
-    """Imports inside of functions count too: they are there to save time, not to hide a circle."""
+    """Imports inside of functions and by strings count too: they save time, and hide no circle."""
     files = {module_of(path): path for path in PACKAGE}
     graph = {}
     for module, path in files.items():
@@ -137,6 +158,48 @@ def test_taichi_is_started_in_one_place(path):
     ]
     starts += [module for module in imported(path) if module == "taichi.init"]
     assert bool(starts) == (name(path) == "taichi_ants/runtime.py")
+
+
+# Parts that no other part needs.
+EXTRAS = {"baselines", "offline", "envs"}
+
+
+@pytest.mark.parametrize("path", PACKAGE, ids=name)
+def test_the_core_does_not_import_extras(path):
+    if part_of(module_of(path)) in {"", *EXTRAS}:  # the package itself names all of its parts
+        return
+    assert not {part_of(module) for module in imported(path)} & EXTRAS, name(path)
+
+
+def test_ants_learn_without_the_extras(tmp_path):
+    """Alone and in a colony, where importing the extras fails."""
+    script = """
+import sys
+for module in ("taichi_ants.baselines", "taichi_ants.offline", "taichi_ants.envs",
+               "minari", "gymnasium", "pettingzoo"):
+    sys.modules[module] = None
+from taichi_ants import Colony, TrainingConfig, evaluate, train, worlds
+config = TrainingConfig("q_learning", 0.1, 0.9, 0.1, 1.0)
+result = train(worlds.paper(), config, 0, episodes=3, max_steps=50)
+evaluate(worlds.paper(), result, rollouts=1)
+assert Colony(worlds.paper(), None, config, ants=5).run(2, 20).ticks.tolist() == [[20], [20]]
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], env=environment(tmp_path), capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+
+
+LAYOUT = "taichi_ants.engines.colony.layout"
+
+
+@pytest.mark.parametrize("path", PACKAGE, ids=name)
+def test_only_the_colony_knows_its_layout(path):
+    """Others use its views, and the engine of runs has arrays of its own."""
+    if path.name != "__init__.py" and not module_of(path).startswith("taichi_ants.engines.colony."):
+        assert not any(module.startswith(LAYOUT) for module in imported(path))
+        texts = {ast.unparse(n) for n in ast.walk(tree(path)) if isinstance(n, ast.Attribute)}
+        assert not [text for text in texts if text.endswith("colony.arrays")]
 
 
 def test_analysis_runs_without_taichi(tmp_path):

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import gymnasium
 import numpy as np
 
+import taichi_ants.envs  # noqa: F401  # registers the environments
 from systems.paper_world import CONFIGS
 from taichi_ants import Task, TrainingConfig, runtime, train, worlds
 from taichi_ants.engines.colony.colony import Colony

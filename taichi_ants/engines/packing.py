@@ -13,7 +13,7 @@ import numpy as np
 
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import AxialGrid
-from taichi_ants.learners.registry import Memory
+from taichi_ants.learners.learner import Memory
 from taichi_ants.task.constants import EMPTY, N_ACTIONS
 from taichi_ants.worlds.world import World
 

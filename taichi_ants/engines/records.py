@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from taichi_ants.errors import shown
+from taichi_ants.grid.hexgrid import AxialGrid
 
 
 class Record:
@@ -29,6 +30,27 @@ class Record:
         names = [field.name for field in fields(self) if field.repr]  # type: ignore[arg-type]
         lines = [f"    {name}: {_described(getattr(self, name))}" for name in names]
         return "\n".join([f"{type(self).__name__}(", *lines, ")"])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Snapshot(Record):
+    """One world at one moment, as `taichi_ants.rendering` draws it.
+
+    Attributes:
+        grid: Where the cells lie in the arrays.
+        ground: uint8 (grid.size,), EMPTY, OBSTACLE, FOOD or QUEEN; EMPTY under ants.
+        trail: int32 or float32 (grid.size,), trail levels.
+        ant_cells: int32 (n,), flat indices of the living ants.
+        ant_headings: int32 (n,), 0 to 5.
+        ant_carries: bool (n,).
+    """
+
+    grid: AxialGrid
+    ground: np.ndarray
+    trail: np.ndarray
+    ant_cells: np.ndarray
+    ant_headings: np.ndarray
+    ant_carries: np.ndarray
 
 
 def same(one: object, other: object) -> bool:

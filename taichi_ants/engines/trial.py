@@ -18,7 +18,7 @@ import numpy as np
 from taichi_ants import runtime
 from taichi_ants.errors import unusable
 from taichi_ants.learners import registry
-from taichi_ants.learners.registry import Learner
+from taichi_ants.learners.learner import Learner
 from taichi_ants.task.constants import N_ACTIONS, ROW
 
 _SECONDS = 30  # until a trial is stopped; it takes less than one

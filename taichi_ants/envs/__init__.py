@@ -1,5 +1,20 @@
-"""Environments for agents of others: Gymnasium, batches of environments, PettingZoo."""
+"""Environments for your own agents: Gymnasium, batches of environments, PettingZoo.
+
+Importing this package registers them with Gymnasium, which has no entry point for that.
+"""
+
+from gymnasium.envs.registration import register
 
 from taichi_ants.envs.events import Event, Reason
 
 __all__ = ["Event", "Reason"]
+
+register(
+    "taichi_ants/HexForage-v0",
+    entry_point="taichi_ants.envs.forage:HexForageEnv",
+    vector_entry_point="taichi_ants.envs.forage:HexForageVectorEnv",
+)
+register(
+    "taichi_ants/HexColony-v0",
+    vector_entry_point="taichi_ants.envs.colony_vector:HexColonyVectorEnv",
+)

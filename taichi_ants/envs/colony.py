@@ -10,7 +10,6 @@ import numpy as np
 
 from taichi_ants import checks
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.engines.colony.layout import ANT_GROUND, PUSHES, AntRow, WorldRow
 from taichi_ants.envs.arguments import worlds_of
 from taichi_ants.envs.events import Event
 from taichi_ants.envs.forage import ACTION_MASKS
@@ -112,24 +111,24 @@ class ColonyWorlds:
 
     def stop(self, which: np.ndarray) -> None:
         """Let some worlds, bool (W,), stand still until they begin again."""
-        self.colony.arrays["worlds"][WorldRow.RUNNING, which] = 0
+        self.colony.stop(which)
 
     def step(self, actions: np.ndarray) -> None:
         """Let each ant do what is given, integers 0 to 4; worlds that were stopped stand still."""
         colony = self.colony
-        self.acted = colony.living & (colony.arrays["worlds"][WorldRow.RUNNING] == 1)[:, None]
+        self.acted = colony.living & colony.running[:, None]
         colony.act(actions)
-        of_engine = colony.ants_by_slot(AntRow.EVENT)
-        self.rewards = np.where(self.acted, colony.arrays["rewards"][of_engine], 0.0)
-        self.events = _EVENTS[actions, of_engine]
+        rewards = colony.task.rewards.by_event()
+        self.rewards = np.where(self.acted, rewards[colony.events], 0.0)
+        self.events = _EVENTS[actions, colony.events]
         if colony.task.traffic.swap:
-            self.events[colony.ants_by_slot(AntRow.FILLED) == PUSHES] = Event.PUSHED
+            self.events[colony.pushed] = Event.PUSHED
         self.events[~self.acted] = Event.NONE
 
     @property
     def ended(self) -> np.ndarray:
         """In which worlds the episode has come to its last step, bool (W,)."""
-        return self.colony.arrays["worlds"][WorldRow.TICKS] >= self.max_steps
+        return self.colony.episode_ticks >= self.max_steps
 
     def action_masks(self) -> np.ndarray:
         """Which actions can succeed, int8 (W, slots, 5).
@@ -139,16 +138,15 @@ class ColonyWorlds:
         the moves count, which turn the ant.
         """
         colony, traffic = self.colony, self.colony.task.traffic
-        percepts = colony.ants_by_slot(AntRow.PERCEPT)
-        masks = ACTION_MASKS.take(percepts, axis=0, mode="clip")
+        masks = ACTION_MASKS.take(colony.percepts, axis=0, mode="clip")
         if traffic.shared:
             base = np.arange(len(masks))[:, None] * colony.grid.size
-            here = base + colony.ants_by_slot(AntRow.CELL)
-            towards = colony.ants_by_slot(AntRow.HEADING)[..., None] + np.arange(RIGHT + 1)
-            ahead = here[..., None] + colony.arrays["compass"].take(towards)
-            enters = colony.arrays["ground"].take(ahead) >= ANT_GROUND
+            towards = colony.headings[..., None] + np.arange(-1, RIGHT)
+            steps = colony.grid.offsets.take(towards, mode="wrap")
+            ahead = (base + colony.cells)[..., None] + steps
+            enters = colony.occupied.take(ahead)
             if not traffic.follow:
-                enters &= (colony.ants_by_slot(AntRow.CARRIES) == 1)[..., None]
+                enters &= colony.carrying[..., None]
             masks[..., : RIGHT + 1] |= enters
         return masks
 
@@ -159,8 +157,8 @@ class ColonyWorlds:
         if self._scene is None:
             self._scene = Scene(self.colony.grid)
         pictures = []
-        deliveries = self.colony.arrays["worlds"][WorldRow.DELIVERIES]
-        for world, ticks in enumerate(self.colony.arrays["worlds"][WorldRow.TICKS].tolist()):
+        deliveries = self.colony.deliveries
+        for world, ticks in enumerate(self.colony.episode_ticks.tolist()):
             snapshot = self.colony.snapshot(world)
             lines = {
                 "step": ticks,

@@ -8,7 +8,6 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.utils import seeding
 
-from taichi_ants.engines.colony.layout import AntRow
 from taichi_ants.envs.colony import MAX_STEPS, METADATA, ColonyWorlds
 from taichi_ants.envs.events import Event
 from taichi_ants.envs.formats import ObservationFormat
@@ -208,7 +207,7 @@ class HexColonyParallelEnv(ParallelEnv):
         return int(actions[name])
 
     def _names(self, slots: list[int]) -> list[str]:
-        numbers = self._worlds.colony.ants_by_slot(AntRow.NUMBER)[0, slots]
+        numbers = self._worlds.colony.numbers[0, slots]
         return [f"ant_{number}" for number in numbers.tolist()]
 
     def _told(

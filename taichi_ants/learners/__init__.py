@@ -2,16 +2,8 @@
 
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.hyperparameters import Hyperparameters
-from taichi_ants.learners.registry import (
-    Learner,
-    Memory,
-    get,
-    label,
-    names,
-    register,
-    settle,
-    td_learner,
-)
+from taichi_ants.learners.learner import Learner, Memory, td_learner
+from taichi_ants.learners.registry import get, label, names, register, settle
 from taichi_ants.settings import Is
 
 __all__ = [

@@ -2,6 +2,7 @@
 
 import taichi as ti
 
+from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.model import (
     Planning,
     error_of,
@@ -12,7 +13,6 @@ from taichi_ants.learners.model import (
     visited,
 )
 from taichi_ants.learners.q_learning import td_error
-from taichi_ants.learners.registry import Learner
 from taichi_ants.task.constants import ROW
 from taichi_ants.task.rules.random_bits import advance, below, bits_of, high_word
 

@@ -11,8 +11,8 @@ from typing import Annotated
 import taichi as ti
 
 from taichi_ants.learners.hyperparameters import Hyperparameters
+from taichi_ants.learners.learner import Memory
 from taichi_ants.learners.memory import values_of
-from taichi_ants.learners.registry import Memory
 from taichi_ants.settings import Is
 from taichi_ants.task.constants import MOST_REWARD, N_ACTIONS, ROW
 from taichi_ants.task.rules.policy import best_value

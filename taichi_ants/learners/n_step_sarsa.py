@@ -6,8 +6,8 @@ from typing import Annotated
 import taichi as ti
 
 from taichi_ants.learners.hyperparameters import Hyperparameters
+from taichi_ants.learners.learner import Learner, Memory
 from taichi_ants.learners.memory import discount_of
-from taichi_ants.learners.registry import Learner, Memory
 from taichi_ants.settings import Is
 from taichi_ants.task.constants import ROW
 

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import taichi as ti
 
+from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.model import (
     Planning,
     error_of,
@@ -16,7 +17,6 @@ from taichi_ants.learners.model import (
     terminated_of,
     visited,
 )
-from taichi_ants.learners.registry import Learner
 from taichi_ants.settings import Is
 from taichi_ants.task.constants import N_ACTIONS, ROW
 

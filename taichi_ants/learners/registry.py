@@ -7,114 +7,15 @@ from a file of your own.
 
 from __future__ import annotations
 
-import dis
-import inspect
 import math
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from importlib import import_module
-from typing import Any
 
-from taichi_ants.errors import AntsError, check_new_name, checked_whole, expect, shown, unusable
+from taichi_ants.errors import AntsError, check_new_name, expect, shown, unusable
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.hyperparameters import Hyperparameters
+from taichi_ants.learners.learner import Learner, Memory, check_arguments, check_td_error
 from taichi_ants.settings import declared, not_a_setting
-
-
-@dataclass(frozen=True)
-class Memory:
-    """What a learner remembers of each run, besides the table that the ant acts by.
-
-    Attributes:
-        tables: Further tables of action values, which start as copies of that one.
-        floats: Further f32 numbers, which start as 0.
-        integers: Further i32 numbers, which start as 0.
-    """
-
-    tables: int = 0
-    floats: int = 0
-    integers: int = 0
-
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            checked_whole(f"{name} of a memory", value, 0, 2**30)
-
-
-@dataclass(frozen=True)
-class Learner:
-    """A tabular learner; `td_learner` makes one from a TD error alone.
-
-    Attributes:
-        name: The name by which configurations call it.
-        learn: A `ti.func` (memory, at, step, rates, random_state) -> (TD error f32, random_state
-            u64) that is called after each step; see `taichi_ants.learners.memory` for the
-            arguments, the first of which is a `ti.template()`. It changes the memory of one run,
-            which begins at `at`, and returns the TD error of the step, for traces.
-        begin: A `ti.func` (memory, at) that is called at the start of each episode, or None.
-        td_error: The TD error, if all ants of a world can share a table, see `td_learner`.
-        draws_next_action: The next action is drawn before the update and then taken (on-policy
-            learners); only then has a step one.
-        plans: The learner keeps `taichi_ants.learners.model` and has the hyperparameter
-            `planning_steps`; ants that share a table share the model. Its updates from the model
-            have no next action, so td_error may not look at it.
-        hyperparameters: What it has besides the settings of all learners: a subclass of
-            `Hyperparameters` whose fields all have defaults.
-        memory: A function (hyperparameters, n_states) -> Memory, where a table has n_states rows.
-        cost: A function (hyperparameters) -> float: the time of a step of one ant, in that of
-            Q-learning. Launches of kernels are cut by it.
-        summary: One line for listings.
-    """
-
-    name: str
-    learn: Any
-    begin: Any = None
-    td_error: Any = None
-    draws_next_action: bool = False
-    plans: bool = False
-    hyperparameters: type[Hyperparameters] = Hyperparameters
-    memory: Callable[[Any, int], Memory] = lambda settings, n_states: Memory()
-    cost: Callable[[Any], float] = lambda settings: 1.0
-    summary: str = ""
-
-    def settings(self, config: TrainingConfig) -> Hyperparameters:
-        """The hyperparameters of a configuration."""
-        return self.hyperparameters(**dict(config.hyperparameters))
-
-    def memory_for(self, config: TrainingConfig, n_states: int) -> Memory:
-        """The memory that it needs with a configuration and tables of n_states rows."""
-        return self.memory(self.settings(config), n_states)
-
-
-def td_learner(
-    name: str, td_error: Any, draws_next_action: bool = False, summary: str = ""
-) -> Learner:
-    """A learner that adds learning_rate * TD error to the value of the pair; ants can share it.
-
-    Args:
-        name: The name by which configurations call it.
-        td_error: A `ti.func` (value, reward, discount, next_values, next_action, epsilon) -> float:
-            the value of the state-action pair that is updated, the reward, the discount (0 where
-            the step terminated), the vector of the five action values of the next state, the next
-            action and the current epsilon; all f32 but next_action (i32).
-        draws_next_action: See `Learner`; only then may td_error look at next_action, which is 0 to
-            4, and 0 where the step terminated.
-        summary: One line for listings.
-
-    Raises:
-        AntsError: The TD error is no `ti.func`, does not take six arguments, or looks at a next
-            action that is not drawn. What it computes is tried when it is first used.
-    """
-    _check_td_error(name, td_error, draws_next_action)
-    from taichi_ants.learners.td_errors import learn_by  # Taichi starts to be imported
-
-    return Learner(
-        name,
-        learn_by(td_error),
-        td_error=td_error,
-        draws_next_action=draws_next_action,
-        summary=summary,
-    )
-
 
 # The package's own, and what readers know them as: NAME in the file `name.py`, imported when it is
 # asked for, since that starts to import Taichi.
@@ -144,12 +45,12 @@ def register(learner: Learner) -> Learner:
     name = learner.name
     check_new_name("learner", name, BUILT_IN)
     parts = ["memory", "at", "step", "rates", "random_state"]
-    _check_arguments(f"the function learn of {name!r}", learner.learn, parts)
+    check_arguments(f"the function learn of {name!r}", learner.learn, parts)
     if learner.begin is not None:
-        _check_arguments(f"the function begin of {name!r}", learner.begin, parts[:2])
+        check_arguments(f"the function begin of {name!r}", learner.begin, parts[:2])
     if learner.td_error is not None:
         drawn = learner.draws_next_action and not learner.plans
-        _check_td_error(name, learner.td_error, drawn)
+        check_td_error(name, learner.td_error, drawn)
     _try_sizes(learner)
     taken = {one.name for one in declared(TrainingConfig)}
     for clash in taken & {one.name for one in declared(learner.hyperparameters)}:
@@ -174,33 +75,6 @@ def _try_sizes(learner: Learner) -> None:
             raise ValueError(f"it gives {learner.cost(settings)}, but it must be above 0")
     except Exception as error:
         raise unusable(learner, f"{part} fails ({error})") from error
-
-
-def _check_arguments(what: str, function: Any, wanted: list[str]) -> list[str]:
-    """The names of the arguments of a `ti.func`, which are as many as are wanted."""
-    # Taichi's own mark; a plain function would be taken apart without its branches and loops.
-    if not getattr(function, "_is_taichi_function", False):
-        raise AntsError(f"{what} is no Taichi function; mark it @ti.func.")
-    arguments = list(inspect.signature(function.func.func).parameters)
-    if len(arguments) != len(wanted):
-        listed = f"{', '.join(wanted[:-1])} and {wanted[-1]}"
-        raise AntsError(f"{what} has {len(arguments)} arguments; it needs {len(wanted)}: {listed}.")
-    return arguments
-
-
-def _check_td_error(name: str, td_error: Any, draws_next_action: bool) -> None:
-    wanted = ["value", "reward", "discount", "next_values", "next_action", "epsilon"]
-    next_action = _check_arguments(f"the TD error of {shown(name)}", td_error, wanted)[4]
-    # Some instructions load two variables at once.
-    instructions = dis.get_instructions(td_error.func.func)
-    loaded = [one.argval for one in instructions if one.opname.startswith("LOAD")]
-    looks = any(next_action in (one if isinstance(one, tuple) else (one,)) for one in loaded)
-    if looks and not draws_next_action:
-        raise AntsError(
-            f"the TD error of {shown(name)} looks at {next_action}, but no next action is drawn; "
-            "give draws_next_action=True (a learner that plans has none in its updates from the "
-            "model)."
-        )
 
 
 def get(name: str) -> Learner:

@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from taichi_ants.learners.registry import td_learner
+from taichi_ants.learners.learner import td_learner
 
 
 @ti.func

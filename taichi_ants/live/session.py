@@ -189,7 +189,7 @@ class Session:
         kept = self._snapshots
         if kept and self._spent - kept[-1].spent < _BETWEEN:
             return
-        if sum(array.nbytes for array in self.colony.arrays.values()) > _LARGEST:
+        if self.colony.nbytes > _LARGEST:
             return
         bare: Any = copy.copy(self)
         bare.setup, bare.edits, bare.changes, bare._snapshots = None, [], [], []

@@ -9,7 +9,6 @@ import numpy as np
 
 from taichi_ants import checks, runtime
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.engines.colony.layout import AntRow, Stage, WorldRow
 from taichi_ants.engines.runs.engine import Progress, Runs
 from taichi_ants.engines.runs.results import RunState
 from taichi_ants.engines.runs.traces import record_steps
@@ -156,27 +155,21 @@ def _tick(colony: Colony, tables: np.ndarray, before: np.ndarray) -> dict[str, n
             those of the tick before.
         tables, before: As `Colony.q_values`.
     """
-    from taichi_ants.engines.looks import is_percept  # imports Taichi
-
-    arrays, slots = colony.arrays, colony.capacity
-    row_at = AntRow.PERCEPT if is_percept(colony.task.sees) else AntRow.STATE
-    ants, streams, step = colony.ant_rows(), arrays["streams"].copy(), colony.ticks
-    running = np.repeat(arrays["worlds"][WorldRow.RUNNING] == 1, slots)
-    (columns,) = np.nonzero((ants[AntRow.STAGE] == Stage.LIVING) & running)
-    owner = np.unravel_index(columns, (len(colony.seeds), slots))[: tables.ndim - 2]
-    state, action = ants[row_at, columns], ants[AntRow.ACTION, columns]
+    step, acting = colony.ticks, colony.living & colony.running[:, None]
+    run, slot = np.nonzero(acting)
+    owner = (run, slot)[: tables.ndim - 2]
+    state, action, streams = colony.states[acting], colony.chosen[acting], colony.streams[acting]
     known = action >= 0
     values = np.where(known[:, None], before[(*owner, state)], tables[(*owner, state)])
-    action = np.where(known, action, _drawn(values, colony.epsilon, streams[columns]))
-    chances = action_probabilities(values, colony.epsilon)[np.arange(len(columns)), action]
+    action = np.where(known, action, _drawn(values, colony.epsilon, streams))
+    chances = action_probabilities(values, colony.epsilon)[np.arange(len(run)), action]
+    agent = colony.numbers[acting]
     colony.tick()
-    run, agent, after = columns // slots, ants[AntRow.NUMBER, columns], colony.ant_rows()
-    there = columns
-    if not np.array_equal(after[AntRow.NUMBER, columns], agent):  # the colony has sorted its ants
-        keys = np.arange(ants.shape[1]) // slots * 2**32 + after[AntRow.NUMBER]
+    if not np.array_equal(colony.numbers[run, slot], agent):  # the colony has sorted its ants
+        keys = (np.arange(len(colony.seeds))[:, None] * 2**32 + colony.numbers).ravel()
         order = np.argsort(keys)
-        there = order[np.searchsorted(keys[order], run * 2**32 + agent)]
-    event = after[AntRow.EVENT, there]
+        slot = order[np.searchsorted(keys[order], run * 2**32 + agent)] % colony.capacity
+    event = colony.events[run, slot]
     return {
         "run": run,
         "agent": agent,
@@ -184,7 +177,7 @@ def _tick(colony: Colony, tables: np.ndarray, before: np.ndarray) -> dict[str, n
         "state": state,
         "action": action,
         "reward": colony.task.rewards.by_event()[event],
-        "next_state": after[row_at, there],
+        "next_state": colony.states[run, slot],
         "terminated": (event == DELIVERED) & (colony.task.delivery == "absorbing"),
         "behaviour_probability": chances,
     }

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.engines.colony.layout import AntRow
 from taichi_ants.engines.runs.traces import Trace, rollout
 from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.grid.constants import STREAM_ROLLOUT
@@ -135,7 +134,7 @@ def colony_of_rollout(
     steady = TrainingConfig("q_learning", 1.0, 0.0, epsilon, 1.0, min_epsilon=0.0)
     colony = Colony(world, task, steady, seed, sharing="fixed", q_values=q_values)
     colony.begin_episode()
-    colony.arrays["streams"][0] = stream_state(seed, STREAM_ROLLOUT, number)
+    colony.streams[0, 0] = stream_state(seed, STREAM_ROLLOUT, number)
     return colony
 
 
@@ -178,7 +177,7 @@ def _moment(colony: Colony, follow: int | None) -> Moment:
         ("moves blocked", f"{100 * blocked:.0f} %"),
     ]
     (slots,) = np.nonzero(colony.living[0])  # those of the snapshot
-    followed = colony.of_ants(AntRow.NUMBER)[slots] == follow
+    followed = colony.numbers[0, slots] == follow
     if follow is None or not followed.any():
         return snapshot, Status(tuple(lines))
     # The one that is followed comes first, since pictures mark what the first one sees.

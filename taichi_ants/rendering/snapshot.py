@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from taichi_ants.engines.colony.colony import ColonySnapshot as Snapshot
+from taichi_ants.engines.records import Snapshot
 from taichi_ants.errors import expect
 from taichi_ants.worlds.world import World
 

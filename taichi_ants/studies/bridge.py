@@ -23,7 +23,6 @@ from taichi_ants.analysis.bridge import (
     length,
 )
 from taichi_ants.engines.colony.hand import Hand
-from taichi_ants.engines.colony.layout import AntRow
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.blocks import kept
 from taichi_ants.studies.colony_study import scheduled
@@ -185,8 +184,8 @@ def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0
         window = colony.ticks * WINDOWS // ticks
         until = opens if colony.ticks < opens else ticks
         colony.tick(min(_LOOK_EVERY, until - colony.ticks))
-        now = zone[colony.of_ants(AntRow.CELL)]
-        carries = colony.of_ants(AntRow.CARRIES) == 1
+        now = zone[colony.cells.ravel()]
+        carries = colony.carrying.ravel()
         inside = now <= _FOOD_ROOM
         crossed = inside & (now != room)
         useful = crossed & (carries == (now == _QUEEN_ROOM))

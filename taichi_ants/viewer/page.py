@@ -133,10 +133,17 @@ def frame(recording: Recording) -> str:
 
 
 def notebook(shown: Any) -> str | None:
-    """A trace or a colony as notebooks show it; None, which is text, if there is no page of it."""
+    """Return what notebooks show of a recording, trace or colony; None if they show text.
+
+    IPython calls it, see `taichi_ants.__init__`.
+    """
+    if isinstance(shown, Recording):
+        return frame(shown)
     if isinstance(shown, Trace):
         small = shown.made is not None and len(shown) <= _MOST_STEPS
         return frame(record_trace(shown)) if small else None
     expect("what is shown", shown, Colony)
+    if shown.episode < 0:
+        return None
     small = shown.grid.size <= _MOST_CELLS and shown.ants <= _MOST_ANTS
     return frame(record_colony(shown)) if small else None

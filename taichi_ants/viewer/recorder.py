@@ -10,8 +10,6 @@ import numpy as np
 
 from taichi_ants import learners
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.engines.colony.layout import AntRow, Stage
-from taichi_ants.engines.looks import is_percept
 from taichi_ants.errors import count, expect
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.randomness import GAMMA, choose, mix
@@ -48,7 +46,6 @@ class Recorder:
         self.grid = start.grid
         self._size, self._n_states = self.grid.size, colony.task.n_states
         self.types = types_of(self._size, self._n_states, colony.pheromone.dense)
-        self._state_row = AntRow.PERCEPT if is_percept(self.observation) else AntRow.STATE
         self._learns = colony.sharing != "fixed"
         learner = learners.get(colony.training.learner)
         self._has_td_errors = learner.td_error is not None and not learner.plans
@@ -160,29 +157,23 @@ class Recorder:
         if n > 1:
             self.colony.tick(n)
             return self._frame({})
-        ants, slots = self._living()
-        states, actions = ants[self._state_row, slots], self._choices(ants, slots)
-        numbers, before = ants[AntRow.NUMBER, slots], self._tables()
-        self.colony.tick()
+        colony, slots = self.colony, self._living()
+        states, actions = colony.states[self.world, slots], self._choices(slots)
+        numbers, before = colony.numbers[self.world, slots], self._tables()
+        colony.tick()
         # The dead have left their slots, but all is still written there.
-        columns = self._ants()
-        order = np.argsort(columns[AntRow.NUMBER], kind="stable")
-        places = order[np.searchsorted(columns[AntRow.NUMBER], numbers, sorter=order)]
-        acts = {"acts": actions + 16 * columns[AntRow.EVENT, places]}
+        after = colony.numbers[self.world]
+        order = np.argsort(after, kind="stable")
+        places = order[np.searchsorted(after, numbers, sorter=order)]
+        acts = {"acts": actions + 16 * colony.events[self.world, places]}
         if td_errors is None and self._learns:
             td_errors = self._td_errors(before, slots, states, actions)
         return self._frame(acts if td_errors is None else {**acts, "td_errors": td_errors})
 
-    def _ants(self) -> np.ndarray:
-        """A copy of the rows of `AntRow` of this world, (rows, slots)."""
-        slots = self.colony.capacity
-        return self.colony.ant_rows()[:, self.world * slots : (self.world + 1) * slots]
-
-    def _living(self) -> tuple[np.ndarray, np.ndarray]:
-        """A copy of the rows, and the slots of the living ants in the order of their numbers."""
-        ants = self._ants()
-        (slots,) = np.nonzero(ants[AntRow.STAGE] == Stage.LIVING)
-        return ants, slots[np.argsort(ants[AntRow.NUMBER, slots], kind="stable")]
+    def _living(self) -> np.ndarray:
+        """The slots of the living ants in the order of their numbers."""
+        (slots,) = np.nonzero(self.colony.living[self.world])
+        return slots[np.argsort(self.colony.numbers[self.world, slots], kind="stable")]
 
     def _tables(self) -> np.ndarray:
         """The rows of all tables, float32 (owners * n_states, 5)."""
@@ -194,21 +185,21 @@ class Recorder:
         """Where the states of ants stand in `_tables`."""
         return slots * self._n_states + states if self.colony.one_a_slot else states
 
-    def _choices(self, ants: np.ndarray, slots: np.ndarray) -> np.ndarray:
+    def _choices(self, slots: np.ndarray) -> np.ndarray:
         """What the ants will do in the next tick: what is drawn already, or what they will draw.
 
         Drawing is what `rules.policy.choose` does; their streams stay as they are.
         """
-        streams = self.colony.arrays["streams"][self.world * self.colony.capacity + slots]
+        streams = self.colony.streams[self.world, slots]
         bits = mix(streams + np.uint64(GAMMA))
         high, low = bits >> np.uint64(32), bits & np.uint64(0xFFFFFFFF)
-        values = self._tables()[self._rows(slots, ants[self._state_row, slots])]
+        values = self._tables()[self._rows(slots, self.colony.states[self.world, slots])]
         best = values >= values.max(axis=1, initial=-np.inf, keepdims=True)
         k = ((low * best.sum(axis=1).astype(np.uint64)) >> np.uint64(32)).astype(np.int64)
         greedy = np.argsort(~best, axis=1, kind="stable")[np.arange(len(slots)), k]
         explores = high < np.uint64(self.colony.epsilon * 2.0**32)
         drawn = np.where(explores, choose(low, N_ACTIONS), greedy)
-        ready = ants[AntRow.ACTION, slots]
+        ready = self.colony.chosen[self.world, slots]
         return np.where(ready >= 0, ready, drawn)
 
     def _td_errors(
@@ -223,20 +214,21 @@ class Recorder:
         pairs = self._rows(slots, states) * N_ACTIONS + actions
         moved = self._tables().astype(np.float64).ravel()[pairs] - before.ravel()[pairs]
         _, place, ants = np.unique(pairs, return_inverse=True, return_counts=True)
-        weights = self.colony.arrays["weights"]
+        weights = self.colony.update_weights
         weights = weights[np.minimum(ants[place], len(weights) - 1)]
         return np.divide(moved, weights, out=np.full(len(moved), np.nan), where=weights > 0)
 
     def _frame(self, sections: dict[str, Any]) -> bytes:
         """What has changed since the last frame, with what the ants did."""
         colony, snapshot = self.colony, self.colony.snapshot(self.world)
-        outcome, (ants, slots) = colony.outcome(), self._living()
-        numbers = ants[AntRow.NUMBER, slots]
+        outcome, slots = colony.outcome(), self._living()
+        numbers = colony.numbers[self.world, slots]
         if not np.array_equal(numbers, self._numbers):
             sections["numbers"] = self._numbers = numbers
-        sections["cells"] = ants[AntRow.CELL, slots]
-        sections["poses"] = ants[AntRow.HEADING, slots] + 8 * ants[AntRow.CARRIES, slots]
-        sections["states"] = ants[self._state_row, slots]
+        sections["cells"] = colony.cells[self.world, slots]
+        headings, carrying = colony.headings[self.world], colony.carrying[self.world]
+        sections["poses"] = (headings + 8 * carrying)[slots]
+        sections["states"] = colony.states[self.world, slots]
         tick = int(outcome.ticks[0, self.world])
         totals = (outcome.deliveries[0, self.world], outcome.returns[0, self.world])
         rates = (colony.epsilon, colony.learning_rate)

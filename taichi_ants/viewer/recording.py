@@ -10,7 +10,6 @@ import json
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -52,11 +51,6 @@ class Recording:
     def sections(self, moment: int) -> dict[str, np.ndarray]:
         """The sections of the frame of a moment."""
         return unpack(self.header["types"], self.frames[moment])
-
-    def _repr_html_(self) -> str:
-        """The recording as notebooks show it: a page that plays it."""
-        # The page stands above recordings; it is looked for only where it is needed.
-        return import_module("taichi_ants.viewer.page").frame(self)
 
 
 def record_colony(

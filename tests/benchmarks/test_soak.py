@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import soak
 
-from taichi_ants.engines.colony.layout import AntRow, WorldRow
+from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.task.constants import EMPTY, FOOD
 
 
@@ -16,12 +16,16 @@ def put_food(colony):
 
 
 def share_a_cell(colony):
-    colony.arrays["ants"][AntRow.CELL, 0] = colony.arrays["ants"][AntRow.CELL, 1]
+    colony.arrays["cell"][0] = colony.arrays["cell"][1]
 
 
-def change(name, row, value):
+def share_a_number(colony):
+    colony.arrays["number"][0] = 1
+
+
+def change(row, value):
     def fault(colony):
-        colony.arrays[name][row, 0] = value(colony.arrays[name][row, 0])
+        colony.arrays["worlds"][row, 0] = value(colony.arrays["worlds"][row, 0])
 
     return fault
 
@@ -33,11 +37,11 @@ def put_trail(colony):
 FAULTS = {
     "food was lost, or came from nowhere": put_food,
     "ants share a cell": share_a_cell,
-    "ants share a number": change("ants", AntRow.NUMBER, lambda number: 1),
-    "ants were lost": change("worlds", WorldRow.LIVING, lambda living: living - 1),
+    "ants share a number": share_a_number,
+    "ants were lost": change(WorldRow.LIVING, lambda living: living - 1),
     "a trail is no number, below 0, or on rock": put_trail,
-    "clocks disagree": change("worlds", WorldRow.TICKS, lambda ticks: ticks + 1),
-    "a counter has overflowed": change("worlds", WorldRow.MOVES, lambda moves: -moves),
+    "clocks disagree": change(WorldRow.TICKS, lambda ticks: ticks + 1),
+    "a counter has overflowed": change(WorldRow.MOVES, lambda moves: -moves),
 }
 
 

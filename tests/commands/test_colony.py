@@ -670,7 +670,7 @@ def test_colonies_live_side_by_side_and_can_start_spread(capsys, tmp_path, monke
         assert alone.outcome().deliveries[0, 0] == colony.outcome().deliveries[0, 2]
         assert np.array_equal(alone.q_values[0], colony.q_values[2])
         cells, _ = world.start(5, 9, place)
-        assert np.array_equal(colony.at_start["cells"][2], cells)
+        assert np.array_equal(colony.at_start["start_cells"][2], cells)
 
 
 @pytest.mark.parametrize(

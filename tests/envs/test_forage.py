@@ -103,7 +103,7 @@ def test_gymnasium_has_nothing_to_say(rules, observation_format):
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             env = gymnasium.make(
-                f"taichi_ants:{ID}",
+                f"taichi_ants.envs:{ID}",
                 world=world,
                 task=rules,
                 observation_format=observation_format,
@@ -113,11 +113,13 @@ def test_gymnasium_has_nothing_to_say(rules, observation_format):
 
 
 def test_the_id_is_known_whichever_is_imported_first(kernels):
-    for lines in (
-        "import taichi_ants, sys; assert 'gymnasium' not in sys.modules; import gymnasium",
-        "import gymnasium, taichi_ants",
+    for lines, name in (
+        ("import taichi_ants, sys; assert 'gymnasium' not in sys.modules; import gymnasium", ""),
+        ("import taichi_ants.envs, gymnasium", ID),
+        ("import gymnasium, taichi_ants.envs", ID),
     ):
-        code = f"{lines}; print(gymnasium.make('{ID}').reset(seed=0)[0])"
+        name = name or f"taichi_ants.envs:{ID}"
+        code = f"{lines}; print(gymnasium.make('{name}').reset(seed=0)[0])"
         said = subprocess.run(
             [sys.executable, "-c", code],
             env=environment(kernels),

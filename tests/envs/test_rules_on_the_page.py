@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from command_lines import ROOT
 
+import taichi_ants.envs  # noqa: F401  # registers the environments
 from taichi_ants import Pheromone, World, worlds
 from taichi_ants.reference.random_stream import hash_of
 from taichi_ants.reference.world_state import WorldState

@@ -6,7 +6,6 @@ import gymnasium
 import numpy as np
 import pytest
 
-import taichi_ants  # noqa: F401 (registers the environments)
 from taichi_ants.envs import Event
 
 pytestmark = pytest.mark.slow

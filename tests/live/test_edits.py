@@ -13,9 +13,9 @@ from random_edits import apply_to_both, random_edit
 from same_colonies import assert_equal
 
 from taichi_ants import AntsError, Colony, TrainingConfig, worlds
-from taichi_ants.engines.colony import colony as colony_module
+from taichi_ants.engines.colony import stepping
 from taichi_ants.engines.colony.hand import Hand
-from taichi_ants.engines.colony.layout import AntRow, Stage, WorldRow
+from taichi_ants.engines.colony.layout import Stage, WorldRow
 from taichi_ants.live import edits
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.reference.hand import Hand as PlainHand
@@ -39,10 +39,9 @@ def assert_sound(hand: Hand) -> None:
     """What holds in every colony at the end of a tick."""
     colony = hand.colony
     arrays, world = colony.arrays, colony.arrays["worlds"][:, 0]
-    ants = colony.ant_rows()
-    ants = ants[:, ants[AntRow.STAGE] != Stage.VACANT]
-    cells, numbers = ants[AntRow.CELL], ants[AntRow.NUMBER]
-    assert (ants[AntRow.STAGE] == Stage.LIVING).all()
+    taken = arrays["stage"] != Stage.VACANT
+    cells, numbers = arrays["cell"][taken], arrays["number"][taken]
+    assert (arrays["stage"][taken] == Stage.LIVING).all()
     assert len(set(cells.tolist())) == len(set(numbers.tolist())) == world[WorldRow.LIVING]
     assert numbers.max(initial=-1) < world[WorldRow.NEXT_NUMBER]
     assert (np.flatnonzero(arrays["ground"] > 15) == np.sort(cells)).all()
@@ -103,9 +102,9 @@ def test_edits_keep_colony_and_reference_equal(kernel):
 
 def test_schedules_do_not_matter_to_edits(monkeypatch):
     """Many chunks; where no slot is vacant, ants are sorted now and then."""
-    monkeypatch.setattr(colony_module, "_CHUNKS_PER_THREAD", 8)
+    monkeypatch.setattr(stepping, "_CHUNKS_PER_THREAD", 8)
     for name in ("_FEWEST_TICKS", "_MOST_TICKS"):  # between two sorts
-        monkeypatch.setattr(colony_module, name, 2)
+        monkeypatch.setattr(stepping, name, 2)
     world, training = worlds.open_world(5, (9, 8, 7)), TRAINING
     hands = []
     for schedule in ("by_world", "by_chunk"):
@@ -127,12 +126,12 @@ def test_schedules_do_not_matter_to_edits(monkeypatch):
         for name in ("ground", "trail", "first_streams", "worlds"):
             known = slice(None) if name != "worlds" else [WorldRow.LIVING, WorldRow.NEXT_NUMBER]
             assert np.array_equal(one.arrays[name][known], other.arrays[name][known]), name
-        lasting = [row for row in AntRow if row not in (AntRow.WANT, AntRow.EVENT, AntRow.FILLED)]
-        rows = []
-        for colony in (one, other):
-            ants = colony.ant_rows()[:, colony.living[0]]
-            rows.append(ants[lasting][:, np.argsort(ants[AntRow.NUMBER])])
-        assert np.array_equal(*rows)
+        for name in set(one.columns()) - {"want", "event", "filled"}:
+            by_number = [
+                colony.arrays[name][colony.living[0]][np.argsort(colony.numbers[colony.living])]
+                for colony in (one, other)
+            ]
+            assert np.array_equal(*by_number), name
     assert 0 < full < 60
 
 
@@ -142,16 +141,14 @@ def test_a_wall_across_a_road_of_ants_has_no_hole(what):
     colony = Colony(worlds.paper(), foraging(), TRAINING, 2, ants=40)
     colony.begin_episode()
     colony.tick(200)
-    hand, before = Hand(colony), colony.ant_rows()
-    cells = np.sort(before[AntRow.CELL])[::2]
+    hand, before = Hand(colony), {name: colony.arrays[name].copy() for name in colony.columns()}
+    cells = np.sort(before["cell"])[::2]
     hand.put(cells, what)
-    after = colony.ant_rows()
     assert (colony.snapshot().ground[cells] == what).all()
-    changed = {AntRow.CELL, AntRow.STATE, AntRow.PERCEPT}
-    kept = [row for row in AntRow if row < len(after) and row not in changed]
-    assert np.array_equal(after[kept], before[kept])
-    moved = before[AntRow.CELL] != after[AntRow.CELL]
-    assert np.array_equal(moved, np.isin(before[AntRow.CELL], cells))
+    for name in before.keys() - {"cell", "state", "percept"}:
+        assert np.array_equal(colony.arrays[name], before[name]), name
+    moved = before["cell"] != colony.arrays["cell"]
+    assert np.array_equal(moved, np.isin(before["cell"], cells))
     assert_sound(hand)
 
 

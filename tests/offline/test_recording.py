@@ -19,7 +19,7 @@ from taichi_ants import (
     rollout,
     worlds,
 )
-from taichi_ants.engines.colony import colony as colony_module
+from taichi_ants.engines.colony import stepping
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.offline.dataset import COLUMNS
 from taichi_ants.reference import ReferenceColony
@@ -139,7 +139,7 @@ def test_ants_of_a_colony_that_appear_and_die(learner, sharing, delivery, life):
 
 
 def test_a_colony_that_sorts_its_ants_is_recorded_alike(monkeypatch):
-    monkeypatch.setattr(colony_module, "_MOST_TICKS", 16)  # between two sorts
+    monkeypatch.setattr(stepping, "_MOST_TICKS", 16)  # between two sorts
     config, life = TrainingConfig("q_learning", 0.3, 0.9, 0.3, 1.0), Life(regrowth=0)
     both = [
         record_colony(

@@ -10,7 +10,6 @@ from named_states import parse_state
 from PIL import Image
 
 from taichi_ants import AntsError, Colony, TrainingConfig, train
-from taichi_ants.engines.colony.layout import AntRow
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.rendering import (
     Episode,
@@ -377,8 +376,8 @@ def test_one_ant_of_a_colony_is_followed(observation) -> None:
     made.begin_episode()
     for _ in range(8):
         snapshot, status = next(colony_moments(made, follow=5))
-        slot = int(np.flatnonzero(made.of_ants(AntRow.NUMBER)[:20] == 5)[0])
-        assert snapshot.ant_cells[0] == made.of_ants(AntRow.CELL)[slot]
+        slot = int(np.flatnonzero(made.numbers[0] == 5)[0])
+        assert snapshot.ant_cells[0] == made.cells[0, slot]
         assert sorted(snapshot.ant_cells) == sorted(made.snapshot().ant_cells)
         assert status.q_values[0] == status.state == table[status.state, 0]
         assert ("ant", "5") in status.lines

@@ -16,7 +16,6 @@ from taichi_ants.analysis.bridge import (
     WINDOWS,
     Design,
 )
-from taichi_ants.engines.colony.layout import AntRow
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.studies.bridge import bridges, crossings, point, task
 from taichi_ants.worlds.double_bridge import branch_cells, double_bridge, junction_cells
@@ -32,11 +31,12 @@ class Scripted:
         grid, (nest, food) = double_bridge(**BRIDGE).grid, junction_cells(**BRIDGE)
         short, long = (cells[len(cells) // 4] for cells in branch_cells(**BRIDGE))
         places = {"nest": nest, "food": food, "short": short, "long": long}
-        self.cells = {name: int(grid.index(cell)) for name, cell in places.items()}
-        assert len(set(self.cells.values())) == 4
+        self.places = {name: int(grid.index(cell)) for name, cell in places.items()}
+        assert len(set(self.places.values())) == 4
         self.script, self.seeds, self.ticks = script, (7, 8), 0
         self.capacity = len(script) // 2
-        self.rows = np.zeros((len(AntRow), len(script)), np.int32)
+        self.cells = np.zeros((2, self.capacity), np.int32)
+        self.carrying = np.zeros((2, self.capacity), bool)
 
     def begin_episode(self, length: int) -> None:
         self.ticks = 0
@@ -46,14 +46,10 @@ class Scripted:
         self.ticks += n
         self._place()
 
-    def of_ants(self, row: AntRow) -> np.ndarray:
-        return self.rows[row]
-
     def _place(self) -> None:
         for ant, moments in enumerate(self.script):
             name, load = moments[max(tick for tick in moments if tick <= self.ticks)]
-            self.rows[AntRow.CELL, ant] = self.cells[name]
-            self.rows[AntRow.CARRIES, ant] = load
+            self.cells.flat[ant], self.carrying.flat[ant] = self.places[name], load
 
 
 def test_an_ant_crosses_when_it_comes_to_the_other_room_by_its_last_branch() -> None:

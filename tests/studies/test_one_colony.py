@@ -56,7 +56,7 @@ def test_a_colony_is_saved_although_its_picture_cannot_be(
     other.tick(ticks)
     saved = Colony.load(save)
     assert saved.ticks == ticks
-    np.testing.assert_array_equal(saved.arrays["ants"], other.arrays["ants"])
+    np.testing.assert_array_equal(saved.cells, other.cells)
     np.testing.assert_array_equal(saved.q_values, other.q_values)
 
 

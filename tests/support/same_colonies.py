@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from taichi_ants import Colony
-from taichi_ants.engines.colony.layout import AntRow, HomeRow, Stage, WorldRow
+from taichi_ants.engines.colony.layout import HomeRow, WorldRow
 from taichi_ants.reference import ReferenceColony
 
 
@@ -14,22 +14,21 @@ def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None
     ours = colony.snapshot(world)
     grid, arrays = ours.grid, colony.arrays
     of_world = slice(world * colony.capacity, (world + 1) * colony.capacity)
-    ants, streams = colony.ant_rows()[:, of_world], arrays["streams"][of_world]
-    (slots,) = np.nonzero(ants[AntRow.STAGE] == Stage.LIVING)
+    (slots,) = np.nonzero(colony.living[world])
     assert slots.tolist() == sorted(plain.ants)
-    cells = grid.cells(ants[AntRow.CELL, slots]).tolist()
-    row_at = AntRow.PERCEPT if colony.task.observation == "paper" else AntRow.STATE
+    cells, states = grid.cells(colony.cells[world, slots]).tolist(), colony.states[world]
+    ants = {name: arrays[name][of_world] for name in colony.columns()}
     for slot, cell in zip(slots.tolist(), cells, strict=True):
         ant = plain.ants[slot]
-        mine = ants[:, slot]
+        mine = {name: column[slot] for name, column in ants.items()}
         assert tuple(cell) == ant.cell
-        assert (mine[AntRow.HEADING], mine[AntRow.CARRIES]) == (ant.heading, ant.carries)
-        assert mine[AntRow.NUMBER] == ant.number
+        assert (mine["heading"], mine["carries"]) == (ant.heading, ant.carries)
+        assert mine["number"] == ant.number
         if colony.ants_change:
-            assert mine[AntRow.AGE] == ant.age
-        assert (mine[AntRow.PERCEPT], mine[row_at]) == (ant.percept, ant.state)
-        assert int(streams[slot]) == ant.stream.state
-        assert ant.action < 0 or arrays["rewards"][mine[AntRow.EVENT]] == ant.reward
+            assert mine["age"] == ant.age
+        assert (mine["percept"], states[slot]) == (ant.percept, ant.state)
+        assert int(mine["streams"]) == ant.stream.state
+        assert ant.action < 0 or arrays["rewards"][mine["event"]] == ant.reward
     existing = np.array(list(plain.world.ground), dtype=np.int64).reshape(-1, 3)
     places = grid.index(existing)
     assert ours.ground[places].tolist() == list(plain.world.ground.values())

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import html
 import re
+import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+import taichi_ants
 from taichi_ants import AntsError, Colony, TrainingConfig, rollout, task, worlds
 from taichi_ants.commands import render
 from taichi_ants.learners.policies import save_policy, trail_follower
@@ -93,22 +96,31 @@ def test_text_can_be_read_and_ants_stand_out(theme):
     assert levels == sorted(levels, reverse=theme == 0)
 
 
-def test_notebooks_show_traces_and_colonies():
+def test_notebooks_show_traces_and_colonies(monkeypatch):
+    """By IPython's formatter, to which the package tells it when it is imported."""
+    display = pytest.importorskip("IPython.core.formatters").DisplayFormatter()
+    shell = SimpleNamespace(display_formatter=display)
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: shell))
+    taichi_ants._show_pages_in_notebooks()
+
+    def html_of(value):
+        return display.format(value, include=["text/html"])[0].get("text/html")
+
     trace = rollout(worlds.paper(), trail_follower())
-    shown = trace._repr_html_()
+    shown = html_of(trace)
     assert shown.startswith("<iframe ")
     inner = html.unescape(re.search(r'srcdoc="([^"]*)"', shown)[1])
     assert inner.startswith("<!doctype html>")
     assert inner.endswith("</html>\n")
     object.__setattr__(trace, "made", None)
-    assert trace._repr_html_() is None
+    assert html_of(trace) is None
     config = TrainingConfig("q_learning", 0.1, 0.9, 0.2, 1.0)
     colony = Colony(worlds.paper(), None, config, ants=3)
-    assert colony._repr_html_() is None
+    assert html_of(colony) is None
     colony.begin_episode()
-    assert "<iframe " in colony._repr_html_()
+    assert "<iframe " in html_of(colony)
     assert colony.ticks == 0
-    assert "<iframe " in record_colony(colony, ticks=2)._repr_html_()
+    assert "<iframe " in html_of(record_colony(colony, ticks=2))
 
 
 def test_the_command_writes_pages(tmp_path, capsys):

@@ -18,7 +18,6 @@ from taichi_ants import (
     trace_training,
     worlds,
 )
-from taichi_ants.engines.colony.layout import AntRow, Stage
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.rendering import Episode
@@ -66,7 +65,8 @@ def test_a_recording_is_what_engine_and_reference_do(learner, sharing, sees, den
         for tick in range(TICKS + 1):
             snapshots.append(colony.snapshot())
             tables.append(colony.q_values[0])
-            ants.append(colony.ant_rows())
+            views = (colony.numbers, colony.cells, colony.headings, colony.carrying, colony.states)
+            ants.append((np.nonzero(colony.living[0])[0], [view[0].copy() for view in views]))
             if tick < TICKS and not plain.over:
                 frames.append(recorder.tick())
                 plain.tick(last=tick == TICKS - 1)
@@ -76,23 +76,16 @@ def test_a_recording_is_what_engine_and_reference_do(learner, sharing, sees, den
         rewards = np.array(recording.header["rewards"])
         before = None
         assert len(moments) == len(transitions)
-        for moment, snapshot, table, rows, did in zip(
+        for moment, snapshot, table, (slots, views), did in zip(
             moments, snapshots, tables, ants, transitions, strict=False
         ):
             assert np.array_equal(moment.ground, snapshot.ground)
             assert moment.trail.dtype == snapshot.trail.dtype
             assert np.array_equal(moment.trail, snapshot.trail)
-            (slots,) = np.nonzero(rows[AntRow.STAGE] == Stage.LIVING)
-            slots = slots[np.argsort(rows[AntRow.NUMBER, slots])]
-            row_at = AntRow.PERCEPT if sees == "paper" else AntRow.STATE
-            for name, row in (
-                ("numbers", AntRow.NUMBER),
-                ("cells", AntRow.CELL),
-                ("headings", AntRow.HEADING),
-                ("loaded", AntRow.CARRIES),
-                ("states", row_at),
-            ):
-                assert getattr(moment, name).tolist() == rows[row, slots].tolist(), name
+            slots = slots[np.argsort(views[0][slots])]
+            names = ("numbers", "cells", "headings", "loaded", "states")
+            for name, view in zip(names, views, strict=True):
+                assert getattr(moment, name).tolist() == view[slots].tolist(), name
             assert moment.clock[6] == len(slots)
             for place, slot in enumerate(slots.tolist()):
                 own = table[slot] if colony.one_a_slot else table

@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from taichi_ants import files
-from taichi_ants.engines.colony.layout import ANT_GROUND, AntRow, HomeRow, Stage, WorldRow
-from taichi_ants.engines.colony.memory import homes_arrays, set_learning_rate
+from taichi_ants.engines.colony import food_sources
+from taichi_ants.engines.colony.layout import ANT_GROUND, HomeRow, Stage, WorldRow
 from taichi_ants.errors import AntsError, count
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_BORN, STREAM_HAND, STREAM_START_CELL
 from taichi_ants.grid.hexgrid import AxialGrid, axial
@@ -93,12 +93,12 @@ class Hand:
         arrays = self.colony.arrays
         held = arrays["ground"][cells]
         ants, to = self._aside(cells) if what != EMPTY else (cells[:0], cells[:0])
-        at = self.colony.of_ants(AntRow.CELL)[ants]
+        at = arrays["cell"][ants]
         cells = cells[((held >> 4 == 0) | np.isin(cells, at)) & (held != QUEEN)]  # see `layout`
         start = self._start.copy()
         start[cells] = what
         self._begin_with(start)
-        self.colony.of_ants(AntRow.CELL)[ants] = to
+        arrays["cell"][ants] = to
         arrays["ground"][to] = arrays["ground"][at]
         arrays["ground"][cells] = what
         arrays["walls"][cells] = what == OBSTACLE
@@ -112,9 +112,8 @@ class Hand:
         colony, grid = self.colony, self.colony.grid
         free = (colony.arrays["ground"] == EMPTY) & grid.exists
         free[cells] = False
-        living = colony.of_ants(AntRow.STAGE) == Stage.LIVING
-        slots = np.flatnonzero(living & np.isin(colony.of_ants(AntRow.CELL), cells))
-        row, column = np.divmod(colony.of_ants(AntRow.CELL)[slots], grid.width)
+        slots = np.flatnonzero(colony.living[0] & np.isin(colony.cells[0], cells))
+        row, column = np.divmod(colony.cells[0, slots], grid.width)
         to = np.full(len(slots), -1)
         for q, r in _STEPS.tolist():
             waiting = np.flatnonzero(to < 0)
@@ -160,12 +159,7 @@ class Hand:
         if self.colony.pheromone.dense:
             arrays["level"][cells] = level
         else:
-            arrays["trail"][cells] = level + self._clock() if level else 0
-
-    def _clock(self) -> int:
-        """How far integer trails have fallen since the episode began."""
-        falls = self.colony.pheromone.evaporation == "linear"
-        return int(self.colony.arrays["worlds"][WorldRow.TICKS, 0]) * falls
+            arrays["trail"][cells] = level + self.colony.trail_clock(0) if level else 0
 
     def add_ants(self, cells: np.ndarray, heading: int | None = None) -> None:
         """Put ants on those cells that are empty; headings are drawn if none is given.
@@ -176,7 +170,7 @@ class Hand:
             AntsError: The colony has no room for so many.
         """
         colony, arrays = self.colony, self.colony.arrays
-        world, of_ants = arrays["worlds"][:, 0], colony.of_ants
+        world = arrays["worlds"][:, 0]
         cells = cells[arrays["ground"][cells] == EMPTY]
         n, living = len(cells), self.living
         if living + n > colony.capacity:
@@ -184,17 +178,18 @@ class Hand:
                 f"{count(n, 'ant')} cannot join {count(living, 'ant')}; the capacity of this "
                 f"colony is {colony.capacity}, so remove ants, or begin with a larger one."
             )
-        slots = np.flatnonzero(of_ants(AntRow.STAGE) == Stage.VACANT)[:n]
+        slots = np.flatnonzero(arrays["stage"] == Stage.VACANT)[:n]
         numbers = world[WorldRow.NEXT_NUMBER] + np.arange(n)
         headings: int | np.ndarray
         if heading is None:
             headings = choose(self._stream.bits(n) >> np.uint64(32), N_HEADINGS)
         else:
             headings = heading
-        arrays["ants"][:, slots] = arrays["traits"][:, slots] = 0
-        of_ants(AntRow.CELL)[slots], of_ants(AntRow.HEADING)[slots] = cells, headings
-        of_ants(AntRow.NUMBER)[slots], of_ants(AntRow.ACTION)[slots] = numbers, -1
-        of_ants(AntRow.STAGE)[slots] = Stage.NEWBORN
+        for name in colony.columns():
+            arrays[name][slots] = 0
+        arrays["cell"][slots], arrays["heading"][slots] = cells, headings
+        arrays["number"][slots], arrays["action"][slots] = numbers, -1
+        arrays["stage"][slots] = Stage.NEWBORN
         born = (colony.episode << 32) + numbers.astype(np.int64)
         arrays["streams"][slots] = stream_state(colony.seeds[0], STREAM_BORN, born)
         arrays["ground"][cells] = ANT_GROUND
@@ -204,23 +199,22 @@ class Hand:
 
     def remove_ants(self, cells: np.ndarray) -> None:
         """Take the ants on these cells away, with the food that they carry."""
-        of_ants = self.colony.of_ants
-        found = (of_ants(AntRow.STAGE) == Stage.LIVING) & np.isin(of_ants(AntRow.CELL), cells)
-        self._remove(np.flatnonzero(found))
+        colony = self.colony
+        self._remove(np.flatnonzero(colony.living[0] & np.isin(colony.cells[0], cells)))
 
     def _remove(self, slots: np.ndarray) -> None:
-        arrays, of_ants = self.colony.arrays, self.colony.of_ants
-        numbers = of_ants(AntRow.NUMBER)[slots]
+        arrays = self.colony.arrays
+        numbers = arrays["number"][slots]
         first = numbers < self.colony.ants  # their streams go on in the next episode
         arrays["first_streams"][numbers[first]] = arrays["streams"][slots[first]]
-        arrays["ground"][of_ants(AntRow.CELL)[slots]] = EMPTY
-        of_ants(AntRow.STAGE)[slots] = Stage.VACANT
+        arrays["ground"][arrays["cell"][slots]] = EMPTY
+        arrays["stage"][slots] = Stage.VACANT
         self._count_ants()
         self.colony.look()
 
     def _count_ants(self) -> None:
         world = self.colony.arrays["worlds"][:, 0]
-        taken = self.colony.of_ants(AntRow.STAGE) != Stage.VACANT
+        taken = self.colony.arrays["stage"] != Stage.VACANT
         world[WorldRow.LIVING] = np.count_nonzero(taken)
         world[WorldRow.TOP] = np.max(np.flatnonzero(taken), initial=-1) + 1
         world[WorldRow.FIRST_VACANT] = np.argmin(taken) if not taken.all() else len(taken)
@@ -235,7 +229,7 @@ class Hand:
             AntsError: The colony, or the world, has no room for so many.
         """
         colony = self.colony
-        (slots,) = np.nonzero(colony.of_ants(AntRow.STAGE) == Stage.LIVING)
+        (slots,) = np.nonzero(colony.living[0])
         missing, free = n - len(slots), np.flatnonzero(colony.arrays["ground"] == EMPTY)
         later = int(np.count_nonzero(self._start == EMPTY))
         room = min(colony.capacity, len(free) + len(slots), later)
@@ -246,7 +240,7 @@ class Hand:
         if missing > 0:
             self.add_ants(self._nearest(free)[:missing])
         elif missing < 0:
-            self._remove(slots[np.argsort(colony.of_ants(AntRow.NUMBER)[slots])[missing:]])
+            self._remove(slots[np.argsort(colony.numbers[0, slots])[missing:]])
 
     def _nearest(self, cells: np.ndarray) -> np.ndarray:
         """Cells in the order in which ants would start there."""
@@ -262,9 +256,9 @@ class Hand:
         Trails stay as they are, and as dense as they are.
         """
         colony, arrays = self.colony, self.colony.arrays
-        levels = np.maximum(arrays["trail"] - self._clock(), 0)
-        colony.task, colony.pheromone = task, task.pheromone_while(colony.sharing != "fixed")
-        arrays["trail"][:] = np.where(levels > 0, levels + self._clock(), 0)
+        levels = np.maximum(arrays["trail"] - colony.trail_clock(0), 0)
+        colony.task, colony.pheromone = task, task.pheromone_while(colony.learns)
+        arrays["trail"][:] = np.where(levels > 0, levels + colony.trail_clock(0), 0)
 
     def set_epsilon(self, epsilon: float) -> None:
         """The epsilon from now on; it decays no more."""
@@ -275,10 +269,8 @@ class Hand:
     def set_learning_rate(self, learning_rate: float) -> None:
         """The learning rate from now on; it decays no more."""
         colony = self.colony
-        colony.learning_rate = learning_rate
-        steady = {"learning_rate_decay": 1.0, "min_learning_rate": 0.0}
-        colony.training = replace(colony.training, **steady)
-        set_learning_rate(colony)
+        colony.training = replace(colony.training, learning_rate_decay=1.0, min_learning_rate=0.0)
+        colony.set_learning_rate(learning_rate)
 
     def state(self) -> str:
         """A hash of all that goes on: where it is equal, all that follows is equal."""
@@ -322,7 +314,7 @@ class Hand:
                 f"{count(ants, 'ant')} start each episode, but this would leave {room} free cells; "
                 "leave more cells free."
             )
-        if self.colony.sharing != "fixed" and not (start == FOOD).any():
+        if self.colony.learns and not (start == FOOD).any():
             raise AntsError("this would take the last food, but ants learn from it; leave some.")
         self._start, self._changed = start, True
 
@@ -355,6 +347,5 @@ class Hand:
                 taken[here[0]] = -1
         _, pile = np.unique(np.array(pile, int), return_inverse=True)  # without those that are gone
         colony.n_homes = max(len(at), int(np.count_nonzero(self._start == FOOD)))
-        arrays |= homes_arrays(
-            colony, arrays["worlds"], [np.array([at, taken, pile], int).reshape(3, -1)]
-        )
+        sources = [np.array([at, taken, pile], int).reshape(3, -1)]
+        arrays |= food_sources.arrays(sources, arrays["worlds"], colony.n_homes, colony.grid.size)

@@ -1,10 +1,10 @@
-"""The kernels of a colony: the phases of a tick, in order, under three schedules.
+"""The kernels of a colony: the phases of a tick, in order, and how threads share them.
 
-Many small worlds: one task a world, all ticks and phases in turn inside it. Few large worlds: all
-threads share each phase by chunks, which are ranges of the ants, or of the cells, of one world. On
-the CPU they do so as a team, which stays together for some ticks; else each phase is a parallel
-loop. All schedules do the same phases in the same order, so that they give the same numbers. The
-order is that of `taichi_ants.reference.ReferenceColony.tick`.
+Many small worlds: each is a part of the work by itself. Few large worlds: all threads share each
+phase by chunks, which are ranges of the ants, or of the cells, of one world. On the CPU they wait
+for each other at a barrier; on a GPU each group of phases is a parallel loop. All do the same
+phases in the same order, so that they give the same numbers. The order is that of
+`taichi_ants.reference.ReferenceColony.tick`.
 """
 
 from collections.abc import Callable, Iterator
@@ -16,10 +16,17 @@ import taichi as ti
 
 from taichi_ants.engines import looks
 from taichi_ants.engines.colony import learning, life, steps, trail
-from taichi_ants.engines.colony.layout import STANDS, Order, Stage, WorldRow
+from taichi_ants.engines.colony.layout import (
+    GAVE_UP,
+    STANDS,
+    Barrier,
+    Order,
+    Stage,
+    WorldRow,
+)
 from taichi_ants.engines.trial import tried
+from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.memory import read_rates
-from taichi_ants.learners.registry import Learner
 from taichi_ants.learners.td_errors import guarded
 from taichi_ants.task.constants import ROW
 from taichi_ants.task.observations import Observation
@@ -103,7 +110,7 @@ def begin_phases(v: Variant) -> Iterator[Phase]:
 
 
 def look_phases(v: Variant) -> Iterator[Phase]:
-    """What follows a change by hand, between two ticks."""
+    """What follows an intervention, between two ticks."""
     yield Phase(ANTS, learning.look)
 
 
@@ -188,15 +195,15 @@ def shared_out(phases: Iterator[Phase]) -> list[tuple[Phase, ...]]:
 
 
 @cache
-def by_chunk(
+def loops(
     v: Variant, phases_of: Callable[[Variant], Iterator[Phase]], arguments: Any
 ) -> Callable[..., None]:
     """A kernel of some phases, each a parallel loop over chunks or worlds."""
-    loops = shared_out(phases_of(v))
+    groups = shared_out(phases_of(v))
 
     @ti.kernel
     def advance_colony(c: arguments):
-        for loop in ti.static(loops):
+        for loop in ti.static(groups):
             ti.loop_config(block_dim=1)
             for chunk in range(
                 c.n_worlds if ti.static(loop[0].of == WORLD) else c.n_worlds * c.n_chunks
@@ -207,37 +214,48 @@ def by_chunk(
     return advance_colony
 
 
+@ti.func
+def wait_for_all(c: ti.template(), part, parts, number):
+    """Wait until all parts have come to barrier `number`; returns 0 if one does not come.
+
+    The first part that starts decides for all: it opens the barrier once the others have arrived,
+    or gives up. Whoever waits for it has arrived itself; so when it gives up, all parts that have
+    started are at this barrier, and one that starts later leaves at its first, which is this one.
+    """
+    goes_on = 1
+    if part == 0:
+        wanted, spins = (number + 1) * (parts - 1), 0
+        # Atomic, since a mere read could be done once for all.
+        arrived = ti.atomic_add(c.barrier[Barrier.ARRIVED], 0)
+        while arrived < wanted and spins < c.orders[Order.SPINS]:
+            arrived = ti.atomic_add(c.barrier[Barrier.ARRIVED], 0)
+            spins += 1
+        goes_on = ti.cast(arrived >= wanted, ti.i32)
+        ti.atomic_add(
+            c.barrier[Barrier.OPENED], ti.select(goes_on == 1, ti.i64(1), ti.i64(GAVE_UP))
+        )
+    else:
+        ti.atomic_add(c.barrier[Barrier.ARRIVED], 1)
+        opened = ti.atomic_add(c.barrier[Barrier.OPENED], 0)
+        while opened >= 0 and opened <= number:
+            opened = ti.atomic_add(c.barrier[Barrier.OPENED], 0)
+        goes_on = ti.cast(opened > number, ti.i32)
+    return goes_on
+
+
 @cache
-def by_world(v: Variant, arguments: Any) -> Callable[..., None]:
-    """A kernel of whole ticks, as many as ordered, of worlds with a single chunk each."""
-    phases, last = tuple(tick_phases(v)), tuple(last_phases(v))
-    planning = tuple(planning_phases(v))
+def ticks(v: Variant, waits: bool, arguments: Any) -> Callable[..., None]:
+    """A kernel of whole ticks, as many as ordered, whose work is divided into parts.
 
-    @ti.kernel
-    def advance_colony(c: arguments):
-        ti.loop_config(block_dim=1)
-        for w in range(c.n_worlds):
-            for _ in range(c.orders[Order.TICKS]):
-                for phase in ti.static(phases):
-                    do(phase, c, v, w)
-                if ti.static(v.plans_together):
-                    for _round in range(c.planning_steps):
-                        for phase in ti.static(planning):
-                            do(phase, c, v, w)
-                for phase in ti.static(last):
-                    do(phase, c, v, w)
-
-    return advance_colony
-
-
-@cache
-def by_team(v: Variant, arguments: Any) -> Callable[..., None]:
-    """A kernel of whole ticks, as many as ordered, in which threads share the work of each phase.
-
-    To begin a parallel loop takes 20 to 200 microseconds, since threads are woken for it and put to
-    sleep behind it. Here there is one for all ticks. Its threads are a team: each member has its
-    share of the chunks, and when it is done with a phase it looks again and again whether the
-    others are. There must be as many threads as members, or they wait for ever.
+    Args:
+        v: What is compiled into it.
+        waits: False: each part is a world of a single chunk, and goes through all ticks by itself.
+            True: each part has its share of the chunks, and when it is done with a group of phases
+            it waits for the others at a barrier. To begin a parallel loop for each group would take
+            20 to 200 microseconds, since threads are put to sleep and woken. If a part does not
+            come, all leave, and another launch begins with the group that follows, see
+            `Order.FIRST`.
+        arguments: The type of the argument pack.
     """
     groups, planning = shared_out(tick_phases(v)), shared_out(planning_phases(v))
     last = shared_out(last_phases(v))
@@ -245,31 +263,40 @@ def by_team(v: Variant, arguments: Any) -> Callable[..., None]:
         groups, last = shared_out(chain(tick_phases(v), last_phases(v))), []
 
     @ti.func
-    def share(group: ti.template(), c: ti.template(), member, members, meetings):
-        """Do a member's share of some phases, wait for the others, and count the meeting."""
-        n = c.n_worlds if ti.static(group[0].of == WORLD) else c.n_worlds * c.n_chunks
-        for chunk in range(n * member // members, n * (member + 1) // members):
+    def share(group: ti.template(), c: ti.template(), part, parts, at):
+        """Do a part's share of group number `at`, and wait; returns the next, -1 to leave."""
+        following = at
+        if ti.static(not waits):
             for phase in ti.static(group):
-                do(phase, c, v, chunk)
-        if members > 1:
-            come = ti.atomic_add(c.come[0], 1) + 1
-            while come < (meetings + 1) * members:
-                come = ti.atomic_add(c.come[0], 0)  # a mere read could be done once for all
-        return meetings + 1
+                do(phase, c, v, part)
+        else:
+            if at >= 0:
+                if at >= c.orders[Order.FIRST]:
+                    n = c.n_worlds if ti.static(group[0].of == WORLD) else c.n_worlds * c.n_chunks
+                    for chunk in range(n * part // parts, n * (part + 1) // parts):
+                        for phase in ti.static(group):
+                            do(phase, c, v, chunk)
+                following = at + 1
+                if parts > 1:
+                    if wait_for_all(c, part, parts, at) == 0:
+                        following = -1
+        return following
 
     @ti.kernel
     def advance_colony(c: arguments):
         ti.loop_config(block_dim=1)
-        for member in range(c.orders[Order.MEMBERS]):
-            members, meetings = c.orders[Order.MEMBERS], ti.cast(0, ti.i64)
+        for i in range(c.orders[Order.PARTS]):
+            part, parts, at = i, c.orders[Order.PARTS], 0
+            if ti.static(waits):
+                part = ti.cast(ti.atomic_add(c.barrier[Barrier.STARTED], 1), ti.i32)
             for _ in range(c.orders[Order.TICKS]):
                 for group in ti.static(groups):
-                    meetings = share(group, c, member, members, meetings)
+                    at = share(group, c, part, parts, at)
                 if ti.static(v.plans_together):
                     for _round in range(c.planning_steps):
                         for group in ti.static(planning):
-                            meetings = share(group, c, member, members, meetings)
+                            at = share(group, c, part, parts, at)
                 for group in ti.static(last):
-                    meetings = share(group, c, member, members, meetings)
+                    at = share(group, c, part, parts, at)
 
     return advance_colony

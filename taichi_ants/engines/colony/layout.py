@@ -1,4 +1,4 @@
-"""Names of what lies in the memory of a colony: the rows of its tables of integers."""
+"""Names of what lies in the arrays of a colony."""
 
 from __future__ import annotations
 
@@ -6,33 +6,27 @@ from enum import IntEnum, auto
 
 from taichi_ants.task.constants import OBSTACLE
 
-
-class AntRow(IntEnum):
-    """What is known of an ant: rows of `ants` (int32), then of `traits` (int8); columns are slots.
-
-    What is small and used in each tick lies in `traits`, a quarter as much for memory to move. Rows
-    that a colony does not use, at the end of either table, are left out. Kernels know each row as
-    an array of its own, by its name in small letters.
-    """
-
-    CELL = 0
-    CARRIED = auto()  # ticks with the food that it carries
-    NUMBER = auto()  # -1 in a slot that was never used in this episode
-    WANT = auto()  # the cell to enter, or of the food to take, else its own; then where it was
-    STATE = auto()  # the row of the table; where the percept is the row, it is not used
-    AGE = auto()  # in ticks; only where ants are born or die
-    HEADING = auto()
-    CARRIES = auto()
-    STAGE = auto()  # a `Stage`
-    PERCEPT = auto()  # the paper's state: what acting and rewards go by
-    ACTION = auto()  # the one that is drawn already, -1
-    EVENT = auto()  # what came of the last action
+# Columns: the arrays with one entry for each slot, by which kernels know the ants. What is small
+# and used in each tick takes a byte, a quarter as much for memory to move.
+INTEGER_COLUMNS = (
+    "cell",
+    "carried",  # ticks with the food that it carries
+    "number",  # -1 in a slot that was never used in this episode
+    "want",  # the cell to enter, or of the food to take, else its own; then where it was
+    "state",  # the state index; only where that is not the percept
+    "age",  # in ticks; only where ants are born or die
+)
+BYTE_COLUMNS = (
+    "heading",
+    "carries",
+    "stage",  # a `Stage`
+    "percept",  # the paper's state: what acting and rewards go by
+    "action",  # the one that is drawn already, -1
+    "event",  # what came of the last action
     # Whether another ant enters the cell that it leaves, or PUSHES it out; only where cells with
     # ants can be entered.
-    FILLED = auto()
-
-
-FIRST_TRAIT = AntRow.HEADING
+    "filled",
+)
 
 
 class Stage(IntEnum):
@@ -82,10 +76,23 @@ TALLY_WIDTH = 16
 
 
 class Order(IntEnum):
-    """Places in `orders`: what a launch is told."""
+    """Places in `orders`: what a launch of `kernels.ticks` is told."""
 
     TICKS = 0  # how many are to pass
-    MEMBERS = auto()  # threads that share the work of a tick, see `kernels.by_team`
+    PARTS = auto()  # into how many the work is divided
+    FIRST = auto()  # the number of the first group to do; those before are done already
+    SPINS = auto()  # how often the first part looks for the others before it gives up
+
+
+class Barrier(IntEnum):
+    """Places in `barrier`, each in a cache line of its own."""
+
+    STARTED = 0  # parts
+    ARRIVED = 8  # times that parts other than the first one came to a barrier
+    OPENED = 16  # barriers that all have passed; negative once the first part has given up
+
+
+GAVE_UP = -(2**40)  # added to OPENED then, so that it still shows how many there were
 
 
 class HomeRow(IntEnum):

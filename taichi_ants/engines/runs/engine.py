@@ -21,7 +21,7 @@ from taichi_ants.engines.runs.results import RunState
 from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.learners.registry import Learner
+from taichi_ants.learners.learner import Learner
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.worlds.starts import first_starts

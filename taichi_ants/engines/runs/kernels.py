@@ -25,8 +25,8 @@ from taichi_ants.engines.layout import (
 from taichi_ants.engines.runs.step import EXTRA_CELLS, Ant, act, percept_of, restore, state_seen
 from taichi_ants.engines.trial import tried
 from taichi_ants.learners.hyperparameters import Hyperparameters
+from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.memory import At, LearnerArrays, Transition, read_rates, values_of
-from taichi_ants.learners.registry import Learner
 from taichi_ants.task.constants import DELIVERED, ROW
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.rules.policy import chance_of, choose

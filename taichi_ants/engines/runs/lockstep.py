@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import runtime
-from taichi_ants.engines.colony.colony import ColonySnapshot
 from taichi_ants.engines.layout import Command
 from taichi_ants.engines.packing import unpack_cells
+from taichi_ants.engines.records import Snapshot
 from taichi_ants.engines.runs.engine import laid_out
 from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.grid.randomness import stream_state
@@ -125,7 +125,7 @@ class Lockstep:
         self.arrays["actions"][:] = actions
         self._go(begins, same_step)
 
-    def snapshot(self, number: int) -> ColonySnapshot:
+    def snapshot(self, number: int) -> Snapshot:
         """The world of an ant as it is now; arrays are copies."""
         arrays, grid = self.arrays, self.worlds[0].grid
         own = self.arrays["shared_cells"] + number * (grid.size + 2)
@@ -134,7 +134,7 @@ class Lockstep:
         one = slice(number, number + 1)
         headings = arrays["headings"][one].astype(np.int32)
         cells, carries = arrays["ant_cells"][one].copy(), arrays["carries"][one].astype(bool)
-        return ColonySnapshot(grid, ground, trail, cells, headings, carries)
+        return Snapshot(grid, ground, trail, cells, headings, carries)
 
     def _go(self, commands: np.ndarray | int, same_step: bool) -> None:
         self.arrays["commands"][:] = commands

@@ -19,7 +19,7 @@ from taichi_ants.files.archives import Kind
 from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.learners.registry import Memory
+from taichi_ants.learners.learner import Memory
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS, ROW
 from taichi_ants.worlds.world import World

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -97,11 +96,6 @@ class Trace(Record):
     def delivered(self) -> np.ndarray:
         """Whether the food was given to the queen, bool (n,)."""
         return self.events == DELIVERED
-
-    def _repr_html_(self) -> str | None:
-        """The trace as notebooks show it: a page that plays it."""
-        # The viewer stands above the engines; it is looked for only where it is needed.
-        return import_module("taichi_ants.viewer").notebook(self)
 
 
 def rollout(

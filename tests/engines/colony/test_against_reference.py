@@ -11,7 +11,6 @@ from random_rewards import random_rewards
 from same_colonies import assert_equal
 
 from taichi_ants import AntsError, Colony, TrainingConfig, World, learners, worlds
-from taichi_ants.engines.colony.layout import AntRow, Stage
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.task import Observation, Task, observations
 from taichi_ants.task.observations import registry
@@ -125,10 +124,11 @@ def test_ants_see_which_ants_stand_around_them_and_what_these_carry(seen_crowd):
         colony.begin_episode()
         for _ in range(15):
             colony.tick()
-            ants = colony.ant_rows()
-            ants = ants[:, ants[AntRow.STAGE] == Stage.LIVING]
-            load = dict(zip(ants[AntRow.CELL].tolist(), ants[AntRow.CARRIES].tolist(), strict=True))
-            for cell, heading, row in ants[[AntRow.CELL, AntRow.HEADING, AntRow.STATE]].T.tolist():
+            living = colony.living
+            columns = (colony.cells, colony.headings, colony.states, colony.carrying)
+            ants = [column[living].tolist() for column in columns]
+            load = dict(zip(ants[0], ants[3], strict=True))
+            for cell, heading, row in zip(*ants[:3], strict=True):
                 steps = [colony.grid.offsets[(heading + k) % 6] for k in seen_crowd.cells]
                 seen = [1 + load[cell + step] if cell + step in load else 0 for step in steps]
                 assert row == int("".join(map(str, seen)), 3)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from taichi_ants import Colony, TrainingConfig, World
-from taichi_ants.engines.colony.layout import AntRow
 from taichi_ants.grid.randomness import GAMMA, mix
 from taichi_ants.learners.policies import random_policy
 from taichi_ants.task import Life, Task
@@ -27,17 +26,16 @@ def begun(world: World, ants: int, life: Life = Life()) -> Colony:  # noqa: B008
 def act(world: World, actions: list[int], life: Life = Life()) -> Colony:  # noqa: B008
     """One tick in which the listed ants do these actions."""
     colony = begun(world, len(actions), life)
-    colony.of_ants(AntRow.ACTION)[:] = actions
+    colony.arrays["action"][:] = actions
     colony.tick()
     return colony
 
 
 def ants(colony: Colony) -> list[tuple[tuple[int, ...], int, int, int]]:
     """Cell, heading, carries and reward of each ant."""
-    table = colony.ant_rows()
-    cells = colony.snapshot().grid.cells(table[AntRow.CELL]).tolist()
-    rewards = colony.arrays["rewards"][table[AntRow.EVENT]]
-    rows = (table[AntRow.HEADING], table[AntRow.CARRIES], rewards)
+    cells = colony.grid.cells(colony.cells[0]).tolist()
+    rewards = colony.arrays["rewards"][colony.events[0]]
+    rows = (colony.headings[0], colony.carrying[0], rewards)
     return [(tuple(cell), *map(int, row)) for cell, *row in zip(cells, *rows, strict=True)]
 
 
@@ -111,9 +109,9 @@ def test_six_ants_around_the_queen_all_give_in_one_tick():
     around = [(tuple((queen + step).tolist()), (h + 3) % 6) for h, step in enumerate(steps)]
     world = World((8, 8, 1), tuple(queen.tolist()), ants=around)
     colony = begun(world, 6)
-    colony.of_ants(AntRow.CARRIES)[:] = 1
-    colony.of_ants(AntRow.PERCEPT)[:] = 64 | 3 << 2  # the queen ahead
-    colony.of_ants(AntRow.ACTION)[:] = GIVE
+    colony.arrays["carries"][:] = 1
+    colony.arrays["percept"][:] = 64 | 3 << 2  # the queen ahead
+    colony.arrays["action"][:] = GIVE
     colony.tick()
     assert [ant[2:] for ant in ants(colony)] == [(0, 10)] * 6
     assert [ant[1] for ant in ants(colony)] == [(h + 3) % 6 for h in range(6)]
@@ -129,10 +127,10 @@ def test_a_blocked_move_turns_the_ant():
 def test_ants_look_like_obstacles_to_each_other():
     world = World((8, 8, 1), (0, 7, 0), ants=[((2, 2, 0), 0), ((3, 2, 0), 0)])
     colony = begun(world, 2)
-    assert colony.of_ants(AntRow.PERCEPT)[0] >> 2 & 3 == 1
-    colony.of_ants(AntRow.ACTION)[:] = [PICK_UP, RIGHT]  # the second moves away
+    assert colony.arrays["percept"][0] >> 2 & 3 == 1
+    colony.arrays["action"][:] = [PICK_UP, RIGHT]  # the second moves away
     colony.tick()
-    assert colony.of_ants(AntRow.PERCEPT)[0] >> 2 & 3 == 0
+    assert colony.arrays["percept"][0] >> 2 & 3 == 0
 
 
 def test_food_that_is_taken_grows_back_at_once():

@@ -289,7 +289,7 @@ def test_an_ant_and_a_cell_take_few_bytes(task, most):
         world = worlds.open_world(1, (side, side, side))
         settings = TrainingConfig("q_learning", 0.1, 0.9, 0.1, 1.0)
         colony = Colony(world, task, settings, ants=ants, schedule="by_chunk")
-        return sum(one.nbytes for one in (*colony.arrays.values(), *colony.at_start.values()))
+        return colony.nbytes
 
     assert (size(60, 2000) - size(60, 1000)) / 1000 < most
     cells = [worlds.open_world(1, (side,) * 3).grid.size for side in (50, 60)]

@@ -9,7 +9,7 @@ import pytest
 from random_colonies import random_colony
 
 from taichi_ants import AntsError, Colony, TrainingConfig, worlds
-from taichi_ants.engines.colony import colony as colony_module
+from taichi_ants.engines.colony import state as colony_state
 from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.files import archives
 from taichi_ants.task import Life, Task
@@ -53,7 +53,7 @@ def test_what_others_have_written_is_not_believed(kept, tmp_path) -> None:
     [
         ({"task": None}, ""),
         ({"task": {"delivery": "never"}}, "`task.delivery` is 'never'"),
-        ({"task": {"observation": "six_cells"}}, "another shape or type"),
+        ({"task": {"observation": "six_cells"}}, "'array_state' is missing"),
         ({"ants": None}, "ants is None"),
         ({"training": {"learner": "sarsa"}}, ""),
         ({"training": None}, ""),
@@ -89,7 +89,7 @@ def test_a_plugin_that_is_missing_is_asked_for(kept, tmp_path, changes, said) ->
 
 
 def test_other_shapes_and_missing_arrays(kept, tmp_path) -> None:
-    for name in ("array_ants", "array_q", "array_ground"):
+    for name in ("array_cell", "array_q", "array_ground"):
         for other in (kept[name][..., :-1], kept[name].astype(float) / 2, np.zeros(())):
             refused({**kept, name: other}, tmp_path)
         refused({key: array for key, array in kept.items() if key != name}, tmp_path)
@@ -140,7 +140,7 @@ def test_moves_are_counted_beyond_32_bits(tmp_path, monkeypatch) -> None:
     plain, rounded = (Colony(worlds.paper(), None, config, (0, 1), 20) for _ in range(2))
     plain.begin_episode()
     plain.tick(40)
-    monkeypatch.setattr(colony_module, "_ROUND", 50)
+    monkeypatch.setattr(colony_state, "_ROUND", 50)
     rounded.begin_episode()
     rounded.tick(25)
     rounded.save(tmp_path / "a.npz")

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from taichi_ants import Colony, TrainingConfig, runtime, train, worlds
-from taichi_ants.engines.colony import colony
-from taichi_ants.engines.colony.layout import AntRow, Order
-from taichi_ants.engines.colony.team import Team
+from taichi_ants.engines.colony import stepping
+from taichi_ants.engines.colony.layout import Order
+from taichi_ants.engines.colony.stepping import ThreadChoice
 from taichi_ants.task import Life, Pheromone, Task
 
 LIVELY = Task(
@@ -19,7 +19,7 @@ LIVELY = Task(
 TRAINING = TrainingConfig("dyna_q", 0.2, 0.9, 0.4, 0.9, planning_steps=2)
 
 
-def all_of_them(team: Team, ticks: int, most: int) -> tuple[int, int]:
+def all_threads(choice: ThreadChoice, ticks: int, most: int) -> tuple[int, int]:
     """A plan in which as many threads as there may be share all ticks."""
     return ticks, most
 
@@ -45,48 +45,75 @@ def assert_same(first: dict, second: dict) -> None:
 
 def test_threads_and_schedules_give_the_same(monkeypatch):
     """Sixteen chunks of a world for two threads, so that their sums are joined."""
-    monkeypatch.setattr(colony, "_CHUNKS_PER_THREAD", 8)
-    monkeypatch.setattr(Team, "plan", all_of_them)
+    monkeypatch.setattr(stepping, "_CHUNKS_PER_THREAD", 8)
+    monkeypatch.setattr(ThreadChoice, "plan", all_threads)
     expected = history(threads=1)
     assert_same(expected, history(threads=1, schedule="by_chunk"))
     # Another number of threads starts Taichi anew.
     for schedule in ("by_world", "by_chunk"):
         assert_same(expected, history(threads=2, schedule=schedule))
-    monkeypatch.setattr(colony, "_can_wait", lambda running: False)  # as on a GPU
+    monkeypatch.setattr(stepping, "_has_barrier", lambda running: False)  # as on a GPU
     assert_same(expected, history(threads=2, schedule="by_chunk"))
 
 
-def test_a_team_has_no_more_members_than_there_are_threads(monkeypatch):
-    """A member without a thread would be waited for without end."""
-    monkeypatch.setattr(Team, "plan", all_of_them)
+@pytest.mark.parametrize("learner", ["dyna_q", "q_learning"])
+def test_threads_that_do_not_come_are_not_waited_for_without_end(learner, monkeypatch):
+    """Seven parts for two threads: the first two leave the barrier, the rest is done by one."""
+    monkeypatch.setattr(stepping, "_CHUNKS_PER_THREAD", 8)
+    monkeypatch.setattr(stepping, "_SPINS", 1000)
+    monkeypatch.setattr(ThreadChoice, "plan", lambda choice, ticks, most: (ticks, 7))
+    training, given_up = TrainingConfig(learner, 0.2, 0.9, 0.4, 0.9), 0
+    expected = Colony(meadow(), LIVELY, training, 3, ants=30, threads=2, schedule="by_world")
+    colony = Colony(meadow(), LIVELY, training, 3, ants=30, threads=2, schedule="by_chunk")
+    for one in (expected, colony):
+        one.begin_episode()
+    for n in (1, 3, 20, 20):
+        expected.tick(n)
+        colony.tick(n)
+        given_up += colony.arrays["orders"][Order.FIRST] > 0
+        for name in expected.stored:
+            assert np.array_equal(colony.arrays[name], expected.arrays[name]), name
+    assert given_up == 4
+
+
+@pytest.mark.parametrize("spins", [0, 1, 20, 300, 4000])
+def test_giving_up_at_any_barrier_gives_the_same(spins, monkeypatch):
+    """With so little patience, threads give up here and there, and the rest follows on one."""
+    monkeypatch.setattr(stepping, "_SPINS", spins)
+    monkeypatch.setattr(ThreadChoice, "plan", all_threads)
+    assert_same(history(threads=2), history(threads=2, schedule="by_chunk"))
+
+
+def test_no_more_threads_wait_for_each_other_than_there_are(monkeypatch):
+    monkeypatch.setattr(ThreadChoice, "plan", all_threads)
     ants = Colony(meadow(), LIVELY, TRAINING, 3, ants=30, threads=2, schedule="by_chunk")
     ants.begin_episode()
     for threads in (2, 1, 8):  # somebody starts Taichi anew; eight are more than processors
         train(worlds.paper(), TRAINING, 1, episodes=1, max_steps=5, threads=threads)
         ants.tick(3)
-        assert ants.arrays["orders"][Order.MEMBERS] == min(threads, runtime.available_threads(), 4)
+        assert ants.arrays["orders"][Order.PARTS] == min(threads, runtime.available_threads(), 4)
     monkeypatch.setattr(runtime, "available_threads", lambda: 1)
     ants.tick(3)
-    assert ants.arrays["orders"][Order.MEMBERS] == 1
+    assert ants.arrays["orders"][Order.PARTS] == 1
 
 
 def test_who_is_faster_goes_on():
-    """Others that use the processors delay a team more than one thread."""
-    team, alone = Team(), []
+    """Other programs that use the processors delay threads that wait more than a single one."""
+    choice, alone = ThreadChoice(), []
     paces = {4: 1.0, 1: 3.0}
     for launch in range(90):
         if launch == 40:  # the processors are busy from now on
             paces[4] = 7.0
-        n, members = team.plan(80, 4)
-        assert (n, members) in ((80, 1), (10, 1), (80, 4), (10, 4))
-        team.took(members, paces[members])
-        alone.append(n if members == 1 else 0)
+        n, threads = choice.plan(80, 4)
+        assert (n, threads) in ((80, 1), (10, 1), (80, 4), (10, 4))
+        choice.took(threads, paces[threads])
+        alone.append(n if threads == 1 else 0)
     assert 0 < sum(alone[:40]) < 0.02 * 80 * 40
     assert sum(alone[50:]) > 0.9 * 80 * 35
-    assert Team().plan(80, 1) == (80, 1)
+    assert ThreadChoice().plan(80, 1) == (80, 1)
 
 
-def test_a_single_world_has_a_team_from_fewer_ants_on():
+def test_threads_share_a_single_world_from_fewer_ants_on():
     world = worlds.open_world(1, (35, 35, 35))
     for n, seeds, schedule in (
         (2047, 1, "by_world"),
@@ -115,13 +142,13 @@ def test_the_internal_order_of_the_ants_does_not_matter(learner):
     rng = np.random.default_rng(0)
     for _ in range(60):
         order = rng.permutation(60)
-        for rows in ("ants", "traits"):
-            shuffled.arrays[rows] = np.ascontiguousarray(shuffled.arrays[rows][:, order])
-        shuffled.arrays["streams"] = shuffled.arrays["streams"][order]
+        for name in shuffled.columns():
+            shuffled.arrays[name][:] = shuffled.arrays[name][order]
         plain.tick()
         shuffled.tick()
-    back = np.argsort(shuffled.of_ants(AntRow.NUMBER))
-    assert np.array_equal(shuffled.ant_rows()[:, back], plain.ant_rows())
+    back = np.argsort(shuffled.numbers[0])
+    for name in plain.columns():
+        assert np.array_equal(shuffled.arrays[name][back], plain.arrays[name]), name
     assert np.array_equal(shuffled.arrays["q"], plain.arrays["q"])
     assert np.array_equal(shuffled.arrays["ground"], plain.arrays["ground"])
     assert plain.outcome().blocked[0, 0] > 0

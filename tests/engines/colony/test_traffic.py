@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from taichi_ants import Colony, TrainingConfig, World
-from taichi_ants.engines.colony.layout import STANDS_WITH_FOOD, AntRow
+from taichi_ants.engines.colony.layout import STANDS_WITH_FOOD
 from taichi_ants.learners.policies import random_policy
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.task import Pheromone, Rewards, Task, Traffic
@@ -60,25 +60,25 @@ def after_a_tick(
     kernels, plain = Colony(*given, **options), ReferenceColony(*given, **options)
     kernels.begin_episode()
     plain.begin_episode()
-    of_ants = kernels.of_ants
+    arrays = kernels.arrays
     for slot, one in enumerate(row):
         ant = plain.ants[slot]
         ant.carries, ant.chosen = one.food, one.action
         plain.look(ant)
-        of_ants(AntRow.CARRIES)[slot], of_ants(AntRow.ACTION)[slot] = one.food, one.action
-        of_ants(AntRow.PERCEPT)[slot] = ant.percept
+        arrays["carries"][slot], arrays["action"][slot] = one.food, one.action
+        arrays["percept"][slot] = ant.percept
         if one.food:
-            kernels.arrays["ground"][of_ants(AntRow.CELL)[slot]] = OBSTACLE | STANDS_WITH_FOOD << 4
+            arrays["ground"][arrays["cell"][slot]] = OBSTACLE | STANDS_WITH_FOOD << 4
     kernels.tick()
     plain.tick()
-    cells = kernels.snapshot().grid.cells(of_ants(AntRow.CELL))
-    payments = kernels.arrays["rewards"][of_ants(AntRow.EVENT)]
+    cells = kernels.snapshot().grid.cells(arrays["cell"])
+    payments = arrays["rewards"][arrays["event"]]
     found = [After(int(x), int(pay)) for (x, *_), pay in zip(cells, payments, strict=True)]
     ants = [plain.ants[slot] for slot in range(len(row))]
     assert found == [After(ant.cell[0], ant.reward) for ant in ants]
-    assert of_ants(AntRow.HEADING).tolist() == [ant.heading for ant in ants]
+    assert arrays["heading"].tolist() == [ant.heading for ant in ants]
     assert int(kernels.outcome().blocked[0, 0]) == plain.record.blocked
-    assert np.count_nonzero(kernels.arrays["ground"] >> 4) == len(row)
+    assert np.count_nonzero(arrays["ground"] >> 4) == len(row)
     return found
 
 
@@ -197,10 +197,10 @@ def test_a_ring_of_three_ants_stays(traffic):
         *(world, Task(traffic=traffic), TRAINING, 0, 3), sharing="fixed", q_values=random_policy()
     )
     colony.begin_episode()
-    colony.of_ants(AntRow.ACTION)[:] = FORWARD
-    before = colony.of_ants(AntRow.CELL).tolist()
+    colony.arrays["action"][:] = FORWARD
+    before = colony.arrays["cell"].tolist()
     colony.tick()
-    assert colony.of_ants(AntRow.CELL).tolist() == before
+    assert colony.arrays["cell"].tolist() == before
     assert int(colony.outcome().blocked[0, 0]) == 3
 
 

@@ -1,0 +1,67 @@
+"""Arrays of the food sources of worlds in which food grows back or wanders."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from taichi_ants.engines.colony.layout import HomeRow, WorldRow
+from taichi_ants.grid.hexgrid import AxialGrid
+from taichi_ants.worlds.world import World
+
+
+def arrays(
+    sources: Iterable[np.ndarray], rows: np.ndarray, room: int, size: int
+) -> dict[str, np.ndarray]:
+    """Make the arrays of the food sources of all worlds and of their piles.
+
+    Args:
+        sources: Of each world (3, n): HomeRow.CELL, TAKEN and PILE.
+        rows: By `WorldRow`, (rows, W); the numbers of sources and piles are written into it.
+        room: For sources in each world.
+        size: Cells of a world.
+    """
+    n_worlds = rows.shape[1]
+    homes = np.zeros((len(HomeRow), max(1, n_worlds * room)), np.int32)
+    begins = np.zeros((n_worlds, room + 1), np.int32)
+    homes[HomeRow.TAKEN] = -1
+    home_of = np.full(n_worlds * size if room else 1, -1, np.int32)
+    for w, (cells, taken, piles) in enumerate(sources):
+        n_piles = int(piles.max(initial=-1)) + 1
+        of_world = homes[:, w * room : w * room + len(cells)]
+        of_world[HomeRow.CELL], of_world[HomeRow.TAKEN] = cells, taken
+        of_world[HomeRow.PILE], of_world[HomeRow.LISTED] = piles, np.argsort(piles, kind="stable")
+        begins[w, 1 : n_piles + 1] = np.cumsum(np.bincount(piles, minlength=n_piles))
+        rows[WorldRow.HOMES, w], rows[WorldRow.PILES, w] = len(cells), n_piles
+        (full,) = np.nonzero(taken < 0)
+        home_of[w * size + cells[full]] = w * room + full
+    return {
+        "homes": homes,
+        # By world: where each pile begins in the row HomeRow.LISTED.
+        "piles": begins.reshape(-1),
+        # The column in `homes` whose food lies in a cell, -1.
+        "home_of": home_of,
+    }
+
+
+def at_start(world: World) -> np.ndarray:
+    """Return what `arrays` needs of a world: a source for each of its foods."""
+    cells = world.grid.index(world.foods)
+    return np.stack([cells, np.full(len(cells), -1), _piles(world.grid, cells)])
+
+
+def _piles(grid: AxialGrid, cells: np.ndarray) -> np.ndarray:
+    """Return the pile of each food: connected cells, numbered in order of their first."""
+    from scipy.sparse import coo_array  # takes a while to import
+    from scipy.sparse.csgraph import connected_components
+
+    place = np.full(grid.size, -1, np.int64)
+    place[cells] = np.arange(len(cells))
+    neighbours = place[cells[:, None] + grid.offsets[None, :]]
+    rows, columns = np.nonzero(neighbours >= 0)
+    links = (rows, neighbours[rows, columns])
+    graph = coo_array((np.ones(len(rows), np.int8), links), shape=(len(cells),) * 2)
+    _, labels = connected_components(graph, directed=False)
+    _, first, numbers = np.unique(labels, return_index=True, return_inverse=True)
+    return np.argsort(np.argsort(first))[numbers].astype(np.int32)

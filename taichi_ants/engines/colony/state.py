@@ -1,0 +1,705 @@
+"""The state of a colony: its worlds, ants and action values, views of them, and its files.
+
+All of it lies in NumPy arrays, on which the kernels work in place. Only this package reads
+`ColonyState.arrays`, see `layout` and `arrays`; others use the views.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+
+from taichi_ants import checks, files, learners, runtime
+from taichi_ants.engines.colony import food_sources
+from taichi_ants.engines.colony.layout import (
+    ANT_GROUND,
+    BYTE_COLUMNS,
+    INTEGER_COLUMNS,
+    PUSHES,
+    TALLY_WIDTH,
+    Order,
+    Stage,
+    SumRow,
+    WorldRow,
+)
+from taichi_ants.engines.packing import compass_of, padded
+from taichi_ants.engines.records import Record, Snapshot, same
+from taichi_ants.errors import AntsError, checked_whole
+from taichi_ants.files.archives import Kind
+from taichi_ants.grid.constants import STREAM_ANT, STREAM_QUEEN
+from taichi_ants.grid.randomness import stream_state
+from taichi_ants.learners.config import TrainingConfig, update_weights
+from taichi_ants.learners.learner import Learner, Memory
+from taichi_ants.task import Task
+from taichi_ants.task.constants import EMPTY, N_ACTIONS, OBSTACLE, ROW
+from taichi_ants.worlds.world import World
+
+State = TypeVar("State", bound="ColonyState")
+Arrays = dict[str, np.ndarray]
+Which = slice | np.ndarray
+ALL = slice(None)  # the worlds, where a bool (W,) would name some
+
+# Kernels count moves in 32 bits, which 10 000 ants fill in 200 000 ticks; so these counters start
+# again at `_ROUND`, and `rounds` holds how often they did.
+_LARGE = (WorldRow.MOVES, WorldRow.BLOCKED)
+_ROUND = 1 << 30
+_MOST_NUMBERS = 2**31 - 1  # kernels index arrays by 32 bits
+
+_KIND = Kind("colony", 10, "Colony.save")
+# What a file holds besides arrays: arguments of `Colony`, and the progress of the episode.
+_OPTIONS = ("seeds", "ants", "capacity", "start", "ends_at_delivery", "sharing", "schedule")
+_PROGRESS = ("epsilon", "learning_rate", "length", "ticks")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ColonyEpisodes(Record):
+    """Results of episodes, arrays of shape (episodes, worlds).
+
+    Attributes:
+        returns: int64, rewards of all ants.
+        ticks: int32, length.
+        deliveries: int32, food items given to the queen.
+        first_delivery: int32, ticks until the first delivery; -1 if there was none.
+        moves: int64, moves that ants tried.
+        blocked: int64, moves that failed.
+        births, deaths: int32, ants.
+        regrown: int32, food items that grew back.
+        living: int32, ants at the end.
+    """
+
+    returns: np.ndarray
+    ticks: np.ndarray
+    deliveries: np.ndarray
+    first_delivery: np.ndarray
+    moves: np.ndarray
+    blocked: np.ndarray
+    births: np.ndarray
+    deaths: np.ndarray
+    regrown: np.ndarray
+    living: np.ndarray
+
+
+class ColonyState:
+    """The state of a colony of W worlds with `capacity` slots each, in which ants live.
+
+    Attributes:
+        worlds, seeds: Of each world.
+        grid: Where the cells lie in the arrays of a world.
+        task, training, ants, capacity, start, ends_at_delivery, sharing: As given to `Colony`.
+        schedule: "by_world" or "by_chunk".
+        is_given_actions: Whether ants do what `Colony.act` is given, so that nobody chooses.
+        one_a_slot: Whether each slot has its own table of action values, not each world.
+        memory: What the learner keeps with each table.
+        pheromone: The pheromone of the task, which evaporates as the task says of this colony.
+        epsilon, learning_rate: Those of the present episode.
+        length: Of the episode in ticks; 0 if it is not known.
+        ticks: Since an episode began for all worlds.
+        delivered: int64 (W,), food items that were delivered in the episodes before this one.
+    """
+
+    arrays: Arrays
+
+    def __init__(
+        self,
+        worlds: tuple[World, ...],
+        task: Task,
+        training: TrainingConfig,
+        seeds: tuple[int, ...],
+        *,
+        ants: int,
+        capacity: int,
+        start: str,
+        ends_at_delivery: bool,
+        sharing: str,
+        q_values: np.ndarray | None,
+        is_given_actions: bool,
+        schedule: str,
+        chunks: int,
+    ) -> None:
+        self.task, self.training, self.seeds = task, training, seeds
+        self.ants, self.capacity, self.start = ants, capacity, start
+        self.ends_at_delivery, self.sharing = ends_at_delivery, sharing
+        self.is_given_actions, self.schedule, self.chunks = is_given_actions, schedule, chunks
+        self.one_a_slot = sharing == "own" or (
+            sharing == "fixed" and q_values is not None and q_values.ndim == 4
+        )
+        self.pheromone = task.pheromone_while(self.learns)
+        self.memory = Memory()
+        if sharing == "own" or self.plans_together:
+            assert self.learner is not None  # since it learns
+            self.memory = padded(self.learner.memory_for(training, task.n_states))
+        self.arrays = {}
+        self.lay_out(worlds)
+        self.arrays |= (lasting := self._lasting(q_values))
+        # The names of those that a file holds.
+        self.stored = (*self._changing, *lasting)
+        self.epsilon, self.learning_rate = training.epsilon, training.learning_rate
+        self.length = self.ticks = 0
+        self.rounds = np.zeros((len(_LARGE), len(seeds)), np.int64)  # see `_LARGE`
+        self.delivered = np.zeros(len(seeds), np.int64)
+
+    @property
+    def learns(self) -> bool:
+        """Whether the ants learn."""
+        return self.sharing != "fixed"
+
+    @property
+    def learner(self) -> Learner | None:
+        """The learner; None if nobody learns."""
+        return learners.get(self.training.learner) if self.learns else None
+
+    @property
+    def plans_together(self) -> bool:
+        """Whether ants share a table and a model from which they plan."""
+        return self.sharing == "shared" and learners.get(self.training.learner).plans
+
+    @property
+    def ants_change(self) -> bool:
+        """Whether ants are born or die."""
+        return self.task.life.births or self.task.life.lifespan is not None
+
+    @property
+    def food_changes(self) -> bool:
+        """Whether food grows back or wanders."""
+        return self.task.life.regrowth is not None or self.task.life.wander is not None
+
+    # Views
+
+    def _by_slot(self, name: str) -> np.ndarray:
+        return self.arrays[name].reshape(len(self.seeds), self.capacity)
+
+    @property
+    def episode(self) -> int:
+        """The number of the present episode, -1 before the first; of the world that had most."""
+        return int(self.arrays["episodes"].max())
+
+    @property
+    def running(self) -> np.ndarray:
+        """Worlds whose episode has not ended, bool (W,)."""
+        return self.arrays["worlds"][WorldRow.RUNNING] == 1
+
+    @property
+    def episode_ticks(self) -> np.ndarray:
+        """Ticks since the episode of each world began, int32 (W,); a view."""
+        return self.arrays["worlds"][WorldRow.TICKS]
+
+    @property
+    def deliveries(self) -> np.ndarray:
+        """Deliveries of the present episode, int32 (W,); a view."""
+        return self.arrays["worlds"][WorldRow.DELIVERIES]
+
+    @property
+    def living(self) -> np.ndarray:
+        """Slots in which ants live, bool (W, capacity)."""
+        return self._by_slot("stage") == Stage.LIVING
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """Number of the ant in each slot, int32 (W, capacity); -1 if never used; a view.
+
+        As all that is known of an ant, it stays when the ant dies, until another one is born.
+        """
+        return self._by_slot("number")
+
+    @property
+    def cells(self) -> np.ndarray:
+        """Flat index of the cell of each ant, int32 (W, capacity); a view."""
+        return self._by_slot("cell")
+
+    @property
+    def headings(self) -> np.ndarray:
+        """Heading of each ant, 0 to 5, int8 (W, capacity); a view."""
+        return self._by_slot("heading")
+
+    @property
+    def carrying(self) -> np.ndarray:
+        """Slots whose ant carries food, bool (W, capacity)."""
+        return self._by_slot("carries") == 1
+
+    @property
+    def percepts(self) -> np.ndarray:
+        """The paper's state of each ant, see `task.states`, int8 (W, capacity); a view."""
+        return self._by_slot("percept")
+
+    @property
+    def states(self) -> np.ndarray:
+        """State index of each ant as it is now, int32 (W, capacity).
+
+        In a slot whose ant has died it is what the ant saw last.
+        """
+        return self._by_slot("state" if "state" in self.arrays else "percept").astype(np.int32)
+
+    @property
+    def chosen(self) -> np.ndarray:
+        """Actions that are drawn already for the next tick, int8 (W, capacity), else -1; a view."""
+        return self._by_slot("action")
+
+    @property
+    def events(self) -> np.ndarray:
+        """Event of the last action of each ant (`task.constants`), int8 (W, capacity); a view."""
+        return self._by_slot("event")
+
+    @property
+    def pushed(self) -> np.ndarray:
+        """Slots whose ant was moved back by an ant with food in the last tick, bool (W, capacity).
+
+        Only where the traffic swaps ants.
+        """
+        return self._by_slot("filled") == PUSHES
+
+    @property
+    def streams(self) -> np.ndarray:
+        """State of the random stream of each ant, uint64 (W, capacity).
+
+        A view that may be written to between two ticks.
+        """
+        return self._by_slot("streams")
+
+    @property
+    def occupied(self) -> np.ndarray:
+        """Cells on which ants stand, bool (W, grid.size)."""
+        return self.arrays["ground"].reshape(len(self.seeds), -1) >= ANT_GROUND
+
+    @property
+    def update_weights(self) -> np.ndarray:
+        """By how much of the mean error n updates move a value, by n; the last is that of more."""
+        return self.arrays["weights"]
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays."""
+        return sum(array.nbytes for array in (*self.arrays.values(), *self.at_start.values()))
+
+    @property
+    def q_values(self) -> np.ndarray:
+        """The action values, float32 (W, n_states, 5), with own tables (W, slots, n_states, 5)."""
+        n = self.capacity if self.one_a_slot else 1
+        tables = self.arrays["q"].reshape(len(self.seeds), n, -1, self.task.n_states, ROW)
+        tables = tables[:, :, 0, :, :N_ACTIONS]
+        return (tables if self.one_a_slot else tables[:, 0]).copy()
+
+    def outcome(self) -> ColonyEpisodes:
+        """Return the results of the episode so far, arrays (1, W).
+
+        Raises:
+            AntsError: The learner has made action values that are not finite.
+        """
+        self.check_finite()
+        counts = {
+            row.name.lower(): self.arrays["worlds"][row][None].copy()
+            for row in WorldRow
+            if row >= WorldRow.TICKS
+        }
+        for rounds, row in zip(self.rounds, _LARGE, strict=True):
+            counts[row.name.lower()] = counts[row.name.lower()] + rounds * _ROUND
+        return ColonyEpisodes(returns=self.arrays["returns"][None].copy(), **counts)
+
+    def snapshot(self, world: int = 0) -> Snapshot:
+        """Return world number `world` as it is now; arrays are copies.
+
+        Raises:
+            AntsError: There is no such world, or no episode has begun.
+        """
+        self.check_begun()
+        world = checked_whole("world", world, most=len(self.seeds) - 1, least=0)
+        cells = slice(world * self.grid.size, (world + 1) * self.grid.size)
+        living = self.living[world]
+        ant_cells = self.cells[world, living]
+        ground = self.arrays["ground"][cells].copy()
+        ground[ant_cells] = EMPTY
+        if self.pheromone.dense:
+            trail = self.arrays["level"][cells].copy()
+        else:
+            trail = np.maximum(self.arrays["trail"][cells] - self.trail_clock(world), 0)
+        return Snapshot(
+            self.grid,
+            ground,
+            trail,
+            ant_cells,
+            self.headings[world, living].astype(np.int32),
+            self.carrying[world, living],
+        )
+
+    def trail_clock(self, world: int) -> int:
+        """Return by how much integer trails have evaporated since the episode began."""
+        return int(self.episode_ticks[world]) * (self.pheromone.evaporation == "linear")
+
+    def check_begun(self) -> None:
+        """Raise an AntsError if no episode has begun."""
+        if self.episode < 0:
+            raise AntsError("no episode has begun; call begin_episode first.")
+
+    def check_finite(self) -> None:
+        """Raise an AntsError if the learner has made action values that are not finite."""
+        tables = self.arrays["q"].reshape(len(self.seeds), -1)
+        checks.check_finite(tables, [self.training], self.seeds)
+
+    # Changes
+
+    def lay_out(self, worlds: tuple[World, ...]) -> None:
+        """Make the arrays that depend on the worlds.
+
+        Raises:
+            AntsError: A world has too few free cells for the ants.
+        """
+        self.worlds, self.grid = worlds, worlds[0].grid
+        most = max(len(world.foods) for world in worlds)
+        self.make_room_for_food(most if self.food_changes else 0)
+        self.arrays |= self._constants()
+
+    def make_room_for_food(self, n: int) -> None:
+        """Set all to the start of an episode, with room for n food sources in each world."""
+        self.n_homes = n
+        self.at_start = self._start_of_episode()
+        self.arrays |= (changing := self._of_episode())
+        self._changing = tuple(changing)
+
+    def begin(self, which: Which = ALL) -> None:
+        """Set these worlds, bool (W,), to the start of an episode.
+
+        Tables, memories and random streams stay.
+        """
+        self.delivered[which] += self.deliveries[which]
+        self.rounds[:, which] = 0
+        self.set_learning_rate(self.learning_rate)
+        self._set_to_start(self.arrays, which)
+        self._copy_worlds(self.arrays, {"streams": self.arrays["first_streams"]}, which)
+        self.arrays["episodes"][which] += 1
+
+    def reseed(self, which: np.ndarray, seeds: Sequence[int]) -> None:
+        """Give some worlds, bool (W,), other seeds, as if nothing had happened in them yet."""
+        (places,) = np.nonzero(which)
+        changed = dict(zip(places.tolist(), seeds, strict=True))
+        self.seeds = tuple(changed.get(w, seed) for w, seed in enumerate(self.seeds))
+        self.arrays["seeds"][:] = _words(self.seeds)
+        self.at_start = self._start_of_episode()
+        self._copy_worlds(self.arrays, self._seeded(), which)
+
+    def stop(self, which: np.ndarray) -> None:
+        """End the episode of some worlds, bool (W,), which stand still until they begin again."""
+        self.arrays["worlds"][WorldRow.RUNNING, which] = 0
+
+    def keep_streams(self, which: Which = ALL) -> None:
+        """Keep the streams of the ants that started an episode of these worlds, at its end."""
+        ours = np.zeros((len(self.seeds), 1), bool)
+        ours[which] = True
+        there = (self._by_slot("stage") != Stage.VACANT) & ours
+        worlds, slots = np.nonzero(there & (self.numbers >= 0) & (self.numbers < self.ants))
+        first_streams = self._by_slot("first_streams")
+        first_streams[worlds, self.numbers[worlds, slots]] = self.streams[worlds, slots]
+
+    def carry_counters(self) -> None:
+        """Move what the largest counters hold into `rounds` before they overflow."""
+        for rounds, row in zip(self.rounds, _LARGE, strict=True):
+            counter = self.arrays["worlds"][row]
+            if counter.max() >= _ROUND:
+                more, counter[:] = np.divmod(counter, _ROUND)
+                rounds += more
+
+    def set_learning_rate(self, learning_rate: float) -> None:
+        """Set the learning rate and the weights that follow from it."""
+        self.learning_rate = learning_rate
+        most = self.capacity if self.sharing == "shared" else 1
+        weights, kept = update_weights(learning_rate, most), self.arrays["weights"]
+        if len(weights) > len(kept):  # seldom: Taichi keeps some bytes for good of each array
+            kept = self.arrays["weights"] = np.empty(min(2 * len(weights), most + 1), np.float32)
+        kept[: len(weights)], kept[len(weights) :] = weights, weights[-1]
+
+    def sort_ants(self) -> None:
+        """Store the ants of a world about in the order of their cells: neighbours share caches.
+
+        Their order changes nothing but the speed: ants have numbers. Slots do matter where ants are
+        born, have tables of their own or are given actions, and vacant ones stay behind the others;
+        there the order stays.
+        """
+        slots_matter = self.ants_change or self.one_a_slot or self.is_given_actions
+        if slots_matter or self.arrays["worlds"][WorldRow.LIVING].min() < self.capacity:
+            return
+        # Cells to 16 bits, by which NumPy sorts in a tenth of the time.
+        near = self.cells >> max(0, self.grid.size.bit_length() - 16)
+        first = np.arange(len(self.seeds))[:, None] * self.capacity
+        order = (np.argsort(near.astype(np.uint16), axis=1, kind="stable") + first).ravel()
+        for name in self.columns():
+            self.arrays[name][:] = self.arrays[name][order]
+
+    def columns(self) -> tuple[str, ...]:
+        """Return the names of the arrays with one entry for each slot."""
+        of_ants = (*INTEGER_COLUMNS, *BYTE_COLUMNS)
+        return (*(name for name in of_ants if name in self.arrays), "streams")
+
+    # Arrays
+
+    def _start_of_episode(self) -> Arrays:
+        """Make what each episode begins with, as short as it can be told; see `_set_to_start`.
+
+        Raises:
+            AntsError: A world has too few free cells for the ants.
+        """
+        worlds, n = self.worlds, self.ants
+        starts = [
+            world.start(seed, n, self.start) for world, seed in zip(worlds, self.seeds, strict=True)
+        ]
+        cells = np.stack([cells for cells, _ in starts])
+        ground = self._of_each(World.ground)
+        np.put_along_axis(ground, cells.astype(np.int64), ANT_GROUND, axis=1)
+        levels = self._of_each(World.trail_levels)
+        levels = levels if levels.any() else levels[:, :1].copy()  # all cells begin alike
+        rows = np.zeros((len(WorldRow), len(worlds)), np.int32)
+        rows[WorldRow.RUNNING] = 1
+        for row in (WorldRow.TOP, WorldRow.FIRST_VACANT, WorldRow.LIVING, WorldRow.NEXT_NUMBER):
+            rows[row] = n
+        rows[WorldRow.FIRST_DELIVERY] = -1
+        rows[WorldRow.QUEEN_CELL] = [int(self.grid.index(world.queen)) for world in worlds]
+        foods = [food_sources.at_start(world) for world in worlds] if self.n_homes else []
+        return {
+            # Where the ants start, by world and number.
+            "start_cells": cells,
+            "start_headings": np.array([headings for _, headings in starts], np.int8),
+            # What a cell holds, and a mark of the ant on it, see `layout`.
+            "ground": ground.reshape(-1),
+            # Integer trails: the clock at which a cell's trail has evaporated; dense: the levels.
+            "level" if self.pheromone.dense else "trail": levels.reshape(-1),
+            "worlds": rows,
+            # Rewards of all ants in this episode.
+            "returns": np.zeros(len(worlds), np.int64),
+            **food_sources.arrays(foods, rows, self.n_homes, self.grid.size),
+        }
+
+    def _of_episode(self) -> Arrays:
+        """Make the arrays that change in an episode, as they are at the start of one."""
+        n_worlds, dense = len(self.worlds), self.pheromone.dense
+        slots, cells = n_worlds * self.capacity, n_worlds * self.grid.size
+        unused = {"state"} if self.task.sees.name == "paper" else set()  # the percept is the state
+        if not self.ants_change:
+            unused.add("age")
+        if not self.task.traffic.shared:
+            unused.add("filled")
+        made = {
+            **{name: array.copy() for name, array in self._at_start().items()},
+            "trail": np.zeros(1 if dense else cells, np.int32),
+            "level": np.zeros(cells if dense else 1, np.float32),
+        }
+        for names, dtype in ((INTEGER_COLUMNS, np.int32), (BYTE_COLUMNS, np.int8)):
+            used = [name for name in names if name not in unused]
+            # In one piece, since columns at the same offset of a page slow each other down.
+            made |= zip(used, np.zeros((len(used), slots), dtype), strict=True)
+        self._set_to_start(made)
+        return made
+
+    def _at_start(self) -> Arrays:
+        """Return what begins an episode without where ants stand, which goes into columns."""
+        return {k: v for k, v in self.at_start.items() if not k.startswith("start_")}
+
+    def _set_to_start(self, arrays: Arrays, which: Which = ALL) -> None:
+        """Set what changes in an episode of these worlds to its start."""
+        self._copy_worlds(arrays, self._at_start(), which)
+        shape = len(self.worlds), self.capacity
+        column = {
+            name: arrays[name].reshape(shape)
+            for name in (*INTEGER_COLUMNS, *BYTE_COLUMNS)
+            if name in arrays
+        }
+        for name, array in column.items():
+            array[which] = -1 if name in ("number", "action") else 0
+        n = self.at_start["start_cells"].shape[1]
+        column["cell"][which, :n] = self.at_start["start_cells"][which]
+        column["heading"][which, :n] = self.at_start["start_headings"][which]
+        column["number"][which, :n] = np.arange(n)
+        column["stage"][which, :n] = Stage.LIVING
+
+    def _lasting(self, q_values: np.ndarray | None) -> Arrays:
+        """Make the arrays that outlive an episode.
+
+        Raises:
+            AntsError: Tables or memories are too large, or `q_values` has not their shape.
+        """
+        slots, memory, n_worlds = self.capacity, self.memory, len(self.seeds)
+        owners = n_worlds * (slots if self.one_a_slot else 1)
+        sizes = ((1 + memory.tables) * self.task.n_states * ROW, memory.floats, memory.integers)
+        if owners * max(sizes) > _MOST_NUMBERS:
+            raise AntsError(
+                f"{owners} tables, and what learner {self.training.learner!r} keeps with each, "
+                f"take more than {_MOST_NUMBERS} numbers; take fewer ants, worlds or states, or "
+                'make sharing "shared".'
+            )
+        return {
+            "streams": np.zeros(n_worlds * slots, np.uint64),
+            **self._seeded(),
+            # By world or slot: the tables, further tables of the learner behind each; its memory.
+            "q": self._tables(q_values),
+            "floats": np.zeros(max(1, owners * memory.floats), np.float32),
+            "integers": np.zeros(max(1, owners * memory.integers), np.int32),
+        }
+
+    def _seeded(self) -> Arrays:
+        """Make what the seeds of the worlds decide, and what goes on through all episodes."""
+        seeds = _words(self.seeds)
+        numbers = np.arange(self.capacity, dtype=np.uint64)  # more ants may start later episodes
+        first_streams = stream_state(seeds[:, None], STREAM_ANT, numbers[None, :])
+        return {
+            # By world and ant number: where the streams of the ants that start episodes stopped.
+            "first_streams": first_streams.reshape(-1),
+            "queen_streams": np.atleast_1d(stream_state(seeds, STREAM_QUEEN, 0)).astype(np.uint64),
+            "episodes": np.full(len(seeds), -1, np.int32),  # the number of the present one
+        }
+
+    def _tables(self, q_values: np.ndarray | None) -> np.ndarray:
+        """Make the tables of all worlds or slots; the initial value everywhere without values."""
+        n_worlds, own = len(self.seeds), self.one_a_slot
+        slots, n_states = self.capacity if own else 1, self.task.n_states
+        q = np.zeros((n_worlds, slots, 1 + self.memory.tables, n_states, ROW), np.float32)
+        q[..., :N_ACTIONS] = self.training.initial_value
+        if q_values is not None:
+            leading, form = q_values.shape[:-2], f"{n_states}, {N_ACTIONS}"
+            if leading not in ((), (n_worlds,)) and not (own and leading == (n_worlds, slots)):
+                raise AntsError(
+                    f"q_values has shape {q_values.shape}; give ({form}), ({n_worlds}, {form}) for "
+                    f"one table a world, or ({n_worlds}, {slots}, {form}) for one a slot, if they "
+                    "are not shared."
+                )
+            given = q_values.reshape(*leading, *[1] * (2 - len(leading)), 1, n_states, N_ACTIONS)
+            q[..., :N_ACTIONS] = given
+        return q.reshape(-1)
+
+    def _constants(self) -> Arrays:
+        """Make what worlds and settings determine, and what is used within a tick alone."""
+        chunks = len(self.seeds) * self.chunks
+        pairs = self.task.n_states * ROW if self.sharing == "shared" else 0
+        sums, cells = max(1, chunks * pairs), len(self.seeds) * self.grid.size
+        return {
+            # 1 for rocks and outside.
+            "walls": self._of_each(_walls).reshape(-1),
+            # A bit for each heading that leads nearer to the queen.
+            "closer": self._of_each(World.closer).reshape(-1),
+            "compass": compass_of(self.grid),  # see `rules.actions`
+            "seeds": _words(self.seeds),
+            "rewards": self.task.rewards.by_event(),
+            "hyperparameters": np.array([*dict(self.training.hyperparameters).values(), 0.0]),
+            # How far the mean of n errors moves a value, by n; see `set_learning_rate`.
+            "weights": np.zeros(2, np.float32),
+            # What the ant on a cell wants, see `layout`.
+            "wants": np.zeros(cells, np.uint8),
+            "spare": np.zeros_like(self.arrays["level"]),  # the next levels, with diffusion
+            "orders": np.zeros(len(Order), np.int32),
+            "barrier": np.zeros(24, np.int64),  # see `kernels.wait_for_all`
+            "tallies": np.zeros(chunks * TALLY_WIDTH, np.int64),
+            # By chunk and pair: fixed-point sums of TD errors, the last error, and see SumRow.
+            "sums": np.zeros(sums, np.int64),
+            "errors": np.zeros(sums, np.float32),
+            "sums_of": np.zeros((len(SumRow), sums), np.int32),
+            # By chunk: how many pairs have updates, then which.
+            "touched": np.zeros(chunks * (pairs + 1), np.int32),
+        }
+
+    def _of_each(self, make: Callable[[World], np.ndarray]) -> np.ndarray:
+        """Make an array for each world, once for those that are equal."""
+        made = {world: make(world) for world in dict.fromkeys(self.worlds)}
+        return np.stack([made[world] for world in self.worlds])
+
+    def _copy_worlds(self, into: Arrays, source: Arrays, which: Which) -> None:
+        """Copy what belongs to some worlds, which lie one after another in the last axis."""
+        n_worlds = len(self.seeds)
+        for name, array in source.items():
+            if array.shape[-1] % n_worlds == 0:  # others are not in use
+                shape = (*array.shape[:-1], n_worlds, -1)
+                into[name].reshape(shape)[..., which, :] = array.reshape(shape)[..., which, :]
+
+    # Files
+
+    def contents(self) -> tuple[dict[str, Any], Arrays]:
+        """Return all that a file holds: facts and arrays."""
+        arrays = {f"array_{name}": self.arrays[name] for name in self.stored}
+        numbers = {world: number for number, world in enumerate(dict.fromkeys(self.worlds))}
+        facts = {
+            "task": self.task.as_dict(),
+            "training": None if self.is_given_actions else self.training.as_dict(),
+            "worlds": [world.as_dict() for world in numbers],
+            "world_of": [numbers[world] for world in self.worlds],
+            "one_a_slot": self.one_a_slot,
+            "rounds": self.rounds.tolist(),
+            "homes": self.n_homes,  # interventions can make more than there are at the start
+            **{name: getattr(self, name) for name in (*_OPTIONS, *_PROGRESS)},
+        }
+        return facts, arrays
+
+    def save(self, path: files.PathLike) -> None:
+        """Write the colony as it is now; `load` resumes it, bit for bit.
+
+        Raises:
+            AntsError: The learner has made action values that are not finite, so that `load` would
+                refuse the file; seeds repeat; or it cannot be written.
+        """
+        self.check_finite()
+        checks.checked_seeds(self.seeds)
+        facts, arrays = self.contents()
+        _KIND.write(path, facts, arrays, compress=False)
+
+    @classmethod
+    def load(
+        cls: type[State],
+        path: files.PathLike,
+        threads: int | None = None,
+        *,
+        arch: str | None = None,
+    ) -> State:
+        """Read a colony that `save` wrote.
+
+        Raises:
+            AntsError: The file is missing, damaged, or holds no colony; or its learner or
+                observation is not registered.
+        """
+        runtime.start(threads, arch)  # its errors are not about the file
+        with _KIND.reading(path) as (arrays, facts):
+            given = facts["training"]
+            training = None if given is None else TrainingConfig(**given)
+            if training is not None:
+                learners.get(training.learner)
+            worlds = [World.from_dict(one) for one in facts["worlds"]]
+            task, options = Task.from_dict(facts["task"]), {name: facts[name] for name in _OPTIONS}
+            if options["sharing"] == "fixed" and training is not None:
+                # Tables of the right shape, until its own are put in.
+                leading = (len(facts["seeds"]), facts["capacity"]) if facts["one_a_slot"] else ()
+                options["q_values"] = np.zeros((*leading, task.n_states, N_ACTIONS), np.float32)
+            make: Any = cls  # `Colony`, whose arguments these are
+            colony = make([worlds[w] for w in facts["world_of"]], task, training, **options)
+            colony.epsilon = checks.checked_share("epsilon", facts["epsilon"])
+            colony.set_learning_rate(checks.checked_share("learning_rate", facts["learning_rate"]))
+            colony.length = checked_whole("length", facts["length"], least=0)
+            colony.ticks = checked_whole("ticks", facts["ticks"], least=0)
+            rounds = np.array(facts["rounds"], np.int64)
+            if rounds.shape != colony.rounds.shape or rounds.min() < 0:
+                raise ValueError("rounds has another shape, or is below 0")
+            colony.rounds = rounds
+            if facts["homes"] != colony.n_homes:
+                colony.make_room_for_food(facts["homes"])
+            for name in colony.stored:
+                array, kept = colony.arrays[name], arrays[f"array_{name}"]
+                if kept.shape != array.shape or kept.dtype != array.dtype:
+                    raise ValueError(f"{name} has another shape or type")
+                array[:] = kept
+        return colony
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether both would be written alike, so that they go on alike."""
+        if not isinstance(other, ColonyState):
+            return NotImplemented
+        (facts, arrays), (other_facts, other_arrays) = self.contents(), other.contents()
+        return (
+            facts == other_facts
+            and arrays.keys() == other_arrays.keys()
+            and all(same(array, other_arrays[name]) for name, array in arrays.items())
+        )
+
+    __hash__ = None  # type: ignore[assignment]  # it changes with each tick
+
+
+def _walls(world: World) -> np.ndarray:
+    return (world.ground() == OBSTACLE).astype(np.uint8)
+
+
+def _words(seeds: Sequence[int]) -> np.ndarray:
+    """Return the 64 bits of each seed that count, uint64."""
+    return np.array([seed % 2**64 for seed in seeds], dtype=np.uint64)

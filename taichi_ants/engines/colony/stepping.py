@@ -1,0 +1,216 @@
+"""Time in a colony: launches of its kernels, and which threads share the work of a tick."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from taichi_ants import runtime
+from taichi_ants.engines.colony.layout import (
+    ADDS,
+    FADES,
+    GAVE_UP,
+    LINEAR,
+    SETS,
+    Barrier,
+    Order,
+)
+from taichi_ants.engines.colony.state import ColonyState
+
+# Slots from which threads share the ants of a world: of a single one, and of each of many.
+_LARGE_ALONE, _LARGE_COLONY = 2048, 16_384
+_CHUNKS_PER_THREAD = 2
+# Ants are sorted once they have taken so many steps together, but not too seldom nor too often.
+_STEPS_BETWEEN_SORTS, _FEWEST_TICKS, _MOST_TICKS = 2_500_000, 16, 256
+_PIECE_SECONDS = 0.4
+_SPINS = 2**26  # of a thread at a barrier: half a second or more
+_LAUNCHES_BETWEEN_TRIALS = 8  # and a trial has so many times fewer ticks
+
+_DEPOSITS = {"none": 0, "set": SETS, "add": ADDS, "fading": FADES}  # as kernels read them
+
+
+def usual_schedule(n_worlds: int, capacity: int) -> str:
+    """Return the faster schedule for so many worlds of so many slots."""
+    large = capacity >= (_LARGE_ALONE if n_worlds == 1 else _LARGE_COLONY)
+    return "by_chunk" if large else "by_world"
+
+
+def chunks_of(schedule: str, threads: int) -> int:
+    """Return into how many chunks the ants of a world are divided."""
+    return _CHUNKS_PER_THREAD * threads if schedule == "by_chunk" else 1
+
+
+class ThreadChoice:
+    """All threads share the ticks of a large world, or one does them alone.
+
+    Threads that share a tick wait for each other several times in it, and wait long where other
+    programs use the processors; one alone may be faster then. The results are the same, so the
+    faster one is taken, and the other one tried now and then.
+    """
+
+    def __init__(self) -> None:
+        self._launches = 0
+        self._paces: dict[int, float] = {}  # seconds a tick took, by threads
+
+    def plan(self, ticks: int, most: int) -> tuple[int, int]:
+        """Return how many of the ticks to launch next, and on how many threads, `most` at most."""
+        if most == 1:
+            return ticks, 1
+        self._launches += 1
+        best, other = sorted((most, 1), key=lambda n: self._paces.get(n, math.inf))
+        if self._launches % _LAUNCHES_BETWEEN_TRIALS == 2:
+            return max(1, ticks // _LAUNCHES_BETWEEN_TRIALS), other
+        return ticks, best
+
+    def took(self, threads: int, seconds: float) -> None:
+        """Note how long so many threads took for a tick."""
+        self._paces[threads] = seconds
+
+
+class Stepper:
+    """Launches the kernels of one colony."""
+
+    def __init__(self) -> None:
+        self._launches: dict[str, Any] = {}  # prepared kernels, by name
+        self._piece = 1  # ticks that take less than _PIECE_SECONDS
+        self.threads = ThreadChoice()
+
+    def pieces(self, state: ColonyState, n: int) -> Iterator[None]:
+        """Let n ticks pass, in short pieces: a launch of a kernel cannot be interrupted."""
+        end = state.ticks + n
+        while state.ticks < end:
+            piece = min(self._piece, end - state.ticks)
+            began = time.perf_counter()
+            self.advance(state, piece)
+            if piece == self._piece:
+                pace = (time.perf_counter() - began) / piece
+                self._piece = max(1, min(2 * piece, int(_PIECE_SECONDS / pace)))
+            yield
+
+    def advance(self, state: ColonyState, n: int) -> None:
+        """Let n ticks pass."""
+        end = state.ticks + n
+        if state.schedule == "by_world":
+            self._launch_ticks(state, n, parts=len(state.seeds))
+        while state.ticks < end:
+            self._share_ticks(state, min(end - state.ticks, self._sort_at_times(state)))
+        state.carry_counters()
+
+    def launch(self, state: ColonyState, name: str) -> None:
+        """Do the phases of this name of `kernels`, or its `ticks`."""
+        runtime.start()  # the caller may have reset Taichi, or forked
+        values = {**kernel_numbers(state), **state.arrays}
+        if name not in self._launches:
+            self._launches[name] = self._prepared(state, name, values)
+        self._launches[name](values)
+
+    @staticmethod
+    def _sort_at_times(state: ColonyState) -> int:
+        """Sort the ants if it is time; return the number of ticks until it is again."""
+        ticks = _STEPS_BETWEEN_SORTS // (len(state.seeds) * state.capacity)
+        ticks = max(_FEWEST_TICKS, min(_MOST_TICKS, ticks))
+        if state.ticks % ticks == 0:
+            state.sort_ants()
+        return ticks - state.ticks % ticks
+
+    def _share_ticks(self, state: ColonyState, n: int) -> None:
+        """Let up to n ticks pass, each shared by all threads."""
+        running = runtime.start()
+        if not _has_barrier(running):
+            rounds = state.training.planning_steps if state.plans_together else 0
+            for phases in ("tick_phases", *["planning_phases"] * rounds, "last_phases"):
+                self.launch(state, phases)
+            state.ticks += 1
+            return
+        most = min(running.threads, runtime.available_threads(), state.chunks)
+        n, threads = self.threads.plan(n, most)
+        compiled, began = "ticks" in self._launches, time.perf_counter()
+        self._launch_ticks(state, n, threads)
+        if compiled:
+            self.threads.took(threads, (time.perf_counter() - began) / n)
+
+    def _launch_ticks(self, state: ColonyState, n: int, parts: int) -> None:
+        """Let n ticks pass in one launch.
+
+        If a thread gave up at the barrier, as there are fewer threads than it was told, all groups
+        of phases up to there are done; a second launch does the rest on one thread.
+        """
+        orders, barrier = state.arrays["orders"], state.arrays["barrier"]
+        orders[:], barrier[:] = (n, parts, 0, _SPINS), 0
+        self.launch(state, "ticks")
+        if (opened := int(barrier[Barrier.OPENED])) < 0:
+            orders[[Order.PARTS, Order.FIRST]] = 1, opened - GAVE_UP + 1
+            barrier[:] = 0
+            self.launch(state, "ticks")
+        state.ticks += n
+
+    @staticmethod
+    def _prepared(state: ColonyState, name: str, values: dict[str, Any]) -> Any:
+        """Return a kernel that can be launched again and again."""
+        from taichi_ants.engines.arguments import Arguments, Launch
+        from taichi_ants.engines.colony import kernels
+
+        variant = kernels.variant(
+            state.learner,
+            state.one_a_slot,
+            state.task.sees,
+            state.pheromone.dense,
+            state.pheromone.view,
+            state.task.traffic,
+            state.ants_change,
+            state.food_changes,
+        )
+        kind = Arguments.type_of(values)
+        if name == "ticks":
+            return Launch(kernels.ticks(variant, state.schedule == "by_chunk", kind))
+        return Launch(kernels.loops(variant, getattr(kernels, name), kind))
+
+
+def _has_barrier(running: runtime.Runtime) -> bool:
+    """Return whether threads can wait for each other: not on a GPU."""
+    return running.arch == "cpu"
+
+
+def kernel_numbers(state: ColonyState) -> dict[str, Any]:
+    """Return what kernels know besides arrays; -1 stands for an option that is off."""
+    life, pheromone, memory, off = state.task.life, state.pheromone, state.memory, -1
+    level = float if pheromone.dense else int
+    return {
+        "n_worlds": len(state.seeds),
+        "n_ants": state.ants,  # that start an episode
+        "n_slots": state.capacity,
+        "n_chunks": state.chunks,
+        "n_homes": state.n_homes,  # room for homes in each world
+        "size": state.grid.size,
+        "length": state.length,
+        "evaporates": int(pheromone.evaporation == "linear"),  # of integer trails: the clock
+        "deposits": _DEPOSITS[pheromone.deposit],
+        "deposit_level": level(pheromone.level),
+        "cap": level(pheromone.cap or 0),
+        "slope": level(pheromone.slope or 0),
+        "fades_after": pheromone.fades_after,
+        "turns_at_queen": int(state.task.turns_at_queen),
+        # The factor of exponential evaporation, 1 for none, -1 for linear.
+        "decay": LINEAR if pheromone.evaporation == "linear" else float(pheromone.decay),
+        "share": float(pheromone.share),  # what a cell gives to each neighbour
+        "births": int(life.births),
+        "lifespan": life.lifespan or off,
+        "regrowth": off if life.regrowth is None else life.regrowth,
+        "wander": life.wander or off,
+        "ends_at_delivery": int(state.ends_at_delivery),
+        "continuing": int(state.task.delivery == "continuing"),
+        "initial_value": state.training.initial_value,
+        "discount": state.training.discount,
+        "epsilon": state.epsilon,
+        "explore_below": np.uint64(state.epsilon * 4294967296.0),
+        "planning_steps": state.training.planning_steps,
+        # So that the sum of the errors of all ants is a fixed-point number, see `learning`.
+        "largest_error": 2.0**31 / (state.capacity + 1),
+        "tables": 1 + memory.tables,
+        "floats_by_8": memory.floats // 8,  # see the runs' `engine`
+        "integers_by_8": memory.integers // 8,
+    }
