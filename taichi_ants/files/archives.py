@@ -123,6 +123,7 @@ class Kind:
         writer: The function that writes it, for messages.
         most: The largest size of a file, packed or unpacked, in bytes.
         foreign: Whether files without a checksum, as other programs write them, are read too.
+        most_lists: The largest number of lists in the facts.
     """
 
     name: str
@@ -130,6 +131,7 @@ class Kind:
     writer: str
     most: int = MOST_BYTES
     foreign: bool = False
+    most_lists: int = MOST_BYTES
 
     def write(
         self,
@@ -153,9 +155,13 @@ class Kind:
         """
         arrays = read(path, content, self.most, self.foreign)
         try:
-            facts = json.loads(arrays.pop("facts").item())  # text or its bytes
+            text = arrays.pop("facts").item()
+            text = text.decode() if isinstance(text, bytes) else text
+            if text.count("[") > self.most_lists:  # each takes much time and memory
+                raise ValueError("too many lists")
+            facts = json.loads(text)
             kind, version = facts["kind"], facts["version"]
-        except (KeyError, ValueError, TypeError, RecursionError):
+        except (AttributeError, KeyError, ValueError, TypeError, RecursionError):
             kind = version = None
         if kind != self.name:
             raise AntsError(

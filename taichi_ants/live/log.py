@@ -17,7 +17,8 @@ MOST_TICKS = 1_000_000_000
 MOST_EDITS = 10_000
 MOST_CELLS = 400_000  # that edits name, all together
 # Sessions within these limits fit into `most`, so reading a file takes little time and memory.
-KIND = Kind("session", 3, "Session.save, or Save on its page,", most=5_000_000)
+_WRITER = "Session.save, or Save on its page,"
+KIND = Kind("session", 3, _WRITER, most=5_000_000, most_lists=100_000)
 
 
 def cells_of(edit: Any) -> int:
