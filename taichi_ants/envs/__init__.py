@@ -1,5 +1,5 @@
 """Environments for agents of others: Gymnasium, batches of environments, PettingZoo."""
 
-from taichi_ants.envs.events import Event, Reason
+from taichi_ants.task.events import Event, Reason
 
 __all__ = ["Event", "Reason"]

@@ -10,31 +10,19 @@ import numpy as np
 
 from taichi_ants import checks
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.engines.colony.layout import ANT_GROUND, PUSHES, AntRow, WorldRow
+from taichi_ants.engines.colony.layout import ANT_GROUND, AntRow, WorldRow
 from taichi_ants.envs.arguments import worlds_of
-from taichi_ants.envs.events import Event
 from taichi_ants.envs.forage import ACTION_MASKS
 from taichi_ants.envs.formats import ObservationFormat, Shown
 from taichi_ants.errors import check_one_of, checked_flag
 from taichi_ants.task import Task
-from taichi_ants.task.constants import DELIVERED, FAILED, N_ACTIONS, PICKED_UP, RIGHT
+from taichi_ants.task.constants import RIGHT
+from taichi_ants.task.events import Event
 from taichi_ants.worlds import World
 
 # The usual length of an episode of a colony, in ticks.
 MAX_STEPS = 1000
 METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
-
-
-def _events() -> np.ndarray:
-    """Return the `Event` by action and event of the engine, int64 (5, 5)."""
-    table = np.full((N_ACTIONS, 5), Event.MOVED, dtype=np.int64)
-    table[:, FAILED] = Event.FAILED
-    table[: RIGHT + 1, FAILED] = Event.BLOCKED
-    table[:, PICKED_UP], table[:, DELIVERED] = Event.PICKED_UP, Event.DELIVERED
-    return table
-
-
-_EVENTS = _events()
 
 
 class ColonyWorlds:
@@ -119,12 +107,9 @@ class ColonyWorlds:
         colony = self.colony
         self.acted = colony.living & (colony.arrays["worlds"][WorldRow.RUNNING] == 1)[:, None]
         colony.act(actions)
-        of_engine = colony.ants_by_slot(AntRow.EVENT)
-        self.rewards = np.where(self.acted, colony.arrays["rewards"][of_engine], 0.0)
-        self.events = _EVENTS[actions, of_engine]
-        if colony.task.traffic.swap:
-            self.events[colony.ants_by_slot(AntRow.FILLED) == PUSHES] = Event.PUSHED
-        self.events[~self.acted] = Event.NONE
+        events = np.where(self.acted, colony.ants_by_slot(AntRow.EVENT), Event.NONE)
+        self.rewards = colony.arrays["rewards"][events].astype(np.float64)
+        self.events = events.astype(np.int64)
 
     @property
     def ended(self) -> np.ndarray:

@@ -14,12 +14,12 @@ from taichi_ants.engines.runs.engine import Progress, Runs
 from taichi_ants.engines.runs.results import RunState
 from taichi_ants.engines.runs.traces import record_steps
 from taichi_ants.errors import AntsError, checked_whole, expect
-from taichi_ants.grid.randomness import GAMMA, choose, mix
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import action_probabilities, random_policy
 from taichi_ants.offline.dataset import COLUMNS, Dataset
 from taichi_ants.task import Task
-from taichi_ants.task.constants import DELIVERED, EPISODE_STEPS, MAX_STEPS, N_ACTIONS
+from taichi_ants.task.constants import EPISODE_STEPS, MAX_STEPS
+from taichi_ants.task.events import Event
 from taichi_ants.worlds.world import World
 
 _FROM_TRACE = {"step": "steps", "state": "states", "action": "actions", "reward": "rewards"}
@@ -158,17 +158,16 @@ def _tick(colony: Colony, tables: np.ndarray, before: np.ndarray) -> dict[str, n
     """
     from taichi_ants.engines.looks import is_percept  # imports Taichi
 
-    arrays, slots = colony.arrays, colony.capacity
+    slots = colony.capacity
     row_at = AntRow.PERCEPT if is_percept(colony.task.sees) else AntRow.STATE
-    ants, streams, step = colony.ant_rows(), arrays["streams"].copy(), colony.ticks
-    running = np.repeat(arrays["worlds"][WorldRow.RUNNING] == 1, slots)
+    ants, step = colony.ant_rows(), colony.ticks
+    running = np.repeat(colony.arrays["worlds"][WorldRow.RUNNING] == 1, slots)
     (columns,) = np.nonzero((ants[AntRow.STAGE] == Stage.LIVING) & running)
     owner = np.unravel_index(columns, (len(colony.seeds), slots))[: tables.ndim - 2]
-    state, action = ants[row_at, columns], ants[AntRow.ACTION, columns]
-    known = action >= 0
-    values = np.where(known[:, None], before[(*owner, state)], tables[(*owner, state)])
-    action = np.where(known, action, _drawn(values, colony.epsilon, streams[columns]))
-    chances = action_probabilities(values, colony.epsilon)[np.arange(len(columns)), action]
+    state, values = ants[row_at, columns], tables[(*owner, ants[row_at, columns])]
+    if colony.draws_ahead:
+        known = ants[AntRow.NEXT_ACTION, columns] >= 0
+        values = np.where(known[:, None], before[(*owner, state)], values)
     colony.tick()
     run, agent, after = columns // slots, ants[AntRow.NUMBER, columns], colony.ant_rows()
     there = columns
@@ -176,7 +175,8 @@ def _tick(colony: Colony, tables: np.ndarray, before: np.ndarray) -> dict[str, n
         keys = np.arange(ants.shape[1]) // slots * 2**32 + after[AntRow.NUMBER]
         order = np.argsort(keys)
         there = order[np.searchsorted(keys[order], run * 2**32 + agent)]
-    event = after[AntRow.EVENT, there]
+    event, action = after[AntRow.EVENT, there], after[AntRow.ACTION, there]
+    chances = action_probabilities(values, colony.epsilon)[np.arange(len(columns)), action]
     return {
         "run": run,
         "agent": agent,
@@ -185,23 +185,9 @@ def _tick(colony: Colony, tables: np.ndarray, before: np.ndarray) -> dict[str, n
         "action": action,
         "reward": colony.task.rewards.by_event()[event],
         "next_state": after[row_at, there],
-        "terminated": (event == DELIVERED) & (colony.task.delivery == "absorbing"),
+        "terminated": (event == Event.DELIVERED) & (colony.task.delivery == "absorbing"),
         "behaviour_probability": chances,
     }
-
-
-def _drawn(values: np.ndarray, epsilon: float, streams: np.ndarray) -> np.ndarray:
-    """What ants with these action values (n, 5) and random streams (n,) choose next.
-
-    As `rules.policy.choose`; the colony forgets an action once it is done.
-    """
-    bits = mix(streams + np.uint64(GAMMA))
-    high, low = bits >> np.uint64(32), bits & np.uint64(0xFFFFFFFF)
-    best = values >= values.max(axis=1, keepdims=True)
-    k = (low * best.sum(axis=1).astype(np.uint64)) >> np.uint64(32)
-    greedy = (best.cumsum(axis=1) == k.astype(np.int64)[:, None] + 1).argmax(axis=1)
-    explores = high < np.uint64(epsilon * 2.0**32)
-    return np.where(explores, choose(low, N_ACTIONS), greedy)
 
 
 def _dataset(pieces: Iterable[dict[str, np.ndarray]], **known: Any) -> Dataset:

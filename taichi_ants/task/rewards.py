@@ -7,6 +7,7 @@ from dataclasses import astuple, dataclass, fields
 import numpy as np
 
 from taichi_ants.errors import checked_whole
+from taichi_ants.task.events import Event
 
 MOST = 1000
 
@@ -14,8 +15,6 @@ MOST = 1000
 @dataclass(frozen=True)
 class Rewards:
     """The reward of each event, whole numbers from -1000 to 1000; the paper's table 1 by default.
-
-    The fields stand in the order of the events, see `constants`.
 
     Attributes:
         empty: A move onto a cell that was seen as E.
@@ -38,8 +37,13 @@ class Rewards:
             object.__setattr__(self, field.name, value)
 
     def by_event(self) -> np.ndarray:
-        """The rewards by event, int32 (5,)."""
-        return np.array(astuple(self), dtype=np.int32)
+        """The rewards by `Event`, int32 (8,)."""
+        rewards = np.zeros(len(Event), np.int32)
+        rewards[[Event.ENTERED_EMPTY, Event.PUSHED]] = self.empty
+        rewards[[Event.BLOCKED, Event.FAILED]] = self.failed
+        rewards[Event.ENTERED_LURE] = self.lure
+        rewards[Event.PICKED_UP], rewards[Event.DELIVERED] = self.pick_up, self.give
+        return rewards
 
     @property
     def largest(self) -> int:

@@ -127,7 +127,7 @@ def test_schedules_do_not_matter_to_edits(monkeypatch):
         for name in ("ground", "trail", "first_streams", "worlds"):
             known = slice(None) if name != "worlds" else [WorldRow.LIVING, WorldRow.NEXT_NUMBER]
             assert np.array_equal(one.arrays[name][known], other.arrays[name][known]), name
-        lasting = [row for row in AntRow if row not in (AntRow.WANT, AntRow.EVENT, AntRow.FILLED)]
+        lasting = [row for row in AntRow if row not in (AntRow.WANT, AntRow.EVENT)]
         rows = []
         for colony in (one, other):
             ants = colony.ant_rows()[:, colony.living[0]]

@@ -14,11 +14,7 @@ from taichi_ants import checks, learners, runtime
 from taichi_ants.engines.colony import files as colony_files
 from taichi_ants.engines.colony import memory
 from taichi_ants.engines.colony.layout import (
-    ADDS,
-    FADES,
     FIRST_TRAIT,
-    LINEAR,
-    SETS,
     AntRow,
     Stage,
     WorldRow,
@@ -61,8 +57,6 @@ _ROUND = 1 << 30
 
 # Where actions are given, nobody chooses or learns, and none of these matters.
 _NO_TRAINING = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
-
-_DEPOSITS = {"none": 0, "set": SETS, "add": ADDS, "fading": FADES}  # as kernels read them
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -192,6 +186,7 @@ class Colony:
             sharing == "fixed" and table is not None and table.ndim == 4
         )
         self._learner = learners.get(training.learner) if learns else None
+        self.draws_ahead = self._learner is not None and self._learner.draws_next_action
         self._plans_together = False
         self.memory = Memory()
         if self._learner is not None:
@@ -551,12 +546,8 @@ class Colony:
         ant_cells = self.ants_by_slot(AntRow.CELL)[world, living]
         ground = self.arrays["ground"][cells].copy()
         ground[ant_cells] = EMPTY
-        if self.pheromone.dense:
-            trail = self.arrays["level"][cells].copy()
-        else:
-            falls = self.pheromone.evaporation == "linear"
-            clock = self.arrays["worlds"][WorldRow.TICKS, world] if falls else 0
-            trail = np.maximum(self.arrays["trail"][cells] - clock, 0)
+        stored, clock = self.stored_trail(world)
+        trail = np.maximum(stored - stored.dtype.type(clock), 0)
         return ColonySnapshot(
             self.grid,
             ground,
@@ -565,6 +556,22 @@ class Colony:
             self.ants_by_slot(AntRow.HEADING)[world, living].astype(np.int32),
             self.ants_by_slot(AntRow.CARRIES)[world, living].astype(bool),
         )
+
+    def stored_trail(self, world: int = 0) -> tuple[np.ndarray, int]:
+        """The trail of world number `world` as kernels store it, and the clock.
+
+        The level of a cell is what is stored less the clock, not below 0.
+
+        Returns:
+            A copy of the expiry clocks, int32 (grid.size,), and the clock as it is now; or of the
+            levels, float32 (grid.size,), and 0, if the pheromone is dense.
+        """
+        cells = slice(world * self.grid.size, (world + 1) * self.grid.size)
+        if self.pheromone.dense:
+            return self.arrays["level"][cells].copy(), 0
+        falls = self.pheromone.evaporation == "linear"
+        clock = int(self.arrays["worlds"][WorldRow.TICKS, world]) * falls
+        return self.arrays["trail"][cells].copy(), clock
 
     def save(self, path: PathLike) -> None:
         """Write the colony as it is now; `load` goes on from it, bit for bit.
@@ -677,6 +684,7 @@ class Colony:
         variant = kernels.variant(
             self._learner,
             self.one_a_slot,
+            self.is_given_actions,
             self.task.sees,
             self.pheromone.dense,
             self.pheromone.view,
@@ -711,8 +719,7 @@ class Colony:
 
     def _numbers(self) -> dict[str, Any]:
         """What kernels know besides arrays; -1 stands for an option that is off."""
-        life, pheromone, memory, off = self.task.life, self.pheromone, self.memory, -1
-        level = float if pheromone.dense else int
+        life, memory, off = self.task.life, self.memory, -1
         return {
             "n_worlds": len(self.seeds),
             "n_ants": self.ants,  # that start an episode
@@ -721,22 +728,14 @@ class Colony:
             "n_homes": self.n_homes,  # room for homes in each world
             "size": self.grid.size,
             "length": self.length,
-            "evaporates": int(pheromone.evaporation == "linear"),  # of integer trails: the clock
-            "deposits": _DEPOSITS[pheromone.deposit],
-            "deposit_level": level(pheromone.level),
-            "cap": level(pheromone.cap or 0),
-            "slope": level(pheromone.slope or 0),
-            "fades_after": pheromone.fades_after,
+            **self.pheromone.numbers,
             "turns_at_queen": int(self.task.turns_at_queen),
-            # The factor of exponential evaporation, 1 for none, -1 for linear.
-            "decay": LINEAR if pheromone.evaporation == "linear" else float(pheromone.decay),
-            "share": float(pheromone.share),  # what a cell gives to each neighbour
             "births": int(life.births),
             "lifespan": life.lifespan or off,
             "regrowth": off if life.regrowth is None else life.regrowth,
             "wander": life.wander or off,
             "ends_at_delivery": int(self.ends_at_delivery),
-            "continuing": int(self.task.delivery == "continuing"),
+            "delivery_terminates": int(self.task.delivery != "continuing"),
             "initial_value": self.training.initial_value,
             "discount": self.training.discount,
             "epsilon": self.epsilon,

@@ -18,7 +18,7 @@ from taichi_ants.task.constants import N_ACTIONS
 if TYPE_CHECKING:
     from taichi_ants.engines.colony.colony import Colony
 
-_KIND = FileKind("taichi-ants colony 8", "colony", "Colony.save")
+_KIND = FileKind("taichi-ants colony 9", "colony", "Colony.save")
 _OPTIONS = ("seeds", "ants", "capacity", "start", "ends_at_delivery", "sharing", "schedule")
 _MOMENT = ("epsilon", "learning_rate", "length", "ticks")
 

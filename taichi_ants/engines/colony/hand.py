@@ -194,6 +194,8 @@ class Hand:
         arrays["ants"][:, slots] = arrays["traits"][:, slots] = 0
         of_ants(AntRow.CELL)[slots], of_ants(AntRow.HEADING)[slots] = cells, headings
         of_ants(AntRow.NUMBER)[slots], of_ants(AntRow.ACTION)[slots] = numbers, -1
+        if colony.draws_ahead:
+            of_ants(AntRow.NEXT_ACTION)[slots] = -1
         of_ants(AntRow.STAGE)[slots] = Stage.NEWBORN
         born = (colony.episode << 32) + numbers.astype(np.int64)
         arrays["streams"][slots] = stream_state(colony.seeds[0], STREAM_BORN, born)

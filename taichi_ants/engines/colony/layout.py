@@ -25,11 +25,9 @@ class AntRow(IntEnum):
     CARRIES = auto()
     STAGE = auto()  # a `Stage`
     PERCEPT = auto()  # the paper's state: what acting and rewards go by
-    ACTION = auto()  # the one that is drawn already, -1
-    EVENT = auto()  # what came of the last action
-    # Whether another ant enters the cell that it leaves, or PUSHES it out; only where cells with
-    # ants can be entered.
-    FILLED = auto()
+    EVENT = auto()  # the result of the last action, an `Event`
+    ACTION = auto()  # the last action, -1 before the first one; or the next one, if it is given
+    NEXT_ACTION = auto()  # that it has drawn already, -1; only for learners that draw ahead
 
 
 FIRST_TRAIT = AntRow.HEADING
@@ -108,18 +106,5 @@ class SumRow(IntEnum):
 
 # What the lower four bits of a cell in `ground` say is how it looks, see `task.constants`; the
 # upper four mark the ant on it, and tell whether it carries food where somebody sees that.
-STANDS, STANDS_WITH_FOOD = 7, 15
-# What an ant wants is in `wants` at its cell while it acts: nothing (0), to enter the cell at a
-# heading, or to take the food there. Where cells with ants can be entered, an ant that wants
-# nothing has STANDS for its mark, so that every ant has one,
-ENTER, TAKE = 1, 9  # plus the heading
-MARK = 15
-# and above the mark is what else the others need to know of it.
-HAS_FOOD, TAKES_FOOD, WINS = 16, 32, 64
-PUSHES = 2  # in FILLED, instead of 1
-ANT_GROUND = OBSTACLE | STANDS << 4  # the cell of an ant without food
-
-# What kernels read of the pheromone: how deposits are laid, 0 for none, and the value of `decay`
-# that stands for linear evaporation.
-SETS, ADDS, FADES = 1, 2, 3
-LINEAR = -1.0
+ANT_STANDS, STANDS_WITH_FOOD = 7, 15
+ANT_GROUND = OBSTACLE | ANT_STANDS << 4  # the cell of an ant without food

@@ -80,7 +80,7 @@ def of_episode(colony: Colony) -> dict[str, np.ndarray]:
     start = {name: array.copy() for name, array in colony.at_start.items() if name not in _PLACES}
     sees_more = not is_percept(colony.task.sees)
     n_rows = FIRST_TRAIT if colony.ants_change else AntRow.AGE if sees_more else AntRow.STATE
-    n_traits = len(AntRow) - FIRST_TRAIT - (not colony.task.traffic.shared)
+    n_traits = (len(AntRow) if colony.draws_ahead else AntRow.NEXT_ACTION) - FIRST_TRAIT
     made = {
         **start,
         "trail": np.zeros(1 if dense else cells, np.int32),
@@ -104,7 +104,7 @@ def set_to_start(colony: Colony, arrays: dict[str, np.ndarray], which: Which = A
     ants = arrays["ants"].reshape(-1, n_worlds, colony.capacity)
     traits = arrays["traits"].reshape(-1, n_worlds, colony.capacity)
     ants[:, which] = traits[:, which] = 0
-    ants[AntRow.NUMBER, which], traits[AntRow.ACTION - FIRST_TRAIT, which] = -1, -1
+    ants[AntRow.NUMBER, which], traits[AntRow.ACTION - FIRST_TRAIT :, which] = -1, -1
     n = start["cells"].shape[1]
     ants[AntRow.CELL][which, :n] = start["cells"][which]
     ants[AntRow.NUMBER][which, :n] = np.arange(n)

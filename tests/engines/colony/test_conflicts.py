@@ -8,7 +8,6 @@ import pytest
 from taichi_ants import Colony, TrainingConfig, World
 from taichi_ants.engines.colony.layout import AntRow
 from taichi_ants.grid.randomness import GAMMA, mix
-from taichi_ants.learners.policies import random_policy
 from taichi_ants.task import Life, Task
 from taichi_ants.task.constants import EMPTY, FOOD, FORWARD, GIVE, LEFT, PICK_UP, RIGHT
 
@@ -16,10 +15,8 @@ TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 0.0, 1.0)
 
 
 def begun(world: World, ants: int, life: Life = Life()) -> Colony:  # noqa: B008
-    """A colony in its first episode that learns nothing."""
-    task = Task(life=life)
-    table = random_policy()
-    colony = Colony(world, task, TRAINING, ants=ants, sharing="fixed", q_values=table)
+    """A colony in its first episode whose ants do what they are given."""
+    colony = Colony(world, Task(life=life), None, ants=ants, sharing="fixed")
     colony.begin_episode()
     return colony
 
@@ -27,8 +24,7 @@ def begun(world: World, ants: int, life: Life = Life()) -> Colony:  # noqa: B008
 def act(world: World, actions: list[int], life: Life = Life()) -> Colony:  # noqa: B008
     """One tick in which the listed ants do these actions."""
     colony = begun(world, len(actions), life)
-    colony.of_ants(AntRow.ACTION)[:] = actions
-    colony.tick()
+    colony.act(np.array([actions]))
     return colony
 
 
@@ -113,8 +109,7 @@ def test_six_ants_around_the_queen_all_give_in_one_tick():
     colony = begun(world, 6)
     colony.of_ants(AntRow.CARRIES)[:] = 1
     colony.of_ants(AntRow.PERCEPT)[:] = 64 | 3 << 2  # the queen ahead
-    colony.of_ants(AntRow.ACTION)[:] = GIVE
-    colony.tick()
+    colony.act(np.full((1, 6), GIVE))
     assert [ant[2:] for ant in ants(colony)] == [(0, 10)] * 6
     assert [ant[1] for ant in ants(colony)] == [(h + 3) % 6 for h in range(6)]
     assert colony.outcome().deliveries[0, 0] == 6
@@ -130,8 +125,7 @@ def test_ants_look_like_obstacles_to_each_other():
     world = World((8, 8, 1), (0, 7, 0), ants=[((2, 2, 0), 0), ((3, 2, 0), 0)])
     colony = begun(world, 2)
     assert colony.of_ants(AntRow.PERCEPT)[0] >> 2 & 3 == 1
-    colony.of_ants(AntRow.ACTION)[:] = [PICK_UP, RIGHT]  # the second moves away
-    colony.tick()
+    colony.act(np.array([[PICK_UP, RIGHT]]))  # the second moves away
     assert colony.of_ants(AntRow.PERCEPT)[0] >> 2 & 3 == 0
 
 
