@@ -396,10 +396,13 @@ def _infos(
     masks = packed.view(np.int8).reshape(-1, 8)[:, :N_ACTIONS]
     if not which.all():
         states, masks = np.where(which, states, 0), masks * which[:, None]
+    events, reasons = arrays["events"].astype(np.int64), arrays["reasons"].astype(np.int64)
+    if not done.all():
+        events[~done], reasons[~done] = Event.NONE, Reason.NONE
     infos = {
         "state": states.astype(np.int64),
         "action_mask": masks,
-        "event": np.where(done, arrays["events"], Event.NONE).astype(np.int64),
-        "reason": np.where(done, arrays["reasons"], Reason.NONE).astype(np.int64),
+        "event": events,
+        "reason": reasons,
     }
     return infos | {f"_{name}": which.copy() for name in infos}

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants import learners, task
+from taichi_ants import learners, task, worlds
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import FOLLOWED, Policy, trail_follower
@@ -31,7 +31,7 @@ WORLDS = {
     "double_bridge": "a double bridge",
     "map": "a map of your own",
 }
-DRAWN = ("open", "far_piles")  # at random, with equal ranges of any size
+DRAWN = tuple(filter(worlds.is_drawn, WORLDS))  # at random, with equal ranges of any size
 SIZE, SIZES = 30, (10, 180)  # the usual one; the least and the largest
 TASKS = {
     "paper": ("the paper's", task.paper()),

@@ -3,7 +3,7 @@
 from taichi_ants.worlds.double_bridge import double_bridge
 from taichi_ants.worlds.open_world import far_piles, open_world
 from taichi_ants.worlds.paper import paper
-from taichi_ants.worlds.registry import build, check_seed_counts, names, register
+from taichi_ants.worlds.registry import build, check_seed_counts, is_drawn, names, register
 from taichi_ants.worlds.text_map import from_text, load_map, to_text
 from taichi_ants.worlds.world import World
 
@@ -14,6 +14,7 @@ __all__ = [
     "double_bridge",
     "far_piles",
     "from_text",
+    "is_drawn",
     "load_map",
     "names",
     "open_world",
@@ -22,7 +23,7 @@ __all__ = [
     "to_text",
 ]
 
-register("paper", lambda seed: paper())
+register("paper", lambda seed: paper(), drawn=False)
 register("open", open_world)
 register("far_piles", far_piles)
 register(
@@ -30,4 +31,5 @@ register(
     lambda seed, short=23, long=36, mirrored=False, aside=0: double_bridge(
         short, long, mirrored, aside
     ),
+    drawn=False,
 )

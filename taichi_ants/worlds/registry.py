@@ -14,15 +14,17 @@ from taichi_ants.worlds.world import World
 Builder = Callable[..., World]
 
 _BUILDERS: dict[str, Builder] = {}
+_DRAWN: set[str] = set()  # the names of those that depend on the seed
 
 
-def register(name: str, builder: Builder) -> None:
+def register(name: str, builder: Builder, *, drawn: bool = True) -> None:
     """Give a world a name, by which `build` and the command lines find it.
 
     Args:
         name: A new name, or that of your own world, which it replaces.
         builder: Called with a seed (int), returns a `World`; the same seed must give the same.
             Further arguments, which need defaults, are settings of the world.
+        drawn: Whether the world depends on the seed.
 
     Raises:
         AntsError: The name is that of a world of the package or not text, or the builder cannot be
@@ -40,6 +42,7 @@ def register(name: str, builder: Builder) -> None:
             f"the builder of {shown(name)} is {shown(builder)}; it must be a function of a seed."
         )
     _BUILDERS[name] = builder
+    (_DRAWN.add if drawn else _DRAWN.discard)(name)
 
 
 def names() -> tuple[str, ...]:
@@ -47,13 +50,17 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(_BUILDERS))
 
 
+def is_drawn(name_or_path: str) -> bool:
+    """Whether a seed decides what the world is like; a map is not drawn."""
+    return name_or_path in _DRAWN
+
+
 def check_seed_counts(name_or_path: str, option: str = "--world-seed") -> None:
     """Make sure that a seed can change the world; AntsError if nothing is drawn, as in a map."""
-    drawn = [name for name in names() if name not in ("paper", "double_bridge")]
-    if name_or_path not in drawn:
+    if not is_drawn(name_or_path):
         raise AntsError(
             f"{option} is for a world drawn at random, not for {shown(name_or_path)}; leave it "
-            f"out, or choose a world of {', '.join(drawn)}."
+            f"out, or choose a world of {', '.join(sorted(_DRAWN))}."
         )
 
 
