@@ -37,21 +37,3 @@ class Command(IntEnum):
     STEP = 0
     BEGIN = auto()  # an episode
     WAIT = auto()
-
-
-class Outcome(IntEnum):
-    """What came of the last action of an ant in lockstep, and why nothing did."""
-
-    NONE = 0  # the episode has just begun
-    MOVED = auto()
-    PICKED_UP = auto()
-    DELIVERED = auto()
-    # Blocked; the ant turned all the same.
-    ROCK_AHEAD = auto()  # or the edge of the world
-    FOOD_AHEAD = auto()
-    QUEEN_AHEAD = auto()
-    # Failed to pick up, or to give.
-    HAS_FOOD = auto()
-    SEES_NO_FOOD = auto()
-    HAS_NO_FOOD = auto()
-    SEES_NO_QUEEN = auto()

@@ -5,7 +5,7 @@ Importing this package registers them with Gymnasium, which has no entry point f
 
 from gymnasium.envs.registration import register
 
-from taichi_ants.envs.events import Event, Reason
+from taichi_ants.task.events import Event, Reason
 
 __all__ = ["Event", "Reason"]
 

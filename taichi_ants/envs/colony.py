@@ -11,29 +11,17 @@ import numpy as np
 from taichi_ants import checks
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.envs.arguments import worlds_of
-from taichi_ants.envs.events import Event
 from taichi_ants.envs.forage import ACTION_MASKS
 from taichi_ants.envs.formats import ObservationFormat, Shown
 from taichi_ants.errors import check_one_of, checked_flag
 from taichi_ants.task import Task
-from taichi_ants.task.constants import DELIVERED, FAILED, N_ACTIONS, PICKED_UP, RIGHT
+from taichi_ants.task.constants import RIGHT
+from taichi_ants.task.events import Event
 from taichi_ants.worlds import World
 
 # The usual length of an episode of a colony, in ticks.
 MAX_STEPS = 1000
 METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
-
-
-def _events() -> np.ndarray:
-    """Return the `Event` by action and event of the engine, int64 (5, 5)."""
-    table = np.full((N_ACTIONS, 5), Event.MOVED, dtype=np.int64)
-    table[:, FAILED] = Event.FAILED
-    table[: RIGHT + 1, FAILED] = Event.BLOCKED
-    table[:, PICKED_UP], table[:, DELIVERED] = Event.PICKED_UP, Event.DELIVERED
-    return table
-
-
-_EVENTS = _events()
 
 
 class ColonyWorlds:
@@ -118,12 +106,9 @@ class ColonyWorlds:
         colony = self.colony
         self.acted = colony.living & colony.running[:, None]
         colony.act(actions)
-        rewards = colony.task.rewards.by_event()
-        self.rewards = np.where(self.acted, rewards[colony.events], 0.0)
-        self.events = _EVENTS[actions, colony.events]
-        if colony.task.traffic.swap:
-            self.events[colony.pushed] = Event.PUSHED
-        self.events[~self.acted] = Event.NONE
+        events = np.where(self.acted, colony.events, Event.NONE)
+        self.rewards = colony.task.rewards.by_event()[events].astype(np.float64)
+        self.events = events.astype(np.int64)
 
     @property
     def ended(self) -> np.ndarray:

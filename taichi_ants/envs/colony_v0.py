@@ -9,12 +9,12 @@ from gymnasium import spaces
 from gymnasium.utils import seeding
 
 from taichi_ants.envs.colony import MAX_STEPS, METADATA, ColonyWorlds
-from taichi_ants.envs.events import Event
 from taichi_ants.envs.formats import ObservationFormat
 from taichi_ants.errors import shown
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import Life, Task
 from taichi_ants.task.constants import N_ACTIONS
+from taichi_ants.task.events import Event
 from taichi_ants.worlds import World
 
 try:

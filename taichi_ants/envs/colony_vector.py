@@ -20,11 +20,11 @@ from taichi_ants.envs.arguments import (
     seeds_of,
 )
 from taichi_ants.envs.colony import MAX_STEPS, METADATA, ColonyWorlds
-from taichi_ants.envs.events import Event
 from taichi_ants.envs.formats import ObservationFormat
 from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS
+from taichi_ants.task.events import Event
 from taichi_ants.worlds import World
 
 

@@ -13,7 +13,6 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from taichi_ants import checks
-from taichi_ants.engines.layout import Outcome
 from taichi_ants.engines.runs.lockstep import Lockstep
 from taichi_ants.envs.arguments import (
     StepLimit,
@@ -26,11 +25,11 @@ from taichi_ants.envs.arguments import (
     worlds_of,
 )
 from taichi_ants.envs.drawing import Drawing
-from taichi_ants.envs.events import Event, Reason
 from taichi_ants.envs.formats import ObservationFormat, Shown
 from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, shown
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EPISODE_STEPS, GIVE, N_ACTIONS, N_STATES, PICK_UP
+from taichi_ants.task.events import Event, Reason
 from taichi_ants.task.states import state_from_index
 from taichi_ants.worlds import World
 
@@ -38,22 +37,6 @@ DELIVERIES = ("absorbing", "continuing", "endless")
 RENDER_MODES = ("rgb_array", "ansi")
 # Of all environments together, with room for some more: 4 GiB.
 _MOST_CELLS = (1 << 30) - (1 << 24)
-
-# The event and the reason of each outcome.
-_CODES = {
-    Outcome.NONE: (Event.NONE, Reason.NONE),
-    Outcome.MOVED: (Event.MOVED, Reason.NONE),
-    Outcome.PICKED_UP: (Event.PICKED_UP, Reason.NONE),
-    Outcome.DELIVERED: (Event.DELIVERED, Reason.NONE),
-    Outcome.ROCK_AHEAD: (Event.BLOCKED, Reason.ROCK_OR_EDGE_AHEAD),
-    Outcome.FOOD_AHEAD: (Event.BLOCKED, Reason.FOOD_AHEAD),
-    Outcome.QUEEN_AHEAD: (Event.BLOCKED, Reason.QUEEN_AHEAD),
-    Outcome.HAS_FOOD: (Event.FAILED, Reason.CARRIES_FOOD_ALREADY),
-    Outcome.SEES_NO_FOOD: (Event.FAILED, Reason.NO_FOOD_IN_VIEW),
-    Outcome.HAS_NO_FOOD: (Event.FAILED, Reason.CARRIES_NO_FOOD),
-    Outcome.SEES_NO_QUEEN: (Event.FAILED, Reason.NO_QUEEN_IN_VIEW),
-}
-_EVENTS, _REASONS = np.array([_CODES[outcome] for outcome in Outcome], np.int64).T.copy()
 
 
 def _action_masks() -> np.ndarray:
@@ -233,12 +216,11 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
 
     def _info(self) -> dict[str, Any]:
         arrays = self._ants.lockstep.arrays
-        outcome = arrays["outcomes"][0]
         return {
             "state": np.int64(arrays["states"][0]),
             "action_mask": ACTION_MASKS[arrays["percepts"][0]].copy(),
-            "event": _EVENTS[outcome],
-            "reason": _REASONS[outcome],
+            "event": np.int64(arrays["events"][0]),
+            "reason": np.int64(arrays["reasons"][0]),
         }
 
     def action_masks(self) -> np.ndarray:
@@ -342,8 +324,7 @@ class HexForageVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         self._ants.lockstep.begin(which)
         self._over = np.zeros(self.num_envs, bool) if self._over is None else self._over & ~which
         arrays = self._ants.lockstep.arrays
-        nothing = np.zeros(self.num_envs, np.uint8)
-        infos = _infos(arrays["states"], arrays["percepts"], nothing, which)
+        infos = _infos(arrays, arrays["states"], arrays["percepts"], which, ~self._all)
         return self._ants.observations(), infos
 
     def step(
@@ -371,18 +352,18 @@ class HexForageVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         # Copies: the next step writes into the arrays of this one.
         terminations = arrays["terminations"].astype(bool)
         truncations = arrays["truncations"].astype(bool)
-        ended, outcomes, all_of_them = terminations | truncations, arrays["outcomes"], self._all
+        ended, goes_on = terminations | truncations, self._all
         if mode == AutoresetMode.SAME_STEP:
-            outcomes = np.where(ended, Outcome.NONE, outcomes)
+            goes_on = ~ended
         else:
             self._over = ended
-        infos = _infos(arrays["states"], arrays["percepts"], outcomes, all_of_them)
+        infos = _infos(arrays, arrays["states"], arrays["percepts"], self._all, goes_on)
         if mode == AutoresetMode.SAME_STEP and ended.any():
             states, percepts = arrays["final_states"], arrays["final_percepts"]
             final = np.full(self.num_envs, None, dtype=object)
             final[ended] = np.fromiter(ants.shown.show(states[ended]), dtype=object)
             infos |= {"final_obs": final, "_final_obs": ended}
-            infos["final_info"] = _infos(states, percepts, arrays["outcomes"], ended)
+            infos["final_info"] = _infos(arrays, states, percepts, ended, ended)
             infos["_final_info"] = ended.copy()
         rewards = arrays["rewards_of"].copy()
         return ants.observations(), rewards, terminations, truncations, infos
@@ -401,18 +382,27 @@ class HexForageVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
 
 
 def _infos(
-    states: np.ndarray, percepts: np.ndarray, outcomes: np.ndarray, which: np.ndarray
+    arrays: Mapping[str, np.ndarray],
+    states: np.ndarray,
+    percepts: np.ndarray,
+    which: np.ndarray,
+    done: np.ndarray,
 ) -> dict[str, Any]:
-    """What is said of some environments, `which` bool (n,); nothing of the others."""
+    """The infos of some environments, `which` bool (n,); zeros for the others.
+
+    The results of actions are told where `done`, bool (n,), is True.
+    """
     packed = _PACKED_MASKS.take(percepts, mode="clip")
     masks = packed.view(np.int8).reshape(-1, 8)[:, :N_ACTIONS]
     if not which.all():
         states, masks = np.where(which, states, 0), masks * which[:, None]
-        outcomes = np.where(which, outcomes, Outcome.NONE)
+    events, reasons = arrays["events"].astype(np.int64), arrays["reasons"].astype(np.int64)
+    if not done.all():
+        events[~done], reasons[~done] = Event.NONE, Reason.NONE
     infos = {
         "state": states.astype(np.int64),
         "action_mask": masks,
-        "event": _EVENTS.take(outcomes, mode="clip"),
-        "reason": _REASONS.take(outcomes, mode="clip"),
+        "event": events,
+        "reason": reasons,
     }
     return infos | {f"_{name}": which.copy() for name in infos}

@@ -127,7 +127,7 @@ class Tools {
       this.aside += cells.filter((cell) => taken.has(cell)).length;
       this.edit({ kind: "ground", what: this.name }, cells.filter((cell) => ground[cell] !== QUEEN));
     } else if (this.name === "trail") {
-      this.edit({ kind: "trail", level: history.header.trail.strongest }, cells.filter((cell) => ground[cell] !== OBSTACLE));
+      this.edit({ kind: "trail", level: history.header.strongest }, cells.filter((cell) => ground[cell] !== OBSTACLE));
     } else if (this.name === "ants") this.edit({ kind: "add_ants", heading: null }, free.filter((cell) => ground[cell] === EMPTY));
     else {
       this.edit({ kind: "remove_ants" }, cells.filter((cell) => taken.has(cell)));

@@ -23,6 +23,7 @@ from taichi_ants.errors import AntsError, checked_flag, checked_whole, expect, s
 from taichi_ants.learners.config import INITIAL_VALUE
 from taichi_ants.offline.dataset import Dataset
 from taichi_ants.task.constants import N_ACTIONS
+from taichi_ants.task.events import Event
 
 _MOST_PENALTY = 1e9
 _MOST_DISCOUNT = 0.9999  # with which Q iteration takes half a second
@@ -111,7 +112,8 @@ def pessimistic_q_iteration(
             f"penalty is {shown(penalty)}; it must be a number from 0 to {_MOST_PENALTY:g}."
         )
     model = EmpiricalModel.of(data, _groups(data, by_run))
-    lowest = data.task.rewards.by_event().min() / (1.0 - checked_discount(discount))
+    worst = data.task.rewards.by_event()[Event.ENTERED_EMPTY :].min()
+    lowest = worst / (1.0 - checked_discount(discount))
     rewards = model.rewards - float(penalty) / np.sqrt(model.counts)
     q = model.solve(discount, rewards, lowest, lowest=lowest, threads=threads).astype(np.float32)
     return q if by_run else q[0]

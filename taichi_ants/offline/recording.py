@@ -13,12 +13,12 @@ from taichi_ants.engines.runs.engine import Progress, Runs
 from taichi_ants.engines.runs.results import RunState
 from taichi_ants.engines.runs.traces import record_steps
 from taichi_ants.errors import AntsError, checked_whole, expect
-from taichi_ants.grid.randomness import GAMMA, choose, mix
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import action_probabilities, random_policy
 from taichi_ants.offline.dataset import COLUMNS, Dataset
 from taichi_ants.task import Task
-from taichi_ants.task.constants import DELIVERED, EPISODE_STEPS, MAX_STEPS, N_ACTIONS
+from taichi_ants.task.constants import EPISODE_STEPS, MAX_STEPS
+from taichi_ants.task.events import Event
 from taichi_ants.worlds.world import World
 
 _FROM_TRACE = {"step": "steps", "state": "states", "action": "actions", "reward": "rewards"}
@@ -158,18 +158,18 @@ def _tick(colony: Colony, tables: np.ndarray, before: np.ndarray) -> dict[str, n
     step, acting = colony.ticks, colony.living & colony.running[:, None]
     run, slot = np.nonzero(acting)
     owner = (run, slot)[: tables.ndim - 2]
-    state, action, streams = colony.states[acting], colony.chosen[acting], colony.streams[acting]
-    known = action >= 0
-    values = np.where(known[:, None], before[(*owner, state)], tables[(*owner, state)])
-    action = np.where(known, action, _drawn(values, colony.epsilon, streams))
-    chances = action_probabilities(values, colony.epsilon)[np.arange(len(run)), action]
-    agent = colony.numbers[acting]
+    state, agent = colony.states[acting], colony.numbers[acting]
+    values = tables[(*owner, state)]
+    if colony.draws_ahead:
+        known = colony.next_actions[acting] >= 0
+        values = np.where(known[:, None], before[(*owner, state)], values)
     colony.tick()
     if not np.array_equal(colony.numbers[run, slot], agent):  # the colony has sorted its ants
         keys = (np.arange(len(colony.seeds))[:, None] * 2**32 + colony.numbers).ravel()
         order = np.argsort(keys)
         slot = order[np.searchsorted(keys[order], run * 2**32 + agent)] % colony.capacity
-    event = colony.events[run, slot]
+    event, action = colony.events[run, slot], colony.actions[run, slot]
+    chances = action_probabilities(values, colony.epsilon)[np.arange(len(run)), action]
     return {
         "run": run,
         "agent": agent,
@@ -178,23 +178,9 @@ def _tick(colony: Colony, tables: np.ndarray, before: np.ndarray) -> dict[str, n
         "action": action,
         "reward": colony.task.rewards.by_event()[event],
         "next_state": colony.states[run, slot],
-        "terminated": (event == DELIVERED) & (colony.task.delivery == "absorbing"),
+        "terminated": (event == Event.DELIVERED) & (colony.task.delivery == "absorbing"),
         "behaviour_probability": chances,
     }
-
-
-def _drawn(values: np.ndarray, epsilon: float, streams: np.ndarray) -> np.ndarray:
-    """What ants with these action values (n, 5) and random streams (n,) choose next.
-
-    As `rules.policy.choose`; the colony forgets an action once it is done.
-    """
-    bits = mix(streams + np.uint64(GAMMA))
-    high, low = bits >> np.uint64(32), bits & np.uint64(0xFFFFFFFF)
-    best = values >= values.max(axis=1, keepdims=True)
-    k = (low * best.sum(axis=1).astype(np.uint64)) >> np.uint64(32)
-    greedy = (best.cumsum(axis=1) == k.astype(np.int64)[:, None] + 1).argmax(axis=1)
-    explores = high < np.uint64(epsilon * 2.0**32)
-    return np.where(explores, choose(low, N_ACTIONS), greedy)
 
 
 def _dataset(pieces: Iterable[dict[str, np.ndarray]], **known: Any) -> Dataset:

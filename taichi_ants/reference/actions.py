@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from taichi_ants.grid.constants import N_HEADINGS
-from taichi_ants.reference.ants import Ant, Event
+from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.geometry import Cell, neighbour
 from taichi_ants.reference.random_stream import RandomStream, hash_of, pick
 from taichi_ants.reference.vision import is_better
@@ -23,6 +23,7 @@ from taichi_ants.task.constants import (
     SEES_GOAL,
     SEES_LURE,
 )
+from taichi_ants.task.events import Event
 
 if TYPE_CHECKING:
     from taichi_ants.task import Task, Traffic
@@ -199,7 +200,7 @@ def _moved(world: WorldState, intent: Intent, destination: Cell | None, task: Ta
     if ant.carries:
         world.trail.deposit(destination, ant.carried)
     ant.reward = rewards.lure if intent.lured else rewards.empty
-    return Event.MOVED
+    return Event.ENTERED_LURE if intent.lured else Event.ENTERED_EMPTY
 
 
 def _pushed(intent: Intent, destination: Cell, task: Task) -> Event:

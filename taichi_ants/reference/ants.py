@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from enum import Enum
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +11,7 @@ from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_START_CELL, STREAM_START_HEADING
 from taichi_ants.reference.geometry import Cell, distance, existing_cells, listed_cells
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
+from taichi_ants.task.events import Event
 
 if TYPE_CHECKING:
     from taichi_ants.worlds.world import World
@@ -51,17 +51,6 @@ class Ant:
     action: int = -1
     reward: int = 0
     chosen: int | None = None
-
-
-class Event(Enum):
-    """What came of an action."""
-
-    MOVED = "moved"
-    BLOCKED = "blocked"  # a move that only turned the ant
-    PUSHED = "pushed"  # another ant changed places with it
-    PICKED_UP = "picked up"
-    DELIVERED = "delivered"
-    FAILED = "failed"  # a pick-up or give that could not be done
 
 
 @dataclass(kw_only=True, slots=True)

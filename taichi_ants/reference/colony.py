@@ -19,7 +19,7 @@ from taichi_ants.grid.constants import (
 )
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.reference.actions import carry_out, choose_action, intend
-from taichi_ants.reference.ants import Ant, Event, Transition, starts
+from taichi_ants.reference.ants import Ant, Transition, starts
 from taichi_ants.reference.geometry import Cell, neighbour
 from taichi_ants.reference.homes import Homes
 from taichi_ants.reference.learners import LEARNERS
@@ -30,6 +30,7 @@ from taichi_ants.reference.vision import observe
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, PICK_UP
+from taichi_ants.task.events import Event
 from taichi_ants.worlds.world import World
 
 

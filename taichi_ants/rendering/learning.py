@@ -19,7 +19,8 @@ from taichi_ants.rendering.moments import Episode
 from taichi_ants.rendering.rasteriser import Rasteriser, draw_marks
 from taichi_ants.rendering.scene import check_size
 from taichi_ants.task import Rewards, Task
-from taichi_ants.task.constants import DELIVERED, FAILED, N_ACTIONS, PICKED_UP
+from taichi_ants.task.constants import N_ACTIONS
+from taichi_ants.task.events import Event
 from taichi_ants.worlds.world import World
 
 STAGES = (0, 1, 2, 20)  # in the world of the paper, ants differ at these most
@@ -65,10 +66,10 @@ class Stage:
         """
         trace = self.episode.trace
         events = trace.events
-        carries = np.cumsum(events == PICKED_UP) > np.cumsum(events == DELIVERED)
-        sources = np.select(
-            [events == FAILED, events == DELIVERED, events == PICKED_UP, carries], [4, 3, 2, 1], 0
-        )
+        gave, took = events == Event.DELIVERED, events == Event.PICKED_UP
+        failed = (events == Event.FAILED) | (events == Event.BLOCKED)
+        carries = np.cumsum(took) > np.cumsum(gave)
+        sources = np.select([failed, gave, took, carries], [4, 3, 2, 1], 0)
         earned = np.zeros((len(trace) + 1, len(_SOURCES)), dtype=np.int64)
         earned[np.arange(1, len(earned)), sources] = trace.rewards
         return earned.cumsum(axis=0)

@@ -28,14 +28,6 @@ ROW = 8
 # State = (carries, left, forward, right); index = 64 * carries + 16 * left + 4 * forward + right.
 N_STATES = 128
 
-# Events, what came of an action. That of a move is how the entered cell looked. Rewards go by them,
-# see `rewards`.
-ENTERED_EMPTY = SEES_EMPTY
-FAILED = SEES_OBSTACLE  # a blocked move, or a pick-up or give that cannot be done
-ENTERED_LURE = SEES_LURE
-PICKED_UP = 3
-DELIVERED = 4
-
 # The largest reward of an event, either way.
 MOST_REWARD = 1000
 

@@ -18,6 +18,7 @@ EVAPORATIONS: tuple[str, ...] = get_args(Evaporation)
 DEPOSITS: tuple[str, ...] = get_args(Deposit)
 VIEWS: tuple[str, ...] = get_args(View)
 MAX_DEPOSIT = 1_000_000
+LINEAR = -1.0  # stands for linear evaporation where kernels read a decay factor
 
 Level = Annotated[int | None, Is(unit="ticks of linear evaporation", least=1, most=MAX_DEPOSIT)]
 
@@ -94,6 +95,22 @@ class Pheromone(Settings, path="task.pheromone"):
         import numpy as np
 
         return np.float32(0.5 ** (1.0 / float(self.half_life)) if self.half_life else 1.0)
+
+    @property
+    def numbers(self) -> dict[str, int | float]:
+        """The numbers by which kernels lay, evaporate and spread trails, by name."""
+        level = float if self.dense else int
+        return {
+            "deposits": DEPOSITS.index(self.deposit),
+            "deposit_level": level(self.level),
+            "cap": level(self.cap or 0),
+            "slope": level(self.slope or 0),
+            "fades_after": self.fades_after,
+            # By how much the clock of trails that are stored as expiry clocks advances per tick.
+            "evaporates": int(self.evaporation == "linear"),
+            "decay": LINEAR if self.evaporation == "linear" else float(self.decay),
+            "share": float(self.share),
+        }
 
     @property
     def share(self) -> np.float32:

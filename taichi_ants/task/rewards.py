@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from taichi_ants.settings import Is, Settings
 from taichi_ants.task.constants import MOST_REWARD
+from taichi_ants.task.events import Event
 
 if TYPE_CHECKING:
     import numpy as np
@@ -17,8 +18,6 @@ Reward = Annotated[int, Is(least=-MOST_REWARD, most=MOST_REWARD)]
 @dataclass(frozen=True)
 class Rewards(Settings, path="task.rewards"):
     """The reward of each event, whole numbers from -1000 to 1000; the paper's table 1 by default.
-
-    The fields are in the order of the events, see `constants`.
 
     Attributes:
         empty: A move onto a cell that was seen as E.
@@ -37,10 +36,15 @@ class Rewards(Settings, path="task.rewards"):
     give: Annotated[Reward, Is("of giving food to the queen")] = 10
 
     def by_event(self) -> np.ndarray:
-        """The rewards by event, int32 (5,)."""
+        """The rewards by `Event`, int32 (8,)."""
         import numpy as np
 
-        return np.array(astuple(self), dtype=np.int32)
+        rewards = np.zeros(len(Event), np.int32)
+        rewards[[Event.ENTERED_EMPTY, Event.PUSHED]] = self.empty
+        rewards[[Event.BLOCKED, Event.FAILED]] = self.failed
+        rewards[Event.ENTERED_LURE] = self.lure
+        rewards[Event.PICKED_UP], rewards[Event.DELIVERED] = self.pick_up, self.give
+        return rewards
 
     @property
     def largest(self) -> int:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 # In `clock`, in this order. Deliveries and returns are of the episode, delivered and ticks of
-# all so far.
+# all so far. What `trail` holds less the clock of the trail is the level, not below 0.
 CLOCK = (
     "episode",
     "tick",
@@ -24,6 +24,7 @@ CLOCK = (
     "ants",
     "delivered",
     "ticks",
+    "trail_clock",
 )
 
 # The sections, in order, and their types; "cell", "state" and "level" depend on the world.
@@ -38,11 +39,11 @@ SECTIONS = {
     # What the ants of the frame before have done since; empty if that was not one tick.
     "acts": "u1",  # the action, plus 16 times the event
     "td_errors": "f4",  # NaN where it is not known; empty if nobody learns
-    # Where the world is not what the frame before lets expect, and what it is there.
+    # Where the world has changed since the frame before, and what it is there.
     "ground_at": "cell",
     "ground": "u1",
     "trail_at": "cell",
-    "trail": "level",
+    "trail": "level",  # expiry clocks, or levels, see `Colony.stored_trail`
     "table_at": "f8",  # (owner * n_states + state) * 5 + action; the owner is 0, or an ant
     "table": "f4",
     # Points for curves since the frame before, of six numbers each, see `course.POINT`.

@@ -16,10 +16,9 @@
    A frame is an ArrayBuffer, or a view of one. */
 
 const EMPTY = 0, OBSTACLE = 5, FOOD = 7, QUEEN = 13; // what a cell holds, as in task/constants.py
-const FAILED = 1, PICKED_UP = 3, DELIVERED = 4; // events
 const N_ACTIONS = 5;
 const MOST_BYTES = 2 ** 27; // of frames; a simulation that runs for hours has more
-const CLOCK = ["episode", "tick", "deliveries", "returns", "epsilon", "learningRate", "ants", "delivered", "ticks"];
+const CLOCK = ["episode", "tick", "deliveries", "returns", "epsilon", "learningRate", "ants", "delivered", "ticks", "trailClock"];
 const POINT = ["episode", "ticks", "delivered", "returns", "epsilon", "ended"]; // as in course.py
 const MOST_POINTS = 1500;
 const ARRAYS = {
@@ -107,7 +106,8 @@ class History {
     this.within = []; // points for curves, within the first episode: objects of `POINT`
     this.ends = []; // those at the ends of episodes
     this.values = new Map(); // entry of a table -> [moments, values] of its changes
-    this.world = { moment: -1, ground: new Uint8Array(this.grid.size), trail: this.emptyTrail() };
+    // `stored` is the trail as kernels store it, `trail` its levels.
+    this.world = { moment: -1, ground: new Uint8Array(this.grid.size), stored: this.emptyTrail(), trail: this.emptyTrail() };
     this.kept = []; // copies of the world now and then, so that seeking is quick
     this.lastKept = -Infinity;
     // At most 64 MiB of copies: large worlds are kept more rarely.
@@ -125,7 +125,7 @@ class History {
 
   /* Append a frame; views into its bytes are kept. One that is whole needs none before it. */
   add(bytes, whole = false) {
-    const frame = this.read(bytes), moment = this.length, before = this.frames[moment - 1];
+    const { header } = this, frame = this.read(bytes), moment = this.length, before = this.frames[moment - 1];
     if (!frame.numbers.length && frame.ants) frame.numbers = before.numbers;
     frame.number = moment;
     frame.whole = whole;
@@ -140,8 +140,8 @@ class History {
       values.push(frame.table[i]);
     }
     for (let i = 0; i < frame.acts.length; i++) {
-      const event = frame.acts[i] >> 4;
-      if (event !== PICKED_UP && event !== DELIVERED) continue;
+      const event = header.events[frame.acts[i] >> 4];
+      if (event !== "PICKED_UP" && event !== "DELIVERED") continue;
       this.events.push({
         moment, kind: event, ant: before.numbers[i], cell: before.cells[i],
       });
@@ -213,12 +213,12 @@ class History {
 
   /* A frame that holds all of a moment, see `pack` in frames.py: it needs none before it. */
   wholeFrame(moment) {
-    const frame = this.frames[moment], { ground, trail } = this.worldAt(moment);
+    const frame = this.frames[moment], { ground, stored } = this.worldAt(moment);
     const since = moment > this.first ? this.frames[moment - 1].ticks : -1;
     const points = [...(moment > this.first ? [] : this.within), ...this.ends].filter(({ ticks }) => ticks > since && ticks <= frame.ticks);
     const entries = [...this.values.keys()].filter((entry) => this.values.get(entry)[0][0] <= moment);
     const sections = {
-      ...frame, acts: [], td_errors: [], ground_at: ground.keys(), ground, trail_at: trail.keys(), trail,
+      ...frame, acts: [], td_errors: [], ground_at: ground.keys(), ground, trail_at: stored.keys(), trail: stored,
       table_at: entries, table: entries.map((entry) => this.entry(moment, entry)),
       course: points.flatMap((point) => POINT.map((name) => point[name])),
     };
@@ -251,20 +251,23 @@ class History {
   /* The world at a moment: {ground, trail}, levels of the trail. Good until the next call. */
   worldAt(moment) {
     const world = this.world;
+    if (moment === world.moment) return world;
     if (moment < world.moment || moment > world.moment + this.keepEvery) {
       let from = null;
       for (const copy of this.kept) if (copy.moment <= moment) from = copy;
       if (from && (moment < world.moment || from.moment > world.moment)) {
         world.moment = from.moment;
         world.ground.set(from.ground);
-        world.trail.set(from.trail);
+        world.stored.set(from.stored);
       } else if (moment < world.moment) {
         world.moment = -1;
         world.ground.fill(0);
-        world.trail.fill(0);
+        world.stored.fill(0);
       }
     }
     while (world.moment < moment) this.step();
+    const { trailClock } = this.frames[moment], { stored, trail } = world;
+    for (let cell = 0; cell < trail.length; cell++) trail[cell] = Math.max(stored[cell] - trailClock, 0);
     return world;
   }
 
@@ -272,60 +275,19 @@ class History {
     const world = this.world, frame = this.frames[world.moment + 1];
     if (frame.whole) {
       world.ground.fill(0);
-      world.trail.fill(0);
-    } else this.fall(frame.passed);
+      world.stored.fill(0);
+    }
     frame.ground_at.forEach((cell, i) => (world.ground[cell] = frame.ground[i]));
-    frame.trail_at.forEach((cell, i) => (world.trail[cell] = frame.trail[i]));
+    frame.trail_at.forEach((cell, i) => (world.stored[cell] = frame.trail[i]));
     world.moment++;
     const last = this.kept[this.kept.length - 1];
     if (world.moment >= (last ? last.moment + this.keepEvery : 0)) {
-      this.kept.push({ moment: world.moment, ground: world.ground.slice(), trail: world.trail.slice() });
+      this.kept.push({ moment: world.moment, ground: world.ground.slice(), stored: world.stored.slice() });
       if (this.kept.length > this.mostKept) {
         this.kept = this.kept.filter((_, i) => i % 2 === 0);
         this.keepEvery *= 2;
       }
     }
-  }
-
-  /* Let trails fall for some ticks, to the same bits as `fallen` in recorder.py. */
-  fall(ticks) {
-    const { evaporation, decay, share } = this.header.trail;
-    const trail = this.world.trail, n = trail.length;
-    if (evaporation === "linear" && share === 0) {
-      for (let i = 0; i < n && ticks > 0; i++) if (trail[i] > 0) trail[i] = Math.max(trail[i] - ticks, 0);
-      return;
-    }
-    for (let tick = 0; tick < ticks && trail.some((level) => level > 0); tick++) {
-      if (evaporation === "linear") {
-        for (let i = 0; i < n; i++) if (trail[i] > 0) trail[i] = Math.max(Math.fround(trail[i] - 1), 0);
-      } else if (evaporation === "exponential") {
-        for (let i = 0; i < n; i++) {
-          if (trail[i] === 0) continue;
-          trail[i] *= decay;
-          if (trail[i] < 1) trail[i] = 0;
-        }
-      }
-      if (share > 0) this.diffuse(share);
-    }
-  }
-
-  diffuse(share) {
-    const { ground, trail } = this.world, round = Math.fround, offsets = this.grid.offsets;
-    const given = trail.map((level) => level * share);
-    const after = trail.slice();
-    for (let cell = 0; cell < trail.length; cell++) {
-      if (ground[cell] === OBSTACLE) continue;
-      let open = 0, received = 0;
-      for (const offset of offsets) {
-        if (ground[cell + offset] === OBSTACLE) continue;
-        open++;
-        received = round(received + given[cell + offset]);
-      }
-      if (trail[cell] === 0 && received === 0) continue;
-      const left = round(trail[cell] - round(given[cell] * open));
-      after[cell] = Math.max(round(left + received), 0);
-    }
-    trail.set(after);
   }
 
   /* Where an ant of a number stands in the lists of a frame, -1 if it does not live then. */
@@ -364,7 +326,7 @@ class History {
 
   act(moment, i, ant) {
     const { header } = this, frame = this.frames[moment], next = this.frames[moment + 1];
-    const action = next.acts[i] & 15, event = next.acts[i] >> 4;
+    const action = next.acts[i] & 15, event = header.events[next.acts[i] >> 4];
     // Some learners draw an action one tick ahead, by the values of that time.
     const ahead = header.draws_ahead && frame.tick > 0 && frame.passed === 1;
     const values = ahead ? this.row(moment - 1, ant.number, ant.state) : ant.values;
@@ -380,7 +342,7 @@ class History {
       }
     }
     const tdError = next.td_errors.length ? next.td_errors[i] : NaN;
-    const reward = header.rewards[event];
+    const reward = header.rewards[next.acts[i] >> 4];
     return { action, event, reward, why, ties, ahead, tdError, sharers, before, after, values };
   }
 
@@ -439,7 +401,7 @@ class History {
       for (let i = 0; i < frame.cells.length; i++) {
         if (frame.cells[i] !== cell + offset) continue;
         const ant = { cell: frame.cells[i], heading: frame.poses[i] & 7 };
-        const action = next.acts[i] & 15, event = next.acts[i] >> 4;
+        const action = next.acts[i] & 15, event = this.header.events[next.acts[i] >> 4];
         if (this.target(ant, action) === cell) found.push({ number: frame.numbers[i], action, event });
       }
     }

@@ -1,7 +1,10 @@
 /* What stands beside the world: the world now, the followed ant, the chosen cell, and the legend. */
 
 const HOLDS = { [EMPTY]: "nothing", [OBSTACLE]: "a rock", [FOOD]: "food", [QUEEN]: "the queen" };
-const CAME = ["enters an empty cell", "fails", "", "picks up food", "gives food to the queen"];
+const CAME = {
+  ENTERED_EMPTY: "enters an empty cell", BLOCKED: "is blocked", PICKED_UP: "picks up food",
+  DELIVERED: "gives food to the queen", FAILED: "fails", PUSHED: "is pushed aside",
+};
 const LETTERS = {
   E: "empty", O: "obstacle", T: "trail", S: "nearer to the queen", F: "food", Q: "queen",
 };
@@ -160,7 +163,7 @@ class Panel {
     }
     const why = { best: "the best", tie: `a tie of ${act.ties}`, explored: "explored" }[act.why];
     const better = ant.loaded ? "comes nearer to the queen" : "enters a trail";
-    const came = act.event === FAILED && act.action < 3 ? "is blocked" : CAME[act.event] || better;
+    const came = CAME[act.event] || better;
     const action = header.actions[act.action], worth = { 1: "up", "-1": "down" }[Math.sign(act.reward)] ?? "";
     const lines = [
       `Chooses <b>${action}</b> <span class="why ${act.why}">${why}</span>`,
@@ -186,10 +189,10 @@ class Panel {
     const level = trail[cell];
     const link = (number) => `<button type="button" class="link" data-follow="${number}">ant ${number}</button>`;
     const wanting = history.wanting(moment, cell).map(({ number, action, event }) =>
-      `${link(number)} (${history.header.actions[action]}${event === FAILED ? ", in vain" : ""})`);
+      `${link(number)} (${history.header.actions[action]}${["BLOCKED", "FAILED"].includes(event) ? ", in vain" : ""})`);
     const lines = [
       ["holds", ants.length ? ants.map(link).join(", ") : HOLDS[ground[cell]] ?? "?"],
-      ["trail", `${plain(level, Number.isInteger(level) ? 0 : 2)} of ${history.header.trail.strongest}`],
+      ["trail", `${plain(level, Number.isInteger(level) ? 0 : 2)} of ${history.header.strongest}`],
       ["wanted by", wanting.join(", ") || "nobody"],
     ];
     card.innerHTML = `<div class="head"><h2>Cell (${history.grid.cube(cell).join(", ")})</h2>`

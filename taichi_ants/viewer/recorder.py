@@ -11,11 +11,10 @@ import numpy as np
 from taichi_ants import learners
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.errors import count, expect
-from taichi_ants.grid.constants import N_HEADINGS
-from taichi_ants.grid.randomness import GAMMA, choose, mix
 from taichi_ants.rendering.observed import name_parts
-from taichi_ants.task import Observation, Pheromone
-from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS, OBSTACLE
+from taichi_ants.task import Observation
+from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS
+from taichi_ants.task.events import Event
 from taichi_ants.viewer.course import Course
 from taichi_ants.viewer.frames import pack, types_of
 
@@ -42,7 +41,6 @@ class Recorder:
         expect("title", title, str)
         self.colony, self.world, self._title, self._follow = colony, world, title, follow
         start = colony.snapshot(world)
-        self._pheromone = colony.pheromone  # by which pages expect trails to fall
         self.grid = start.grid
         self._size, self._n_states = self.grid.size, colony.task.n_states
         self.types = types_of(self._size, self._n_states, colony.pheromone.dense)
@@ -53,7 +51,7 @@ class Recorder:
         # What a page that has read all frames so far knows.
         self._numbers = np.zeros(0, np.int32)
         self._ground = np.zeros(self._size, np.uint8)
-        self._trail = np.zeros(self._size, start.trail.dtype)
+        self._trail = np.zeros(self._size, start.trail.dtype)  # as it is stored
         owners = colony.capacity if colony.one_a_slot else 1
         self._known = np.zeros(owners * self._n_states, bool)  # rows of tables
         self._table = np.full((owners * self._n_states, N_ACTIONS), np.nan, np.float32)
@@ -61,7 +59,6 @@ class Recorder:
         self._fixed: np.ndarray | None = None  # the tables where nobody learns
         if not self._learns:
             self._fixed = self._tables()
-        self._clock = (-1, 0)
         self.course = Course(colony, world)
 
     @property
@@ -75,25 +72,21 @@ class Recorder:
         States have names as far as they have been seen, all of them if they are few: a task or "",
         the rest of the name, and a letter or two for each cell in view where the name has them.
         """
-        colony, task, pheromone = self.colony, self.colony.task, self._pheromone
+        colony, task = self.colony, self.colony.task
         changes = task.life.births or task.life.lifespan
         ants = "Ants" if changes else count(colony.ants, "ant")
         return {
-            "format": 1,
+            "format": 2,
             "title": self._title or f"{ants} in a world of {self.grid.count} cells",
             "ranges": list(self.grid.ranges),
             "types": self.types,
-            "trail": {
-                "evaporation": pheromone.evaporation,
-                "decay": float(pheromone.decay),
-                "share": float(pheromone.share),
-                "strongest": int(task.pheromone.level),
-            },
+            "strongest": int(task.pheromone.level),
             "n_states": self._n_states,
             "names": self.names(),
             "view": list(self.observation.cells),
             "letters": self.observation.letters,
             "actions": ACTION_NAMES,
+            "events": [event.name for event in Event],
             "rewards": task.rewards.by_event().tolist(),
             "learns": self._learns,
             "own_tables": colony.one_a_slot,
@@ -158,13 +151,14 @@ class Recorder:
             self.colony.tick(n)
             return self._frame({})
         colony, slots = self.colony, self._living()
-        states, actions = colony.states[self.world, slots], self._choices(slots)
-        numbers, before = colony.numbers[self.world, slots], self._tables()
+        states, numbers = colony.states[self.world, slots], colony.numbers[self.world, slots]
+        before = self._tables()
         colony.tick()
         # The dead have left their slots, but all is still written there.
         after = colony.numbers[self.world]
         order = np.argsort(after, kind="stable")
         places = order[np.searchsorted(after, numbers, sorter=order)]
+        actions = colony.actions[self.world, places]
         acts = {"acts": actions + 16 * colony.events[self.world, places]}
         if td_errors is None and self._learns:
             td_errors = self._td_errors(before, slots, states, actions)
@@ -184,23 +178,6 @@ class Recorder:
     def _rows(self, slots: np.ndarray, states: np.ndarray) -> np.ndarray:
         """Where the states of ants stand in `_tables`."""
         return slots * self._n_states + states if self.colony.one_a_slot else states
-
-    def _choices(self, slots: np.ndarray) -> np.ndarray:
-        """What the ants will do in the next tick: what is drawn already, or what they will draw.
-
-        Drawing is what `rules.policy.choose` does; their streams stay as they are.
-        """
-        streams = self.colony.streams[self.world, slots]
-        bits = mix(streams + np.uint64(GAMMA))
-        high, low = bits >> np.uint64(32), bits & np.uint64(0xFFFFFFFF)
-        values = self._tables()[self._rows(slots, self.colony.states[self.world, slots])]
-        best = values >= values.max(axis=1, initial=-np.inf, keepdims=True)
-        k = ((low * best.sum(axis=1).astype(np.uint64)) >> np.uint64(32)).astype(np.int64)
-        greedy = np.argsort(~best, axis=1, kind="stable")[np.arange(len(slots)), k]
-        explores = high < np.uint64(self.colony.epsilon * 2.0**32)
-        drawn = np.where(explores, choose(low, N_ACTIONS), greedy)
-        ready = self.colony.chosen[self.world, slots]
-        return np.where(ready >= 0, ready, drawn)
 
     def _td_errors(
         self, before: np.ndarray, slots: np.ndarray, states: np.ndarray, actions: np.ndarray
@@ -234,17 +211,13 @@ class Recorder:
         rates = (colony.epsilon, colony.learning_rate)
         delivered = colony.delivered[self.world] + totals[0]
         counts = (len(numbers), delivered, self.course.ticks)
-        sections["clock"] = (colony.episode, tick, *totals, *rates, *counts)
+        stored, clock = colony.stored_trail(self.world)
+        sections["clock"] = (colony.episode, tick, *totals, *rates, *counts, clock)
         sections.setdefault("course", self.course.news())
-        # Trails fall by themselves; all else is told.
-        episode, last = self._clock
-        passed = tick - last if episode == colony.episode else 0
-        expected = fallen(self._trail, self._ground, self._pheromone, self.grid.offsets, passed)
         sections |= _changes("ground", self._ground, snapshot.ground)
-        sections |= _changes("trail", expected, snapshot.trail)
+        sections |= _changes("trail", self._trail, stored)
         sections |= self._table_changes(slots, numbers, sections["states"])
-        self._ground, self._trail = snapshot.ground, snapshot.trail
-        self._clock = (colony.episode, tick)
+        self._ground, self._trail = snapshot.ground, stored
         return pack(self.types, sections)
 
     def _table_changes(
@@ -266,41 +239,7 @@ class Recorder:
         return {"table_at": places, "table": values[row, action]}
 
 
-def fallen(
-    trail: np.ndarray, ground: np.ndarray, pheromone: Pheromone, offsets: np.ndarray, ticks: int
-) -> np.ndarray:
-    """What trails (size,) become in some ticks if nobody lays any; as in the engine.
-
-    Pages expect the same, to the bit.
-    """
-    if pheromone.share == 0 and pheromone.evaporation == "linear":
-        return np.maximum(trail - trail.dtype.type(min(ticks, trail.max(initial=0) + 1)), 0)
-    if pheromone.share == 0 and pheromone.evaporation == "none":
-        return trail
-    for _ in range(ticks):
-        if not trail.any():
-            break
-        if pheromone.evaporation == "linear":
-            trail = np.maximum(trail - trail.dtype.type(1), 0)
-        elif pheromone.evaporation == "exponential":
-            trail = trail * pheromone.decay
-            trail[trail < 1] = 0
-        if pheromone.share > 0:
-            around = np.zeros_like(trail)
-            n_open = np.zeros_like(trail)
-            walls = ground == OBSTACLE
-            for heading in range(N_HEADINGS):
-                # The border of the array is void, so it does not matter that rolling wraps.
-                open_there = np.roll(~walls, -int(offsets[heading]))
-                n_open += open_there
-                there = np.roll(trail, -int(offsets[heading])) * pheromone.share
-                around += np.where(open_there, there, np.float32(0))
-            spread = np.maximum(trail - trail * pheromone.share * n_open + around, 0)
-            trail = np.where(walls, trail, spread)
-    return trail
-
-
 def _changes(name: str, old: np.ndarray, new: np.ndarray) -> dict[str, np.ndarray]:
-    """Where an array differs from what was expected, and what it holds there."""
+    """Where an array has changed, and what it holds there."""
     places = np.flatnonzero(old != new)
     return {f"{name}_at": places, name: new[places]}

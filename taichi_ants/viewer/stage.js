@@ -57,7 +57,7 @@ class Stage {
 
   /* The colour of a trail, by its share of the strongest one. */
   trailColour(level) {
-    return Math.round(Math.min(level / this.history.header.trail.strongest, 1) * 255);
+    return Math.round(Math.min(level / this.history.header.strongest, 1) * 255);
   }
 
   /* Take the size from the page; whether it has changed. */

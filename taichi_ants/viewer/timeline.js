@@ -157,10 +157,10 @@ class Timeline {
     this.drawn = history.length;
     this.time.min = history.origin;
     this.time.max = this.ticks(player.last);
-    const strokes = { [PICKED_UP]: new Set(), [DELIVERED]: new Set() };
+    const strokes = { PICKED_UP: new Set(), DELIVERED: new Set() };
     for (const { moment, kind } of history.events) strokes[kind].add(Math.round(20 * this.across(this.ticks(moment))) / 2);
     const paths = Object.entries(strokes).map(([kind, places]) => {
-      const [name, y] = Number(kind) === PICKED_UP ? ["picked", 9] : ["delivered", 1];
+      const [name, y] = kind === "PICKED_UP" ? ["picked", 9] : ["delivered", 1];
       return `<path class="${name}" d="${[...places].map((x) => `M${x} ${y}v4`).join("")}"/>`;
     });
     const svg = byId("events");

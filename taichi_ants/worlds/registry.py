@@ -17,7 +17,7 @@ Builder = Callable[..., World]
 _BUILDERS: dict[str, Builder] = {}
 
 
-def register(name: str, builder: Builder) -> None:
+def register(name: str, builder: Builder, *, drawn: bool = True) -> None:
     """Give a world a name, by which `build` and the command lines find it.
 
     Args:

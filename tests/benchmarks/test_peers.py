@@ -11,7 +11,7 @@ from systems import numpy_runs
 from taichi_ants import AntsError, Task, TrainingConfig, train, worlds
 from taichi_ants.analysis.tables import Table, plain_text
 from taichi_ants.engines.runs.traces import trace_training
-from taichi_ants.task.constants import DELIVERED
+from taichi_ants.task.events import Event
 
 # They learn soon, so that deliveries and long episodes both occur.
 CONFIGS = [
@@ -43,7 +43,7 @@ def assert_distributed_alike(ours, theirs):
 def trace():
     """Forty episodes of one run: what it sees and does, and its table after each step."""
     made = trace_training(worlds.paper(), CONFIGS[0], 3, EPISODES, STEPS, Task(delivery=CONTINUING))
-    assert (made.events == DELIVERED).sum() > 5
+    assert (made.events == Event.DELIVERED).sum() > 5
     return made
 
 

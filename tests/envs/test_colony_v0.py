@@ -94,8 +94,7 @@ def test_agents_are_the_ants_of_the_reference_by_number():
                 assert terminated[name] == (ants[name] not in plain.ants.values())
                 assert truncated[name] == (step == 90)
             for passed in plain.transitions:
-                event = Event[passed.event.value.replace(" ", "_").upper()]
-                assert infos[f"ant_{passed.number}"]["event"] == event
+                assert infos[f"ant_{passed.number}"]["event"] == passed.event
             for name in set(observations) - set(acting):  # the newborn
                 assert name not in ever
                 assert (rewards[name], terminated[name], truncated[name]) == (0, False, False)

@@ -235,7 +235,12 @@ def test_what_users_register_and_wrap():
     assert set(infos[0]) == {
         *("state", "action_mask", "event", "final_obs", "final_info", "episode")
     }
-    assert infos[0]["final_info"]["event"] in (Event.MOVED, Event.BLOCKED, Event.FAILED)
+    assert infos[0]["final_info"]["event"] in (
+        Event.ENTERED_EMPTY,
+        Event.ENTERED_LURE,
+        Event.BLOCKED,
+        Event.FAILED,
+    )
     assert infos[3]["episode"]["l"] == 5
 
 

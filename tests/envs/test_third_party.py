@@ -28,7 +28,7 @@ def test_gymnasiums_wrapper_returns_all_infos_as_tensors() -> None:
         assert said.keys() == info.keys()
         infos = many.step(torch.ones(3, dtype=torch.int64))[4]
         assert all(torch.is_tensor(value) for value in (*said.values(), *infos.values()))
-        assert infos["event"].tolist() == [Event.NONE if step == 3 else Event.MOVED] * 3
+        assert infos["event"].tolist() == [Event.NONE if step == 3 else Event.ENTERED_EMPTY] * 3
 
 
 def test_tianshou_trains_a_dqn() -> None:

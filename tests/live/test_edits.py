@@ -126,7 +126,7 @@ def test_schedules_do_not_matter_to_edits(monkeypatch):
         for name in ("ground", "trail", "first_streams", "worlds"):
             known = slice(None) if name != "worlds" else [WorldRow.LIVING, WorldRow.NEXT_NUMBER]
             assert np.array_equal(one.arrays[name][known], other.arrays[name][known]), name
-        for name in set(one.columns()) - {"want", "event", "filled"}:
+        for name in set(one.columns()) - {"want", "event"}:
             by_number = [
                 colony.arrays[name][colony.living[0]][np.argsort(colony.numbers[colony.living])]
                 for colony in (one, other)

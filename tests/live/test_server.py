@@ -161,7 +161,7 @@ def test_it_listens_on_this_machine_alone(room):
 def shown(guest: Guest, session):
     """The world that a page has after all that it was sent."""
     recording = Recording(guest.header, guest.frames)
-    return list(played(recording, session._recorder._pheromone))[-1]
+    return list(played(recording))[-1]
 
 
 def assert_same(guest: Guest, session) -> None:

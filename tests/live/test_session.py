@@ -137,10 +137,9 @@ def test_a_snapshot_gives_the_same_bits_as_a_replay_from_the_start(name, monkeyp
     assert undone.same(again)
     assert undone.to_bytes() == again.to_bytes()
     assert undone.ticks == again.ticks
-    pheromone = session.setup.task.pheromone_while(session.setup.learns)
     for one in (undone, again):
         one.advance(10)
-        (seen,) = played(Recording(one.header(), [one.moment()]), pheromone)
+        (seen,) = played(Recording(one.header(), [one.moment()]))
         assert np.array_equal(seen.trail, one.colony.snapshot().trail)
     assert undone.same(again)
     assert session.hand.state() == stands
@@ -233,9 +232,8 @@ def test_a_page_that_joins_late_sees_what_the_others_see(name):
                 continue
         first.append(frame)
         late += [frame] if late else []
-    pheromone = session.setup.task.pheromone_while(session.setup.learns)
-    early = list(played(Recording(header, first), pheromone))
-    joined = list(played(Recording(session.header(), late), pheromone))
+    early = list(played(Recording(header, first)))
+    joined = list(played(Recording(session.header(), late)))
     for a, b in zip(early[-len(joined) :], joined, strict=True):
         assert a.clock == b.clock
         for field in ("numbers", "cells", "headings", "loaded", "states", "ground", "trail"):
@@ -270,16 +268,15 @@ def test_a_recording_holds_what_happened(edited):
     before = session.hand.state()
     whole = recording(session.log(), most_frames=10_000)
     few = recording(session.log(), most_frames=50)
-    pheromone = session.setup.task.pheromone
     for one in (whole, few):
-        last = list(played(unpacked(one.to_bytes()), pheromone))[-1]
+        last = list(played(unpacked(one.to_bytes())))[-1]
         snapshot = session.colony.snapshot()
         assert np.array_equal(last.ground, snapshot.ground)
         assert np.array_equal(last.trail, snapshot.trail)
         assert np.array_equal(np.sort(last.cells), np.sort(snapshot.ant_cells))
     assert session.steps < len(whole) < session.steps + 200
     assert 20 < len(few) <= 52
-    acting = [moment for moment in played(whole, pheromone) if len(moment.actions)]
+    acting = [moment for moment in played(whole) if len(moment.actions)]
     assert len(acting) > 0.9 * session.ticks
     assert session.hand.state() == before
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 import pytest
 from colonies import GAMMA, act, begun, load
 
-from taichi_ants.reference.ants import Event
 from taichi_ants.task import Pheromone, Rewards
 from taichi_ants.task.constants import EMPTY, FOOD, FORWARD, GIVE, LEFT, PICK_UP, RIGHT
+from taichi_ants.task.events import Event
 from taichi_ants.worlds.world import World
 
 A, L, M, R = (0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)
@@ -48,7 +48,7 @@ class Scene:
 )
 def test_a_move_onto_an_empty_cell_turns_and_goes(action, heading, cell):
     scene = Scene()
-    assert scene.act(action) == (0, Event.MOVED)
+    assert scene.act(action) == (0, Event.ENTERED_EMPTY)
     assert scene.ends == (cell, heading, False)
     assert scene.world.level(cell) == 0  # without food, no deposit
 
@@ -64,8 +64,8 @@ def test_headings_wrap_around():
 
 def test_a_move_onto_a_trail_that_is_seen_pays_one():
     trails = [(L, 10), (M, 4)]  # M has less than half of L, so it looks E
-    assert Scene(trails=trails).act(LEFT) == (1, Event.MOVED)
-    assert Scene(trails=trails).act(FORWARD) == (0, Event.MOVED)
+    assert Scene(trails=trails).act(LEFT) == (1, Event.ENTERED_LURE)
+    assert Scene(trails=trails).act(FORWARD) == (0, Event.ENTERED_EMPTY)
 
 
 @pytest.mark.parametrize("action", [LEFT, FORWARD, RIGHT])
@@ -86,7 +86,7 @@ def test_a_move_out_of_the_world_only_turns():
 
 def test_with_food_a_move_nearer_pays_one_and_deposits_on_the_new_cell():
     scene = Scene(carries=True, queen=(4, 0, 0))  # sees S E E
-    assert scene.act(LEFT) == (1, Event.MOVED)
+    assert scene.act(LEFT) == (1, Event.ENTERED_LURE)
     assert scene.ends == (L, 0, True)
     assert scene.world.level(L) == 250
     assert scene.world.level(A) == 0
@@ -94,7 +94,7 @@ def test_with_food_a_move_nearer_pays_one_and_deposits_on_the_new_cell():
 
 def test_with_food_a_move_not_nearer_pays_nothing_and_deposits_too():
     scene = Scene(carries=True, queen=(4, 0, 0))
-    assert scene.act(FORWARD) == (0, Event.MOVED)
+    assert scene.act(FORWARD) == (0, Event.ENTERED_EMPTY)
     assert scene.world.level(M) == 250
 
 
@@ -186,8 +186,8 @@ def test_give_fails(contents):
 
 def test_every_event_pays_what_the_task_says():
     pays = {"rewards": Rewards(empty=-5, failed=-7, lure=20, pick_up=30, give=40)}
-    assert Scene(**pays).act(FORWARD) == (-5, Event.MOVED)
-    assert Scene(trails=[(M, 9)], **pays).act(FORWARD) == (20, Event.MOVED)
+    assert Scene(**pays).act(FORWARD) == (-5, Event.ENTERED_EMPTY)
+    assert Scene(trails=[(M, 9)], **pays).act(FORWARD) == (20, Event.ENTERED_LURE)
     assert Scene(obstacles=[M], **pays).act(FORWARD) == (-7, Event.BLOCKED)
     assert Scene(**pays).act(PICK_UP) == (-7, Event.FAILED)
     assert Scene(**pays).act(GIVE) == (-7, Event.FAILED)

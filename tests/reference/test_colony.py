@@ -9,9 +9,9 @@ from random_worlds import random_world
 
 from taichi_ants import TrainingConfig
 from taichi_ants.reference import LEARNERS, ReferenceColony
-from taichi_ants.reference.ants import Event
 from taichi_ants.task import Life, Task
 from taichi_ants.task.constants import FORWARD, GIVE
+from taichi_ants.task.events import Event
 from taichi_ants.worlds import World
 
 # Food ahead, the queen behind, as in the training of one ant: 2 ticks at best.

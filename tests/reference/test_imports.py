@@ -12,6 +12,7 @@ ALLOWED = {
     "taichi_ants.task",
     "taichi_ants.grid.constants",
     "taichi_ants.task.constants",
+    "taichi_ants.task.events",
     "taichi_ants.errors",
     "taichi_ants.learners.config",
     "taichi_ants.worlds.world",

@@ -24,9 +24,9 @@ from plain_runs import train, train_with_tables
 
 from taichi_ants.errors import AntsError
 from taichi_ants.reference import LEARNERS
-from taichi_ants.reference.ants import Event
 from taichi_ants.task import Task
 from taichi_ants.task.constants import GIVE, PICK_UP
+from taichi_ants.task.events import Event
 from taichi_ants.worlds.world import World
 
 TWO_STEPS = World((3, 3, 3), (0, 0, 1), foods=[(1, 1, 0)], ants=[((0, 0, 0), 1)])

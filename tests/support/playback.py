@@ -10,10 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from taichi_ants.grid.hexgrid import AxialGrid
-from taichi_ants.task import Pheromone
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.viewer import Recording
-from taichi_ants.viewer.recorder import fallen
 
 
 @dataclass
@@ -47,21 +45,18 @@ class Played:
         return np.array([self.values[first + a] for a in range(N_ACTIONS)], np.float32)
 
 
-def played(recording: Recording, pheromone: Pheromone) -> Iterator[Played]:
-    """Every moment of a recording of a world with that pheromone."""
+def played(recording: Recording) -> Iterator[Played]:
+    """Every moment of a recording."""
     grid = AxialGrid(tuple(recording.header["ranges"]))
     ground = np.zeros(grid.size, np.uint8)
-    trail = np.zeros(grid.size, recording.sections(0)["trail"].dtype)
+    stored = np.zeros(grid.size, recording.sections(0)["trail"].dtype)
     values: dict[int, float] = {}
-    numbers, last = np.zeros(0, np.int32), (-1.0, 0.0)
+    numbers = np.zeros(0, np.int32)
     for moment in range(len(recording)):
         frame = recording.sections(moment)
         clock = frame["clock"].tolist()
-        passed = clock[1] - last[1] if clock[0] == last[0] else 0
-        last = (clock[0], clock[1])
-        trail = fallen(trail, ground, pheromone, grid.offsets, int(passed)).copy()
         ground[frame["ground_at"]] = frame["ground"]
-        trail[frame["trail_at"]] = frame["trail"]
+        stored[frame["trail_at"]] = frame["trail"]
         entries = frame["table_at"].astype(np.int64).tolist()
         values |= dict(zip(entries, frame["table"].tolist(), strict=True))
         if len(frame["numbers"]):
@@ -79,7 +74,7 @@ def played(recording: Recording, pheromone: Pheromone) -> Iterator[Played]:
             frame["acts"] >> 4,
             frame["td_errors"],
             ground.copy(),
-            trail,
+            np.maximum(stored - stored.dtype.type(clock[9]), 0),
             dict(values),
         )
 

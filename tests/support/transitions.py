@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from taichi_ants.reference.ants import Event, Transition
+from taichi_ants.reference.ants import Transition
+from taichi_ants.task.events import Event
 
 
 def transition(
@@ -14,7 +15,7 @@ def transition(
         "next_action": None,
         "terminated": False,
         "truncated": False,
-        **{"episode": 0, "step": 0, "event": Event.MOVED},
+        **{"episode": 0, "step": 0, "event": Event.ENTERED_EMPTY},
         **{"cell": (0, 0, 0), "heading": 0},
         **given,
     }

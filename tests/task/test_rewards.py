@@ -14,7 +14,7 @@ from taichi_ants.worlds import paper
 
 
 def test_the_papers_table_by_event():
-    assert Rewards().by_event().tolist() == [0, -1, 1, 3, 10]
+    assert Rewards().by_event().tolist() == [0, 0, -1, 1, 3, 10, -1, 0]
     assert Rewards().by_event().dtype == np.int32
 
 

@@ -17,7 +17,8 @@ from taichi_ants import Colony, Task, TrainingConfig, World, trace_training, wor
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.rendering import Episode
 from taichi_ants.task import Life, Pheromone
-from taichi_ants.task.constants import ACTION_NAMES, DELIVERED, PICKED_UP
+from taichi_ants.task.constants import ACTION_NAMES
+from taichi_ants.task.events import Event
 from taichi_ants.viewer import Recording, page, record_colony, record_episode, record_trace
 from taichi_ants.viewer.page import SCRIPTS, part
 
@@ -62,7 +63,7 @@ def colony(folder):
     many = Colony(world, rules, TrainingConfig("q_learning", 0.2, 0.9, 0.2, 1.0), 3, ants=25)
     many.begin_episode()
     recording = record_colony(many, 90, title="a crowd")
-    return written(folder, "colony", recording), list(played(recording, many.pheromone)), recording
+    return written(folder, "colony", recording), list(played(recording)), recording
 
 
 @pytest.fixture
@@ -119,7 +120,7 @@ def test_ants_on_the_page_do_what_those_of_the_engine_do(crowd, colony):
             act, values = one["act"], before.row(state, 128)
             assert one["state"] == state
             assert np.array_equal(np.array(one["values"], np.float32), values)
-            assert (act["action"], act["event"]) == (action, after.events[place])
+            assert (act["action"], Event[act["event"]]) == (action, after.events[place])
             assert act["reward"] == rewards[after.events[place]]
             best = np.flatnonzero(values == values.max())
             why = "explored" if action not in best else "tie" if len(best) > 1 else "best"
@@ -227,7 +228,7 @@ def test_the_time_line_and_the_curves_seek(ant):
     ant.settle()
     assert ant.moment == 17
     events = ant.read("viewer.history.events.map(({ moment, kind }) => [moment, kind])")
-    assert events == [[17, PICKED_UP], [34, DELIVERED]]
+    assert events == [[17, "PICKED_UP"], [34, "DELIVERED"]]
     assert ant.tab.locator("#events .picked").get_attribute("d").count("M") == 1
     # Who never explores has no curve of epsilon.
     assert ant.tab.locator(".curve:visible b").all_inner_texts() == ["0", "19"]

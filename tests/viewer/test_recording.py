@@ -21,7 +21,7 @@ from taichi_ants import (
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.rendering import Episode
-from taichi_ants.task.constants import DELIVERED
+from taichi_ants.task.events import Event
 from taichi_ants.viewer import (
     Recorder,
     Recording,
@@ -72,7 +72,7 @@ def test_a_recording_is_what_engine_and_reference_do(learner, sharing, sees, den
                 plain.tick(last=tick == TICKS - 1)
                 transitions.append(sorted(plain.transitions, key=lambda one: one.number))
         recording = unpacked(Recording(recorder.header(), frames).to_bytes())
-        moments = list(played(recording, colony.pheromone))
+        moments = list(played(recording))
         rewards = np.array(recording.header["rewards"])
         before = None
         assert len(moments) == len(transitions)
@@ -105,7 +105,7 @@ def test_a_recording_is_what_engine_and_reference_do(learner, sharing, sees, den
 def test_an_episode_is_its_trace(epsilon):
     episode = Episode.play(worlds.paper(), trail_follower(), seed=5, max_steps=60, epsilon=epsilon)
     trace, recording = episode.trace, record_episode(episode)
-    moments = list(played(recording, episode.task.pheromone))
+    moments = list(played(recording))
     assert len(moments) == len(trace) + 1
     assert recording.header["follow"] == 0
     for step, (moment, after) in enumerate(pairwise(moments)):
@@ -123,8 +123,7 @@ def test_a_trace_of_training_holds_tables_and_td_errors(learner):
     config = TrainingConfig(learner, 0.1, 0.9, 0.3, 0.99)
     trace = trace_training(worlds.paper(), config, seed=7, episodes=3, max_steps=80)
     recording = record_trace(trace, title="learns")
-    task = Task()
-    moments = list(played(recording, task.pheromone.lasting))
+    moments = list(played(recording))
     assert len(moments) == len(trace) + 3  # each episode begins with a moment of its own
     acting = [moment for moment in moments if len(moment.actions)]
     for step, moment in enumerate(acting):
@@ -143,7 +142,7 @@ def test_td_errors_of_a_shared_table_are_the_mean_of_its_ants():
     world, config = worlds.open_world(2, (9, 9, 9)), TrainingConfig("q_learning", 0.5, 0, 0, 1)
     colony = Colony(world, task, config, 1, 12)
     colony.begin_episode()
-    moments = list(played(record_colony(colony, 60), colony.pheromone))
+    moments = list(played(record_colony(colony, 60)))
     shared = 0
     for before, after in pairwise(moments):
         pairs = list(zip(before.states.tolist(), after.actions.tolist(), strict=True))
@@ -171,7 +170,7 @@ def test_what_is_skipped_and_what_is_changed_by_hand():
     frames = [recorder.moment(), recorder.tick(5)]
     colony.arrays["ground"][colony.grid.index((3, 0, 1))] = 5
     frames += [recorder.moment(), recorder.tick()]
-    moments = list(played(Recording(recorder.header(), frames), colony.pheromone))
+    moments = list(played(Recording(recorder.header(), frames)))
     assert [moment.clock[1] for moment in moments] == [0, 5, 5, 6]
     assert [len(moment.actions) for moment in moments] == [0, 0, 0, 1]
     assert np.array_equal(moments[-1].ground, colony.snapshot().ground)
@@ -181,11 +180,9 @@ def test_what_is_skipped_and_what_is_changed_by_hand():
 
 
 def test_a_delivery_is_in_the_totals_and_the_events():
-    moments = list(
-        played(record_episode(Episode.play(worlds.paper(), trail_follower())), Task().pheromone)
-    )
+    moments = list(played(record_episode(Episode.play(worlds.paper(), trail_follower()))))
     assert [moment.clock[2] for moment in moments[-2:]] == [0, 1]
-    assert moments[-1].events.tolist() == [DELIVERED]
+    assert moments[-1].events.tolist() == [Event.DELIVERED]
 
 
 def test_what_cannot_be_recorded_says_why():

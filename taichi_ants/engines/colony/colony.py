@@ -235,7 +235,7 @@ class Colony(ColonyState):
                     f"an action is {wrong[0]}; it must lie between 0 and {N_ACTIONS - 1}: "
                     f"{', '.join(ACTION_NAMES)}."
                 )
-        self.chosen[:] = given
+        self.actions[:] = given
         self._stepper.advance(self, 1)
 
     def end_episode(self) -> None:

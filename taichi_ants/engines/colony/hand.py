@@ -189,6 +189,8 @@ class Hand:
             arrays[name][slots] = 0
         arrays["cell"][slots], arrays["heading"][slots] = cells, headings
         arrays["number"][slots], arrays["action"][slots] = numbers, -1
+        if "next_action" in arrays:
+            arrays["next_action"][slots] = -1
         arrays["stage"][slots] = Stage.NEWBORN
         born = (colony.episode << 32) + numbers.astype(np.int64)
         arrays["streams"][slots] = stream_state(colony.seeds[0], STREAM_BORN, born)

@@ -18,7 +18,6 @@ from taichi_ants.engines import looks
 from taichi_ants.engines.colony import learning, life, steps, trail
 from taichi_ants.engines.colony.layout import (
     GAVE_UP,
-    STANDS,
     Barrier,
     Order,
     Stage,
@@ -30,6 +29,7 @@ from taichi_ants.learners.memory import read_rates
 from taichi_ants.learners.td_errors import guarded
 from taichi_ants.task.constants import ROW
 from taichi_ants.task.observations import Observation
+from taichi_ants.task.rules.conflicts import STANDS
 from taichi_ants.task.traffic import Traffic
 
 ANTS, CELLS, WORLD = "ants", "cells", "world"
@@ -56,6 +56,7 @@ class Variant:
     Args:
         learner: The learner, None if nobody learns.
         own_tables: Whether there is a table for each slot, not one for each world.
+        is_given_actions: Whether ants do what they are given.
         observation: The observation.
         dense: Whether levels are f32, see `trail`.
         view: Which trails look like one, see `Pheromone`.
@@ -68,6 +69,7 @@ class Variant:
         self,
         learner: Learner | None,
         own_tables: bool,
+        is_given_actions: bool,
         observation: Observation,
         dense: bool,
         view: str,
@@ -76,6 +78,7 @@ class Variant:
         food_changes: bool,
     ) -> None:
         self.own_tables, self.dense = own_tables, dense
+        self.is_given_actions = is_given_actions
         self.view, self.half, self.traffic = view, view == "half", traffic
         # The mark of an ant that wants nothing.
         self.idle = STANDS if traffic.shared else 0

@@ -21,11 +21,9 @@ BYTE_COLUMNS = (
     "carries",
     "stage",  # a `Stage`
     "percept",  # the paper's state: what acting and rewards go by
-    "action",  # the one that is drawn already, -1
-    "event",  # what came of the last action
-    # Whether another ant enters the cell that it leaves, or PUSHES it out; only where cells with
-    # ants can be entered.
-    "filled",
+    "event",  # the result of the last action, an `Event`
+    "action",  # the last action, -1 before the first one; or the next one, if it is given
+    "next_action",  # the one that it has drawn already, -1; only for learners that draw ahead
 )
 
 
@@ -115,18 +113,5 @@ class SumRow(IntEnum):
 
 # What the lower four bits of a cell in `ground` say is how it looks, see `task.constants`; the
 # upper four mark the ant on it, and tell whether it carries food where somebody sees that.
-STANDS, STANDS_WITH_FOOD = 7, 15
-# What an ant wants is in `wants` at its cell while it acts: nothing (0), to enter the cell at a
-# heading, or to take the food there. Where cells with ants can be entered, an ant that wants
-# nothing has STANDS for its mark, so that every ant has one,
-ENTER, TAKE = 1, 9  # plus the heading
-MARK = 15
-# and above the mark is what else the others need to know of it.
-HAS_FOOD, TAKES_FOOD, WINS = 16, 32, 64
-PUSHES = 2  # in FILLED, instead of 1
-ANT_GROUND = OBSTACLE | STANDS << 4  # the cell of an ant without food
-
-# What kernels read of the pheromone: how deposits are laid, 0 for none, and the value of `decay`
-# that stands for linear evaporation.
-SETS, ADDS, FADES = 1, 2, 3
-LINEAR = -1.0
+ANT_STANDS, STANDS_WITH_FOOD = 7, 15
+ANT_GROUND = OBSTACLE | ANT_STANDS << 4  # the cell of an ant without food

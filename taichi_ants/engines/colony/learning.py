@@ -27,7 +27,8 @@ from taichi_ants.learners.model import (
     terminated_of,
     visited,
 )
-from taichi_ants.task.constants import DELIVERED, N_ACTIONS, ROW
+from taichi_ants.task.constants import N_ACTIONS, ROW
+from taichi_ants.task.rules.delivery import step_end, terminates
 from taichi_ants.task.rules.random_bits import advance, draw_below
 
 _ONE = 4294967296.0  # fixed-point numbers have 32 binary places
@@ -74,7 +75,7 @@ def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     if trait(c.stage, ant) != Stage.NEWBORN:
         c.wants[w * c.size + c.want[ant]] = 0
         if ti.static(v.draws_next_action):
-            if terminates(c, trait(c.event, ant)) == 0:
+            if terminates(trait(c.event, ant), c.delivery_terminates) == 0:
                 c.streams[ant] = advance(c.streams[ant])
                 next_action = draw_action(c, v, w, ant, row, c.streams[ant])
         if ti.static(v.alone):
@@ -82,7 +83,8 @@ def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         elif ti.static(v.together):
             share_error(c, v, w, chunk, ant, row, next_action)
     note_look(c, v, ant, percept, row)
-    put(c.action, ant, next_action)
+    if ti.static(v.draws_next_action):
+        put(c.next_action, ant, next_action)
 
 
 @ti.func
@@ -123,9 +125,8 @@ def learn_alone(c: ti.template(), v: ti.template(), ant, seen, next_action, tick
     """Update the ant's own table, as an ant that is alone does."""
     memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
     event = trait(c.event, ant)
-    terminated = terminates(c, event)
-    last = trait(c.stage, ant) == Stage.DYING or tick + 1 == c.length
-    last = last or (c.ends_at_delivery == 1 and event == DELIVERED)
+    last = ti.cast((trait(c.stage, ant) == Stage.DYING) | (tick + 1 == c.length), ti.i32)
+    terminated, truncated = step_end(event, c.delivery_terminates, c.ends_at_delivery, last)
     step = Transition(
         state=row_seen(c, v, ant),
         action=trait(c.action, ant),
@@ -133,17 +134,11 @@ def learn_alone(c: ti.template(), v: ti.template(), ant, seen, next_action, tick
         next_state=seen,
         next_action=next_action,
         terminated=terminated,
-        truncated=ti.cast(last, ti.i32) & (1 - terminated),
+        truncated=truncated,
     )
     _, c.streams[ant] = v.learner.learn(
         memory, memory_of(c, v, ant), step, rates_of(c, v), c.streams[ant]
     )
-
-
-@ti.func
-def terminates(c: ti.template(), event):
-    """1 if the update does not bootstrap: at a delivery, if that is absorbing."""
-    return ti.cast(event == DELIVERED, ti.i32) & (1 - c.continuing)
 
 
 @ti.func
@@ -169,7 +164,8 @@ def error_of(
 def share_error(c: ti.template(), v: ti.template(), w, chunk, ant, seen, next_action):
     """Add the TD error of an ant to the sums of its chunk, and what it saw."""
     event = trait(c.event, ant)
-    reward, terminated = ti.cast(c.rewards[event], ti.f32), terminates(c, event)
+    reward = ti.cast(c.rewards[event], ti.f32)
+    terminated = terminates(event, c.delivery_terminates)
     pair = row_seen(c, v, ant) * ROW + trait(c.action, ant)
     error = error_of(c, v, w, pair, reward, terminated, seen, next_action)
     add_to_sums(c, v, chunk, pair, error, fixed(error), 1)

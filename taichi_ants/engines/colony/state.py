@@ -18,7 +18,6 @@ from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
     BYTE_COLUMNS,
     INTEGER_COLUMNS,
-    PUSHES,
     TALLY_WIDTH,
     Order,
     Stage,
@@ -233,22 +232,28 @@ class ColonyState:
         return self._by_slot("state" if "state" in self.arrays else "percept").astype(np.int32)
 
     @property
-    def chosen(self) -> np.ndarray:
-        """Actions that are drawn already for the next tick, int8 (W, capacity), else -1; a view."""
+    def draws_ahead(self) -> bool:
+        """Whether ants draw their next action while they learn from the last one."""
+        learner = self.learner
+        return learner is not None and learner.draws_next_action
+
+    @property
+    def actions(self) -> np.ndarray:
+        """Last action of each ant, int8 (W, capacity), -1 before the first one; a view."""
         return self._by_slot("action")
 
     @property
-    def events(self) -> np.ndarray:
-        """Event of the last action of each ant (`task.constants`), int8 (W, capacity); a view."""
-        return self._by_slot("event")
+    def next_actions(self) -> np.ndarray:
+        """Actions that are drawn already for the next tick, int8 (W, capacity), else -1; a view.
+
+        Only for learners that draw ahead.
+        """
+        return self._by_slot("next_action")
 
     @property
-    def pushed(self) -> np.ndarray:
-        """Slots whose ant was moved back by an ant with food in the last tick, bool (W, capacity).
-
-        Only where the traffic swaps ants.
-        """
-        return self._by_slot("filled") == PUSHES
+    def events(self) -> np.ndarray:
+        """`Event` of the last action of each ant, int8 (W, capacity); a view."""
+        return self._by_slot("event")
 
     @property
     def streams(self) -> np.ndarray:
@@ -310,10 +315,8 @@ class ColonyState:
         ant_cells = self.cells[world, living]
         ground = self.arrays["ground"][cells].copy()
         ground[ant_cells] = EMPTY
-        if self.pheromone.dense:
-            trail = self.arrays["level"][cells].copy()
-        else:
-            trail = np.maximum(self.arrays["trail"][cells] - self.trail_clock(world), 0)
+        stored, clock = self.stored_trail(world)
+        trail = np.maximum(stored - stored.dtype.type(clock), 0)
         return Snapshot(
             self.grid,
             ground,
@@ -322,6 +325,20 @@ class ColonyState:
             self.headings[world, living].astype(np.int32),
             self.carrying[world, living],
         )
+
+    def stored_trail(self, world: int = 0) -> tuple[np.ndarray, int]:
+        """Return the trail of world number `world` as kernels store it, and the clock.
+
+        The level of a cell is what is stored less the clock, not below 0.
+
+        Returns:
+            A copy of the expiry clocks, int32 (grid.size,), and the clock as it is now; or of the
+            levels, float32 (grid.size,), and 0, if the pheromone is dense.
+        """
+        cells = slice(world * self.grid.size, (world + 1) * self.grid.size)
+        if self.pheromone.dense:
+            return self.arrays["level"][cells].copy(), 0
+        return self.arrays["trail"][cells].copy(), self.trail_clock(world)
 
     def trail_clock(self, world: int) -> int:
         """Return by how much integer trails have evaporated since the episode began."""
@@ -475,8 +492,8 @@ class ColonyState:
         unused = {"state"} if self.task.sees.name == "paper" else set()  # the percept is the state
         if not self.ants_change:
             unused.add("age")
-        if not self.task.traffic.shared:
-            unused.add("filled")
+        if not self.draws_ahead:
+            unused.add("next_action")
         made = {
             **{name: array.copy() for name, array in self._at_start().items()},
             "trail": np.zeros(1 if dense else cells, np.int32),
@@ -503,7 +520,7 @@ class ColonyState:
             if name in arrays
         }
         for name, array in column.items():
-            array[which] = -1 if name in ("number", "action") else 0
+            array[which] = -1 if name in ("number", "action", "next_action") else 0
         n = self.at_start["start_cells"].shape[1]
         column["cell"][which, :n] = self.at_start["start_cells"][which]
         column["heading"][which, :n] = self.at_start["start_headings"][which]

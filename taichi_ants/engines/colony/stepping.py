@@ -11,11 +11,7 @@ import numpy as np
 
 from taichi_ants import runtime
 from taichi_ants.engines.colony.layout import (
-    ADDS,
-    FADES,
     GAVE_UP,
-    LINEAR,
-    SETS,
     Barrier,
     Order,
 )
@@ -29,8 +25,6 @@ _STEPS_BETWEEN_SORTS, _FEWEST_TICKS, _MOST_TICKS = 2_500_000, 16, 256
 _PIECE_SECONDS = 0.4
 _SPINS = 2**26  # of a thread at a barrier: half a second or more
 _LAUNCHES_BETWEEN_TRIALS = 8  # and a trial has so many times fewer ticks
-
-_DEPOSITS = {"none": 0, "set": SETS, "add": ADDS, "fading": FADES}  # as kernels read them
 
 
 def usual_schedule(n_worlds: int, capacity: int) -> str:
@@ -157,6 +151,7 @@ class Stepper:
         variant = kernels.variant(
             state.learner,
             state.one_a_slot,
+            state.is_given_actions,
             state.task.sees,
             state.pheromone.dense,
             state.pheromone.view,
@@ -177,8 +172,7 @@ def _has_barrier(running: runtime.Runtime) -> bool:
 
 def kernel_numbers(state: ColonyState) -> dict[str, Any]:
     """Return what kernels know besides arrays; -1 stands for an option that is off."""
-    life, pheromone, memory, off = state.task.life, state.pheromone, state.memory, -1
-    level = float if pheromone.dense else int
+    life, memory, off = state.task.life, state.memory, -1
     return {
         "n_worlds": len(state.seeds),
         "n_ants": state.ants,  # that start an episode
@@ -187,22 +181,14 @@ def kernel_numbers(state: ColonyState) -> dict[str, Any]:
         "n_homes": state.n_homes,  # room for homes in each world
         "size": state.grid.size,
         "length": state.length,
-        "evaporates": int(pheromone.evaporation == "linear"),  # of integer trails: the clock
-        "deposits": _DEPOSITS[pheromone.deposit],
-        "deposit_level": level(pheromone.level),
-        "cap": level(pheromone.cap or 0),
-        "slope": level(pheromone.slope or 0),
-        "fades_after": pheromone.fades_after,
+        **state.pheromone.numbers,
         "turns_at_queen": int(state.task.turns_at_queen),
-        # The factor of exponential evaporation, 1 for none, -1 for linear.
-        "decay": LINEAR if pheromone.evaporation == "linear" else float(pheromone.decay),
-        "share": float(pheromone.share),  # what a cell gives to each neighbour
         "births": int(life.births),
         "lifespan": life.lifespan or off,
         "regrowth": off if life.regrowth is None else life.regrowth,
         "wander": life.wander or off,
         "ends_at_delivery": int(state.ends_at_delivery),
-        "continuing": int(state.task.delivery == "continuing"),
+        "delivery_terminates": int(state.task.delivery != "continuing"),
         "initial_value": state.training.initial_value,
         "discount": state.training.discount,
         "epsilon": state.epsilon,

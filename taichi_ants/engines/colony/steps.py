@@ -1,14 +1,9 @@
 """What each ant of a colony does in a tick, phase by phase; see `rules` for what it means.
 
-The conflict rule: a cell to enter must be empty at the start of the tick. Of several ants that want
-one cell (to enter it, or to take the food in it) the one with the smallest key wins, a hash of the
-cell it stands on and the tick. So neither ant numbers nor threads matter, and nothing is atomic:
-each ant writes what it wants into `wants` at its own cell, and looks at the six cells around what
-it wants. `wants` stays as it is while ants act, and each ant takes its own mark away when it looks
-around at the end of the tick.
-
-Where cells with ants can be entered, see `Traffic`, the winners are marked in a phase of their own
-before all act: each ant finds its own way out of what all have written.
+Each ant writes what it wants into `wants` at its own cell, see `rules.conflicts`. `wants` stays as
+it is while ants act, and each ant takes its own mark away when it looks around at the end of the
+tick. Where cells with ants can be entered, see `Traffic`, the winners are marked in a phase of
+their own before all act: each ant finds its own way out of what all have written.
 """
 
 import taichi as ti
@@ -16,15 +11,8 @@ from taichi.math import popcnt
 
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
-    ENTER,
-    HAS_FOOD,
-    MARK,
-    PUSHES,
-    STANDS,
-    TAKE,
-    TAKES_FOOD,
+    ANT_STANDS,
     TALLY_WIDTH,
-    WINS,
     HomeRow,
     Tally,
 )
@@ -38,20 +26,15 @@ from taichi_ants.engines.looks import judge
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.learners.memory import values_of
 from taichi_ants.task.constants import (
-    DELIVERED,
     EMPTY,
-    ENTERED_EMPTY,
-    ENTERED_LURE,
-    FAILED,
     FORWARD,
-    GIVE,
     LEFT,
     OBSTACLE,
     PICK_UP,
-    PICKED_UP,
     RIGHT,
     ROW,
 )
+from taichi_ants.task.events import Event
 from taichi_ants.task.rules.actions import (
     is_open,
     move_event,
@@ -60,6 +43,17 @@ from taichi_ants.task.rules.actions import (
     turn_round,
     turned_by,
 )
+from taichi_ants.task.rules.conflicts import (
+    ENTER,
+    HAS_FOOD,
+    TAKE,
+    TAKES_FOOD,
+    WINS,
+    had_ant,
+    prevails,
+    settle,
+)
+from taichi_ants.task.rules.delivery import can_give, heading_after_delivery
 from taichi_ants.task.rules.policy import bit_number, choose_in_crowd, lowest_bit_number
 from taichi_ants.task.rules.random_bits import advance, bits_of, draw_below
 from taichi_ants.task.rules.vision import (
@@ -179,7 +173,7 @@ def ant_on(ground):
 @ti.func
 def ground_under(carries):
     """What the cell of an ant holds when nobody wants anything."""
-    return ti.cast(OBSTACLE | (STANDS << 4) + (carries << 7), ti.u8)
+    return ti.cast(OBSTACLE | (ANT_STANDS << 4) + (carries << 7), ti.u8)
 
 
 @ti.func
@@ -202,9 +196,13 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 
     Hardly a branch: what the next ant does cannot be predicted from what this one did.
     """
-    action, percept = trait(c.action, ant), trait(c.percept, ant)
+    action, percept = -1, trait(c.percept, ant)
     cell, carries = c.cell[ant], trait(c.carries, ant)
     random_state = c.streams[ant]
+    if ti.static(v.is_given_actions):
+        action = trait(c.action, ant)
+    elif ti.static(v.draws_next_action):
+        action = trait(c.next_action, ant)
     if action < 0:
         random_state = advance(random_state)
         action = draw_action(c, v, w, ant, row_seen(c, v, ant), random_state)
@@ -234,115 +232,16 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 
 
 @ti.func
-def prevails(c: ti.template(), v: ti.template(), base, cell, wanted, tick):
-    """Whether the ant on a cell gets what it wants; one that wants nothing wants its own cell."""
-    kind = ti.cast(c.wants[base + cell], ti.i32) & 8  # 8 to take, else 0
-    rivals = -1  # the ant itself is found too
-    for heading in ti.static(range(N_HEADINGS)):
-        other = ti.cast(c.wants[base + wanted + c.compass[heading + 1]], ti.i32) & MARK
-        rivals += ti.cast(other == wanting(kind, heading), ti.i32)
-    won = wanted != cell
-    if rivals > 0:
-        won = won and wins(c, v, base, cell, wanted, kind, tick)
-    return won
-
-
-@ti.func
 def resolve(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Where cells with ants can be entered: mark the winners, and note what a move would be.
 
     A move is judged before any ant lays a trail.
     """
     base, cell, wanted = w * c.size, c.cell[ant], c.want[ant]
-    won = prevails(c, v, base, cell, wanted, tick)
+    won = prevails(c.wants, c.compass, v.traffic, base, cell, wanted, tick)
     c.wants[base + cell] = c.wants[base + cell] | ti.cast(ti.select(won, WINS, 0), ti.u8)
     c.want[ant] = ti.select(won, wanted, cell)
     put(c.event, ant, event_of(c, v, base, ant, tick * c.evaporates))
-
-
-@ti.func
-def wanting(kind, heading):
-    """The mark of an ant at `heading` from a cell that wants that cell: it looks back."""
-    return kind | 1 + turn_round(heading)
-
-
-@ti.func
-def wins(c: ti.template(), v: ti.template(), base, cell, wanted, kind, tick):
-    """Whether no other ant that wants the same comes before the one on `cell`."""
-    own, won = conflict_key(cell, tick), True
-    for heading in range(N_HEADINGS):
-        other = wanted + c.compass[heading + 1]
-        mark = ti.cast(c.wants[base + other], ti.i32) & MARK
-        if mark == wanting(kind, heading) and other != cell:
-            after = conflict_key(other, tick) > own
-            if ti.static(v.traffic.carriers_first):
-                loaded = c.wants[base + cell] & HAS_FOOD
-                other_loaded = c.wants[base + other] & HAS_FOOD
-                after = loaded > other_loaded or (loaded == other_loaded and after)
-            won = won and after
-    return won
-
-
-@ti.func
-def conflict_key(cell, tick):
-    """The smallest key wins."""
-    inner = bits_of(advance(ti.cast(cell, ti.u64)))
-    return bits_of(advance(inner ^ ti.cast(tick, ti.u64)))
-
-
-@ti.func
-def had_ant(c: ti.template(), place):
-    """Whether an ant stood on a cell at the start of the tick; there all have a mark."""
-    return c.wants[place] != 0
-
-
-@ti.func
-def heading_wanted(c: ti.template(), place):
-    """The heading at which the ant on a cell wants to enter the next one."""
-    return (ti.cast(c.wants[place], ti.i32) & MARK) - ENTER
-
-
-@ti.func
-def way_is_free(c: ti.template(), v: ti.template(), base, cell, wanted):
-    """Whether the winner on `cell` enters a cell that is empty, or whose ant moves on as it does.
-
-    The winners of cells with ants form queues; one moves if its head enters an empty cell. A queue
-    that bites its own tail is a ring, which stays.
-    """
-    ahead = wanted
-    if ti.static(v.traffic.follow):
-        moving = True
-        while moving:
-            moving = had_ant(c, base + ahead) and ahead != cell
-            moving = moving and c.wants[base + ahead] & (WINS | TAKES_FOOD) == WINS
-            if moving:
-                ahead += c.compass[heading_wanted(c, base + ahead) + 1]
-    return not had_ant(c, base + ahead)
-
-
-@ti.func
-def entering(c: ti.template(), base, cell):
-    """The cell of the ant that wins the cell of another one, -1 if nobody does."""
-    found = -1
-    for heading in ti.static(range(N_HEADINGS)):
-        other = cell + c.compass[heading + 1]
-        mark = ti.cast(c.wants[base + other], ti.i32) & (MARK | WINS)
-        found = ti.select(mark == wanting(WINS, heading), other, found)
-    return found
-
-
-@ti.func
-def gives_way(c: ti.template(), v: ti.template(), base, cell):
-    """Whether the ant on a cell gives way to one with food that wins its cell.
-
-    Where ants follow, one that moves is never asked: then the other one moves as well.
-    """
-    mark = c.wants[base + cell]
-    stays = mark & (HAS_FOOD | TAKES_FOOD) == 0
-    if ti.static(not v.traffic.follow):
-        if stays and mark & WINS != 0:
-            stays = had_ant(c, base + cell + c.compass[heading_wanted(c, base + cell) + 1])
-    return stays
 
 
 @ti.func
@@ -358,45 +257,12 @@ def event_of(c: ti.template(), v: ti.template(), base, ant, clock):
     event = move_event(code_in_view(percept, ti.min(action, RIGHT)))
     here = base + c.cell[ant]
     ahead = here + step_ahead(c, ant)
-    if had_ant(c, ahead):  # seldom, so that few trails are read
+    if had_ant(c.wants, ahead):  # seldom, so that few trails are read
         rises = level_of(c, v, ahead, clock) > level_of(c, v, here, clock)
         nearer = ti.cast(c.closer[here], ti.i32) >> trait(c.heading, ant) & 1 == 1
         better = ti.select(trait(c.carries, ant) == 1, nearer, rises)
-        event = ti.select(better, ENTERED_LURE, ENTERED_EMPTY)
+        event = ti.select(better, Event.ENTERED_LURE, Event.ENTERED_EMPTY)
     return event
-
-
-@ti.func
-def settle(c: ti.template(), v: ti.template(), base, ant, cell, wanted, carries, moves):
-    """Where the ant is after the tick, whether another one enters its cell, and its event.
-
-    It moves on an empty way; or, with food, it changes places with the ant in its way; or it gives
-    way to an ant with food that wins its cell; or it stays.
-    """
-    # Conditions one inside the other: Taichi works out both sides of an `and`.
-    enters, event, goes, filled = False, FAILED, cell, 0
-    if moves & (wanted != cell):
-        enters = way_is_free(c, v, base, cell, wanted)
-        if ti.static(v.traffic.follow):
-            filled = ti.cast(enters and entering(c, base, cell) >= 0, ti.i32)
-        if ti.static(v.traffic.swap):
-            if not enters:
-                if carries == 1:
-                    if gives_way(c, v, base, wanted):
-                        enters, filled = True, 1
-        if enters:
-            goes, event = wanted, trait(c.event, ant)
-    if ti.static(v.traffic.swap):
-        if not enters:
-            follower = entering(c, base, cell)
-            if follower >= 0:
-                if c.wants[base + follower] & HAS_FOOD != 0 and gives_way(c, v, base, cell):
-                    goes, filled, event = follower, PUSHES, ENTERED_EMPTY
-                    if ti.static(v.traffic.grant):
-                        if moves & (cell + step_ahead(c, ant) == follower):
-                            enters, filled = True, 1
-                            event = trait(c.event, ant)
-    return goes, filled, event, enters
 
 
 @ti.func
@@ -407,33 +273,35 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     cell, wanted = c.cell[ant], c.want[ant]
     carries, heading = trait(c.carries, ant), trait(c.heading, ant)
     moves = action <= RIGHT
-    goes, filled, event, enters = cell, 0, FAILED, False
+    goes, filled, event, enters = cell, False, ti.select(moves, Event.BLOCKED, Event.FAILED), False
     takes = False
     if ti.static(v.traffic.shared):
-        goes, filled, event, enters = settle(c, v, base, ant, cell, wanted, carries, moves)
+        ahead = cell + step_ahead(c, ant)
+        goes, filled, event, enters = settle(
+            *(c.wants, c.compass, v.traffic, base, cell, wanted, ahead, carries, moves),
+            trait(c.event, ant),
+        )
         takes = not moves and wanted != cell
-        put(c.filled, ant, filled)
     else:
-        won = prevails(c, v, base, cell, wanted, tick)
+        won = prevails(c.wants, c.compass, v.traffic, base, cell, wanted, tick)
         enters, takes = won & moves, won & (not moves)
         goes = ti.select(enters, wanted, cell)
-        event = ti.select(enters, move_event(code_in_view(percept, ti.min(action, RIGHT))), FAILED)
-    if filled == 0:
+        event = ti.select(enters, move_event(code_in_view(percept, ti.min(action, RIGHT))), event)
+    if not filled:
         c.ground[base + cell] = EMPTY
     c.want[ant] = cell  # where its mark is
     if carries == 1:
         carried = c.carried[ant]
         if goes != cell:
             deposit(c, v, base + goes, clock, carried)
-        elif action == GIVE and goals_in_view(percept) != 0:
-            event, carries, carried = DELIVERED, 0, -1
+        elif can_give(action, percept):
+            event, carries, carried = ti.cast(Event.DELIVERED, ti.i32), 0, -1
             put(c.carries, ant, 0)
-            if c.turns_at_queen == 1:
-                put(c.heading, ant, turn_round(heading))
+            put(c.heading, ant, heading_after_delivery(heading, c.turns_at_queen))
             tally(c, Tally.DELIVERIES, chunk, 1)
         c.carried[ant] = carried + 1
     elif takes:
-        event, carries = PICKED_UP, 1
+        event, carries = ti.cast(Event.PICKED_UP, ti.i32), 1
         put(c.carries, ant, 1)
         c.carried[ant] = 1
         c.ground[base + wanted] = EMPTY

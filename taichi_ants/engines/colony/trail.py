@@ -1,20 +1,22 @@
-"""Trails of a colony: levels, deposits, evaporation and diffusion.
-
-Integer mode stores the clock at which a trail has evaporated, so that evaporation costs nothing.
-Dense mode (exponential evaporation, diffusion) stores levels as f32 and walks over all cells.
-"""
+"""The trails of a colony in its arrays: expiry clocks in `trail`, or levels in `level` if dense."""
 
 import taichi as ti
 
-from taichi_ants.engines.colony.layout import ADDS, FADES, LINEAR, STANDS_WITH_FOOD
-from taichi_ants.grid.constants import N_HEADINGS
+from taichi_ants.engines.colony.layout import STANDS_WITH_FOOD
 from taichi_ants.task.constants import EMPTY
+from taichi_ants.task.rules.pheromone import (
+    NONE,
+    diffused,
+    evaporated,
+    level_after_deposit,
+    level_left,
+)
 
 
 @ti.func
 def level_of(c: ti.template(), v: ti.template(), place, clock):
     """The trail on a cell: i32, or f32 if dense."""
-    return c.level[place] if ti.static(v.dense) else ti.max(c.trail[place] - clock, 0)
+    return c.level[place] if ti.static(v.dense) else level_left(c.trail[place], clock)
 
 
 @ti.func
@@ -37,13 +39,8 @@ def level_that_counts(c: ti.template(), v: ti.template(), place, clock):
 @ti.func
 def deposit(c: ti.template(), v: ti.template(), place, clock, carried):
     """Lay the trail of an ant that has carried its food for so many ticks, as the task says."""
-    if c.deposits != 0:
-        laid = c.deposit_level
-        if c.deposits == ADDS:
-            laid = ti.min(level_of(c, v, place, clock) + laid, c.cap)
-        elif c.deposits == FADES:
-            laid -= c.slope * ti.min(carried, c.fades_after)
-            laid = ti.max(level_of(c, v, place, clock), laid)
+    if c.deposits != NONE:
+        laid = level_after_deposit(c, c.deposits, level_of(c, v, place, clock), carried)
         if ti.static(v.dense):
             c.level[place] = laid
         else:
@@ -53,34 +50,14 @@ def deposit(c: ti.template(), v: ti.template(), place, clock, carried):
 @ti.func
 def evaporate(c: ti.template(), place):
     """One tick of evaporation of a cell in dense mode."""
-    level = c.level[place]
-    if c.decay == LINEAR:
-        level = ti.max(level - 1.0, 0.0)
-    elif c.decay < 1.0:
-        level *= c.decay
-        if level < 1.0:
-            level = 0.0
-    c.level[place] = level
+    c.level[place] = evaporated(c.level[place], c.decay)
 
 
 @ti.func
 def diffuse(c: ti.template(), place):
-    """Compute the level of a cell after one tick of diffusion.
-
-    The share that is aimed at a wall stays.
-    """
+    """Compute the level of a cell after one tick of diffusion."""
     if c.share > 0.0:
-        level = c.level[place]
-        if c.walls[place] == 0:
-            n_open, received = 0.0, 0.0
-            for heading in ti.static(range(N_HEADINGS)):
-                neighbour = place + c.compass[heading + 1]
-                if c.walls[neighbour] == 0:
-                    n_open += 1.0
-                    received += c.level[neighbour] * c.share
-            # At rate 1 all is given away, and rounding could leave less than nothing.
-            level = ti.max(level - level * c.share * n_open + received, 0.0)
-        c.spare[place] = level
+        c.spare[place] = diffused(c.level, c.walls, c.compass, place, c.share)
 
 
 @ti.func

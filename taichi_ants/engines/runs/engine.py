@@ -22,7 +22,7 @@ from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.learner import Learner
-from taichi_ants.task import Task
+from taichi_ants.task import Pheromone, Task
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.worlds.starts import first_starts
 from taichi_ants.worlds.world import World
@@ -44,15 +44,11 @@ _NO_WORK: dict[str, Any] = {
     "max_steps": 0,
     "size": 0,  # cells of the world
     # The task.
-    "falls": 0,  # by how much a trail falls per tick: 1, or 0 without evaporation
-    "level": 0,  # of a deposit
-    "slope": 0,  # of deposits that fade
-    "fades_after": 0,
+    **Pheromone().numbers,
     "turns_at_queen": 0,
-    "cap": 0,  # of deposits that add
     "regrows": 0,  # 1 if food grows back at once; not while an episode ends at a delivery
-    "continuing": 0,  # 1 if a delivery is no terminal state
-    "rewards": np.zeros(1, np.int32),  # (5,) by event
+    "delivery_terminates": 0,  # 1 if a delivery is a terminal state
+    "rewards": np.zeros(1, np.int32),  # (8,) by `Event`
     # The world.
     "world": np.zeros(1, np.int32),  # (size,) packed cells at the start of an episode
     "trails": np.zeros(1, np.int32),  # (size,) trails at the start, under food too
@@ -145,14 +141,10 @@ def laid_out(worlds: Sequence[World], task: Task, falls: bool) -> dict[str, Any]
 
     `falls` tells whether trails evaporate.
     """
-    pheromone, grid = task.pheromone, worlds[0].grid
+    grid = worlds[0].grid
     return {
         "size": grid.size,
-        "falls": int(falls and pheromone.evaporation == "linear"),
-        "level": pheromone.level,
-        "cap": pheromone.cap or 0,
-        "slope": pheromone.slope or 0,
-        "fades_after": pheromone.fades_after,
+        **(task.pheromone if falls else task.pheromone.lasting).numbers,
         "turns_at_queen": int(task.turns_at_queen),
         "rewards": task.rewards.by_event(),
         "world": np.concatenate([pack_cells(world) for world in worlds]),
@@ -178,14 +170,16 @@ class Launcher:
         self._cells, self._headings = first_starts(world, words)
         self.cells_of_a_run = world.grid.size + EXTRA_CELLS
         learns, pheromone = runs.learner is not None, task.pheromone
+        deposits, half = pheromone.numbers["deposits"], pheromone.view == "half"
         self._kernel = run_kernel(
-            *(runs.learner, task.sees, pheromone.deposit, pheromone.view == "half", traced),
+            *(runs.learner, task.sees, deposits, half, traced),
             self._arguments.type_of(_NO_WORK),
         )
         compile_once(self._kernel, lambda: Arguments().pack(_NO_WORK))
         falls = task.evaporation_in_training if learns else task.evaporation_in_evaluation
         self._values = _NO_WORK | laid_out([world], task, falls)
-        self._values |= {"max_steps": max_steps, "continuing": int(task.delivery == "continuing")}
+        terminates = int(task.delivery != "continuing")
+        self._values |= {"max_steps": max_steps, "delivery_terminates": terminates}
 
     def launch(self, some: slice, episodes: slice, **arrays: Any) -> None:
         """Do some episodes of some runs; what comes out is written into the arrays."""

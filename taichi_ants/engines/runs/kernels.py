@@ -27,8 +27,10 @@ from taichi_ants.engines.trial import tried
 from taichi_ants.learners.hyperparameters import Hyperparameters
 from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.memory import At, LearnerArrays, Transition, read_rates, values_of
-from taichi_ants.task.constants import DELIVERED, ROW
+from taichi_ants.task.constants import ROW
+from taichi_ants.task.events import Event
 from taichi_ants.task.observations import Observation
+from taichi_ants.task.rules.delivery import step_end
 from taichi_ants.task.rules.policy import chance_of, choose
 from taichi_ants.task.rules.random_bits import advance, bits_of
 
@@ -41,7 +43,7 @@ _PLACES = 2**30 - 1
 def run_kernel(
     learner: Learner | None,
     observation: Observation,
-    deposit: str,
+    deposit: int,
     half: bool,
     traced: bool,
     arguments: Any,
@@ -51,7 +53,7 @@ def run_kernel(
     Args:
         learner: The learner; None for a fixed policy.
         observation: What row of its table an ant looks at.
-        deposit: How trails are laid, see `Pheromone`.
+        deposit: How trails are laid, see `rules.pheromone`.
         half: Whether trails of half the strongest look like one, see `Pheromone.view`.
         traced: Record each step too, in `n_episodes * max_steps` rows for each run.
         arguments: The type of the argument pack, which `engine` lists.
@@ -125,7 +127,7 @@ def run_kernel(
                     next_action, ant.random_state = decide(a, at.table, ant, state, explore_below)
                     if ti.static(traced):
                         next_chance = chance(a, at.table, state, next_action, explore_below)
-                while step < a.max_steps and ant.event != DELIVERED:
+                while step < a.max_steps and ant.event != Event.DELIVERED:
                     action = next_action
                     if ti.static(not on_policy):
                         action, ant.random_state = decide(a, at.table, ant, state, explore_below)
@@ -137,13 +139,13 @@ def run_kernel(
                             )
                     before = ant
                     ant = act(deposit, a, base, ant, percept, action, clock)
-                    clock += a.falls
+                    clock += a.evaporates
                     reward = a.rewards[ant.event]
                     total += reward
                     seen = percept_of(half, a, base, ant, clock)
                     next_state = state_of(a, base, ant, clock, seen)
-                    delivered = ti.cast(ant.event == DELIVERED, ti.i32)
-                    terminated = delivered & (1 - a.continuing)
+                    last = ti.cast(step + 1 == a.max_steps, ti.i32)
+                    terminated, truncated = step_end(ant.event, a.delivery_terminates, 1, last)
                     if ti.static(on_policy):
                         next_action = -1
                         if terminated == 0:
@@ -161,8 +163,7 @@ def run_kernel(
                         next_state=next_state,
                         next_action=next_action,
                         terminated=terminated,
-                        truncated=(delivered | ti.cast(step + 1 == a.max_steps, ti.i32))
-                        & (1 - terminated),
+                        truncated=truncated,
                     )
                     if ti.static(learns):
                         error, ant.random_state = learner.learn(
@@ -180,7 +181,7 @@ def run_kernel(
                     step += 1
                 rng = ant.random_state
                 a.outcomes[RETURNS, i, episode], a.outcomes[STEPS, i, episode] = total, step
-                a.outcomes[DELIVERIES, i, episode] = ti.cast(ant.event == DELIVERED, ti.i32)
+                a.outcomes[DELIVERIES, i, episode] = ti.cast(ant.event == Event.DELIVERED, ti.i32)
                 restore(a, base, 0, a.cells[base + a.size], a.cells[base + a.size + 1])
                 exploration = ti.max(
                     a.settings[first + MIN_EPSILON],

@@ -38,9 +38,10 @@ class Lockstep:
 
     Attributes:
         arrays: By name, one row for each ant: percepts uint8 and states int32, what it sees;
-            rewards_of float64, terminations and truncations uint8, outcomes uint8 (`Outcome`), what
-            came of its last action; final_states int32 and final_percepts uint8, what it saw when
-            the episode ended that `step` has restarted; and where it stands.
+            rewards_of float64, terminations and truncations uint8, events uint8 (`Event`) and
+            reasons uint8 (`Reason`), the result of its last action; final_states int32 and
+            final_percepts uint8, what it saw when the episode ended that `step` has restarted; and
+            where it stands.
     """
 
     def __init__(
@@ -92,7 +93,8 @@ class Lockstep:
             "rewards_of": np.zeros(n, np.float64),
             "terminations": np.zeros(n, np.uint8),
             "truncations": np.zeros(n, np.uint8),
-            "outcomes": np.zeros(n, np.uint8),
+            "events": np.zeros(n, np.uint8),
+            "reasons": np.zeros(n, np.uint8),
             "final_states": np.zeros(n, np.int32),
             "final_percepts": np.zeros(n, np.uint8),
         }
@@ -130,7 +132,7 @@ class Lockstep:
         arrays, grid = self.arrays, self.worlds[0].grid
         own = self.arrays["shared_cells"] + number * (grid.size + 2)
         ground, levels = unpack_cells(arrays["cells"][own : own + grid.size])
-        trail = np.maximum(levels - arrays["steps"][number] * arrays["falls"], 0)
+        trail = np.maximum(levels - arrays["steps"][number] * arrays["evaporates"], 0)
         one = slice(number, number + 1)
         headings = arrays["headings"][one].astype(np.int32)
         cells, carries = arrays["ant_cells"][one].copy(), arrays["carries"][one].astype(bool)
@@ -150,8 +152,9 @@ class Lockstep:
         from taichi_ants.engines.runs.lockstep_kernel import step_kernel
 
         pheromone, kind = self.task.pheromone, Arguments.type_of(self.arrays)
-        half, serial = pheromone.view == "half", self.n <= _PER_CHUNK
-        return Launch(step_kernel(self.task.sees, pheromone.deposit, half, serial, kind))
+        deposits, half = pheromone.numbers["deposits"], pheromone.view == "half"
+        serial = self.n <= _PER_CHUNK
+        return Launch(step_kernel(self.task.sees, deposits, half, serial, kind))
 
     def __getstate__(self) -> dict[str, Any]:
         """All but what Taichi holds, which is made anew; so copies and pickles go on alike."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import taichi as ti
 
-from taichi_ants.engines.layout import Command, Outcome
+from taichi_ants.engines.layout import Command
 from taichi_ants.engines.runs.step import (
     EXTRA_CELLS,
     Ant,
@@ -20,52 +20,49 @@ from taichi_ants.engines.runs.step import (
     state_seen,
 )
 from taichi_ants.task.constants import (
-    DELIVERED,
-    FAILED,
     FOOD,
     FORWARD,
     PICK_UP,
-    PICKED_UP,
     QUEEN,
-    RIGHT,
 )
+from taichi_ants.task.events import Event, Reason
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.rules.actions import step_towards
+from taichi_ants.task.rules.delivery import step_end
+from taichi_ants.task.rules.pheromone import FADING
 
 
 @ti.func
-def outcome_of(a: ti.template(), base, before, after, action):
-    """What came of an action, as an `Outcome`."""
-    outcome = Outcome.MOVED
-    if after.event == FAILED:
-        if action <= RIGHT:
-            ahead = before.cell + step_towards(a.compass, after.heading, FORWARD)
-            ground = ground_of(a.cells[base + ahead])
-            outcome = Outcome.ROCK_AHEAD
-            if ground == FOOD:
-                outcome = Outcome.FOOD_AHEAD
-            elif ground == QUEEN:
-                outcome = Outcome.QUEEN_AHEAD
-        elif action == PICK_UP:
-            outcome = ti.select(before.carries == 1, Outcome.HAS_FOOD, Outcome.SEES_NO_FOOD)
+def reason_of(a: ti.template(), base, before, after, action):
+    """Why an action was blocked or failed, as a `Reason`."""
+    reason = ti.cast(Reason.NONE, ti.i32)
+    if after.event == Event.BLOCKED:
+        ahead = before.cell + step_towards(a.compass, after.heading, FORWARD)
+        ground = ground_of(a.cells[base + ahead])
+        reason = Reason.ROCK_OR_EDGE_AHEAD
+        if ground == FOOD:
+            reason = Reason.FOOD_AHEAD
+        elif ground == QUEEN:
+            reason = Reason.QUEEN_AHEAD
+    elif after.event == Event.FAILED:
+        if action == PICK_UP:
+            reason = ti.select(
+                before.carries == 1, Reason.CARRIES_FOOD_ALREADY, Reason.NO_FOOD_IN_VIEW
+            )
         else:
-            outcome = ti.select(before.carries == 1, Outcome.SEES_NO_QUEEN, Outcome.HAS_NO_FOOD)
-    elif after.event == PICKED_UP:
-        outcome = Outcome.PICKED_UP
-    elif after.event == DELIVERED:
-        outcome = Outcome.DELIVERED
-    return outcome
+            reason = ti.select(before.carries == 1, Reason.NO_QUEEN_IN_VIEW, Reason.CARRIES_NO_FOOD)
+    return reason
 
 
 @cache
 def step_kernel(
-    observation: Observation, deposit: str, half: bool, serial: bool, arguments: Any
+    observation: Observation, deposit: int, half: bool, serial: bool, arguments: Any
 ) -> Callable[..., None]:
     """The kernel; it is compiled on first use.
 
     Args:
         observation: What row of its table an ant looks at.
-        deposit: How trails are laid, see `Pheromone`.
+        deposit: How trails are laid, see `rules.pheromone`.
         half: Whether trails of half the strongest look like one, see `Pheromone.view`.
         serial: Whether one thread does all, which saves to wake the others.
         arguments: The type of the argument pack, which `lockstep` lists.
@@ -77,7 +74,7 @@ def step_kernel(
         """Write down an ant."""
         a.ant_cells[i] = ant.cell
         a.headings[i], a.carries[i] = ti.cast(ant.heading, ti.u8), ti.cast(ant.carries, ti.u8)
-        if ti.static(deposit == "fading"):
+        if ti.static(deposit == FADING):
             a.carried[i] = ant.carried
 
     @ti.func
@@ -102,7 +99,7 @@ def step_kernel(
         """An action of an ant; returns whether the episode has ended."""
         before = Ant(origin=origin, cell=a.ant_cells[i], heading=ti.cast(a.headings[i], ti.i32))
         before.carries = ti.cast(a.carries[i], ti.i32)
-        if ti.static(deposit == "fading"):
+        if ti.static(deposit == FADING):
             before.carried = a.carried[i]
         if action == PICK_UP:  # only which of several foods it takes is left to chance
             before.random_state = a.random_states[i]
@@ -110,19 +107,20 @@ def step_kernel(
         # they stay in the processor's cache.
         changed = ti.cast(a.changed[i], ti.i32)
         base = ti.select((changed == 1) | (action == PICK_UP), own, origin)
-        clock, percept = a.steps[i] * a.falls, ti.cast(a.percepts[i], ti.i32)
+        clock, percept = a.steps[i] * a.evaporates, ti.cast(a.percepts[i], ti.i32)
         after = act(deposit, a, base, before, percept, action, clock)
-        a.outcomes[i] = ti.cast(outcome_of(a, base, before, after, action), ti.u8)
-        if after.event == PICKED_UP:
+        a.events[i] = ti.cast(after.event, ti.u8)
+        a.reasons[i] = ti.cast(reason_of(a, base, before, after, action), ti.u8)
+        if after.event == Event.PICKED_UP:
             changed, a.random_states[i] = 1, after.random_state
         a.changed[i] = ti.cast(changed, ti.u8)
         a.steps[i] = a.steps[i] + 1
         put(a, i, after)
-        look(a, i, ti.select(changed == 1, own, origin), after, clock + a.falls)
-        delivered = ti.cast(after.event == DELIVERED, ti.i32)
-        terminated = delivered & a.delivery_terminates
-        last = ti.cast(a.steps[i] == a.max_steps, ti.i32) | delivered & a.delivery_truncates
-        truncated = last & (1 - terminated)
+        look(a, i, ti.select(changed == 1, own, origin), after, clock + a.evaporates)
+        last = ti.cast(a.steps[i] == a.max_steps, ti.i32)
+        terminated, truncated = step_end(
+            after.event, a.delivery_terminates, a.delivery_truncates, last
+        )
         a.rewards_of[i] = a.rewards[after.event]
         a.terminations[i], a.truncations[i] = ti.cast(terminated, ti.u8), ti.cast(truncated, ti.u8)
         return terminated | truncated
@@ -140,7 +138,8 @@ def step_kernel(
                         a.final_states[i], a.final_percepts[i] = a.states[i], a.percepts[i]
                         begin(a, i, own, origin)
                 elif a.commands[i] == Command.BEGIN:
-                    a.rewards_of[i], a.outcomes[i] = 0.0, ti.cast(Outcome.NONE, ti.u8)
+                    a.rewards_of[i], a.events[i] = 0.0, ti.cast(Event.NONE, ti.u8)
+                    a.reasons[i] = ti.cast(Reason.NONE, ti.u8)
                     a.terminations[i], a.truncations[i] = ti.cast(0, ti.u8), ti.cast(0, ti.u8)
                     begin(a, i, own, origin)
 

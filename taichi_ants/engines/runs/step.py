@@ -10,15 +10,12 @@ from taichi.math import popcnt
 from taichi_ants.engines.looks import is_percept, judge, look_type, row_function
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task.constants import (
-    DELIVERED,
-    FAILED,
     FORWARD,
-    GIVE,
     LEFT,
     PICK_UP,
-    PICKED_UP,
     RIGHT,
 )
+from taichi_ants.task.events import Event
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.rules.actions import (
     is_open,
@@ -27,6 +24,8 @@ from taichi_ants.task.rules.actions import (
     turn,
     turn_round,
 )
+from taichi_ants.task.rules.delivery import can_give, heading_after_delivery
+from taichi_ants.task.rules.pheromone import FADING, NONE, level_after_deposit, level_left
 from taichi_ants.task.rules.policy import bit_number, lowest_bit_number
 from taichi_ants.task.rules.random_bits import draw_below
 from taichi_ants.task.rules.vision import (
@@ -62,21 +61,14 @@ def restore(a: ti.template(), base, origin, first, last):
 
 
 @ti.func
-def lay(kind: ti.template(), a: ti.template(), base, cell, clock, trail, carried):
-    """Lay a trail on an empty cell, stored as the clock at which it will have evaporated.
+def lay(kind: ti.template(), a: ti.template(), base, cell, clock, expiry, carried):
+    """Lay a trail on an empty cell.
 
-    `kind` is the deposit of the task's pheromone, `trail` what is stored there so far, `carried`
-    for how many ticks the ant has carried its food.
+    `kind` is the deposit, see `rules.pheromone`, `expiry` the clock that is stored there so far,
+    `carried` for how many ticks the ant has carried its food.
     """
-    if ti.static(kind == "set"):
-        a.cells[base + cell] = clock + a.level
-    elif ti.static(kind == "add"):
-        a.cells[base + cell] = clock + ti.min(ti.max(trail - clock, 0) + a.level, a.cap)
-    elif ti.static(kind == "fading"):
-        fresh = a.level - a.slope * ti.min(carried, a.fades_after)
-        a.cells[base + cell] = ti.max(trail, clock + fresh)
-    else:
-        a.cells[base + cell] = trail
+    level = level_after_deposit(a, kind, level_left(expiry, clock), carried)
+    a.cells[base + cell] = clock + level
     a.cells[base + a.size] = ti.min(a.cells[base + a.size], cell)
     a.cells[base + a.size + 1] = ti.max(a.cells[base + a.size + 1], cell)
 
@@ -125,11 +117,11 @@ def state_seen(observation: Observation, half: bool) -> Callable[..., Any]:
     @ti.func
     def see(a: ti.template(), base, ant, clock, percept):
         here, nearer = base + ant.cell, nearer_from(a.closer[ant.origin + ant.cell], ant.heading)
-        look = look_of(carries=ant.carries, own_level=ti.max(a.cells[here] - clock, 0))
+        look = look_of(carries=ant.carries, own_level=level_left(a.cells[here], clock))
         for k in ti.static(range(len(view))):
             towards = (ant.heading + view[k] + N_HEADINGS) % N_HEADINGS
             cell = a.cells[here + step_towards(a.compass, towards, FORWARD)]
-            look.levels[k] = ti.max(cell - clock, 0)
+            look.levels[k] = level_left(cell, clock)
             look.nearer[k] = nearer >> (view[k] % N_HEADINGS) & 1
             look.codes[k] = ground_of(cell)
         ahead = ti.max(look.levels[left], look.levels[forward])
@@ -149,7 +141,7 @@ def _percept_itself(a: ti.template(), base, ant, clock, percept):
 def act(deposit: ti.template(), a: ti.template(), base, ant, percept, action, clock):
     """The ant after its action, with the event; the cells it changes are changed."""
     after = ant
-    after.event = FAILED
+    after.event = Event.FAILED
     if action <= RIGHT:
         after.heading = turn(a.compass, ant.heading, action)
         code = code_in_view(percept, action)
@@ -157,7 +149,7 @@ def act(deposit: ti.template(), a: ti.template(), base, ant, percept, action, cl
         if is_open(code):
             after.cell += step_towards(a.compass, after.heading, FORWARD)
             if ant.carries == 1:
-                if ti.static(deposit != "none"):
+                if ti.static(deposit != NONE):
                     before = a.cells[base + after.cell]
                     lay(deposit, a, base, after.cell, clock, before, ant.carried)
     else:
@@ -173,12 +165,11 @@ def act(deposit: ti.template(), a: ti.template(), base, ant, percept, action, cl
             lay(deposit, a, base, ant.cell, clock, a.cells[base + ant.cell], 0)
             after.heading = turn_round(ant.heading)
             after.carries = 1
-            after.event = PICKED_UP
-        elif goals != 0 and action == GIVE and ant.carries == 1:
+            after.event = Event.PICKED_UP
+        elif ant.carries == 1 and can_give(action, percept):
             after.carries = 0
-            if a.turns_at_queen == 1:
-                after.heading = turn_round(ant.heading)
-            after.event = DELIVERED
-    if ti.static(deposit == "fading"):
+            after.heading = heading_after_delivery(ant.heading, a.turns_at_queen)
+            after.event = Event.DELIVERED
+    if ti.static(deposit == FADING):
         after.carried = (ant.carried + 1) * after.carries
     return after

@@ -19,7 +19,8 @@ from taichi_ants.engines.runs.results import RunState
 from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
-from taichi_ants.task.constants import DELIVERED, EPISODE_STEPS, N_ACTIONS
+from taichi_ants.task.constants import EPISODE_STEPS, N_ACTIONS
+from taichi_ants.task.events import Event
 from taichi_ants.worlds.world import World
 
 MAX_ROLLOUT_STEPS = 1_000_000
@@ -64,8 +65,7 @@ class Trace(Record):
         rewards: int32 (n,).
         next_percepts, next_states: int32 (n,), what the ant sees after the step.
         terminated: bool (n,), whether the learner took the next state as terminal.
-        events: int32 (n,), what came of the action: ENTERED_EMPTY, ENTERED_LURE, FAILED, PICKED_UP
-            or DELIVERED, see `taichi_ants.task.constants`.
+        events: int32 (n,), the results of the actions, see `Event`.
         q_values: float32 (n, 5), the action values of the state when the action was chosen.
         td_errors: float32 (n,), of the update after the step; None without learning.
         tables: float32 (n, n_states, 5), the Q-table after the step; None without learning.
@@ -95,7 +95,7 @@ class Trace(Record):
     @property
     def delivered(self) -> np.ndarray:
         """Whether the food was given to the queen, bool (n,)."""
-        return self.events == DELIVERED
+        return self.events == Event.DELIVERED
 
 
 def rollout(

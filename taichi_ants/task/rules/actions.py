@@ -3,7 +3,8 @@
 import taichi as ti
 
 from taichi_ants.grid.constants import N_HEADINGS
-from taichi_ants.task.constants import FAILED, LEFT, RIGHT
+from taichi_ants.task.constants import LEFT, RIGHT
+from taichi_ants.task.events import Event
 
 # A compass is an i32 array of 294: the index steps to the left, forward and right cell of heading h
 # at h, h + 1 and h + 2; the heading after each of the five actions, by action and heading (picking
@@ -63,8 +64,8 @@ def is_open(code):
 
 @ti.func
 def move_event(code):
-    """What comes of a move to a cell that looks like this: ENTERED_EMPTY, ENTERED_LURE, FAILED."""
-    return ti.select(is_open(code), code, FAILED)
+    """The event of a move to a cell that looks like this."""
+    return ti.select(is_open(code), code + Event.ENTERED_EMPTY, Event.BLOCKED)
 
 
 @ti.func

@@ -7,7 +7,6 @@ import pytest
 
 from taichi_ants import Colony, TrainingConfig, World
 from taichi_ants.grid.randomness import GAMMA, mix
-from taichi_ants.learners.policies import random_policy
 from taichi_ants.task import Life, Task
 from taichi_ants.task.constants import EMPTY, FOOD, FORWARD, GIVE, LEFT, PICK_UP, RIGHT
 
@@ -15,10 +14,8 @@ TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 0.0, 1.0)
 
 
 def begun(world: World, ants: int, life: Life = Life()) -> Colony:  # noqa: B008
-    """A colony in its first episode that learns nothing."""
-    task = Task(life=life)
-    table = random_policy()
-    colony = Colony(world, task, TRAINING, ants=ants, sharing="fixed", q_values=table)
+    """A colony in its first episode whose ants do what they are given."""
+    colony = Colony(world, Task(life=life), None, ants=ants, sharing="fixed")
     colony.begin_episode()
     return colony
 
@@ -26,8 +23,7 @@ def begun(world: World, ants: int, life: Life = Life()) -> Colony:  # noqa: B008
 def act(world: World, actions: list[int], life: Life = Life()) -> Colony:  # noqa: B008
     """One tick in which the listed ants do these actions."""
     colony = begun(world, len(actions), life)
-    colony.arrays["action"][:] = actions
-    colony.tick()
+    colony.act(np.array([actions]))
     return colony
 
 
@@ -111,8 +107,7 @@ def test_six_ants_around_the_queen_all_give_in_one_tick():
     colony = begun(world, 6)
     colony.arrays["carries"][:] = 1
     colony.arrays["percept"][:] = 64 | 3 << 2  # the queen ahead
-    colony.arrays["action"][:] = GIVE
-    colony.tick()
+    colony.act(np.full((1, 6), GIVE))
     assert [ant[2:] for ant in ants(colony)] == [(0, 10)] * 6
     assert [ant[1] for ant in ants(colony)] == [(h + 3) % 6 for h in range(6)]
     assert colony.outcome().deliveries[0, 0] == 6
@@ -128,8 +123,7 @@ def test_ants_look_like_obstacles_to_each_other():
     world = World((8, 8, 1), (0, 7, 0), ants=[((2, 2, 0), 0), ((3, 2, 0), 0)])
     colony = begun(world, 2)
     assert colony.arrays["percept"][0] >> 2 & 3 == 1
-    colony.arrays["action"][:] = [PICK_UP, RIGHT]  # the second moves away
-    colony.tick()
+    colony.act(np.array([[PICK_UP, RIGHT]]))  # the second moves away
     assert colony.arrays["percept"][0] >> 2 & 3 == 0
 
 

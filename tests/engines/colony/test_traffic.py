@@ -57,7 +57,8 @@ def after_a_tick(
     task = Task(traffic=traffic, rewards=rewards, pheromone=Pheromone(deposit="none"))
     given = (world, task, TRAINING, 0, len(row))
     options = {"sharing": "fixed", "q_values": random_policy()}
-    kernels, plain = Colony(*given, **options), ReferenceColony(*given, **options)
+    kernels = Colony(world, task, None, 0, len(row), sharing="fixed")
+    plain = ReferenceColony(*given, **options)
     kernels.begin_episode()
     plain.begin_episode()
     arrays = kernels.arrays
@@ -65,11 +66,10 @@ def after_a_tick(
         ant = plain.ants[slot]
         ant.carries, ant.chosen = one.food, one.action
         plain.look(ant)
-        arrays["carries"][slot], arrays["action"][slot] = one.food, one.action
-        arrays["percept"][slot] = ant.percept
+        arrays["carries"][slot], arrays["percept"][slot] = one.food, ant.percept
         if one.food:
             arrays["ground"][arrays["cell"][slot]] = OBSTACLE | STANDS_WITH_FOOD << 4
-    kernels.tick()
+    kernels.act(np.array([[one.action for one in row]]))
     plain.tick()
     cells = kernels.snapshot().grid.cells(arrays["cell"])
     payments = arrays["rewards"][arrays["event"]]
@@ -193,13 +193,10 @@ def test_a_ring_of_three_ants_stays(traffic):
     steps = [places[(k + 1) % 3] - places[k] for k in range(3)]
     headings = [grid.offsets.tolist().index(step) for step in steps]
     world = World((12, 8, 1), (0, 7, 0), ants=list(zip(cells, headings, strict=True)))
-    colony = Colony(
-        *(world, Task(traffic=traffic), TRAINING, 0, 3), sharing="fixed", q_values=random_policy()
-    )
+    colony = Colony(world, Task(traffic=traffic), None, 0, 3, sharing="fixed")
     colony.begin_episode()
-    colony.arrays["action"][:] = FORWARD
     before = colony.arrays["cell"].tolist()
-    colony.tick()
+    colony.act(np.full((1, 3), FORWARD))
     assert colony.arrays["cell"].tolist() == before
     assert int(colony.outcome().blocked[0, 0]) == 3
 

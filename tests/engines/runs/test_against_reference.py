@@ -20,10 +20,11 @@ from taichi_ants import (
     trace_training,
     train,
 )
-from taichi_ants.reference.ants import Event, starts
+from taichi_ants.reference.ants import starts
 from taichi_ants.settings import declared
 from taichi_ants.task import Life, Pheromone, Task, observations
 from taichi_ants.task.constants import DEPOSIT_LEVEL
+from taichi_ants.task.events import Event
 from taichi_ants.worlds import World, paper
 
 DELIVERIES = ("absorbing", "continuing")

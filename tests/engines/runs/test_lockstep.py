@@ -9,11 +9,10 @@ from random_rewards import random_rewards
 from random_worlds import random_world
 
 from taichi_ants import Life, Pheromone, Task, runtime
-from taichi_ants.engines.layout import Outcome
 from taichi_ants.engines.runs.lockstep import Lockstep
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.reference.ants import Event
 from taichi_ants.task.constants import GIVE, PICK_UP
+from taichi_ants.task.events import Event, Reason
 from taichi_ants.worlds import World, from_text, paper, starts
 
 # Each is a kernel of its own: observation, deposit, view.
@@ -23,16 +22,6 @@ KERNELS = [
     ("queues", "fading", "strongest_under_carriers"),
     ("trail_levels", "none", "half"),
 ]
-EVENTS = {
-    Event.MOVED: {Outcome.MOVED},
-    Event.BLOCKED: {Outcome.ROCK_AHEAD, Outcome.FOOD_AHEAD, Outcome.QUEEN_AHEAD},
-    Event.PICKED_UP: {Outcome.PICKED_UP},
-    Event.DELIVERED: {Outcome.DELIVERED},
-    Event.FAILED: {
-        *(Outcome.HAS_FOOD, Outcome.SEES_NO_FOOD),
-        *(Outcome.HAS_NO_FOOD, Outcome.SEES_NO_QUEEN),
-    },
-}
 
 
 def plain(world: World, task: Task, seed: int, ends: str, falls: bool) -> ReferenceColony:
@@ -117,7 +106,8 @@ def test_each_step_equals_the_reference(kernel):
             for i, colony in enumerate(colonies):
                 if begins[i] and not same_step:
                     colony.begin_episode()
-                    assert arrays["outcomes"][i] == Outcome.NONE
+                    assert arrays["events"][i] == Event.NONE
+                    assert arrays["reasons"][i] == Reason.NONE
                     assert arrays["rewards_of"][i] == arrays["terminations"][i] == 0
                     assert arrays["truncations"][i] == 0
                     check_equal(ants, i, colony, world)
@@ -129,7 +119,9 @@ def test_each_step_equals_the_reference(kernel):
                 terminated = gave and ends == "absorbing"
                 last = colony.record.ticks == max_steps or (gave and ends != "endless")
                 assert arrays["rewards_of"][i] == step.reward
-                assert arrays["outcomes"][i] in EVENTS[step.event]
+                assert arrays["events"][i] == step.event
+                succeeds = step.event not in (Event.BLOCKED, Event.FAILED)
+                assert (arrays["reasons"][i] == Reason.NONE) == succeeds
                 assert arrays["terminations"][i] == terminated
                 assert arrays["truncations"][i] == (last and not terminated)
                 if last and same_step:
@@ -159,23 +151,23 @@ BEFORE_QUEEN = """
 
 
 @pytest.mark.parametrize(
-    ("drawing", "actions", "outcomes"),
+    ("drawing", "actions", "reasons"),
     [
-        (BESIDE_FOOD, [1, 4, 2], ["ROCK_AHEAD", "HAS_NO_FOOD", "FOOD_AHEAD"]),
-        (BESIDE_FOOD, [3, 4, 3], ["PICKED_UP", "SEES_NO_QUEEN", "HAS_FOOD"]),
-        (BESIDE_FOOD, [3, 1, 1], ["PICKED_UP", "MOVED", "ROCK_AHEAD"]),  # the edge of the world
-        (BEFORE_QUEEN, [1, 3, 0], ["QUEEN_AHEAD", "SEES_NO_FOOD", "MOVED"]),
+        (BESIDE_FOOD, [1, 4, 2], ["ROCK_OR_EDGE_AHEAD", "CARRIES_NO_FOOD", "FOOD_AHEAD"]),
+        (BESIDE_FOOD, [3, 4, 3], ["NONE", "NO_QUEEN_IN_VIEW", "CARRIES_FOOD_ALREADY"]),
+        (BESIDE_FOOD, [3, 1, 1], ["NONE", "NONE", "ROCK_OR_EDGE_AHEAD"]),  # the edge of the world
+        (BEFORE_QUEEN, [1, 3, 0], ["QUEEN_AHEAD", "NO_FOOD_IN_VIEW", "NONE"]),
     ],
 )
-def test_outcomes_say_why_nothing_happened(drawing, actions, outcomes):
+def test_reasons_say_why_nothing_happened(drawing, actions, reasons):
     ants = Lockstep([from_text(drawing)], Task(), 1, 100, "endless", falls=False)
     ants.seed([0], np.arange(1))
     ants.begin(np.ones(1, bool))
     told = []
     for action in actions:
         ants.step(np.array([action]))
-        told.append(Outcome(ants.arrays["outcomes"][0]).name)
-    assert told == outcomes
+        told.append(Reason(ants.arrays["reasons"][0]).name)
+    assert told == reasons
 
 
 def test_ants_of_different_worlds_and_threads_do_not_meet():

@@ -1,21 +1,24 @@
-"""Codes of what an action did, which environments return in their infos."""
+"""The results of actions: what happened, and why nothing did."""
 
 from __future__ import annotations
 
 from enum import IntEnum, auto
 
+from taichi_ants.task.constants import SEES_EMPTY, SEES_LURE
+
 
 class Event(IntEnum):
-    """The result of an ant's last action: `info["event"]`.
+    """The result of an ant's last action, by which rewards go; `Event(code).name` is its name.
 
-    `Event(code).name` is its name.
+    That of a move is how the entered cell looked, plus 1.
     """
 
     NONE = 0  # the ant has not acted in this episode
-    MOVED = auto()
+    ENTERED_EMPTY = SEES_EMPTY + 1
+    BLOCKED = auto()  # a move that only turned the ant
+    ENTERED_LURE = SEES_LURE + 1  # a trail, or with food a cell nearer to the queen
     PICKED_UP = auto()
     DELIVERED = auto()
-    BLOCKED = auto()  # a move that only turned the ant
     FAILED = auto()  # a pick-up or a delivery that could not be done
     PUSHED = auto()  # another ant changed places with this one; in colonies only
 
