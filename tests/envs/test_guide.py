@@ -10,6 +10,6 @@ def test_the_guides_examples_work(capsys):
     code = "\n".join(part.split("```")[0] for part in guide.split("```python\n")[1:])
     names: dict = {}
     exec(compile(code, "environments.md", "exec"), names)
-    assert capsys.readouterr().out.startswith("1 [1 1 1 0 0]\n")
+    assert capsys.readouterr().out.startswith("3 [1 1 1 0 0]\n")
     assert names["colony"].states.shape == (8, 64)
     assert names["env"].agents == []

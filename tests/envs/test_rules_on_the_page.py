@@ -74,16 +74,16 @@ class Page:
         return codes
 
     def step(self, action: int) -> tuple[int, bool, bool, dict[str, Any]]:
-        codes, event, reason, reward = self.codes(), 5, 0, -1
+        codes, event, reason, reward = self.codes(), 6, 0, -1
         if action <= 2:
             self.heading = (self.heading + action - 1) % 6
             target = ahead(self.cell, self.heading)
             if codes[action] in (0, 2):
-                self.cell, event, reward = target, 1, codes[action] // 2
+                self.cell, event, reward = target, 1 + codes[action], codes[action] // 2
                 if self.load:
                     self.trail[target] = 250
             else:
-                event, reason = 4, self.content(target)
+                event, reason = 2, self.content(target)
         elif action == 3:
             if self.load or 3 not in codes:
                 reason = 4 if self.load else 5
@@ -93,16 +93,16 @@ class Page:
                     self.holds[food] = EMPTY
                 self.trail[food] = self.trail[self.cell] = 250
                 self.heading, self.load = (self.heading + 3) % 6, 1
-                event, reward = 2, 3
+                event, reward = 4, 3
         elif not self.load or 3 not in codes:
             reason = 7 if self.load else 6
         else:
-            self.load, event, reward = 0, 3, 10
+            self.load, event, reward = 0, 5, 10
         if self.evaporates:
             self.trail = {cell: max(level - 1, 0) for cell, level in self.trail.items()}
         self.steps += 1
-        terminated = event == 3 and self.delivery == "absorbing"
-        over = self.steps == self.limit or (event == 3 and self.delivery == "continuing")
+        terminated = event == 5 and self.delivery == "absorbing"
+        over = self.steps == self.limit or (event == 5 and self.delivery == "continuing")
         return reward, terminated, over and not terminated, self.info(event, reason)
 
     def info(self, event: int, reason: int) -> dict[str, Any]:

@@ -238,7 +238,7 @@ def resolve(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     A move is judged before any ant lays a trail.
     """
     base, cell, wanted = w * c.size, c.cell[ant], c.want[ant]
-    won = prevails(c.wants, c.compass, v.traffic, base, cell, wanted, tick)
+    won = prevails(c, v.traffic, base, cell, wanted, tick)
     c.wants[base + cell] = c.wants[base + cell] | ti.cast(ti.select(won, WINS, 0), ti.u8)
     c.want[ant] = ti.select(won, wanted, cell)
     put(c.event, ant, event_of(c, v, base, ant, tick * c.evaporates))
@@ -257,7 +257,7 @@ def event_of(c: ti.template(), v: ti.template(), base, ant, clock):
     event = move_event(code_in_view(percept, ti.min(action, RIGHT)))
     here = base + c.cell[ant]
     ahead = here + step_ahead(c, ant)
-    if had_ant(c.wants, ahead):  # seldom, so that few trails are read
+    if had_ant(c, ahead):  # seldom, so that few trails are read
         rises = level_of(c, v, ahead, clock) > level_of(c, v, here, clock)
         nearer = ti.cast(c.closer[here], ti.i32) >> trait(c.heading, ant) & 1 == 1
         better = ti.select(trait(c.carries, ant) == 1, nearer, rises)
@@ -278,12 +278,11 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     if ti.static(v.traffic.shared):
         ahead = cell + step_ahead(c, ant)
         goes, filled, event, enters = settle(
-            *(c.wants, c.compass, v.traffic, base, cell, wanted, ahead, carries, moves),
-            trait(c.event, ant),
+            *(c, v.traffic, base, cell, wanted, ahead, carries, moves, trait(c.event, ant))
         )
         takes = not moves and wanted != cell
     else:
-        won = prevails(c.wants, c.compass, v.traffic, base, cell, wanted, tick)
+        won = prevails(c, v.traffic, base, cell, wanted, tick)
         enters, takes = won & moves, won & (not moves)
         goes = ti.select(enters, wanted, cell)
         event = ti.select(enters, move_event(code_in_view(percept, ti.min(action, RIGHT))), event)

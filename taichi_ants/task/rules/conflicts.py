@@ -6,7 +6,8 @@ key wins, a hash of the cell it stands on and the tick. So neither ant numbers n
 and nothing is atomic: each ant writes a mark, what it wants, into `wants` at its own cell, and
 reads the marks of the six cells around what it wants.
 
-`base` is where the cells of a world begin in `wants`; other cells are numbers within the world.
+`c` has the arrays `wants` and `compass`, see `rules.actions`; `base` is where the cells of a world
+begin in `wants`; other cells are numbers within the world.
 """
 
 import taichi as ti
@@ -39,57 +40,50 @@ def wanting(kind, heading):
 
 
 @ti.func
-def prevails(
-    wants: ti.template(), compass: ti.template(), traffic: ti.template(), base, cell, wanted, tick
-):  # fmt: skip
+def prevails(c: ti.template(), traffic: ti.template(), base, cell, wanted, tick):
     """Whether the ant on a cell gets what it wants; one that wants nothing wants its own cell."""
-    kind = ti.cast(wants[base + cell], ti.i32) & 8  # 8 to take, else 0
+    kind = ti.cast(c.wants[base + cell], ti.i32) & 8  # 8 to take, else 0
     rivals = -1  # the ant itself is found too
     for heading in ti.static(range(N_HEADINGS)):
-        other = ti.cast(wants[base + wanted + compass[heading + 1]], ti.i32) & MARK
+        other = ti.cast(c.wants[base + wanted + c.compass[heading + 1]], ti.i32) & MARK
         rivals += ti.cast(other == wanting(kind, heading), ti.i32)
     won = wanted != cell
     if rivals > 0:
-        won = won and wins(wants, compass, traffic, base, cell, wanted, kind, tick)
+        won = won and wins(c, traffic, base, cell, wanted, kind, tick)
     return won
 
 
 @ti.func
-def wins(
-    wants: ti.template(), compass: ti.template(), traffic: ti.template(),
-    base, cell, wanted, kind, tick,
-):  # fmt: skip
+def wins(c: ti.template(), traffic: ti.template(), base, cell, wanted, kind, tick):
     """Whether no other ant that wants the same comes before the one on `cell`."""
     own, won = conflict_key(cell, tick), True
     for heading in range(N_HEADINGS):
-        other = wanted + compass[heading + 1]
-        mark = ti.cast(wants[base + other], ti.i32) & MARK
+        other = wanted + c.compass[heading + 1]
+        mark = ti.cast(c.wants[base + other], ti.i32) & MARK
         if mark == wanting(kind, heading) and other != cell:
             after = conflict_key(other, tick) > own
             if ti.static(traffic.carriers_first):
-                loaded = wants[base + cell] & HAS_FOOD
-                other_loaded = wants[base + other] & HAS_FOOD
+                loaded = c.wants[base + cell] & HAS_FOOD
+                other_loaded = c.wants[base + other] & HAS_FOOD
                 after = loaded > other_loaded or (loaded == other_loaded and after)
             won = won and after
     return won
 
 
 @ti.func
-def had_ant(wants: ti.template(), place):
+def had_ant(c: ti.template(), place):
     """Whether an ant stood on a cell at the start of the tick; there all have a mark."""
-    return wants[place] != 0
+    return c.wants[place] != 0
 
 
 @ti.func
-def heading_wanted(wants: ti.template(), place):
+def heading_wanted(c: ti.template(), place):
     """The heading at which the ant on a cell wants to enter the next one."""
-    return (ti.cast(wants[place], ti.i32) & MARK) - ENTER
+    return (ti.cast(c.wants[place], ti.i32) & MARK) - ENTER
 
 
 @ti.func
-def way_is_free(
-    wants: ti.template(), compass: ti.template(), traffic: ti.template(), base, cell, wanted
-):  # fmt: skip
+def way_is_free(c: ti.template(), traffic: ti.template(), base, cell, wanted):
     """Whether the winner on `cell` enters a cell that is empty, or whose ant moves on as it does.
 
     The winners of cells with ants form queues; one moves if its head enters an empty cell. A queue
@@ -99,46 +93,43 @@ def way_is_free(
     if ti.static(traffic.follow):
         moving = True
         while moving:
-            moving = had_ant(wants, base + ahead) and ahead != cell
-            moving = moving and wants[base + ahead] & (WINS | TAKES_FOOD) == WINS
+            moving = had_ant(c, base + ahead) and ahead != cell
+            moving = moving and c.wants[base + ahead] & (WINS | TAKES_FOOD) == WINS
             if moving:
-                ahead += compass[heading_wanted(wants, base + ahead) + 1]
-    return not had_ant(wants, base + ahead)
+                ahead += c.compass[heading_wanted(c, base + ahead) + 1]
+    return not had_ant(c, base + ahead)
 
 
 @ti.func
-def entering(wants: ti.template(), compass: ti.template(), base, cell):
+def entering(c: ti.template(), base, cell):
     """The cell of the ant that wins the cell of another one, -1 if nobody does."""
     found = -1
     for heading in ti.static(range(N_HEADINGS)):
-        other = cell + compass[heading + 1]
-        mark = ti.cast(wants[base + other], ti.i32) & (MARK | WINS)
+        other = cell + c.compass[heading + 1]
+        mark = ti.cast(c.wants[base + other], ti.i32) & (MARK | WINS)
         found = ti.select(mark == wanting(WINS, heading), other, found)
     return found
 
 
 @ti.func
-def gives_way(
-    wants: ti.template(), compass: ti.template(), traffic: ti.template(), base, cell
-):  # fmt: skip
+def gives_way(c: ti.template(), traffic: ti.template(), base, cell):
     """Whether the ant on a cell gives way to one with food that wins its cell.
 
     Where ants follow, one that moves is never asked: then the other one moves as well.
     """
-    mark = wants[base + cell]
+    mark = c.wants[base + cell]
     stays = mark & (HAS_FOOD | TAKES_FOOD) == 0
     if ti.static(not traffic.follow):
         if stays and mark & WINS != 0:
-            ahead = cell + compass[heading_wanted(wants, base + cell) + 1]
-            stays = had_ant(wants, base + ahead)
+            ahead = cell + c.compass[heading_wanted(c, base + cell) + 1]
+            stays = had_ant(c, base + ahead)
     return stays
 
 
 @ti.func
 def settle(
-    wants: ti.template(), compass: ti.template(), traffic: ti.template(),
-    base, cell, wanted, ahead, carries, moves, entered,
-):  # fmt: skip
+    c: ti.template(), traffic: ti.template(), base, cell, wanted, ahead, carries, moves, entered
+):
     """Where an ant is after the tick, whether another one takes its place, and its event.
 
     It moves on an empty way; or, with food, it changes places with the ant in its way; or it gives
@@ -157,23 +148,21 @@ def settle(
     enters, goes, filled = False, cell, False
     event = ti.select(moves, Event.BLOCKED, Event.FAILED)
     if moves & (wanted != cell):
-        enters = way_is_free(wants, compass, traffic, base, cell, wanted)
+        enters = way_is_free(c, traffic, base, cell, wanted)
         if ti.static(traffic.follow):
-            filled = enters and entering(wants, compass, base, cell) >= 0
+            filled = enters and entering(c, base, cell) >= 0
         if ti.static(traffic.swap):
             if not enters:
                 if carries == 1:
-                    if gives_way(wants, compass, traffic, base, wanted):
+                    if gives_way(c, traffic, base, wanted):
                         enters, filled = True, True
         if enters:
             goes, event = wanted, entered
     if ti.static(traffic.swap):
         if not enters:
-            follower = entering(wants, compass, base, cell)
+            follower = entering(c, base, cell)
             if follower >= 0:
-                if wants[base + follower] & HAS_FOOD != 0 and gives_way(
-                    wants, compass, traffic, base, cell
-                ):
+                if c.wants[base + follower] & HAS_FOOD != 0 and gives_way(c, traffic, base, cell):
                     goes, filled, event = follower, True, Event.PUSHED
                     if ti.static(traffic.grant):
                         if moves & (ahead == follower):
