@@ -197,7 +197,9 @@ class Setting(NamedTuple):
     @property
     def _kind_in_words(self) -> str:
         if self.kind is str:
-            return f"one of {', '.join(self.allowed_words)}" if self.allowed_words else "text"
+            words = ", ".join(self.allowed_words)
+            registered = ", or that of a plugin" if self.rule.choices else ""
+            return f"one of {words}{registered}" if words else "text"
         if self.is_group:
             words = ", ".join(self.kind.named())  # type: ignore[attr-defined]
             return f"a {self.kind.__name__}" + (f", or one of {words}" if words else "")

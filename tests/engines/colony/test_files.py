@@ -77,14 +77,14 @@ def test_wrong_facts(kept, tmp_path, changes, said) -> None:
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"task": {"observation": "own"}}, "there is no observation 'own'; "),
+        ({"task": {"observation": "own"}}, "`task.observation` is 'own'; "),
         ({"training": {**PLANNING.as_dict(), "learner": "mine"}}, "there is no learner 'mine'; "),
     ],
 )
 def test_a_plugin_that_is_missing_is_asked_for(kept, tmp_path, changes, said) -> None:
     facts = {**json.loads(kept["facts"].item()), **changes}
     archives.write(tmp_path / "x.npz", {**kept, "facts": np.array(json.dumps(facts))})
-    with pytest.raises(AntsError, match=f"{said}.*--plugin"):
+    with pytest.raises(AntsError, match=rf"{said}.*plugin"):
         Colony.load(tmp_path / "x.npz")
 
 

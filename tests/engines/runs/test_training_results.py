@@ -96,7 +96,7 @@ def test_damaged_arrays(stored, tmp_path, name, value, said):
         ({"max_steps": 0}, "max_steps is 0"),
         ({"task": {"delivery": "never"}}, "`task.delivery` is 'never'"),
         ({"task": {"observation": "paper"}}, "of shape (2, 3, 1, 128, 8)"),
-        ({"task": {"observation": "own"}}, "there is no observation 'own'; "),
+        ({"task": {"observation": "own"}}, "`task.observation` is 'own'; "),
         ({"world": {**WORLD, "ranges": [0, 1, 2]}}, "ranges are"),
         ({"world": None}, ""),
         ({"seconds": "long"}, ""),
