@@ -21,13 +21,13 @@ typedef struct {
 typedef struct {
     int32_t pair, next; /* places in the table */
     float reward, discount;
-} Outcome;
+} Transition;
 
-/* The outcomes of all visited pairs, in the order of first visits. */
+/* The transitions of all visited pairs, in the order of first visits. */
 typedef struct {
     int n;
     int16_t place[N_PAIRS]; /* of a pair in this order, from 1 */
-    Outcome outcomes[N_PAIRS];
+    Transition transitions[N_PAIRS];
 } Model;
 
 /* The cell in view at position 0 (left), 1 (forward) or 2 (right). */
@@ -115,20 +115,20 @@ static int choose(const float *values, uint64_t bits, uint64_t explore_below)
     return __builtin_ctz((unsigned)mask);
 }
 
-static void update(float *q, Outcome seen, float next_value, float learning_rate)
+static void update(float *q, Transition seen, float next_value, float learning_rate)
 {
     float error = seen.reward + seen.discount * next_value - q[seen.pair];
     q[seen.pair] += learning_rate * error;
 }
 
-static void plan(float *q, Model *model, Outcome seen, int steps, float learning_rate,
+static void plan(float *q, Model *model, Transition seen, int steps, float learning_rate,
                  uint64_t *random)
 {
     if (model->place[seen.pair] == 0)
         model->place[seen.pair] = (int16_t)++model->n;
-    model->outcomes[model->place[seen.pair] - 1] = seen;
+    model->transitions[model->place[seen.pair] - 1] = seen;
     for (int k = 0; k < steps; k++) {
-        Outcome drawn = model->outcomes[below(draw(random) >> 32, model->n)];
+        Transition drawn = model->transitions[below(draw(random) >> 32, model->n)];
         update(q, drawn, best_of(q + drawn.next), learning_rate);
     }
 }
@@ -158,11 +158,11 @@ static inline __attribute__((always_inline)) int train_run(const World *world, c
             if (learner != SARSA)
                 action = choose(q + state * N_ACTIONS, draw(&ant.random), explore_below);
             int reward = act(world, &ant, state, action);
-            int next = observe(world, &ant), terminated = ant.delivered && !job->continuing;
+            int next = observe(world, &ant), terminated = ant.delivered && !job->delivery_truncates;
             const float *values = q + next * N_ACTIONS;
             if (learner == SARSA && !terminated)
                 next_action = choose(values, draw(&ant.random), explore_below);
-            Outcome seen = {state * N_ACTIONS + action, next * N_ACTIONS, (float)reward,
+            Transition seen = {state * N_ACTIONS + action, next * N_ACTIONS, (float)reward,
                             terminated ? 0.0f : run.discount};
             float next_value = learner == SARSA ? values[next_action] : best_of(values);
             update(q, seen, next_value, run.learning_rate);

@@ -30,7 +30,7 @@ typedef struct {
 
 /* What all runs of a call have in common, and where their results go. */
 typedef struct {
-    int32_t n, learner, planning_steps, continuing, episodes, max_steps, threads;
+    int32_t n, learner, planning_steps, delivery_truncates, episodes, max_steps, threads;
     float *q;         /* (n, 128, 5), the values to begin with */
     int32_t *returns; /* (n, episodes) */
     int32_t *steps;   /* (n, episodes) */

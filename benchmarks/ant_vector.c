@@ -16,8 +16,8 @@ enum { LANES = 16, N_PAIRS = N_STATES * N_ACTIONS };
 enum { TABLE = N_PAIRS + 16 };
 /* A cell holds its `closer`, its level or what is on it above, and the sign if something is. */
 enum { LEVEL_AT = 6, CLOSER = 63, OCCUPIED = INT32_MIN };
-/* What was seen last of a pair: its place in a table, that of the next row, and the outcome. */
-enum { ROW_AT = 11, OUTCOME_AT = 22, PLACE = 2047 };
+/* What was seen last of a pair: its place in a table, that of the next row, and the transition. */
+enum { ROW_AT = 11, TRANSITION_AT = 22, PLACE = 2047 };
 
 #define INLINE static inline __attribute__((always_inline))
 
@@ -48,7 +48,7 @@ typedef struct {
     int32_t running;                       /* lanes with a run */
     int32_t visited[LANES];                /* pairs of state and action */
     int16_t place[LANES][N_PAIRS];         /* of a pair in the order of first visits, from 1 */
-    uint32_t outcomes[LANES][N_PAIRS];     /* from the lowest bit: pair, next row, outcome */
+    uint32_t transitions[LANES][N_PAIRS];     /* from the lowest bit: pair, next row, transition */
     int32_t stride;                        /* from lane to lane of the cells */
     int32_t *cells, *fresh;                /* and how they are at the start of an episode */
 } Memory;
@@ -175,11 +175,11 @@ INLINE Floats value_of(const Floats values[N_ACTIONS], Ints action)
     return chosen;
 }
 
-/* Action values after an update; an outcome is the reward * 2, and 1 more where it is terminal. */
-INLINE Floats updated(const Ants *ants, Floats value, Ints outcome, Floats next_value)
+/* Action values after an update; a transition is the reward * 2, and 1 more where it is terminal. */
+INLINE Floats updated(const Ants *ants, Floats value, Ints transition, Floats next_value)
 {
-    Mask goes_on = _mm512_testn_epi32_mask(outcome, all(1));
-    Floats reward = _mm512_cvtepi32_ps(_mm512_srai_epi32(outcome, 1));
+    Mask goes_on = _mm512_testn_epi32_mask(transition, all(1));
+    Floats reward = _mm512_cvtepi32_ps(_mm512_srai_epi32(transition, 1));
     Floats discount = _mm512_maskz_mov_ps(goes_on, ants->discount);
     Floats error = _mm512_add_ps(reward, _mm512_mul_ps(discount, next_value));
     error = _mm512_sub_ps(error, value);
@@ -327,14 +327,14 @@ INLINE Ints act(const World *world, Memory *memory, Ants *ants, Ints action, Mas
 INLINE void remember(Memory *memory, Ints pair, Ints packed)
 {
     int32_t pairs[LANES] __attribute__((aligned(64)));
-    uint32_t outcomes[LANES] __attribute__((aligned(64)));
+    uint32_t transitions[LANES] __attribute__((aligned(64)));
     _mm512_store_si512(pairs, pair);
-    _mm512_store_si512(outcomes, packed);
+    _mm512_store_si512(transitions, packed);
     for (int i = 0; i < LANES; i++) {
         int16_t *place = &memory->place[i][pairs[i]];
         if (*place == 0)
             *place = (int16_t)++memory->visited[i];
-        memory->outcomes[i][*place - 1] = outcomes[i];
+        memory->transitions[i][*place - 1] = transitions[i];
     }
 }
 
@@ -349,15 +349,15 @@ INLINE void plan(Memory *memory, Ants *ants, int steps)
         draw_some(ants->random, 0xFFFF, &low, &high);
         _mm512_store_si512(at, _mm512_add_epi32(below_some(high, visited), lanes));
         for (int i = 0; i < LANES; i++)
-            seen[i] = memory->outcomes[0][at[i]];
+            seen[i] = memory->transitions[0][at[i]];
         const Ints packed = _mm512_load_si512(seen);
         Ints place = place_of(_mm512_and_si512(packed, all(PLACE)));
         Ints row = _mm512_and_si512(_mm512_srli_epi32(packed, ROW_AT), all(PLACE));
-        Ints outcome = _mm512_srai_epi32(packed, OUTCOME_AT);
+        Ints transition = _mm512_srai_epi32(packed, TRANSITION_AT);
         Floats values[N_ACTIONS];
         load_rows(memory->q, place_of(row), values);
         Floats value = load_values(memory->q, place);
-        store_values(memory->q, place, updated(ants, value, outcome, best_of(values)));
+        store_values(memory->q, place, updated(ants, value, transition, best_of(values)));
     }
 }
 
@@ -472,7 +472,7 @@ INLINE void train_lanes(const World *world, const Job *job, const Run *runs, int
         }
         Mask delivered;
         Ints reward = act(world, memory, &ants, action, &delivered);
-        Mask terminated = job->continuing ? 0 : delivered;
+        Mask terminated = job->delivery_truncates ? 0 : delivered;
         look(world, memory, &ants);
         judge(&ants);
         Ints pair = _mm512_add_epi32(row_of(state), action);
@@ -486,13 +486,13 @@ INLINE void train_lanes(const World *world, const Job *job, const Run *runs, int
         } else {
             next_value = best_of(values);
         }
-        Ints outcome = _mm512_slli_epi32(reward, 1);
-        outcome = _mm512_mask_or_epi32(outcome, terminated, outcome, all(1));
-        Floats value = updated(&ants, value_of(ants.values, action), outcome, next_value);
+        Ints transition = _mm512_slli_epi32(reward, 1);
+        transition = _mm512_mask_or_epi32(transition, terminated, transition, all(1));
+        Floats value = updated(&ants, value_of(ants.values, action), transition, next_value);
         store_values(memory->q, place_of(pair), value);
         if (learner == DYNA_Q) {
             Ints packed = _mm512_or_si512(pair, _mm512_slli_epi32(row, ROW_AT));
-            packed = _mm512_or_si512(packed, _mm512_slli_epi32(outcome, OUTCOME_AT));
+            packed = _mm512_or_si512(packed, _mm512_slli_epi32(transition, TRANSITION_AT));
             remember(memory, pair, packed);
             plan(memory, &ants, job->planning_steps);
             load_rows(memory->q, place_of(row), ants.values);

@@ -49,7 +49,7 @@ class Direction(NamedTuple):
 
 def runs(n: int, observation: str = "paper", episodes: int = 500) -> Work:
     """Training of n runs."""
-    task = Task(delivery="continuing", observation=observation)
+    task = Task(delivery="truncates", observation=observation)
 
     def work() -> int:
         came = train(worlds.paper(), Q_LEARNING, range(n), episodes, task=task)

@@ -14,18 +14,18 @@ import time
 import numpy as np
 
 from taichi_ants import AntsError, Colony, Life, Pheromone, Task, TrainingConfig, runtime, worlds
-from taichi_ants.engines.colony.layout import HomeRow, Stage, WorldRow
+from taichi_ants.engines.colony.layout import FoodSourceRow, Stage, WorldRow
 from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
 from taichi_ants.task import Traffic
 from taichi_ants.task.constants import EMPTY, FOOD, QUEEN
 
 RULES = {
-    "paper": Task(delivery="continuing", evaporation_in_training=True),
+    "paper": Task(delivery="truncates", evaporation_in_training=True),
     "lively": Task(
         "queues",
         pheromone=Pheromone("exponential", 50.0, 0.1, "fading", 500, view="strongest"),
         traffic=Traffic.named()["following"],
-        delivery="continuing",
+        delivery="truncates",
         evaporation_in_training=True,
         life=Life(births=True, lifespan=40_000, regrowth=50, wander=100),
     ),
@@ -57,7 +57,7 @@ def faults(colony: Colony) -> list[str]:
     foods = np.count_nonzero(ground == FOOD) + ants["carries"].sum(dtype=int)
     came, walls = len(colony.worlds[0].foods) + world[WorldRow.REGROWN], arrays["walls"] != 0
     trails = arrays["level"] if colony.pheromone.dense else arrays["trail"]
-    homes = arrays["homes"][:, : world[WorldRow.HOMES]]
+    food_sources = arrays["food_sources"][:, : world[WorldRow.FOOD_SOURCES]]
     ages, lifespan = ants.get("age", np.zeros(1)), colony.task.life.lifespan
     outcome = colony.outcome()  # which makes sure that action values are finite
     moves, blocked = outcome.moves[0, 0], outcome.blocked[0, 0]
@@ -80,7 +80,8 @@ def faults(colony: Colony) -> list[str]:
         and not trails[walls].any(),
         "clocks disagree": world[WorldRow.TICKS] == colony.ticks,
         "an ant is too old": lifespan is None or ages.max(initial=0) < lifespan,
-        "a food was taken later than now": homes[HomeRow.TAKEN].max(initial=-1) < colony.ticks,
+        "a food was taken later than now": food_sources[FoodSourceRow.TAKEN].max(initial=-1)
+        < colony.ticks,
         "a counter has overflowed": 0 <= blocked <= moves <= colony.capacity * colony.ticks,
     }
     return [words for words, true in holds.items() if not true]

@@ -1,6 +1,6 @@
 """How fast the paper's grid trains, beside the same in plain C.
 
-Trains the 16 configurations of each learner with several seeds, delivery continuing. Two yardsticks
+Trains the 16 configurations of each learner with several seeds; delivery truncates. Two yardsticks
 do the same runs, and their results are equal to the bit: ant.c, one run after the other, with
 branches, as one would write it by hand; and ant_vector.c, sixteen runs at a time in the lanes of
 AVX-512 vectors. Both are compiled with -O3 for this processor. Ours and theirs are measured in
@@ -68,7 +68,10 @@ class CJob(ctypes.Structure):
     """The struct Job of ant.h."""
 
     _fields_ = (
-        *((name, ctypes.c_int32) for name in ("n", "learner", "planning_steps", "continuing")),
+        *(
+            (name, ctypes.c_int32)
+            for name in ("n", "learner", "planning_steps", "delivery_truncates")
+        ),
         *((name, ctypes.c_int32) for name in ("episodes", "max_steps", "threads")),
         *((name, ctypes.c_void_p) for name in ("q", "returns", "steps")),
     )
@@ -115,7 +118,7 @@ def train_in_c(
     world: World,
     configs: Sequence[TrainingConfig],
     seeds: Sequence[int],
-    continuing: bool,
+    delivery_truncates: bool,
     episodes: int = EPISODES,
     max_steps: int = EPISODE_STEPS,
     threads: int = 1,
@@ -134,7 +137,12 @@ def train_in_c(
     returns, steps = np.zeros((2, *shape, episodes), np.int32)
     planning_steps = dict(configs[0].hyperparameters).get("planning_steps", 0)
     job = CJob(
-        *(len(runs), _NUMBERS_IN_C.index(configs[0].learner), int(planning_steps), continuing),
+        *(
+            len(runs),
+            _NUMBERS_IN_C.index(configs[0].learner),
+            int(planning_steps),
+            delivery_truncates,
+        ),
         *(episodes, max_steps, threads),
         *(array.ctypes.data for array in (q_values, returns, steps)),
     )
@@ -175,7 +183,7 @@ def measured(
 ) -> tuple[dict[str, int], dict[str, np.ndarray]]:
     """By learner: the steps, and the seconds of ours and of the yardsticks, (rounds, 1 + n)."""
     steps, seconds = {}, {}
-    world, task = worlds.paper(), Task(delivery="continuing")
+    world, task = worlds.paper(), Task(delivery="truncates")
     with progress_bar("Measuring") as progress:
         for label, learner in LEARNERS.items():
             configs, found = grid(*learner), []

@@ -25,7 +25,7 @@ from taichi_ants.studies.colony_study import scheduled
 
 ANTS, TICKS, WORLDS, EPISODES = 64, 1000, 4, 60
 FORAGING = replace(task.foraging(), life=Life(regrowth=0))  # food grows back at once
-TRIAL_SEED = 10_000
+TEST_SEED = 10_000
 
 
 def environments() -> VectorEnv:
@@ -47,7 +47,7 @@ def neural(seed: int, episodes: int) -> Agent:
 def foods_by_chance(agent: Agent) -> float:
     """Foods per 1000 ticks and colony of ants that draw their actions, as in training."""
     envs, foods = environments(), 0
-    seen, _ = envs.reset(seed=TRIAL_SEED)
+    seen, _ = envs.reset(seed=TEST_SEED)
     for _ in range(TICKS):
         with torch.no_grad():
             actions = agent.policy(seen).sample().numpy()
@@ -67,9 +67,9 @@ def tabular(seed: int, episodes: int) -> np.ndarray:
 def foods(q_values: np.ndarray) -> float:
     """Foods per 1000 ticks and colony of ants that follow a table, but at one tick in a hundred."""
     follow = TrainingConfig("sarsa", 0.1, 0.9, epsilon=0.01, epsilon_decay=1.0)
-    seeds = range(TRIAL_SEED, TRIAL_SEED + WORLDS)
+    seeds = range(TEST_SEED, TEST_SEED + WORLDS)
     colony = Colony(
-        *(worlds.paper(), FORAGING, follow, seeds, ANTS), sharing="fixed", q_values=q_values
+        *(worlds.paper(), FORAGING, follow, seeds, ANTS), sharing="frozen", q_values=q_values
     )
     return float(colony.run(4, TICKS).deliveries.mean()) * 1000 / TICKS
 

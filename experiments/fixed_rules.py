@@ -24,7 +24,13 @@ with stoppable():  # these imports take a moment, in which Ctrl-C shall be heard
     import numpy as np
 
     from taichi_ants import AntsError, Colony, Pheromone, Task, TrainingConfig, World, files, task
-    from taichi_ants.analysis.colony.study import ABROAD, ARENAS, EVALUATION_EPSILON, JOINT, WORLDS
+    from taichi_ants.analysis.colony.study import (
+        ABROAD,
+        EVALUATION_EPSILON,
+        JOINT,
+        WORLD_KINDS,
+        WORLDS,
+    )
     from taichi_ants.analysis.statistics import bootstrap_interval
     from taichi_ants.learners.policies import FOLLOWED, RULES, trail_follower
     from taichi_ants.studies.colony_study import LARGE_SIZE, place, task_in
@@ -58,7 +64,7 @@ HEAD = (
     "world    rules              epsilon  deliveries  interval      worst  first  blocked"
     "  learned  learned - fixed"
 )
-# Deliveries of each seed, by arena, rules, number of ants and measure.
+# Deliveries of each seed, by kind of world, rules, number of ants and measure.
 Learned = Mapping[tuple[str, str, int, str], Mapping[int, float]]
 
 
@@ -66,8 +72,13 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
     parser = Parser(__doc__)
     add = parser.add_argument
-    worlds = {"nargs": "+", "choices": tuple(WORLDS), "metavar": "NAME", "default": tuple(ARENAS)}
-    add("--worlds", **worlds, help="kinds of world, as of colony.py study --arenas")
+    worlds = {
+        "nargs": "+",
+        "choices": tuple(WORLDS),
+        "metavar": "NAME",
+        "default": tuple(WORLD_KINDS),
+    }
+    add("--worlds", **worlds, help="kinds of world, as of colony.py study --world-kinds")
     add("--ants", type=whole_number(1), default=64, metavar="N", help="of each colony")
     add("--seeds", type=whole_number(2), default=20, metavar="N", help="how many, from 0 on")
     add("--epsilon", type=float, nargs="+", default=[0.0, 0.01], metavar="X", help="one or more")
@@ -107,9 +118,9 @@ def read_study(folder: Path) -> Learned:
     """
     learned: dict[tuple[str, str, int, str], dict[int, float]] = {}
     for one in files.read_csv(folder / "seeds.csv"):
-        if one["way"] == (JOINT if one["arena"] in ARENAS else ABROAD):
+        if one["regime"] == (JOINT if one["world_kind"] in WORLD_KINDS else ABROAD):
             for name in MEASURES.values():
-                key = one["arena"], one["rules"], int(one["ants"]), name
+                key = one["world_kind"], one["rules"], int(one["ants"]), name
                 learned.setdefault(key, {})[int(one["seed"])] = one[name]
     return learned
 
@@ -153,7 +164,7 @@ def evaluate(
         TrainingConfig("sarsa", 0.1, 0.9, epsilon, 1.0, min_epsilon=epsilon),
         [seed + EVALUATION_SEEDS for seed in range(settings.seeds)],
         ants,
-        sharing="fixed",
+        sharing="frozen",
         q_values=trail_follower(rules.observation),
         threads=settings.threads,
     )

@@ -34,9 +34,9 @@ _COLONY = [
     *("--epsilon", "0.01", "--title", "a colony that learned together"),
 ]
 GALLERY: dict[str, list[str]] = {
-    "still.png": [*_COLONY, "--ticks", "500", "--every", "500", "--size", "1280x720"],
+    "still.png": [*_COLONY, "--ticks", "500", "--frame-interval", "500", "--size", "1280x720"],
     "colony.gif": [
-        *(*_COLONY, "--ticks", "400", "--every", "8", "--fps", "10"),
+        *(*_COLONY, "--ticks", "400", "--frame-interval", "8", "--fps", "10"),
         *("--size", "800x450"),
     ],
     "episode.gif": [
@@ -72,7 +72,7 @@ FIGURES = {
 }
 _QUEUEING = str(ROOT / "experiments" / "policies" / "queueing.npz")
 MILLION = [
-    *("live", "--policy", _QUEUEING, "--sharing", "fixed", "--training.epsilon", "0.01"),
+    *("live", "--policy", _QUEUEING, "--sharing", "frozen", "--training.epsilon", "0.01"),
     *("--ants", "64", "--colonies", "15625", "--world.ranges", "30", "30", "30", "--ticks", "300"),
 ]
 

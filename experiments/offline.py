@@ -210,7 +210,7 @@ def _colony(seeds: range, life: Life, epsilon: float, q_values: np.ndarray | Non
     training = TrainingConfig("sarsa", 0.1, 0.9, epsilon, 1.0)
     task = replace(FORAGING.task, life=life)
     world = worlds.far_piles(1, (20, 20, 20))
-    return Colony(world, task, training, seeds, 64, 64, sharing="fixed", q_values=table)
+    return Colony(world, task, training, seeds, 64, 64, sharing="frozen", q_values=table)
 
 
 def _delivered(seeds: range, q_values: np.ndarray) -> np.ndarray:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-_HOMES = {
+_NAMES_IN = {
     "engines.colony.colony": ("Colony", "ColonyEpisodes"),
     "engines.runs.results": ("Rollouts", "TrainingResult"),
     "engines.runs.traces": ("Trace", "rollout", "trace_training"),
@@ -108,9 +108,9 @@ _show_pages_in_notebooks()
 
 
 def __getattr__(name: str) -> object:
-    for home, names in _HOMES.items():
+    for module, names in _NAMES_IN.items():
         if name in names:
-            globals()[name] = getattr(import_module(f"taichi_ants.{home}"), name)
+            globals()[name] = getattr(import_module(f"taichi_ants.{module}"), name)
             return globals()[name]
     for module in _MODULES:
         if module.split(".")[-1] == name:

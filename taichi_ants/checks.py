@@ -88,7 +88,7 @@ def check_sharing(learner: Learner, sharing: str) -> None:
     if sharing == "shared" and learner.td_error is None:
         raise AntsError(
             f"learner {learner.name!r} has no TD error that can be summed over ants, so they "
-            'cannot share its table; make sharing "own".'
+            'cannot share its table; make sharing "independent".'
         )
 
 

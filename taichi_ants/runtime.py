@@ -33,7 +33,7 @@ _QUOTAS = (
 # Taichi compiles and launches for one thread at a time; environments of several threads hold this.
 alone = threading.RLock()
 
-_kept: list[object] = []  # see start_for_trial
+_kept: list[object] = []  # see start_for_plugin_check
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def start(threads: int | None = None, arch: str | None = None) -> Runtime:
     return wanted
 
 
-def start_for_trial() -> None:
+def start_for_plugin_check() -> None:
     """Start a Taichi that checks the bounds of arrays, in a forked process.
 
     The process must end by `os._exit`: the parent's Taichi can be left, but not be destroyed here.

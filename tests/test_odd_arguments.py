@@ -22,10 +22,10 @@ from taichi_ants import (
 )
 from taichi_ants import worlds as places
 from taichi_ants.analysis import statistics
-from taichi_ants.engines.colony.hand import Hand
+from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.policies import Policy
-from taichi_ants.rendering import learning_stages, policy_sheet, save_animation
+from taichi_ants.rendering import learning_checkpoints, policy_sheet, save_animation
 from taichi_ants.studies.command_line import Parser, notice
 from taichi_ants.viewer import frame, is_page, notebook, record_colony
 
@@ -42,22 +42,24 @@ def data() -> offline.Dataset:
 
 @pytest.fixture(scope="module")
 def colony() -> Colony:
-    return Colony(WORLD, None, None, 0, 2, sharing="fixed")
+    return Colony(WORLD, None, None, 0, 2, sharing="frozen")
 
 
 ODD = {
     "configs": lambda _: train(WORLD, SCALAR, 0, 1),
     "progress": lambda _: train(WORLD, CONFIG, 0, 1, progress="x"),
     "progress of rollouts": lambda _: evaluate(WORLD, TABLE, progress=np.zeros(0)),
-    "progress of stages": lambda _: learning_stages(WORLD, CONFIG, stages=[1], progress=3),
+    "progress of checkpoints": lambda _: learning_checkpoints(
+        WORLD, CONFIG, checkpoints=[1], progress=3
+    ),
     "progress of a colony": lambda colony: colony.run(1, 1, progress=object()),
-    "stages": lambda _: learning_stages(WORLD, CONFIG, stages=range(10**6, 0, -1)),
+    "checkpoints": lambda _: learning_checkpoints(WORLD, CONFIG, checkpoints=range(10**6, 0, -1)),
     "world": lambda _: Colony(SCALAR, None, CONFIG),
     "world of an episode": lambda colony: colony.begin_episode(world=SCALAR),
     "which": lambda colony: colony.begin_some(RAGGED),
     "seeds": lambda colony: colony.begin_some(np.array([True]), seeds=object()),
     "actions": lambda colony: (colony.begin_episode(), colony.act(RAGGED)),
-    "a reward": lambda _: Rewards(give=HUGE),
+    "a reward": lambda _: Rewards(deliver=HUGE),
     "cells": lambda _: WORLD.grid.index(RAGGED),
     "a far cell": lambda _: WORLD.grid.index([(2**63, 0, 0)]),
     "far cells": lambda _: WORLD.grid.number([(2**62, -(2**62), 0)]),
@@ -68,14 +70,14 @@ ODD = {
     "no learner": lambda _: learners.get(["sarsa"]),
     "no configuration": lambda _: learners.settle(None),
     "a name of one's own": lambda _: learners.td_learner(LONG, print),
-    "a stage": lambda _: learning_stages(WORLD, CONFIG, stages=SCALAR),
-    "a task": lambda _: learning_stages(WORLD, CONFIG, stages=[0], task=np.zeros(0)),
+    "a checkpoint": lambda _: learning_checkpoints(WORLD, CONFIG, checkpoints=SCALAR),
+    "a task": lambda _: learning_checkpoints(WORLD, CONFIG, checkpoints=[0], task=np.zeros(0)),
     "who is followed": lambda colony: record_colony(colony, follow=np.zeros(0)),
     "a state": lambda _: states.state_name(2**31),
     "progress of a record": lambda _: record(WORLD, episodes=1, max_steps=2, progress=3),
-    "a first value": lambda _: offline.fitted_q_iteration(data(), initial_value=None),
-    "no first value": lambda _: offline.batch_q_learning(data(), initial_value=HUGE),
-    "an offline model's": lambda _: offline.model_based(data(), TABLE, initial_value="x"),
+    "a first value": lambda _: offline.fitted_q_iteration(data(), initial_q=None),
+    "no first value": lambda _: offline.batch_q_learning(data(), initial_q=HUGE),
+    "an offline model's": lambda _: offline.model_based(data(), TABLE, initial_q="x"),
     "by run": lambda _: offline.fitted_q_iteration(data(), by_run=np.zeros(0)),
     "a penalty": lambda _: offline.pessimistic_q_iteration(data(), penalty=HUGE),
     "a label": lambda _: learners.label(["sarsa"]),
@@ -85,7 +87,9 @@ ODD = {
     "data of a model": lambda _: offline.EmpiricalModel.of(None, SCALAR),
     "one dimension": lambda _: statistics.bootstrap_interval(np.arange(5.0)),
     "one dimension of Student's": lambda _: statistics.student_interval(np.arange(5.0)),
-    "three worlds": lambda _: Hand(Colony(WORLD, None, None, range(3), 2, sharing="fixed")),
+    "three worlds": lambda _: Interventions(
+        Colony(WORLD, None, None, range(3), 2, sharing="frozen")
+    ),
     "two runs": lambda _: rollout(WORLD, train(WORLD, CONFIG, range(2), 1)),
     "two policies": lambda _: policy_sheet(np.zeros((2, 128, 5))),
     "a world's name": lambda _: places.check_seed_counts(LONG),

@@ -134,7 +134,7 @@ def test_a_command_by_its_name(tmp_path):
     tiny = [
         *("--seeds", "1", "--episodes", "2", "--max-steps", "30", "--learners", "q_learning"),
         *("--learning-rates", "0.1", "--discounts", "0.9", "--epsilons", "0.3"),
-        *("--epsilon-decays", "0.9", "--delivery", "absorbing"),
+        *("--epsilon-decays", "0.9", "--delivery", "terminates"),
     ]
     done = call(["compare", *tiny], tmp_path)
     assert (done.returncode, done.stderr) == (0, "")

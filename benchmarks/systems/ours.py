@@ -13,16 +13,16 @@ from taichi_ants import Task, TrainingConfig, runtime, train, worlds
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.task import foraging
 
-_CONTINUING = Task(delivery="continuing")
+_TRUNCATES = Task(delivery="truncates")
 _BATCHES = 16  # of actions drawn beforehand
 # As in the colony's study.
-SARSA = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.98, initial_value=10.0)
+SARSA = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.98, initial_q=10.0)
 
 
 def training(each: int) -> Callable[[], int]:
     """Work on the paper's grid: all of its runs, of which each configuration has so many."""
     train(worlds.paper(), CONFIGS, 0, 1, 1)  # compiles
-    return lambda: int(train(worlds.paper(), CONFIGS, range(each), task=_CONTINUING).steps.sum())
+    return lambda: int(train(worlds.paper(), CONFIGS, range(each), task=_TRUNCATES).steps.sum())
 
 
 def environments(n: int) -> Callable[[], int]:

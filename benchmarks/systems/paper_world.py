@@ -1,6 +1,6 @@
 """The paper's world and grid as plain arrays, for those who do the same task with other means.
 
-One food, one queen, a trail that does not evaporate, continuing delivery: what `throughput.py`
+One food, one queen, a trail that does not evaporate, deliveries that truncate: what `throughput.py`
 trains.
 """
 

@@ -3,7 +3,7 @@
 A contrast is a number of each seed, mostly the difference of two conditions, with a criterion that
 it shall fulfil. Contrasts that are judged together get intervals at a level corrected for the
 number of intervals (Bonferroni): with a probability of at least 95 % all of them hold at once,
-however they depend on each other. A contrast in reward or steps may rest on the typical run: then
+however they depend on each other. A contrast in reward or steps may rest on the IQM: then
 the interquartile mean decides, and the mean is judged beside it.
 """
 
@@ -101,21 +101,21 @@ class Contrast:
 
     Attributes:
         label: What is compared, for example "Q-learning minus SARSA".
-        values: Float64 (seeds,); (k, seeds) with `of_centres`. nan where there are none.
-        criterion: What the centre over seeds shall fulfil.
-        typical: Whether it rests on the typical run, that is on the interquartile mean over seeds.
-        possible: The range that the centre cannot leave; its interval is cut off there.
-        of_centres: For a question about the centres themselves (how unequal are the effects of 8
-            configurations?), as the noise of single seeds would be taken for the answer: a smooth
+        values: Float64 (seeds,); (k, seeds) with `of_estimates`. nan where there are none.
+        criterion: The condition on the estimate over seeds.
+        uses_iqm: Whether it rests on the interquartile mean (IQM) over seeds.
+        possible: The range that the estimate cannot leave; its interval is cut off there.
+        of_estimates: For a question about the estimates themselves (how unequal are the effects of
+            8 configurations?), as the noise of single seeds would be taken for the answer: a smooth
             function of them, float (k, ...) -> float (...).
     """
 
     label: str
     values: np.ndarray
     criterion: Criterion
-    typical: bool = False
+    uses_iqm: bool = False
     possible: tuple[float, float] = UNBOUNDED
-    of_centres: Callable[[np.ndarray], np.ndarray] | None = None
+    of_estimates: Callable[[np.ndarray], np.ndarray] | None = None
 
     @property
     def seeds(self) -> int:
@@ -127,12 +127,12 @@ class Contrast:
         """Whether there are no values, or some are nan."""
         return not self.seeds or bool(np.isnan(self.values).any())
 
-    def reading(self, typical: bool) -> tuple[np.ndarray, bool]:
+    def reading(self, uses_iqm: bool) -> tuple[np.ndarray, bool]:
         """What is averaged over seeds, float64 (seeds,), and whether by interquartile mean."""
-        if self.of_centres is None:
-            return self.values, typical
-        values = interquartile_values(self.values) if typical else self.values
-        return jackknife_values(self.of_centres, values), False
+        if self.of_estimates is None:
+            return self.values, uses_iqm
+        values = interquartile_values(self.values) if uses_iqm else self.values
+        return jackknife_values(self.of_estimates, values), False
 
 
 @dataclass(frozen=True)
@@ -142,10 +142,10 @@ class Finding:
     Attributes:
         contrast: The contrast.
         verdict: The verdict; not tested if values of the contrast are missing.
-        effect: The centre over seeds; nan if it was not tested.
+        effect: The estimate over seeds; nan if it was not tested.
         low, high: Its interval at the corrected level; nan for one seed.
         level: Confidence level of that one interval.
-        by_mean: What the mean says of a contrast that rests on the typical run, else None.
+        by_mean: What the mean says of a contrast that rests on the IQM, else None.
     """
 
     contrast: Contrast
@@ -160,32 +160,32 @@ class Finding:
 def judge(contrasts: Sequence[Contrast]) -> list[Finding]:
     """The findings on contrasts that are judged together, in their order."""
     readings = {
-        (place, typical): contrast.reading(typical)
+        (place, uses_iqm): contrast.reading(uses_iqm)
         for place, contrast in enumerate(contrasts)
-        for typical in ((True, False) if contrast.typical else (False,))
+        for uses_iqm in ((True, False) if contrast.uses_iqm else (False,))
         if not contrast.missing
     }
     level = 1 - (1 - SIMULTANEOUS_LEVEL) / max(1, len(readings))
     numbers: dict[tuple[int, bool], tuple[float, ...]] = {}
-    # One batch for each number of seeds and each centre.
+    # One batch for each number of seeds and each estimator.
     for seeds, iqm in {(len(values), iqm) for values, iqm in readings.values()}:
         batch = [key for key, (values, by) in readings.items() if (len(values), by) == (seeds, iqm)]
         rows = np.stack([readings[key][0] for key in batch])
-        centres = interquartile_mean(rows) if iqm else rows.mean(axis=1)
-        columns = (centres, *cautious_interval(rows, level, iqm=iqm))
+        estimates = interquartile_mean(rows) if iqm else rows.mean(axis=1)
+        columns = (estimates, *cautious_interval(rows, level, iqm=iqm))
         lines = zip(*(without_noise(column, rows).tolist() for column in columns), strict=True)
         numbers.update(zip(batch, lines, strict=True))
 
-    def finding(place: int, typical: bool) -> Finding:
-        contrast, by_mean = contrasts[place], finding(place, False) if typical else None
+    def finding(place: int, uses_iqm: bool) -> Finding:
+        contrast, by_mean = contrasts[place], finding(place, False) if uses_iqm else None
         if contrast.missing:
             return Finding(contrast, Verdict.NOT_TESTED, np.nan, np.nan, np.nan, level, by_mean)
-        effect, *ends = numbers[place, typical]
+        effect, *ends = numbers[place, uses_iqm]
         low, high = np.clip(ends, *contrast.possible).tolist()
         verdict = contrast.criterion.judge(low, high)
         return Finding(contrast, verdict, effect, low, high, level, by_mean)
 
-    return [finding(place, contrast.typical) for place, contrast in enumerate(contrasts)]
+    return [finding(place, contrast.uses_iqm) for place, contrast in enumerate(contrasts)]
 
 
 def seeds_in_words(seeds: int) -> str:

@@ -1,7 +1,7 @@
-"""Centres over seeds and their intervals: what they are for and cover is in docs/statistics.md.
+"""Estimates over seeds and their intervals: what they are for and cover is in docs/statistics.md.
 
-Two centres: the mean says what runs bring on average, the interquartile mean (IQM) what a typical
-run brings (Agarwal et al. 2021). Each has two intervals:
+Two estimators: the mean says the average over runs, the interquartile mean (IQM) the average of
+the middle half (Agarwal et al. 2021). Each has two intervals:
 
 - The bootstrap's. For the mean it is BCa with the expansion of Hesterberg (2015): the normal
   quantile z in the percentile levels is replaced by sqrt(n / (n - 1)) times the t quantile with
@@ -98,8 +98,8 @@ def interquartile_values(values: np.ndarray) -> np.ndarray:
     return interquartile_mean(values)[:, None] + moved
 
 
-def centres(values: np.ndarray, typical: bool = True) -> dict[str, np.ndarray]:
-    """Columns of a table, float64 (rows,) each: centres of values (rows, seeds) with intervals.
+def estimates(values: np.ndarray, uses_iqm: bool = True) -> dict[str, np.ndarray]:
+    """Columns of a table, float64 (rows,) each: estimates of values (rows, seeds) with intervals.
 
     "mean", "ci_low" and "ci_high", then "iqm", "iqm_ci_low" and "iqm_ci_high" if there is a typical
     run; of shares and counts there is none.
@@ -107,7 +107,7 @@ def centres(values: np.ndarray, typical: bool = True) -> dict[str, np.ndarray]:
     values = np.asarray(values, float)
     columns = {"mean": values.mean(axis=1)}
     columns["ci_low"], columns["ci_high"] = bootstrap_interval(values)
-    if typical:
+    if uses_iqm:
         columns["iqm"] = interquartile_mean(values)
         columns["iqm_ci_low"], columns["iqm_ci_high"] = bootstrap_interval(values, iqm=True)
     return {name: without_noise(column, values) for name, column in columns.items()}

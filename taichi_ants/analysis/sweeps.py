@@ -12,7 +12,7 @@ import numpy as np
 
 from taichi_ants.analysis import style
 from taichi_ants.analysis.findings import LEAST_SEEDS
-from taichi_ants.analysis.statistics import bootstrap_interval, centres
+from taichi_ants.analysis.statistics import bootstrap_interval, estimates
 from taichi_ants.analysis.tables import MISSING, Table, plain_text, sentence
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def seed_rows(
             yield {**one, "seed": seed, **{n: float(array[p, s]) for n, array in values.items()}}
 
 
-class Centre(NamedTuple):
+class Estimator(NamedTuple):
     """A measure over seeds: its mean, its IQM if it has a typical run, and 95 % intervals.
 
     Intervals of one seed are nan.
@@ -63,34 +63,34 @@ class Centre(NamedTuple):
         return {f"{name}_{field}": getattr(self, field) for field in fields}
 
 
-def centre_columns(found: Mapping[str, Centre]) -> dict[str, float]:
+def centre_columns(found: Mapping[str, Estimator]) -> dict[str, float]:
     """Return the columns of several measures."""
     return {k: v for name, one in found.items() for k, v in one.columns(name).items()}
 
 
 def centres_of(
-    values: Mapping[str, np.ndarray], typical: Sequence[str] = ()
-) -> list[dict[str, Centre]]:
+    values: Mapping[str, np.ndarray], with_iqm: Sequence[str] = ()
+) -> list[dict[str, Estimator]]:
     """Return the measures of each point over its seeds, by name.
 
     Args:
         values: Measures by name, float64 (points, seeds).
         typical: The measures that have an interquartile mean.
     """
-    columns = {name: centres(array, name in typical).values() for name, array in values.items()}
+    columns = {name: estimates(array, name in with_iqm).values() for name, array in values.items()}
     rows = {name: np.transpose([*several]).tolist() for name, several in columns.items()}
     points = len(next(iter(values.values())))
-    return [{name: Centre(*several[p]) for name, several in rows.items()} for p in range(points)]
+    return [{name: Estimator(*several[p]) for name, several in rows.items()} for p in range(points)]
 
 
 def summary_rows(
-    settings: Sequence[Settings], values: Mapping[str, np.ndarray], typical: Sequence[str] = ()
+    settings: Sequence[Settings], values: Mapping[str, np.ndarray], with_iqm: Sequence[str] = ()
 ) -> list[dict[str, Any]]:
     """Return a row for each point: what varies, the number of seeds, and `centres_of` measures."""
     seeds = next(iter(values.values())).shape[1]
     return [
         {**one, "seeds": seeds, **centre_columns(found)}
-        for one, found in zip(settings, centres_of(values, typical), strict=True)
+        for one, found in zip(settings, centres_of(values, with_iqm), strict=True)
     ]
 
 

@@ -43,12 +43,12 @@ KINDS = {
     "study": "The study of the colony",
     "live": "One colony, or many side by side, that live for a while",
 }
-ARENAS = (
+WORLD_KINDS = (
     *("paper", "open", "piles"),
     *("rocks", "one_pile", "moving", "slow", "small", "wide", "large"),
 )
 QUICK = {
-    "arenas": ("paper", "open", "piles"),
+    "world_kinds": ("paper", "open", "piles"),
     "sizes": (1, 16, 64),
     "seeds": 8,
     "episodes": 20,
@@ -62,7 +62,17 @@ COUNT: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
 SEEDS, CONDITIONS = "seeds.csv", "conditions.csv"
 FIGURES, POLICIES = "figures", "policies"
 AGAIN = "Stopped; finished parts are kept, and the same command goes on from there."
-_OF_RESUMED = ("resume", "ticks", "save", "render", "every", "figure", "plugin", "threads", "arch")
+_OF_RESUMED = (
+    "resume",
+    "ticks",
+    "save",
+    "render",
+    "frame_interval",
+    "figure",
+    "plugin",
+    "threads",
+    "arch",
+)
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -78,7 +88,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     if settings.kind == "study":
         for name in QUICK.keys() - given.keys() if settings.quick else ():
             setattr(settings, name, QUICK[name])
-        settings.arenas = tuple(one for one in ARENAS if one in settings.arenas)
+        settings.world_kinds = tuple(one for one in WORLD_KINDS if one in settings.world_kinds)
         settings.sizes = tuple(sorted({1, *settings.sizes}))
         with_folder(settings, "colony")
     else:
@@ -94,20 +104,22 @@ def _check_live(
         if settings.resume and name not in _OF_RESUMED:
             error(f"{flag} cannot change a colony that is resumed, leave it out")
         learns = name.startswith("training.") and name != "training.epsilon"
-        if settings.sharing == "fixed" and learns:
+        if settings.sharing == "frozen" and learns:
             error(
-                f"{flag} is of learning, but with --sharing fixed nobody learns, so leave one out"
+                f"{flag} is of learning, but with --sharing frozen nobody learns, so leave one out"
             )
     if settings.policy and "task.observation" in given:
         error("--task.observation is that of the policy, leave it out")
-    if "every" in given and (not settings.render or settings.render.lower().endswith(".png")):
-        error("--every is of an animation, name one with --render, or leave it out")
+    if "frame_interval" in given and (
+        not settings.render or settings.render.lower().endswith(".png")
+    ):
+        error("--frame-interval is of an animation, name one with --render, or leave it out")
 
 
 def _add_study(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    arenas: dict[str, Any] = {"nargs": "+", "choices": ARENAS, "metavar": "NAME"}
-    add("--arenas", **arenas, default=ARENAS, help="kinds of world")
+    world_kinds: dict[str, Any] = {"nargs": "+", "choices": WORLD_KINDS, "metavar": "NAME"}
+    add("--world-kinds", **world_kinds, default=WORLD_KINDS, help="kinds of world")
     several: dict[str, Any] = {"nargs": "+", "type": whole_number(1, 100_000)}
     sizes = "numbers of ants where they are trained"
     add("--sizes", **several, default=(1, 4, 16, 64), metavar="N", help=sizes)
@@ -132,7 +144,9 @@ def _add_live(parser: argparse.ArgumentParser) -> None:
     start = "of ants, by the queen or anywhere"
     add("--start", choices=("nest", "spread"), default="nest", help=start)
     add("--world", default="open", metavar="NAME", help=WORLDS)
-    add("--sharing", choices=("shared", "own", "fixed"), default="shared", help="of tables")
+    add(
+        "--sharing", choices=("shared", "independent", "frozen"), default="shared", help="of tables"
+    )
     add("--policy", metavar="FILE", help="a policy file to start from (.npz)")
     add("--capacity", **COUNT, help="most ants at once, if births are on")
     which = "rules to start from (default: those of --policy, else the paper's)"
@@ -142,7 +156,7 @@ def _add_live(parser: argparse.ArgumentParser) -> None:
     add("--resume", metavar="FILE", help="go on with a colony that was saved")
     picture = "a picture of the end (.png), or an animation (.gif, .mp4, a folder)"
     add("--render", metavar="PATH", help=picture)
-    add("--every", **COUNT, default=2, help="ticks a picture of an animation")
+    add("--frame-interval", **COUNT, default=2, help="ticks a picture of an animation")
     figure = "foods delivered per tick over time, of all colonies together (.png and .csv)"
     add("--figure", metavar="FILE.png", help=figure)
     add_common(parser)
@@ -157,7 +171,7 @@ def _learning(epsilon: float) -> TrainingConfig:
 
 def _living(task: Task) -> Task:
     """A task for colonies that live on after a delivery, while trails evaporate."""
-    return replace(task, delivery="continuing", evaporation_in_training=True)
+    return replace(task, delivery="truncates", evaporation_in_training=True)
 
 
 def training_config(settings: argparse.Namespace, epsilon: float) -> TrainingConfig:
@@ -172,7 +186,7 @@ def study(settings: argparse.Namespace) -> None:
 
     seeds = tuple(range(settings.seed, settings.seed + settings.seeds))
     conditions = plan(
-        settings.arenas,
+        settings.world_kinds,
         settings.sizes,
         seeds,
         training_config(settings, 0.3),
@@ -181,7 +195,7 @@ def study(settings: argparse.Namespace) -> None:
         settings.rollouts,
     )
     asked = study_of(conditions, seeds)
-    words = {name: getattr(settings, name) for name in ("arenas", "sizes")}
+    words = {name: getattr(settings, name) for name in ("world_kinds", "sizes")}
     facts = {**words, **asked.settings()}
     work = partial(do_study, settings, conditions, asked)
     page = partial(make_page, settings, conditions, asked)
@@ -267,7 +281,14 @@ def live(settings: argparse.Namespace) -> None:
     begun, began = colony.ticks, time.perf_counter()
     with held() as stopped:
         with progress_bar("colony") as progress:
-            live(colony, settings.ticks, progress, stopped, *files, every=settings.every)
+            live(
+                colony,
+                settings.ticks,
+                progress,
+                stopped,
+                *files,
+                frame_interval=settings.frame_interval,
+            )
         print(summary(colony, colony.ticks - begun, time.perf_counter() - began))
         for path in filter(None, files):
             print(f"{path} is written.")
@@ -283,9 +304,9 @@ def new_colony(settings: argparse.Namespace) -> Colony:
     of_world = {"seed": settings.seed, **given_settings(settings).get("world", {})}
     world = worlds.build(settings.world, **of_world)
     policy = load_policy(settings.policy) if settings.policy else None
-    if settings.sharing == "fixed" and policy is None:
+    if settings.sharing == "frozen" and policy is None:
         raise AntsError(
-            "--sharing fixed needs a table that the ants follow; give --policy FILE, or choose "
+            "--sharing frozen needs a table that the ants follow; give --policy FILE, or choose "
             "another --sharing."
         )
     colony = Colony(

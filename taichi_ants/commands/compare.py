@@ -37,14 +37,14 @@ if TYPE_CHECKING:
     from taichi_ants.analysis.paper.results import Results
     from taichi_ants.rendering import Episode
     from taichi_ants.report.players import Seen
-    from taichi_ants.studies.beside import Beside
     from taichi_ants.studies.blocks import Outcome
     from taichi_ants.studies.runner import RunPoint, Study
+    from taichi_ants.studies.worker_process import WorkerProcess
 
 # Begins a call, and gives what waits for its end.
 Begin = Callable[..., Callable[[], Any]]
 
-DELIVERIES = ("continuing", "absorbing")
+DELIVERIES = ("truncates", "terminates")
 ROLLOUTS = 50
 QUICK_SEEDS = 10
 SIZE = 720, 480  # of animations
@@ -79,7 +79,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--hyperparameter", **{**HYPERPARAMETER, "help": words})
     switch: dict[str, Any] = {"choices": ("on", "off"), "metavar": "on|off"}
     add("--train-evaporation", **switch, default="off", help="of trails; off in the paper")
-    add("--greedy-evaporation", **switch, default="on", help="in the greedy evaluation")
+    add("--eval-evaporation", **switch, default="on", help="in the greedy evaluation")
     add("--world", default="paper", help=WORLDS)
     add("--world-seed", type=whole_number(), metavar="N", help="seed of a world drawn at random")
     add_common(parser)
@@ -119,7 +119,7 @@ def points(settings: argparse.Namespace, world: World) -> tuple[RunPoint, ...]:
         Task(
             delivery=delivery,  # type: ignore[arg-type]
             evaporation_in_training=settings.train_evaporation == "on",
-            evaporation_in_evaluation=settings.greedy_evaporation == "on",
+            evaporation_in_evaluation=settings.eval_evaporation == "on",
         )
         for delivery in (DELIVERIES if settings.delivery == "both" else (settings.delivery,))
     ]
@@ -243,7 +243,7 @@ def write_policies(
     study: Study[RunPoint],
     comparison: Comparison,
     tables: Mapping[tuple[int, int], np.ndarray],
-    beside: Beside,
+    worker: WorkerProcess,
 ) -> list[Callable[[], None]]:
     """Write the final Q-tables of the examples, with what an ant that follows them does.
 
@@ -279,7 +279,7 @@ def write_policies(
             # The first of the lines beside the world says in words what the policy does.
             episode = played(point, tables[row, run], study.seeds[run])
             episode = replace(episode, name=metadata["behaviour"])
-            drawn.append(beside.begin(render_policy, shown, episode, title))
+            drawn.append(worker.begin(render_policy, shown, episode, title))
     return drawn
 
 
@@ -287,22 +287,22 @@ def render_policy(path: Path, episode: Episode, title: str) -> None:
     """Show what a policy does."""
     from taichi_ants.rendering import PAUSE, frames, save_animation
 
-    save_animation(path, frames(episode.moments(), SIZE, title=title), pause=PAUSE)
+    save_animation(path, frames(episode.snapshots(), SIZE, title=title), pause=PAUSE)
 
 
 def compare(settings: argparse.Namespace) -> None:
     """Run the comparison, or show the finished one."""
     from taichi_ants.files.results import MANIFEST
-    from taichi_ants.studies.beside import Beside
     from taichi_ants.studies.result_folder import work_or_show
+    from taichi_ants.studies.worker_process import WorkerProcess
 
     shows = not settings.no_figures
     # Who asks for one thread wants the other processors for something else.
-    with Beside(shows and settings.threads != 1) as beside:
+    with WorkerProcess(shows and settings.threads != 1) as worker:
         if not (settings.out / MANIFEST).exists():
-            beside.begin(import_module, "taichi_ants.report.players")  # this takes a while
+            worker.begin(import_module, "taichi_ants.report.players")  # this takes a while
         study = build_study(settings)
-        work = partial(do_comparison, settings, study, beside)
+        work = partial(do_comparison, settings, study, worker)
         page = partial(make_page, settings, study)
         work_or_show(settings, study.settings(), work, page=page)
 
@@ -368,8 +368,8 @@ def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draw
 
     from taichi_ants import runtime
     from taichi_ants.analysis import style
-    from taichi_ants.rendering import colony_moments, frames
-    from taichi_ants.rendering.moments import colony_of_rollout
+    from taichi_ants.rendering import colony_snapshots, frames
+    from taichi_ants.rendering.snapshots import colony_of_rollout
     from taichi_ants.task.constants import N_ACTIONS
     from taichi_ants.viewer import record_colony
 
@@ -378,7 +378,7 @@ def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draw
     runtime.start(**where)
     nothing = np.zeros((point.task.n_states, N_ACTIONS), np.float32)
     colony = colony_of_rollout(point.world, point.task, nothing)
-    next(frames(colony_moments(colony), SIZE))
+    next(frames(colony_snapshots(colony), SIZE))
     record_colony(colony, 1)
     for kind in ("png", "svg") if draws else ():
         style.new_figure(1.0).savefig(io.BytesIO(), format=kind)
@@ -393,7 +393,11 @@ def draw_figures(comparison: Comparison, baselines: Sequence[Baseline], folder: 
 
 
 def do_comparison(
-    settings: argparse.Namespace, study: Study[RunPoint], beside: Beside, blocks: Path, ready: Path
+    settings: argparse.Namespace,
+    study: Study[RunPoint],
+    worker: WorkerProcess,
+    blocks: Path,
+    ready: Path,
 ) -> tuple[Results, Seen]:
     """Do what is not done yet, and write all results."""
     from taichi_ants import files
@@ -405,20 +409,20 @@ def do_comparison(
     where, first = {"threads": settings.threads, "arch": settings.arch}, study.points[0]
     world, task, steps, shows = first.world, first.task, first.max_steps, not settings.no_figures
     discounts = tuple(dict.fromkeys(settings.discounts))
-    beside.begin(rehearse, first, settings.plugin, where, settings.quick)
-    bounds = beside.begin(bound_rows, world, task, discounts, steps)
+    worker.begin(rehearse, first, settings.plugin, where, settings.quick)
+    bounds = worker.begin(bound_rows, world, task, discounts, steps)
     arrays = measured(study, blocks, **where)
     comparison, tables = with_curves(study, blocks, comparison_of(settings, study, arrays))
     arrays |= {_CURVE + name: curve for name, curve in comparison.curves.items()}
     archives.write(ready / RUNS, arrays)
     follow = partial(evaluate, **where)
     baselines = bounds() + policy_rows(world, task, follow, study.seeds, ROLLOUTS, steps)
-    animated = write_policies(settings, ready, study, comparison, tables, beside)
+    animated = write_policies(settings, ready, study, comparison, tables, worker)
     # Beside this process there is time for the figures, unless there are animations.
-    draw = beside.begin if settings.quick else partial
+    draw = worker.begin if settings.quick else partial
     drawn = [draw(draw_figures, comparison, baselines, ready / FIGURES)] if shows else []
-    seen = see(settings, ready, study, comparison, baselines, beside.begin, draw)
-    beside.finish()
+    seen = see(settings, ready, study, comparison, baselines, worker.begin, draw)
+    worker.finish()
     rows = [one._asdict() for one in baselines]
     files.write_csv(ready / BASELINES, rows, list(rows[0]))
     with progress_bar("statistics and pictures") as progress:
@@ -444,7 +448,7 @@ def see(
 
     Args:
         settings, folder, study, comparison, baselines: What was done, and what came of it.
-        play, draw: Begin players and figures, as `Beside.begin`.
+        play, draw: Begin players and figures, as `WorkerProcess.begin`.
 
     Returns:
         What waits for them.

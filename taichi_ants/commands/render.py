@@ -32,15 +32,15 @@ if TYPE_CHECKING:
     import numpy as np
 
     from taichi_ants import World
-    from taichi_ants.rendering import Stage
-    from taichi_ants.rendering.moments import Moment
+    from taichi_ants.rendering import Checkpoint
+    from taichi_ants.rendering.snapshots import CaptionedSnapshot
 
 # Without options that change them.
 TASK, TRAINING = Task(), TrainingConfig("sarsa", 0.001, 0.9, 0.3, 0.99)
 KINDS = {  # what each subcommand shows, and how it is called
     "episode": ("One ant that follows a policy", "--policy my.npz --epsilon 0.1 --out ant.mp4"),
     "colony": ("Many ants that follow one policy", "--ants 200 --out ants.gif"),
-    "learning": ("One ant before and after it learns, side by side", "--stages 0 5 500"),
+    "learning": ("One ant before and after it learns, side by side", "--checkpoints 0 5 500"),
     "sheet": ("What a policy does in each state", "--policy my.npz --out sheet.png"),
 }
 
@@ -57,13 +57,13 @@ _LENGTH: dict[str, Any] = {"type": whole_number(1, 100_000), "default": 600, "me
 _COUNT: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
 _NUMBER: dict[str, Any] = {"type": float, "metavar": "X"}
 _SEEDS: dict[str, Any] = {"type": whole_number(1, 10_000), "default": 200, "metavar": "N"}
-_STAGES = {"nargs": "+", "type": whole_number(0), "metavar": "N"}
+_CHECKPOINTS = {"nargs": "+", "type": whole_number(0), "metavar": "N"}
 
 # Each option: the kinds of pictures that it is for, by their first letters, what it does, and how
 # it is read.
 _TRAINING: dict[str, tuple[str, str, dict[str, Any]]] = {  # of no use beside --policy
     "--episodes": ("ecs", "of training", {**_COUNT, "default": 500}),
-    "--stages": ("l", "looks at the ant after so many episodes of training", _STAGES),
+    "--checkpoints": ("l", "looks at the ant after so many episodes of training", _CHECKPOINTS),
 }
 _OPTIONS = {
     "--out": ("ecls", "file or folder", {"metavar": "PATH"}),
@@ -81,8 +81,12 @@ _OPTIONS = {
     **_TRAINING,
     "--size": ("ecl", "in pixels", {"type": _size, "metavar": "WxH"}),
     "--fps": ("ecl", "pictures a second", {**_NUMBER, "default": 8.0}),
-    "--every": ("c", "ticks from one picture to the next", {**_COUNT, "default": None}),
-    "--plain": ("ec", "the world alone, without text and marks", {"action": "store_true"}),
+    "--frame-interval": ("c", "ticks from one picture to the next", {**_COUNT, "default": None}),
+    "--no-overlay": (
+        "ec",
+        "the world alone, without text and marks",
+        {"action": "store_false", "dest": "overlay"},
+    ),
 }
 # Where a kind has defaults of its own.
 _DEFAULTS: dict[str, dict[str, Any]] = {
@@ -93,7 +97,7 @@ _DEFAULTS: dict[str, dict[str, Any]] = {
     },
     "learning": {
         **{"out": "results/renders/learning.gif", "size": "1280x520"},
-        **{"max_steps": 150, "stages": (0, 1, 2, 20), "seed": None},
+        **{"max_steps": 150, "checkpoints": (0, 1, 2, 20), "seed": None},
     },
     "sheet": {"out": "results/renders/policy_sheet.png"},
 }
@@ -117,16 +121,18 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
         of_training = flag in _TRAINING or flag.startswith(("--training.", "--task."))
         if of_training and getattr(settings, "policy", None):
             parser.error(f"{flag} is of training, but --policy is trained, so leave one out")
-        if flag in ("--follow", "--title") and getattr(settings, "plain", False):
-            parser.error(f"--plain leaves out what {flag} shows, so leave out one of them")
+        if flag in ("--follow", "--title") and not getattr(settings, "overlay", True):
+            parser.error(f"--no-overlay leaves out what {flag} shows, so leave out one of them")
         if flag == "--seeds" and settings.seed is not None:
             parser.error(
                 "--seeds chooses the seed that is shown, but --seed names it; leave one out"
             )
-        if flag in ("--size", "--fps", "--plain") and is_page(settings):
+        if flag in ("--size", "--fps", "--no-overlay") and is_page(settings):
             parser.error(f"{flag} is of pictures, but --out names a page, so leave {flag} out")
-    if settings.kind == "colony" and settings.every is None:
-        settings.every = 1 if is_page(settings) else 4  # a page tells what each ant does in a tick
+    if settings.kind == "colony" and settings.frame_interval is None:
+        settings.frame_interval = (
+            1 if is_page(settings) else 4
+        )  # a page tells what each ant does in a tick
     return settings
 
 
@@ -173,7 +179,7 @@ def show_episode(settings: argparse.Namespace, world: World) -> None:
     if is_page(settings):
         save_page(settings.out, record_episode(episode, title))
     else:
-        _save_moments(settings, episode.moments(), len(episode), title, task)
+        _save_snapshots(settings, episode.snapshots(), len(episode), title, task)
     outcome = "delivered" if episode.delivered else "not delivered"
     rewards = int(episode.trace.rewards.sum())
     print(f"{settings.out}: {count(len(episode.trace), 'step')}, return {rewards}, {outcome}")
@@ -186,23 +192,25 @@ def show_colony(settings: argparse.Namespace, world: World) -> None:
     """
     from taichi_ants import Colony
     from taichi_ants.errors import count
-    from taichi_ants.rendering import colony_moments
+    from taichi_ants.rendering import colony_snapshots
     from taichi_ants.viewer import record_colony, save_page
 
     q_values, task, title = find_policy(settings, world)
     config = replace(training_config(settings), epsilon=settings.epsilon, min_epsilon=0.0)
     who = (config, settings.seed, settings.ants)
-    colony = Colony(world, task, *who, sharing="fixed", q_values=q_values)
+    colony = Colony(world, task, *who, sharing="frozen", q_values=q_values)
     colony.begin_episode()
-    times = settings.ticks, settings.every
+    times = settings.ticks, settings.frame_interval
     if is_page(settings):
         with progress_bar("Recording") as progress:
             more: dict[str, Any] = {"follow": settings.follow, "progress": progress}
             recording = record_colony(colony, *times, title=title, **more)
         save_page(settings.out, recording)
     else:
-        moments = colony_moments(colony, *times, settings.follow)
-        _save_moments(settings, moments, 1 + -(-settings.ticks // settings.every), title, task)
+        snapshots = colony_snapshots(colony, *times, settings.follow)
+        _save_snapshots(
+            settings, snapshots, 1 + -(-settings.ticks // settings.frame_interval), title, task
+        )
     delivered = count(int(colony.outcome().deliveries.sum()), "delivery")
     ants, ticks = count(settings.ants, "ant"), count(colony.ticks, "tick")
     print(f"{settings.out}: {ants}, {ticks}, {delivered}")
@@ -214,13 +222,13 @@ def show_learning(settings: argparse.Namespace, world: World) -> None:
     from taichi_ants.errors import count
     from taichi_ants.rendering import learning_frames
 
-    seed, stages = noted_stages(settings, world)
+    seed, checkpoints = noted_checkpoints(settings, world)
     ant = "an ant" if settings.seed is not None else f"the median of {count(settings.seeds, 'ant')}"
     config = training_config(settings)
     title = settings.title or f"{learners.label(config.learner)}: {ant} before and after learning"
-    longest = max(len(stage.episode) for stage in stages)
-    _save(settings, learning_frames(stages, settings.size, title), longest)
-    told = [f"{one.title}{f' ({one.among})' if one.among else ''}" for one in stages]
+    longest = max(len(checkpoint.episode) for checkpoint in checkpoints)
+    _save(settings, learning_frames(checkpoints, settings.size, title), longest)
+    told = [f"{one.title}{f' ({one.among})' if one.among else ''}" for one in checkpoints]
     print(f"{settings.out}: seed {seed}, {', '.join(told)}")
 
 
@@ -263,14 +271,14 @@ def training_config(settings: argparse.Namespace) -> TrainingConfig:
     return TRAINING.but(**given_settings(settings).get("training", {}))
 
 
-def noted_stages(settings: argparse.Namespace, world: World) -> tuple[int, list[Stage]]:
-    """The seed, and the stages of its ant, each with its behaviour and those of other seeds."""
+def noted_checkpoints(settings: argparse.Namespace, world: World) -> tuple[int, list[Checkpoint]]:
+    """The seed, and the checkpoints of its ant, with its behaviour and those of other seeds."""
     from taichi_ants.analysis.behaviour import BEHAVIOURS, DELIVERS, OTHER, classify
-    from taichi_ants.rendering import learning_stages, typical_seed
+    from taichi_ants.rendering import learning_checkpoints, typical_seed
 
-    seed, among = settings.seed, [""] * len(settings.stages)
+    seed, among = settings.seed, [""] * len(settings.checkpoints)
     what: dict[str, Any] = {
-        "stages": settings.stages,
+        "checkpoints": settings.checkpoints,
         "max_steps": settings.max_steps,
         "task": TASK.but(**given_settings(settings).get("task", {})),
         "epsilon": settings.epsilon,
@@ -282,30 +290,36 @@ def noted_stages(settings: argparse.Namespace, world: World) -> tuple[int, list[
             seed, deliver = typical_seed(world, training_config(settings), seeds=several, **what)
             if settings.seeds > 1:
                 among = [f"{n} of {settings.seeds} ants deliver{'s' * (n == 1)}" for n in deliver]
-        stages = learning_stages(world, training_config(settings), seed=seed, **what)
-    numbers = [classify(stage.episode.trace, settings.max_steps)[0][0] for stage in stages]
-    notes = [
-        stage.note if number in (DELIVERS, OTHER) else BEHAVIOURS[number]
-        for stage, number in zip(stages, numbers, strict=True)
+        checkpoints = learning_checkpoints(world, training_config(settings), seed=seed, **what)
+    numbers = [
+        classify(checkpoint.episode.trace, settings.max_steps)[0][0] for checkpoint in checkpoints
     ]
-    noted = zip(stages, notes, among, strict=True)
-    return seed, [replace(stage, note=note, among=other) for stage, note, other in noted]
+    notes = [
+        checkpoint.note if number in (DELIVERS, OTHER) else BEHAVIOURS[number]
+        for checkpoint, number in zip(checkpoints, numbers, strict=True)
+    ]
+    noted = zip(checkpoints, notes, among, strict=True)
+    return seed, [replace(checkpoint, note=note, among=other) for checkpoint, note, other in noted]
 
 
-def _save_moments(
-    settings: argparse.Namespace, moments: Iterable[Moment], n: int, title: str, task: Task
+def _save_snapshots(
+    settings: argparse.Namespace,
+    snapshots: Iterable[CaptionedSnapshot],
+    n: int,
+    title: str,
+    task: Task,
 ) -> None:
-    """Write n moments of a task as an animation, or the last one as a picture."""
+    """Write n snapshots of a task as an animation, or the last one as a picture."""
     from taichi_ants.rendering import frames, save_picture
     from taichi_ants.rendering.writers import is_picture
 
-    look: dict[str, Any] = {"size": settings.size, "title": title, "plain": settings.plain}
+    look: dict[str, Any] = {"size": settings.size, "title": title, "overlay": settings.overlay}
     look["strongest"] = task.pheromone.level
     if is_picture(settings.out):
-        (last,) = deque(moments, maxlen=1)
+        (last,) = deque(snapshots, maxlen=1)
         save_picture(settings.out, next(frames([last], **look)))
     else:
-        _save(settings, frames(moments, **look), n)
+        _save(settings, frames(snapshots, **look), n)
 
 
 def _save(settings: argparse.Namespace, pictures: Iterable[np.ndarray], n: int) -> None:

@@ -75,8 +75,8 @@ def do_sweep(settings: argparse.Namespace, asked: Sweep, blocks: Path, ready: Pa
     values = measured(asked, blocks, settings.threads, settings.arch)
     of_seeds = sweeps.seed_rows(asked.settings, asked.study.seeds, values)
     files.write_csv(ready / RUNS, of_seeds, [*sweeps.columns_of(asked.settings), "seed", *values])
-    typical = [name for name in values if measures(asked.kind)[name].typical]
-    rows = sweeps.summary_rows(asked.settings, values, typical)
+    with_iqm = [name for name in values if measures(asked.kind)[name].uses_iqm]
+    rows = sweeps.summary_rows(asked.settings, values, with_iqm)
     files.write_csv(ready / SUMMARY, rows, sweeps.columns_of(rows))
     found = findings(asked, values[asked.measures[0]])
     if asked.against:
@@ -135,7 +135,7 @@ def measures(kind: str) -> dict[str, Any]:
     from taichi_ants.analysis.paper.measures import WINDOW
 
     if kind == "colony":
-        usual = {"episodes": 0, "typical": False}
+        usual = {"episodes": 0, "uses_iqm": False}
         return {n: argparse.Namespace(words=words, **usual) for n, words in OF_COLONIES.items()}
     # Where the comparison takes all episodes if there are fewer than the last 50, a sweep takes 50.
     least = {name: WINDOW if name.endswith("_last50") else 1 for name in OF_RUNS}

@@ -57,7 +57,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--session", metavar="FILE", help="a saved session to go on with")
     add("--port", type=whole_number(0, 65535), default=0, metavar="N", help="0: one that is free")
     add("--no-browser", action="store_true", help="open none; none is opened without a terminal")
-    add("--for", type=whole_number(1), metavar="N", dest="seconds", help="end after N seconds")
+    add("--duration", type=whole_number(1), metavar="N", help="end after N seconds")
     add("--plugin", metavar="FILE", help="a Python file with learners, worlds, observations")
     add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
     return parser.parse_args(arguments)
@@ -91,7 +91,7 @@ def watch(settings: argparse.Namespace) -> None:
             if room.watched:
                 opened.close()
 
-        room.run(settings.seconds, each_turn)
+        room.run(settings.duration, each_turn)
     print("Ended.")
 
 

@@ -32,7 +32,7 @@ TRACE = (
 
 
 class Command(IntEnum):
-    """What an ant in lockstep is told to do."""
+    """What an ant of a batch is told to do."""
 
     STEP = 0
     BEGIN = auto()  # an episode

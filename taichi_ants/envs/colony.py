@@ -68,7 +68,7 @@ class ColonyWorlds:
             ants=ants,
             capacity=capacity,
             start=start,  # type: ignore[arg-type]  # the colony checks it
-            sharing="fixed",
+            sharing="frozen",
         )
         shape = n_worlds, self.colony.capacity
         self.acted, self.rewards = np.zeros(shape, bool), np.zeros(shape)

@@ -58,15 +58,15 @@ class HexColonyVectorEnv(StepLimit, VectorEnv):
 
     ## Episode End
     After `max_steps` steps all ants of a world are truncated at once. A delivery ends nothing in
-    the world; its ant goes on from where it stands. If the task's delivery is "absorbing", the
+    the world; its ant goes on from where it stands. If the task's delivery is "terminates", the
     default, the delivering ant is nevertheless `terminated`: what comes later is no longer credited
     to the delivery, as for all colonies here. The ant's next observation, from where it stands,
     begins its next episode. A single ant can begin anew only in the step in which it ends, so that
-    absorbing delivery needs the autoreset mode `SAME_STEP`; with delivery "continuing" no ant is
-    ever terminated, and all modes are possible. All three modes reset whole worlds: `SAME_STEP` in
-    the step of the truncation, with `final_obs` and `final_info`; `NEXT_STEP` in the next one,
-    which ignores the actions of these ants and pays 0; `DISABLED` when `reset` is called, with
-    `options={"reset_mask": ...}` for some worlds.
+    a delivery that terminates needs the autoreset mode `SAME_STEP`; with delivery "truncates" no
+    ant is ever terminated, and all modes are possible. All three modes reset whole worlds:
+    `SAME_STEP` in the step of the truncation, with `final_obs` and `final_info`; `NEXT_STEP` in
+    the next one, which ignores the actions of these ants and pays 0; `DISABLED` when `reset` is
+    called, with `options={"reset_mask": ...}` for some worlds.
 
     ## Info
     Arrays with an entry for each ant, and for each key `_key`, bool, which ants have one:
@@ -129,11 +129,11 @@ class HexColonyVectorEnv(StepLimit, VectorEnv):
                 f"life of the task is {rules.life}; a vector environment has a fixed number of "
                 "ants, so leave out births and lifespan, or take the parallel_env of colony_v0."
             )
-        self._absorbing = rules.delivery == "absorbing"
-        if self._absorbing and self.autoreset_mode is not AutoresetMode.SAME_STEP:
+        self._terminates = rules.delivery == "terminates"
+        if self._terminates and self.autoreset_mode is not AutoresetMode.SAME_STEP:
             raise AntsError(
                 f"autoreset_mode is {self.autoreset_mode.value!r}, but an ant that delivers goes "
-                'on at once; take "SameStep", or a task with delivery "continuing".'
+                'on at once; take "SameStep", or a task with delivery "truncates".'
             )
         self.metadata = {**METADATA, "autoreset_mode": self.autoreset_mode}
         self.render_mode = render_mode
@@ -210,7 +210,7 @@ class HexColonyVectorEnv(StepLimit, VectorEnv):
         worlds.step(actions.reshape(self._n_worlds, -1))
         acted = worlds.acted.reshape(-1)
         rewards, events = worlds.rewards.reshape(-1), worlds.events.reshape(-1)
-        terminated = acted & (events == Event.DELIVERED) & self._absorbing
+        terminated = acted & (events == Event.DELIVERED) & self._terminates
         ended = worlds.ended & ~waited
         truncated = self._by_ant(ended)
         over, final = terminated | truncated, {}

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taichi_ants.engines.runs.lockstep import Lockstep
+from taichi_ants.engines.runs.batched import BatchedEnvironments
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 from taichi_ants.worlds import text_map
 
@@ -24,8 +24,8 @@ _MARKS = {
 class Drawing:
     """Draws ants and their worlds in the mode that was asked for, None for none."""
 
-    def __init__(self, lockstep: Lockstep, mode: str | None) -> None:
-        self._lockstep, self._mode = lockstep, mode
+    def __init__(self, batched: BatchedEnvironments, mode: str | None) -> None:
+        self._batched, self._mode = batched, mode
         self._scene: Scene | None = None
 
     def draw(self, number: int) -> Any:
@@ -36,7 +36,7 @@ class Drawing:
 
     def _facts(self, number: int) -> list[tuple[str, str]]:
         """What is said beside the world."""
-        arrays, observation = self._lockstep.arrays, self._lockstep.task.sees
+        arrays, observation = self._batched.arrays, self._batched.task.sees
         return [
             ("step", str(arrays["steps"][number])),
             ("reward", f"{arrays['rewards_of'][number]:g}"),
@@ -46,15 +46,15 @@ class Drawing:
     def _picture(self, number: int) -> np.ndarray:
         from taichi_ants import rendering
 
-        snapshot, task = self._lockstep.snapshot(number), self._lockstep.task
+        snapshot, task = self._batched.snapshot(number), self._batched.task
         if self._scene is None:
             self._scene = rendering.Scene(snapshot.grid, view=True, strongest=task.pheromone.level)
-        lines, state = tuple(self._facts(number)), int(self._lockstep.arrays["states"][number])
+        lines, state = tuple(self._facts(number)), int(self._batched.arrays["states"][number])
         return self._scene.draw(snapshot, rendering.Status(lines, state, observation=task.sees))
 
     def _text(self, number: int) -> str:
         """A text map, see `worlds.text_map`, below comments; an ant is its heading."""
-        now = self._lockstep.snapshot(number)
+        now = self._batched.snapshot(number)
         grid, exists = now.grid, now.grid.exists
         marks = [
             (grid.cells(np.flatnonzero((now.ground == ground) & exists)), mark)

@@ -13,7 +13,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from taichi_ants import checks
-from taichi_ants.engines.runs.lockstep import Lockstep
+from taichi_ants.engines.runs.batched import BatchedEnvironments
 from taichi_ants.envs.arguments import (
     StepLimit,
     checked_actions,
@@ -33,7 +33,7 @@ from taichi_ants.task.events import Event, Reason
 from taichi_ants.task.states import state_from_index
 from taichi_ants.worlds import World
 
-DELIVERIES = ("absorbing", "continuing", "endless")
+DELIVERIES = ("terminates", "truncates", "continues")
 RENDER_MODES = ("rgb_array", "ansi")
 # Of all environments together, with room for some more: 4 GiB.
 _MOST_CELLS = (1 << 30) - (1 << 24)
@@ -84,9 +84,9 @@ class _Ants:
         most = _MOST_CELLS // worlds[0].grid.size
         if n > most:
             raise AntsError(f"num_envs is {n}; of this world there can be at most {most} at once.")
-        self.lockstep = Lockstep(worlds, self.task, n, max_steps, delivery, falls)
+        self.batched = BatchedEnvironments(worlds, self.task, n, max_steps, delivery, falls)
         self._seeded = False
-        self.drawing = Drawing(self.lockstep, render_mode)
+        self.drawing = Drawing(self.batched, render_mode)
 
     def seed(
         self, seeds: Sequence[int | None], which: np.ndarray, chance: np.random.Generator
@@ -98,12 +98,12 @@ class _Ants:
         pairs = ((i, seeds[i]) for i in np.flatnonzero(which).tolist())
         given = {i: seed for i, seed in pairs if seed is not None}
         if given:
-            self.lockstep.seed(list(given.values()), np.array(list(given)))
+            self.batched.seed(list(given.values()), np.array(list(given)))
         self._seeded = True
 
     def observations(self) -> np.ndarray:
         """What the ants see, (n, ...)."""
-        return self.shown.show(self.lockstep.arrays["states"])
+        return self.shown.show(self.batched.arrays["states"])
 
 
 class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
@@ -122,7 +122,7 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
     queen).
 
     - "cells": `MultiDiscrete([p1, ..., pk])`, int64 (k,).
-    - "index": `Discrete(p1 * ... * pk)`, the state's index, a row of a table of action values.
+    - "index": `Discrete(p1 * ... * pk)`, the state index.
     - "one_hot": `Box(0, 1, (p1 + ... + pk,), float32)`, each part one-hot.
 
     ## Action Space
@@ -139,8 +139,8 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
     place and with a heading that the seed decides.
 
     ## Episode End
-    Terminated when the food is delivered ("absorbing"); truncated then ("continuing"); or neither:
-    food grows back at once and the ant goes on ("endless"). Truncated after `max_steps` steps.
+    Terminated when the food is delivered ("terminates"); truncated then ("truncates"); or neither:
+    food grows back at once and the ant goes on ("continues"). Truncated after `max_steps` steps.
 
     ## Info
     - `state`: int64, the state's index.
@@ -155,7 +155,7 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
     ## Arguments
     world: Name of a registered world, path of a text map, its text, or a World.
     task: The rules, a `taichi_ants.Task`, or its `as_dict()`; None is the paper's.
-    delivery: "absorbing", "continuing" or "endless"; None is the task's, by default "absorbing".
+    delivery: "terminates", "truncates" or "continues"; None is the task's, by default "terminates".
     evaporation: Whether trails evaporate; None is as the task says of training, by default not.
     max_steps: Steps after which an episode is truncated.
     observation_format: "cells", "index" or "one_hot".
@@ -192,7 +192,7 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         """Begin an episode. With a seed, which decides all chance, episodes repeat exactly."""
         super().reset(seed=seed)
         self._ants.seed([seed], self._all, self.np_random)
-        self._ants.lockstep.begin(self._all)
+        self._ants.batched.begin(self._all)
         self._over, self._begun = False, True
         return self._ants.observations()[0], self._info()
 
@@ -205,17 +205,17 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         """
         if self._over:
             raise ResetNeeded("no episode is under way; call reset() before step().")
-        ants, arrays = self._ants, self._ants.lockstep.arrays
+        ants, arrays = self._ants, self._ants.batched.arrays
         if not self.action_space.contains(action):
             raise InvalidAction(f"the action is {shown(action)}; it must be 0, 1, 2, 3 or 4.")
-        ants.lockstep.step(action, begins=0)
+        ants.batched.step(action, begins=0)
         terminated, truncated = bool(arrays["terminations"][0]), bool(arrays["truncations"][0])
         self._over = terminated or truncated
         reward = float(arrays["rewards_of"][0])
         return ants.observations()[0], reward, terminated, truncated, self._info()
 
     def _info(self) -> dict[str, Any]:
-        arrays = self._ants.lockstep.arrays
+        arrays = self._ants.batched.arrays
         return {
             "state": np.int64(arrays["states"][0]),
             "action_mask": ACTION_MASKS[arrays["percepts"][0]].copy(),
@@ -231,7 +231,7 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         """
         if not self._begun:
             raise ResetNeeded("no episode is under way; call reset() before action_masks().")
-        return ACTION_MASKS[self._ants.lockstep.arrays["percepts"][0]].astype(bool)
+        return ACTION_MASKS[self._ants.batched.arrays["percepts"][0]].astype(bool)
 
     def render(self) -> Any:
         """A picture or a text map of the world as it is, see `render_mode`; None without one.
@@ -321,9 +321,9 @@ class HexForageVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
             raise ResetNeeded("no episode is under way; call reset() without a reset_mask first.")
         super().reset(seed=int(seed) if isinstance(seed, (int, np.integer)) else None)
         self._ants.seed(seeds_of(seed, self.num_envs), which, self.np_random)
-        self._ants.lockstep.begin(which)
+        self._ants.batched.begin(which)
         self._over = np.zeros(self.num_envs, bool) if self._over is None else self._over & ~which
-        arrays = self._ants.lockstep.arrays
+        arrays = self._ants.batched.arrays
         infos = _infos(arrays, arrays["states"], arrays["percepts"], which, ~self._all)
         return self._ants.observations(), infos
 
@@ -336,7 +336,7 @@ class HexForageVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
             ResetNeeded: No episode has begun; or one has ended, and autoreset_mode is "Disabled".
             InvalidAction: There are not as many actions, or one of them is none.
         """
-        ants, arrays, mode = self._ants, self._ants.lockstep.arrays, self.autoreset_mode
+        ants, arrays, mode = self._ants, self._ants.batched.arrays, self.autoreset_mode
         if self._over is None:
             raise ResetNeeded("no episode is under way; call reset() before step().")
         if mode == AutoresetMode.DISABLED and self._over.any():
@@ -344,7 +344,7 @@ class HexForageVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
                 f"the episode of environment {self._over.argmax()} has ended; call reset() with "
                 'options={"reset_mask": ...} before step().'
             )
-        ants.lockstep.step(
+        ants.batched.step(
             checked_actions(actions, self.num_envs),
             begins=self._over if mode == AutoresetMode.NEXT_STEP else 0,
             same_step=mode == AutoresetMode.SAME_STEP,

@@ -21,7 +21,7 @@ _MOST_NUMBERS = 1 << 25  # of the table of all states
 class Shown:
     """What an ant sees, in one of the formats.
 
-    A state is a row of a table of action values, see `taichi_ants.task.Observation`. In the
+    A state is an index into a table of action values, see `taichi_ants.task.Observation`. In the
     paper's, and in all others of this package, it is made of the load (1 with food) and a code for
     each cell in view.
 

@@ -23,4 +23,4 @@ STREAM_QUEEN = 5  # number: 0
 STREAM_BRIDGE = 6  # number: the colony at the double bridge of `baselines.goss`
 STREAM_TOUR = 7  # number: colony * 2**32 + the ant of `baselines.ant_system`
 STREAM_FORAGER = 8  # number: colony * 2**32 + the ant of `baselines.utility`
-STREAM_HAND = 9  # number: 0; what is drawn for ants that a hand adds
+STREAM_INTERVENTION = 9  # number: 0; what is drawn for ants that an intervention adds

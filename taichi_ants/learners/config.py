@@ -34,7 +34,7 @@ class TrainingConfig(Settings, path="training"):
         learning_rate_decay: Factor on the learning rate after each episode, in (0, 1].
         min_learning_rate: Lower bound of the decay of the learning rate, in [0, 1]. If it is
             larger than `learning_rate`, the learning rate stays as it is.
-        initial_value: Of each action in each state before learning, from -1e6 to 1e6. Values above
+        initial_q: Of each action in each state before learning, from -1e6 to 1e6. Values above
             what can be reached ("optimistic") make ants try all actions.
         hyperparameters: What this learner has besides, (name, number) pairs by name; given as a
             mapping, or as keywords: `TrainingConfig("dyna_q", ..., planning_steps=5)`. Those that
@@ -60,7 +60,7 @@ class TrainingConfig(Settings, path="training"):
     min_learning_rate: Annotated[
         Share, Is("value below which the learning rate does not decay")
     ] = 0.0
-    initial_value: Annotated[
+    initial_q: Annotated[
         float,
         Is("value of each action before learning; high ones make ants try every action"),
         Is(least=-MOST_VALUE, most=MOST_VALUE),
@@ -79,7 +79,7 @@ class TrainingConfig(Settings, path="training"):
         *,
         learning_rate_decay: float = 1.0,
         min_learning_rate: float = 0.0,
-        initial_value: float = 0.0,
+        initial_q: float = 0.0,
         **more: float,
     ) -> None:
         given = locals()
@@ -136,7 +136,7 @@ class TrainingConfig(Settings, path="training"):
         return {**asdict(self), "hyperparameters": dict(self.hyperparameters)}
 
 
-INITIAL_VALUE = setting(TrainingConfig, "initial_value")
+INITIAL_VALUE = setting(TrainingConfig, "initial_q")
 
 
 def share_of_one(value: Any) -> bool:

@@ -7,7 +7,7 @@ from taichi_ants.learners.model import (
     Planning,
     error_of,
     model_memory,
-    pack_outcome,
+    pack_transition,
     recall,
     remember,
     visited,
@@ -18,9 +18,9 @@ from taichi_ants.task.rules.random_bits import advance, below, bits_of, high_wor
 
 
 @ti.func
-def update(memory: ti.template(), at, rates, pair, outcome):
+def update(memory: ti.template(), at, rates, pair, transition):
     """Update a pair by its TD error, which is returned."""
-    error = error_of(memory, at, rates, pair, outcome)
+    error = error_of(memory, at, rates, pair, transition)
     memory.q[at.table + pair] = memory.q[at.table + pair] + rates.learning_rate * error
     return error
 
@@ -29,9 +29,9 @@ def update(memory: ti.template(), at, rates, pair, outcome):
 def learn(memory: ti.template(), at, step, rates, random_state):
     """Q-learning from the step, then from pairs of the model that are drawn."""
     pair = step.state * ROW + step.action
-    outcome = pack_outcome(step.next_state, step.reward, step.terminated)
-    error = update(memory, at, rates, pair, outcome)
-    remember(memory, at, pair, outcome)
+    transition = pack_transition(step.next_state, step.reward, step.terminated)
+    error = update(memory, at, rates, pair, transition)
+    remember(memory, at, pair, transition)
     rng, n_visited = random_state, visited(memory, at)
     for _ in range(rates.planning_steps):
         rng = advance(rng)

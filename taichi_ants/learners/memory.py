@@ -18,7 +18,7 @@ class LearnerArrays(NamedTuple):
             The first table of a run is the one that it acts by; its further ones follow.
         floats: f32 array.
         integers: i32 array.
-        n_states: Rows of a table, a number of Python's.
+        n_states: The number of states, a number of Python's.
     """
 
     q: Any
@@ -31,7 +31,7 @@ class LearnerArrays(NamedTuple):
 # table + k * n_states * ROW.
 At = ti.types.struct(table=ti.i32, floats=ti.i32, integers=ti.i32)
 
-# One step of an ant, in rows of its table. The next action is -1 where none was drawn. A step is
+# One step of an ant, by state indices. The next action is -1 where none was drawn. A step is
 # `truncated` if the episode ends with it although it did not terminate.
 Transition = ti.types.struct(
     state=ti.i32,

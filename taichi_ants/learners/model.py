@@ -1,8 +1,8 @@
-"""A model of the world: the outcome that was seen last of each visited pair of row and action.
+"""A model of the world: the transition that was seen last of each visited pair of state and action.
 
 It lies in the integers of a learner's memory: the number of visited pairs; from 2 on, in the order
-of first visits, each pair (its offset in the table) and its packed outcome; behind the room for all
-pairs, for each pair its place in this order plus 1, or 0.
+of first visits, each pair (its offset in the table) and its packed transition; behind the room for
+all pairs, for each pair its place in this order plus 1, or 0.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from taichi_ants.settings import Is
 from taichi_ants.task.constants import MOST_REWARD, N_ACTIONS, ROW
 from taichi_ants.task.rules.policy import best_value
 
-# An outcome packs the next row (20 bits), the reward (11 bits) and whether the step terminated.
+# A transition packs the next state (20 bits), the reward (11 bits) and whether the step terminated.
 _REWARD_AT, _TERMINATED_AT = 20, 31
 # Pairs and slots lie below this. Masks tell the compiler that they are not negative: indices that
 # might be take it one more instruction each, and planning is made of little else.
@@ -41,28 +41,28 @@ def model_memory(n_states: int, floats: int = 0) -> Memory:
 
 
 @ti.func
-def pack_outcome(next_state, reward, terminated):
-    """An outcome as one i32; the reward is a whole number as f32."""
+def pack_transition(next_state, reward, terminated):
+    """A transition as one i32; the reward is a whole number as f32."""
     paid = ti.cast(reward, ti.i32) + MOST_REWARD
     return next_state | paid << _REWARD_AT | terminated << _TERMINATED_AT
 
 
 @ti.func
-def next_state_of(outcome):
-    """The next row of an outcome."""
-    return outcome & (1 << _REWARD_AT) - 1
+def next_state_of(transition):
+    """The next state of a transition."""
+    return transition & (1 << _REWARD_AT) - 1
 
 
 @ti.func
-def reward_of(outcome):
-    """The reward of an outcome, f32."""
-    return ti.cast((outcome >> _REWARD_AT & 2047) - MOST_REWARD, ti.f32)
+def reward_of(transition):
+    """The reward of a transition, f32."""
+    return ti.cast((transition >> _REWARD_AT & 2047) - MOST_REWARD, ti.f32)
 
 
 @ti.func
-def terminated_of(outcome):
-    """1 if the step of an outcome terminated, else 0."""
-    return ti.cast(outcome < 0, ti.i32)
+def terminated_of(transition):
+    """1 if the step of a transition terminated, else 0."""
+    return ti.cast(transition < 0, ti.i32)
 
 
 @ti.func
@@ -72,32 +72,32 @@ def visited(memory: ti.template(), at):
 
 
 @ti.func
-def remember(memory: ti.template(), at, pair, outcome):
+def remember(memory: ti.template(), at, pair, transition):
     """Store what was seen last of a pair, new pairs behind all others; the pair's slot."""
-    row, action = (pair & _PAIRS) // ROW, (pair & _PAIRS) % ROW
-    key = at.integers + 2 + (2 * memory.n_states + row) * N_ACTIONS + action
+    state, action = (pair & _PAIRS) // ROW, (pair & _PAIRS) % ROW
+    key = at.integers + 2 + (2 * memory.n_states + state) * N_ACTIONS + action
     place = memory.integers[key]
     if place == 0:
         place = memory.integers[at.integers] + 1
         memory.integers[at.integers] = place
         memory.integers[key] = place
         memory.integers[at.integers + 2 * place] = pair
-    memory.integers[at.integers + 2 * place + 1] = outcome
+    memory.integers[at.integers + 2 * place + 1] = transition
     return place - 1
 
 
 @ti.func
 def recall(memory: ti.template(), at, slot):
-    """The pair in a slot, and its outcome."""
+    """The pair in a slot, and its transition."""
     place = at.integers + 2 + 2 * (slot & _PAIRS)
     return memory.integers[place] & _PAIRS, memory.integers[place + 1]
 
 
 @ti.func
-def error_of(memory: ti.template(), at, rates, pair, outcome):
-    """The TD error of Q-learning for an outcome of a pair."""
-    target = reward_of(outcome)
-    if terminated_of(outcome) == 0:
-        next_values = values_of(memory.q, at.table, next_state_of(outcome))
+def error_of(memory: ti.template(), at, rates, pair, transition):
+    """The TD error of Q-learning for a transition of a pair."""
+    target = reward_of(transition)
+    if terminated_of(transition) == 0:
+        next_values = values_of(memory.q, at.table, next_state_of(transition))
         target += rates.discount * best_value(next_values)
     return target - memory.q[at.table + pair]

@@ -30,7 +30,7 @@ class Policy(NamedTuple):
 
     Attributes:
         q_values: Action values, float32 (n_states, 5).
-        observation: Name of the registered observation whose states are the rows.
+        observation: Name of the registered observation whose states index the rows.
         metadata: What made the policy.
     """
 
@@ -58,7 +58,7 @@ class Policy(NamedTuple):
             envs.step(policy.actions(infos["state"], rng))
 
         Args:
-            states: Rows of the table, integers of any shape; one state gives one action.
+            states: State indices, integers of any shape; one state gives one action.
             rng: Decides ties.
 
         Raises:
@@ -132,7 +132,7 @@ def trail_follower(observation: str = "paper") -> ActionValues:
     so only by moving against that ant, and it waits behind an ant that is further up the trail (p).
 
     Args:
-        observation: The observation whose states are the rows, one of `FOLLOWED`.
+        observation: The observation whose states index the rows, one of `FOLLOWED`.
 
     Returns:
         Float32 (n_states, 5): 1 for the actions that it takes, 0 for the others.
@@ -185,7 +185,7 @@ def save_policy(
         q_values: Action values of shape (n_states, 5), finite as float32.
         metadata: What made the policy (configuration, seed, world ...), anything that
             JSON can hold.
-        observation: Name of the registered observation whose states are the rows.
+        observation: Name of the registered observation whose states index the rows.
 
     Raises:
         AntsError: The observation is unknown, the values are no policy of it, the metadata cannot

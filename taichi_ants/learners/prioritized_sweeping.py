@@ -11,7 +11,7 @@ from taichi_ants.learners.model import (
     error_of,
     model_memory,
     next_state_of,
-    pack_outcome,
+    pack_transition,
     recall,
     remember,
     terminated_of,
@@ -50,9 +50,9 @@ def learn(memory: ti.template(), at, step, rates, random_state):
     The integers are the model, the floats the priority of each of its slots.
     """
     pair = step.state * ROW + step.action
-    outcome = pack_outcome(step.next_state, step.reward, step.terminated)
-    error = error_of(memory, at, rates, pair, outcome)
-    slot = remember(memory, at, pair, outcome)
+    transition = pack_transition(step.next_state, step.reward, step.terminated)
+    error = error_of(memory, at, rates, pair, transition)
+    slot = remember(memory, at, pair, transition)
     if ti.abs(error) > rates.threshold:
         memory.floats[at.floats + slot] = ti.abs(error)
     planned = 0

@@ -36,7 +36,7 @@ BY_HAND = "by hand"
 # What 64 ants need to learn to forage together in 60 episodes; see docs/foraging.md.
 _LEARNING: dict[str, Any] = {
     **{"learning_rate": 0.1, "discount": 0.9, "epsilon": 0.3, "epsilon_decay": 0.92},
-    **{"learning_rate_decay": 0.95, "min_learning_rate": 0.01, "initial_value": 10.0},
+    **{"learning_rate_decay": 0.95, "min_learning_rate": 0.01, "initial_q": 10.0},
 }
 
 
@@ -158,7 +158,7 @@ class Choices:
             ants=checked_whole("how many ants", chosen["ants"], 1, MOST_ANTS),
             seed=checked_whole("the seed", chosen["seed"], 0),
             ticks_per_episode=checked_whole("ticks an episode", chosen["ticks"], 0, 1_000_000),
-            sharing="shared" if shares else "own",
+            sharing="shared" if shares else "independent",
             world_seed=checked_whole("the seed of the world", chosen["world_seed"], 0),
             world_settings={**settings.get("world", {}), **ranges},
         )

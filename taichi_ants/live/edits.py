@@ -1,4 +1,5 @@
-"""What a hand can change in a colony that runs: each edit is a small dictionary, as JSON holds it.
+"""Interventions in a running colony, as pages send them: each edit is a small dictionary, as JSON
+holds it.
 
     {"kind": "ground", "what": "empty", "rock" or "food", "cells": [...]}
     {"kind": "trail", "level": number, "cells": [...]}
@@ -10,7 +11,7 @@
 
 Cells are flat indices of cells of the world. Cells that cannot take what is put there are left as
 they are: the ground under the queen, trails on rocks, ants on anything but empty cells. Rock and
-food move ants aside. See `taichi_ants.engines.colony.hand` for how, and for what lasts.
+food move ants aside. See `taichi_ants.engines.colony.interventions` for how, and for what lasts.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from taichi_ants.engines.colony.hand import Hand
+from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.errors import AntsError, check_one_of, expect, shown
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import Pheromone
@@ -58,20 +59,20 @@ class Value(NamedTuple):
     step: float
 
 
-def values(hand: Hand) -> dict[str, Value]:
+def values(interventions: Interventions) -> dict[str, Value]:
     """What "set" changes in a colony, by name; only what makes a difference there.
 
     - ants: how many live now; set, it is how many start each later episode as well.
-    - epsilon, learning_rate: from now on; what a hand has set decays no more.
+    - epsilon, learning_rate: from now on; a value set by an intervention no longer decays.
     - deposit, slope, cap: as `Pheromone` has them; the deposit is its level.
     - evaporation: 1 if trails fall, else 0. half_life, diffusion: as `Pheromone` has them.
     """
-    colony, pheromone = hand.colony, hand.colony.pheromone
+    colony, pheromone = interventions.colony, interventions.colony.pheromone
     found = {
-        "ants": Value(max(hand.living, 1), 1, colony.capacity, 1),
+        "ants": Value(max(interventions.living, 1), 1, colony.capacity, 1),
         "epsilon": Value(colony.epsilon, 0.0, 1.0, 0.01),
     }
-    if colony.sharing != "fixed":
+    if colony.sharing != "frozen":
         found["learning_rate"] = Value(colony.learning_rate, 0.0, 1.0, 0.001)
     if pheromone.deposit != "none":
         found["deposit"] = Value(int(pheromone.level), 1, max(1000, int(pheromone.level)), 1)
@@ -79,7 +80,7 @@ def values(hand: Hand) -> dict[str, Value]:
         if (number := getattr(pheromone, name)) is not None:
             found[name] = Value(int(number), 1, max(usual, int(number)), 1)
     falls = pheromone.evaporation != "none"
-    if _with_evaporation(hand, not falls)[0].dense == pheromone.dense:
+    if _with_evaporation(interventions, not falls)[0].dense == pheromone.dense:
         found["evaporation"] = Value(int(falls), 0, 1, 1)
     if pheromone.half_life is not None:
         half_life = float(pheromone.half_life)
@@ -90,15 +91,15 @@ def values(hand: Hand) -> dict[str, Value]:
     return found
 
 
-def _with_evaporation(hand: Hand, falls: bool) -> tuple[Pheromone, Pheromone]:
+def _with_evaporation(interventions: Interventions, falls: bool) -> tuple[Pheromone, Pheromone]:
     """The pheromone that a colony has if its trails fall, or do not, and that of its task then."""
-    pheromone = hand.colony.task.pheromone
+    pheromone = interventions.colony.task.pheromone
     if falls and pheromone.evaporation == "none":
         pheromone = replace(pheromone, evaporation="linear")
     return (pheromone if falls else pheromone.lasting), pheromone
 
 
-def checked(edit: object, hand: Hand) -> Edit:
+def checked(edit: object, interventions: Interventions) -> Edit:
     """A copy of an edit, if it is one; whether there is room for it tells `apply`.
 
     Raises:
@@ -116,16 +117,16 @@ def checked(edit: object, hand: Hand) -> Edit:
         )
     plain: Edit = {"kind": kind}
     for name in _FIELDS[kind]:
-        plain[name] = _CHECKS[name](edit[name], edit, hand)
+        plain[name] = _CHECKS[name](edit[name], edit, interventions)
     return plain
 
 
-def apply(edit: Edit, hand: Hand, length: int | None) -> None:
+def apply(edit: Edit, interventions: Interventions, length: int | None) -> None:
     """Do an edit that `checked` gave.
 
     Args:
         edit: What to do.
-        hand: Whose colony is in an episode.
+        interventions: Whose colony is in an episode.
         length: Of an episode that begins.
 
     Raises:
@@ -133,57 +134,57 @@ def apply(edit: Edit, hand: Hand, length: int | None) -> None:
     """
     kind = edit["kind"]
     if kind == "ground":
-        hand.put(np.array(edit["cells"]), _GROUNDS[edit["what"]])
+        interventions.put(np.array(edit["cells"]), _GROUNDS[edit["what"]])
     elif kind == "trail":
-        hand.lay_trail(np.array(edit["cells"]), edit["level"])
+        interventions.lay_trail(np.array(edit["cells"]), edit["level"])
     elif kind == "add_ants":
-        hand.add_ants(np.array(edit["cells"]), edit["heading"])
+        interventions.add_ants(np.array(edit["cells"]), edit["heading"])
     elif kind == "remove_ants":
-        hand.remove_ants(np.array(edit["cells"]))
+        interventions.remove_ants(np.array(edit["cells"]))
     elif kind == "queen":
-        hand.move_queen(edit["cell"])
+        interventions.move_queen(edit["cell"])
     elif kind == "set":
-        _set(edit["name"], edit["value"], hand)
+        _set(edit["name"], edit["value"], interventions)
     else:
-        hand.begin_episode(length)
+        interventions.begin_episode(length)
 
 
-def _set(name: str, value: float, hand: Hand) -> None:
+def _set(name: str, value: float, interventions: Interventions) -> None:
     if name in _SETS:
-        _SETS[name](hand, value)
+        _SETS[name](interventions, value)
         return
-    task = hand.colony.task
+    task = interventions.colony.task
     pheromone = task.pheromone
     if name == "evaporation":
-        _, pheromone = _with_evaporation(hand, value == 1)
-        learns = hand.colony.sharing != "fixed"
+        _, pheromone = _with_evaporation(interventions, value == 1)
+        learns = interventions.colony.sharing != "frozen"
         flag = "evaporation_in_training" if learns else "evaporation_in_evaluation"
         flags: dict[str, Any] = {flag: value == 1}
         task = replace(task, **flags)
     else:
         numbers: dict[str, Any] = {"level" if name == "deposit" else name: value}
         pheromone = replace(pheromone, **numbers)
-    hand.set_task(replace(task, pheromone=pheromone))
+    interventions.set_task(replace(task, pheromone=pheromone))
 
 
-_SETS: dict[str, Callable[[Hand, Any], None]] = {
-    "ants": Hand.set_ants,
-    "epsilon": Hand.set_epsilon,
-    "learning_rate": Hand.set_learning_rate,
+_SETS: dict[str, Callable[[Interventions, Any], None]] = {
+    "ants": Interventions.set_ants,
+    "epsilon": Interventions.set_epsilon,
+    "learning_rate": Interventions.set_learning_rate,
 }
 
 
-def _checked_what(what: Any, edit: Mapping, hand: Hand) -> str:
+def _checked_what(what: Any, edit: Mapping, interventions: Interventions) -> str:
     check_one_of("what", what, tuple(_GROUNDS))
     return what
 
 
-def _checked_cells(cells: Any, edit: Mapping, hand: Hand) -> list[int]:
+def _checked_cells(cells: Any, edit: Mapping, interventions: Interventions) -> list[int]:
     """Cells of the world, in the order given, each once."""
-    most = hand.colony.grid.count
+    most = interventions.colony.grid.count
     if not isinstance(cells, list) or not 1 <= len(cells) <= most:
         raise AntsError(f"cells is {shown(cells)}; it must be a list of 1 to {most} cells.")
-    exists = hand.colony.grid.exists
+    exists = interventions.colony.grid.exists
     for cell in cells:
         if type(cell) is not int or not 0 <= cell < len(exists) or not exists[cell]:
             raise AntsError(
@@ -192,27 +193,27 @@ def _checked_cells(cells: Any, edit: Mapping, hand: Hand) -> list[int]:
     return list(dict.fromkeys(cells))
 
 
-def _checked_cell(cell: Any, edit: Mapping, hand: Hand) -> int:
-    return _checked_cells([cell], edit, hand)[0]
+def _checked_cell(cell: Any, edit: Mapping, interventions: Interventions) -> int:
+    return _checked_cells([cell], edit, interventions)[0]
 
 
-def _checked_level(level: Any, edit: Mapping, hand: Hand) -> int:
+def _checked_level(level: Any, edit: Mapping, interventions: Interventions) -> int:
     return int(_number("level", level, Value(0, 0, MAX_DEPOSIT, 1)))
 
 
-def _checked_heading(heading: Any, edit: Mapping, hand: Hand) -> int | None:
+def _checked_heading(heading: Any, edit: Mapping, interventions: Interventions) -> int | None:
     if heading is None:
         return None
     return int(_number("heading", heading, Value(0, 0, N_HEADINGS - 1, 1), ", or None"))
 
 
-def _checked_name(name: Any, edit: Mapping, hand: Hand) -> str:
-    check_one_of("the name of a value", name, tuple(values(hand)))
+def _checked_name(name: Any, edit: Mapping, interventions: Interventions) -> str:
+    check_one_of("the name of a value", name, tuple(values(interventions)))
     return name
 
 
-def _checked_value(value: Any, edit: Mapping, hand: Hand) -> float:
-    return _number(edit["name"], value, values(hand)[edit["name"]])
+def _checked_value(value: Any, edit: Mapping, interventions: Interventions) -> float:
+    return _number(edit["name"], value, values(interventions)[edit["name"]])
 
 
 def _number(name: str, value: Any, allowed: Value, otherwise: str = "") -> float:
@@ -227,7 +228,7 @@ def _number(name: str, value: Any, allowed: Value, otherwise: str = "") -> float
     return value if whole else float(value)
 
 
-_CHECKS: dict[str, Callable[[Any, Mapping, Hand], Any]] = {
+_CHECKS: dict[str, Callable[[Any, Mapping, Interventions], Any]] = {
     "what": _checked_what,
     "cells": _checked_cells,
     "cell": _checked_cell,

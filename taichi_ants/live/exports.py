@@ -24,10 +24,10 @@ _PROGRESS_EVERY = 0.1  # seconds
 
 
 def recording(log: Log, most_frames: int = 1000, progress: Progress | None = None) -> Recording:
-    """The session as a page plays it without a server, see `Session.moments`."""
-    moments = _moments(log, most_frames, progress)
-    session, first = next(moments)
-    frames = [first, *(frame for _, frame in moments)]
+    """The session as a page plays it without a server, see `Session.snapshots`."""
+    snapshots = _snapshots(log, most_frames, progress)
+    session, first = next(snapshots)
+    frames = [first, *(frame for _, frame in snapshots)]
     return Recording(session.header(), frames)
 
 
@@ -37,11 +37,11 @@ def page_bytes(log: Log, progress: Progress | None = None) -> bytes:
 
 
 def gif_bytes(log: Log, progress: Progress | None = None, most_frames: int = 300) -> bytes:
-    """An animation of the session, see `Session.moments`."""
-    from taichi_ants.rendering import colony_moments, frames, save_animation
+    """An animation of the session, see `Session.snapshots`."""
+    from taichi_ants.rendering import colony_snapshots, frames, save_animation
 
-    passed = _moments(log, most_frames, progress)
-    shown = (moment for session, _ in passed for moment in colony_moments(session.colony))
+    passed = _snapshots(log, most_frames, progress)
+    shown = (one for session, _ in passed for one in colony_snapshots(session.colony))
     pictures = frames(shown, strongest=log.setup.task.pheromone.level)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "session.gif")
@@ -49,8 +49,8 @@ def gif_bytes(log: Log, progress: Progress | None = None, most_frames: int = 300
         return path.read_bytes()
 
 
-def _moments(log: Log, most: int, progress: Progress | None) -> Iterator[tuple[Session, bytes]]:
-    for session, frame in Session.moments(log, most):
+def _snapshots(log: Log, most: int, progress: Progress | None) -> Iterator[tuple[Session, bytes]]:
+    for session, frame in Session.snapshots(log, most):
         yield session, frame
         if progress is not None:
             progress(session.ticks)

@@ -1,4 +1,4 @@
-"""The log of a session: how it began, and all that a hand has changed. It replays the session."""
+"""The log of a session: how it began, and all interventions. It replays the session."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Log:
         edits: (steps, edit) of each edit, in order, see `edits`.
         steps: How many steps time has made, see `Session`.
         ticks: How many ticks have passed; None if that is not known.
-        state: What `Hand.state` gives then; None if that is not known.
+        state: What `Interventions.state` gives then; None if that is not known.
         name: What messages call it.
         changes: As in `Session`.
     """

@@ -408,7 +408,7 @@ class Room:
 
     def _moment(self) -> list[str | bytes]:
         """All as it is now, for a page that knows nothing of it."""
-        return [_say("moment"), self.session.moment()]
+        return [_say("snapshot"), self.session.snapshot()]
 
     def _play(self, page: Page, request: dict[str, Any]) -> None:
         self.playing, self._due = True, time.monotonic()

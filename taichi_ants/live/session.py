@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from taichi_ants import files
-from taichi_ants.engines.colony.hand import Hand
+from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.learners.policies import save_policy
 from taichi_ants.live import edits
@@ -42,7 +42,7 @@ class _Snapshot(NamedTuple):
 
 
 class Session:
-    """A colony in a world, from its first tick on, and all that a hand has changed.
+    """A colony in a world, from its first tick on, and all interventions.
 
     It depends on its setup and its edits alone: `load` replays them.
 
@@ -63,20 +63,20 @@ class Session:
     def __init__(self, setup: Setup) -> None:
         expect("setup", setup, Setup)
         self.setup, self.colony = setup, setup.build_colony()
-        self.hand = Hand(self.colony)
+        self.interventions = Interventions(self.colony)
         self.ticks = self.steps = 0
         self.edits: list[tuple[int, edits.Edit]] = []
         self.changes: list[int] = []
         self._cells = 0  # that the edits name
         self._snapshots: list[_Snapshot] = []
         self._spent = 0.0  # seconds of simulation so far
-        self.hand.begin_episode(self._length)
-        self.colony.look()  # changes nothing, but compiles what the first edit needs
-        # A hand changes how many ants there are.
+        self.interventions.begin_episode(self._length)
+        self.colony.observe()  # changes nothing, but compiles what the first edit needs
+        # Interventions change the number of ants.
         title = f"Ants in a world of {self.colony.grid.count} cells"
         self._recorder = Recorder(self.colony, title=title)
-        self._recorder.course.note()
-        self._recorder.moment()
+        self._recorder.progress.note()
+        self._recorder.snapshot()
         self._named = set(self._recorder.names())
 
     @property
@@ -100,7 +100,7 @@ class Session:
         self._named |= new.keys()
         return new
 
-    def moment(self) -> bytes:
+    def snapshot(self) -> bytes:
         """A frame that holds all as it is now, for a page that has read none."""
         return self._recorder.whole()
 
@@ -113,7 +113,7 @@ class Session:
         Raises:
             AntsError: n is not allowed.
         """
-        return self._pass(checked_whole("n", n), self._recorder.tick) or self._recorder.moment()
+        return self._pass(checked_whole("n", n), self._recorder.tick) or self._recorder.snapshot()
 
     def leap(self, n: int) -> bytes:
         """Let time make n steps, also through several episodes; a frame of what has changed.
@@ -126,14 +126,14 @@ class Session:
         until = self.steps + checked_whole("n", n)
         while self.steps < until:
             self._pass(until - self.steps, self.colony.tick)
-        return self._recorder.moment()
+        return self._recorder.snapshot()
 
     def _pass(self, n: int, tick: Callable[[int], Any]) -> Any:
         """As `advance`, by a function that lets ticks pass; what it gives, None without ticks."""
-        course = self._recorder.course
+        progress = self._recorder.progress
         if self.ended:
-            course.note(ended=True)
-            self.hand.begin_episode(self._length)
+            progress.note(ended=True)
+            self.interventions.begin_episode(self._length)
             self.steps += 1
             return None
         n = min(n, self._length - self.colony.ticks if self._length else n)
@@ -146,7 +146,7 @@ class Session:
             self.ticks += self.colony.ticks - before
             self.steps += self.colony.ticks - before
             self._spent += time.perf_counter() - began
-        course.note()
+        progress.note()
         return frame
 
     def apply(self, edit: object, goes_on: bool = False) -> bytes:
@@ -162,18 +162,18 @@ class Session:
             AntsError: It is none, or there is no room for it; nothing has changed.
         """
         self._do(edit, goes_on)
-        return self._recorder.moment()
+        return self._recorder.snapshot()
 
     def _do(self, edit: object, goes_on: bool = False) -> None:
-        plain = edits.checked(edit, self.hand)
+        plain = edits.checked(edit, self.interventions)
         check_room(len(self.edits) + 1, self._cells + cells_of(plain))
         begins = not (goes_on and self.changes)
         if begins:
             self._take_snapshot()
         began = time.perf_counter()
         if plain["kind"] == "episode":
-            self._recorder.course.note(ended=True)
-        edits.apply(plain, self.hand, self._length)
+            self._recorder.progress.note(ended=True)
+        edits.apply(plain, self.interventions, self._length)
         if begins:
             self.changes.append(len(self.edits))
         self.edits.append((self.steps, plain))
@@ -202,11 +202,11 @@ class Session:
 
     def values(self) -> dict[str, dict[str, float]]:
         """What the edit "set" can change, by name: value, least, most and step."""
-        return {name: value._asdict() for name, value in edits.values(self.hand).items()}
+        return {name: value._asdict() for name, value in edits.values(self.interventions).items()}
 
     def log(self) -> Log:
         """How it began, the edits, and what its end is like."""
-        state = self.hand.state()
+        state = self.interventions.state()
         done, changes = tuple(self.edits), tuple(self.changes)
         return Log(self.setup, done, self.steps, self.ticks, state, changes=changes)
 
@@ -252,7 +252,7 @@ class Session:
             session = cls(log.setup)
             for _ in session._follow(log.edits, log.steps, log.changes):
                 yield session
-            if log.state not in (None, session.hand.state()):
+            if log.state not in (None, session.interventions.state()):
                 raise ValueError("replayed, it does not end as it did")
         yield session
 
@@ -266,12 +266,12 @@ class Session:
             yield
         yield from self._pieces(steps)
         self.changes = list(changes)
-        self._recorder.moment()
+        self._recorder.snapshot()
 
     def same(self, other: Session) -> bool:
         """Whether another one began alike, was changed alike, and stands where this one does."""
         one, two = ((it.steps, it.edits, it.setup.to_json()) for it in (self, other))
-        return one == two and self.hand.state() == other.hand.state()
+        return one == two and self.interventions.state() == other.interventions.state()
 
     def undone(self) -> Iterator[Session]:
         """Make the session as it was before its last change, from the last snapshot before it.
@@ -283,7 +283,7 @@ class Session:
             AntsError: Nothing has been changed.
         """
         if not self.changes:
-            raise AntsError("there is nothing to undo: nobody has changed this session by hand.")
+            raise AntsError("there is nothing to undo: this session has no interventions.")
         return self._before_last_change()
 
     def _before_last_change(self) -> Iterator[Session]:
@@ -301,13 +301,13 @@ class Session:
         yield session
 
     @classmethod
-    def moments(cls, log: Log, most: int = 1000) -> Iterator[tuple[Session, bytes]]:
-        """A session once more from its beginning, moment by moment.
+    def snapshots(cls, log: Log, most: int = 1000) -> Iterator[tuple[Session, bytes]]:
+        """Replay a session from its beginning, snapshot by snapshot.
 
         Args:
             log: Of the session.
-            most: About how many moments there are at most. If there are fewer steps and edits, each
-                step has a moment, and what a hand has changed before it as well.
+            most: About how many snapshots there are at most. If there are fewer steps and edits,
+                each step has a snapshot, and so does each intervention.
 
         Yields:
             The session at that moment, and a frame of what has changed since the last one.
@@ -315,7 +315,7 @@ class Session:
         changes = len({steps for steps, _ in log.edits})
         every = max(1, -(-(log.steps + changes) // checked_whole("most", most)))
         session = cls(log.setup)
-        yield session, session.moment()
+        yield session, session.snapshot()
         for steps, edits_then in groupby([*log.edits, (log.steps, None)], lambda one: one[0]):
             while session.steps < steps:
                 if every == 1:
@@ -323,12 +323,12 @@ class Session:
                     continue
                 session._go(min(steps, session.steps + every - session.steps % every))
                 if session.steps % every == 0:
-                    yield session, session._recorder.moment()
+                    yield session, session._recorder.snapshot()
             wanted = [edit for _, edit in edits_then if edit is not None]
             for edit in wanted:
                 session._do(edit)
             if wanted if every == 1 else steps == log.steps:
-                yield session, session._recorder.moment()
+                yield session, session._recorder.snapshot()
 
     def _pieces(self, steps: int) -> Iterator[None]:
         """Let time pass until it has made so many steps, in pieces of about `_PIECE` seconds."""
@@ -367,7 +367,7 @@ class Session:
 
         Its later episodes begin as those of the session would, with as many ants as this one.
         """
-        self.colony.worlds = (self.hand.world(),)
+        self.colony.worlds = (self.interventions.world(),)
         return _bytes_of("colony.npz", self.colony.save)
 
 

@@ -41,7 +41,7 @@ class Setup:
         capacity: How many ants can live at once; None: 2 * `ants` + 64.
         seed: Of the colony.
         ticks_per_episode: 0 for one episode without an end.
-        sharing: Of ants that learn: "shared" or "own", see `Colony`.
+        sharing: Of ants that learn: "shared" or "independent", see `Colony`.
         epsilon: With which ants follow action values.
         world_seed: Of a world that is drawn.
         world_settings: Of a registered world, see `worlds.build`.
@@ -67,7 +67,7 @@ class Setup:
         expect("world", self.world, str)
         expect("task", self.task, Task)
         if isinstance(self.policy, TrainingConfig):
-            check_one_of("sharing", self.sharing, ("shared", "own"))
+            check_one_of("sharing", self.sharing, ("shared", "independent"))
             learners.get(self.policy.learner)
         else:
             object.__setattr__(self, "policy", checked_table(self.policy, self.task).copy())
@@ -126,7 +126,7 @@ class Setup:
         """The colony, before its first episode; raises AntsError if it cannot be."""
         options: dict[str, Any] = {"ants": self.ants, "capacity": self.capacity}
         numbers = self.capacity * self.task.n_states * ROW  # type: ignore[operator]
-        if self.learns and self.sharing == "own" and numbers > _MOST_NUMBERS:
+        if self.learns and self.sharing == "independent" and numbers > _MOST_NUMBERS:
             raise AntsError(
                 f"capacity is {self.capacity}, but tables of {self.task.n_states} states for so "
                 'many ants take too much memory; take a smaller one, or sharing "shared".'
@@ -135,7 +135,7 @@ class Setup:
             options |= {"sharing": self.sharing}
             training = self.policy
         else:
-            options |= {"sharing": "fixed", "q_values": self.policy}
+            options |= {"sharing": "frozen", "q_values": self.policy}
             training = TrainingConfig("q_learning", 1.0, 0.0, self.epsilon, 1.0, min_epsilon=0.0)
         return Colony(self.build_world(), self.task, training, self.seed, **options)
 

@@ -95,7 +95,7 @@ class Live {
     if (message.say === "begin") this.meet(message);
     else if (message.say === "over") this.ended = true; // the socket closes next
     else if (message.say === "names") Object.assign(this.viewer.history.header.names, message.names);
-    else if (message.say === "moment" || message.say === "file") this.waiting = message;
+    else if (message.say === "snapshot" || message.say === "file") this.waiting = message;
     else {
       if (message.say === "state") {
         if (!this.stands) this.running = message.playing;

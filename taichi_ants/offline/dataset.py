@@ -48,7 +48,7 @@ class Dataset(Record):
             steps of an episode come in order.
         agent: int32 (n,), the number of the ant in its colony, 0 of an ant that is alone.
         step: int32 (n,), the tick of its world, from 0. A newborn's first is larger.
-        state: int32 (n,), the row of a table of action values.
+        state: int32 (n,), the state index.
         action: int32 (n,), 0 to 4.
         reward: int32 (n,).
         next_state: int32 (n,).

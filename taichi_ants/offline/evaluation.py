@@ -110,7 +110,7 @@ def model_based(
     q_values: np.ndarray,
     discount: float = 0.9,
     epsilon: float = 0.0,
-    initial_value: float = 0.0,
+    initial_q: float = 0.0,
     resamples: int = RESAMPLES,
     level: float = 0.95,
     threads: int | None = None,
@@ -122,18 +122,18 @@ def model_based(
     states that ants see are not Markov. A resample has a model of its own.
 
     Args:
-        initial_value: Value of the pairs that the data lack.
+        initial_q: Value of the pairs that the data lack.
 
     Others, and errors, are those of `importance_sampling`; the discount must be at most 0.9999.
     """
     expect("data", data, Dataset)
     policies, shape = _policies(data, q_values, epsilon)
-    times, initial_value = _times(data, resamples), INITIAL_VALUE.checked(initial_value)
+    times, initial_q = _times(data, resamples), INITIAL_VALUE.checked(initial_q)
     model, first = EmpiricalModel.resampled(data, times), data.state[data.begins[:-1]]
     starts = times / times.sum(axis=1, keepdims=True, dtype=np.int64)  # of each episode
     outcomes = []
     for policy in policies:
-        q = model.solve(discount, model.rewards, initial_value, policy, threads=threads)
+        q = model.solve(discount, model.rewards, initial_q, policy, threads=threads)
         values = (policy[first] * q[:, first]).sum(axis=-1)
         outcomes.append((*_interval((starts * values).sum(axis=1), level), np.nan))
     return _values(outcomes, shape)

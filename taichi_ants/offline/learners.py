@@ -34,7 +34,7 @@ def batch_q_learning(
     discount: float = 0.9,
     learning_rate: float = 0.1,
     sweeps: int = 100,
-    initial_value: float = 0.0,
+    initial_q: float = 0.0,
     by_run: bool = False,
     threads: int | None = None,
 ) -> np.ndarray:
@@ -48,7 +48,7 @@ def batch_q_learning(
         discount: Discount factor gamma, from 0 to 1.
         learning_rate: Step size alpha, from 0 to 1.
         sweeps: How often it goes over the data, at least 1.
-        initial_value: Of all pairs before; of those that the data lack, after.
+        initial_q: Of all pairs before; of those that the data lack, after.
         by_run: Whether to learn a table from the data of each run.
         threads: CPU threads; None keeps what runs, or takes all.
 
@@ -58,7 +58,7 @@ def batch_q_learning(
     expect("data", data, Dataset)
     rates = checked_share("learning_rate", learning_rate), checked_share("discount", discount)
     sweeps, groups = checked_whole("sweeps", sweeps), _groups(data, by_run)
-    first = INITIAL_VALUE.checked(initial_value)
+    first = INITIAL_VALUE.checked(initial_q)
     q = np.full((len(groups) - 1, data.task.n_states, N_ACTIONS), first, np.float32)
     runtime.start(threads)
     from taichi_ants.offline.kernels import replay  # imports Taichi
@@ -72,7 +72,7 @@ def batch_q_learning(
 def fitted_q_iteration(
     data: Dataset,
     discount: float = 0.9,
-    initial_value: float = 0.0,
+    initial_q: float = 0.0,
     by_run: bool = False,
     threads: int | None = None,
 ) -> np.ndarray:
@@ -81,12 +81,12 @@ def fitted_q_iteration(
     Fitted Q iteration (Ernst, Geurts and Wehenkel, Tree-based batch mode reinforcement learning,
     JMLR 6, 2005) with a table for regression: its fit to all targets is their mean over the
     transitions of a pair, so that it iterates Q on that model. The order of the data is irrelevant.
-    Pairs that the data lack keep `initial_value`. Arguments and errors are those of
+    Pairs that the data lack keep `initial_q`. Arguments and errors are those of
     `batch_q_learning`, but the discount must be at most 0.9999.
     """
-    initial_value = INITIAL_VALUE.checked(initial_value)
+    initial_q = INITIAL_VALUE.checked(initial_q)
     model = EmpiricalModel.of(data, _groups(data, by_run))
-    q = model.solve(discount, model.rewards, initial_value, threads=threads).astype(np.float32)
+    q = model.solve(discount, model.rewards, initial_q, threads=threads).astype(np.float32)
     return q if by_run else q[0]
 
 
@@ -127,7 +127,7 @@ class EmpiricalModel:
     is another question: where they are not, it depends on the behaviour policy too.
 
     Attributes:
-        n_states: Rows of a table.
+        n_states: The number of states.
         largest: What the task pays, or takes, at most.
         groups: int32 (groups + 1,), where the pairs of a group of rows begin.
         pairs: int32 (pairs,), state * 5 + action, ascending in a group.
@@ -206,7 +206,7 @@ class EmpiricalModel:
         self,
         discount: float,
         rewards: np.ndarray,
-        initial_value: float,
+        initial_q: float,
         policy: np.ndarray | None = None,
         lowest: float = -np.inf,
         threads: int | None = None,
@@ -216,7 +216,7 @@ class EmpiricalModel:
         Args:
             discount: Discount factor gamma, below 1.
             rewards: float64 (pairs,), expected.
-            initial_value: Of all pairs before; of those that the data lack, after.
+            initial_q: Of all pairs before; of those that the data lack, after.
             policy: The probabilities of the actions (n_states, 5) of the policy whose values are
                 asked for; None: the greedy one.
             lowest: No value falls below it.
@@ -226,7 +226,7 @@ class EmpiricalModel:
             float64 (groups, n_states, 5).
         """
         discount, n_groups = checked_discount(discount), len(self.groups) - 1
-        q = np.full((n_groups, self.n_states, N_ACTIONS), initial_value, np.float64)
+        q = np.full((n_groups, self.n_states, N_ACTIONS), initial_q, np.float64)
         values = np.empty((n_groups, self.n_states))
         greedy = np.zeros((self.n_states, N_ACTIONS)) if policy is None else policy
         runtime.start(threads)
@@ -236,7 +236,7 @@ class EmpiricalModel:
         # An array of length 0 cannot be an argument.
         successors, probabilities = np.append(self.successors, np.int32(0)), self.probabilities
         model = (self.groups, self.pairs, rewards, self.begins, successors)
-        numbers = (discount, lowest, tolerance(self.largest, discount, initial_value))
+        numbers = (discount, lowest, tolerance(self.largest, discount, initial_q))
         probabilities = np.append(probabilities, 0.0)
         iterate(*flat, int(policy is None), *model, probabilities, self.n_states, *numbers)
         return q
@@ -256,9 +256,9 @@ def _tally(data: Dataset, pair: np.ndarray) -> tuple[np.ndarray, ...]:
     return keys // (ends + 1), keys % (ends + 1), counts, rewards, which
 
 
-def tolerance(largest: float, discount: float, initial_value: float) -> float:
+def tolerance(largest: float, discount: float, initial_q: float) -> float:
     """Q iteration ends when no action value changes by more: far above rounding errors."""
-    return 1e-12 * max(1.0, largest / (1.0 - discount), abs(initial_value))
+    return 1e-12 * max(1.0, largest / (1.0 - discount), abs(initial_q))
 
 
 def checked_discount(discount: float) -> float:

@@ -108,8 +108,9 @@ def record_colony(
     """Record what the ants of a colony do, while it goes on for some episodes.
 
     A run is a world of the colony. An episode of the data is what one ant does until it dies, until
-    the colony's episode ends, or, if deliveries are absorbing, until it gives its food; then
-    another one of the same ant begins. The colony acts and learns as in `Colony.run`, to the bit.
+    the colony's episode ends, or, if a delivery terminates the episode, until it gives its food;
+    then another one of the same ant begins. The colony acts and learns as in `Colony.run`, to the
+    bit.
 
     Args:
         colony: The colony; it may learn, or follow fixed tables. All its worlds are the same one.
@@ -178,7 +179,7 @@ def _tick(colony: Colony, tables: np.ndarray, before: np.ndarray) -> dict[str, n
         "action": action,
         "reward": colony.task.rewards.by_event()[event],
         "next_state": colony.states[run, slot],
-        "terminated": (event == Event.DELIVERED) & (colony.task.delivery == "absorbing"),
+        "terminated": (event == Event.DELIVERED) & (colony.task.delivery == "terminates"),
         "behaviour_probability": chances,
     }
 

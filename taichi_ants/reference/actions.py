@@ -199,7 +199,7 @@ def _moved(world: WorldState, intent: Intent, destination: Cell | None, task: Ta
     ant.cell = destination
     if ant.carries:
         world.trail.deposit(destination, ant.carried)
-    ant.reward = rewards.lure if intent.lured else rewards.empty
+    ant.reward = rewards.shaping if intent.lured else rewards.empty
     return Event.ENTERED_LURE if intent.lured else Event.ENTERED_EMPTY
 
 
@@ -220,7 +220,7 @@ def _handled(world: WorldState, intent: Intent, wins: bool, task: Task) -> Event
         ant.carries, ant.carried = False, 0
         if task.turns_at_queen:
             ant.heading = (ant.heading + 3) % N_HEADINGS
-        ant.reward = rewards.give
+        ant.reward = rewards.deliver
         return Event.DELIVERED
     if intent.action == PICK_UP and wins and intent.target is not None:
         world.ground[intent.target] = EMPTY

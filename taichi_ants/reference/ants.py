@@ -32,7 +32,7 @@ class Ant:
         age: Ticks that it has lived, where there is a lifespan, else 0.
         carried: Ticks that it has carried its food, 0 without food.
         percept: What lies in the three cells ahead, 0..127; what it does goes by this.
-        state: The row of its table that it looks at; what it chooses and learns goes by this.
+        state: The index of its state; what it chooses and learns goes by this.
         action: What it did last, 0..4; -1 before its first tick.
         reward: What that gave; 0 before its first tick.
         chosen: The action that it has drawn already for its next tick, if any.

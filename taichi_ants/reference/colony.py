@@ -20,8 +20,8 @@ from taichi_ants.grid.constants import (
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.reference.actions import carry_out, choose_action, intend
 from taichi_ants.reference.ants import Ant, Transition, starts
+from taichi_ants.reference.food_sources import FoodSources
 from taichi_ants.reference.geometry import Cell, neighbour
-from taichi_ants.reference.homes import Homes
 from taichi_ants.reference.learners import LEARNERS
 from taichi_ants.reference.observations import OBSERVATIONS
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
@@ -72,7 +72,7 @@ class ReferenceColony:
         seed, sharing, slots, start: As given; there are so many slots for ants.
         ants: The living ants by slot.
         streams: Of the initial ants; they run on through all episodes.
-        homes: The places of the foods of the start.
+        food_sources: The places of the foods of the start.
         next_number: Of the next ant that comes to those that started.
         store: Foods that wait with the queen to become ants.
         queen_stream: Her random stream, which runs on; food that wanders draws from it as well.
@@ -106,10 +106,10 @@ class ReferenceColony:
             training: The learner and its settings.
             seed: Any integer.
             ants, capacity, start, ends_at_delivery: As in `Colony`.
-            sharing: "shared", "own" or "fixed".
-            q_values: The table to begin with, (n_states, 5); with "own" also (slots, n_states, 5).
-                Zeros if not given. A born ant that has a table of its own begins with zeros all the
-                same.
+            sharing: "shared", "independent" or "frozen".
+            q_values: The table to begin with, (n_states, 5); with "independent" also (slots,
+                n_states, 5). Zeros if not given. A born ant that has a table of its own begins
+                with zeros all the same.
 
         Raises:
             AntsError: The learner, one of its hyperparameters, the sharing or the observation is
@@ -121,7 +121,7 @@ class ReferenceColony:
         check_one_of("learner", training.learner, tuple(LEARNERS))
         check_one_of("observation", task.observation, tuple(OBSERVATIONS))
         falls = (
-            task.evaporation_in_evaluation if sharing == "fixed" else task.evaporation_in_training
+            task.evaporation_in_evaluation if sharing == "frozen" else task.evaporation_in_training
         )
         self.pheromone = task.pheromone if falls else task.pheromone.lasting
         self._row = OBSERVATIONS[task.observation]
@@ -141,7 +141,7 @@ class ReferenceColony:
     def _set_up(self) -> None:
         """Put everything that does not outlive an episode where it starts."""
         self.world = WorldState(self.start_world, self.pheromone)
-        self.homes = Homes(self.start_world)
+        self.food_sources = FoodSources(self.start_world)
         self.store = 0
         self.next_number = self.n_ants
         self.record = EpisodeRecord()
@@ -152,7 +152,7 @@ class ReferenceColony:
         for number, (cell, heading) in enumerate(begin):
             self.add(Ant(cell, heading, slot=number, number=number, stream=self.streams[number]))
         for ant in self.ants.values():
-            self.look(ant)
+            self.observe(ant)
 
     def add(self, ant: Ant) -> None:
         """Put an ant into its slot and onto its cell."""
@@ -163,9 +163,9 @@ class ReferenceColony:
     def q_values(self) -> np.ndarray:
         """A copy of the table, float32 (n_states, 5), or of all, (slots, n_states, 5)."""
         tables = np.array([learner.table() for learner in self.minds.tables])
-        return tables if self.sharing == "own" else tables[0]
+        return tables if self.sharing == "independent" else tables[0]
 
-    def look(self, ant: Ant) -> None:
+    def observe(self, ant: Ant) -> None:
         """Let an ant see what is around it now."""
         ant.percept = observe(self.world, ant)
         ant.state = self._row(self.world, ant)
@@ -217,7 +217,7 @@ class ReferenceColony:
         events = carry_out(self.world, intents, tick, self.task)
         for intent, event in zip(intents, events, strict=True):
             if event is Event.PICKED_UP and intent.target is not None:
-                self.homes.taken(intent.target, tick)
+                self.food_sources.taken(intent.target, tick)
         self.world.trail.tick()
         self._count(acting, events)
         if self.task.life.births:
@@ -226,7 +226,7 @@ class ReferenceColony:
         dying = self._deaths(acting)
         self._food(tick)
         for ant in [*self.ants.values(), *dying]:
-            self.look(ant)
+            self.observe(ant)
         self.over = self._ends_at_delivery and self.record.deliveries > 0
         self._learn(before, acting, events, last or self.over)
         self.record.ticks += 1
@@ -296,9 +296,9 @@ class ReferenceColony:
     def _food(self, tick: int) -> None:
         life = self.task.life
         if life.regrowth is not None:
-            self.record.regrown += self.homes.regrow(self.world, life.regrowth, tick)
+            self.record.regrown += self.food_sources.regrow(self.world, life.regrowth, tick)
         if life.wander is not None and (tick + 1) % life.wander == 0:
-            self.homes.wander(self.world, self.queen_stream)
+            self.food_sources.wander(self.world, self.queen_stream)
 
     def _learn(
         self, before: Sequence[Ant], after: Sequence[Ant], events: Sequence[Event], last: bool
@@ -306,8 +306,8 @@ class ReferenceColony:
         """Draw a' where the learner wants it, by the tables as they stand; then learn."""
         self.transitions = []
         for was, ant, event in zip(before, after, events, strict=True):
-            terminated = event is Event.DELIVERED and self.task.delivery == "absorbing"
-            # After an absorbing delivery the ant goes on with a choice of its own.
+            terminated = event is Event.DELIVERED and self.task.delivery == "terminates"
+            # After a delivery that terminates the ant goes on with a choice of its own.
             if self.minds.draws_next_action and not terminated:
                 ant.chosen = self._draw_action(ant)
             self.transitions.append(
@@ -338,7 +338,7 @@ def beginner(
 
     Of the world's listed ants it is the first; if there is none, it is placed by the seed.
     """
-    return ReferenceColony(world, task, config, seed, ends_at_delivery=True, sharing="own")
+    return ReferenceColony(world, task, config, seed, ends_at_delivery=True, sharing="independent")
 
 
 def follower(
@@ -355,7 +355,7 @@ def follower(
     """
     training = TrainingConfig("q_learning", 1.0, 1.0, epsilon, 1.0)
     colony = ReferenceColony(
-        world, task, training, seed, ends_at_delivery=True, sharing="fixed", q_values=q_values
+        world, task, training, seed, ends_at_delivery=True, sharing="frozen", q_values=q_values
     )
     colony.streams[0] = RandomStream(stream_state(seed, STREAM_ROLLOUT, number))
     return colony

@@ -1,4 +1,4 @@
-"""The twins of the package's observations: what row of its table an ant looks at."""
+"""The twins of the package's observations: what an ant observes."""
 
 from __future__ import annotations
 

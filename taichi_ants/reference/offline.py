@@ -23,10 +23,10 @@ def batch_q_learning(
     discount: float,
     learning_rate: float,
     sweeps: int,
-    initial_value: float,
+    initial_q: float,
 ) -> np.ndarray:
     """Q-learning over all steps in order, some times; float32 (n_states, 5)."""
-    q = np.full((n_states, N_ACTIONS), initial_value, np.float32)
+    q = np.full((n_states, N_ACTIONS), initial_q, np.float32)
     for _ in range(sweeps):
         for episode in episodes:
             for state, action, reward, next_state, terminated in episode:
@@ -41,7 +41,7 @@ def q_iteration(
     episodes: Episodes,
     n_states: int,
     discount: float,
-    initial_value: float,
+    initial_q: float,
     tolerance: float,
     policy: np.ndarray | None = None,
     penalty: float = 0.0,
@@ -57,7 +57,7 @@ def q_iteration(
             rewards[state, action] += reward
             if not terminated:
                 led_to[state, action][next_state] += 1
-    q: list[list[float]] = [[initial_value] * N_ACTIONS for _ in range(n_states)]
+    q: list[list[float]] = [[initial_q] * N_ACTIONS for _ in range(n_states)]
     change = np.inf
     while change > tolerance:
         values: list[float] = [max(row) for row in q]

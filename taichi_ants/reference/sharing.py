@@ -19,7 +19,7 @@ Make = Callable[[np.ndarray | None], Learner]
 _ONE = 1 << 32  # TD errors are summed in units of 2**-32
 
 
-class FixedTable:
+class FrozenTable:
     """One table for all ants, that stays as it is.
 
     Attributes:
@@ -53,7 +53,7 @@ class FixedTable:
         """
 
 
-class SharedTable(FixedTable):
+class SharedTable(FrozenTable):
     """One table into which all ants learn.
 
     All errors of a tick, and of a round of planning, are errors by the table as it stood before.
@@ -68,7 +68,7 @@ class SharedTable(FixedTable):
         if not self._common.shares:
             raise AntsError(
                 f"the learner {self._common.name!r} has no TD error that can be summed over ants, "
-                'so they cannot share its table; make sharing "own".'
+                'so they cannot share its table; make sharing "independent".'
             )
         self.draws_next_action = self._common.draws_next_action
         self._slots = slots
@@ -113,7 +113,7 @@ def mean_error(errors: Sequence[np.float32]) -> np.float32:
     return np.float32(float(total) / (float(len(errors)) * _ONE))
 
 
-class OwnTables(FixedTable):
+class IndependentTables(FrozenTable):
     """A table for each slot, into which the ant in it learns as if alone."""
 
     def __init__(self, make: Make, slots: int, q_values: np.ndarray | None) -> None:
@@ -139,4 +139,4 @@ class OwnTables(FixedTable):
             step.td_error = self.tables[step.slot].learn(step, epsilon, stream)
 
 
-SHARING = {"shared": SharedTable, "own": OwnTables, "fixed": FixedTable}
+SHARING = {"shared": SharedTable, "independent": IndependentTables, "frozen": FrozenTable}

@@ -15,31 +15,31 @@ from taichi_ants.errors import AntsError, count, entries_of, expect, shown, whol
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.rendering import colours, text
 from taichi_ants.rendering.marks import cell
-from taichi_ants.rendering.moments import Episode
 from taichi_ants.rendering.rasteriser import Rasteriser, draw_marks
 from taichi_ants.rendering.scene import check_size
+from taichi_ants.rendering.snapshots import Episode
 from taichi_ants.task import Rewards, Task
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.task.events import Event
 from taichi_ants.worlds.world import World
 
-STAGES = (0, 1, 2, 20)  # in the world of the paper, ants differ at these most
+CHECKPOINTS = (0, 1, 2, 20)  # in the world of the paper, ants differ at these most
 SEEDS = 200
 DEFAULT_SIZE = (1280, 520)  # four worlds in a row fill it
 # In sizes of the text: the title of a tile, one more line below it, all other text, the legend.
 _TITLE_LINES, _MORE_LINES, _TILE_LINES, _LEGEND_LINES = 1.7, 1.4, 5.6, 2.6
 # What earns or costs reward: its letter, that of a cell, its words, and which reward it is.
 _SOURCES = (
-    ("T", "T", "onto a trail", "lure"),
-    ("S", "S", "nearer to the queen", "lure"),
+    ("T", "T", "onto a trail", "shaping"),
+    ("S", "S", "nearer to the queen", "shaping"),
     ("F", "F", "food", "pick_up"),
-    ("Q", "Q", "delivery", "give"),
+    ("Q", "Q", "delivery", "deliver"),
     ("X", "O", "blocked, in vain", "failed"),
 )
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
+class Checkpoint:
     """How an ant does after so many episodes of training.
 
     Attributes:
@@ -59,7 +59,7 @@ class Stage:
         return f"after {count(self.episodes, 'episode')}" if self.episodes else "before learning"
 
     def account(self) -> np.ndarray:
-        """What was earned until each moment, int (len(episode), 5); the sum is the return.
+        """What was earned until each snapshot, int (len(episode), 5); the sum is the return.
 
         The columns are T, S, F, Q and X: steps onto a trail, steps nearer to the queen with food,
         food picked up, food given to her, and what failed.
@@ -75,24 +75,24 @@ class Stage:
         return earned.cumsum(axis=0)
 
 
-def learning_stages(
+def learning_checkpoints(
     world: World,
     config: TrainingConfig,
     *,
     seed: int = 0,
-    stages: Sequence[int] = STAGES,
+    checkpoints: Sequence[int] = CHECKPOINTS,
     max_steps: int = 150,
     task: Task | None = None,
     epsilon: float = 0.0,
     progress: Callable[[float], None] | None = None,
-) -> list[Stage]:
+) -> list[Checkpoint]:
     """Train one ant, and roll its policy out whenever it has had a given number of episodes.
 
     Args:
         world: The world.
         config: The learner and its settings.
         seed: Of training and rollouts.
-        stages: Numbers of episodes, ascending; 0 is before learning.
+        checkpoints: Numbers of episodes, ascending; 0 is before learning.
         max_steps: Step limit of a rollout.
         task: The rules of the game; None is the paper's.
         epsilon: Probability of a random action in the rollouts.
@@ -102,16 +102,19 @@ def learning_stages(
         AntsError: An argument is not allowed; the message names it.
     """
     checks.check_progress(progress)
-    task, stages = checks.checked_task(Task() if task is None else task), _checked_stages(stages)
+    task, checkpoints = (
+        checks.checked_task(Task() if task is None else task),
+        _checked_checkpoints(checkpoints),
+    )
     played = []
-    for n in stages:
+    for n in checkpoints:
         table = _tables(world, config, [seed], n, task)[0]
         episode = Episode.play(
             world, table, seed=seed, max_steps=max_steps, task=task, epsilon=epsilon
         )
-        played.append(Stage(n, episode, "delivered" if episode.delivered else ""))
+        played.append(Checkpoint(n, episode, "delivered" if episode.delivered else ""))
         if progress is not None:
-            progress(len(played) / len(stages))
+            progress(len(played) / len(checkpoints))
     return played
 
 
@@ -120,7 +123,7 @@ def typical_seed(
     config: TrainingConfig,
     *,
     seeds: int | Sequence[int] = range(SEEDS),
-    stages: Sequence[int] = STAGES,
+    checkpoints: Sequence[int] = CHECKPOINTS,
     max_steps: int = 150,
     task: Task | None = None,
     epsilon: float = 0.0,
@@ -128,25 +131,29 @@ def typical_seed(
 ) -> tuple[int, list[int]]:
     """Return the seed of the run that is nearest to the median run, and how many seeds deliver.
 
-    Each run is ranked among all seeds by the return and by the steps of its rollout at each stage;
-    equal values share the middle rank. The typical run is the one whose largest distance from the
-    middle rank is smallest; of several, the first.
+    Each run is ranked among all seeds by the return and by the steps of its rollout at each
+    checkpoint; equal values share the middle rank. The typical run is the one whose largest
+    distance from the middle rank is smallest; of several, the first.
 
     Args:
-        world, config, stages, max_steps, task, epsilon, progress: As in `learning_stages`.
+        world, config, checkpoints, max_steps, task, epsilon, progress: As in
+            `learning_checkpoints`.
         seeds: The seeds to choose from.
 
     Returns:
-        The seed, and for each stage the number of seeds that deliver within `max_steps`.
+        The seed, and for each checkpoint the number of seeds that deliver within `max_steps`.
 
     Raises:
         AntsError: An argument is not allowed; the message names it.
     """
     checks.check_progress(progress)
-    task, stages = checks.checked_task(Task() if task is None else task), _checked_stages(stages)
+    task, checkpoints = (
+        checks.checked_task(Task() if task is None else task),
+        _checked_checkpoints(checkpoints),
+    )
     chosen = checks.checked_seeds(seeds)
     distances, deliver = np.zeros(len(chosen)), []
-    for done, n in enumerate(stages, start=1):
+    for done, n in enumerate(checkpoints, start=1):
         tables = _tables(world, config, chosen, n, task)
         outcome = evaluate(world, tables, 1, chosen, max_steps, task, epsilon)
         for values in (outcome.returns[:, 0], outcome.steps[:, 0]):
@@ -154,18 +161,20 @@ def typical_seed(
             distances = np.maximum(distances, np.abs(above) / len(chosen))
         deliver.append(int((outcome.deliveries[:, 0] > 0).sum()))
         if progress is not None:
-            progress(done / len(stages))
+            progress(done / len(checkpoints))
     return int(chosen[distances.argmin()]), deliver
 
 
-def _checked_stages(stages: Sequence[int]) -> list[int]:
-    listed = entries_of(stages)
+def _checked_checkpoints(checkpoints: Sequence[int]) -> list[int]:
+    listed = entries_of(checkpoints)
     if listed is None:
-        raise AntsError(f"stages is {shown(stages)}; it must be numbers of episodes.")
-    stages = [whole("a stage", stage) for stage in listed]
-    if not stages or stages != sorted(set(stages)) or stages[0] < 0:
-        raise AntsError(f"stages are {shown(tuple(stages))}; they must ascend, from 0 or more.")
-    return stages
+        raise AntsError(f"checkpoints is {shown(checkpoints)}; it must be numbers of episodes.")
+    checkpoints = [whole("a checkpoint", checkpoint) for checkpoint in listed]
+    if not checkpoints or checkpoints != sorted(set(checkpoints)) or checkpoints[0] < 0:
+        raise AntsError(
+            f"checkpoints are {shown(tuple(checkpoints))}; they must ascend, from 0 or more."
+        )
+    return checkpoints
 
 
 def _tables(
@@ -178,25 +187,28 @@ def _tables(
 
 
 def learning_frames(
-    stages: Sequence[Stage], size: tuple[int, int] = DEFAULT_SIZE, title: str = ""
+    checkpoints: Sequence[Checkpoint], size: tuple[int, int] = DEFAULT_SIZE, title: str = ""
 ) -> Iterator[np.ndarray]:
-    """The pictures of all stages side by side, uint8 (height, width, 3), until the last one ends.
+    """The pictures of all checkpoints side by side, uint8 (height, width, 3), until the last one
+    ends.
 
-    A stage that has ended stays as it ended.
+    A checkpoint that has ended stays as it ended.
 
     Args:
-        stages: At least one, all in one world.
+        checkpoints: At least one, all in one world.
         size: Width and height in pixels.
         title: A line above all.
 
     Raises:
         AntsError: The size is not allowed.
     """
-    expect("stages", stages, list, tuple)
-    for stage in stages:
-        expect("a stage", stage, Stage)
-    if len({stage.episode.world for stage in stages}) != 1:
-        raise AntsError("the stages are of several worlds, or there are none; give those of one.")
+    expect("checkpoints", checkpoints, list, tuple)
+    for checkpoint in checkpoints:
+        expect("a checkpoint", checkpoint, Checkpoint)
+    if len({checkpoint.episode.world for checkpoint in checkpoints}) != 1:
+        raise AntsError(
+            "the checkpoints are of several worlds, or there are none; give those of one."
+        )
     width, height = check_size(size)
     expect("title", title, str)
     canvas = np.full((height, width, 3), colours.channels(colours.PAGE))
@@ -206,18 +218,20 @@ def learning_frames(
     room = width - 2 * letters
     text.write(canvas, title, width / 2, 1.5 * letters, letters, align="middle", room=room)
     if letters:
-        _draw_legend(canvas, bottom, letters, stages[0].episode.task.rewards)
-    columns = math.ceil(len(stages) / max(1, math.isqrt(len(stages) * height // width)))
-    more = _MORE_LINES * any(stage.among for stage in stages)
-    rows, lines = math.ceil(len(stages) / columns), round((_TILE_LINES + more) * letters)
+        _draw_legend(canvas, bottom, letters, checkpoints[0].episode.task.rewards)
+    columns = math.ceil(len(checkpoints) / max(1, math.isqrt(len(checkpoints) * height // width)))
+    more = _MORE_LINES * any(checkpoint.among for checkpoint in checkpoints)
+    rows, lines = math.ceil(len(checkpoints) / columns), round((_TILE_LINES + more) * letters)
     w = width // columns
     # No higher than wide, so that a title stays near to what it speaks of.
     h = min((bottom - top) // rows, w + lines)
     top += (bottom - top - rows * h) // 2
-    grid, margin = stages[0].episode.world.grid, max(2, round(min(w, h) / 60))
+    grid, margin = checkpoints[0].episode.world.grid, max(2, round(min(w, h) / 60))
     rasteriser = Rasteriser(grid, w, max(1, h - lines), margin)
-    pictures = [_tile_pictures(stage, rasteriser, h, letters, more) for stage in stages]
-    for _ in range(max(len(stage.episode) for stage in stages)):
+    pictures = [
+        _tile_pictures(checkpoint, rasteriser, h, letters, more) for checkpoint in checkpoints
+    ]
+    for _ in range(max(len(checkpoint.episode) for checkpoint in checkpoints)):
         for place, waiting in enumerate(pictures):
             x, y = place % columns * w, top + place // columns * h
             for tile in islice(waiting, 1):
@@ -226,18 +240,18 @@ def learning_frames(
 
 
 def _tile_pictures(
-    stage: Stage, rasteriser: Rasteriser, height: int, letters: int, more: float
+    checkpoint: Checkpoint, rasteriser: Rasteriser, height: int, letters: int, more: float
 ) -> Iterator[np.ndarray]:
     """One of the worlds, with a title above and how its ant does below."""
-    account, width = stage.account(), rasteriser.width
+    account, width = checkpoint.account(), rasteriser.width
     above = round((_TITLE_LINES + more) * letters)
     tile = np.empty((height, width, 3), dtype=np.uint8)
-    for step, (snapshot, _) in enumerate(stage.episode.moments()):
+    for step, (snapshot, _) in enumerate(checkpoint.episode.snapshots()):
         tile[:] = colours.channels(colours.PAGE)
         tile[above : above + rasteriser.height] = rasteriser.draw(snapshot)
         result = f"step {step}, return {account[step].sum()}"
-        if stage.note and step == len(stage.episode.trace):
-            result += f": {stage.note}"
+        if checkpoint.note and step == len(checkpoint.episode.trace):
+            result += f": {checkpoint.note}"
         parts = [
             f"{'+' if earned > 0 else '-'} {letter} {abs(earned)}"
             for (letter, *_), earned in zip(_SOURCES, account[step].tolist(), strict=True)
@@ -246,8 +260,8 @@ def _tile_pictures(
         sources = f"= {' '.join(parts).removeprefix('+ ')}" if parts else ""
         below = above + rasteriser.height + 1.2 * letters
         lines = (
-            (stage.title, 1.2 * letters),
-            (stage.among, (1.2 + _MORE_LINES) * letters),
+            (checkpoint.title, 1.2 * letters),
+            (checkpoint.among, (1.2 + _MORE_LINES) * letters),
             (result, below),
             (sources, below + 1.4 * letters),
         )

@@ -8,8 +8,8 @@ import numpy as np
 
 from taichi_ants.rendering import colours, text
 from taichi_ants.rendering.marks import ants, cell
-from taichi_ants.rendering.observed import PAPER, Observation
 from taichi_ants.rendering.rasteriser import draw_marks
+from taichi_ants.rendering.state_names import PAPER, Observation
 from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS
 
 # A cell by its letter, whether an ant on it carries food, a letter on it, and what it is called.
@@ -28,7 +28,7 @@ LEGEND_HEIGHT = 14.8  # in sizes of the text
 
 @dataclass(frozen=True, eq=False)
 class Status:
-    """What is said of a moment.
+    """The text about a snapshot.
 
     Attributes:
         lines: Names and values, such as ("step", "12").

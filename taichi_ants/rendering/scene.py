@@ -8,10 +8,10 @@ from taichi_ants.errors import AntsError, checked_flag, checked_whole, expect, s
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import colours, panel, text
-from taichi_ants.rendering.observed import name_parts
 from taichi_ants.rendering.panel import Status
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.rendering.snapshot import Snapshot
+from taichi_ants.rendering.state_names import name_parts
 from taichi_ants.task.constants import DEPOSIT_LEVEL, FOOD, QUEEN
 
 SMALLEST_SIDE, LARGEST_SIDE = 64, 4096
@@ -42,7 +42,7 @@ class Scene:
         grid: The grid of all worlds to draw.
         size: Width and height of the pictures, 64 to 4096 pixels each.
         title: A line above the panel.
-        plain: Whether to draw the world alone, without panel and marks.
+        overlay: Whether to draw the panel and marks, not the world alone.
         view: Whether to leave room for the cells in view beyond the border of the world.
         strongest: The trail level, 1 or more, from which trails have the darkest colour.
 
@@ -56,7 +56,7 @@ class Scene:
         size: tuple[int, int] = DEFAULT_SIZE,
         *,
         title: str = "",
-        plain: bool = False,
+        overlay: bool = True,
         view: bool = False,
         strongest: int = DEPOSIT_LEVEL,
     ) -> None:
@@ -65,15 +65,15 @@ class Scene:
         expect("title", title, str)
         view = checked_flag("view", view)
         strongest = checked_whole("strongest", strongest)
-        self._plain = checked_flag("plain", plain)
+        self._overlay = checked_flag("overlay", overlay)
         letters = round(min(width, height) / 38)
         self._background = np.full((height, width, 3), colours.channels(colours.PAGE))
         margin = max(2, round(min(width, height) / 60))
-        self._has_panel = not plain and letters >= text.SMALLEST
+        self._has_panel = overlay and letters >= text.SMALLEST
         room = width  # of the world, on the left
         if self._has_panel:
             room -= _PANEL_WIDTH * letters + margin
-        self._rasteriser = Rasteriser(grid, room, height, margin, view and not plain, strongest)
+        self._rasteriser = Rasteriser(grid, room, height, margin, view and overlay, strongest)
         if self._has_panel:
             column = width - margin - room
             bottom = height - margin - round(panel.LEGEND_HEIGHT * letters)
@@ -106,7 +106,7 @@ class Scene:
     def _draw_world(self, snapshot: Snapshot, status: Status | None) -> np.ndarray:
         """The world; the cells that ant number 0 sees are marked, with its letters for them."""
         rasteriser, hexagon = self._rasteriser, self._rasteriser.hexagon
-        state = None if status is None or self._plain else status.state
+        state = None if status is None or not self._overlay else status.state
         if status is None or state is None or not len(snapshot.ant_cells):
             return rasteriser.draw(snapshot)
         turned = (snapshot.ant_headings[0] + np.array(status.observation.cells)) % N_HEADINGS

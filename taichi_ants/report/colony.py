@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from taichi_ants.analysis.colony.contrasts import Judged
-from taichi_ants.analysis.colony.study import ARENAS, EVALUATION_EPSILON, MEASURES, WORLDS
+from taichi_ants.analysis.colony.study import EVALUATION_EPSILON, MEASURES, WORLD_KINDS, WORLDS
 from taichi_ants.analysis.colony.tables import (
     ConditionRow,
     glance,
@@ -39,16 +39,17 @@ def colony_page(
         facts: How it was done, names and words.
         files: The names of the files and folders beside the page.
     """
-    arenas = list(dict.fromkeys(row.condition.arena for row in rows))
-    trained = [arena for arena in ARENAS if arena in arenas]
+    world_kinds = list(dict.fromkeys(row.condition.world_kind for row in rows))
+    trained = [world_kind for world_kind in WORLD_KINDS if world_kind in world_kinds]
     seeds = seeds_in_words(rows[0].seeds)
     return fill(
         "colony.html",
         title="When does a colony do more than its ants?",
-        byline=f"{seeds}, {count(len(rows), 'condition')}, {count(len(arenas), 'kind')} of world",
+        byline=f"{seeds}, {count(len(rows), 'condition')}, "
+        f"{count(len(world_kinds), 'kind')} of world",
         seeds=seeds,
         epsilon=f"{EVALUATION_EPSILON:g}",
-        worlds=[ARENAS[arena] for arena in trained],
+        worlds=[WORLD_KINDS[world_kind] for world_kind in trained],
         headlines=headlines(rows, findings),
         findings=_statements(findings),
         glance=glance(rows),
@@ -63,7 +64,7 @@ def colony_page(
 def _statements(findings: Judged) -> Statements:
     """The findings, with the verdict on the largest colony."""
     lines = []
-    for (arena, series), by_sizes in findings.items():
+    for (world_kind, series), by_sizes in findings.items():
         unit = MEASURES[series.measure]
         told = [
             judged(count(n, "ant") if n == less else f"{n} against {less}", one, "Difference", unit)
@@ -72,5 +73,5 @@ def _statements(findings: Judged) -> Statements:
         facts = {"Question": series.question, "Difference in": unit}
         verdicts = [of_largest(by_sizes).verdict]
         statement = f"{sentence(series.statement)}."
-        lines.append(Statement(statement, sentence(WORLDS[arena]), verdicts, facts, told))
+        lines.append(Statement(statement, sentence(WORLDS[world_kind]), verdicts, facts, told))
     return Statements(("Statement", "World", "Largest colony"), lines, "statements")

@@ -80,12 +80,15 @@ def _claims(results: Results) -> Statements:
     """The claims, with a column of verdicts for each delivery setting."""
     lines = []
     for claim, findings in results.audit.items():
-        unit, centre = claim.quantity.unit, claim.centre
+        unit, estimator = claim.quantity.unit, claim.estimator
         told = [
-            judged(f"{setting} delivery", one, one.contrast.label, unit)
+            judged(f"delivery {setting}", one, one.contrast.label, unit)
             for setting, one in findings.items()
         ]
-        facts = {"Tested on": claim.tested_on, "Asked": f"{centre} {claim.criterion.words} {unit}"}
+        facts = {
+            "Tested on": claim.tested_on,
+            "Asked": f"{estimator} {claim.criterion.words} {unit}",
+        }
         verdicts = [one.verdict for one in findings.values()]
         lines.append(Statement(claim.statement, claim.section, verdicts, facts, told))
     settings = map(sentence, results.comparison.delivery_settings)

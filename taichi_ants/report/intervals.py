@@ -31,8 +31,8 @@ def interval_drawing(finding: Finding, label: str, unit: str = "") -> str:
         return ""
     criterion, contrast = finding.contrast.criterion, finding.contrast
     margin, wanted = criterion.margin, (criterion.low, criterion.high)
-    centre = "IQM" if contrast.typical else "mean"
-    axis = f"{label}{f' ({unit})' if unit else ''}, {centre} of {count(contrast.seeds, 'seed')}"
+    estimator = "IQM" if contrast.uses_iqm else "mean"
+    axis = f"{label}{f' ({unit})' if unit else ''}, {estimator} of {count(contrast.seeds, 'seed')}"
     edges = [*wanted, *(() if margin is None else (-margin, margin))]
     shown = [finding.low, finding.high, *filter(math.isfinite, edges)]
     room = 0.06 * (max(shown) - min(shown)) or 1.0

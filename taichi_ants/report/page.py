@@ -140,7 +140,7 @@ def _measured(finding: Finding, label: str, unit: str) -> str:
     """The effect and its interval in words, after its label."""
     if finding.verdict is Verdict.NOT_TESTED:
         return label
-    digits = 1 if finding.contrast.typical or abs(finding.effect) >= 10 else 2
+    digits = 1 if finding.contrast.uses_iqm or abs(finding.effect) >= 10 else 2
     effect, low, high = (number(x, digits) for x in (finding.effect, finding.low, finding.high))
     known = math.isfinite(finding.low) and math.isfinite(finding.high)
     ends = f"between {low} and {high}" if known else "without an interval"

@@ -12,7 +12,7 @@ import numpy as np
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS, DELIVERS, counts
 from taichi_ants.analysis.bounds.baselines import Baseline
-from taichi_ants.analysis.colony.study import ARENAS, JOINT, RULES
+from taichi_ants.analysis.colony.study import JOINT, RULES, WORLD_KINDS
 from taichi_ants.analysis.drawings import Drawing, drawings
 from taichi_ants.analysis.paper.best_of import example_name, examples
 from taichi_ants.analysis.paper.comparison import Comparison
@@ -78,7 +78,7 @@ def what_is_seen(
     Args:
         policies: The folder of the examples' policies; those that it lacks are left out.
         study, comparison: What was done, and what came of it.
-        begin: Begins a call and gives what waits for its end, as `Beside.begin`.
+        begin: Begins a call and gives what waits for its end, as `WorkerProcess.begin`.
 
     Returns:
         What waits for them.
@@ -92,7 +92,7 @@ def what_is_seen(
         point, seed, (_, variant, grid) = study.points[row], study.seeds[run], comparison.rows[row]
         policy = load_policy(policies / f"{example_name(comparison, row, run)}.npz")
         whose = (
-            f"{variant.label}, {point.task.delivery} delivery, seed {seed}, {grid.label} (learning "
+            f"{variant.label}, delivery {point.task.delivery}, seed {seed}, {grid.label} (learning "
             "rate / discount / epsilon / decay)"
         )
         share = f"{thousands(done[code])} of {thousands(comparison.behaviours.size)}"
@@ -118,28 +118,28 @@ def sheet(task: Task, q_values: np.ndarray, title: str, words: str) -> Picture:
 
 def at_work(policies: Path, conditions: Plan, seeds: Sequence[int], arch: str) -> list[Player]:
     """Recordings of the largest colony under each of the compared rules, all in one world."""
-    trained = [one for one in conditions if one.way == JOINT and one.ants <= MOST_ANTS]
+    trained = [one for one in conditions if one.regime == JOINT and one.ants <= MOST_ANTS]
     if not trained:
         return []
-    arena = max((one.arena for one in trained), key=list(ARENAS).index)
+    world_kind = max((one.world_kind for one in trained), key=list(WORLD_KINDS).index)
     ants = max(one.ants for one in trained)
     players = []
     for condition in trained:
         _, rules, _, n = condition
-        if condition.arena != arena or rules not in COMPARED or n != ants:
+        if condition.world_kind != world_kind or rules not in COMPARED or n != ants:
             continue
         point = conditions[condition]
         colony = Colony(
             *(point.world[0] if isinstance(point.world, tuple) else point.world, point.task),
             replace(point.training, epsilon=point.training.least_epsilon),
             *(seeds[0], ants),
-            sharing="fixed",
-            q_values=load_policy(policies / f"{arena}_{rules}_{ants}.npz").q_values,
+            sharing="frozen",
+            q_values=load_policy(policies / f"{world_kind}_{rules}_{ants}.npz").q_values,
             arch=arch,
         )
         colony.begin_episode()
         recording = record_colony(colony, TICKS, title=RULES[rules])
         done = count(int(colony.outcome().deliveries.sum()), "delivery")
-        words = f"{count(ants, 'ant')} in {ARENAS[arena]}: {done} in {TICKS} ticks."
+        words = f"{count(ants, 'ant')} in {WORLD_KINDS[world_kind]}: {done} in {TICKS} ticks."
         players.append(Player(sentence(RULES[rules]), words, recording))
     return players

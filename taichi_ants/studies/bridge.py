@@ -22,7 +22,7 @@ from taichi_ants.analysis.bridge import (
     Design,
     length,
 )
-from taichi_ants.engines.colony.hand import Hand
+from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.blocks import kept
 from taichi_ants.studies.colony_study import scheduled
@@ -133,7 +133,7 @@ def _followed(
             *(double_bridge(**bridge), learned.task, calm),
             [seed + EVALUATION_SEEDS for seed in seeds[some]],
             ants=design.ants,
-            sharing="fixed",
+            sharing="frozen",
             q_values=q_values[some],
             threads=where[0],
             arch=where[1],
@@ -176,11 +176,11 @@ def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0
     branch = np.full(len(world), _SHORT)
     colony.begin_episode(ticks)
     if opens:
-        short, hand = colony.grid.index(branch_cells(**bridge)[0]), Hand(colony)
-        hand.put(short, OBSTACLE)
+        short, interventions = colony.grid.index(branch_cells(**bridge)[0]), Interventions(colony)
+        interventions.put(short, OBSTACLE)
     while colony.ticks < ticks:
         if opens and colony.ticks == opens:
-            hand.put(short, EMPTY)
+            interventions.put(short, EMPTY)
         window = colony.ticks * WINDOWS // ticks
         until = opens if colony.ticks < opens else ticks
         colony.tick(min(_LOOK_EVERY, until - colony.ticks))

@@ -1,4 +1,4 @@
-"""The study of the colony: its arenas, its designs, and what is done for each condition.
+"""The study of the colony: its kinds of world, its designs, and what is done for each condition.
 
 Other rules of the game are an entry in `RULES` (`analysis.colony.study`) and one in `TASKS`, other
 worlds one in `WORLDS` there and one in `_place` here.
@@ -20,7 +20,6 @@ from taichi_ants.analysis.colony.study import (
     ABC_SILENT,
     ABROAD,
     ALONE,
-    ARENAS,
     BC,
     EVALUATION_EPSILON,
     FEW,
@@ -29,6 +28,7 @@ from taichi_ants.analysis.colony.study import (
     QUEUES,
     SILENT,
     SOME,
+    WORLD_KINDS,
     WORLDS,
     A,
     Condition,
@@ -68,7 +68,7 @@ Plan = dict[Condition, ColonyPoint]
 
 
 def plan(
-    arenas: Sequence[str],
+    world_kinds: Sequence[str],
     sizes: Sequence[int],
     seeds: Sequence[int],
     training: TrainingConfig,
@@ -76,22 +76,22 @@ def plan(
     ticks: int,
     rollouts: int,
 ) -> Plan:
-    """The conditions of some arenas.
+    """The conditions of some kinds of world.
 
     Args:
-        arenas: Names in `WORLDS`.
+        world_kinds: Names in `WORLDS`.
         sizes: Numbers of ants, ascending; ants that were trained elsewhere are as many as the last.
-        seeds: A seed gives its world to all conditions of an arena.
+        seeds: A seed gives its world to all conditions of a kind of world.
         training: The learner. Its epsilon is that of the first episode; it decays to
             `EVALUATION_EPSILON` while its learning rate decays to a tenth, and both stay there for
             the last 30 % of the episodes.
         episodes, ticks, rollouts: As of a `ColonyPoint`.
 
     Raises:
-        AntsError: There is no such arena, or ants cannot learn together with the learner.
+        AntsError: There is no such kind of world, or ants cannot learn together with the learner.
     """
-    for arena in arenas:
-        check_one_of("the arena", arena, tuple(WORLDS))
+    for world_kind in world_kinds:
+        check_one_of("the kind of world", world_kind, tuple(WORLDS))
     if learners.get(training.learner).td_error is None:
         able = [name for name in learners.names() if learners.get(name).td_error]
         raise AntsError(
@@ -100,69 +100,71 @@ def plan(
         )
     training = scheduled(replace(training, min_epsilon=EVALUATION_EPSILON), episodes)
     places = {
-        arena: worlds.paper() if arena == "paper" else tuple(place(arena, seed) for seed in seeds)
-        for arena in dict.fromkeys([*arenas, OPEN])
+        world_kind: worlds.paper()
+        if world_kind == "paper"
+        else tuple(place(world_kind, seed) for seed in seeds)
+        for world_kind in dict.fromkeys([*world_kinds, OPEN])
     }
-    pools = {arena: _pool(arena) for arena in places}
+    pools = {world_kind: _pool(world_kind) for world_kind in places}
 
-    def trained(arena: str, rules: str, ants: int) -> ColonyPoint:
+    def trained(world_kind: str, rules: str, ants: int) -> ColonyPoint:
         return ColonyPoint(
-            *(places[arena], TASKS[rules], training, pools[arena], ants),
+            *(places[world_kind], TASKS[rules], training, pools[world_kind], ants),
             episodes=episodes,
             ticks=ticks,
             rollouts=rollouts,
         )
 
     conditions: Plan = {}
-    for arena in arenas:
-        for rules, n in product(TASKS, sizes if arena in ARENAS else ()):
-            conditions[Condition(arena, rules, JOINT, n)] = trained(arena, rules, n)
-        for rules, (way, few), n in product(COMPARED, TRAINED_WITH.items(), sizes):
-            if arena in ARENAS and n > few:
-                after = trained(arena, rules, few)
+    for world_kind in world_kinds:
+        for rules, n in product(TASKS, sizes if world_kind in WORLD_KINDS else ()):
+            conditions[Condition(world_kind, rules, JOINT, n)] = trained(world_kind, rules, n)
+        for rules, (regime, few), n in product(COMPARED, TRAINED_WITH.items(), sizes):
+            if world_kind in WORLD_KINDS and n > few:
+                after = trained(world_kind, rules, few)
                 copies = replace(after, ants=n, episodes=0, after=after)
-                conditions[Condition(arena, rules, way, n)] = copies
-        for rules in COMPARED if arena != OPEN else ():
+                conditions[Condition(world_kind, rules, regime, n)] = copies
+        for rules in COMPARED if world_kind != OPEN else ():
             after = trained(OPEN, rules, sizes[-1])
             abroad = replace(
                 after,
-                world=places[arena],
-                task=task_in(arena, after.task),
+                world=places[world_kind],
+                task=task_in(world_kind, after.task),
                 pool=None,
-                ants=LARGE_SIZE if arena == "large" else sizes[-1],
+                ants=LARGE_SIZE if world_kind == "large" else sizes[-1],
                 episodes=0,
                 after=after,
             )
-            conditions[Condition(arena, rules, ABROAD, abroad.ants)] = abroad
+            conditions[Condition(world_kind, rules, ABROAD, abroad.ants)] = abroad
     return conditions
 
 
-# Where food is not as in all other arenas.
+# Where food is not as in all other kinds of world.
 LIVES = {"moving": Life(regrowth=0, wander=100), "slow": Life(regrowth=100)}
 RANGES = {"small": (15, 15, 15), "wide": (60, 60, 60), "large": (100, 100, 100)}
 _PILES = {"piles": 3, "moving": 3, "one_pile": 1}  # and no other food
 
 
-def task_in(arena: str, task: Task) -> Task:
-    """Return the task with the food of an arena."""
-    return replace(task, life=LIVES.get(arena, _LIVELY))
+def task_in(world_kind: str, task: Task) -> Task:
+    """Return the task with the food of a kind of world."""
+    return replace(task, life=LIVES.get(world_kind, _LIVELY))
 
 
-def place(arena: str, seed: int) -> World:
-    """Return the world of an arena that a seed gives; the paper's is the only one of its kind."""
-    if arena == "paper":
+def place(world_kind: str, seed: int) -> World:
+    """Return the world of a kind and a seed; there is only one paper's world."""
+    if world_kind == "paper":
         return worlds.paper()
-    ranges = RANGES.get(arena, (30, 30, 30))
-    if arena in _PILES:
-        return worlds.far_piles(seed, ranges, piles=_PILES[arena])
-    return worlds.open_world(seed, ranges, rock_share=0.3 if arena == "rocks" else 0.15)
+    ranges = RANGES.get(world_kind, (30, 30, 30))
+    if world_kind in _PILES:
+        return worlds.far_piles(seed, ranges, piles=_PILES[world_kind])
+    return worlds.open_world(seed, ranges, rock_share=0.3 if world_kind == "rocks" else 0.15)
 
 
-def _pool(arena: str) -> tuple[World, ...] | None:
+def _pool(world_kind: str) -> tuple[World, ...] | None:
     """Worlds for training, other ones than for evaluation; the paper's is the only one."""
-    if arena not in ARENAS or arena == "paper":
+    if world_kind not in WORLD_KINDS or world_kind == "paper":
         return None
-    return tuple(place(arena, FIRST_OF_POOL + n) for n in range(POOL))
+    return tuple(place(world_kind, FIRST_OF_POOL + n) for n in range(POOL))
 
 
 def scheduled(training: TrainingConfig, episodes: int) -> TrainingConfig:
@@ -174,7 +176,7 @@ def scheduled(training: TrainingConfig, episodes: int) -> TrainingConfig:
         epsilon_decay=min(1.0, (low / max(training.epsilon, low)) ** (1 / exploring)),
         learning_rate_decay=0.1 ** (1 / exploring),
         min_learning_rate=training.learning_rate / 10,
-        initial_value=OPTIMISM,
+        initial_q=OPTIMISM,
     )
 
 
@@ -234,8 +236,8 @@ def median_policies(
         A name, the action values float32 (n_states, 5), what made them, and their observation.
     """
     for condition, point in conditions.items():
-        arena, rules, way, ants = condition
-        if rules not in COMPARED or way != JOINT:
+        world_kind, rules, regime, ants = condition
+        if rules not in COMPARED or regime != JOINT:
             continue
         deliveries = found[condition]["deliveries"]
         run = int(np.argsort(deliveries, kind="stable")[(len(seeds) - 1) // 2])
@@ -249,4 +251,4 @@ def median_policies(
             "deliveries_per_1000_ticks": deliveries[run],
         }
         table = outcomes[point]["q_values"][run]
-        yield f"{arena}_{rules}_{ants}", table, metadata, point.task.observation
+        yield f"{world_kind}_{rules}_{ants}", table, metadata, point.task.observation

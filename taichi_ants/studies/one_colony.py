@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from taichi_ants import files
 from taichi_ants.analysis.colony import over_time
-from taichi_ants.analysis.colony.over_time import Moment
+from taichi_ants.analysis.colony.over_time import Totals
 from taichi_ants.errors import AntsError, count
 
 if TYPE_CHECKING:
@@ -42,39 +42,39 @@ def live(
     save: str | None = None,
     render: str | None = None,
     figure: str | None = None,
-    every: int = 2,
+    frame_interval: int = 2,
 ) -> None:
     """Let time pass in a colony, then write its files; it ends early once `stopped()` is true.
 
     It is saved even if its picture (.png) or animation (.gif, .mp4, a folder) cannot be written. An
-    animation has a picture for `every` so many ticks. A figure (.png) shows what was delivered over
-    time, and has its numbers beside it (.csv).
+    animation has a picture every `frame_interval` ticks. A figure (.png) shows what was delivered
+    over time, and has its numbers beside it (.csv).
     """
-    from taichi_ants.rendering import colony_moments, frames, save_animation, save_picture
+    from taichi_ants.rendering import colony_snapshots, frames, save_animation, save_picture
     from taichi_ants.rendering.writers import is_picture
 
     strongest = colony.task.pheromone.level
     animated = render is not None and not is_picture(render)
-    every = every if animated else 0
-    least = every or 1  # a span is a whole number of pictures
+    frame_interval = frame_interval if animated else 0
+    least = frame_interval or 1  # a span is a whole number of pictures
     span = -(-ticks // (least * over_time.MOST_SPANS)) * least if figure else ticks
-    passing = _pieces(colony, ticks, progress, stopped, every, span)
-    moments = [_so_far(colony)]
+    passing = _pieces(colony, ticks, progress, stopped, frame_interval, span)
+    totals = [_so_far(colony)]
     if figure:
-        passing = _noted(passing, colony, span, moments)
+        passing = _noted(passing, colony, span, totals)
     try:
         if render and animated:
-            shown = (moment for _ in chain([0], passing) for moment in colony_moments(colony))
+            shown = (one for _ in chain([0], passing) for one in colony_snapshots(colony))
             save_animation(render, frames(shown, strongest=strongest), FRAMES_PER_SECOND)
         for _ in passing:
             pass
         if render and not animated:
-            save_picture(render, next(frames(colony_moments(colony), strongest=strongest)))
+            save_picture(render, next(frames(colony_snapshots(colony), strongest=strongest)))
         if figure:
-            if moments[-1].tick < colony.ticks:  # stopped within a span, or the last one is shorter
-                moments.append(_so_far(colony))
+            if totals[-1].tick < colony.ticks:  # stopped within a span, or the last one is shorter
+                totals.append(_so_far(colony))
             who = _who(colony.ants * len(colony.seeds), colony)
-            over_time.save(over_time.rates(moments), who, figure)
+            over_time.save(over_time.rates(totals), who, figure)
     except (AntsError, OSError):
         # Pictures are drawn between ticks, so this one is whole, and may have taken hours.
         _save(colony, save)
@@ -94,7 +94,7 @@ def _pieces(
     ticks: int,
     progress: Callable[[float], None],
     stopped: Callable[[], bool],
-    every: int,
+    frame_interval: int,
     span: int,
 ) -> Iterator[int]:
     """Move a colony on by short pieces, after which it can be stopped.
@@ -105,7 +105,7 @@ def _pieces(
     begun, piece, passed, ends = colony.ticks, 1, 0, stopped()
     while not ends:
         began, left = time.perf_counter(), min(ticks - passed, span - passed % span)
-        now = min(piece, left, every - passed % every if every else left)
+        now = min(piece, left, frame_interval - passed % frame_interval if frame_interval else left)
         colony.tick(now)
         took, passed = time.perf_counter() - began, colony.ticks - begun
         if took > _PIECE_SECONDS:
@@ -113,27 +113,27 @@ def _pieces(
         elif now == piece:
             piece *= 2
         ends = passed == ticks or stopped()
-        if ends or not every or passed % every == 0 or passed % span == 0:
+        if ends or not frame_interval or passed % frame_interval == 0 or passed % span == 0:
             yield colony.ticks
         progress(passed / ticks)
 
 
 def _noted(
-    passing: Iterator[int], colony: Colony, span: int, moments: list[Moment]
+    passing: Iterator[int], colony: Colony, span: int, totals: list[Totals]
 ) -> Iterator[int]:
     """Let time pass, and note what has happened after every `span` ticks."""
     begun = colony.ticks
     for tick in passing:
         if (tick - begun) % span == 0:
-            moments.append(_so_far(colony))
+            totals.append(_so_far(colony))
         yield tick
 
 
-def _so_far(colony: Colony) -> Moment:
+def _so_far(colony: Colony) -> Totals:
     """What all colonies together have done in this episode."""
     now = colony.outcome()
     counts = now.deliveries, now.moves, now.blocked
-    return Moment(colony.ticks, *(int(count.sum()) for count in counts))
+    return Totals(colony.ticks, *(int(count.sum()) for count in counts))
 
 
 def summary(colony: Colony, ticks: int, seconds: float) -> str:

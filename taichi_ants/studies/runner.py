@@ -146,7 +146,7 @@ class ColonyPoint:
             is drawn from these by the seed, so that evaluation in `world` tells what was learned
             for worlds that no ant has seen. None: training takes place in `world`.
         ants: How many.
-        sharing: "shared" or "own", of tables while the ants learn.
+        sharing: "shared" or "independent", of tables while the ants learn.
         start, capacity: As of a `Colony`.
         episodes: Training episodes; with 0 the ants follow what the ants of `after` have learned.
         ticks: Of each episode, of training and evaluation.
@@ -175,7 +175,7 @@ class ColonyPoint:
         object.__setattr__(self, "training", config)
         checks.checked_task(self.task)
         checks.checked_capacity(self.task, self.ants, self.capacity, self.start, False)
-        check_one_of("sharing", self.sharing, ("shared", "own"))
+        check_one_of("sharing", self.sharing, ("shared", "independent"))
         checks.check_sharing(learners.get(config.learner), self.sharing)
         checked_whole("episodes", self.episodes, least=0 if self.after else 1)
         checked_whole("ticks", self.ticks, most=MAX_STEPS)
@@ -192,7 +192,7 @@ class ColonyPoint:
         slots, states = self.capacity or self.ants, self.task.n_states
         memory = learners.get(self.training.learner).memory_for(self.training, states)
         table = (1 + memory.tables) * states * ROW + memory.floats + memory.integers
-        owners = slots if self.sharing == "own" else 1
+        owners = slots if self.sharing == "independent" else 1
         ants, cells = slots * _NUMBERS_OF_AN_ANT, world.grid.size * _NUMBERS_OF_A_CELL
         return max(1, _NUMBERS_OF_A_BLOCK // (ants + cells + owners * table))
 
@@ -247,7 +247,7 @@ class ColonyPoint:
         calm = replace(point.training, epsilon=least, epsilon_decay=1.0)
         others = [seed + EVALUATION_SEEDS for seed in seeds]
         colony = Colony(
-            *(point.world, point.task, calm, others), **options, sharing="fixed", q_values=tables
+            *(point.world, point.task, calm, others), **options, sharing="frozen", q_values=tables
         )
         episodes = colony.run(point.rollouts, point.ticks, _part(progress, share, 1 - share))
         outcome = {name: files.smallest(getattr(episodes, name).T) for name in _COLONY_ARRAYS}

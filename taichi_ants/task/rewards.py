@@ -22,18 +22,18 @@ class Rewards(Settings, path="task.rewards"):
     Attributes:
         empty: A move onto a cell that was seen as E.
         failed: A blocked move, or a pick-up or give that cannot be done.
-        lure: A move onto a cell that was seen as T or S.
+        shaping: A move onto a cell that was seen as T or S.
         pick_up: A food picked up.
-        give: A food given to the queen.
+        deliver: A food given to the queen.
     """
 
     empty: Annotated[Reward, Is("of a move onto a cell seen as empty (E)")] = 0
     failed: Annotated[Reward, Is("of a blocked move, or a pick-up or give that fails")] = -1
-    lure: Annotated[
+    shaping: Annotated[
         Reward, Is("of a move onto a cell seen as T (trail) or S (nearer to the queen)")
     ] = 1
     pick_up: Annotated[Reward, Is("of picking up food")] = 3
-    give: Annotated[Reward, Is("of giving food to the queen")] = 10
+    deliver: Annotated[Reward, Is("of giving food to the queen")] = 10
 
     def by_event(self) -> np.ndarray:
         """The rewards by `Event`, int32 (8,)."""
@@ -42,8 +42,8 @@ class Rewards(Settings, path="task.rewards"):
         rewards = np.zeros(len(Event), np.int32)
         rewards[[Event.ENTERED_EMPTY, Event.PUSHED]] = self.empty
         rewards[[Event.BLOCKED, Event.FAILED]] = self.failed
-        rewards[Event.ENTERED_LURE] = self.lure
-        rewards[Event.PICKED_UP], rewards[Event.DELIVERED] = self.pick_up, self.give
+        rewards[Event.ENTERED_LURE] = self.shaping
+        rewards[Event.PICKED_UP], rewards[Event.DELIVERED] = self.pick_up, self.deliver
         return rewards
 
     @property

@@ -50,7 +50,7 @@ def state_from_index(index: int) -> State:
 
 
 def name_of_codes(n_cells: int, foraging: str, carrying: str) -> Callable[[int], str]:
-    """A function that names rows of a table, such as "foraging E T O".
+    """A function that names states, such as "foraging E T O".
 
     Args:
         n_cells: How many cells are in view; the row is the load, then their codes as digits.

@@ -14,7 +14,7 @@ from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rewards import Rewards
 from taichi_ants.task.traffic import Traffic
 
-Delivery = Literal["absorbing", "continuing"]
+Delivery = Literal["terminates", "truncates"]
 DELIVERIES: tuple[str, ...] = get_args(Delivery)
 
 
@@ -26,8 +26,8 @@ class Task(Settings, path="task"):
     numbers that kernels read.
 
     Attributes:
-        observation: Name of a registered observation, which tells what row of its table an ant
-            looks at, see `taichi_ants.task.observations`.
+        observation: Name of a registered observation, which gives the state index that an ant
+            sees, see `taichi_ants.task.observations`.
         rewards: What each event pays.
         pheromone: How trails are laid, fall and spread.
         traffic: Who may enter a cell on which another ant stands: a `Traffic`, or the name of one.
@@ -35,8 +35,8 @@ class Task(Settings, path="task"):
             "following": besides, queues move as one.
         turns_at_queen: Whether an ant turns round when it has given its food, as it does when it
             has picked one up.
-        delivery: "absorbing": the delivery is a terminal state, its target is the reward alone.
-            "continuing": the update at delivery bootstraps from what the ant then sees. An episode
+        delivery: "terminates": the delivery is a terminal state, its target is the reward alone.
+            "truncates": the update at delivery bootstraps from what the ant then sees. An episode
             of one ant ends in both.
         evaporation_in_training: Whether trails fall, as the pheromone says, while ants learn.
         evaporation_in_evaluation: Whether they do while nobody learns.
@@ -55,7 +55,7 @@ class Task(Settings, path="task"):
         default_factory=Traffic
     )
     turns_at_queen: Annotated[bool, Is("turn ants round when they have given their food")] = False
-    delivery: Annotated[Delivery, Is("whether the update at a delivery bootstraps")] = "absorbing"
+    delivery: Annotated[Delivery, Is("whether the update at a delivery bootstraps")] = "terminates"
     evaporation_in_training: Annotated[bool, Is("evaporate trails while ants learn")] = False
     evaporation_in_evaluation: Annotated[bool, Is("evaporate trails while nobody learns")] = True
     life: Annotated[Life, Is("what comes and goes (colonies only)")] = field(default_factory=Life)
@@ -78,7 +78,7 @@ class Task(Settings, path="task"):
 
     @property
     def n_states(self) -> int:
-        """The rows of a table of action values."""
+        """The number of states."""
         return self.sees.n_states
 
     def pheromone_while(self, learning: bool) -> Pheromone:

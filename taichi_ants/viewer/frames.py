@@ -46,8 +46,8 @@ SECTIONS = {
     "trail": "level",  # expiry clocks, or levels, see `Colony.stored_trail`
     "table_at": "f8",  # (owner * n_states + state) * 5 + action; the owner is 0, or an ant
     "table": "f4",
-    # Points for curves since the frame before, of six numbers each, see `course.POINT`.
-    "course": "f8",
+    # Points for curves since the frame before, of six numbers each, see `progress.POINT`.
+    "progress": "f8",
 }
 _HEAD = 8 * -(-(1 + len(SECTIONS)) // 2)  # bytes
 

@@ -19,7 +19,7 @@ const EMPTY = 0, OBSTACLE = 5, FOOD = 7, QUEEN = 13; // what a cell holds, as in
 const N_ACTIONS = 5;
 const MOST_BYTES = 2 ** 27; // of frames; a simulation that runs for hours has more
 const CLOCK = ["episode", "tick", "deliveries", "returns", "epsilon", "learningRate", "ants", "delivered", "ticks", "trailClock"];
-const POINT = ["episode", "ticks", "delivered", "returns", "epsilon", "ended"]; // as in course.py
+const POINT = ["episode", "ticks", "delivered", "returns", "epsilon", "ended"]; // as in progress.py
 const MOST_POINTS = 1500;
 const ARRAYS = {
   u1: Uint8Array, u2: Uint16Array, u4: Uint32Array, i4: Int32Array, f4: Float32Array, f8: Float64Array,
@@ -147,8 +147,8 @@ class History {
       });
     }
     if (whole) [this.within, this.ends] = [[], []];
-    for (let at = 0; at < frame.course.length; at += POINT.length) {
-      const point = Object.fromEntries(POINT.map((name, i) => [name, frame.course[at + i]]));
+    for (let at = 0; at < frame.progress.length; at += POINT.length) {
+      const point = Object.fromEntries(POINT.map((name, i) => [name, frame.progress[at + i]]));
       if (point.ended) this.ends.push(point);
       else if (!moment || whole) this.within.push(point); // later frames tell of it themselves
     }
@@ -220,7 +220,7 @@ class History {
     const sections = {
       ...frame, acts: [], td_errors: [], ground_at: ground.keys(), ground, trail_at: stored.keys(), trail: stored,
       table_at: entries, table: entries.map((entry) => this.entry(moment, entry)),
-      course: points.flatMap((point) => POINT.map((name) => point[name])),
+      progress: points.flatMap((point) => POINT.map((name) => point[name])),
     };
     const arrays = this.names.map((name, i) => this.kinds[i].from(sections[name]));
     const places = arrays.map(({ byteLength }) => 8 * Math.ceil(byteLength / 8));

@@ -11,18 +11,18 @@ import numpy as np
 from taichi_ants import learners
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.errors import count, expect
-from taichi_ants.rendering.observed import name_parts
+from taichi_ants.rendering.state_names import name_parts
 from taichi_ants.task import Observation
 from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS
 from taichi_ants.task.events import Event
-from taichi_ants.viewer.course import Course
 from taichi_ants.viewer.frames import pack, types_of
+from taichi_ants.viewer.progress import Progress
 
 _MOST_NAMES = 4096  # of states that a header holds, seen or not
 
 
 class Recorder:
-    """Makes frames of one world of a colony: `moment` of how it is, `tick` while time passes.
+    """Makes frames of one world of a colony: `snapshot` of how it is, `tick` while time passes.
 
     Args:
         colony: In an episode.
@@ -44,7 +44,7 @@ class Recorder:
         self.grid = start.grid
         self._size, self._n_states = self.grid.size, colony.task.n_states
         self.types = types_of(self._size, self._n_states, colony.pheromone.dense)
-        self._learns = colony.sharing != "fixed"
+        self._learns = colony.sharing != "frozen"
         learner = learners.get(colony.training.learner)
         self._has_td_errors = learner.td_error is not None and not learner.plans
         self._draws_ahead = self._learns and learner.draws_next_action
@@ -59,7 +59,7 @@ class Recorder:
         self._fixed: np.ndarray | None = None  # the tables where nobody learns
         if not self._learns:
             self._fixed = self._tables()
-        self.course = Course(colony, world)
+        self.progress = Progress(colony, world)
 
     @property
     def observation(self) -> Observation:
@@ -117,7 +117,7 @@ class Recorder:
             ("they see", f"{self.observation.name}, {self._n_states} states"),
         ]
         if not self._learns:
-            return [*lines, ("policy", "fixed"), ("epsilon", f"{colony.epsilon:g}")]
+            return [*lines, ("policy", "frozen"), ("epsilon", f"{colony.epsilon:g}")]
         tables = "each has its own" if colony.one_a_slot else "one for all"
         return [
             *lines,
@@ -127,8 +127,8 @@ class Recorder:
             ("discount", f"{config.discount:g}"),
         ]
 
-    def moment(self) -> bytes:
-        """A frame of the colony as it is now: the first one, or after it was changed by hand."""
+    def snapshot(self) -> bytes:
+        """A frame of the colony as it is now: the first one, or after an intervention."""
         return self._frame({})
 
     def whole(self) -> bytes:
@@ -138,7 +138,7 @@ class Recorder:
         late._ground, late._trail = np.zeros_like(self._ground), np.zeros_like(self._trail)
         late._known, late._owners = self._known.copy(), self._owners.copy()
         late._table = np.full_like(self._table, np.nan)
-        return late._frame({"course": self.course.points()})
+        return late._frame({"progress": self.progress.points()})
 
     def tick(self, n: int = 1, td_errors: np.ndarray | None = None) -> bytes:
         """Let n ticks pass and return a frame; what ants did is in it only where n is 1.
@@ -210,10 +210,10 @@ class Recorder:
         totals = (outcome.deliveries[0, self.world], outcome.returns[0, self.world])
         rates = (colony.epsilon, colony.learning_rate)
         delivered = colony.delivered[self.world] + totals[0]
-        counts = (len(numbers), delivered, self.course.ticks)
+        counts = (len(numbers), delivered, self.progress.ticks)
         stored, clock = colony.stored_trail(self.world)
         sections["clock"] = (colony.episode, tick, *totals, *rates, *counts, clock)
-        sections.setdefault("course", self.course.news())
+        sections.setdefault("progress", self.progress.news())
         sections |= _changes("ground", self._ground, snapshot.ground)
         sections |= _changes("trail", self._trail, stored)
         sections |= self._table_changes(slots, numbers, sections["states"])

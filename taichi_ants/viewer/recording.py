@@ -18,7 +18,7 @@ from taichi_ants.checks import check_progress
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.traces import Trace
 from taichi_ants.errors import AntsError, checked_whole, expect
-from taichi_ants.rendering.moments import Episode, colony_of_rollout
+from taichi_ants.rendering.snapshots import Episode, colony_of_rollout
 from taichi_ants.task import Task
 from taichi_ants.viewer.frames import unpack
 from taichi_ants.viewer.recorder import Recorder
@@ -56,7 +56,7 @@ class Recording:
 def record_colony(
     colony: Colony,
     ticks: int = 0,
-    every: int = 1,
+    frame_interval: int = 1,
     *,
     world: int = 0,
     title: str = "",
@@ -68,7 +68,8 @@ def record_colony(
     Args:
         colony: In an episode.
         ticks: How many; 0 gives the moment as it is.
-        every: Ticks from one moment to the next; what each ant did is known only if it is 1.
+        frame_interval: Ticks from one moment to the next; what each ant did is known only if it is
+            1.
         world: Which of its worlds.
         title: What the page is called.
         follow: The number of the ant that the page follows at first.
@@ -78,18 +79,18 @@ def record_colony(
         AntsError: A number is not allowed, or no episode has begun.
     """
     ticks = checked_whole("ticks", ticks, least=0)
-    every = checked_whole("every", every)
+    frame_interval = checked_whole("frame_interval", frame_interval)
     check_progress(progress)
     if follow is not None:
         follow = checked_whole("follow", follow, least=0)
     recorder = Recorder(colony, world, title, follow)
     if follow is not None and follow >= colony.ants and not colony.task.life.births:
         raise AntsError(f"follow is {follow}; the {colony.ants} ants have numbers from 0.")
-    frames = [recorder.moment()]
-    for done in range(0, ticks, every):
-        frames.append(recorder.tick(min(every, ticks - done)))
+    frames = [recorder.snapshot()]
+    for done in range(0, ticks, frame_interval):
+        frames.append(recorder.tick(min(frame_interval, ticks - done)))
         if progress is not None:
-            progress(min(done + every, ticks) / ticks)
+            progress(min(done + frame_interval, ticks) / ticks)
     return Recording(recorder.header(), frames)
 
 
@@ -122,18 +123,18 @@ def record_trace(trace: Trace, title: str = "") -> Recording:
             *(made.seed, made.number, len(trace), title),
         )
     # A colony of one ant with a table of its own learns as it did.
-    options: dict[str, Any] = {"sharing": "own", "ends_at_delivery": True}
+    options: dict[str, Any] = {"sharing": "independent", "ends_at_delivery": True}
     colony = Colony(made.world, made.task, made.config, made.seed, 1, **options)
     recorder, frames = None, []
     errors = np.zeros(len(trace)) if trace.td_errors is None else trace.td_errors
     for step, error in zip(trace.steps.tolist(), errors.tolist(), strict=True):
         if step == 0:
             if recorder is not None:
-                recorder.course.note(ended=True)
+                recorder.progress.note(ended=True)
                 colony.end_episode()
             colony.begin_episode(made.max_steps)
             recorder = recorder or Recorder(colony, 0, title, 0)
-            frames.append(recorder.moment())
+            frames.append(recorder.snapshot())
         assert recorder is not None  # the first step is number 0
         frames.append(recorder.tick(td_errors=np.array([error])))
     assert recorder is not None

@@ -113,11 +113,11 @@ def finding_of(
     criterion: Criterion,
     possible: tuple[float, float] = UNBOUNDED,
 ) -> Finding:
-    typical = possible == UNBOUNDED
+    uses_iqm = possible == UNBOUNDED
     return weakest(
         judge(
             [
-                Contrast(label, np.resize(values, 20), criterion, typical, possible)
+                Contrast(label, np.resize(values, 20), criterion, uses_iqm, possible)
                 for label, values in effects.items()
             ]
         )
@@ -161,12 +161,12 @@ def test_one_far_run_decides_the_mean_but_not_the_typical_run() -> None:
     assert share.by_mean is None
 
 
-def test_a_statistic_of_centres_is_that_of_typical_runs() -> None:
-    """The difference of two centres, near 0 and near 3, with a far run in the first."""
+def test_a_statistic_of_estimates_is_that_of_the_iqm() -> None:
+    """The difference of two estimates, near 0 and near 3, with a far run in the first."""
     random = np.random.default_rng(0)
     rows = random.normal(0, 0.1, size=(2, 40)) + np.array([[0.0], [3.0]])
     rows[0, 7] = 900.0
-    contrast = Contrast("spread", rows, above(1.0), True, of_centres=lambda c: c[1] - c[0])
+    contrast = Contrast("spread", rows, above(1.0), True, of_estimates=lambda c: c[1] - c[0])
     (finding,) = judge([contrast])
     assert finding.effect == pytest.approx(3.0, abs=0.1)
     assert finding.by_mean.effect == pytest.approx(3 - 900 / 40, abs=0.1)
@@ -186,7 +186,7 @@ def test_more_contrasts_at_once_need_wider_intervals() -> None:
 
 def test_both_readings_of_a_typical_contrast_count_for_the_level() -> None:
     values = np.random.default_rng(0).normal(1, 1, 20)
-    (finding,) = judge([Contrast("a", values, above(), typical=True)])
+    (finding,) = judge([Contrast("a", values, above(), uses_iqm=True)])
     assert finding.level == finding.by_mean.level == pytest.approx(1 - 0.05 / 2)
 
 
@@ -215,8 +215,8 @@ def test_rounding_errors_are_no_effect() -> None:
 
 def test_what_is_missing_is_not_tested_and_counts_for_no_level() -> None:
     """Neither a contrast with a nan nor one without seeds, nor a claim with such a contrast."""
-    good = Contrast("a", np.random.default_rng(0).normal(1, 1, 20), above(), typical=True)
-    lost = Contrast("b", np.full(20, np.nan), above(), typical=True)
+    good = Contrast("a", np.random.default_rng(0).normal(1, 1, 20), above(), uses_iqm=True)
+    lost = Contrast("b", np.full(20, np.nan), above(), uses_iqm=True)
     none = Contrast("c", np.empty(0), above())
     (alone,) = judge([good])
     first, *others = judge([good, lost, none])

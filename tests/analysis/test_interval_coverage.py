@@ -35,7 +35,7 @@ SARSA = TrainingConfig("sarsa", 0.001, 0.99, 0.3, 0.99)
 def pools() -> dict[str, np.ndarray]:
     """Quantities of the analysis, float64 (seeds,) each, over the last 50 of 500 episodes."""
     result = train(
-        worlds.paper(), (SLOW, FAST, SARSA), range(POOL), task=Task(delivery="continuing")
+        worlds.paper(), (SLOW, FAST, SARSA), range(POOL), task=Task(delivery="truncates")
     )
     late = slice(-50, None)
     slow, fast, sarsa = result.returns[..., late].mean(axis=2)
@@ -53,12 +53,12 @@ def pools() -> dict[str, np.ndarray]:
 def coverage(
     pool: np.ndarray, seeds: int, iqm: bool, level: float | None = None, draws: int = DRAWS
 ) -> float:
-    """The share of draws whose interval holds the pool's centre.
+    """The share of draws whose interval holds the pool's value.
 
     Args:
         pool: Values of runs, float (runs,).
         seeds: How many of them a draw has, each at most once.
-        iqm: Whether the centre is the interquartile mean, else the mean.
+        iqm: Whether the estimator is the interquartile mean, else the mean.
         level: None for the interval of tables, at 95 %; else the level of the interval of verdicts.
         draws: How many draws.
     """
@@ -73,13 +73,13 @@ def coverage(
 
 
 def coverage_table(data: dict[str, np.ndarray], level: float | None, draws: int) -> str:
-    """Markdown: a line for each pool, its centres, and the coverage at each number of seeds."""
+    """Markdown: a line for each pool, its estimates, and the coverage at each number of seeds."""
     kinds = [(iqm, size) for iqm in (False, True) for size in SIZES]
     lines, digits = [], 3 if level is None else 4
     for name, pool in data.items():
         cells = [f"{coverage(pool, size, iqm, level, draws):.{digits}f}" for iqm, size in kinds]
-        centres = (pool.mean(), interquartile_mean(pool[None])[0])
-        lines.append([name, *(f"{centre:.2f}" for centre in centres), *cells])
+        estimates = (pool.mean(), interquartile_mean(pool[None])[0])
+        lines.append([name, *(f"{estimator:.2f}" for estimator in estimates), *cells])
     headers = [f"{'IQM' if iqm else 'mean'}, {size}" for iqm, size in kinds]
     return Table("", ["Of 50 episodes", "mean", "IQM", *headers], lines).markdown()
 
@@ -101,7 +101,7 @@ def test_the_level_that_is_tested_is_that_of_the_claims() -> None:
 
 
 @pytest.mark.long
-def test_intervals_cover_the_centres_of_real_runs_as_documented() -> None:
+def test_intervals_cover_the_values_of_real_runs_as_documented() -> None:
     data = pools()
     print(coverage_table(data, None, DRAWS))
     print(coverage_table(data, VERDICT_LEVEL, DRAWS))

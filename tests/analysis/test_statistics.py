@@ -18,7 +18,7 @@ from taichi_ants.analysis.statistics import (
     all_equal,
     bootstrap_interval,
     cautious_interval,
-    centres,
+    estimates,
     interquartile_mean,
     interquartile_values,
     jackknife_values,
@@ -109,7 +109,7 @@ def test_the_interquartile_mean_ignores_few_far_runs_and_keeps_nan() -> None:
     np.testing.assert_array_equal(interquartile_mean(values), [3.5, 3.5, np.nan])
 
 
-def test_interquartile_values_have_the_centre_and_the_spread_of_the_iqm() -> None:
+def test_interquartile_values_have_the_estimate_and_the_spread_of_the_iqm() -> None:
     values = np.random.default_rng(0).standard_t(1.5, size=(3, 40))
     moved = interquartile_values(values)
     np.testing.assert_allclose(moved.mean(axis=1), interquartile_mean(values))
@@ -142,7 +142,7 @@ def test_the_bootstrap_of_the_iqm_agrees_with_scipy() -> None:
 
 @pytest.mark.parametrize("n", [10, pytest.param(30, marks=pytest.mark.slow)])
 def test_intervals_of_the_iqm_cover_what_they_say_where_those_of_the_mean_do_not(n: int) -> None:
-    """One run in fifty is far away: it moves the mean by 8 and the typical run hardly."""
+    """One run in fifty is far away: it moves the mean by 8 and the IQM hardly."""
 
     def draw(random: np.random.Generator, shape: tuple[int, int]) -> np.ndarray:
         return random.normal(45, 1, shape) + 400 * (random.random(shape) < 0.02)
@@ -168,11 +168,11 @@ def test_ties_in_the_middle_half_leave_an_interval_where_the_tails_are_near() ->
 def test_columns_of_a_table_are_free_of_rounding_noise() -> None:
     values = np.array([[0.1, 0.2, -0.3, 0.1, 0.2, -0.3], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]])
     assert 0 < abs(values[0].mean()) < 1e-16
-    columns = centres(values)
+    columns = estimates(values)
     assert columns["mean"].tolist() == [0.0, 3.5]
     assert columns["iqm"].tolist() == [without_noise(interquartile_mean(values), values)[0], 3.5]
     assert list(columns) == ["mean", "ci_low", "ci_high", "iqm", "iqm_ci_low", "iqm_ci_high"]
-    assert list(centres(values, typical=False)) == ["mean", "ci_low", "ci_high"]
+    assert list(estimates(values, uses_iqm=False)) == ["mean", "ci_low", "ci_high"]
 
 
 def test_student_interval_by_hand() -> None:

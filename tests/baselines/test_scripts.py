@@ -92,7 +92,7 @@ def test_mistakes_end_in_a_sentence_and_nothing_else(
 @pytest.mark.slow
 def test_fixed_rules_prints_a_row_for_each_world_and_task(kernels: Path, tmp_path: Path) -> None:
     study = [
-        *("arena,rules,way,ants,seed,deliveries,greedy", "paper,queueing,joint,3,0,50,60"),
+        *("world_kind,rules,way,ants,seed,deliveries,greedy", "paper,queueing,joint,3,0,50,60"),
         *("paper,queueing,joint,3,1,70,80", "paper,queueing,alone,3,1,9,9"),
     ]
     (tmp_path / "seeds.csv").write_text("\n".join(study), "utf-8")
@@ -107,7 +107,7 @@ def test_fixed_rules_prints_a_row_for_each_world_and_task(kernels: Path, tmp_pat
     assert [row[:2] for row in rows] == expected
     assert header[:3] == ["world", "rules", "epsilon"]
     place = paper()
-    follow = {"sharing": "fixed", "q_values": trail_follower("queues")}
+    follow = {"sharing": "frozen", "q_values": trail_follower("queues")}
     rules = replace(queueing(), life=Life(regrowth=0))
     training = TrainingConfig("sarsa", 0.1, 0.9, 0.01, 1.0)
     outcome = Colony(place, rules, training, (2**32, 2**32 + 1), 3, **follow).run(4, 1000)

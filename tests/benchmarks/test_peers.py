@@ -19,13 +19,13 @@ CONFIGS = [
     TrainingConfig("q_learning", 0.1, 0.99, 0.5, 0.95),
 ]
 SEEDS, EPISODES, STEPS = 60, 40, 150
-CONTINUING = "continuing"
+TRUNCATES = "truncates"
 
 
 @pytest.fixture(scope="module")
 def ours():
     given = worlds.paper(), CONFIGS, range(SEEDS), EPISODES, STEPS
-    result = train(*given, Task(delivery=CONTINUING))
+    result = train(*given, Task(delivery=TRUNCATES))
     assert 0.2 < result.deliveries.mean() < 0.9
     return [values.reshape(-1, EPISODES) for values in (result.returns, result.steps)]
 
@@ -42,7 +42,7 @@ def assert_distributed_alike(ours, theirs):
 @pytest.fixture(scope="module")
 def trace():
     """Forty episodes of one run: what it sees and does, and its table after each step."""
-    made = trace_training(worlds.paper(), CONFIGS[0], 3, EPISODES, STEPS, Task(delivery=CONTINUING))
+    made = trace_training(worlds.paper(), CONFIGS[0], 3, EPISODES, STEPS, Task(delivery=TRUNCATES))
     assert (made.events == Event.DELIVERED).sum() > 5
     return made
 

@@ -27,7 +27,7 @@ def yardstick_of(yardsticks, name):
 
 
 @pytest.mark.parametrize("name", throughput.YARDSTICKS.values())
-@pytest.mark.parametrize("delivery", ["continuing", "absorbing"])
+@pytest.mark.parametrize("delivery", ["truncates", "terminates"])
 @pytest.mark.parametrize("learner", throughput.LEARNERS)
 def test_c_gives_the_same_runs(learner, delivery, name, yardsticks):
     yardstick = yardstick_of(yardsticks, name)
@@ -41,7 +41,7 @@ def test_c_gives_the_same_runs(learner, delivery, name, yardsticks):
         result = train(world, configs, seeds, 25, 150, Task(delivery=delivery))
         deliveries += result.deliveries.sum()
         for threads in (1, 2):
-            given = (delivery == "continuing", 25, 150, threads)
+            given = (delivery == "truncates", 25, 150, threads)
             trained = throughput.train_in_c(yardstick, world, configs, seeds, *given)
             throughput.check_same(trained, result)
     assert deliveries > 100
@@ -78,7 +78,7 @@ def test_its_table_and_its_guard(capsys):
     code, said = said_by(SMALL, capsys)
     assert code == 0
     rows = rows_of(said.out)
-    expected = train(paper(), throughput.grid("sarsa", 0), 0, task=Task(delivery="continuing"))
+    expected = train(paper(), throughput.grid("sarsa", 0), 0, task=Task(delivery="truncates"))
     assert int(rows[1][0]) == expected.steps.sum()
     assert int(rows[-1][0]) == sum(int(row[0]) for row in rows[:-1])
     for row in rows:

@@ -37,7 +37,7 @@ from taichi_ants.task import Traffic, foraging, paper, queueing
 
 SEEDS, EPISODES, TICKS, ROLLOUTS = (3, 4), 4, 80, 2
 SMALL = [
-    *("study", "--arenas", "paper", "small", "--sizes", 1, 3),
+    *("study", "--world-kinds", "paper", "small", "--sizes", 1, 3),
     *("--seeds", len(SEEDS), "--seed", SEEDS[0]),
     *("--episodes", EPISODES, "--ticks", TICKS, "--rollouts", ROLLOUTS),
 ]
@@ -108,7 +108,7 @@ def test_all_files_are_there(finished):
 
 
 DECAYS = {"epsilon_decay": (0.01 / 0.3) ** (1 / 3), "learning_rate_decay": 0.1 ** (1 / 3)}
-LEAST = {"min_epsilon": 0.01, "min_learning_rate": 0.01, "initial_value": 10}
+LEAST = {"min_epsilon": 0.01, "min_learning_rate": 0.01, "initial_q": 10}
 TRAINING = TrainingConfig("sarsa", 0.1, 0.9, 0.3, **DECAYS, **LEAST)
 CALM = TrainingConfig("sarsa", 0.1, 0.9, 0.01, 1.0)
 OTHERS = [seed + 2**32 for seed in SEEDS]
@@ -116,7 +116,7 @@ OTHERS = [seed + 2**32 for seed in SEEDS]
 
 def task(pheromone=Pheromone(), life=Life(regrowth=0)):  # noqa: B008 - both are frozen
     """That of a colony that lives for a while."""
-    return Task(pheromone=pheromone, delivery="continuing", evaporation_in_training=True, life=life)
+    return Task(pheromone=pheromone, delivery="truncates", evaporation_in_training=True, life=life)
 
 
 @pytest.mark.slow
@@ -126,7 +126,7 @@ def test_the_numbers_are_those_of_the_library(finished):
     rules = replace(foraging(), life=Life(regrowth=0))
     alone = Colony(worlds.paper(), rules, TRAINING, SEEDS)
     alone.run(EPISODES, TICKS)
-    table = {"sharing": "fixed", "q_values": alone.q_values}
+    table = {"sharing": "frozen", "q_values": alone.q_values}
     colony = Colony(worlds.paper(), rules, CALM, OTHERS, 3, **table)
     condition = ("paper", "foraging", "alone", "3")
     assert_measured(folder, condition, colony.run(ROLLOUTS, TICKS))
@@ -143,7 +143,7 @@ def test_ants_are_evaluated_in_worlds_that_they_have_not_seen(finished):
     together = Colony(places[0], rules, TRAINING, SEEDS, 3)
     together.run(EPISODES, TICKS, worlds=places)
     small = [worlds.open_world(seed, (15, 15, 15)) for seed in SEEDS]
-    table = {"sharing": "fixed", "q_values": together.q_values}
+    table = {"sharing": "frozen", "q_values": together.q_values}
     colony = Colony(small, rules, CALM, OTHERS, 3, **table)
     assert_measured(folder, ("small", "queueing", "open", "3"), colony.run(ROLLOUTS, TICKS))
 
@@ -171,7 +171,7 @@ def test_policies_say_where_they_come_from(finished):
     policy = load_policy(folder / "policies" / "paper_foraging_3.npz")
     metadata = policy.metadata
     assert policy.observation == metadata["task"]["observation"] == "ants"
-    assert (metadata["way"], metadata["ants"], metadata["arena"]) == ("joint", 3, "paper")
+    assert (metadata["regime"], metadata["ants"], metadata["world_kind"]) == ("joint", 3, "paper")
     assert metadata["seed"] in SEEDS
 
 
@@ -206,11 +206,11 @@ def test_other_arenas_are_the_only_difference_and_their_order_is_none(
 
     monkeypatch.setattr(command, "do_study", stop)
     monkeypatch.chdir(tmp_path)
-    small = ["study", "--out", "out", "--seeds", 1, "--sizes", 2, "--arenas"]
-    for arenas in (["paper", "small"], ["small", "paper", "small"]):
-        assert call("colony", [*small, *arenas], capsys)[0] == 130
+    small = ["study", "--out", "out", "--seeds", 1, "--sizes", 2, "--world-kinds"]
+    for world_kinds in (["paper", "small"], ["small", "paper", "small"]):
+        assert call("colony", [*small, *world_kinds], capsys)[0] == 130
     _, _, err = call("colony", [*small, "paper"], capsys)
-    assert "(arenas differ)" in err
+    assert "(world_kinds differ)" in err
     _, _, err = call("colony", [*small, "paper", "small", "--training.discount", 0.8], capsys)
     assert "(training.discount differ)" in err
 
@@ -220,7 +220,7 @@ def test_other_arenas_are_the_only_difference_and_their_order_is_none(
 def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
     fault, remembered, tmp_path
 ):
-    arguments = [*SMALL, "--arenas", "small", "--no-figures"]
+    arguments = [*SMALL, "--world-kinds", "small", "--no-figures"]
     assert faults.assert_it_survives(fault, "colony", arguments, tmp_path / "out") > 40
 
 
@@ -255,11 +255,17 @@ def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
             "`task.pheromone.level` is 3; leave it out",
         ),
         (
-            ["live", "--sharing", "fixed", "--training.discount", 0.9],
+            ["live", "--sharing", "frozen", "--training.discount", 0.9],
             "--training.discount is of learning, but with",
         ),
-        (["live", "--every", 2], "--every is of an animation, name one with --render"),
-        (["live", "--render", "a.PNG", "--every", 2], "--every is of an animation"),
+        (
+            ["live", "--frame-interval", 2],
+            "--frame-interval is of an animation, name one with --render",
+        ),
+        (
+            ["live", "--render", "a.PNG", "--frame-interval", 2],
+            "--frame-interval is of an animation",
+        ),
         (
             ["live", "--task.pheromone.cap", 5],
             "`task.pheromone.cap` is 5; leave it out unless `deposit` is 'add'",
@@ -273,12 +279,12 @@ def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
         (["live", "--figure", "a.gif"], "'a.gif' is to hold one picture"),
         (["live", "--figure", "/proc/x/a.png"], "cannot write '/proc/x/a.png'"),
         (["live", "--resume", "x"], "cannot read 'x'"),
-        (["study", "--arenas", "moon"], "--arenas: invalid choice: 'moon' (choose from"),
+        (["study", "--world-kinds", "moon"], "--world-kinds: invalid choice: 'moon' (choose from"),
         (
             ["study", "--training.learner", "sarsa_lambda"],
             "learn together; choose one of q_learning, sarsa,",
         ),
-        (["study", "--sizes", "300", "8", "--arenas", "paper"], "300 ants are asked for"),
+        (["study", "--sizes", "300", "8", "--world-kinds", "paper"], "300 ants are asked for"),
         (["study", "--training.learner", "none"], "there is no learner 'none'"),
         (["study", "--training.epsilon", 2], "`training.epsilon` is 2; it must be between 0 and 1"),
         (["live", "--ants", 0], "0 is not allowed"),
@@ -306,8 +312,8 @@ def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
             "`task.pheromone.half_life` is 5.0; leave it out",
         ),
         (
-            ["live", "--sharing", "fixed"],
-            "--sharing fixed needs a table that the ants follow; give --policy FILE",
+            ["live", "--sharing", "frozen"],
+            "--sharing frozen needs a table that the ants follow; give --policy FILE",
         ),
         (["live", "--policy", "x.npz"], "cannot read 'x.npz'"),
         (
@@ -416,7 +422,7 @@ def test_a_colony_that_is_saved_and_resumed_is_the_one_that_lived_on(capsys, tmp
     assert "deliveries by tick 120" in out
     assert call("colony", [*LIFE, "--ticks", 50, "--save", "part.npz"], capsys)[0] == 0
     more = ["live", "--resume", "part.npz", "--ticks", 70, "--save", "part.npz"]
-    status, out, _ = call("colony", [*more, "--render", "rest.gif", "--every", 7], capsys)
+    status, out, _ = call("colony", [*more, "--render", "rest.gif", "--frame-interval", 7], capsys)
     assert status == 0
     assert "ants, 70 ticks in " in out
     with np.load("whole.npz") as one, np.load("part.npz") as other:
@@ -498,11 +504,11 @@ def test_stopped_before_it_begins_it_promises_only_what_is_so(
 
 def test_a_colony_starts_from_a_policy(capsys):
     policy = EXPERIMENTS / "policies" / "foraging.npz"
-    fixed = ["live", "--ants", 2, "--world", "paper", "--ticks", 60, "--sharing", "fixed"]
+    fixed = ["live", "--ants", 2, "--world", "paper", "--ticks", 60, "--sharing", "frozen"]
     assert call("colony", [*fixed, "--policy", policy, "--task.life.regrowth", 0], capsys)[0] == 0
 
 
-LASTING = {"delivery": "continuing", "evaporation_in_training": True}
+LASTING = {"delivery": "truncates", "evaporation_in_training": True}
 FOOD_IS_BACK = replace(queueing(), life=Life(regrowth=0))
 
 
@@ -586,9 +592,9 @@ def test_rules_are_those_named_else_the_policys_else_the_papers(
 def test_a_figure_shows_what_all_colonies_deliver_by_tick(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     policy = EXPERIMENTS / "policies" / "queueing.npz"
-    fixed = ["--policy", policy, "--sharing", "fixed", "--training.epsilon", 0.01, "--ants", 16]
+    fixed = ["--policy", policy, "--sharing", "frozen", "--training.epsilon", 0.01, "--ants", 16]
     where = ["--world.ranges", 15, 15, 15, "--colonies", 2, "--seed", 3]
-    more = ["--ticks", 230, "--figure", "a.png", "--render", "a.gif", "--every", 4]
+    more = ["--ticks", 230, "--figure", "a.png", "--render", "a.gif", "--frame-interval", 4]
     status, out, err = call("colony", ["live", *fixed, *where, *more], capsys)
     assert (status, err) == (0, "")
     assert "a.png is written" in out
@@ -596,7 +602,7 @@ def test_a_figure_shows_what_all_colonies_deliver_by_tick(capsys, tmp_path, monk
     with open("a.csv", newline="") as file:
         rows = [{name: float(text) for name, text in row.items()} for row in csv.DictReader(file)]
     world, q = worlds.open_world(3, (15, 15, 15)), load_policy(policy)
-    colony = Colony(world, q.task, CALM, (3, 4), 16, sharing="fixed", q_values=q.q_values)
+    colony = Colony(world, q.task, CALM, (3, 4), 16, sharing="frozen", q_values=q.q_values)
     colony.begin_episode()
     before = colony.outcome()
     # Spans are whole pictures, at most sixty of them; the last one is shorter.
@@ -677,7 +683,7 @@ def test_colonies_live_side_by_side_and_can_start_spread(capsys, tmp_path, monke
     ("arguments", "expected"),
     [
         ("", ("study", "live")),
-        ("study", ("--quick", "--arenas", "--sizes", "--training.learner", "--force")),
+        ("study", ("--quick", "--world-kinds", "--sizes", "--training.learner", "--force")),
         (
             "live",
             ("--ants", "--world", "--save", "--resume", "--render", "--task.pheromone.half-life"),

@@ -29,7 +29,7 @@ from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.commands import compare as commands
 from taichi_ants.files import archives
 from taichi_ants.rendering import PAUSE, Episode, frames, save_animation, text
-from taichi_ants.studies import beside
+from taichi_ants.studies import worker_process
 
 GARDEN = EXPERIMENTS / "maps" / "garden.txt"
 SEEDS, EPISODES, MAX_STEPS, ROLLOUTS = (7, 8, 9), 60, 45, 50
@@ -42,7 +42,7 @@ SMALL = [
 TINY = [
     *("--seeds", 1, "--episodes", 2, "--max-steps", 30, "--learners", "q_learning"),
     *("--learning-rates", 0.1, "--discounts", 0.9, "--epsilons", 0.3, "--epsilon-decays", 0.9),
-    *("--delivery", "absorbing", "--no-figures"),
+    *("--delivery", "terminates", "--no-figures"),
 ]
 COLUMNS = [
     *("learner", "hyperparameters", "learning_rate", "discount", "epsilon", "epsilon_decay"),
@@ -68,7 +68,7 @@ LEARNERS = {
 # Within 45 steps some deliver and some do not, in all of these.
 SHOWN = [
     f"{delivery}_{learner}_{behaviour}"
-    for delivery in ("continuing", "absorbing")
+    for delivery in ("truncates", "terminates")
     for learner in LEARNERS
     for behaviour in ("delivers", "circles_with_food")
 ]
@@ -153,7 +153,7 @@ def test_summary_lists_the_grid(finished):
     assert len({(config_of(row), task_of(row)) for row in rows}) == len(rows) == 2 * 3 * 2
     learners = [(row["learner"], row["hyperparameters"], row["delivery"]) for row in rows]
     names = LEARNERS.values()
-    deliveries = "continuing", "absorbing"
+    deliveries = "truncates", "terminates"
     assert set(learners) == {(*name, delivery) for name in names for delivery in deliveries}
     assert {row["discount"] for row in rows} == {"0.9", "0.99"}
     assert {row["seeds"] for row in rows} == {str(len(SEEDS))}
@@ -264,7 +264,7 @@ def test_behaviours_are_those_of_the_policies(finished):
 
 @pytest.mark.parametrize(("training", "greedy"), [("on", "off"), ("off", "off")])
 def test_evaporation_is_chosen_told_and_kept_apart(training, greedy, tmp_path, compare):
-    flags = ["--train-evaporation", training, "--greedy-evaporation", greedy]
+    flags = ["--train-evaporation", training, "--eval-evaporation", greedy]
     out = tmp_path / "out"
     assert compare(*TINY, "--episodes", 30, *flags, "--out", out)[0] == 0
     (row,) = read_csv(out / "summary.csv")
@@ -293,7 +293,7 @@ def test_evaporation_is_chosen_told_and_kept_apart(training, greedy, tmp_path, c
 
 def test_pictures_show_the_episode_that_told_the_behaviour(finished, tmp_path):
     """Without evaporation, as in training."""
-    name = "continuing_sarsa_circles_with_food"
+    name = "truncates_sarsa_circles_with_food"
     q_values, _, metadata = load_policy(finished / "policies" / f"{name}.npz")
     shown = (finished / "renders" / f"{name}.gif").read_bytes()
     for evaporation in (False, True):
@@ -301,13 +301,13 @@ def test_pictures_show_the_episode_that_told_the_behaviour(finished, tmp_path):
         task = Task(evaporation_in_evaluation=evaporation)
         more = {"seed": metadata["seed"], "max_steps": MAX_STEPS, "task": task}
         episode = replace(Episode.play(worlds.paper(), q_values, **more), name="circles with food")
-        pictures = frames(episode.moments(), (720, 480), title="SARSA, continuing")
+        pictures = frames(episode.snapshots(), (720, 480), title="SARSA, truncates")
         save_animation(path, pictures, pause=PAUSE)
         assert (path.read_bytes() == shown) == (not evaporation)
 
 
 def test_one_process_alone_draws_the_same_and_names_what_is_shown(finished, tmp_path, monkeypatch):
-    monkeypatch.setattr(beside, "available_threads", lambda: 1)
+    monkeypatch.setattr(worker_process, "available_threads", lambda: 1)
     lines = []
     write = text.write
     monkeypatch.setattr(
@@ -320,7 +320,7 @@ def test_one_process_alone_draws_the_same_and_names_what_is_shown(finished, tmp_
     assert [name for name in FILES if before[name] != after[name]] == [
         name for name in FILES if name in timed
     ]
-    for delivery in ("continuing", "absorbing"):
+    for delivery in ("truncates", "terminates"):
         assert {f"{name}, {delivery}" for name in ("SARSA", "Dyna-Q (p2)")} <= set(lines)
     assert {"delivers", "circles with food", "delivered"} <= set(lines)
     assert not [line for line in lines if line.endswith("...")]
@@ -335,8 +335,8 @@ def test_what_is_prepared_beside_can_be_done(draws):
 
 
 def test_who_asks_for_one_thread_gets_one_process(compare, tmp_path, monkeypatch):
-    started, threads = [], beside.available_threads()
-    monkeypatch.setattr(beside, "_started", lambda: started.append("process"))
+    started, threads = [], worker_process.available_threads()
+    monkeypatch.setattr(worker_process, "_started", lambda: started.append("process"))
     few = [option for option in TINY if option != "--no-figures"]
     assert compare(*few, "--threads", 1, "--out", tmp_path / "one")[0] == 0
     assert started == []
@@ -514,7 +514,7 @@ def test_a_learner_of_ones_own_and_a_discount_of_one_are_reported(tmp_path, comp
     tables = (tmp_path / "out" / "table2.md").read_text("utf-8")
     lines = [line.split(" | ") for line in tables.splitlines() if line.startswith("| hysteretic *")]
     assert lines[4][2] == f"{greedy:.1f}"
-    assert f"hysteretic *, absorbing: 0.1 / {best} / 0.3 / 0.9" in tables
+    assert f"hysteretic *, terminates: 0.1 / {best} / 0.3 / 0.9" in tables
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert "the discount is 1.0, so there is no optimal policy" in page
     assert max(len(line) for line in out.splitlines()[:-2]) < 80

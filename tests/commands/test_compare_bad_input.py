@@ -8,7 +8,7 @@ from command_lines import assert_one_sentence, call, run
 TINY = [
     *("--seeds", 1, "--episodes", 2, "--max-steps", 30, "--learners", "q_learning"),
     *("--learning-rates", 0.1, "--discounts", 0.9, "--epsilons", 0.3, "--epsilon-decays", 0.9),
-    *("--delivery", "absorbing", "--no-figures"),
+    *("--delivery", "terminates", "--no-figures"),
 ]
 
 

@@ -42,7 +42,7 @@ BLOCKS = 2 * 2 * 2  # settings of delivery, learners, pieces of at most 333 runs
 TINY = [
     *("--seeds", 1, "--episodes", 2, "--max-steps", 30, "--learners", "q_learning"),
     *("--learning-rates", 0.1, "--discounts", 0.9, "--epsilons", 0.3, "--epsilon-decays", 0.9),
-    *("--delivery", "absorbing", "--no-figures"),
+    *("--delivery", "terminates", "--no-figures"),
 ]
 
 

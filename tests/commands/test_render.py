@@ -131,15 +131,15 @@ def test_a_wrong_size_is_refused_before_the_training(tmp_path, monkeypatch) -> N
 
 @pytest.mark.parametrize("shown", ["episode", "colony", "learning", "sheet"])
 def test_what_is_trained_on_the_spot_sees_what_is_asked_for(shown, monkeypatch) -> None:
-    more = ["--stages", "1"] if shown == "learning" else ["--episodes", "1"]
+    more = ["--checkpoints", "1"] if shown == "learning" else ["--episodes", "1"]
     chosen = ["--task.observation", "ants_seen", "--training.learner", "dyna_q"]
     chosen += ["--training.planning-steps", "2"]
     length = ["--ticks", "5"] if shown == "colony" else []
     settings = render.parse_arguments([shown, *more, *chosen, *length])
     assert render.training_config(settings).planning_steps == 2
     if shown == "learning":
-        _, (stage,) = render.noted_stages(settings, paper())
-        table, task = stage.episode.q_values, stage.episode.task
+        _, (checkpoint,) = render.noted_checkpoints(settings, paper())
+        table, task = checkpoint.episode.q_values, checkpoint.episode.task
     else:
         table, task, title = render.find_policy(settings, paper())
         assert title == "Dyna-Q after 1 episode"
@@ -148,7 +148,7 @@ def test_what_is_trained_on_the_spot_sees_what_is_asked_for(shown, monkeypatch) 
 
 def test_learning_and_a_colony(tmp_path) -> None:
     done = run(
-        *("learning", "--seed", 5, "--stages", 0, 2, "--max-steps", 9, "--size", "300x200"),
+        *("learning", "--seed", 5, "--checkpoints", 0, 2, "--max-steps", 9, "--size", "300x200"),
         *("--out", tmp_path / "a.gif"),
     )
     assert done.returncode == 0, done.stderr
@@ -157,7 +157,7 @@ def test_learning_and_a_colony(tmp_path) -> None:
         assert image.n_frames >= 5
     done = run(
         *("colony", "--world", "open", "--ants", 7, "--episodes", 2, "--ticks", 9),
-        *("--every", 3, "--size", "300x200", "--out", tmp_path / "b.gif"),
+        *("--frame-interval", 3, "--size", "300x200", "--out", tmp_path / "b.gif"),
     )
     assert done.returncode == 0, done.stderr
     assert "7 ants, 9 ticks" in done.stdout
@@ -187,17 +187,17 @@ WRONG = {
         "--world.seed is for a world drawn at random",
     ),
     "ants of an episode": (["episode", "--ants", "80"], "--ants"),
-    "plain learning": (["learning", "--plain"], "--plain"),
-    "stages of an episode": (["episode", "--stages", "1"], "--stages"),
+    "plain learning": (["learning", "--no-overlay"], "--no-overlay"),
+    "checkpoints of an episode": (["episode", "--checkpoints", "1"], "--checkpoints"),
     "epsilon": (
         ["episode", "--policy", "{policy}", "--epsilon", "2", "--out", "{}/a.gif"],
         "epsilon",
     ),
     "learner": (["episode", "--training.learner", "magic", "--out", "{}/a.gif"], "magic"),
-    "stages": (["learning", "--stages", "5", "1", "--out", "{}/a.gif"], "ascend"),
-    "order of stages": (
-        ["learning", "--stages", "5", "2", "--out", "{}/a.gif"],
-        "stages are (5, 2); they must ascend",
+    "checkpoints": (["learning", "--checkpoints", "5", "1", "--out", "{}/a.gif"], "ascend"),
+    "order of checkpoints": (
+        ["learning", "--checkpoints", "5", "2", "--out", "{}/a.gif"],
+        "checkpoints are (5, 2); they must ascend",
     ),
     "steps": (["episode", "--max-steps", "0"], "from 1 to"),
     "training of a policy": (["sheet", "--policy", "a.npz", "--episodes", "5"], "--episodes is of"),
@@ -210,10 +210,10 @@ WRONG = {
         "--task.observation is of training",
     ),
     "view of a plain picture": (
-        ["colony", "--plain", "--follow", "0"],
-        "--plain leaves out what --follow shows",
+        ["colony", "--no-overlay", "--follow", "0"],
+        "--no-overlay leaves out what --follow shows",
     ),
-    "title of a plain picture": (["episode", "--plain", "--title", "a"], "what --title shows"),
+    "title of a plain picture": (["episode", "--no-overlay", "--title", "a"], "what --title shows"),
     "wrong number": (
         ["sheet", "--training.discount", "y", "--out", "{}/a.png"],
         "is 'y'; it must be",
@@ -335,19 +335,21 @@ def test_the_picture_of_learning_shows_stages_that_differ_and_the_median_of_many
 ) -> None:
     """The README says of it what the picture shows, and how many of 200 ants do so."""
     arguments = render.parse_arguments(gallery.GALLERY["learning.gif"])
-    assert render.parse_arguments(["learning"]).stages == arguments.stages
-    _, stages = render.noted_stages(arguments, paper())
-    steps = [len(stage.episode.trace) for stage in stages]
-    assert len({(n, stage.note) for n, stage in zip(steps, stages, strict=True)}) == len(stages)
+    assert render.parse_arguments(["learning"]).checkpoints == arguments.checkpoints
+    _, checkpoints = render.noted_checkpoints(arguments, paper())
+    steps = [len(checkpoint.episode.trace) for checkpoint in checkpoints]
+    assert len(
+        {(n, checkpoint.note) for n, checkpoint in zip(steps, checkpoints, strict=True)}
+    ) == len(checkpoints)
     readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").lower().split())
-    for n, stage in zip(steps[1:], stages[1:], strict=True):
-        assert stage.note == "delivered"
-        number, _, seeds = stage.among.split()[:3]
-        assert f"{stage.title} it delivers in {n} steps ({number} of {seeds} ants" in readme
+    for n, checkpoint in zip(steps[1:], checkpoints[1:], strict=True):
+        assert checkpoint.note == "delivered"
+        number, _, seeds = checkpoint.among.split()[:3]
+        assert f"{checkpoint.title} it delivers in {n} steps ({number} of {seeds} ants" in readme
     lines = []
     monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
-    list(learning_frames(stages, arguments.size))
-    assert {stage.among for stage in stages} < set(lines)
+    list(learning_frames(checkpoints, arguments.size))
+    assert {checkpoint.among for checkpoint in checkpoints} < set(lines)
     assert f"step {steps[-1]}, return 45: delivered" in lines
 
 
@@ -355,19 +357,21 @@ def test_an_ant_that_circles_earns_more_than_a_delivery_and_the_picture_says_why
     monkeypatch,
 ) -> None:
     """docs/rendering.md says so of this seed."""
-    arguments = render.parse_arguments(["learning", "--seed", "7", "--stages", "0", "10", "20"])
-    seed, stages = render.noted_stages(arguments, paper())
+    arguments = render.parse_arguments(
+        ["learning", "--seed", "7", "--checkpoints", "0", "10", "20"]
+    )
+    seed, checkpoints = render.noted_checkpoints(arguments, paper())
     assert seed == 7
-    assert [(stage.note, stage.among) for stage in stages] == [
+    assert [(checkpoint.note, checkpoint.among) for checkpoint in checkpoints] == [
         *(("", ""), ("circles with food", ""), ("delivered", "")),
     ]
-    returns = [int(stage.episode.trace.rewards.sum()) for stage in stages]
+    returns = [int(checkpoint.episode.trace.rewards.sum()) for checkpoint in checkpoints]
     assert returns[1] > returns[2] == 45
     told = (ROOT / "docs" / "rendering.md").read_text(encoding="utf-8")
     assert f"returns {returns[1]} after 10 episodes" in told
     lines = []
     monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
-    list(learning_frames(stages, (1200, 480)))
+    list(learning_frames(checkpoints, (1200, 480)))
     assert f"step 150, return {returns[1]}: circles with food" in lines
     assert "= T 16 + S 16 + F 3 + Q 10" in lines
     assert "S nearer to the queen +1" in lines  # the legend

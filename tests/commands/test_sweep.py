@@ -35,7 +35,7 @@ max_steps = 60
 rollouts = 3
 
 [task]
-delivery = "continuing"
+delivery = "truncates"
 
 [training]
 learner = "sarsa"
@@ -45,7 +45,7 @@ epsilon_decay = 0.99
 [vary]
 training.learning_rate = [0.01, 0.1]
 training.epsilon = [0.1, 0.5, 1.0]
-task.rewards.lure = [1, 0]
+task.rewards.shaping = [1, 0]
 """
 COLONY = """
 kind = "colony"
@@ -107,13 +107,13 @@ def test_a_row_is_a_point_and_a_seed_as_the_library_has_it(sweep):
         *("runs.csv", "summary.csv", "report.txt", "manifest.json", "figures/return_last50.png"),
     }
     rows = read_csv(folder / "runs.csv")
-    names = ["training.learning_rate", "training.epsilon", "task.rewards.lure"]
+    names = ["training.learning_rate", "training.epsilon", "task.rewards.shaping"]
     assert list(rows[0]) == [*names, "seed", "return_last50", "greedy_deliveries"]
     assert len(rows) == 2 * 3 * 2 * 3
     for row in rows[::5]:
         rate, epsilon = (float(row[name]) for name in names[:2])
         config = TrainingConfig("sarsa", rate, 0.9, epsilon, 0.99)
-        task = Task(delivery="continuing", rewards=Rewards(lure=int(row[names[2]])))
+        task = Task(delivery="truncates", rewards=Rewards(shaping=int(row[names[2]])))
         trained = train(worlds.paper(), config, int(row["seed"]), 50, 60, task)
         assert float(row["return_last50"]) == trained.returns.mean()
     summary = read_csv(folder / "summary.csv")
@@ -128,9 +128,9 @@ def test_a_row_is_a_point_and_a_seed_as_the_library_has_it(sweep):
         assert float(line["return_last50_ci_high"]) == pytest.approx(high[0])
     report = (folder / "report.txt").read_text("utf-8")
     assert out.startswith(report)
-    assert "learning_rate epsilon lure" in report
+    assert "learning_rate epsilon shaping" in report
     facts = json.loads((folder / "manifest.json").read_text("utf-8"))["settings"]
-    assert (facts["task.delivery"], facts["seeds"]) == ("continuing", [7, 2, 5])
+    assert (facts["task.delivery"], facts["seeds"]) == ("truncates", [7, 2, 5])
 
 
 def test_a_sweep_of_colonies_is_what_the_library_gives(sweep):
@@ -146,7 +146,7 @@ def test_a_sweep_of_colonies_is_what_the_library_gives(sweep):
     greedy = TrainingConfig("sarsa", 0.1, 0.9, 0.01, 1.0)
     others = (EVALUATION_SEEDS, EVALUATION_SEEDS + 1)
     table = colony.q_values
-    after = Colony(several, task, greedy, others, 4, sharing="fixed", q_values=table).run(2, 60)
+    after = Colony(several, task, greedy, others, 4, sharing="frozen", q_values=table).run(2, 60)
     expected = after.deliveries.mean(axis=0) * 1000 / 60
     assert [float(row["deliveries"]) for row in rows[2:4]] == pytest.approx(expected.tolist())
 
@@ -158,9 +158,9 @@ def test_a_finished_sweep_is_shown(sweep):
     assert status == 0
     assert "holds these results already" in out
     assert contents(Path("results/sweep-my")) == before
-    status, out, err = sweep(RUNS.replace("lure = [1, 0]", "lure = [1, 2]"))
+    status, out, err = sweep(RUNS.replace("shaping = [1, 0]", "shaping = [1, 2]"))
     assert status == 2
-    assert "(task.rewards.lure, vary differ)" in err
+    assert "(task.rewards.shaping, vary differ)" in err
 
 
 WRONG = {
@@ -168,9 +168,17 @@ WRONG = {
     "no kind": ('kind = "runs"', "", ["kind is missing", "runs, colony"]),
     "measure": ('"return_last50"', '"return_last"', ["'return_last'", "return_last50"]),
     "no measure": (RUNS[RUNS.index("measures") : RUNS.index("seeds")], "", ["measures is missing"]),
-    "unknown": ("lure =", "lures =", ["'task.rewards.lures' is no setting", "task.rewards.lure"]),
+    "unknown": (
+        "shaping =",
+        "shapings =",
+        ["'task.rewards.shapings' is no setting", "task.rewards.shaping"],
+    ),
     "unknown above": ("episodes =", "episode =", ["'episode' is no setting", "episodes"]),
-    "not in full": ("task.rewards.lure =", "lure =", ["'lure' is no setting", "task.rewards.lure"]),
+    "not in full": (
+        "task.rewards.shaping =",
+        "shaping =",
+        ["'shaping' is no setting", "task.rewards.shaping"],
+    ),
     "of the other kind": (
         "rollouts = 3",
         "ants = 3",
@@ -186,7 +194,7 @@ WRONG = {
         "discount = 0.9\nepsilon = 0.1",
         ["training.epsilon stands in [vary]"],
     ),
-    "empty": ("[1, 0]", "[]", ["task.rewards.lure is an empty list"]),
+    "empty": ("[1, 0]", "[]", ["task.rewards.shaping is an empty list"]),
     "seeds": ("seeds = [7, 2, 5]", "seeds = 0", ["seeds is 0", "or a list of seeds"]),
     "seed twice": ("[7, 2, 5]", "[7, 7]", ["seeds holds 7 more than once"]),
     "world": ("[task]", '[world]\npreset = "mars"\n[task]', ["'mars'", "open, paper"]),
@@ -196,16 +204,20 @@ WRONG = {
     "observation": ("[task]", '[task]\nobservation = "all"', ["'all'", "paper"]),
     "learner": ('"sarsa"', '"salsa"', ["'salsa'", "sarsa"]),
     "for colonies": ("[vary]", "[vary]\ntask.life.regrowth = [1]", ["use a Colony"]),
-    "against": ("[task]", "[against]\ntask.rewards.lure = 7\n[task]", ["against is", "in [vary]"]),
+    "against": (
+        "[task]",
+        "[against]\ntask.rewards.shaping = 7\n[task]",
+        ["against is", "in [vary]"],
+    ),
     "margin": ("seeds =", "margin = -1\nseeds =", ["margin is -1"]),
-    "no margin": ("seeds =", "against.task.rewards.lure = 0\nmargin = nan\nseeds =", ["is nan"]),
+    "no margin": ("seeds =", "against.task.rewards.shaping = 0\nmargin = nan\nseeds =", ["is nan"]),
     "flag as margin": ("seeds =", "margin = true\nseeds =", ["margin is True"]),
     "margin alone": ("seeds =", "margin = 1\nseeds =", ["margin is given without against"]),
     "against text": ("seeds =", 'against = "paper"\nseeds =', ["against is 'paper'"]),
     "against list": ("seeds =", "against = [{a = 1}]\nseeds =", ["against is [{'a': 1}]"]),
     "against nothing": ("seeds =", "against.training = {}\nseeds =", ["against is {'training'"]),
     "measure twice": ('"greedy_deliveries"', '"return_last50"', ["'return_last50' more than once"]),
-    "value twice": ("[1, 0]", "[1, 1]", ["task.rewards.lure holds 1 more than once"]),
+    "value twice": ("[1, 0]", "[1, 1]", ["task.rewards.shaping holds 1 more than once"]),
     "few episodes": ("episodes = 50", "episodes = 49", ["return_last50 needs 50 episodes"]),
     "too few": ("return_last50", "return_first50", ["return_first50 needs 100 episodes"]),
     "seed of one world": (
@@ -221,7 +233,7 @@ WRONG = {
     "a part twice": (
         "[task]",
         "[task]\nrewards = 3",
-        ["task.rewards.lure stands in [vary] and task.rewards among"],
+        ["task.rewards.shaping stands in [vary] and task.rewards among"],
     ),
     "wrong name": ("[vary]", '[vary]\ntraining.lerner = ["a"]', ["lerner' is", "training.learner"]),
     "cut name": (
@@ -288,7 +300,7 @@ training.planning_steps = [2, 4, 6]
 
 
 def test_each_grid_has_a_figure(sweep):
-    grids = "[[vary]]\ntask.rewards.lure = [1, 0]\n[[vary]]\ntask.rewards.failed = [-1, 0]\n"
+    grids = "[[vary]]\ntask.rewards.shaping = [1, 0]\n[[vary]]\ntask.rewards.failed = [-1, 0]\n"
     text = RUNS[: RUNS.index("[vary]")] + "learning_rate = 0.1\nepsilon = 0.3\n" + grids
     assert sweep(text)[0] == 0
     figures = Path("results/sweep-my/figures").iterdir()
@@ -296,11 +308,11 @@ def test_each_grid_has_a_figure(sweep):
 
 
 def test_what_is_asked_for_twice_is_done_once_and_shown_twice(sweep):
-    grids = "[[vary]]\ntask.rewards.lure = [1, 0]\n[[vary]]\ntask.rewards.lure = [2, 1]\n"
+    grids = "[[vary]]\ntask.rewards.shaping = [1, 0]\n[[vary]]\ntask.rewards.shaping = [2, 1]\n"
     text = RUNS[: RUNS.index("[vary]")] + "learning_rate = 0.1\nepsilon = 0.3\n" + grids
     assert sweep(text, "--no-figures")[0] == 0
     rows = read_csv("results/sweep-my/runs.csv")
-    assert [row["task.rewards.lure"] for row in rows] == [*"111000222111"]
+    assert [row["task.rewards.shaping"] for row in rows] == [*"111000222111"]
     assert rows[:3] == rows[9:]
     assert rows[0]["return_last50"] != rows[3]["return_last50"]
 
@@ -310,7 +322,7 @@ def test_findings_compare_with_the_value_against_which_all_are_held(sweep):
     status, out, _ = sweep(RUNS.replace("[task]", against), "--no-figures")
     assert status == 0
     assert "return_last50 against epsilon 0.5" in out
-    names = ["training.learning_rate", "training.epsilon", "task.rewards.lure"]
+    names = ["training.learning_rate", "training.epsilon", "task.rewards.shaping"]
     rows = read_csv("results/sweep-my/runs.csv")
 
     def mean(*values):
@@ -318,11 +330,11 @@ def test_findings_compare_with_the_value_against_which_all_are_held(sweep):
         return np.mean([float(row["return_last50"]) for row in alike])
 
     found = read_csv("results/sweep-my/findings.csv")
-    assert len(found) == 2 * 2 * 2  # two rates, two other epsilons, two lures
+    assert len(found) == 2 * 2 * 2  # two rates, two other epsilons, two shapings
     for line in found:
-        rate, epsilon, lure = (float(line[name]) for name in names)
+        rate, epsilon, shaping = (float(line[name]) for name in names)
         assert epsilon != 0.5
-        expected = mean(rate, epsilon, lure) - mean(rate, 0.5, lure)
+        expected = mean(rate, epsilon, shaping) - mean(rate, 0.5, shaping)
         assert float(line["difference"]) == pytest.approx(expected)
         assert float(line["low"]) <= expected + 1e-9 <= float(line["high"]) + 2e-9
         assert line["finding"] == "equal"  # all within the margin
@@ -334,7 +346,7 @@ def test_findings_compare_with_the_value_against_which_all_are_held(sweep):
 )
 def test_what_findings_say(shift, margin, word, tmp_path):
     (tmp_path / "a.toml").write_text(
-        RUNS.replace("[task]", f"margin = {margin}\nagainst.task.rewards.lure = 0\n[task]")
+        RUNS.replace("[task]", f"margin = {margin}\nagainst.task.rewards.shaping = 0\n[task]")
         .replace("[0.01, 0.1]", "0.1")
         .replace("[0.1, 0.5, 1.0]", "0.1")
         .replace("[7, 2, 5]", "20")
@@ -368,11 +380,11 @@ def test_a_preset_of_ones_own_and_its_settings_can_be_named(tmp_path, monkeypatc
 
 
 def test_traffic_has_names_and_learners_first_values(tmp_path):
-    grid = '[vary]\ntask.traffic = ["blocking", "following"]\ntraining.initial_value = [0, 10]\n'
+    grid = '[vary]\ntask.traffic = ["blocking", "following"]\ntraining.initial_q = [0, 10]\n'
     more = "learning_rate = 0.1\nepsilon = 0.3\n"
     (tmp_path / "a.toml").write_text(RUNS[: RUNS.index("[vary]")] + more + grid)
     points = read_sweep(tmp_path / "a.toml", NAMES).study.points
-    found = [(point.task.traffic.follow, point.training.initial_value) for point in points]
+    found = [(point.task.traffic.follow, point.training.initial_q) for point in points]
     assert found == [(False, 0), (False, 10), (True, 0), (True, 10)]
 
 

@@ -42,7 +42,9 @@ def test_ctrl_c_ends_it_promptly_in_one_line(number: int, kernels: Path, tmp_pat
 def test_ctrl_c_ends_the_replay_of_a_session(kernels: Path, tmp_path: Path) -> None:
     log = Session(Choices({}).setup(load("watch").START)).log()
     replace(log, steps=10**9, ticks=10**9).write(tmp_path / "endless.npz")
-    assert run("watch", ["--for", 1], kernels, tmp_path).returncode == 0  # compiles some kernels
+    assert (
+        run("watch", ["--duration", 1], kernels, tmp_path).returncode == 0
+    )  # compiles some kernels
     process = start("watch", ["--session", tmp_path / "endless.npz"], kernels, tmp_path)
     time.sleep(5)
     assert process.poll() is None
@@ -62,13 +64,13 @@ def test_ctrl_c_that_a_library_swallows_ends_it(
         return {}
 
     monkeypatch.setattr(load("watch"), "policies", swallowing)
-    status, _, said = call("watch", ["--for", 3], capsys)
+    status, _, said = call("watch", ["--duration", 3], capsys)
     assert (status, said) == (130, "Stopped.\n")
 
 
 def test_it_ends_after_some_seconds(capsys: pytest.CaptureFixture[str]) -> None:
     began = time.monotonic()
-    status, said, err = call("watch", ["--for", 1], capsys)
+    status, said, err = call("watch", ["--duration", 1], capsys)
     assert (status, err) == (0, "")
     assert said.endswith("Ended.\n")
     assert time.monotonic() - began >= 1
@@ -78,7 +80,7 @@ def test_a_saved_session_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[s
     session = Session(Choices({}).setup(load("watch").START))
     session.advance(3)
     session.save(tmp_path / "mine.npz")
-    arguments = ["--for", 1, "--session", tmp_path / "mine.npz"]
+    arguments = ["--duration", 1, "--session", tmp_path / "mine.npz"]
     assert call("watch", arguments, capsys)[0] == 0
     status, _, said = call("watch", ["--session", tmp_path / "none.npz"], capsys)
     assert status == 2

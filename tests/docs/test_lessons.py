@@ -138,11 +138,11 @@ def test_lessons_tell_what_comes_after_a_delivery():
         "\n".join(cell["source"] for cell in cells_of(path)).replace("\n", " ")
         for path in LESSONS[:2]
     )
-    assert "absorbing" in first
-    assert "absorbing" in second
+    assert "terminal" in first
+    assert "terminal" in second
     counts = "\n".join(shown(cells_of(LESSONS[1])))
-    assert re.search("Dyna-Q +absorbing +{'delivers': 0,", counts)
-    assert re.search("Dyna-Q +continuing {'delivers': 40,", counts)
+    assert re.search("Dyna-Q +terminates +{'delivers': 0,", counts)
+    assert re.search("Dyna-Q +truncates +{'delivers': 40,", counts)
 
 
 @pytest.mark.slow

@@ -15,11 +15,11 @@ from taichi_ants.worlds import World, paper
 
 # Uneven on purpose: some deliver within 34 steps, some walk in circles for all of an episode, a
 # step of Dyna-Q costs several of the others, and memories differ in size.
-CONTINUING = Task(delivery="continuing")
+TRUNCATES = Task(delivery="truncates")
 CONFIGS = (
     TrainingConfig("q_learning", 0.01, 0.99, 0.3, 0.9),
     TrainingConfig("dyna_q", 0.01, 0.99, 0.5, 0.99, planning_steps=5),
-    TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.95, learning_rate_decay=0.9, initial_value=3),
+    TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.95, learning_rate_decay=0.9, initial_q=3),
     TrainingConfig("dyna_q", 0.1, 0.9, 0.3, 0.9, planning_steps=1),
     TrainingConfig("double_q", 0.37, 0.9, 0.3, 0.9),
     TrainingConfig("dyna_q", 0.001, 0.99, 0.3, 0.9, planning_steps=5),
@@ -35,7 +35,7 @@ GREEDY = ARRAYS[:3]
 
 @pytest.fixture(scope="module")
 def expected():
-    result = train(paper(), CONFIGS, SEEDS, EPISODES, MAX_STEPS, CONTINUING, threads=1)
+    result = train(paper(), CONFIGS, SEEDS, EPISODES, MAX_STEPS, TRUNCATES, threads=1)
     lengths = result.steps.mean(axis=(1, 2))
     assert lengths.max() > 2 * lengths.min()  # uneven indeed
     assert 0 < result.deliveries.mean() < 1
@@ -49,7 +49,7 @@ def assert_same(one, other, names=ARRAYS):
 
 def test_repeats_and_threads(expected):
     for threads in (2, 2, 1):
-        again = train(paper(), CONFIGS, SEEDS, EPISODES, MAX_STEPS, CONTINUING, threads=threads)
+        again = train(paper(), CONFIGS, SEEDS, EPISODES, MAX_STEPS, TRUNCATES, threads=threads)
         assert_same(again, expected)
         assert again.state == expected.state
 
@@ -62,20 +62,20 @@ def test_whatever_else_is_in_the_sweep(expected):
         seeds = shuffle.sample(range(len(SEEDS)), shuffle.randint(1, len(SEEDS)))
         part = train(
             *(paper(), [CONFIGS[c] for c in chosen], [SEEDS[s] for s in seeds]),
-            *(EPISODES, MAX_STEPS, CONTINUING),
+            *(EPISODES, MAX_STEPS, TRUNCATES),
         )
         for name in ARRAYS:
             whole = getattr(expected, name)[np.ix_(chosen, seeds)]
             assert np.array_equal(getattr(part, name), whole), name
     for c, config in enumerate(CONFIGS):
-        alone = train(paper(), config, SEEDS[c], EPISODES, MAX_STEPS, CONTINUING)
+        alone = train(paper(), config, SEEDS[c], EPISODES, MAX_STEPS, TRUNCATES)
         for name in ARRAYS:
             assert np.array_equal(getattr(alone, name)[0, 0], getattr(expected, name)[c, c])
 
 
 def test_a_configuration_that_is_listed_twice_runs_twice(expected):
     twice = train(
-        paper(), [CONFIGS[1], CONFIGS[0], CONFIGS[1]], SEEDS[:2], EPISODES, MAX_STEPS, CONTINUING
+        paper(), [CONFIGS[1], CONFIGS[0], CONFIGS[1]], SEEDS[:2], EPISODES, MAX_STEPS, TRUNCATES
     )
     for name in ARRAYS:
         array = getattr(twice, name)
@@ -87,7 +87,7 @@ def test_a_configuration_that_is_listed_twice_runs_twice(expected):
 def test_whatever_the_size_of_launches(size, expected, monkeypatch):
     used = []
     monkeypatch.setattr(run_engine, "size_of_launch", lambda *sizes: used.append(sizes) or size)
-    again = train(paper(), CONFIGS, SEEDS, EPISODES, MAX_STEPS, CONTINUING, threads=2)
+    again = train(paper(), CONFIGS, SEEDS, EPISODES, MAX_STEPS, TRUNCATES, threads=2)
     assert used
     assert_same(again, expected)
     assert again.state == expected.state
@@ -141,7 +141,7 @@ def test_evaluation(expected):
 
 def test_evaluation_leaves_training_as_it_is(expected):
     """Rollouts have streams of their own."""
-    first = train(paper(), CONFIGS, SEEDS, EPISODES // 2, MAX_STEPS, CONTINUING)
+    first = train(paper(), CONFIGS, SEEDS, EPISODES // 2, MAX_STEPS, TRUNCATES)
     evaluate(paper(), first.q_values, 5, SEEDS)
     assert_same(continue_training(first, EPISODES - EPISODES // 2), expected)
 

@@ -33,7 +33,7 @@ def plain_one(worlds: ColonyWorlds, seed: int) -> ReferenceColony:
     ours = worlds.colony
     return ReferenceColony(
         *(ours.worlds[0], ours.task, training(), seed, ours.ants, ours.capacity, ours.start),
-        sharing="fixed",
+        sharing="frozen",
         q_values=np.zeros((ours.task.n_states, N_ACTIONS), np.float32),
     )
 

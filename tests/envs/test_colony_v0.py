@@ -69,7 +69,7 @@ def test_agents_are_the_ants_of_the_reference_by_number():
     env = colony(observation_format="index", ants=16, max_steps=90)
     rules = replace(LIVELY, evaporation_in_evaluation=LIVELY.evaporation_in_training)
     table = np.zeros((rules.n_states, N_ACTIONS), np.float32)
-    plain = ReferenceColony(*(MEADOW, rules, training(), 6, 16), sharing="fixed", q_values=table)
+    plain = ReferenceColony(*(MEADOW, rules, training(), 6, 16), sharing="frozen", q_values=table)
     rng = np.random.default_rng(8)
     for seed in (6, None):
         observations, infos = env.reset(seed=seed)

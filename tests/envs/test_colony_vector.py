@@ -23,7 +23,7 @@ from taichi_ants.task.constants import GIVE
 from taichi_ants.task.task import foraging
 
 ANTS = 6
-GOES_ON = Task(delivery="continuing")
+GOES_ON = Task(delivery="truncates")
 SAME, NEXT, DISABLED = AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP, AutoresetMode.DISABLED
 MEADOW = worlds.open_world(3, (8, 8, 8))
 
@@ -61,7 +61,7 @@ def test_each_world_is_the_parallel_environment_of_its_seed(form):
     """Different worlds in one batch; observations, rewards, states, masks and events."""
     places = [MEADOW, worlds.open_world(4, (8, 8, 8))]
     rules = {"task": foraging(), "observation_format": form}
-    many = ants_of(2, world=places, **{**rules, "task": replace(foraging(), delivery="continuing")})
+    many = ants_of(2, world=places, **{**rules, "task": replace(foraging(), delivery="truncates")})
     single = [parallel_env(one, ants=ANTS, max_steps=20, **rules) for one in places]
     seen, infos = many.reset(seed=7)
     theirs = [env.reset(seed=7 + w) for w, env in enumerate(single)]
@@ -192,7 +192,7 @@ def test_worlds_that_were_seeded_anew_are_as_in_a_new_environment():
 
 
 def test_an_ant_that_delivers_is_terminated_and_goes_on():
-    """With absorbing delivery; a batch in which food lies beside the nest."""
+    """Where delivery terminates; a batch in which food lies beside the nest."""
     env = ants_of(task=Task(), max_steps=300)
     _, infos = env.reset(seed=2)
     rng = np.random.default_rng(5)

@@ -32,10 +32,10 @@ ID = "taichi_ants/HexForage-v0"
 SMALL = [worlds.open_world(seed, (8, 8, 8)) for seed in range(3)]
 SETTINGS: list[dict[str, Any]] = [
     {},
-    {"task": task.foraging(), "delivery": "endless", "evaporation": True},
+    {"task": task.foraging(), "delivery": "continues", "evaporation": True},
     {
         "task": Task(pheromone=Pheromone(deposit="add")),
-        "delivery": "continuing",
+        "delivery": "truncates",
         "observation_format": "one_hot",
     },
 ]
@@ -149,15 +149,15 @@ def test_a_table_gets_in_an_environment_what_its_rollout_gets():
 @pytest.mark.parametrize(
     ("delivery", "ends"),
     [
-        ("absorbing", (True, False)),
-        ("continuing", (False, True)),
-        ("endless", (False, False)),
+        ("terminates", (True, False)),
+        ("truncates", (False, True)),
+        ("continues", (False, False)),
         (None, (False, True)),  # as the task says
     ],
 )
 def test_a_delivery_ends_an_episode_as_is_asked_for(delivery, ends):
     q_values, rng = trail_follower(), np.random.default_rng(0)
-    rules, foods = Task(delivery="continuing"), len(worlds.paper().foods)
+    rules, foods = Task(delivery="truncates"), len(worlds.paper().foods)
     env = gymnasium.make(ID, task=rules, delivery=delivery, render_mode="ansi")
     _, info = env.reset(seed=0)
     delivered = 0
@@ -172,9 +172,9 @@ def test_a_delivery_ends_an_episode_as_is_asked_for(delivery, ends):
             assert not any(ended)
         if any(ended):
             break
-    assert delivered >= (3 if delivery == "endless" else 1)
+    assert delivered >= (3 if delivery == "continues" else 1)
     left = worlds.from_text(env.render()).foods
-    assert len(left) == (foods if delivery == "endless" else foods - 1)
+    assert len(left) == (foods if delivery == "continues" else foods - 1)
 
 
 def test_episodes_are_truncated_at_the_step_limit():
@@ -262,7 +262,7 @@ def test_nothing_is_drawn_before_an_episode_begins():
 
 def test_seeds_repeat_all_chance_and_without_one_it_goes_on():
     world = World((9, 9, 9), (0, 0, 0), foods=[(4, 0, 4), (4, 0, 5), (5, 0, 4)])
-    env = gymnasium.make(ID, world=world, delivery="endless", max_steps=200)
+    env = gymnasium.make(ID, world=world, delivery="continues", max_steps=200)
 
     def played(**seed: int) -> list[tuple]:
         observation, info = env.reset(**seed)

@@ -72,7 +72,7 @@ def test_an_episode_of_an_ant_is_one_of_minaris():
 
 def test_the_environment_of_single_ants_is_recovered():
     """With its world, rules and format: the same actions give the same episode."""
-    world, task = worlds.open_world(5, (6, 6, 6)), Task(delivery="continuing", observation="ants")
+    world, task = worlds.open_world(5, (6, 6, 6)), Task(delivery="truncates", observation="ants")
     to_minari(record(world, task=task, seeds=3, episodes=2), "ants/alone-v0", "one_hot")
     loaded = minari.load_dataset("ants/alone-v0")
     recovered = loaded.recover_environment()

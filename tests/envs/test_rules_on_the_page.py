@@ -39,7 +39,7 @@ class Page:
     """One ant in a world that lists its start; no two food items are ever in view at once."""
 
     def __init__(
-        self, world: World, delivery: str = "absorbing", evaporation: bool = False, max_steps=600
+        self, world: World, delivery: str = "terminates", evaporation: bool = False, max_steps=600
     ) -> None:
         self.world, self.delivery, self.limit = world, delivery, max_steps
         self.evaporates = evaporation
@@ -89,7 +89,7 @@ class Page:
                 reason = 4 if self.load else 5
             else:
                 food = ahead(self.cell, self.heading + codes.index(3) - 1)
-                if self.delivery != "endless":
+                if self.delivery != "continues":
                     self.holds[food] = EMPTY
                 self.trail[food] = self.trail[self.cell] = 250
                 self.heading, self.load = (self.heading + 3) % 6, 1
@@ -101,8 +101,8 @@ class Page:
         if self.evaporates:
             self.trail = {cell: max(level - 1, 0) for cell, level in self.trail.items()}
         self.steps += 1
-        terminated = event == 5 and self.delivery == "absorbing"
-        over = self.steps == self.limit or (event == 5 and self.delivery == "continuing")
+        terminated = event == 5 and self.delivery == "terminates"
+        over = self.steps == self.limit or (event == 5 and self.delivery == "truncates")
         return reward, terminated, over and not terminated, self.info(event, reason)
 
     def info(self, event: int, reason: int) -> dict[str, Any]:
@@ -138,7 +138,7 @@ def compare(steps: int, seed: int) -> int:
     while done < steps:
         world = worlds.paper() if rng.random() < 0.3 else garden(int(rng.integers(10**6)))
         rules: dict[str, Any] = {
-            "delivery": str(rng.choice(["absorbing", "continuing", "endless"])),
+            "delivery": str(rng.choice(["terminates", "truncates", "continues"])),
             "evaporation": bool(rng.random() < 0.6),
             "max_steps": int(rng.integers(1, 400)),
         }

@@ -90,7 +90,7 @@ def test_a_network_is_rendered_put_into_a_colony_and_compared(
     sheet = run("render", ["sheet", "--policy", path, "--out", "sheet.png"], kernels, tmp_path)
     assert sheet.returncode == 0, sheet.stderr
     assert (tmp_path / "sheet.png").stat().st_size > 10_000
-    shared = ["--sharing", "fixed", "--ants", 4, "--ticks", 50]
+    shared = ["--sharing", "frozen", "--ants", 4, "--ticks", 50]
     live = run("colony", ["live", "--policy", path, *shared], kernels, tmp_path)
     assert live.returncode == 0, live.stderr
     ours = evaluate(worlds.paper(), load_policy(path).q_values, rollouts=3)

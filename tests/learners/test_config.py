@@ -37,7 +37,7 @@ def test_defaults():
         *((name, 1) for name in NOT_ZERO),
         *(("learning_rate", 1e-37), ("epsilon_decay", 1e-300), ("learning_rate_decay", 5e-324)),
         *((name, value) for name in MAY_BE_ZERO for value in (0, 1)),
-        *(("initial_value", value) for value in (-1e6, 0, 1e6)),
+        *(("initial_q", value) for value in (-1e6, 0, 1e6)),
         *(("planning_steps", 0), ("planning_steps", 1000)),
         ("learner", "not registered yet"),
     ],

@@ -24,7 +24,7 @@ from taichi_ants.reference.learners.sarsa import Sarsa
 from taichi_ants.task import Task
 from taichi_ants.worlds import paper
 
-DELIVERIES = ("absorbing", "continuing")
+DELIVERIES = ("terminates", "truncates")
 
 
 @ti.func

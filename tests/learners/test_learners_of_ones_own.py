@@ -18,7 +18,7 @@ from taichi_ants import (
     trace_training,
     train,
 )
-from taichi_ants.engines import trial
+from taichi_ants.engines import plugin_check
 from taichi_ants.learners import (
     Hyperparameters,
     Is,
@@ -39,7 +39,7 @@ def _no_learner_stays(monkeypatch):
 
 
 @pytest.fixture(autouse=True)
-def _trials_are_those_of_users(monkeypatch):
+def _plugins_are_those_of_users(monkeypatch):
     """How the compiler takes what is wrong depends on its passes."""
     monkeypatch.delenv("TI_CFG_OPTIMIZATION", raising=False)
 
@@ -277,7 +277,7 @@ def that_never_ends(value, reward, discount, next_values, next_action, epsilon):
 
 
 def test_one_that_never_ends_is_stopped(monkeypatch):
-    monkeypatch.setattr(trial, "_SECONDS", 2)
+    monkeypatch.setattr(plugin_check, "_SECONDS", 2)
     register(td_learner("mine", that_never_ends))
     with pytest.raises(AntsError, match="'mine' cannot be used: it does not come to an end within"):
         in_runs()
@@ -370,7 +370,7 @@ def test_a_memory_in_a_colony_belongs_to_an_ant():
     kinds = [(with_momentum(0.5), 0), (with_momentum(0.0), 1), (config("sarsa"), 2)]
     tables = {}
     for training, kind in kinds:
-        colony = Colony(paper(), None, training, ants=5, sharing="own")
+        colony = Colony(paper(), None, training, ants=5, sharing="independent")
         colony.run(2, 100)
         tables[kind] = colony.q_values
     assert np.array_equal(tables[1], tables[2])
@@ -503,7 +503,7 @@ def test_values_that_are_not_finite_are_named(td_error):
     named = r"^learner 'mine' made action values that are not finite, with .*rate=0\.1.* seed 0; "
     with pytest.raises(AntsError, match=named):
         in_runs()
-    for sharing in ("shared", "own"):
+    for sharing in ("shared", "independent"):
         with pytest.raises(AntsError, match=named):
             in_a_colony(sharing=sharing)
     actions = trace_training(paper(), config(), 0, 3).actions  # a trace shows what happens
@@ -512,7 +512,7 @@ def test_values_that_are_not_finite_are_named(td_error):
 
 def test_values_that_are_not_finite_are_named_while_a_colony_is_stepped(tmp_path):
     register(td_learner("mine", of_a_logarithm))
-    for sharing in ("shared", "own"):
+    for sharing in ("shared", "independent"):
         colony = Colony(paper(), None, config(), ants=5, sharing=sharing)
         colony.begin_episode()
         colony.tick(100)

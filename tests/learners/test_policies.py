@@ -141,7 +141,7 @@ def test_a_colony_of_trail_followers_delivers_more_than_learned_tables(
         TrainingConfig("sarsa", 0.1, 0.9, 0.01, 1.0),
         range(4),
         ants=64,
-        sharing="fixed",
+        sharing="frozen",
         q_values=trail_follower(task.observation),
     )
     assert colony.run(1, 1000).deliveries.min() > least

@@ -586,7 +586,7 @@ def test_files_are_saved_and_loaded(page, room, tmp_path):
         with page.tab.expect_download() as got:
             page.tab.click(f'[data-export="{kind}"]')
         got.value.save_as(tmp_path / got.value.suggested_filename)
-    state = room.session.hand.state()
+    state = room.session.interventions.state()
     assert np.array_equal(
         load_policy(tmp_path / "policy.npz").q_values, room.session.colony.q_values[0]
     )
@@ -595,11 +595,11 @@ def test_files_are_saved_and_loaded(page, room, tmp_path):
     wait(page, "viewer.history.length === 1")
     page.tab.set_input_files("#upload", tmp_path / "session.npz")
     wait(page, "viewer.history.frames.at(-1).tick === 10")
-    assert room.session.hand.state() == state
+    assert room.session.interventions.state() == state
     assert_same(page, room)
     page.tab.set_input_files("#upload", tmp_path / "session.gif")
     page.tab.wait_for_selector("#toast.bad:not([hidden])")
-    assert room.session.hand.state() == state
+    assert room.session.interventions.state() == state
 
 
 def test_pages_look_on_together(page, browser, room):
@@ -841,7 +841,7 @@ def test_curves_are_over_time_and_a_late_page_has_them(page, browser, room):
         ]
         ended = 50 * np.arange(1, session.colony.episode + 1) / session.ticks * 100
         assert np.abs(ended[:, None] - lines[1]).min(axis=0).max() < 0.01
-        if len(ended) < 500:  # a longer course is thinned
+        if len(ended) < 500:  # a longer one is thinned
             assert len(lines[1]) == len(ended)
         for line in lines:
             assert line == sorted(line)

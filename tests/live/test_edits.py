@@ -1,5 +1,5 @@
-"""Edits: colony and reference stay equal to the bit, whatever a hand does; what is wrong changes
-nothing."""
+"""Edits: colony and reference stay equal to the bit, whatever the interventions; what is wrong
+changes nothing."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from same_colonies import assert_equal
 
 from taichi_ants import AntsError, Colony, TrainingConfig, worlds
 from taichi_ants.engines.colony import stepping
-from taichi_ants.engines.colony.hand import Hand
+from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.engines.colony.layout import Stage, WorldRow
 from taichi_ants.live import edits
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.reference.hand import Hand as PlainHand
+from taichi_ants.reference.interventions import Interventions as PlainInterventions
 from taichi_ants.task import foraging
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
@@ -26,18 +26,18 @@ from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 KERNELS = [
     ("q_learning", "shared", "paper", False, "blocking", "half"),
     ("sarsa", "shared", "ants", False, "right_of_way", "strongest"),
-    ("q_learning", "fixed", "queues", False, "following", "strongest_under_carriers"),
-    ("double_q", "own", "ants_seen", True, "blocking", "half"),
+    ("q_learning", "frozen", "queues", False, "following", "strongest_under_carriers"),
+    ("double_q", "independent", "ants_seen", True, "blocking", "half"),
     ("dyna_q", "shared", "trail_levels", True, "blocking", "half"),
-    ("n_step_sarsa", "own", "paper", False, "blocking", "half"),
+    ("n_step_sarsa", "independent", "paper", False, "blocking", "half"),
 ]
 TRAINING = TrainingConfig("sarsa", 0.2, 0.9, 0.4, 0.9)
 MARKED = [*KERNELS[:4], *(pytest.param(one, marks=pytest.mark.slow) for one in KERNELS[4:])]
 
 
-def assert_sound(hand: Hand) -> None:
+def assert_sound(interventions: Interventions) -> None:
     """What holds in every colony at the end of a tick."""
-    colony = hand.colony
+    colony = interventions.colony
     arrays, world = colony.arrays, colony.arrays["worlds"][:, 0]
     taken = arrays["stage"] != Stage.VACANT
     cells, numbers = arrays["cell"][taken], arrays["number"][taken]
@@ -49,9 +49,9 @@ def assert_sound(hand: Hand) -> None:
     assert (arrays["walls"] == (bare == OBSTACLE)).all()
     assert np.flatnonzero(bare == QUEEN).tolist() == [world[WorldRow.QUEEN_CELL]]
     assert colony.snapshot().trail[bare == OBSTACLE].sum() == 0
-    later = hand.world()
+    later = interventions.world()
     assert (later.closer() == arrays["closer"]).all()
-    assert np.count_nonzero(later.ground() == EMPTY) >= hand.ants
+    assert np.count_nonzero(later.ground() == EMPTY) >= interventions.ants
 
 
 @pytest.mark.parametrize("kernel", MARKED, ids=lambda kernel: "-".join(map(str, kernel[:4])))
@@ -79,18 +79,18 @@ def test_edits_keep_colony_and_reference_equal(kernel):
         plain = ReferenceColony(*given, **rules)
         colony.begin_episode()
         plain.begin_episode()
-        hand, plain_hand = Hand(colony), PlainHand(plain)
+        interventions, plain_hand = Interventions(colony), PlainInterventions(plain)
         for _ in range(40):
-            edit = random_edit(rng, hand)
-            before = hand.state()
+            edit = random_edit(rng, interventions)
+            before = interventions.state()
             try:
-                apply_to_both(edit, hand, plain_hand)
+                apply_to_both(edit, interventions, plain_hand)
                 done[edit["kind"]] = done.get(edit["kind"], 0) + 1
             except AntsError as error:
                 refused += 1
-                assert (hand.state(), str(error)[-1]) == (before, "."), edit  # noqa: PT017
+                assert (interventions.state(), str(error)[-1]) == (before, "."), edit  # noqa: PT017
             assert_equal(colony, plain)
-            assert_sound(hand)
+            assert_sound(interventions)
             for _ in range(int(rng.integers(0, 3))):
                 colony.tick()
                 plain.tick()
@@ -106,21 +106,21 @@ def test_schedules_do_not_matter_to_edits(monkeypatch):
     for name in ("_FEWEST_TICKS", "_MOST_TICKS"):  # between two sorts
         monkeypatch.setattr(stepping, name, 2)
     world, training = worlds.open_world(5, (9, 8, 7)), TRAINING
-    hands = []
+    both = []
     for schedule in ("by_world", "by_chunk"):
         options = {"ants": 40, "capacity": 40, "schedule": schedule}
         colony = Colony(world, foraging(), training, 3, **options)
         colony.begin_episode()
-        hands.append(Hand(colony))
+        both.append(Interventions(colony))
     rng, full = np.random.default_rng(1), 0
     for _ in range(60):
-        edit = random_edit(rng, hands[0])
-        for hand in hands:
+        edit = random_edit(rng, both[0])
+        for interventions in both:
             with contextlib.suppress(AntsError):
-                edits.apply(edits.checked(edit, hand), hand, None)
-            hand.colony.tick(3)
-            assert_sound(hand)
-        one, other = (hand.colony for hand in hands)
+                edits.apply(edits.checked(edit, interventions), interventions, None)
+            interventions.colony.tick(3)
+            assert_sound(interventions)
+        one, other = (interventions.colony for interventions in both)
         full += int(one.living.all())
         assert np.array_equal(one.q_values, other.q_values)
         for name in ("ground", "trail", "first_streams", "worlds"):
@@ -141,21 +141,24 @@ def test_a_wall_across_a_road_of_ants_has_no_hole(what):
     colony = Colony(worlds.paper(), foraging(), TRAINING, 2, ants=40)
     colony.begin_episode()
     colony.tick(200)
-    hand, before = Hand(colony), {name: colony.arrays[name].copy() for name in colony.columns()}
+    interventions, before = (
+        Interventions(colony),
+        {name: colony.arrays[name].copy() for name in colony.columns()},
+    )
     cells = np.sort(before["cell"])[::2]
-    hand.put(cells, what)
+    interventions.put(cells, what)
     assert (colony.snapshot().ground[cells] == what).all()
     for name in before.keys() - {"cell", "state", "percept"}:
         assert np.array_equal(colony.arrays[name], before[name]), name
     moved = before["cell"] != colony.arrays["cell"]
     assert np.array_equal(moved, np.isin(before["cell"], cells))
-    assert_sound(hand)
+    assert_sound(interventions)
 
 
 def test_an_ant_without_room_stays_where_it_is():
     colony = Colony(worlds.from_text("Q   0   F\n"), foraging(), TRAINING, ants=1)
     colony.begin_episode()
-    hand, (cell,) = Hand(colony), colony.snapshot().ant_cells
-    hand.put(np.array([cell]), OBSTACLE)
+    interventions, (cell,) = Interventions(colony), colony.snapshot().ant_cells
+    interventions.put(np.array([cell]), OBSTACLE)
     assert colony.snapshot().ground[cell] == EMPTY
     assert colony.snapshot().ant_cells.tolist() == [cell]

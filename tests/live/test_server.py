@@ -54,7 +54,7 @@ def room(shared):
 
 def state_of(room) -> object:
     session = room.session
-    return session.hand.state(), session.ticks, list(session.edits)
+    return session.interventions.state(), session.ticks, list(session.edits)
 
 
 def get(

@@ -34,9 +34,9 @@ from taichi_ants.live.exports import gif_bytes, recording
 from taichi_ants.live.log import Log
 from taichi_ants.live.session import Session, Setup
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
-from taichi_ants.viewer import Recording, course
-from taichi_ants.viewer.course import POINT
+from taichi_ants.viewer import Recording, progress
 from taichi_ants.viewer.frames import CLOCK, unpack
+from taichi_ants.viewer.progress import POINT
 
 LEARNS = TrainingConfig("sarsa", 0.2, 0.9, 0.3, 0.9, learning_rate_decay=0.8)
 LIVELY = Task(
@@ -56,7 +56,7 @@ SETUPS = {
         *(12, 30, 5, 40),
         world_settings=SMALL,
     ),
-    "paper": Setup("paper", Task(), LEARNS, 5, ticks_per_episode=30, sharing="own"),
+    "paper": Setup("paper", Task(), LEARNS, 5, ticks_per_episode=30, sharing="independent"),
 }
 
 
@@ -65,7 +65,7 @@ def with_edits(setup: Setup, n: int, seed: int = 0) -> Session:
     session, rng = Session(setup), np.random.default_rng(seed)
     while len(session.edits) < n:
         try:
-            session.apply(random_edit(rng, session.hand))
+            session.apply(random_edit(rng, session.interventions))
         except AntsError:
             continue
         for _ in range(int(rng.integers(0, 3))):
@@ -93,10 +93,10 @@ def test_two_hundred_edits_are_replayed_to_the_bit(edited, name, tmp_path):
     }
     session.save(tmp_path / "session.npz")
     again = Session.load(tmp_path / "session.npz")
-    assert again.hand.state() == session.hand.state()
+    assert again.interventions.state() == session.interventions.state()
     assert (again.ticks, again.steps, again.edits) == (session.ticks, session.steps, session.edits)
     assert again.to_bytes() == session.to_bytes()
-    assert replayed(again.to_bytes()).hand.state() == session.hand.state()
+    assert replayed(again.to_bytes()).interventions.state() == session.interventions.state()
 
 
 @pytest.mark.parametrize("name", SETUPS)
@@ -105,17 +105,22 @@ def test_changes_are_undone_one_by_one(name):
     session, rng, before = Session(SETUPS[name]), np.random.default_rng(7), []
     for _ in range(6):
         session.advance(int(rng.integers(1, 9)))
-        stands = session.hand.state(), session.ticks, session.steps, list(session.edits)
+        stands = session.interventions.state(), session.ticks, session.steps, list(session.edits)
         for part in range(int(rng.integers(1, 4))):
             with contextlib.suppress(AntsError):
-                session.apply(random_edit(rng, session.hand), goes_on=part > 0)
+                session.apply(random_edit(rng, session.interventions), goes_on=part > 0)
         if len(session.edits) > len(stands[-1]):
             before.append(stands)
     session.advance(20)
     assert len(before) > 3
     for stands in reversed(before):
         *_, session = session.undone()
-        assert (session.hand.state(), session.ticks, session.steps, session.edits) == stands
+        assert (
+            session.interventions.state(),
+            session.ticks,
+            session.steps,
+            session.edits,
+        ) == stands
     with pytest.raises(AntsError, match="there is nothing to undo"):
         session.undone()
 
@@ -125,7 +130,7 @@ def test_a_snapshot_gives_the_same_bits_as_a_replay_from_the_start(name, monkeyp
     """Undoing takes no tick, however long the session was, and leaves the session as it is."""
     monkeypatch.setattr(session_module, "_BETWEEN", 0.0)
     session = with_edits(SETUPS[name], 25, seed=3)
-    stands = session.hand.state()
+    stands = session.interventions.state()
     with monkeypatch.context() as still:
         still.setattr(Colony, "tick", lambda *_: pytest.fail("a tick was replayed"))
         *_, undone = session.undone()
@@ -139,10 +144,10 @@ def test_a_snapshot_gives_the_same_bits_as_a_replay_from_the_start(name, monkeyp
     assert undone.ticks == again.ticks
     for one in (undone, again):
         one.advance(10)
-        (seen,) = played(Recording(one.header(), [one.moment()]))
+        (seen,) = played(Recording(one.header(), [one.snapshot()]))
         assert np.array_equal(seen.trail, one.colony.snapshot().trail)
     assert undone.same(again)
-    assert session.hand.state() == stands
+    assert session.interventions.state() == stands
 
 
 def test_snapshots_are_bounded_by_time_and_memory(monkeypatch):
@@ -185,7 +190,7 @@ def test_threads_and_processes_do_not_matter(edited, tmp_path, kernels):
     script = (
         "import sys; from taichi_ants import runtime; from taichi_ants.live.session import Session;"
         "runtime.start(int(sys.argv[1]));"
-        "print(*(Session.load(path).hand.state() for path in sys.argv[2:]))"
+        "print(*(Session.load(path).interventions.state() for path in sys.argv[2:]))"
     )
     names = ("foraging", "lively")
     paths = [str(tmp_path / f"{name}.npz") for name in names]
@@ -200,7 +205,7 @@ def test_threads_and_processes_do_not_matter(edited, tmp_path, kernels):
             text=True,
         )
         assert done.returncode == 0, done.stderr
-        assert done.stdout.split() == [edited[name].hand.state() for name in names]
+        assert done.stdout.split() == [edited[name].interventions.state() for name in names]
 
 
 def test_pieces_of_time_do_not_matter():
@@ -211,23 +216,23 @@ def test_pieces_of_time_do_not_matter():
         other.advance()
     assert one.ticks == other.ticks == 3 * 25
     assert one.colony.episode == 2
-    assert one.hand.state() == other.hand.state()
+    assert one.interventions.state() == other.interventions.state()
 
 
 @pytest.mark.parametrize("name", SETUPS)
 def test_a_page_that_joins_late_sees_what_the_others_see(name):
     session, rng = Session(SETUPS[name]), np.random.default_rng(4)
-    first, late, header = [session.moment()], [], session.header()
+    first, late, header = [session.snapshot()], [], session.header()
     for step in range(90):
         if step == 45:
-            late = [session.moment()]
+            late = [session.snapshot()]
             header["names"] |= session.news()
         frame = session.advance()
         if step % 3 == 0:
             first.append(frame)
             late += [frame] if late else []
             try:
-                frame = session.apply(random_edit(rng, session.hand))
+                frame = session.apply(random_edit(rng, session.interventions))
             except AntsError:
                 continue
         first.append(frame)
@@ -265,7 +270,7 @@ def test_states_have_names_before_they_are_seen_on_pages():
 
 def test_a_recording_holds_what_happened(edited):
     session = edited["foraging"]
-    before = session.hand.state()
+    before = session.interventions.state()
     whole = recording(session.log(), most_frames=10_000)
     few = recording(session.log(), most_frames=50)
     for one in (whole, few):
@@ -278,7 +283,7 @@ def test_a_recording_holds_what_happened(edited):
     assert 20 < len(few) <= 52
     acting = [moment for moment in played(whole) if len(moment.actions)]
     assert len(acting) > 0.9 * session.ticks
-    assert session.hand.state() == before
+    assert session.interventions.state() == before
 
 
 def test_exports_are_files_of_the_project(edited, tmp_path):
@@ -368,10 +373,10 @@ WRONG = [
 
 
 def refused(session: Session, edit: object) -> str:
-    before, edits = session.hand.state(), list(session.edits)
+    before, edits = session.interventions.state(), list(session.edits)
     with pytest.raises(AntsError) as caught:
         session.apply(edit)
-    assert session.hand.state() == before
+    assert session.interventions.state() == before
     assert session.edits == edits
     text = str(caught.value)
     assert text.endswith(".")
@@ -402,7 +407,7 @@ def test_what_was_interrupted_is_counted(monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         session.advance(7)
     assert (session.ticks, session.colony.ticks) == (7, 7)
-    assert replayed(session.to_bytes()).hand.state() == session.hand.state()
+    assert replayed(session.to_bytes()).interventions.state() == session.interventions.state()
 
 
 def test_edits_without_room_change_nothing():
@@ -495,11 +500,14 @@ def test_no_session_at_all(content):
         ({"ants": 10**9}, "ants is"),
         ({"ants": 9, "capacity": 8}, "capacity is 8"),
         ({"ants": 9999}, "9999 ants"),
-        ({"capacity": 100_000, "sharing": "own", "task": {"observation": "six_cells"}}, "memory"),
+        (
+            {"capacity": 100_000, "sharing": "independent", "task": {"observation": "six_cells"}},
+            "memory",
+        ),
         ({"seed": 2**70}, "a seed"),
         ({"seed": 1.5}, "a seed"),
         ({"ticks_per_episode": -1}, "ticks_per_episode is -1"),
-        ({"sharing": "fixed"}, "sharing is 'fixed'"),
+        ({"sharing": "frozen"}, "sharing is 'frozen'"),
         ({"colour": "red"}, "no 'colour'"),
         ({"epsilon": math.nan}, "epsilon is nan"),
     ],
@@ -518,7 +526,7 @@ def test_setups_are_json(name):
     facts = json.loads(json.dumps(setup.to_json()))
     again = Setup.from_json(facts, None if setup.learns else setup.policy)
     assert again.to_json() == setup.to_json()
-    assert Session(again).hand.state() == Session(setup).hand.state()
+    assert Session(again).interventions.state() == Session(setup).interventions.state()
 
 
 @pytest.mark.parametrize("table", [np.zeros((3, 5)), np.zeros((2, 128, 5)), "paper", None, [[1j]]])
@@ -561,7 +569,7 @@ def test_a_recording_counts_what_was_delivered_between_its_frames(edited):
     types = few.header["types"]
     told = [
         unpack(types, frame)["clock"][CLOCK.index("delivered")]
-        for frame in (few.frames[-1], session.moment())
+        for frame in (few.frames[-1], session.snapshot())
     ]
     assert told == [counted, counted]
     assert counted > 0
@@ -577,14 +585,14 @@ def test_a_leap_is_as_many_steps_through_episodes():
     while slow.steps < 57:  # two episodes of 25 ticks, and some
         slow.advance()
     told = clock(quick, quick.leap(57))
-    assert quick.hand.state() == slow.hand.state()
+    assert quick.interventions.state() == slow.interventions.state()
     assert (told["episode"], told["tick"]) == (2, 5)
     assert told["ticks"] == quick.ticks == slow.ticks == 55
-    assert clock(quick, quick.moment())["ticks"] == 55
+    assert clock(quick, quick.snapshot())["ticks"] == 55
 
 
-def test_a_late_page_is_told_of_the_whole_course():
-    """Also of a session that was loaded, and of episodes that a hand has ended."""
+def test_a_late_page_is_told_of_the_whole_progress():
+    """Also of a session that was loaded, and of episodes that an intervention ended."""
     session, ends = Session(SETUPS["foraging"]), []
     for steps in (26, 26, 10):
         session.leap(steps - 1)
@@ -593,7 +601,7 @@ def test_a_late_page_is_told_of_the_whole_course():
         session.apply({"kind": "episode"})
     *_, again = Session.replay(session.log())
     for one in (session, again):
-        points = unpack(one.header()["types"], one.moment())["course"].reshape(-1, len(POINT))
+        points = unpack(one.header()["types"], one.snapshot())["progress"].reshape(-1, len(POINT))
         ended = points[:, POINT.index("ended")] == 1
         named = [POINT.index(name) for name in ("episode", "ticks", "returns")]
         assert points[ended][:, named].tolist() == ends
@@ -601,11 +609,11 @@ def test_a_late_page_is_told_of_the_whole_course():
         assert (points[~ended][:, POINT.index("episode")] == 0).all()
 
 
-def test_a_long_course_is_thinned(monkeypatch):
-    monkeypatch.setattr(course, "_MOST", 8)
+def test_a_long_progress_is_thinned(monkeypatch):
+    monkeypatch.setattr(progress, "_MOST", 8)
     session = Session(SETUPS["foraging"])
     for _ in range(60):
         session.apply({"kind": "episode"})
-    ends = [point for point in session._recorder.course.points() if point[-1]]
+    ends = [point for point in session._recorder.progress.points() if point[-1]]
     assert 4 <= len(ends) <= 8
     assert len({b[0] - a[0] for a, b in pairwise(ends)}) == 1

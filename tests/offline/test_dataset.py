@@ -14,14 +14,14 @@ from taichi_ants.offline.dataset import COLUMNS
 
 @pytest.fixture(scope="module")
 def data() -> Dataset:
-    return record(worlds.paper(), None, 4, (5, 6, 7), 20, Task(delivery="continuing"))
+    return record(worlds.paper(), None, 4, (5, 6, 7), 20, Task(delivery="truncates"))
 
 
 def test_files_hold_everything(data, tmp_path):
     data.save(tmp_path / "ants.npz")
     loaded = Dataset.load(tmp_path / "ants.npz")
     assert loaded == data
-    assert loaded.task == Task(delivery="continuing")
+    assert loaded.task == Task(delivery="truncates")
     assert loaded.behaviour == {"policy": "random", "epsilon": 0.0}
 
 

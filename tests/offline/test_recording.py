@@ -45,7 +45,7 @@ def test_a_learner_while_it_learns(learner):
     for number in range(8):
         world, task = (
             random_world(number),
-            Task(delivery="continuing" if number % 2 else "absorbing"),
+            Task(delivery="truncates" if number % 2 else "terminates"),
         )
         data = record(world, config, 5, seeds, 30, task)
         for run, seed in enumerate(seeds):
@@ -97,8 +97,8 @@ def test_many_steps_come_in_several_pieces(monkeypatch):
 
 
 COLONIES = [
-    ("sarsa", "shared", "absorbing", Life(births=True, lifespan=9, regrowth=0)),
-    ("q_learning", "shared", "continuing", Life(births=True, lifespan=9, regrowth=0)),
+    ("sarsa", "shared", "terminates", Life(births=True, lifespan=9, regrowth=0)),
+    ("q_learning", "shared", "truncates", Life(births=True, lifespan=9, regrowth=0)),
 ]
 
 
@@ -134,7 +134,7 @@ def test_ants_of_a_colony_that_appear_and_die(learner, sharing, delivery, life):
     assert data.behaviour_probability.tolist() == [c for *_, span in spans for _, c in span]
     assert np.diff(data.begins).tolist() == [len(span) for *_, span in spans]
     assert data.step[data.begins[:-1]].max() > 0  # some appear while others live
-    assert data.terminated.any() == (delivery == "absorbing")
+    assert data.terminated.any() == (delivery == "terminates")
     assert len(lives) > 20
 
 
@@ -156,7 +156,7 @@ def test_a_colony_that_sorts_its_ants_is_recorded_alike(monkeypatch):
 
 def test_a_colony_of_one_with_a_table_of_its_own_is_a_run():
     config, world = TrainingConfig("sarsa", 0.5, 0.9, 0.4, 0.7), random_world(3)
-    colony = Colony(world, None, config, (1, 2), sharing="own", ends_at_delivery=True)
+    colony = Colony(world, None, config, (1, 2), sharing="independent", ends_at_delivery=True)
     both = record_colony(colony, 6, 60), record(world, config, 6, (1, 2), 60)
     for name in COLUMNS:
         assert np.array_equal(*(getattr(one, name) for one in both)), name

@@ -185,7 +185,7 @@ def test_give_fails(contents):
 
 
 def test_every_event_pays_what_the_task_says():
-    pays = {"rewards": Rewards(empty=-5, failed=-7, lure=20, pick_up=30, give=40)}
+    pays = {"rewards": Rewards(empty=-5, failed=-7, shaping=20, pick_up=30, deliver=40)}
     assert Scene(**pays).act(FORWARD) == (-5, Event.ENTERED_EMPTY)
     assert Scene(trails=[(M, 9)], **pays).act(FORWARD) == (20, Event.ENTERED_LURE)
     assert Scene(obstacles=[M], **pays).act(FORWARD) == (-7, Event.BLOCKED)

@@ -19,7 +19,7 @@ TWO_STEPS = World((3, 3, 3), (0, 0, 1), foods=[(1, 1, 0)], ants=[((0, 0, 0), 1)]
 SHARING = [name for name in LEARNERS if LEARNERS[name].shares]
 
 
-@pytest.mark.parametrize("delivery", ["absorbing", "continuing"])
+@pytest.mark.parametrize("delivery", ["terminates", "truncates"])
 @pytest.mark.parametrize("learner", SHARING)
 def test_one_ant_learns_into_a_shared_table_what_it_learns_into_its_own(learner, delivery):
     learning = TrainingConfig(learner, 0.37, 0.9, 0.6, 0.9, 0.05)
@@ -80,10 +80,10 @@ def test_the_last_tick_of_a_run_truncates_for_all():
 @pytest.mark.parametrize(
     ("delivery", "ends_at_delivery", "terminated", "truncated"),
     [
-        ("absorbing", True, True, False),
-        ("continuing", True, False, True),
-        ("absorbing", False, True, False),  # of the colony's ant; its episode goes on
-        ("continuing", False, False, False),
+        ("terminates", True, True, False),
+        ("truncates", True, False, True),
+        ("terminates", False, True, False),  # of the colony's ant; its episode goes on
+        ("truncates", False, False, False),
     ],
 )
 def test_what_a_delivery_ends(delivery, ends_at_delivery, terminated, truncated):
@@ -97,7 +97,7 @@ def test_what_a_delivery_ends(delivery, ends_at_delivery, terminated, truncated)
     assert colony.over == ends_at_delivery
 
 
-@pytest.mark.parametrize(("sharing", "level"), [("own", 10), ("shared", 10), ("fixed", 9)])
+@pytest.mark.parametrize(("sharing", "level"), [("independent", 10), ("shared", 10), ("frozen", 9)])
 def test_by_default_trails_fall_only_where_nobody_learns(sharing, level):
     world = World((5, 5, 5), (0, 0, 4), trails=[((1, 0, 0), 10)], ants=[((0, 0, 0), 0)])
     colony = ReferenceColony(world, None, training(), 0, sharing=sharing)
@@ -116,7 +116,7 @@ def test_what_a_learner_remembers_of_an_episode_ends_with_it(learner):
     # Two steps of the first episode wait, or leave traces. The first step of the second one, from
     # an untouched state, moves its own value alone, or none yet.
     world = World((5, 5, 5), (0, 0, 4), obstacles=[(1, 0, 0)], ants=[((0, 0, 0), 0)])
-    colony = begun(world, training(learner), sharing="own")
+    colony = begun(world, training(learner), sharing="independent")
     act(colony, GIVE)
     act(colony, FORWARD)
     before = colony.q_values[0]

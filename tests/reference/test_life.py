@@ -104,7 +104,7 @@ def test_the_food_waits_while_no_neighbour_is_free():
     assert colony.queen_stream.state == stream_state(0, STREAM_QUEEN, 0)  # no draw in vain
     # The ant at heading 2 turns round and goes: its cell is free in this very tick, for one.
     colony.ants[2].heading = 2
-    colony.look(colony.ants[2])
+    colony.observe(colony.ants[2])
     act(colony, GIVE, GIVE, FORWARD, GIVE, GIVE, GIVE)
     assert (len(colony.ants), colony.store, colony.record.births) == (7, 5, 1)
     assert (colony.ants[6].cell, colony.ants[6].heading) == (neighbour(QUEEN, 2), 2)

@@ -1,4 +1,4 @@
-"""The row of its table that an ant looks at, in drawn worlds whose rows are worked out by hand.
+"""The state index of each ant, in drawn worlds whose rows are worked out by hand.
 
 In the drawings 0 to 5 are ants with that heading, F is food, Q the queen, # a rock, t a trail. With
 heading 0 an ant looks up; around it lie, from behind left (heading -2) on: down left, up left, up,
@@ -32,7 +32,7 @@ trail = 8
 PERCEPT = 16 * 2 + 4 * 3
 
 
-def row_of(drawing, observation, slot=0, carries=False, **options):
+def state_of(drawing, observation, slot=0, carries=False, **options):
     """The row that an ant looks at."""
     colony = begun(drawing, observation=observation, **options)
     if carries:
@@ -45,7 +45,7 @@ def digits(base, *codes):
 
 
 def test_the_papers_row_is_the_percept():
-    assert row_of(AROUND, "paper") == PERCEPT
+    assert state_of(AROUND, "paper") == PERCEPT
     for seed in range(30):
         colony = ReferenceColony(random_world(seed), None, training(epsilon=1.0), seed)
         for [step] in colony.run_episode(40):
@@ -64,7 +64,7 @@ def test_the_papers_row_is_the_percept():
     ],
 )
 def test_without_food(observation, row):
-    assert row_of(AROUND, observation) == row
+    assert state_of(AROUND, observation) == row
 
 
 @pytest.mark.parametrize(
@@ -81,7 +81,7 @@ def test_without_food(observation, row):
     ],
 )
 def test_with_food(observation, row):
-    assert row_of(AROUND, observation, carries=True) == row
+    assert state_of(AROUND, observation, carries=True) == row
 
 
 # The queen is two cells away: the cells behind left and behind are nearer to her.
@@ -103,13 +103,13 @@ HOMEWARDS = """
     ],
 )
 def test_with_food_the_cells_behind_lure_if_they_are_nearer_to_the_queen(observation, row):
-    assert row_of(HOMEWARDS, observation, carries=True) == row
+    assert state_of(HOMEWARDS, observation, carries=True) == row
 
 
 def test_with_food_a_nearer_cell_is_a_strong_trail_and_the_queen_a_goal():
     facing = HOMEWARDS.replace("0", "3")  # ahead down; to the right down left, to the left the rock
-    assert row_of(facing, "trail_levels", carries=True) == digits(6, 1, 1, 4, 4)
-    assert row_of(AROUND.replace("0", "3"), "trail_levels", carries=True) == digits(6, 1, 0, 5, 1)
+    assert state_of(facing, "trail_levels", carries=True) == digits(6, 1, 1, 4, 4)
+    assert state_of(AROUND.replace("0", "3"), "trail_levels", carries=True) == digits(6, 1, 0, 5, 1)
 
 
 A = (0, 0, 0)
@@ -120,7 +120,7 @@ def with_trails(observation, levels, pheromone=None):
     """The row of an ant with heading 1 for these levels at headings -2, -1, ... relative to it."""
     trails = [(neighbour(A, 1 - 2 + turn), level) for turn, level in enumerate(levels)]
     world = World((5, 5, 5), FAR, trails=trails, ants=[(A, 1)])
-    return row_of(world, observation, pheromone=pheromone or Pheromone())
+    return state_of(world, observation, pheromone=pheromone or Pheromone())
 
 
 @pytest.mark.parametrize(
@@ -161,7 +161,7 @@ def test_a_trail_on_food_is_food_and_counts_for_nothing():
     foods = [neighbour(A, 0)]
     trails = [(foods[0], 900), (neighbour(A, 1), 9), (neighbour(A, 2), 3)]
     world = World((5, 5, 5), FAR, foods=foods, trails=trails, ants=[(A, 1)])
-    assert row_of(world, "trail_levels") == digits(6, 0, 5, 4, 3)
+    assert state_of(world, "trail_levels") == digits(6, 0, 5, 4, 3)
 
 
 # Ant 0 looks up at another one; beside that a rock and the end of the world.
@@ -202,7 +202,7 @@ def test_ants_look_like_what_they_carry_and_where_they_stand(loads, of_upper, of
         colony = begun(CROWD, observation=name)
         load(colony, *(slot for slot in range(2) if loads[slot]))
         for slot in range(2):
-            colony.look(colony.ants[slot])
+            colony.observe(colony.ants[slot])
         seen = [1 if code == AHEAD and name == "ants" else code for code in (of_upper, of_lower)]
         upper, lower = (colony.ants[slot].state for slot in range(2))
         assert upper // base % base == seen[0]
@@ -217,7 +217,7 @@ def test_without_food_a_better_cell_has_a_stronger_trail_than_the_ants_own(level
     colony = begun(world, observation="queues")
     assert colony.ants[0].state == digits(7, 0, 0, AHEAD if code == P else 1, 0)
     load(colony, 1)
-    colony.look(colony.ants[0])
+    colony.observe(colony.ants[0])
     assert colony.ants[0].state == digits(7, 0, 0, code, 0)
     assert colony.ants[0].percept == 4  # what it can do goes by the paper's state
 
@@ -236,18 +236,18 @@ def test_ants_choose_and_learn_by_the_row_and_act_by_the_percept(name):
     # it looks at; the move pays as the percept says, +1; and what it learns stands in that row.
     n_states = observations.get(name).n_states
     q_values = np.zeros((n_states, 5), np.float32)
-    q_values[row_of(AROUND, name), LEFT] = 4
+    q_values[state_of(AROUND, name), LEFT] = 4
     colony = begun(AROUND, training(discount=0.0), "shared", q_values=q_values, observation=name)
     colony.tick()
     [step] = colony.transitions
-    assert (step.state, step.action, step.reward) == (row_of(AROUND, name), LEFT, 1)
+    assert (step.state, step.action, step.reward) == (state_of(AROUND, name), LEFT, 1)
     assert step.next_state == colony.ants[0].state
     learnt = colony.q_values
     assert learnt.shape == (n_states, 5)
     assert learnt[step.state, LEFT] == 2.5  # 4 + 0.5 * (1 - 4)
 
 
-@pytest.mark.parametrize("sharing", ["shared", "own", "fixed"])
+@pytest.mark.parametrize("sharing", ["shared", "independent", "frozen"])
 @pytest.mark.parametrize("name", OBSERVATIONS)
 def test_tables_have_as_many_rows_as_the_observation(name, sharing):
     n_states = observations.get(name).n_states
@@ -264,7 +264,7 @@ def test_each_observation_has_a_twin():
     own = [
         name
         for name in observations.names()
-        if observations.get(name).row.__module__.startswith("taichi_ants.")
+        if observations.get(name).encode.__module__.startswith("taichi_ants.")
     ]
     assert list(OBSERVATIONS) == own
 
@@ -272,4 +272,4 @@ def test_each_observation_has_a_twin():
 def test_an_observation_without_a_twin_is_refused(monkeypatch):
     monkeypatch.delitem(OBSERVATIONS, "ants_seen")
     with pytest.raises(AntsError, match=r"observation is 'ants_seen'.*paper, five_cells"):
-        row_of(AROUND, "ants_seen")
+        state_of(AROUND, "ants_seen")

@@ -100,7 +100,11 @@ def test_of_those_that_want_a_free_cell_exactly_one_gets_it(seed):
 @settings(max_examples=20, deadline=None, derandomize=True)
 def test_homes_that_are_full_hold_food(seed):
     for _, colony, _ in colonies_of(seed):
-        full = [home.cell for home in colony.homes.homes if home.waiting_since is None]
+        full = [
+            source.cell
+            for source in colony.food_sources.food_sources
+            if source.waiting_since is None
+        ]
         assert len(set(full)) == len(full)
         assert set(full) <= foods_of(colony)
 

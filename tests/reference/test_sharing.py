@@ -18,7 +18,7 @@ from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.learners.config import update_weights
 from taichi_ants.reference import LEARNERS, ReferenceColony
 from taichi_ants.reference.random_stream import RandomStream, stream_state
-from taichi_ants.reference.sharing import OwnTables, SharedTable, mean_error
+from taichi_ants.reference.sharing import IndependentTables, SharedTable, mean_error
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP
 from taichi_ants.worlds import World
 
@@ -177,7 +177,7 @@ def test_two_ants_that_meet_update_one_pair():
 
 
 def test_with_own_tables_each_learns_its_own():
-    colony = begun(MEETING, sharing="own", capacity=3)
+    colony = begun(MEETING, sharing="independent", capacity=3)
     act(colony, FORWARD, FORWARD)
     tables = colony.q_values
     assert tables.shape == (3, 128, 5)
@@ -188,7 +188,7 @@ def test_with_own_tables_each_learns_its_own():
 
 def test_a_fixed_table_stays_as_it_is():
     q_values = table(s0a1=1)
-    colony = begun(MEETING, sharing="fixed", q_values=q_values, seed=4)
+    colony = begun(MEETING, sharing="frozen", q_values=q_values, seed=4)
     for _ in range(3):
         colony.tick()
     np.testing.assert_array_equal(colony.q_values, q_values)
@@ -198,7 +198,7 @@ def test_a_fixed_table_stays_as_it_is():
 
 @pytest.mark.parametrize(("learner", "n"), [("sarsa", 3), ("dyna_q", 3), ("q_learning", 3)])
 def test_with_a_fixed_table_ants_draw_for_their_actions_alone(learner, n):
-    colony = begun(MEETING, training(learner), sharing="fixed", seed=4)
+    colony = begun(MEETING, training(learner), sharing="frozen", seed=4)
     for _ in range(n):
         colony.tick()
     for number, ant in colony.ants.items():
@@ -227,14 +227,14 @@ def test_sarsa_after_a_delivery():
     # executed, though the ant has just delivered.
     ready = World((5, 5, 5), (1, 0, 0), ants=[((0, 0, 0), 0)])
     start = stream_state(0, STREAM_ANT, 0)
-    for delivery, error, draws in (("absorbing", 10, 0), ("continuing", 12, 1)):
+    for delivery, error, draws in (("terminates", 10, 0), ("truncates", 12, 1)):
         q_values = table(s4a1=4)  # what the ant sees after it gave: E O E
         colony = begun(ready, training("sarsa"), "shared", q_values=q_values, delivery=delivery)
         load(colony, 0)
         act(colony, GIVE)
         [step] = colony.transitions
         assert step.next_state == 4
-        assert step.terminated == (delivery == "absorbing")
+        assert step.terminated == (delivery == "terminates")
         assert step.next_action == (None if step.terminated else FORWARD)
         assert errors_of(colony) == [error]
         assert n_draws(colony.ants[0].stream.state, start) == draws
@@ -301,7 +301,7 @@ def test_a_round_sees_the_table_as_it_stood_at_its_start():
 
 
 def test_own_tables_plan_each_from_its_own_model():
-    minds = OwnTables(maker("dyna_q", planning_steps=2), 3, None)
+    minds = IndependentTables(maker("dyna_q", planning_steps=2), 3, None)
     ants = streams(2)
     minds.learn(
         [
@@ -324,7 +324,9 @@ def test_an_ant_born_into_a_slot_begins_with_nothing():
     world = World((5, 5, 5), queen, ants=[((0, 0, 1), 1), ((3, 0, 0), 0)])
     learning = training("dyna_q", planning_steps=1)
     q_values = table(s127a0=9)
-    colony = begun(world, learning, "own", q_values=q_values, births=True, capacity=3, lifespan=50)
+    colony = begun(
+        world, learning, "independent", q_values=q_values, births=True, capacity=3, lifespan=50
+    )
     assert (colony.q_values[:, 127, 0] == 9).all()
     colony.ants[1].age = 49
     load(colony, 0)
@@ -373,7 +375,7 @@ def test_with_own_tables_an_ant_far_from_others_is_an_ant_alone():
     learning = training("sarsa", epsilon=0.5)
     runs = []
     for place, n in ((world, 2), (alone, 1)):
-        colony = ReferenceColony(place, None, learning, 8, ants=n, sharing="own")
+        colony = ReferenceColony(place, None, learning, 8, ants=n, sharing="independent")
         colony.run(2, 60)
         runs.append(colony)
     np.testing.assert_array_equal(runs[0].q_values[0], runs[1].q_values[0])
@@ -382,13 +384,18 @@ def test_with_own_tables_an_ant_far_from_others_is_an_ant_alone():
 
 def test_a_table_for_each_slot_may_be_given():
     each = np.arange(2 * 640, dtype=np.float32).reshape(2, 128, 5)
-    colony = ReferenceColony(MEETING, None, training(), 0, ants=2, sharing="own", q_values=each)
+    colony = ReferenceColony(
+        MEETING, None, training(), 0, ants=2, sharing="independent", q_values=each
+    )
     np.testing.assert_array_equal(colony.q_values, each)
 
 
 @pytest.mark.parametrize(
     ("sharing", "learner", "message"),
-    [("common", "q_learning", "'common'.*shared, own, fixed"), ("own", "sarsi", "'sarsi'")],
+    [
+        ("common", "q_learning", "'common'.*shared, independent, frozen"),
+        ("independent", "sarsi", "'sarsi'"),
+    ],
 )
 def test_unknown_names_are_refused(sharing, learner, message):
     with pytest.raises(AntsError, match=message):
@@ -397,9 +404,9 @@ def test_unknown_names_are_refused(sharing, learner, message):
 
 @pytest.mark.parametrize("learner", [name for name in LEARNERS if not LEARNERS[name].shares])
 def test_learners_with_a_memory_of_their_own_cannot_share_a_table(learner):
-    with pytest.raises(AntsError, match=f"'{learner}'.*own"):
+    with pytest.raises(AntsError, match=f"'{learner}'.*independent"):
         begun(MEETING, training(learner), "shared")
-    colony = begun(MEETING, training(learner), "own")
+    colony = begun(MEETING, training(learner), "independent")
     for _ in range(3):
         colony.tick()
     assert colony.q_values.shape == (2, 128, 5)

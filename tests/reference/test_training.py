@@ -42,7 +42,7 @@ def prepared(learning, task=None, rng_state=0):
     return run
 
 
-def train_once(learning, delivery="absorbing", max_steps=600, rng_state=0):
+def train_once(learning, delivery="terminates", max_steps=600, rng_state=0):
     task = Task(delivery=delivery)
     begun = prepared(learning, task, rng_state)
     return train(TWO_STEPS, learning, 0, 1, max_steps, task, start_from=begun)
@@ -74,17 +74,17 @@ def test_the_record_of_the_episode():
 
 # All learners see the same errors here: a' is the best action, and epsilon is 0.
 #   Step 0: 3 + 0.5 * 2 - 1 = 3.
-#   Step 1, absorbing: 10 - 2 = 8; continuing: 10 + 0.5 * 4 - 2 = 10.
-@pytest.mark.parametrize(("delivery", "last"), [("absorbing", 8.0), ("continuing", 10.0)])
+#   Step 1, terminates: 10 - 2 = 8; truncates: 10 + 0.5 * 4 - 2 = 10.
+@pytest.mark.parametrize(("delivery", "last"), [("terminates", 8.0), ("truncates", 10.0)])
 @pytest.mark.parametrize("learner", LEARNERS)
 def test_td_errors_by_delivery_setting(learner, delivery, last):
     run = train_once(training(learner), delivery)
     assert [step.td_error for step in run.trace] == [3.0, last]
-    assert [step.terminated for step in run.trace] == [False, delivery == "absorbing"]
+    assert [step.terminated for step in run.trace] == [False, delivery == "terminates"]
     assert run.deliveries == [1]
 
 
-@pytest.mark.parametrize(("delivery", "given"), [("absorbing", 6.0), ("continuing", 7.0)])
+@pytest.mark.parametrize(("delivery", "given"), [("terminates", 6.0), ("truncates", 7.0)])
 @pytest.mark.parametrize("learner", ["q_learning", "sarsa", "expected_sarsa"])
 def test_the_table_moves_by_the_learning_rate(learner, delivery, given):
     run = train_once(training(learner), delivery)
@@ -96,7 +96,7 @@ def test_the_table_moves_by_the_learning_rate(learner, delivery, given):
     assert run.model == {}
 
 
-@pytest.mark.parametrize("delivery", ["absorbing", "continuing"])
+@pytest.mark.parametrize("delivery", ["terminates", "truncates"])
 @pytest.mark.parametrize("learner", LEARNERS)
 def test_truncation_bootstraps(learner, delivery):
     run = train_once(training(learner), delivery, max_steps=1)
@@ -114,12 +114,12 @@ def test_a_delivery_in_the_last_step_is_no_truncation():
 @pytest.mark.parametrize(
     ("learner", "delivery", "max_steps", "expected"),
     [
-        ("q_learning", "absorbing", 600, 2),  # one for each choice
-        ("expected_sarsa", "continuing", 600, 2),
-        ("sarsa", "absorbing", 600, 2),  # the second is a' of the first step, none at the end
-        ("sarsa", "continuing", 600, 3),  # a' at the delivery, for the target
-        ("sarsa", "absorbing", 1, 2),  # a' at truncation, for the target
-        ("dyna_q", "absorbing", 600, 8),  # 2 choices and 2 * 3 planning steps
+        ("q_learning", "terminates", 600, 2),  # one for each choice
+        ("expected_sarsa", "truncates", 600, 2),
+        ("sarsa", "terminates", 600, 2),  # the second is a' of the first step, none at the end
+        ("sarsa", "truncates", 600, 3),  # a' at the delivery, for the target
+        ("sarsa", "terminates", 1, 2),  # a' at truncation, for the target
+        ("dyna_q", "terminates", 600, 8),  # 2 choices and 2 * 3 planning steps
     ],
 )
 def test_how_many_draws_are_made(learner, delivery, max_steps, expected):
@@ -158,7 +158,7 @@ def test_planning_draws_one_of_the_visited_pairs(rng_state, pick_up, give):
 
 def test_the_model_holds_the_last_outcome_in_the_order_of_first_visit():
     learning = training("dyna_q", epsilon=1.0)
-    run = train(TWO_STEPS, learning, 3, 8, 40, Task(delivery="continuing"))
+    run = train(TWO_STEPS, learning, 3, 8, 40, Task(delivery="truncates"))
     outcomes, changed = {}, 0
     for step in run.trace:
         pair, outcome = (step.state, step.action), (step.reward, step.next_state, False)
@@ -168,7 +168,7 @@ def test_the_model_holds_the_last_outcome_in_the_order_of_first_visit():
     assert changed > 0  # the test would not see the difference otherwise
 
 
-@pytest.mark.parametrize("delivery", ["absorbing", "continuing"])
+@pytest.mark.parametrize("delivery", ["terminates", "truncates"])
 def test_sarsa_executes_the_action_it_learned_from(delivery):
     learning, task = training("sarsa", epsilon=0.7), Task(delivery=delivery)
     run, tables = train_with_tables(TWO_STEPS, learning, 1, 6, 30, task)
@@ -205,7 +205,7 @@ def test_the_floor_never_raises_epsilon():
 @pytest.mark.parametrize("learner", LEARNERS)
 def test_going_on_gives_what_training_in_one_go_gives(learner):
     learning = training(learner, epsilon=0.6, epsilon_decay=0.9)
-    task = Task(delivery="continuing")
+    task = Task(delivery="truncates")
     whole = train(TWO_STEPS, learning, 9, 12, 40, task)
     half = train(TWO_STEPS, learning, 9, 5, 40, task)
     table_before, model_before = half.q_values.copy(), dict(half.model)

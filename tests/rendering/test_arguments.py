@@ -24,7 +24,7 @@ def episode() -> Episode:
 
 
 def colony() -> Colony:
-    made = Colony(WORLD, None, CONFIG, 0, 3, sharing="fixed", q_values=TABLE)
+    made = Colony(WORLD, None, CONFIG, 0, 3, sharing="frozen", q_values=TABLE)
     made.begin_episode()
     return made
 
@@ -46,12 +46,12 @@ CALLS: dict[str, list[tuple[str, Callable[[object], object]]]] = {
         ("grid", of(Scene)),
         ("size", lambda wrong: Scene(WORLD.grid, wrong)),
         ("title", lambda wrong: Scene(WORLD.grid, title=wrong)),
-        ("plain", lambda wrong: Scene(WORLD.grid, plain=wrong)),
+        ("overlay", lambda wrong: Scene(WORLD.grid, overlay=wrong)),
         ("snapshot", lambda wrong: Scene(WORLD.grid).draw(wrong)),
         ("status", lambda wrong: Scene(WORLD.grid).draw(at_start(WORLD), wrong)),
     ],
     "Snapshot": [("snapshot", of(Scene(WORLD.grid).draw))],
-    "Stage": [("a stage", lambda wrong: next(rendering.learning_frames([wrong])))],
+    "Checkpoint": [("a checkpoint", lambda wrong: next(rendering.learning_frames([wrong])))],
     "Status": [("status", lambda wrong: Scene(WORLD.grid).draw(at_start(WORLD), wrong))],
     "at_start": [("world", of(at_start))],
     "check_animation": [
@@ -59,21 +59,24 @@ CALLS: dict[str, list[tuple[str, Callable[[object], object]]]] = {
         ("fps", lambda wrong: rendering.check_animation("a.gif", wrong)),
     ],
     "check_picture": [("path", of(rendering.check_picture))],
-    "colony_moments": [
-        ("colony", of(rendering.colony_moments, 3)),
-        ("ticks", lambda wrong: next(rendering.colony_moments(colony(), wrong))),
-        ("every", lambda wrong: next(rendering.colony_moments(colony(), 3, every=wrong))),
+    "colony_snapshots": [
+        ("colony", of(rendering.colony_snapshots, 3)),
+        ("ticks", lambda wrong: next(rendering.colony_snapshots(colony(), wrong))),
+        (
+            "frame_interval",
+            lambda wrong: next(rendering.colony_snapshots(colony(), 3, frame_interval=wrong)),
+        ),
     ],
     "frames": [
         ("snapshot", lambda wrong: next(rendering.frames([(wrong, Status(()))]))),
         ("status", lambda wrong: next(rendering.frames([(at_start(WORLD), wrong)]))),
-        ("size", lambda wrong: next(rendering.frames(episode().moments(), wrong))),
+        ("size", lambda wrong: next(rendering.frames(episode().snapshots(), wrong))),
     ],
     "learning_frames": [
-        ("stages", of(rendering.learning_frames)),
-        ("title", lambda wrong: next(rendering.learning_frames([stage()], title=wrong))),
+        ("checkpoints", of(rendering.learning_frames)),
+        ("title", lambda wrong: next(rendering.learning_frames([checkpoint()], title=wrong))),
     ],
-    "learning_stages": [("stages", lambda wrong: learning_stages(wrong))],
+    "learning_checkpoints": [("checkpoints", lambda wrong: learning_checkpoints(wrong))],
     "policy_sheet": [
         ("q_values", of(rendering.policy_sheet)),
         ("title", lambda wrong: rendering.policy_sheet(TABLE, wrong)),
@@ -89,18 +92,18 @@ CALLS: dict[str, list[tuple[str, Callable[[object], object]]]] = {
         ("a frame", lambda wrong: rendering.save_picture("a.png", wrong)),
     ],
     "typical_seed": [
-        ("stages", lambda wrong: rendering.typical_seed(WORLD, CONFIG, stages=wrong)),
+        ("checkpoints", lambda wrong: rendering.typical_seed(WORLD, CONFIG, checkpoints=wrong)),
         ("a seed", lambda wrong: rendering.typical_seed(WORLD, CONFIG, seeds=wrong)),
     ],
 }
 
 
-def stage() -> rendering.Stage:
-    return rendering.Stage(0, episode())
+def checkpoint() -> rendering.Checkpoint:
+    return rendering.Checkpoint(0, episode())
 
 
-def learning_stages(wrong: object) -> object:
-    return rendering.learning_stages(WORLD, CONFIG, stages=wrong)
+def learning_checkpoints(wrong: object) -> object:
+    return rendering.learning_checkpoints(WORLD, CONFIG, checkpoints=wrong)
 
 
 def test_all_that_is_public_is_tried() -> None:

@@ -24,7 +24,7 @@ SIZE = (330, 324)
 @pytest.fixture(scope="module")
 def frames() -> list[np.ndarray]:
     episode = Episode.play(paper(), trail_follower(), max_steps=24)
-    return list(rendering.frames(episode.moments(), SIZE, title="a title"))
+    return list(rendering.frames(episode.snapshots(), SIZE, title="a title"))
 
 
 def decoded(path: Path) -> tuple[list[np.ndarray], list[float]]:

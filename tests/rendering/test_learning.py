@@ -12,20 +12,20 @@ from PIL import Image
 from taichi_ants import AntsError, Colony, TrainingConfig, train
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.rendering import (
+    Checkpoint,
     Episode,
-    Stage,
-    colony_moments,
+    colony_snapshots,
     frames,
+    learning_checkpoints,
     learning_frames,
-    learning_stages,
     policy_sheet,
     save_animation,
     text,
     typical_seed,
 )
 from taichi_ants.rendering.colours import CELL_FOOD, CHOSEN
-from taichi_ants.rendering.observed import PAPER
 from taichi_ants.rendering.sheet import clarity, learned, usual_spread
+from taichi_ants.rendering.state_names import PAPER
 from taichi_ants.task import Life, Observation, Rewards, Task, observations
 from taichi_ants.task.constants import ACTION_NAMES, PICK_UP, RIGHT
 from taichi_ants.task.states import REACHABLE_STATES
@@ -39,41 +39,49 @@ def coloured(picture: np.ndarray, colour: int) -> np.ndarray:
 
 
 def test_stages_are_those_of_one_training() -> None:
-    stages = learning_stages(paper(), CONFIG, seed=2, stages=(0, 3, 20), max_steps=60)
-    assert [stage.episodes for stage in stages] == [0, 3, 20]
-    assert [stage.title for stage in stages] == [
+    checkpoints = learning_checkpoints(
+        paper(), CONFIG, seed=2, checkpoints=(0, 3, 20), max_steps=60
+    )
+    assert [checkpoint.episodes for checkpoint in checkpoints] == [0, 3, 20]
+    assert [checkpoint.title for checkpoint in checkpoints] == [
         "before learning",
         "after 3 episodes",
         "after 20 episodes",
     ]
-    for stage in stages:
+    for checkpoint in checkpoints:
         table = np.zeros((128, 5), dtype=np.float32)
-        if stage.episodes:
-            table = train(paper(), CONFIG, 2, stage.episodes).q_values[0, 0]
-        trace = stage.episode.trace
+        if checkpoint.episodes:
+            table = train(paper(), CONFIG, 2, checkpoint.episodes).q_values[0, 0]
+        trace = checkpoint.episode.trace
         assert (trace.q_values == table[trace.states]).all()
         assert len(trace) <= 60
 
 
 def test_the_account_says_where_the_return_comes_from() -> None:
     """The shortest delivery earns 16 on the trail, 16 on the way back, 3 for the food and 10."""
-    follower = Stage(500, Episode.play(paper(), trail_follower()))
+    follower = Checkpoint(500, Episode.play(paper(), trail_follower()))
     account = follower.account()
     assert account[-1].tolist() == [16, 16, 3, 10, 0]
     assert account[0].tolist() == [0] * 5
-    for seed, stages in ((2, (0, 10)), (7, (10, 30))):
-        for stage in learning_stages(paper(), CONFIG, seed=seed, stages=stages, max_steps=80):
-            returns = np.concatenate([[0], stage.episode.trace.rewards.cumsum()])
-            assert (stage.account().sum(axis=1) == returns).all()
-            assert (stage.account()[:, :4] >= 0).all()
-            assert (stage.account()[:, 4] <= 0).all()
+    for seed, checkpoints in ((2, (0, 10)), (7, (10, 30))):
+        for checkpoint in learning_checkpoints(
+            paper(), CONFIG, seed=seed, checkpoints=checkpoints, max_steps=80
+        ):
+            returns = np.concatenate([[0], checkpoint.episode.trace.rewards.cumsum()])
+            assert (checkpoint.account().sum(axis=1) == returns).all()
+            assert (checkpoint.account()[:, :4] >= 0).all()
+            assert (checkpoint.account()[:, 4] <= 0).all()
 
 
 def test_the_typical_seed_is_the_one_nearest_to_the_middle_rank_at_every_stage() -> None:
-    seeds, stages, steps = (3, 14, 15, 92, 65, 35, 89, 79), (0, 1, 3), 80
-    chosen, deliver = typical_seed(paper(), CONFIG, seeds=seeds, stages=stages, max_steps=steps)
+    seeds, checkpoints, steps = (3, 14, 15, 92, 65, 35, 89, 79), (0, 1, 3), 80
+    chosen, deliver = typical_seed(
+        paper(), CONFIG, seeds=seeds, checkpoints=checkpoints, max_steps=steps
+    )
     played = {
-        seed: learning_stages(paper(), CONFIG, seed=seed, stages=stages, max_steps=steps)
+        seed: learning_checkpoints(
+            paper(), CONFIG, seed=seed, checkpoints=checkpoints, max_steps=steps
+        )
         for seed in seeds
     }
     for n, told in enumerate(deliver):
@@ -81,7 +89,7 @@ def test_the_typical_seed_is_the_one_nearest_to_the_middle_rank_at_every_stage()
     assert deliver[0] < deliver[-1]
 
     def values(seed: int) -> list[int]:
-        traces = [stage.episode.trace for stage in played[seed]]
+        traces = [checkpoint.episode.trace for checkpoint in played[seed]]
         return [one for trace in traces for one in (int(trace.rewards.sum()), len(trace))]
 
     def farthest(seed: int) -> int:
@@ -94,27 +102,29 @@ def test_the_typical_seed_is_the_one_nearest_to_the_middle_rank_at_every_stage()
     assert chosen == min(seeds, key=farthest)
 
 
-@pytest.mark.parametrize("stages", [(), (3, 2), (0, 5, 5), (-1, 5)])
-def test_stages_that_are_refused(stages) -> None:
-    for function in (learning_stages, typical_seed):
-        with pytest.raises(AntsError, match="stages"):
-            function(paper(), CONFIG, stages=stages)
+@pytest.mark.parametrize("checkpoints", [(), (3, 2), (0, 5, 5), (-1, 5)])
+def test_stages_that_are_refused(checkpoints) -> None:
+    for function in (learning_checkpoints, typical_seed):
+        with pytest.raises(AntsError, match="checkpoints"):
+            function(paper(), CONFIG, checkpoints=checkpoints)
 
 
 def test_stages_of_several_worlds_are_refused() -> None:
-    stages = [Stage(1, Episode.play(world, trail_follower())) for world in (paper(), open_world(3))]
+    checkpoints = [
+        Checkpoint(1, Episode.play(world, trail_follower())) for world in (paper(), open_world(3))
+    ]
     with pytest.raises(AntsError, match="several worlds"):
-        next(learning_frames(stages))
+        next(learning_frames(checkpoints))
 
 
 def test_a_stage_that_has_ended_stays() -> None:
-    stages = learning_stages(paper(), CONFIG, seed=2, stages=(0, 50), max_steps=60)
-    short, long = sorted(stages, key=lambda stage: len(stage.episode))
+    checkpoints = learning_checkpoints(paper(), CONFIG, seed=2, checkpoints=(0, 50), max_steps=60)
+    short, long = sorted(checkpoints, key=lambda checkpoint: len(checkpoint.episode))
     assert len(short.episode) < len(long.episode) == 61
-    frames = list(learning_frames(stages, (640, 400), "a title"))
+    frames = list(learning_frames(checkpoints, (640, 400), "a title"))
     assert len(frames) == 61
     halves = [(frame[:, :320], frame[:, 320:]) for frame in frames]
-    ended = stages.index(short)
+    ended = checkpoints.index(short)
     last = len(short.episode) - 1
     assert all((half[ended] == halves[last][ended]).all() for half in halves[last:])
     assert not (halves[last - 1][ended] == halves[last][ended]).all()
@@ -123,8 +133,8 @@ def test_a_stage_that_has_ended_stays() -> None:
 
 @pytest.mark.parametrize("size", [(1280, 720), (400, 900), (64, 64), (4096, 200)])
 def test_all_stages_fit(size, tmp_path) -> None:
-    stages = learning_stages(paper(), CONFIG, stages=(0, 1, 2, 3), max_steps=3)
-    save_animation(tmp_path / "a.gif", learning_frames(stages, size), 10)
+    checkpoints = learning_checkpoints(paper(), CONFIG, checkpoints=(0, 1, 2, 3), max_steps=3)
+    save_animation(tmp_path / "a.gif", learning_frames(checkpoints, size), 10)
     with Image.open(tmp_path / "a.gif") as image:
         assert image.size == size
         picture = np.asarray(image.convert("RGB")).astype(int)
@@ -285,7 +295,7 @@ def test_of_very_many_states_a_sheet_shows_the_first_and_says_so(monkeypatch) ->
 
 
 def test_states_with_names_of_another_form_are_written_out(monkeypatch) -> None:
-    own = Observation("own", 4, lambda look: 0, name_of=lambda row: f"carrying crumb number {row}")
+    own = Observation("own", 4, lambda view: 0, name_of=lambda row: f"carrying crumb number {row}")
     monkeypatch.setattr(Task, "sees", own)
     monkeypatch.setattr(Task, "n_states", 4)
     lines: list[str] = []
@@ -297,7 +307,7 @@ def test_states_with_names_of_another_form_are_written_out(monkeypatch) -> None:
 
 def test_states_without_names_are_told_by_their_numbers_and_not_split_by_load(monkeypatch) -> None:
     episode = Episode.play(paper(), random_policy(), max_steps=1)
-    monkeypatch.setattr(Task, "sees", Observation("own", 4, lambda look: 0))
+    monkeypatch.setattr(Task, "sees", Observation("own", 4, lambda view: 0))
     monkeypatch.setattr(Task, "n_states", 4)
     lines: list[str] = []
     monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
@@ -349,21 +359,21 @@ def test_sheets_that_are_refused() -> None:
 
 
 def colony(ants: int = 30) -> Colony:
-    made = Colony(open_world(3), None, CONFIG, 0, ants, sharing="fixed", q_values=trail_follower())
+    made = Colony(open_world(3), None, CONFIG, 0, ants, sharing="frozen", q_values=trail_follower())
     made.begin_episode()
     return made
 
 
 def test_a_colony_on_the_move() -> None:
-    pictures = list(frames(colony_moments(colony(), 7, every=3), (200, 150)))
+    pictures = list(frames(colony_snapshots(colony(), 7, frame_interval=3), (200, 150)))
     assert len(pictures) == 4
     assert not any((a == b).all() for a, b in itertools.pairwise(pictures))
     other = colony()
     other.tick(7)
-    assert (next(frames(colony_moments(other), (200, 150))) == pictures[-1]).all()
-    for wrong in ({"every": 0}, {"ticks": -1}):
+    assert (next(frames(colony_snapshots(other), (200, 150))) == pictures[-1]).all()
+    for wrong in ({"frame_interval": 0}, {"ticks": -1}):
         with pytest.raises(AntsError, match=next(iter(wrong))):
-            list(colony_moments(colony(), **{"ticks": 5, **wrong}))
+            list(colony_snapshots(colony(), **{"ticks": 5, **wrong}))
 
 
 @pytest.mark.parametrize("observation", ["paper", "ants"])
@@ -372,10 +382,10 @@ def test_one_ant_of_a_colony_is_followed(observation) -> None:
     table = random_policy(observation)
     table += np.arange(table.shape[0])[:, None]
     task = Task(observation, life=Life(lifespan=9))
-    made = Colony(open_world(3), task, CONFIG, 0, 20, sharing="fixed", q_values=table)
+    made = Colony(open_world(3), task, CONFIG, 0, 20, sharing="frozen", q_values=table)
     made.begin_episode()
     for _ in range(8):
-        snapshot, status = next(colony_moments(made, follow=5))
+        snapshot, status = next(colony_snapshots(made, follow=5))
         slot = int(np.flatnonzero(made.numbers[0] == 5)[0])
         assert snapshot.ant_cells[0] == made.cells[0, slot]
         assert sorted(snapshot.ant_cells) == sorted(made.snapshot().ant_cells)
@@ -384,17 +394,17 @@ def test_one_ant_of_a_colony_is_followed(observation) -> None:
         assert ("sees", task.sees.name_of(status.state).split(" ", 1)[1]) in status.lines
         made.tick()
     made.tick()
-    _, status = next(colony_moments(made, follow=5))
+    _, status = next(colony_snapshots(made, follow=5))
     assert status.state is None
     with pytest.raises(AntsError, match="follow is 20; the 20 ants have numbers from 0"):
-        next(colony_moments(made, follow=20))
+        next(colony_snapshots(made, follow=20))
 
 
 def test_the_legend_of_learning_tells_the_rewards_of_the_task(monkeypatch) -> None:
     lines: list[str] = []
     monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
-    task = Task(rewards=Rewards(lure=2, give=50, failed=-4))
-    stages = learning_stages(paper(), CONFIG, stages=(0,), max_steps=5, task=task)
-    next(learning_frames(stages, (1400, 600)))
+    task = Task(rewards=Rewards(shaping=2, deliver=50, failed=-4))
+    checkpoints = learning_checkpoints(paper(), CONFIG, checkpoints=(0,), max_steps=5, task=task)
+    next(learning_frames(checkpoints, (1400, 600)))
     told = {"T onto a trail +2", "Q delivery +50", "F food +3", "X blocked, in vain -4"}
     assert told <= set(lines)

@@ -72,7 +72,7 @@ def test_text_keeps_off_the_edges(size) -> None:
 
 def test_small_pictures_have_no_text() -> None:
     for size in ((64, 64), (320, 322)):
-        assert (picture(size, title="x") == picture(size, plain=True)).all()
+        assert (picture(size, title="x") == picture(size, overlay=False)).all()
 
 
 @pytest.mark.parametrize(
@@ -106,7 +106,7 @@ def test_letters_lie_in_the_cells_in_view() -> None:
     for x, y in centres:
         around = changed[int(y) - 6 : int(y) + 6, int(x) - 6 : int(x) + 6]
         assert around.sum() > 12
-    plainer = Scene(WORLD.grid, (320, 320), plain=True)
+    plainer = Scene(WORLD.grid, (320, 320), overlay=False)
     assert (plainer.draw(snapshot, seen) == plain).all()
 
 
@@ -115,7 +115,7 @@ def test_an_observation_of_five_cells_marks_five() -> None:
     five = Observation(
         "five",
         1,
-        lambda look: 0,
+        lambda view: 0,
         cells=(-2, -1, 0, 1, 2),
         name_of=lambda row: "foraging E T O E T",
     )
@@ -199,7 +199,7 @@ def test_letters_with_accents_lose_these_only() -> None:
 
 
 def test_a_plain_picture_is_the_world_alone() -> None:
-    plain, whole = picture(plain=True, title="x"), picture(title="x")
+    plain, whole = picture(overlay=False, title="x"), picture(title="x")
     assert (plain == Rasteriser(WORLD.grid, 640, 400, 7).draw(at_start(WORLD))).all()
     assert (whole[:, 480:] != 255).any()
 

@@ -31,13 +31,13 @@ def page() -> str:
 def test_the_main_findings_come_first_with_their_verdicts(page: str) -> None:
     rows = tables(page[: page.index('<section id="table">')])[""][1:]
     by_statement = {
-        (sentence(series.statement), arena): findings
-        for (arena, series), findings in study_results().judged.items()
+        (sentence(series.statement), world_kind): findings
+        for (world_kind, series), findings in study_results().judged.items()
     }
     assert len(rows) == 3
     for statement, *cells in rows:
-        for arena, cell in zip(("paper", "open"), cells, strict=True):
-            assert cell.startswith(by_statement[statement, arena][8, 8].verdict.value)
+        for world_kind, cell in zip(("paper", "open"), cells, strict=True):
+            assert cell.startswith(by_statement[statement, world_kind][8, 8].verdict.value)
 
 
 def test_deliveries_are_those_of_the_csv(page: str) -> None:
@@ -45,7 +45,7 @@ def test_deliveries_are_those_of_the_csv(page: str) -> None:
     assert rows[0] == ["", "The paper's world", "Open worlds (30, 30, 30)"]
     [line] = [cells for cells in rows if cells[0] == "A + B + C"]
     means = [
-        row.centres["deliveries"].mean
+        row.estimates["deliveries"].mean
         for row in study_results().rows
         if row.condition[1:] == ("foraging", "joint", 8)
     ]
@@ -71,14 +71,14 @@ def test_it_asks_for_nothing(page: str) -> None:
 
 
 def test_little_is_told_of_little() -> None:
-    measured = build(seeds=1, sizes=(1,), ways=("open",), arenas=("small",))
+    measured = build(seeds=1, sizes=(1,), regimes=("open",), world_kinds=("small",))
     told = colony_page(*Results.of(measured), **BARE)
     assert not re.search(r"\b(nan|inf)\b", words_of(told))
     assert "small worlds (15, 15, 15)" in told
 
 
 def test_few_seeds_are_said_and_give_no_verdict() -> None:
-    measured = build(seeds=8, sizes=(1, 4), arenas=("paper", "rocks"))
+    measured = build(seeds=8, sizes=(1, 4), world_kinds=("paper", "rocks"))
     page = colony_page(*Results.of(measured), **BARE)
     assert page.count("8 seeds, too few for a verdict") >= 5  # byline, lead, three tables
     assert "too few seeds" in page
@@ -95,7 +95,7 @@ def test_what_has_no_interval_says_so() -> None:
 
 
 def test_the_page_is_the_same_from_the_files() -> None:
-    measured = build(seeds=3, arenas=("paper", "slow"))
+    measured = build(seeds=3, world_kinds=("paper", "slow"))
     for measures in measured.values():
         measures["bound"][:] = measures["of_bound"][:] = float("nan")
     found = Results.of(measured)

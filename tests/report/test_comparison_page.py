@@ -63,7 +63,7 @@ def test_table_2_stands_beside_the_papers(page: str) -> None:
     rows = tables(page)["Return, last 50 episodes"]
     assert rows[0] == ["Learner", "Delivery", "Mean", "IQM", "Best run", "Paper", "Below"]
     for cells, line in zip(rows[1:], results().lines, strict=True):
-        mean, *_, iqm = line.summary.centres["return_last50"][:4]
+        mean, *_, iqm = line.summary.estimates["return_last50"][:4]
         assert float(cells[2].split()[0]) == pytest.approx(mean, abs=0.51)
         assert float(cells[3].split()[0]) == pytest.approx(iqm, abs=0.51)
         assert float(cells[5]) == line.of_paper("return")
@@ -82,8 +82,10 @@ def test_every_claim_has_a_line_with_the_numbers_of_the_csv(page: str) -> None:
             assert cells[0].startswith(row["statement"])
             assert cells[1] == row["section"]
             assert cells[2 + column] == row["verdict"]
-            digits = 1 if row["centre"] == "interquartile mean" or abs(row["effect"]) >= 10 else 2
-            told = f"{row['delivery'].capitalize()} delivery: {row['verdict']} . {row['contrast']}"
+            digits = (
+                1 if row["estimator"] == "interquartile mean" or abs(row["effect"]) >= 10 else 2
+            )
+            told = f"Delivery {row['delivery']}: {row['verdict']} . {row['contrast']}"
             assert told in cells[0]
             if row["verdict"] != "not tested":
                 effect = signed(number(row["effect"], digits))
@@ -155,7 +157,7 @@ def test_what_comes_from_the_user_is_escaped(page: str) -> None:
 
 def test_little_is_told_of_little() -> None:
     """One seed of one configuration, no figures, no players, another world."""
-    one = subset(build({"absorbing": unchanged}, variants=[Variant("sarsa")]), [3], 1, 7)
+    one = subset(build({"terminates": unchanged}, variants=[Variant("sarsa")]), [3], 1, 7)
     told = comparison_page(Results.of(replace(one, world="garden.txt"), []), **BARE)
     assert "nan" not in re.sub(r"<script.*?</script>|<style.*?</style>", "", told, flags=re.S)
     assert "table 2, beside ours" not in told

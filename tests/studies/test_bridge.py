@@ -74,7 +74,7 @@ def test_an_ant_crosses_when_it_comes_to_the_other_room_by_its_last_branch() -> 
 def test_nobody_takes_the_short_branch_before_it_opens(opens: int) -> None:
     place, ticks = double_bridge(**BRIDGE), 602
     training = TrainingConfig("sarsa", 0.1, 0.9, epsilon=0.02, epsilon_decay=1.0)
-    follow = {"sharing": "fixed", "q_values": trail_follower("queues"), "schedule": "by_world"}
+    follow = {"sharing": "frozen", "q_values": trail_follower("queues"), "schedule": "by_world"}
     colony = Colony(place, task(Design()), training, [3], 12, **follow)
     found = crossings(colony, BRIDGE, ticks, opens)
     before, after = found[: WINDOWS // 2].sum(axis=(0, 1, 3)), found[5:].sum(axis=(0, 1, 3))
@@ -92,7 +92,7 @@ def test_colonies_learn_where_the_short_branch_lies_on_either_side() -> None:
     assert one.pool == (double_bridge(aside=1), double_bridge(mirrored=True, aside=1))
     drawn = np.array([[place is one.pool[0] for place in of] for of in one.places(range(20))])
     assert 0.4 < drawn.mean() < 0.6
-    assert one.training.initial_value > 0
+    assert one.training.initial_q > 0
     assert one.training.next_epsilon(one.training.epsilon) < one.training.epsilon
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from taichi_ants import AntsError, TrainingConfig, worlds
 from taichi_ants.analysis.bounds.limits import limits_of
-from taichi_ants.analysis.colony.study import ARENAS, ELSEWHERES, Condition
+from taichi_ants.analysis.colony.study import ELSEWHERES, WORLD_KINDS, Condition
 from taichi_ants.studies.colony_study import (
     COMPARED,
     POOL,
@@ -25,27 +25,29 @@ SEEDS = (3, 4)
 
 @pytest.fixture(scope="module")
 def planned():
-    return plan([*ARENAS, *ELSEWHERES], (1, 4, 16, 64), SEEDS, SARSA, 60, 1000, 4)
+    return plan([*WORLD_KINDS, *ELSEWHERES], (1, 4, 16, 64), SEEDS, SARSA, 60, 1000, 4)
 
 
 def test_every_design_has_its_conditions(planned) -> None:
-    jointly = [one for one in planned if one.way == "joint"]
-    assert len(jointly) == len(ARENAS) * len(TASKS) * 4
-    for way, sizes in (("alone", {4, 16, 64}), ("with_4", {16, 64}), ("with_16", {64})):
+    jointly = [one for one in planned if one.regime == "joint"]
+    assert len(jointly) == len(WORLD_KINDS) * len(TASKS) * 4
+    for regime, sizes in (("alone", {4, 16, 64}), ("with_4", {16, 64}), ("with_16", {64})):
         found = {
-            one.ants for one in planned if (one.arena, one.rules, one.way) == ("open", "paper", way)
+            one.ants
+            for one in planned
+            if (one.world_kind, one.rules, one.regime) == ("open", "paper", regime)
         }
         assert found == sizes
-    abroad = {one.arena: one.ants for one in planned if one.way == "open"}
+    abroad = {one.world_kind: one.ants for one in planned if one.regime == "open"}
     assert abroad.keys() == {"paper", "piles", *ELSEWHERES}
-    assert {arena for arena, ants in abroad.items() if ants != 64} == {"large"}
-    assert len(planned) == len(jointly) + len(ARENAS) * len(COMPARED) * 6 + len(abroad) * 3
+    assert {world_kind for world_kind, ants in abroad.items() if ants != 64} == {"large"}
+    assert len(planned) == len(jointly) + len(WORLD_KINDS) * len(COMPARED) * 6 + len(abroad) * 3
 
 
 def test_nobody_is_evaluated_where_it_was_trained(planned) -> None:
-    for (arena, *_), point in planned.items():
+    for (world_kind, *_), point in planned.items():
         teacher = point.after or point
-        if arena == "paper" and point.after is None:
+        if world_kind == "paper" and point.after is None:
             assert point.pool is None
             assert point.world == worlds.paper()
         elif teacher.pool is not None:
@@ -97,5 +99,7 @@ def test_a_colony_is_held_against_the_bound_of_its_own_world(planned) -> None:
 
 
 def test_an_unknown_arena_is_named() -> None:
-    with pytest.raises(AntsError, match="the arena is 'moon'; it must be one of paper, open, pil"):
+    with pytest.raises(
+        AntsError, match="the world_kind is 'moon'; it must be one of paper, open, pil"
+    ):
         plan(["moon"], (1,), SEEDS, SARSA, 2, 10, 1)

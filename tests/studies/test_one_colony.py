@@ -16,7 +16,7 @@ from taichi_ants.rendering import writers
 from taichi_ants.studies.interruption import held, stoppable
 from taichi_ants.studies.one_colony import check_places, live, summary
 
-TASK = Task(delivery="continuing", evaporation_in_training=True)
+TASK = Task(delivery="truncates", evaporation_in_training=True)
 TRAINING = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0, 0.1)
 
 
@@ -50,7 +50,7 @@ def test_a_colony_is_saved_although_its_picture_cannot_be(
     colony = begun()
     save = str(tmp_path / "keep.npz")
     with pytest.raises((AntsError, OSError), match="o space left on device"):
-        live(colony, 20, lambda share: None, never, save, str(tmp_path / render), every=2)
+        live(colony, 20, lambda share: None, never, save, str(tmp_path / render), frame_interval=2)
     assert os.listdir(tmp_path) == ["keep.npz"]
     other = begun()
     other.tick(ticks)
@@ -75,7 +75,7 @@ def test_a_stopped_colony_ends_at_a_whole_tick_with_all_its_files(tmp_path, caps
 
     def work() -> None:
         with stoppable(), held() as stopped:
-            live(colony, 10, progress, stopped, save, render, every=2)
+            live(colony, 10, progress, stopped, save, render, frame_interval=2)
 
     with pytest.raises(SystemExit) as end:
         work()
@@ -85,7 +85,7 @@ def test_a_stopped_colony_ends_at_a_whole_tick_with_all_its_files(tmp_path, caps
 
 
 def test_a_colony_with_pictures_far_apart_hears_a_signal_between_them(tmp_path) -> None:
-    """With `--every 1000000` it used to be heard at the next picture, minutes later."""
+    """With `--frame-interval 1000000` it used to be heard at the next picture, minutes later."""
     shares = []
 
     def progress(share: float) -> None:
@@ -96,7 +96,7 @@ def test_a_colony_with_pictures_far_apart_hears_a_signal_between_them(tmp_path) 
     colony, other = begun(), begun()
     path = str(tmp_path / "a.gif")
     with pytest.raises(SystemExit), stoppable(), held() as stopped:
-        live(colony, 10**7, progress, stopped, render=path, every=10**6)
+        live(colony, 10**7, progress, stopped, render=path, frame_interval=10**6)
     assert 3 < colony.ticks < 100
     other.tick(colony.ticks)
     assert colony == other

@@ -16,16 +16,16 @@ from taichi_ants.studies.runner import EVALUATION_SEEDS, ColonyPoint, RunPoint, 
 from taichi_ants.task import Life, Pheromone, Rewards, Task
 from taichi_ants.worlds import World, open_world, paper
 
-ABSORBING, CONTINUING = Task(), Task(delivery="continuing")
+TERMINATES, TRUNCATES = Task(), Task(delivery="truncates")
 SARSA = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.99)
 LAMBDA = replace(SARSA, learner="sarsa_lambda")
 DYNA = TrainingConfig("dyna_q", 0.1, 0.9, 0.3, 0.99, planning_steps=2)
 KINDS = (
-    (ABSORBING, SARSA),
-    (CONTINUING, DYNA),
-    (ABSORBING, replace(SARSA, learning_rate=0.2)),
-    (ABSORBING, replace(SARSA, learning_rate=0.3)),
-    (CONTINUING, replace(SARSA, learning_rate=0.4)),
+    (TERMINATES, SARSA),
+    (TRUNCATES, DYNA),
+    (TERMINATES, replace(SARSA, learning_rate=0.2)),
+    (TERMINATES, replace(SARSA, learning_rate=0.3)),
+    (TRUNCATES, replace(SARSA, learning_rate=0.4)),
 )
 POINTS = tuple(RunPoint(paper(), task, config, 6, 80, 3) for task, config in KINDS)
 SEEDS = (4, 0, 9, 7, -2)
@@ -102,7 +102,7 @@ def test_evaporation_is_a_setting_of_each(training, greedy, tmp_path):
         assert np.array_equal(outcome[f"greedy_{name}"], getattr(rollouts, name)[0])
 
 
-LIVELY = Task(delivery="continuing", evaporation_in_training=True, life=Life(regrowth=0))
+LIVELY = Task(delivery="truncates", evaporation_in_training=True, life=Life(regrowth=0))
 WORLDS = tuple(open_world(seed, (12, 12, 12)) for seed in (3, 5))
 ALONE = ColonyPoint(WORLDS, LIVELY, SARSA, episodes=2, ticks=60, rollouts=2)
 
@@ -110,7 +110,7 @@ ALONE = ColonyPoint(WORLDS, LIVELY, SARSA, episodes=2, ticks=60, rollouts=2)
 @pytest.mark.slow
 def test_a_study_of_colonies_is_learning_and_evaluation(tmp_path):
     joint = replace(ALONE, ants=4, after=ALONE)
-    own = replace(ALONE, ants=4, sharing="own", start="spread")
+    own = replace(ALONE, ants=4, sharing="independent", start="spread")
     outcomes = Study((joint, own), (3, 5)).run(tmp_path)
     assert set(outcomes) == {ALONE, joint, own}
     first = Colony(WORLDS, LIVELY, SARSA, (3, 5))
@@ -123,7 +123,7 @@ def test_a_study_of_colonies_is_learning_and_evaluation(tmp_path):
         learning = Colony(WORLDS, LIVELY, SARSA, (3, 5), **options, sharing=point.sharing, **more)
         learning.run(2, 60)
         table = learning.q_values
-        colony = Colony(WORLDS, LIVELY, calm, others, **options, sharing="fixed", q_values=table)
+        colony = Colony(WORLDS, LIVELY, calm, others, **options, sharing="frozen", q_values=table)
         episodes = colony.run(2, 60)
         for name in ("deliveries", "first_delivery", "moves", "blocked", "returns"):
             assert np.array_equal(outcomes[point][name], getattr(episodes, name).T)
@@ -135,7 +135,7 @@ def test_colonies_in_blocks_of_some_seeds_give_the_same(tmp_path, monkeypatch):
     seeds = (3, 5, 8, 1, 0)
     each = replace(ALONE, world=tuple(open_world(seed, (12, 12, 12)) for seed in seeds))
     one = replace(ALONE, world=WORLDS[0])
-    points = (each, replace(each, ants=4, after=each), replace(one, ants=3, sharing="own"))
+    points = (each, replace(each, ants=4, after=each), replace(one, ants=3, sharing="independent"))
     points += (replace(one, ants=4, episodes=0, after=one), replace(each, pool=WORLDS))
     study, found = Study(points, seeds), []
     for size in (runner._NUMBERS_OF_A_BLOCK, 8_000):
@@ -153,7 +153,7 @@ def test_a_block_of_colonies_is_limited_in_memory(monkeypatch):
     """To a quarter of a gigabyte, but it has one seed at least."""
     many = replace(ALONE, world=WORLDS[0], ants=10_000, start="spread")
     assert 100 < many.runs_of_a_block < 1000
-    tables = replace(many, sharing="own")
+    tables = replace(many, sharing="independent")
     assert 1 <= tables.runs_of_a_block < many.runs_of_a_block / 10
     assert replace(many, ants=16_000_000, capacity=16_000_000).runs_of_a_block == 1
 
@@ -164,7 +164,7 @@ def test_copies_follow_what_another_point_has_learned_and_train_nothing(tmp_path
     calm = replace(SARSA, epsilon=SARSA.min_epsilon, epsilon_decay=1.0)
     others = [seed + EVALUATION_SEEDS for seed in (3, 5)]
     table = outcomes[ALONE]["q_values"]
-    colony = Colony(WORLDS, LIVELY, calm, others, ants=4, sharing="fixed", q_values=table)
+    colony = Colony(WORLDS, LIVELY, calm, others, ants=4, sharing="frozen", q_values=table)
     assert np.array_equal(outcomes[copies]["moves"], colony.run(2, 60).moves.T)
 
 
@@ -271,11 +271,11 @@ def test_bad_points_of_runs_are_named(change, says):
         ({"ants": 0}, "ants is 0"),
         ({"capacity": 3, "ants": 9}, "capacity is 3, but 9 ants start"),
         ({"start": "there"}, "start is 'there'"),
-        ({"sharing": "fixed"}, "sharing is 'fixed'"),
+        ({"sharing": "frozen"}, "sharing is 'frozen'"),
         ({"episodes": 0}, "episodes is 0"),
         ({"ticks": 0}, "ticks is 0"),
         ({"rollouts": 0}, "rollouts is 0"),
-        ({"after": replace(ALONE, sharing="own")}, "learned into one table"),
+        ({"after": replace(ALONE, sharing="independent")}, "learned into one table"),
         ({"training": LAMBDA}, "'sarsa_lambda' has no TD error that can be summed"),
     ],
 )
@@ -309,7 +309,7 @@ def test_settings_tell_all_that_determines_results():
     settings = Study(POINTS, SEEDS).settings()
     others = {
         "world": World((3, 3, 3), (0, 0, 0), foods=[(2, 0, 0)]),
-        "task": Task(rewards=Rewards(give=11)),
+        "task": Task(rewards=Rewards(deliver=11)),
         "training": replace(SARSA, min_epsilon=0.02),
         **{"episodes": 7, "max_steps": 81, "rollouts": 4},
     }
@@ -320,7 +320,12 @@ def test_settings_tell_all_that_determines_results():
     assert Study(POINTS[:-1], SEEDS).settings() != settings
     assert Study(tuple(map(replace, POINTS)), SEEDS).settings() == settings
     joint = replace(ALONE, ants=4, after=ALONE)
-    for name, value in {"after": None, "start": "spread", "ticks": 61, "sharing": "own"}.items():
+    for name, value in {
+        "after": None,
+        "start": "spread",
+        "ticks": 61,
+        "sharing": "independent",
+    }.items():
         changed = Study((ALONE, replace(joint, **{name: value})), (3, 5))
         assert changed.settings() != Study((ALONE, joint), (3, 5)).settings(), name
 
@@ -328,7 +333,7 @@ def test_settings_tell_all_that_determines_results():
 def test_settings_say_once_what_all_points_have_in_common():
     settings = Study(POINTS, SEEDS).settings()
     assert settings["task.delivery"] == [task.delivery for task, _ in KINDS]
-    assert settings["task.rewards.give"] == 10
+    assert settings["task.rewards.deliver"] == 10
     assert settings["training.hyperparameters.planning_steps"] == [None, 2, None, None, None]
     assert settings["worlds"] == [world_facts(paper())]
     assert settings["world"] == 0

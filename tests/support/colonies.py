@@ -32,7 +32,7 @@ def training(learner: str = "q_learning", **settings: object) -> TrainingConfig:
 def begun(
     world: World | str,
     learning: TrainingConfig | None = None,
-    sharing: str = "fixed",
+    sharing: str = "frozen",
     seed: int = 0,
     q_values: np.ndarray | None = None,
     **options: object,
@@ -70,7 +70,7 @@ def load(colony: ReferenceColony, *slots: int) -> None:
     for slot in slots:
         ant = colony.ants[slot]
         ant.carries = True
-        colony.look(ant)
+        colony.observe(ant)
 
 
 def cells_of(colony: ReferenceColony) -> list[Cell]:

@@ -31,7 +31,7 @@ BASELINES = [Baseline("shortest delivery", None, 45.0, 34.0, 1.0)]
 @cache
 def results() -> Results:
     """A comparison in which all claims hold with one kind of delivery, not with the other."""
-    edits = {"continuing": unchanged, "absorbing": change(DYNA_P5, late_return=200)}
+    edits = {"truncates": unchanged, "terminates": change(DYNA_P5, late_return=200)}
     return Results.of(build(edits, seeds=6), BASELINES)
 
 
@@ -56,10 +56,10 @@ def comparison_html() -> str:
 def study_results() -> StudyResults:
     """A study in which all three rules double what ants deliver."""
 
-    def truth(rules: str, way: str, ants: int) -> float:
+    def truth(rules: str, regime: str, ants: int) -> float:
         return 20.0 * ants * (2 if rules in ("foraging", "queueing") and ants > 1 else 1)
 
-    measured = build_study(truth, seeds=12, arenas=("paper", "open", "small"))
+    measured = build_study(truth, seeds=12, world_kinds=("paper", "open", "small"))
     return StudyResults.of(measured)
 
 
@@ -68,7 +68,7 @@ def colony_html() -> str:
     """Its page."""
     steady = TrainingConfig("sarsa", 0.1, 0.9, 0.01, 1.0)
     colony = Colony(
-        worlds.paper(), Task(), steady, 3, ants=9, sharing="fixed", q_values=trail_follower()
+        worlds.paper(), Task(), steady, 3, ants=9, sharing="frozen", q_values=trail_follower()
     )
     colony.begin_episode()
     found = study_results()

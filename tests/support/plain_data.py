@@ -27,7 +27,7 @@ def random_data(world: World, seed: int, episodes: int = 6, runs: int = 2) -> Da
     """What epsilon-greedy ants do by random tables; some of their episodes end by delivery."""
     rng = np.random.default_rng(seed)
     tables = rng.normal(size=(runs, 128, 5))
-    delivery = "continuing" if seed % 2 else "absorbing"
+    delivery = "truncates" if seed % 2 else "terminates"
     return record(
         world, tables, episodes, range(seed, seed + runs), 60, Task(delivery=delivery), epsilon=0.7
     )

@@ -17,7 +17,7 @@ STEPS = [(1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1), (1, 0, 1)]
 DELIVERED = None
 
 
-PAPERS = Rewards(empty=0, failed=-1, lure=1, pick_up=3, give=10)
+PAPERS = Rewards(empty=0, failed=-1, shaping=1, pick_up=3, deliver=10)
 
 
 class PlainWorld:
@@ -44,7 +44,7 @@ class PlainWorld:
             return [((cell, (heading + 3) % 6, target), self.paid.pick_up) for target in in_view]
         if action == 4:
             gives = taken and self.queen in seen
-            return [(DELIVERED, self.paid.give)] if gives else [(state, self.paid.failed)]
+            return [(DELIVERED, self.paid.deliver)] if gives else [(state, self.paid.failed)]
         target, heading = seen[action], (heading + action - 1) % 6
         if not self._is_empty(target, foods):
             return [((cell, heading, taken), self.paid.failed)]
@@ -54,7 +54,7 @@ class PlainWorld:
             levels = [self.trails.get(c, 0) for c in seen if self._is_empty(c, foods)]
             level = self.trails.get(target, 0)
             lured = level >= 1 and level >= max(levels) / 2
-        return [((target, heading, taken), self.paid.lure if lured else self.paid.empty)]
+        return [((target, heading, taken), self.paid.shaping if lured else self.paid.empty)]
 
     def _is_empty(self, cell: tuple, foods: set) -> bool:
         exists = all(value < size for value, size in zip(cell, self.ranges, strict=True))

@@ -55,7 +55,7 @@ def random_colony(
     sharing = str(rng.choice(SHARINGS)) if sharing is None else sharing
     population, task = _rules(rng, min(room, most_ants), dense, changes)
     training, delivery = _training(rng, learner)
-    given = sharing == "fixed" or rng.random() < 0.6
+    given = sharing == "frozen" or rng.random() < 0.6
     return RandomColony(
         world=world,
         task=replace(
@@ -150,6 +150,6 @@ def _training(rng: np.random.Generator, learner: str | None) -> tuple[TrainingCo
         hyperparameters={"planning_steps": 2} if learner == "dyna_q" else {},
         learning_rate_decay=float(rng.choice([0.5, 0.9, 1.0])),
         min_learning_rate=float(rng.choice([0.0, 0.1])),
-        initial_value=float(rng.choice([0.0, 0.0, 1.7, -3.0])),
+        initial_q=float(rng.choice([0.0, 0.0, 1.7, -3.0])),
     )
-    return config, str(rng.choice(["absorbing", "continuing"]))
+    return config, str(rng.choice(["terminates", "truncates"]))

@@ -6,18 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants.engines.colony.hand import Hand
+from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.live import edits
 from taichi_ants.reference.geometry import Cell
-from taichi_ants.reference.hand import Hand as PlainHand
+from taichi_ants.reference.interventions import Interventions as PlainInterventions
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
 
 KINDS = (*("ground",) * 4, "trail", "add_ants", "remove_ants", "queen", *("set",) * 3, "episode")
 
 
-def random_edit(rng: np.random.Generator, hand: Hand) -> dict[str, Any]:
+def random_edit(rng: np.random.Generator, interventions: Interventions) -> dict[str, Any]:
     """An edit of the right form; there may be no room for it."""
-    grid, ground = hand.colony.grid, hand.colony.arrays["ground"]
+    grid, ground = interventions.colony.grid, interventions.colony.arrays["ground"]
     there = np.flatnonzero(grid.exists)
     some = rng.choice(there, rng.integers(1, min(9, len(there)) + 1)).tolist()
     kind = str(rng.choice(KINDS))
@@ -34,20 +34,22 @@ def random_edit(rng: np.random.Generator, hand: Hand) -> dict[str, Any]:
         free = there[ground[there] == EMPTY] if rng.random() < 0.8 else there
         return {"kind": kind, "cell": int(rng.choice(free if len(free) else there))}
     if kind == "set":
-        known = edits.values(hand)
+        known = edits.values(interventions)
         name = str(rng.choice(list(known)))
         value, least, most, step = known[name]
         drawn = float(rng.choice([value, least, most, rng.uniform(least, most)]))
         if name == "ants":
-            drawn = float(rng.integers(1, hand.ants + 4))
+            drawn = float(rng.integers(1, interventions.ants + 4))
         return {"kind": kind, "name": name, "value": int(drawn) if isinstance(step, int) else drawn}
     return {"kind": kind}
 
 
-def apply_to_both(edit: dict[str, Any], hand: Hand, plain: PlainHand) -> None:
+def apply_to_both(
+    edit: dict[str, Any], interventions: Interventions, plain: PlainInterventions
+) -> None:
     """Do an edit to a colony, and then to its twin; raises AntsError where there is no room."""
-    grid = hand.colony.grid
-    edits.apply(edits.checked(edit, hand), hand, None)
+    grid = interventions.colony.grid
+    edits.apply(edits.checked(edit, interventions), interventions, None)
     cells: list[Cell] = []
     for cell in dict.fromkeys(edit.get("cells", ())):
         x, y, z = grid.cells(cell).tolist()
@@ -69,7 +71,7 @@ def apply_to_both(edit: dict[str, Any], hand: Hand, plain: PlainHand) -> None:
         plain.begin_episode()
 
 
-def _set(name: str, value: float, plain: PlainHand) -> None:
+def _set(name: str, value: float, plain: PlainInterventions) -> None:
     if name == "ants":
         plain.set_ants(int(value))
     elif name == "epsilon":

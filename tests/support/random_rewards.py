@@ -10,9 +10,9 @@ from taichi_ants.task.rewards import Rewards
 # Tables in which something that is recognised by its reward would be mistaken.
 TELLING = (
     Rewards(pick_up=10),
-    Rewards(failed=10, empty=10, lure=10),
-    Rewards(give=0),
-    Rewards(lure=7, empty=-3),
+    Rewards(failed=10, empty=10, shaping=10),
+    Rewards(deliver=0),
+    Rewards(shaping=7, empty=-3),
     Rewards(*[MOST_REWARD] * 5),
     Rewards(*[-MOST_REWARD] * 5),
 )

@@ -88,7 +88,7 @@ class Guest:
             self.state = said
         elif said["say"] == "error":
             self.errors.append(said["words"])
-        elif said["say"] == "moment":
+        elif said["say"] == "snapshot":
             self.frames = [self.socket.recv(SECONDS)]  # type: ignore[list-item]
             return "whole", self.frames[0]
         elif said["say"] == "file":

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from taichi_ants import Colony
-from taichi_ants.engines.colony.layout import HomeRow, WorldRow
+from taichi_ants.engines.colony.layout import FoodSourceRow, WorldRow
 from taichi_ants.reference import ReferenceColony
 
 
@@ -47,13 +47,13 @@ def _assert_equal_records(colony: Colony, plain: ReferenceColony, world: int) ->
         assert getattr(outcome, name)[0, world] == getattr(record, name), name
     assert outcome.regrown[0, world] == record.regrown
     assert row[WorldRow.STORE] == plain.store
-    first = world * colony.n_homes
-    homes = colony.arrays["homes"][:, first : first + row[WorldRow.HOMES]]
-    theirs = plain.homes.homes[: homes.shape[1]]
-    assert homes[HomeRow.TAKEN].tolist() == [
-        -1 if home.waiting_since is None else home.waiting_since for home in theirs
+    first = world * colony.n_food_sources
+    food_sources = colony.arrays["food_sources"][:, first : first + row[WorldRow.FOOD_SOURCES]]
+    theirs = plain.food_sources.food_sources[: food_sources.shape[1]]
+    assert food_sources[FoodSourceRow.TAKEN].tolist() == [
+        -1 if source.waiting_since is None else source.waiting_since for source in theirs
     ]
-    cells = colony.snapshot(world).grid.cells(homes[HomeRow.CELL]).tolist()
-    assert cells == [list(home.cell) for home in theirs]
+    cells = colony.snapshot(world).grid.cells(food_sources[FoodSourceRow.CELL]).tolist()
+    assert cells == [list(source.cell) for source in theirs]
     if colony.sharing == "shared" and colony.training.learner == "dyna_q":
         assert colony.arrays["integers"][0] == len(plain.minds.tables[0].model)

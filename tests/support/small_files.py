@@ -32,7 +32,7 @@ from taichi_ants.studies.sweep_file import read_sweep
 from taichi_ants.worlds import World
 
 WORLD = World((3, 3, 3), (0, 0, 0), foods=[(2, 0, 0)])
-TASK = Task(delivery="continuing")
+TASK = Task(delivery="truncates")
 SARSA = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.99)
 Q_VALUES = np.random.default_rng(0).normal(size=(128, 5)).round(1).astype(np.float32)
 MAP = "trail = 7\n; a comment\n  .\n.   F\n  Q\n.   #\n  0\n"
@@ -75,7 +75,7 @@ def small_files(folder: Path) -> dict[str, SmallFile]:
         "training result": of("training.npz", TrainingResult.load),
         "data set": of("data.npz", Dataset.load),
         "colony": of("colony.npz", Colony.load),
-        "session": of("session.npz", lambda path: Session.load(path).hand.state()),
+        "session": of("session.npz", lambda path: Session.load(path).interventions.state()),
         "block": of("block.npz", _block),
         "manifest": of("finished/manifest.json", lambda path: _finished(path.parent)),
         "table": of("finished/table.csv", lambda path: _finished(path.parent)),

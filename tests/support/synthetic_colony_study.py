@@ -6,16 +6,16 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from taichi_ants.analysis.colony.study import RULES, WAYS, Condition, Measured
+from taichi_ants.analysis.colony.study import REGIMES, RULES, Condition, Measured
 
 SIZES = (1, 2, 4, 8)
 
 
-# (rules, way, ants) -> deliveries per 1000 ticks of the whole colony.
+# (rules, regime, ants) -> deliveries per 1000 ticks of the whole colony.
 Truth = Callable[[str, str, int], float]
 
 
-def proportional(rules: str, way: str, ants: int) -> float:
+def proportional(rules: str, regime: str, ants: int) -> float:
     """Every ant delivers 20, whatever it shares and smells."""
     return 20.0 * ants
 
@@ -26,11 +26,11 @@ def build(
     seeds: int = 12,
     noise: float = 1.0,
     sizes: Sequence[int] = SIZES,
-    ways: Sequence[str] = tuple(WAYS),
+    regimes: Sequence[str] = tuple(REGIMES),
     rules: Sequence[str] = tuple(RULES),
     first: Callable[[int], int] = lambda ants: 40,
-    reward: Truth = lambda rules, way, ants: 500.0,
-    arenas: Sequence[str] = ("paper",),
+    reward: Truth = lambda rules, regime, ants: 500.0,
+    world_kinds: Sequence[str] = ("paper",),
 ) -> Measured:
     """A study in which all is as the truth says, but for noise of the given standard deviation.
 
@@ -38,28 +38,28 @@ def build(
 
     Args:
         truth: Deliveries per 1000 ticks.
-        seeds, sizes, ways, rules, arenas: The conditions.
+        seeds, sizes, regimes, rules, kinds of world: The conditions.
         noise: Standard deviation over seeds, as a share of the truth in percent.
         first: Ticks to the first delivery by number of ants.
         reward: Reward per ant and 1000 ticks.
     """
     random = np.random.default_rng(0)
     measured = {}
-    for arena in arenas:
+    for world_kind in world_kinds:
         for one in rules:
-            for way in ways:
+            for regime in regimes:
                 for ants in sizes:
                     spread = 1 + noise / 100 * random.standard_normal(seeds)
-                    deliveries = truth(one, way, ants) * spread
-                    measured[Condition(arena, one, way, ants)] = {
+                    deliveries = truth(one, regime, ants) * spread
+                    measured[Condition(world_kind, one, regime, ants)] = {
                         "deliveries": deliveries,
                         "greedy": 1.5 * deliveries,
                         "bound": np.full(seeds, 25.0 * ants),
                         "of_bound": deliveries / (25.0 * ants),
                         "per_ant": deliveries / ants,
                         "first_delivery": np.full(seeds, float(first(ants))),
-                        "fruitless": np.zeros(seeds),
+                        "no_delivery_rate": np.zeros(seeds),
                         "blocked": np.full(seeds, ants / 100),
-                        "reward": reward(one, way, ants) * spread,
+                        "reward": reward(one, regime, ants) * spread,
                     }
     return measured

@@ -32,18 +32,18 @@ def test_the_defaults_are_the_rules_of_the_world():
     assert task.life == Life(births=False, lifespan=None, regrowth=None, wander=None)
     assert dataclasses.astuple(task.traffic) == (False, False, False, False)
     assert not task.turns_at_queen
-    assert (task.observation, task.n_states, task.delivery) == ("paper", 128, "absorbing")
+    assert (task.observation, task.n_states, task.delivery) == ("paper", 128, "terminates")
     assert (task.evaporation_in_training, task.evaporation_in_evaluation) == (False, True)
 
 
 def test_a_task_can_be_written_as_json():
     for task in (
         Task(),
-        Task("six_cells", random_rewards(3), delivery="continuing", evaporation_in_training=True),
+        Task("six_cells", random_rewards(3), delivery="truncates", evaporation_in_training=True),
         Task(pheromone=Pheromone("exponential", 7.5, 0.1, "add", 9, 99), life=Life(True, 5, 0, 2)),
     ):
         assert Task.from_dict(json.loads(json.dumps(task.as_dict()))) == task
-    assert Task.from_dict({"rewards": {"give": 5}}) == Task(rewards=Rewards(give=5))
+    assert Task.from_dict({"rewards": {"deliver": 5}}) == Task(rewards=Rewards(deliver=5))
     assert Task.from_dict({"traffic": "following"}) == Task(traffic=Traffic.named()["following"])
 
 
@@ -52,7 +52,7 @@ def _no_observation_stays(monkeypatch):
     monkeypatch.setattr(registry, "_OBSERVATIONS", dict(registry._OBSERVATIONS))
 
 
-def always_zero(look):
+def always_zero(view):
     return 0
 
 
@@ -75,15 +75,15 @@ def test_an_observation_of_ones_own_is_known_by_its_name():
             "'paper' is the name of a built-in observation, which",
         ),
         ({"n_states": 0}, "n_states of 'mine' is 0; it must lie between 1"),
-        ({"row": 3}, "row of 'mine' is 3; it must be a function of one argument"),
-        ({"row": lambda look, more: 0}, "it must be a function of one argument"),
+        ({"encode": 3}, "encode of 'mine' is 3; it must be a function of one argument"),
+        ({"encode": lambda view, more: 0}, "it must be a function of one argument"),
         ({"cells": (0, 1)}, r"cells of 'mine' is \(0, 1\); it must be a tuple of -1, 0 and 1"),
         ({"cells": None}, "cells of 'mine' is None; it must be a tuple"),
         ({"cells": [-1, 0, 1]}, r"cells of 'mine' is \[-1, 0, 1\]; it must be a tuple"),
         ({"summary": 5}, "summary of 'mine' is 5; it must be text"),
         ({"name_of": 5}, "observation 'mine' cannot be used: name_of fails"),
-        ({"name_of": int}, "name_of fails .the name of row 0 is 0; it must be text.;"),
-        ({"n_states": 9999, "name_of": lambda row: "abc"[row % 9998]}, "name_of fails"),
+        ({"name_of": int}, "name_of fails .the name of state 0 is 0; it must be text.;"),
+        ({"n_states": 9999, "name_of": lambda encode: "abc"[encode % 9998]}, "name_of fails"),
         ({"cells": (-1, 0, 1, 1)}, "each once"),
         ({"cells": (-1, 0, 1, 4)}, "may hold -2, 2 and 3"),
     ],

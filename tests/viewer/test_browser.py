@@ -632,7 +632,7 @@ def test_frames_per_second(browser, folder):
     """A hundred thousand cells and five thousand ants, drawn without a graphics processor."""
     world = worlds.open_world(1, (183, 183, 183))
     config = TrainingConfig("sarsa", 0.01, 0.9, 0.05, 1.0)
-    rules = {"sharing": "fixed", "q_values": trail_follower(), "start": "spread"}
+    rules = {"sharing": "frozen", "q_values": trail_follower(), "start": "spread"}
     many = Colony(world, None, config, ants=5000, **rules)
     many.begin_episode()
     opened = Page(browser, written(folder, "large", record_colony(many, 100)))
@@ -685,7 +685,7 @@ def test_what_lies_between_moments_is_not_made_up(browser, folder):
     rules = TrainingConfig("q_learning", 0.2, 0.9, 0.2, 1.0)
     one = Colony(worlds.paper(), Task("queues", life=Life(births=True)), rules)
     one.begin_episode()
-    recording = record_colony(one, 60, every=10)
+    recording = record_colony(one, 60, frame_interval=10)
     assert recording.header["title"].startswith("Ants in a world of ")
     opened = Page(browser, written(folder, "thinned", recording))
     opened.read("viewer.player.go(6)")

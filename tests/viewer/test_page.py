@@ -145,7 +145,7 @@ def test_the_command_writes_pages(tmp_path, capsys):
     [
         (["episode", "--size", "300x300"], "--size is of pictures"),
         (["colony", "--fps", "9"], "--fps is of pictures"),
-        (["episode", "--plain"], "--plain is of pictures"),
+        (["episode", "--no-overlay"], "--no-overlay is of pictures"),
     ],
 )
 def test_options_of_pictures_are_refused(arguments, message, capsys):

@@ -34,8 +34,8 @@ from taichi_ants.viewer import (
 KERNELS = [
     ("q_learning", "shared", "paper", False, "blocking"),
     pytest.param("sarsa", "shared", "ants_seen", True, "blocking", marks=pytest.mark.slow),
-    ("sarsa", "own", "paper", False, "blocking"),
-    pytest.param("q_learning", "fixed", "queues", True, "following", marks=pytest.mark.slow),
+    ("sarsa", "independent", "paper", False, "blocking"),
+    pytest.param("q_learning", "frozen", "queues", True, "following", marks=pytest.mark.slow),
 ]
 TICKS = 40
 
@@ -60,7 +60,7 @@ def test_a_recording_is_what_engine_and_reference_do(learner, sharing, sees, den
         colony.begin_episode(TICKS)
         plain.begin_episode()
         recorder = Recorder(colony)
-        frames = [recorder.moment()]
+        frames = [recorder.snapshot()]
         transitions = [[]]
         for tick in range(TICKS + 1):
             snapshots.append(colony.snapshot())
@@ -97,7 +97,7 @@ def test_a_recording_is_what_engine_and_reference_do(learner, sharing, sees, den
                 assert before.numbers.tolist() == [one.number for one in did]
                 assert moment.actions.tolist() == [one.action for one in did]
                 assert rewards[moment.events].tolist() == [one.reward for one in did]
-                assert len(moment.td_errors) == (len(did) if sharing != "fixed" else 0)
+                assert len(moment.td_errors) == (len(did) if sharing != "frozen" else 0)
             before = moment
 
 
@@ -162,20 +162,20 @@ def test_what_is_skipped_and_what_is_changed_by_hand():
         worlds.paper(),
         None,
         TrainingConfig("sarsa", 1.0, 0.0, 0.0, 1.0, min_epsilon=0),
-        sharing="fixed",
+        sharing="frozen",
         q_values=trail_follower(),
     )
     colony.begin_episode()
     recorder = Recorder(colony)
-    frames = [recorder.moment(), recorder.tick(5)]
+    frames = [recorder.snapshot(), recorder.tick(5)]
     colony.arrays["ground"][colony.grid.index((3, 0, 1))] = 5
-    frames += [recorder.moment(), recorder.tick()]
+    frames += [recorder.snapshot(), recorder.tick()]
     moments = list(played(Recording(recorder.header(), frames)))
     assert [moment.clock[1] for moment in moments] == [0, 5, 5, 6]
     assert [len(moment.actions) for moment in moments] == [0, 0, 0, 1]
     assert np.array_equal(moments[-1].ground, colony.snapshot().ground)
     assert np.array_equal(moments[-1].trail, colony.snapshot().trail)
-    every = record_colony(colony, 7, every=3)
+    every = record_colony(colony, 7, frame_interval=3)
     assert [every.sections(k)["clock"][1] for k in range(4)] == [6, 9, 12, 13]
 
 

@@ -97,13 +97,13 @@ class EpisodeBounds:
         # Without food.
         trail = in_view(around.trail)
         lured = (trail >= 1) & (2 * trail >= trail.max(axis=0))
-        moved = np.where(lured, paid.lure, paid.empty)
+        moved = np.where(lured, paid.shaping, paid.empty)
         follows[:3, :half] = around.moves(around.empty)
         self._rewards[:3, :half] = np.where(in_view(around.empty), moved, paid.failed)
         seen = in_view(food).sum(axis=0)
         self._rewards[PICK_UP, :half][seen > 0] = paid.pick_up
         # With each food, whose cell is empty now.
-        moved = in_view(np.where(around.nearer, paid.lure, paid.empty))
+        moved = in_view(np.where(around.nearer, paid.shaping, paid.empty))
         gives = around.sees(around.queen)
         picks = []
         for number, taken in enumerate(foods, start=1):
@@ -112,7 +112,7 @@ class EpisodeBounds:
             follows[:3, carrying] = carrying.start + around.moves(can_enter)
             self._rewards[:3, carrying] = np.where(in_view(can_enter), moved, paid.failed)
             follows[GIVE, carrying.start + gives] = n - 1
-            self._rewards[GIVE, carrying.start + gives] = paid.give
+            self._rewards[GIVE, carrying.start + gives] = paid.deliver
             takes = around.sees(food & (around.neighbours == taken))
             picks.append((takes, carrying.start + around.turned_round(takes)))
         # A pick-up takes any of the foods in view.

@@ -39,8 +39,8 @@ class Series:
         measure: A name in `MEASURES`.
         against: With how many ants of the second each number of ants of the first is compared:
             with the same number or with each smaller one.
-        least: The smallest number of ants that is compared with the same. For one ant all ways are
-            alike, and so are rules for several.
+        least: The smallest number of ants that is compared with the same. For one ant all regimes
+            are alike, and so are rules for several.
         main: Whether it is one of the main findings.
     """
 
@@ -53,18 +53,18 @@ class Series:
     least: int = 2
     main: bool = False
 
-    def contrasts(self, measured: Measured, arena: str) -> dict[Sizes, Contrast]:
-        """The contrasts of an arena; none where conditions are missing."""
+    def contrasts(self, measured: Measured, world_kind: str) -> dict[Sizes, Contrast]:
+        """The contrasts of a kind of world; none where conditions are missing."""
         found = {}
-        for n, other in self._sizes(measured, arena):
-            values = measured[Condition(arena, *self.first, n)][self.measure]
-            subtracted = measured[Condition(arena, *self.second, other)][self.measure]
+        for n, other in self._sizes(measured, world_kind):
+            values = measured[Condition(world_kind, *self.first, n)][self.measure]
+            subtracted = measured[Condition(world_kind, *self.second, other)][self.measure]
             found[n, other] = Contrast(self.statement, values - subtracted, above())
         return found
 
-    def _sizes(self, measured: Measured, arena: str) -> list[Sizes]:
+    def _sizes(self, measured: Measured, world_kind: str) -> list[Sizes]:
         sizes, others = (
-            sorted(one.ants for one in measured if one[:3] == (arena, *design))
+            sorted(one.ants for one in measured if one[:3] == (world_kind, *design))
             for design in (self.first, self.second)
         )
         if self.against == "smaller":
@@ -118,27 +118,28 @@ SERIES: tuple[Series, ...] = (
 # fmt: on
 
 QUESTIONS: tuple[str, ...] = tuple(dict.fromkeys(series.question for series in SERIES))
-# By the name of the arena and the series.
+# By the name of the kind of world and the series.
 Judged = dict[tuple[str, Series], dict[Sizes, Finding]]
 
 
 def judge_all(measured: Measured) -> Judged:
-    """Return the findings on all contrasts; those of one question in one arena are judged together.
+    """Return the findings on all contrasts; those of one question in one kind of world are judged
+    together.
 
     With fewer than `LEAST_SEEDS` seeds none has a verdict.
     """
     judged: Judged = {}
-    for arena in dict.fromkeys(one.arena for one in measured):
+    for world_kind in dict.fromkeys(one.world_kind for one in measured):
         for question in QUESTIONS:
             contrasts = {
                 (series, sizes): contrast
                 for series in SERIES
                 if series.question == question
-                for sizes, contrast in series.contrasts(measured, arena).items()
+                for sizes, contrast in series.contrasts(measured, world_kind).items()
             }
             findings = judge(list(contrasts.values()))
             for (series, sizes), finding in zip(contrasts, findings, strict=True):
                 if finding.contrast.seeds < LEAST_SEEDS:
                     finding = replace(finding, verdict=Verdict.TOO_FEW)
-                judged.setdefault((arena, series), {})[sizes] = finding
+                judged.setdefault((world_kind, series), {})[sizes] = finding
     return judged

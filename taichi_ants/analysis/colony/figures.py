@@ -11,7 +11,6 @@ from taichi_ants.analysis.colony.study import (
     ABC,
     ABROAD,
     ALONE,
-    ARENAS,
     BC,
     EVALUATION_EPSILON,
     FEW,
@@ -21,6 +20,7 @@ from taichi_ants.analysis.colony.study import (
     QUEUES,
     RULES,
     SOME,
+    WORLD_KINDS,
     WORLDS,
     A,
     Design,
@@ -51,7 +51,9 @@ def rules(rows: Rows) -> Figure | None:
 
 def training(rows: Rows) -> Figure | None:
     """What the largest colony delivers after training with so many ants."""
-    designs = [Design(rules, way) for rules in (PAPER, ABC) for way in (ALONE, FEW, SOME, JOINT)]
+    designs = [
+        Design(rules, regime) for rules in (PAPER, ABC) for regime in (ALONE, FEW, SOME, JOINT)
+    ]
     return _dots(rows, designs, "With how many ants to train")
 
 
@@ -76,22 +78,22 @@ FIGURES: dict[str, Callable[[Rows], Figure | None]] = {
 
 
 def _dots(rows: Rows, designs: Sequence[Design], title: str) -> Figure | None:
-    """Deliveries of the largest colonies, a line for each design, a panel for each arena."""
+    """Deliveries of the largest colonies, a line per design, a panel per kind of world."""
     panels: dict[str, dict[Design, ConditionRow]] = {}
     for row in sorted(rows, key=lambda row: row.condition.ants):
         if row.design in designs:  # larger colonies come later
-            panels.setdefault(row.condition.arena, {})[row.design] = row
+            panels.setdefault(row.condition.world_kind, {})[row.design] = row
     if not panels:
         return None
     across = min(3, len(panels))
     down = -(-len(panels) // across)
-    alike = len({one.way for one in designs}) == 1  # then the title says it
+    alike = len({one.regime for one in designs}) == 1  # then the title says it
     names = [RULES[one.rules] if alike else one.words for one in designs]
     with style.styled():
         figure = style.new_figure(1.3 + down * (0.9 + 0.28 * len(designs)))
         axes = figure.subplots(down, across, sharey=True, squeeze=False)
-        for axis, (arena, lines) in zip(axes.flat, panels.items(), strict=False):
-            axis.set_title(textwrap.fill(sentence(WORLDS[arena]), 32), fontsize=9)
+        for axis, (world_kind, lines) in zip(axes.flat, panels.items(), strict=False):
+            axis.set_title(textwrap.fill(sentence(WORLDS[world_kind]), 32), fontsize=9)
             for design, row in lines.items():
                 _dot(axis, designs.index(design), row)
             axis.set_xlim(left=0)
@@ -113,13 +115,13 @@ def _dots(rows: Rows, designs: Sequence[Design], title: str) -> Figure | None:
 
 def _dot(axis: Axes, place: int, row: ConditionRow) -> None:
     """The mean with its interval, value and range over seeds, and the bounds where known."""
-    mean, low, high, *_ = row.centres["deliveries"]
+    mean, low, high, *_ = row.estimates["deliveries"]
     colour = style.COLOURS[place % len(style.COLOURS)]
     axis.hlines(place, low, high, color=colour, lw=3)
     axis.plot(mean, place, "o", color=colour)
     axis.hlines(place, *row.ranges["deliveries"], color=colour, lw=0.8)
     axis.hlines(place, *row.ranges["bound"], color=style.GREY, lw=3, alpha=0.5)
-    axis.plot(row.centres["bound"].mean, place, "|", color=style.GREY, ms=12, mew=2)
+    axis.plot(row.estimates["bound"].mean, place, "|", color=style.GREY, ms=12, mew=2)
     axis.annotate(
         f"{mean:.0f}", (mean, place), (0, 5), textcoords="offset points", ha="center", fontsize=8
     )
@@ -128,21 +130,25 @@ def _dot(axis: Axes, place: int, row: ConditionRow) -> None:
 def _lines(
     rows: Rows, designs: Sequence[Design], measures: Sequence[str], title: str
 ) -> Figure | None:
-    """Measures against the number of ants, a column of panels for each arena."""
-    arenas = [one for one in ARENAS if any(row.condition.arena == one for row in rows)]
-    if not arenas:
+    """Measures against the number of ants, a column of panels for each kind of world."""
+    world_kinds = [
+        one for one in WORLD_KINDS if any(row.condition.world_kind == one for row in rows)
+    ]
+    if not world_kinds:
         return None
     with style.styled():
         figure = style.new_figure(5.6)
-        shape = len(measures), len(arenas)
+        shape = len(measures), len(world_kinds)
         axes = figure.subplots(*shape, sharex="col", sharey="row", squeeze=False)
         for line_of_axes, measure in zip(axes, measures, strict=True):
             line_of_axes[0].set_ylabel(textwrap.fill(sentence(MEASURES[measure]), 30))
-            for axis, arena in zip(line_of_axes, arenas, strict=True):
-                of_arena = [row for row in rows if row.condition.arena == arena]
-                draw_lines(axis, {one.words: _points(of_arena, one, measure) for one in designs})
-        for column, arena in zip(axes.T, arenas, strict=True):
-            column[0].set_title(sentence(ARENAS[arena]), fontsize=9)
+            for axis, world_kind in zip(line_of_axes, world_kinds, strict=True):
+                of_world_kind = [row for row in rows if row.condition.world_kind == world_kind]
+                draw_lines(
+                    axis, {one.words: _points(of_world_kind, one, measure) for one in designs}
+                )
+        for column, world_kind in zip(axes.T, world_kinds, strict=True):
+            column[0].set_title(sentence(WORLD_KINDS[world_kind]), fontsize=9)
             column[-1].set_xlabel("Ants")
         style.frame(figure, title, _spread(rows), style.legend_entries(axes.flat))
     return figure
@@ -157,4 +163,6 @@ def _spread(rows: Rows) -> str:
 
 def _points(rows: Rows, design: Design, measure: str) -> list[tuple[float, ...]]:
     """The number of ants, the mean and the ends of its interval, of each condition of a design."""
-    return [(row.condition.ants, *row.centres[measure][:3]) for row in rows if row.design == design]
+    return [
+        (row.condition.ants, *row.estimates[measure][:3]) for row in rows if row.design == design
+    ]

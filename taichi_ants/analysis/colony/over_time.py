@@ -18,7 +18,7 @@ COLUMNS = ("from_tick", "to_tick", "foods_per_tick", "blocked")
 Rates = Sequence[Mapping[str, float]]
 
 
-class Moment(NamedTuple):
+class Totals(NamedTuple):
     """What has happened until a tick: foods delivered, moves tried, and those of them blocked."""
 
     tick: int
@@ -27,10 +27,10 @@ class Moment(NamedTuple):
     blocked: int
 
 
-def rates(moments: Sequence[Moment]) -> Rates:
-    """A row for each span between two moments: its ticks, foods per tick, blocked share."""
+def rates(totals: Sequence[Totals]) -> Rates:
+    """A row for each span between two totals: its ticks, foods per tick, blocked share."""
     rows = []
-    for one, next_ in pairwise(moments):
+    for one, next_ in pairwise(totals):
         ticks, deliveries, moves, blocked = (b - a for a, b in zip(one, next_, strict=True))
         row = one.tick, next_.tick, deliveries / ticks, blocked / max(1, moves)
         rows.append(dict(zip(COLUMNS, row, strict=True)))

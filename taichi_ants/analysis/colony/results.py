@@ -28,7 +28,7 @@ class Results(NamedTuple):
         """Return the same from the rows of seeds.csv."""
         by_condition: dict[Condition, list[Mapping]] = {}
         for row in seeds:
-            condition = Condition(row["arena"], row["rules"], row["way"], int(row["ants"]))
+            condition = Condition(row["world_kind"], row["rules"], row["regime"], int(row["ants"]))
             by_condition.setdefault(condition, []).append(row)
         return cls.of(
             {  # an empty field is None, which is nan as a float

@@ -1,8 +1,8 @@
 """What the study of the colony compares, and what it measures.
 
 A condition is so many ants of a design in one kind of world. A design is the rules of the game and
-a way to come to a policy. Seeds are the unit of all statistics; they pair the conditions of an
-arena, since a seed gives all of them the same world. But in the paper's world, ants are evaluated
+a training regime. Seeds are the unit of all statistics; they pair the conditions of a kind of
+world, since a seed gives all of them the same world. But in the paper's world, ants are evaluated
 in worlds that none has seen before.
 """
 
@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 # Kinds of world in which ants are trained and evaluated, with the words of tables and figures.
-ARENAS: dict[str, str] = {
+WORLD_KINDS: dict[str, str] = {
     "paper": "the paper's world",
     "open": "open worlds (30, 30, 30)",
     "piles": "three far piles (30, 30, 30)",
@@ -29,7 +29,7 @@ ELSEWHERES: dict[str, str] = {
     "wide": "wide worlds (60, 60, 60)",
     "large": "large worlds (100, 100, 100), 1000 ants",
 }
-WORLDS = {**ARENAS, **ELSEWHERES}
+WORLDS = {**WORLD_KINDS, **ELSEWHERES}
 
 # Rules of the game: A, trails that rise towards food; B, right of way; C, ants in view.
 PAPER, SILENT, A, BC, ABC, ABC_SILENT, QUEUES = (
@@ -47,7 +47,7 @@ RULES: dict[str, str] = {
 }
 # Ways to come to a policy.
 JOINT, ALONE, FEW, SOME, ABROAD = "joint", "alone", "with_4", "with_16", "open"
-WAYS: dict[str, str] = {
+REGIMES: dict[str, str] = {
     JOINT: "trained jointly",
     ALONE: "trained alone, copied",
     FEW: "trained with 4",
@@ -57,24 +57,24 @@ WAYS: dict[str, str] = {
 
 
 class Design(NamedTuple):
-    """Names in `RULES` and `WAYS`."""
+    """Names in `RULES` and `REGIMES`."""
 
     rules: str
-    way: str = JOINT
+    regime: str = JOINT
 
     @property
     def words(self) -> str:
         """What tables call it."""
         rules = RULES[self.rules]
-        return rules if self.way == JOINT else f"{rules}, {WAYS[self.way]}"
+        return rules if self.regime == JOINT else f"{rules}, {REGIMES[self.regime]}"
 
 
 class Condition(NamedTuple):
     """What was evaluated: a name in `WORLDS`, a design, and how many ants."""
 
-    arena: str
+    world_kind: str
     rules: str
-    way: str
+    regime: str
     ants: int
 
 
@@ -84,7 +84,7 @@ MEASURES: dict[str, str] = {
     "deliveries": "deliveries per 1000 ticks",
     "per_ant": "deliveries per ant and 1000 ticks",
     "first_delivery": "ticks to the first delivery",
-    "fruitless": "share of episodes without a delivery",
+    "no_delivery_rate": "share of episodes without a delivery",
     "blocked": "share of blocked moves",
     "reward": "reward per ant and 1000 ticks",
 }
@@ -104,7 +104,7 @@ def measures_of(outcome: Mapping[str, np.ndarray], ants: int, ticks: int) -> dic
 
     An episode without a delivery counts with all its ticks for `first_delivery`: the mean is that
     of the time to the first delivery or the end, whichever comes first (the restricted mean of
-    survival analysis), and never too large. `fruitless` tells how often this was so.
+    survival analysis), and never too large. `no_delivery_rate` tells how often this was so.
 
     Args:
         outcome: That of a `ColonyPoint`, integer arrays (seeds, episodes) by name.
@@ -120,7 +120,7 @@ def measures_of(outcome: Mapping[str, np.ndarray], ants: int, ticks: int) -> dic
         "deliveries": deliveries,
         "per_ant": deliveries / ants,
         "first_delivery": np.where(first < 0, ticks, first).mean(axis=1),
-        "fruitless": (first < 0).mean(axis=1),
+        "no_delivery_rate": (first < 0).mean(axis=1),
         "blocked": outcome["blocked"].sum(axis=1) / np.maximum(moves, 1.0),
         "reward": rewards / ants,
     }

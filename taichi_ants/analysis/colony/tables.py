@@ -13,20 +13,20 @@ from taichi_ants.analysis.colony.study import (
     ABC,
     ABROAD,
     ALONE,
-    ARENAS,
     EVALUATION_EPSILON,
     MEASURES,
     OF_STUDY,
     PAPER,
+    REGIMES,
     RULES,
-    WAYS,
+    WORLD_KINDS,
     WORLDS,
     Condition,
     Design,
     Measured,
 )
 from taichi_ants.analysis.findings import Finding, Verdict, seeds_in_words, weakest
-from taichi_ants.analysis.sweeps import Centre, centre_columns, centres_of, seed_rows
+from taichi_ants.analysis.sweeps import Estimator, centre_columns, centres_of, seed_rows
 from taichi_ants.analysis.tables import (
     MISSING,
     Block,
@@ -56,26 +56,26 @@ class ConditionRow(NamedTuple):
     Attributes:
         condition: The condition.
         seeds: The number of seeds.
-        centres: The measures of `OF_STUDY` over seeds.
+        estimates: The measures of `OF_STUDY` over seeds.
         ranges: The least and the greatest value of deliveries and bounds over seeds.
     """
 
     condition: Condition
     seeds: int
-    centres: Mapping[str, Centre]
+    estimates: Mapping[str, Estimator]
     ranges: Mapping[str, tuple[float, float]]
 
     @property
     def design(self) -> Design:
         """Its rules and the way to its policy."""
-        return Design(self.condition.rules, self.condition.way)
+        return Design(self.condition.rules, self.condition.regime)
 
     def columns(self) -> dict[str, Any]:
         """Return the columns of conditions.csv."""
         return {
             **self.condition._asdict(),
             "seeds": self.seeds,
-            **centre_columns(self.centres),
+            **centre_columns(self.estimates),
             **{
                 f"{name}_{end}": value
                 for name, ends in self.ranges.items()
@@ -91,20 +91,20 @@ def condition_rows(measured: Measured) -> list[ConditionRow]:
         ConditionRow(
             condition,
             seeds,
-            centres,
+            estimates,
             {n: (float(one[n].min()), float(one[n].max())) for n in ("deliveries", "bound")},
         )
-        for (condition, one), centres in zip(
+        for (condition, one), estimates in zip(
             measured.items(), centres_of(_stacked(measured)), strict=True
         )
     ]
 
 
 def difference_rows(judged: Judged) -> list[dict[str, Any]]:
-    """The rows of differences.csv; the intervals of one question in one arena hold all at once."""
+    """The rows of differences.csv; intervals of a question in a kind of world hold together."""
     return [
         {
-            "arena": arena,
+            "world_kind": world_kind,
             "question": series.question,
             "statement": series.statement,
             "measure": series.measure,
@@ -115,7 +115,7 @@ def difference_rows(judged: Judged) -> list[dict[str, Any]]:
             "high": finding.high,
             "verdict": finding.verdict.value,
         }
-        for (arena, series), findings in judged.items()
+        for (world_kind, series), findings in judged.items()
         for (ants, against), finding in findings.items()
     ]
 
@@ -123,12 +123,16 @@ def difference_rows(judged: Judged) -> list[dict[str, Any]]:
 def means(rows: Sequence[ConditionRow]) -> list[Table]:
     """Return tables of mean deliveries.
 
-    One for each arena in which ants were trained, designs down, ants across; then one of the
-    policies of open worlds in others, with intervals and the worst seed.
+    One for each kind of world in which ants were trained, designs down, ants across; then one of
+    the policies of open worlds in others, with intervals and the worst seed.
     """
     tables, seeds = [], f"{_basis(rows)}: {MEASURES['deliveries']}"
-    for arena in ARENAS:
-        here = [one for one in rows if one.condition.arena == arena and one.design.way != ABROAD]
+    for world_kind in WORLD_KINDS:
+        here = [
+            one
+            for one in rows
+            if one.condition.world_kind == world_kind and one.design.regime != ABROAD
+        ]
         sizes = sorted({one.condition.ants for one in here})
         lines: dict[Design, dict[int, ConditionRow]] = {}
         for one in here:
@@ -136,9 +140,9 @@ def means(rows: Sequence[ConditionRow]) -> list[Table]:
         cells = []
         for design, by_size in lines.items():
             delivered = (
-                by_size[n].centres["deliveries"].mean if n in by_size else None for n in sizes
+                by_size[n].estimates["deliveries"].mean if n in by_size else None for n in sizes
             )
-            largest = list(by_size.values())[-1].centres
+            largest = list(by_size.values())[-1].estimates
             share, bound = (largest[name].mean for name in ("of_bound", "bound"))
             cells.append([design.words, *map(figure, delivered), percent(share), figure(bound)])
         if cells:
@@ -147,17 +151,17 @@ def means(rows: Sequence[ConditionRow]) -> list[Table]:
                 f"Of {count(sizes[-1], 'ant')}: the mean share of each world's own bound, and the "
                 "mean of the bounds."
             )
-            title = f"{sentence(ARENAS[arena])}, {seeds}"
+            title = f"{sentence(WORLD_KINDS[world_kind])}, {seeds}"
             tables.append(Table(title, headers, cells, [note]))
-    abroad = [one for one in rows if one.design.way == ABROAD]
+    abroad = [one for one in rows if one.design.regime == ABROAD]
     if abroad:
         rules = list(dict.fromkeys(one.condition.rules for one in abroad))
         there: dict[str, dict[str, str]] = {}
         for one in abroad:
-            there.setdefault(one.condition.arena, {})[one.condition.rules] = _spread(one)
+            there.setdefault(one.condition.world_kind, {})[one.condition.rules] = _spread(one)
         cells = [[WORLDS[a], *(by[name] for name in rules)] for a, by in there.items()]
         headers = ("world", *(RULES[name] for name in rules))
-        title = f"{sentence(WAYS[ABROAD])}, {count(abroad[0].condition.ants, 'ant')}, {seeds}"
+        title = f"{sentence(REGIMES[ABROAD])}, {count(abroad[0].condition.ants, 'ant')}, {seeds}"
         note = "Mean, its 95 % interval, and the worst seed."
         tables.append(Table(title, headers, cells, [note]))
     return tables
@@ -170,40 +174,48 @@ def _basis(rows: Sequence[ConditionRow]) -> str:
 
 def _spread(row: ConditionRow) -> str:
     """A mean with its interval, and the worst seed."""
-    mean, low, high, *_ = row.centres["deliveries"]
+    mean, low, high, *_ = row.estimates["deliveries"]
     return f"{figure(mean)} {interval(low, high, 0)}, {figure(row.ranges['deliveries'][0])}"
 
 
 def glance(rows: Sequence[ConditionRow]) -> Table:
-    """Return what the largest colonies deliver: designs down, arenas across.
+    """Return what the largest colonies deliver: designs down, kinds of world across.
 
     It has no rows where none are trained.
     """
-    largest = max((one.condition.ants for one in rows if one.design.way != ABROAD), default=0)
+    largest = max((one.condition.ants for one in rows if one.design.regime != ABROAD), default=0)
     shown = {
-        (one.condition.arena, one.design): one
+        (one.condition.world_kind, one.design): one
         for one in rows
-        if one.condition.ants == largest and one.condition.arena in ARENAS
+        if one.condition.ants == largest and one.condition.world_kind in WORLD_KINDS
     }
     designs = [Design(PAPER, ALONE), *(Design(rules) for rules in RULES), Design(ABC, ALONE)]
-    arenas = [arena for arena in ARENAS if any(place == arena for place, _ in shown)]
-    most = max((one.centres["deliveries"].mean for one in shown.values()), default=0)
+    world_kinds = [
+        world_kind for world_kind in WORLD_KINDS if any(place == world_kind for place, _ in shown)
+    ]
+    most = max((one.estimates["deliveries"].mean for one in shown.values()), default=0)
     digits = 0 if most >= 100 else 1
     cells = [
-        [sentence(one.words), *(_delivered(shown.get((arena, one)), digits) for arena in arenas)]
+        [
+            sentence(one.words),
+            *(_delivered(shown.get((world_kind, one)), digits) for world_kind in world_kinds),
+        ]
         for one in designs
-        if any((arena, one) in shown for arena in arenas)
+        if any((world_kind, one) in shown for world_kind in world_kinds)
     ]
     if cells:  # most is possible where ants with food have right of way
         bounds = [
             max(
-                (one for (place, _), one in shown.items() if place == arena),
-                key=lambda one: one.centres["bound"].mean,
+                (one for (place, _), one in shown.items() if place == world_kind),
+                key=lambda one: one.estimates["bound"].mean,
             )
-            for arena in arenas
+            for world_kind in world_kinds
         ]
         cells.append(["Mean bound, right of way [range]", *map(_bounds, bounds)])
-    headers = ("", *(sentence(ARENAS[arena]).replace(" (", "\n(") for arena in arenas))
+    headers = (
+        "",
+        *(sentence(WORLD_KINDS[world_kind]).replace(" (", "\n(") for world_kind in world_kinds),
+    )
     title = f"{sentence(MEASURES['deliveries'])} of {count(largest, 'ant')}"
     note = f"{_basis(rows)}; in brackets: 0. %: of each world's own bound."
     return Table(title, headers, cells, [note] if cells else [])
@@ -213,36 +225,41 @@ def _delivered(row: ConditionRow | None, digits: int) -> str:
     """Deliveries with and without exploration, and the share of the bounds."""
     if row is None:
         return MISSING
-    with_, without = (number(row.centres[name].mean, digits) for name in ("deliveries", "greedy"))
-    return f"{with_} ({without}), {percent(row.centres['of_bound'].mean)}"
+    with_, without = (number(row.estimates[name].mean, digits) for name in ("deliveries", "greedy"))
+    return f"{with_} ({without}), {percent(row.estimates['of_bound'].mean)}"
 
 
 def _bounds(row: ConditionRow) -> str:
     """The mean of the worlds' bounds, with their range where they differ."""
     low, high = row.ranges["bound"]
     range_ = "" if low == high else f" {interval(low, high, 0)}"
-    return figure(row.centres["bound"].mean) + range_
+    return figure(row.estimates["bound"].mean) + range_
 
 
 def headlines(rows: Sequence[ConditionRow], judged: Judged) -> Table:
-    """Return the main findings on the largest colonies: statements down, arenas across."""
-    by_condition = {one.condition: one.centres for one in rows}
-    arenas = [one for one in ARENAS if any(arena == one and s.main for arena, s in judged)]
+    """Return the main findings on the largest colonies: statements down, kinds of world across."""
+    by_condition = {one.condition: one.estimates for one in rows}
+    world_kinds = [
+        one for one in WORLD_KINDS if any(world_kind == one and s.main for world_kind, s in judged)
+    ]
     cells = []
     for series in [one for one in SERIES if one.main]:
         line = []
-        for arena in arenas:
-            n = max((ants for ants, _ in judged.get((arena, series), {})), default=1)
+        for world_kind in world_kinds:
+            n = max((ants for ants, _ in judged.get((world_kind, series), {})), default=1)
             if n > 1:
                 means = (
-                    figure(by_condition[Condition(arena, *design, n)][series.measure].mean)
+                    figure(by_condition[Condition(world_kind, *design, n)][series.measure].mean)
                     for design in (series.first, series.second)
                 )
-                verdict = judged[arena, series][n, n].verdict.value
+                verdict = judged[world_kind, series][n, n].verdict.value
                 line.append(f"{verdict}\n{n}: {' against '.join(means)}")
-        if len(line) == len(arenas) > 0:
+        if len(line) == len(world_kinds) > 0:
             cells.append([sentence(series.statement), *line])
-    headers = ("Statement", *(sentence(ARENAS[arena]).replace(" (", "\n(") for arena in arenas))
+    headers = (
+        "Statement",
+        *(sentence(WORLD_KINDS[world_kind]).replace(" (", "\n(") for world_kind in world_kinds),
+    )
     note = (
         "Below the verdict: the number of ants, and the means compared, in "
         f"{MEASURES['deliveries']}. {_basis(rows)}."
@@ -254,8 +271,8 @@ def on_one_screen(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
     """Return deliveries at a glance, the main findings, and how many statements hold."""
     seen = glance(rows)
     tables = [seen] if seen.rows else means(rows)
-    arenas = {one.condition.arena for one in rows}
-    conditions = f"{count(len(rows), 'condition')} in {count(len(arenas), 'kind')} of world"
+    world_kinds = {one.condition.world_kind for one in rows}
+    conditions = f"{count(len(rows), 'condition')} in {count(len(world_kinds), 'kind')} of world"
     sizes = f"{conditions}, {seeds_in_words(rows[0].seeds)}."
     return [sizes, *tables, headlines(rows, judged), tallies(judged)]
 
@@ -286,18 +303,18 @@ _HEADERS = ("World", "Statement", *(f"{sentence(one)}\nwith" for one in _SHOWN),
 
 
 def found(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
-    """Return the findings: a table for each question, a line for each series in each arena."""
+    """Return the findings: a table per question, a line per series and kind of world."""
     blocks: list[Block] = []
-    centres = {one.condition: one.centres for one in rows}
+    estimates = {one.condition: one.estimates for one in rows}
     for question in QUESTIONS:
         lines, units, shown = [], [], ""
-        for (arena, series), findings in judged.items():
+        for (world_kind, series), findings in judged.items():
             if series.question == question:
-                world = "" if arena == shown else sentence(WORLDS[arena])
-                verdicts = _verdicts(centres, arena, series, findings)
+                world = "" if world_kind == shown else sentence(WORLDS[world_kind])
+                verdicts = _verdicts(estimates, world_kind, series, findings)
                 lines.append([world, sentence(series.statement), *verdicts])
                 units.append(MEASURES[series.measure])
-                shown = arena
+                shown = world_kind
         what = f"{sentence(' or '.join(dict.fromkeys(units)))}, as the statement says"
         notes = [f"{what}; {_basis(rows)}."]
         if lines:
@@ -311,8 +328,8 @@ def found(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
 
 
 def _verdicts(
-    centres: Mapping[Condition, Mapping[str, Centre]],
-    arena: str,
+    estimates: Mapping[Condition, Mapping[str, Estimator]],
+    world_kind: str,
     series: Series,
     findings: Mapping[Sizes, Finding],
 ) -> list[str]:
@@ -325,8 +342,8 @@ def _verdicts(
     cells = [", ".join(map(str, sorted(by_verdict[one]))) or MISSING for one in _SHOWN]
 
     def both(n: int, other: int) -> tuple[float, float]:
-        first = centres[Condition(arena, *series.first, n)][series.measure]
-        second = centres[Condition(arena, *series.second, other)][series.measure]
+        first = estimates[Condition(world_kind, *series.first, n)][series.measure]
+        second = estimates[Condition(world_kind, *series.second, other)][series.measure]
         return first.mean, second.mean
 
     def distance(sizes: Sizes) -> float:

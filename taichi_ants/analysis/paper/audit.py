@@ -27,7 +27,7 @@ def assess(comparison: Comparison, claims: Sequence[Claim] = CLAIMS) -> Audit:
         (claim, delivery): [
             Contrast(
                 *(label, effect(Slice(comparison, delivery)), claim.criterion),
-                *(claim.quantity.typical, claim.quantity.possible, claim.quantity.of_centres),
+                *(claim.quantity.uses_iqm, claim.quantity.possible, claim.quantity.of_estimates),
             )
             for label, effect in claim.quantity.effects.items()
         ]
@@ -56,7 +56,7 @@ def claims_rows(audit: Audit) -> list[dict]:
                 "criterion": claim.criterion.words,
                 "unit": claim.quantity.unit,
                 "delivery": delivery,
-                "centre": claim.centre,
+                "estimator": claim.estimator,
                 **numbers,
                 **{f"mean_{name}": value for name, value in by_mean.items()},
                 "level": one.level,
@@ -120,7 +120,7 @@ def claims_markdown(audit: Audit, world: str) -> str:
     rows = [
         [
             *(claim.id, claim.section, claim.statement, claim.tested_on),
-            f"{claim.centre} {claim.criterion.words} {claim.quantity.unit}",
+            f"{claim.estimator} {claim.criterion.words} {claim.quantity.unit}",
             *map(_effect, findings.values()),
         ]
         for claim, findings in audit.items()
@@ -140,14 +140,14 @@ def claims_markdown(audit: Audit, world: str) -> str:
 _EXPLANATION = """\
 Effects are paired by seed. Where the verdict by the mean is another, it stands behind. Of claims \
 with several contrasts the weakest is shown. Intervals are at {:.3f} % each, so that all hold at \
-once with 95 %. docs/statistics.md says what centres, verdicts and margins mean."""
+once with 95 %. docs/statistics.md explains estimators, verdicts and margins mean."""
 
 
 def _effect(finding: Finding) -> str:
     """Verdict, effect, interval and contrast of a claim; then those by mean where they differ."""
     if finding.verdict is Verdict.NOT_TESTED:
         return finding.verdict.value
-    digits = 1 if finding.contrast.typical else 2
+    digits = 1 if finding.contrast.uses_iqm else 2
     span = interval(finding.low, finding.high, digits)
     text = f"**{finding.verdict.value}** {number(finding.effect, digits)} {span}, "
     text += finding.contrast.label

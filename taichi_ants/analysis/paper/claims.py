@@ -67,9 +67,9 @@ class Claim:
         return f"{text}; {self.why}" if self.why else text
 
     @property
-    def centre(self) -> str:
+    def estimator(self) -> str:
         """What of the seeds must fulfil the criterion."""
-        return "interquartile mean" if self.quantity.typical else "mean"
+        return "interquartile mean" if self.quantity.uses_iqm else "mean"
 
 
 # What is too small to matter. An episode along the shortest path returns 45 reward in 34 steps:

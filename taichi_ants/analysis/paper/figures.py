@@ -73,7 +73,7 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Baseline] = ()) 
             if name == "deliveries":  # a share, of which few hundredths are not to look like much
                 axis.set_ylim(min(0.9, axis.get_ylim()[0]), 1.02)
         for column, setting in zip(axes.T, settings, strict=True):
-            column[0].set_title(f"{setting.capitalize()} delivery")
+            column[0].set_title(f"Delivery {setting}")
             _shortest_delivery(column, baselines)
             column[-1].set_xlabel("Episode")
             logarithmic(column[-1].xaxis, (1,) if comparison.episodes > 50 else (1, 2, 5))
@@ -94,7 +94,7 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Baseli
     """Who earns reward by delivering, and what the others do instead: a mark for each run.
 
     Of the rows of baselines.csv the optimal policies, for which delivery is the end, are shown only
-    in the panel of absorbing delivery.
+    in the panel of deliveries that terminate.
     """
     settings = comparison.delivery_settings
     returns = comparison.measures["return_last50"]
@@ -103,7 +103,7 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Baseli
         figure = new_figure(5.0)
         axes = figure.subplots(1, len(settings), sharex=True, sharey=True, squeeze=False)[0]
         for axis, setting in zip(axes, settings, strict=True):
-            axis.set_title(f"{setting.capitalize()} delivery")
+            axis.set_title(f"Delivery {setting}")
             axis.set_xlabel("Deliveries per episode (last 50)")
             of_setting = np.array([row.delivery == setting for row in comparison.rows])[:, None]
             for code in counts(comparison.behaviours):
@@ -146,7 +146,7 @@ def _baseline_marks(axis: Axes, baselines: Sequence[Baseline], setting: str) -> 
     """Hollow marks, larger than those of the data and above them."""
     for row, marker in zip(baselines, cycle("osD^vph")):
         # Optimal policies take delivery for the end; elsewhere they are no yardstick.
-        counts_here = setting == "absorbing" or row.baseline != "optimal policy"
+        counts_here = setting == "terminates" or row.baseline != "optimal policy"
         x, y = row.deliveries_mean, row.return_mean
         if x is not None and y is not None and counts_here:
             axis.plot(

@@ -49,8 +49,8 @@ class Measure:
     episodes: int = 1
 
     @property
-    def typical(self) -> bool:
-        """Whether it has a typical run (an IQM); a share or a count has a mean only."""
+    def uses_iqm(self) -> bool:
+        """Whether it has an IQM; a share or a count has a mean only."""
         return self.unit in ("reward", "steps")
 
 

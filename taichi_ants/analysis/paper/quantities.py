@@ -132,18 +132,18 @@ class Quantity:
         unit: The unit.
         effects: What reads them, by label, such as "Q-learning minus SARSA".
         possible: The range that the numbers cannot leave.
-        of_centres: As of a `Contrast`; then `effects` read float64 (k, seeds).
+        of_estimates: As of a `Contrast`; then `effects` read float64 (k, seeds).
     """
 
     words: str
     unit: str
     effects: dict[str, Effect]
     possible: tuple[float, float] = UNBOUNDED
-    of_centres: Callable[[np.ndarray], np.ndarray] | None = None
+    of_estimates: Callable[[np.ndarray], np.ndarray] | None = None
 
     @property
-    def typical(self) -> bool:
-        """Whether it rests on the typical run, that is on the IQM over seeds.
+    def uses_iqm(self) -> bool:
+        """Whether it rests on the IQM over seeds.
 
         Quantities in reward or steps do: the paper speaks of what a learner does, and there the
         mean hangs on a run in hundreds that does something else. Shares, counts of deliveries and
@@ -188,7 +188,7 @@ def _quantity(
 ) -> Quantity:
     """A quantity in the unit of a measure; the bounds are those of a share or a count."""
     one = MEASURES[measure]
-    possible = UNBOUNDED if one.typical else bounds
+    possible = UNBOUNDED if one.uses_iqm else bounds
     return Quantity(f"{one.words}, {scope}", one.unit, effects, possible)
 
 
@@ -249,7 +249,7 @@ def stronger(measure: str, factor: str) -> Quantity:
         f"{MEASURES[measure].words}, absolute effect of a hyperparameter, mean of the learners",
         MEASURES[measure].unit,
         {f"{factor} minus {other}".replace("_", " "): effects(other) for other in others},
-        of_centres=lambda centres: _first_minus_second(np.abs(centres), np.mean),
+        of_estimates=lambda estimates: _first_minus_second(np.abs(estimates), np.mean),
     )
 
 
@@ -266,11 +266,11 @@ def more_dependent(measure: str, factor: str, *pairs: tuple[Variant, Variant]) -
         "configurations (jackknife over seeds)",
         MEASURES[measure].unit,
         {f"{one.label} minus {other.label}": effects(one, other) for one, other in pairs},
-        of_centres=lambda centres: _first_minus_second(centres, partial(np.std, ddof=1)),
+        of_estimates=lambda estimates: _first_minus_second(estimates, partial(np.std, ddof=1)),
     )
 
 
-def _first_minus_second(centres: np.ndarray, statistic: Callable[..., Any]) -> np.ndarray:
+def _first_minus_second(estimates: np.ndarray, statistic: Callable[..., Any]) -> np.ndarray:
     """A statistic of the first half of the rows minus that of the second."""
-    first, second = np.split(centres, 2)
+    first, second = np.split(estimates, 2)
     return statistic(first, axis=0) - statistic(second, axis=0)

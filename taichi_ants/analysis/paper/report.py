@@ -81,8 +81,8 @@ def _glance(lines: Sequence[Line]) -> Table:
     headers = ("Learner", "Delivery", *returns, "Steps\nmean", "best\nrun", *paper, "Food\nmean")
     rows = []
     for line in shown:
-        centres, best = line.summary.centres, line.best_run
-        gains = centres["return_last50"]
+        estimates, best = line.summary.estimates, line.best_run
+        gains = estimates["return_last50"]
         rows.append(
             [
                 *(line.label, line.delivery),
@@ -90,18 +90,18 @@ def _glance(lines: Sequence[Line]) -> Table:
                 number(gains.iqm),
                 number(best["return_last50"].median),
                 *([number(line.of_paper("return"))] if beside else []),
-                number(centres["steps_all"].mean),
+                number(estimates["steps_all"].mean),
                 number(best["steps_all"].median),
                 *([number(line.of_paper("steps"))] if beside else []),
-                number(centres["deliveries_last50"].mean, 2),
+                number(estimates["deliveries_last50"].mean, 2),
             ]
         )
     notes = [
         "Return and food of the last 50 episodes, steps of all. IQM: interquartile mean, the "
-        "typical run. Best run: best by return of all configurations, one run each.",
+        "IQM. Best run: best by return of all configurations, one run each.",
     ]
-    if any(line.summary.centres["return_last50"].apart for line in shown):
-        notes.append(f"{APART} a few far runs have moved the mean away from the typical run.")
+    if any(line.summary.estimates["return_last50"].apart for line in shown):
+        notes.append(f"{APART} a few far runs have moved the mean away from the IQM.")
     if any(line.summary.mixed for line in shown):
         notes.append("+ the runs do different things, and no run has their mean.")
     if not all(line.paper_configuration for line in shown):
@@ -134,9 +134,9 @@ def _greedy(lines: Sequence[Line]) -> Table:
     for line in lines:
         cells = [line.label, line.delivery]
         for name in ("greedy_return", "greedy_steps"):
-            one = line.summary.centres[name]
+            one = line.summary.estimates[name]
             cells += [number(one.mean) + (f" {APART}" if one.apart else ""), number(one.iqm)]
-        food = line.summary.centres["greedy_deliveries"].mean
+        food = line.summary.estimates["greedy_deliveries"].mean
         rows.append([*cells, number(food, 2)])
     low, high = GREEDY_STEPS
     note = f"The paper, in its world: about {GREEDY_RETURN:g} reward in {low:g} to {high:g} steps."

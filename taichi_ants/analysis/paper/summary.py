@@ -10,7 +10,7 @@ import numpy as np
 from taichi_ants.analysis.behaviour import BEHAVIOURS, NAMES, counts
 from taichi_ants.analysis.paper.comparison import Comparison, Row
 from taichi_ants.analysis.paper.measures import MEASURES
-from taichi_ants.analysis.sweeps import Centre, centre_columns, centres_of
+from taichi_ants.analysis.sweeps import Estimator, centre_columns, centres_of
 
 _GREEDY = ("greedy_return", "greedy_steps", "greedy_deliveries")
 _MEASURES = ("return_last50", "steps_last50", "steps_all", "deliveries_last50", *_GREEDY)
@@ -22,13 +22,13 @@ class Summary(NamedTuple):
     Attributes:
         row: The configuration.
         seeds: The number of seeds.
-        centres: Measures over seeds, by name.
+        estimates: Measures over seeds, by name.
         runs: The number of runs by what their final policies do, a place in `BEHAVIOURS`.
     """
 
     row: Row
     seeds: int
-    centres: Mapping[str, Centre]
+    estimates: Mapping[str, Estimator]
     runs: Mapping[int, int]
 
     @property
@@ -41,7 +41,7 @@ class Summary(NamedTuple):
         return {
             **self.row.columns(),
             "seeds": self.seeds,
-            **centre_columns(self.centres),
+            **centre_columns(self.estimates),
             **{f"runs_{name}": self.runs.get(code, 0) for code, name in enumerate(NAMES)},
         }
 
@@ -77,12 +77,12 @@ class BehaviourMeans(NamedTuple):
 def summarise(comparison: Comparison) -> list[Summary]:
     """Return a summary of each configuration, in their order."""
     values = {name: comparison.measures[name] for name in _MEASURES}
-    centres = centres_of(values, [name for name in values if MEASURES[name].typical])
+    estimates = centres_of(values, [name for name in values if MEASURES[name].uses_iqm])
     done = map(counts, comparison.behaviours)
     seeds = len(comparison.seeds)
     return [
         Summary(row, seeds, found, runs)
-        for row, found, runs in zip(comparison.rows, centres, done, strict=True)
+        for row, found, runs in zip(comparison.rows, estimates, done, strict=True)
     ]
 
 

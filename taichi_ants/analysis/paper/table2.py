@@ -115,7 +115,7 @@ def table2(comparison: Comparison, summaries: Sequence[Summary], draws: int = DR
 
 
 def _spread(measure: str, middle: float | None, low: float, high: float, mark: str = "") -> str:
-    """Return a centre and below it its interval, if it has one; "-" where there is no centre."""
+    """Return an estimator and below it its interval, if it has one; "-" if there is none."""
     if middle is None:
         return MISSING
     large = max(abs(middle), abs(high)) >= 100
@@ -136,11 +136,11 @@ def figure_tables(lines: Sequence[Line], comparison: Comparison) -> list[Table]:
     for name, title in zip(FIGURES, titles, strict=True):
         rows = []
         for line in lines:
-            centre, best = line.summary.centres[name], line.best_run[name]
+            estimator, best = line.summary.estimates[name], line.best_run[name]
             cells = [
                 *(line.label, line.delivery),
-                _spread(name, *centre[:3], mark=f" {APART}" if centre.apart else ""),
-                _spread(name, *centre[3:]),
+                _spread(name, *estimator[:3], mark=f" {APART}" if estimator.apart else ""),
+                _spread(name, *estimator[3:]),
                 _spread(name, *best[:3]),
                 number(line.of_paper(name), 2 if "deliver" in name else 1),
                 percent(best.paper_percentile / 100),
@@ -155,10 +155,10 @@ def _notes(lines: Sequence[Line], seeds: int, beside: bool) -> list[str]:
         f"Mean, IQM: over {seeds} seeds, with intervals at 95 %."
         if seeds > 1
         else "Mean, IQM: of one seed, which has no interval.",
-        "IQM: interquartile mean, of the middle half of the runs: the typical run.",
+        "IQM: interquartile mean, of the middle half of the runs.",
         "Best run: best by return of all configurations, one run each: median, [95 % range].",
     ]
-    if any(line.summary.centres[name].apart for line in lines for name in FIGURES):
+    if any(line.summary.estimates[name].apart for line in lines for name in FIGURES):
         notes.append(f"{APART} the mean is outside of the IQM's interval: far runs have moved it.")
     if beside:
         notes += [

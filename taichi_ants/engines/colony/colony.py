@@ -27,7 +27,7 @@ from taichi_ants.worlds.starts import Start
 from taichi_ants.worlds.world import World
 
 Progress = Callable[[float], None]
-Sharing = Literal["shared", "own", "fixed"]
+Sharing = Literal["shared", "independent", "frozen"]
 SHARINGS: tuple[str, ...] = get_args(Sharing)
 
 # Where actions are given, nobody chooses or learns, and none of these matters.
@@ -44,7 +44,7 @@ class Colony(ColonyState):
         world: One world for all seeds, or one for each, of the same ranges.
         task: The rules of the game; None is the paper's. Colonies that learn have its evaporation
             in training, others that in evaluation.
-        training: The learner and its settings. None, with sharing "fixed": ants do what `act` is
+        training: The learner and its settings. None, with sharing "frozen": ants do what `act` is
             given, and there are no action values.
         seeds: One seed for each of the W worlds.
         ants: How many start each episode, 1 to 2**24: the listed ants of the World first, then
@@ -55,8 +55,8 @@ class Colony(ColonyState):
             the queen; "spread", on free cells anywhere. The seed decides which, and the headings.
         ends_at_delivery: Whether an episode ends at its first delivery, as when an ant trains
             alone. Only for one ant, without births.
-        sharing: "shared": one table for all ants of a world, for learners with a TD error. "own":
-            one, and a memory of the learner, for each slot. "fixed": nobody learns.
+        sharing: "shared": one table for all ants of a world, for learners with a TD error.
+            "independent": one, and a memory of the learner, for each slot. "frozen": nobody learns.
         q_values: Action values to start from, float (n_states, 5) or (W, n_states, 5); None: zeros,
             but if nobody learns they must be given, unless `training` is None. If tables are not
             shared, (W, slots, n_states, 5) too.
@@ -90,19 +90,19 @@ class Colony(ColonyState):
         task = checks.checked_task(Task() if task is None else task)
         capacity = checks.checked_capacity(task, ants, capacity, start, ends_at_delivery)
         check_one_of("sharing", sharing, SHARINGS)
-        learns = sharing != "fixed"
+        learns = sharing != "frozen"
         is_given_actions = training is None and not learns and q_values is None
         if is_given_actions:
             training = _NO_TRAINING
         if not isinstance(training, TrainingConfig):
             raise AntsError(
                 f"training is {shown(training)}; it must be one TrainingConfig, or None with "
-                'sharing="fixed" and without q_values.'
+                'sharing="frozen" and without q_values.'
             )
         (training,) = checks.checked_configs(training)
         if not learns and q_values is None and not is_given_actions:
             raise AntsError(
-                "sharing is 'fixed', but q_values is None; nobody learns, so give the action "
+                "sharing is 'frozen', but q_values is None; nobody learns, so give the action "
                 "values that the ants follow."
             )
         if learns:
@@ -183,14 +183,14 @@ class Colony(ColonyState):
         self.begin(which)
         self._stepper.launch(self, "begin_phases")
 
-    def look(self) -> None:
+    def observe(self) -> None:
         """Let the ants see what interventions have changed since the last tick.
 
         Raises:
             AntsError: No episode has begun.
         """
         self.check_begun()
-        self._stepper.launch(self, "look_phases")
+        self._stepper.launch(self, "intervention_phases")
 
     def tick(self, n: int = 1) -> None:
         """Let n ticks pass; worlds whose episode has ended stand still.
@@ -220,7 +220,7 @@ class Colony(ColonyState):
         if not self.is_given_actions:
             raise AntsError(
                 "this colony has a training by which ants choose; call tick, or make it with "
-                'training=None and sharing="fixed".'
+                'training=None and sharing="frozen".'
             )
         given, shape = array_of("actions", actions), (len(self.seeds), self.capacity)
         if given.dtype.kind not in "iu" or given.shape != shape:

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from taichi_ants.engines.colony.layout import HomeRow, WorldRow
+from taichi_ants.engines.colony.layout import FoodSourceRow, WorldRow
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.worlds.world import World
 
@@ -17,31 +17,34 @@ def arrays(
     """Make the arrays of the food sources of all worlds and of their piles.
 
     Args:
-        sources: Of each world (3, n): HomeRow.CELL, TAKEN and PILE.
+        sources: Of each world (3, n): FoodSourceRow.CELL, TAKEN and PILE.
         rows: By `WorldRow`, (rows, W); the numbers of sources and piles are written into it.
         room: For sources in each world.
         size: Cells of a world.
     """
     n_worlds = rows.shape[1]
-    homes = np.zeros((len(HomeRow), max(1, n_worlds * room)), np.int32)
+    food_sources = np.zeros((len(FoodSourceRow), max(1, n_worlds * room)), np.int32)
     begins = np.zeros((n_worlds, room + 1), np.int32)
-    homes[HomeRow.TAKEN] = -1
-    home_of = np.full(n_worlds * size if room else 1, -1, np.int32)
+    food_sources[FoodSourceRow.TAKEN] = -1
+    source_of = np.full(n_worlds * size if room else 1, -1, np.int32)
     for w, (cells, taken, piles) in enumerate(sources):
         n_piles = int(piles.max(initial=-1)) + 1
-        of_world = homes[:, w * room : w * room + len(cells)]
-        of_world[HomeRow.CELL], of_world[HomeRow.TAKEN] = cells, taken
-        of_world[HomeRow.PILE], of_world[HomeRow.LISTED] = piles, np.argsort(piles, kind="stable")
+        of_world = food_sources[:, w * room : w * room + len(cells)]
+        of_world[FoodSourceRow.CELL], of_world[FoodSourceRow.TAKEN] = cells, taken
+        of_world[FoodSourceRow.PILE], of_world[FoodSourceRow.LISTED] = (
+            piles,
+            np.argsort(piles, kind="stable"),
+        )
         begins[w, 1 : n_piles + 1] = np.cumsum(np.bincount(piles, minlength=n_piles))
-        rows[WorldRow.HOMES, w], rows[WorldRow.PILES, w] = len(cells), n_piles
+        rows[WorldRow.FOOD_SOURCES, w], rows[WorldRow.PILES, w] = len(cells), n_piles
         (full,) = np.nonzero(taken < 0)
-        home_of[w * size + cells[full]] = w * room + full
+        source_of[w * size + cells[full]] = w * room + full
     return {
-        "homes": homes,
-        # By world: where each pile begins in the row HomeRow.LISTED.
+        "food_sources": food_sources,
+        # By world: where each pile begins in the row FoodSourceRow.LISTED.
         "piles": begins.reshape(-1),
-        # The column in `homes` whose food lies in a cell, -1.
-        "home_of": home_of,
+        # The column in `food_sources` whose food lies in a cell, -1.
+        "source_of": source_of,
     }
 
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import taichi as ti
 
-from taichi_ants.engines import looks
+from taichi_ants.engines import views
 from taichi_ants.engines.colony import learning, life, steps, trail
 from taichi_ants.engines.colony.layout import (
     GAVE_UP,
@@ -23,7 +23,7 @@ from taichi_ants.engines.colony.layout import (
     Stage,
     WorldRow,
 )
-from taichi_ants.engines.trial import tried
+from taichi_ants.engines.plugin_check import checked_plugin
 from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.memory import read_rates
 from taichi_ants.learners.td_errors import guarded
@@ -83,7 +83,7 @@ class Variant:
         # The mark of an ant that wants nothing.
         self.idle = STANDS if traffic.shared else 0
         self.ants_change, self.food_changes = ants_change, food_changes
-        self.learner = None if learner is None else tried(learner)
+        self.learner = None if learner is None else checked_plugin(learner)
         self.draws_next_action = learner is not None and learner.draws_next_action
         # Each ant learns into a table of its own, or all ants of a world into one.
         self.alone = learner is not None and own_tables
@@ -96,12 +96,12 @@ class Variant:
             self.td_error = guarded(learner.td_error)
         self.observation = observation
         self.n_pairs = observation.n_states * ROW  # of a row and an action, and some of no meaning
-        self.sees_percept = looks.is_percept(observation)
+        self.sees_percept = views.is_percept(observation)
         # Whether the cell of an ant has to tell what the ant carries.
         self.sees_ants = not self.sees_percept or view == "strongest_under_carriers"
         if not self.sees_percept:
-            self.row = looks.row_function(observation)
-            self.look_type = looks.look_type(observation, dense)
+            self.encode = views.encode_function(observation)
+            self.view_type = views.view_type(observation, dense)
 
 
 variant = cache(Variant)
@@ -112,9 +112,9 @@ def begin_phases(v: Variant) -> Iterator[Phase]:
     yield Phase(ANTS, learning.begin)
 
 
-def look_phases(v: Variant) -> Iterator[Phase]:
+def intervention_phases(v: Variant) -> Iterator[Phase]:
     """What follows an intervention, between two ticks."""
-    yield Phase(ANTS, learning.look)
+    yield Phase(ANTS, learning.see_interventions)
 
 
 def tick_phases(v: Variant) -> Iterator[Phase]:

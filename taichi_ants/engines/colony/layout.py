@@ -44,7 +44,7 @@ class WorldRow(IntEnum):
     FIRST_VACANT = auto()  # no slot below is vacant
     NEXT_NUMBER = auto()  # of the next ant that is born
     STORE = auto()  # foods that the queen has not turned into ants yet
-    HOMES = auto()
+    FOOD_SOURCES = auto()
     PILES = auto()
     QUEEN_CELL = auto()
     # What `ColonyEpisodes` counts, by the names of its fields.
@@ -93,14 +93,14 @@ class Barrier(IntEnum):
 GAVE_UP = -(2**40)  # added to OPENED then, so that it still shows how many there were
 
 
-class HomeRow(IntEnum):
-    """Rows of `homes`, one column for each food of the start: where it lies, or grows back."""
+class FoodSourceRow(IntEnum):
+    """Rows of `food_sources`, one column for each food source: where food lies or grows back."""
 
     CELL = 0
     TAKEN = auto()  # the tick in which it was taken; -1: it is there
     MOVES = auto()  # whether it does in this tick
     PILE = auto()
-    LISTED = auto()  # the homes (numbers in their world), pile by pile
+    LISTED = auto()  # the food sources (numbers in their world), pile by pile
 
 
 class SumRow(IntEnum):
@@ -108,7 +108,7 @@ class SumRow(IntEnum):
 
     COUNT = 0
     LATEST = auto()  # the highest ant number
-    OUTCOME = auto()  # and what that ant saw
+    TRANSITION = auto()  # and what that ant saw
 
 
 # What the lower four bits of a cell in `ground` say is how it looks, see `task.constants`; the

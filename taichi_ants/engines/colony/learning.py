@@ -13,14 +13,14 @@ from taichi_ants.engines.colony.steps import (
     draw_action,
     observe,
     put,
-    row_seen,
+    state_index_of,
     table_of,
     trait,
 )
 from taichi_ants.learners.memory import At, LearnerArrays, Transition, discount_of, values_of
 from taichi_ants.learners.model import (
     next_state_of,
-    pack_outcome,
+    pack_transition,
     recall,
     remember,
     reward_of,
@@ -37,16 +37,16 @@ _ONE = 4294967296.0  # fixed-point numbers have 32 binary places
 @ti.func
 def see_anew(c: ti.template(), v: ti.template(), w, ant, clock):
     """Note what an ant sees."""
-    percept, row = observe(c, v, w, ant, clock)
-    note_look(c, v, ant, percept, row)
+    percept, state = observe(c, v, w, ant, clock)
+    note_seen(c, v, ant, percept, state)
 
 
 @ti.func
-def note_look(c: ti.template(), v: ti.template(), ant, percept, row):
+def note_seen(c: ti.template(), v: ti.template(), ant, percept, state):
     """Note what an ant has seen."""
     put(c.percept, ant, percept)
     if ti.static(not v.sees_percept):
-        c.state[ant] = row
+        c.state[ant] = state
 
 
 @ti.func
@@ -58,8 +58,8 @@ def begin(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 
 
 @ti.func
-def look(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
-    """Between two ticks an ant sees what a hand has changed; one that it has put there begins."""
+def see_interventions(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
+    """Let an ant see what interventions changed; a newly placed ant begins its life."""
     if trait(c.stage, ant) == Stage.NEWBORN:
         put(c.stage, ant, Stage.LIVING)
         if ti.static(v.alone):
@@ -70,19 +70,19 @@ def look(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 @ti.func
 def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Observe, choose the next action where the learner asks for it, and learn."""
-    percept, row = observe(c, v, w, ant, (tick + 1) * c.evaporates)
+    percept, state = observe(c, v, w, ant, (tick + 1) * c.evaporates)
     next_action = -1
     if trait(c.stage, ant) != Stage.NEWBORN:
         c.wants[w * c.size + c.want[ant]] = 0
         if ti.static(v.draws_next_action):
             if terminates(trait(c.event, ant), c.delivery_terminates) == 0:
                 c.streams[ant] = advance(c.streams[ant])
-                next_action = draw_action(c, v, w, ant, row, c.streams[ant])
+                next_action = draw_action(c, v, w, ant, state, c.streams[ant])
         if ti.static(v.alone):
-            learn_alone(c, v, ant, row, next_action, tick)
+            learn_alone(c, v, ant, state, next_action, tick)
         elif ti.static(v.together):
-            share_error(c, v, w, chunk, ant, row, next_action)
-    note_look(c, v, ant, percept, row)
+            share_error(c, v, w, chunk, ant, state, next_action)
+    note_seen(c, v, ant, percept, state)
     if ti.static(v.draws_next_action):
         put(c.next_action, ant, next_action)
 
@@ -112,7 +112,7 @@ def forget(c: ti.template(), v: ti.template(), ant):
     """Begin anew the tables and the memory of a slot for the ant that was born into it."""
     at = memory_of(c, v, ant)
     for i in range(at.table, table_of(c, v, ant + 1)):
-        c.q[i] = ti.select(i % ROW < N_ACTIONS, c.initial_value, 0.0)
+        c.q[i] = ti.select(i % ROW < N_ACTIONS, c.initial_q, 0.0)
     for i in range(at.floats, at.floats + c.floats_by_8 * 8):
         c.floats[i] = 0.0
     for i in range(at.integers, at.integers + c.integers_by_8 * 8):
@@ -128,7 +128,7 @@ def learn_alone(c: ti.template(), v: ti.template(), ant, seen, next_action, tick
     last = ti.cast((trait(c.stage, ant) == Stage.DYING) | (tick + 1 == c.length), ti.i32)
     terminated, truncated = step_end(event, c.delivery_terminates, c.ends_at_delivery, last)
     step = Transition(
-        state=row_seen(c, v, ant),
+        state=state_index_of(c, v, ant),
         action=trait(c.action, ant),
         reward=ti.cast(c.rewards[event], ti.f32),
         next_state=seen,
@@ -166,12 +166,12 @@ def share_error(c: ti.template(), v: ti.template(), w, chunk, ant, seen, next_ac
     event = trait(c.event, ant)
     reward = ti.cast(c.rewards[event], ti.f32)
     terminated = terminates(event, c.delivery_terminates)
-    pair = row_seen(c, v, ant) * ROW + trait(c.action, ant)
+    pair = state_index_of(c, v, ant) * ROW + trait(c.action, ant)
     error = error_of(c, v, w, pair, reward, terminated, seen, next_action)
     add_to_sums(c, v, chunk, pair, error, fixed(error), 1)
     if ti.static(v.learner.plans):
-        outcome = pack_outcome(seen, reward, terminated)
-        note_outcome(c, v.n_pairs * chunk + pair, c.number[ant], outcome)
+        transition = pack_transition(seen, reward, terminated)
+        note_transition(c, v.n_pairs * chunk + pair, c.number[ant], transition)
 
 
 @ti.func
@@ -202,11 +202,11 @@ def add_to_sums(c: ti.template(), v: ti.template(), chunk, pair, error, total, c
 
 
 @ti.func
-def note_outcome(c: ti.template(), place, number, outcome):
-    """Note what an ant saw of a pair, for the model; the highest ant number's outcome stays."""
+def note_transition(c: ti.template(), place, number, transition):
+    """Note what an ant saw of a pair, for the model; the highest ant number's transition stays."""
     if number > c.sums_of[SumRow.LATEST, place]:
         c.sums_of[SumRow.LATEST, place] = number
-        c.sums_of[SumRow.OUTCOME, place] = outcome
+        c.sums_of[SumRow.TRANSITION, place] = transition
 
 
 @ti.func
@@ -229,15 +229,18 @@ def join_sums(c: ti.template(), v: ti.template(), w):
             place = v.n_pairs * chunk + pair
             count = c.sums_of[SumRow.COUNT, place]
             add_to_sums(c, v, first, pair, c.errors[place], c.sums[place], count)
-            latest, outcome = c.sums_of[SumRow.LATEST, place], c.sums_of[SumRow.OUTCOME, place]
-            note_outcome(c, v.n_pairs * first + pair, latest, outcome)
+            latest, transition = (
+                c.sums_of[SumRow.LATEST, place],
+                c.sums_of[SumRow.TRANSITION, place],
+            )
+            note_transition(c, v.n_pairs * first + pair, latest, transition)
             c.sums_of[SumRow.COUNT, place] = 0
         c.touched[listed] = 0
 
 
 @ti.func
 def remember_shared(c: ti.template(), v: ti.template(), w):
-    """Store the joined outcomes in the shared model, new pairs in ascending order."""
+    """Store the joined transitions in the shared model, new pairs in ascending order."""
     memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
     chunk = w * c.n_chunks
     listed = list_of(v, chunk)
@@ -251,8 +254,8 @@ def remember_shared(c: ti.template(), v: ti.template(), w):
         c.touched[listed + j + 1] = pair
     for i in range(1, n + 1):
         pair = c.touched[listed + i]
-        outcome = c.sums_of[SumRow.OUTCOME, v.n_pairs * chunk + pair]
-        remember(memory, memory_of(c, v, w), pair, outcome)
+        transition = c.sums_of[SumRow.TRANSITION, v.n_pairs * chunk + pair]
+        remember(memory, memory_of(c, v, w), pair, transition)
 
 
 @ti.func
@@ -281,9 +284,9 @@ def draw_pair(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
         at = memory_of(c, v, w)
         drawn, c.streams[ant] = draw_below(c.streams[ant], visited(memory, at))
-        pair, outcome = recall(memory, at, drawn)
+        pair, transition = recall(memory, at, drawn)
         add_to_sums(c, v, chunk, pair, 0.0, ti.cast(0, ti.i64), 1)
-        note_outcome(c, v.n_pairs * chunk + pair, 0, outcome)
+        note_transition(c, v.n_pairs * chunk + pair, 0, transition)
 
 
 @ti.func
@@ -295,7 +298,7 @@ def plan_together(c: ti.template(), v: ti.template(), w, tick):
     for i in range(c.touched[listed]):
         pair = c.touched[listed + 1 + i]
         place = v.n_pairs * chunk + pair
-        seen = c.sums_of[SumRow.OUTCOME, place]
+        seen = c.sums_of[SumRow.TRANSITION, place]
         reward, terminated = reward_of(seen), terminated_of(seen)
         error = error_of(c, v, w, pair, reward, terminated, next_state_of(seen), -1)
         c.errors[place] = error

@@ -10,7 +10,7 @@ from taichi.math import popcnt
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
     TALLY_WIDTH,
-    HomeRow,
+    FoodSourceRow,
     Stage,
     Tally,
     WorldRow,
@@ -118,16 +118,18 @@ def grow_old(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 
 @ti.func
 def regrow(c: ti.template(), v: ti.template(), w, tick):
-    """Food grows back in homes that have waited long enough and are empty."""
+    """Food grows back in food sources that have waited long enough and are empty."""
     base = w * c.size
-    for home in range(w * c.n_homes, w * c.n_homes + c.worlds[WorldRow.HOMES, w]):
-        taken = c.homes[HomeRow.TAKEN, home]
+    for source in range(
+        w * c.n_food_sources, w * c.n_food_sources + c.worlds[WorldRow.FOOD_SOURCES, w]
+    ):
+        taken = c.food_sources[FoodSourceRow.TAKEN, source]
         if c.regrowth >= 0 and taken >= 0 and tick >= taken + c.regrowth:
-            place = base + c.homes[HomeRow.CELL, home]
+            place = base + c.food_sources[FoodSourceRow.CELL, source]
             if c.ground[place] == EMPTY:
                 c.ground[place] = FOOD
-                c.home_of[place] = home
-                c.homes[HomeRow.TAKEN, home] = -1
+                c.source_of[place] = source
+                c.food_sources[FoodSourceRow.TAKEN, source] = -1
                 c.worlds[WorldRow.REGROWN, w] += 1
 
 
@@ -144,52 +146,58 @@ def wander(c: ti.template(), v: ti.template(), w, tick):
 def move_pile(c: ti.template(), w, pile):
     """A pile takes a step: its foods that can move leave their cells, then all enter the next ones.
 
-    So the front of a pile makes way for what is behind it, whatever the order of the homes.
+    So the front of a pile makes way for what is behind it, whatever the order of the food sources.
     """
     heading, c.queen_streams[w] = draw_below(c.queen_streams[w], N_HEADINGS)
     step = c.compass[heading + 1]
-    begins = w * (c.n_homes + 1) + pile
+    begins = w * (c.n_food_sources + 1) + pile
     for i in range(c.piles[begins], c.piles[begins + 1]):
-        home = listed_home(c, w, i)
-        c.homes[HomeRow.MOVES, home] = ti.cast(can_move(c, w, home, step), ti.i32)
+        source = listed_source(c, w, i)
+        c.food_sources[FoodSourceRow.MOVES, source] = ti.cast(can_move(c, w, source, step), ti.i32)
     for i in range(c.piles[begins], c.piles[begins + 1]):
-        home = listed_home(c, w, i)
-        if c.homes[HomeRow.MOVES, home] == 1 and c.homes[HomeRow.TAKEN, home] < 0:
-            place = w * c.size + c.homes[HomeRow.CELL, home]
+        source = listed_source(c, w, i)
+        if (
+            c.food_sources[FoodSourceRow.MOVES, source] == 1
+            and c.food_sources[FoodSourceRow.TAKEN, source] < 0
+        ):
+            place = w * c.size + c.food_sources[FoodSourceRow.CELL, source]
             c.ground[place] = EMPTY
-            c.home_of[place] = -1
+            c.source_of[place] = -1
     for i in range(c.piles[begins], c.piles[begins + 1]):
-        home = listed_home(c, w, i)
-        if c.homes[HomeRow.MOVES, home] == 1:
-            c.homes[HomeRow.CELL, home] += step
-            if c.homes[HomeRow.TAKEN, home] < 0:
-                place = w * c.size + c.homes[HomeRow.CELL, home]
+        source = listed_source(c, w, i)
+        if c.food_sources[FoodSourceRow.MOVES, source] == 1:
+            c.food_sources[FoodSourceRow.CELL, source] += step
+            if c.food_sources[FoodSourceRow.TAKEN, source] < 0:
+                place = w * c.size + c.food_sources[FoodSourceRow.CELL, source]
                 c.ground[place] = FOOD
-                c.home_of[place] = home
+                c.source_of[place] = source
 
 
 @ti.func
-def listed_home(c: ti.template(), w, i):
-    """The column in `homes` of the i-th home in the order of piles."""
-    return w * c.n_homes + c.homes[HomeRow.LISTED, w * c.n_homes + i]
+def listed_source(c: ti.template(), w, i):
+    """The column in `food_sources` of the i-th food source in the order of piles."""
+    return w * c.n_food_sources + c.food_sources[FoodSourceRow.LISTED, w * c.n_food_sources + i]
 
 
 @ti.func
-def can_move(c: ti.template(), w, home, step):
-    """Whether a home can take the step.
+def can_move(c: ti.template(), w, source, step):
+    """Whether a food source can take the step.
 
     One with food can if the cell ahead is empty, or holds food of the same pile that can itself:
     the foods in a row move together. One that waits can unless rock or queen is ahead.
     """
-    ahead = w * c.size + c.homes[HomeRow.CELL, home] + step
+    ahead = w * c.size + c.food_sources[FoodSourceRow.CELL, source] + step
     can = c.walls[ahead] == 0 and c.ground[ahead] & 15 != QUEEN
-    if c.homes[HomeRow.TAKEN, home] < 0:
+    if c.food_sources[FoodSourceRow.TAKEN, source] < 0:
         in_row = True
         while in_row:
             in_row = False
-            other = c.home_of[ahead]
+            other = c.source_of[ahead]
             if other >= 0:
-                in_row = c.homes[HomeRow.PILE, other] == c.homes[HomeRow.PILE, home]
+                in_row = (
+                    c.food_sources[FoodSourceRow.PILE, other]
+                    == c.food_sources[FoodSourceRow.PILE, source]
+                )
             if in_row:
                 ahead += step
         can = c.ground[ahead] == EMPTY

@@ -122,12 +122,12 @@ class ColonyState:
         self.ants, self.capacity, self.start = ants, capacity, start
         self.ends_at_delivery, self.sharing = ends_at_delivery, sharing
         self.is_given_actions, self.schedule, self.chunks = is_given_actions, schedule, chunks
-        self.one_a_slot = sharing == "own" or (
-            sharing == "fixed" and q_values is not None and q_values.ndim == 4
+        self.one_a_slot = sharing == "independent" or (
+            sharing == "frozen" and q_values is not None and q_values.ndim == 4
         )
         self.pheromone = task.pheromone_while(self.learns)
         self.memory = Memory()
-        if sharing == "own" or self.plans_together:
+        if sharing == "independent" or self.plans_together:
             assert self.learner is not None  # since it learns
             self.memory = padded(self.learner.memory_for(training, task.n_states))
         self.arrays = {}
@@ -143,7 +143,7 @@ class ColonyState:
     @property
     def learns(self) -> bool:
         """Whether the ants learn."""
-        return self.sharing != "fixed"
+        return self.sharing != "frozen"
 
     @property
     def learner(self) -> Learner | None:
@@ -369,7 +369,7 @@ class ColonyState:
 
     def make_room_for_food(self, n: int) -> None:
         """Set all to the start of an episode, with room for n food sources in each world."""
-        self.n_homes = n
+        self.n_food_sources = n
         self.at_start = self._start_of_episode()
         self.arrays |= (changing := self._of_episode())
         self._changing = tuple(changing)
@@ -470,7 +470,7 @@ class ColonyState:
             rows[row] = n
         rows[WorldRow.FIRST_DELIVERY] = -1
         rows[WorldRow.QUEEN_CELL] = [int(self.grid.index(world.queen)) for world in worlds]
-        foods = [food_sources.at_start(world) for world in worlds] if self.n_homes else []
+        foods = [food_sources.at_start(world) for world in worlds] if self.n_food_sources else []
         return {
             # Where the ants start, by world and number.
             "start_cells": cells,
@@ -482,7 +482,7 @@ class ColonyState:
             "worlds": rows,
             # Rewards of all ants in this episode.
             "returns": np.zeros(len(worlds), np.int64),
-            **food_sources.arrays(foods, rows, self.n_homes, self.grid.size),
+            **food_sources.arrays(foods, rows, self.n_food_sources, self.grid.size),
         }
 
     def _of_episode(self) -> Arrays:
@@ -564,11 +564,11 @@ class ColonyState:
         }
 
     def _tables(self, q_values: np.ndarray | None) -> np.ndarray:
-        """Make the tables of all worlds or slots; the initial value everywhere without values."""
+        """Make the tables of all worlds or slots; without values, of the initial value."""
         n_worlds, own = len(self.seeds), self.one_a_slot
         slots, n_states = self.capacity if own else 1, self.task.n_states
         q = np.zeros((n_worlds, slots, 1 + self.memory.tables, n_states, ROW), np.float32)
-        q[..., :N_ACTIONS] = self.training.initial_value
+        q[..., :N_ACTIONS] = self.training.initial_q
         if q_values is not None:
             leading, form = q_values.shape[:-2], f"{n_states}, {N_ACTIONS}"
             if leading not in ((), (n_worlds,)) and not (own and leading == (n_worlds, slots)):
@@ -637,7 +637,8 @@ class ColonyState:
             "world_of": [numbers[world] for world in self.worlds],
             "one_a_slot": self.one_a_slot,
             "rounds": self.rounds.tolist(),
-            "homes": self.n_homes,  # interventions can make more than there are at the start
+            # Interventions can make more than there are at the start.
+            "food_sources": self.n_food_sources,
             **{name: getattr(self, name) for name in (*_OPTIONS, *_PROGRESS)},
         }
         return facts, arrays
@@ -676,7 +677,7 @@ class ColonyState:
                 learners.get(training.learner)
             worlds = [World.from_dict(one) for one in facts["worlds"]]
             task, options = Task.from_dict(facts["task"]), {name: facts[name] for name in _OPTIONS}
-            if options["sharing"] == "fixed" and training is not None:
+            if options["sharing"] == "frozen" and training is not None:
                 # Tables of the right shape, until its own are put in.
                 leading = (len(facts["seeds"]), facts["capacity"]) if facts["one_a_slot"] else ()
                 options["q_values"] = np.zeros((*leading, task.n_states, N_ACTIONS), np.float32)
@@ -690,8 +691,8 @@ class ColonyState:
             if rounds.shape != colony.rounds.shape or rounds.min() < 0:
                 raise ValueError("rounds has another shape, or is below 0")
             colony.rounds = rounds
-            if facts["homes"] != colony.n_homes:
-                colony.make_room_for_food(facts["homes"])
+            if facts["food_sources"] != colony.n_food_sources:
+                colony.make_room_for_food(facts["food_sources"])
             for name in colony.stored:
                 array, kept = colony.arrays[name], arrays[f"array_{name}"]
                 if kept.shape != array.shape or kept.dtype != array.dtype:

@@ -24,7 +24,7 @@ _CHUNKS_PER_THREAD = 2
 _STEPS_BETWEEN_SORTS, _FEWEST_TICKS, _MOST_TICKS = 2_500_000, 16, 256
 _PIECE_SECONDS = 0.4
 _SPINS = 2**26  # of a thread at a barrier: half a second or more
-_LAUNCHES_BETWEEN_TRIALS = 8  # and a trial has so many times fewer ticks
+_LAUNCHES_BETWEEN_PROBES = 8  # and a probe has so many times fewer ticks
 
 
 def usual_schedule(n_worlds: int, capacity: int) -> str:
@@ -56,8 +56,8 @@ class ThreadChoice:
             return ticks, 1
         self._launches += 1
         best, other = sorted((most, 1), key=lambda n: self._paces.get(n, math.inf))
-        if self._launches % _LAUNCHES_BETWEEN_TRIALS == 2:
-            return max(1, ticks // _LAUNCHES_BETWEEN_TRIALS), other
+        if self._launches % _LAUNCHES_BETWEEN_PROBES == 2:
+            return max(1, ticks // _LAUNCHES_BETWEEN_PROBES), other
         return ticks, best
 
     def took(self, threads: int, seconds: float) -> None:
@@ -178,7 +178,7 @@ def kernel_numbers(state: ColonyState) -> dict[str, Any]:
         "n_ants": state.ants,  # that start an episode
         "n_slots": state.capacity,
         "n_chunks": state.chunks,
-        "n_homes": state.n_homes,  # room for homes in each world
+        "n_food_sources": state.n_food_sources,  # room for food sources in each world
         "size": state.grid.size,
         "length": state.length,
         **state.pheromone.numbers,
@@ -188,8 +188,8 @@ def kernel_numbers(state: ColonyState) -> dict[str, Any]:
         "regrowth": off if life.regrowth is None else life.regrowth,
         "wander": life.wander or off,
         "ends_at_delivery": int(state.ends_at_delivery),
-        "delivery_terminates": int(state.task.delivery != "continuing"),
-        "initial_value": state.training.initial_value,
+        "delivery_terminates": int(state.task.delivery != "truncates"),
+        "initial_q": state.training.initial_q,
         "discount": state.training.discount,
         "epsilon": state.epsilon,
         "explore_below": np.uint64(state.epsilon * 4294967296.0),

@@ -13,7 +13,7 @@ from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
     ANT_STANDS,
     TALLY_WIDTH,
-    HomeRow,
+    FoodSourceRow,
     Tally,
 )
 from taichi_ants.engines.colony.trail import (
@@ -22,7 +22,7 @@ from taichi_ants.engines.colony.trail import (
     level_of,
     level_that_counts,
 )
-from taichi_ants.engines.looks import judge
+from taichi_ants.engines.views import judge
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.learners.memory import values_of
 from taichi_ants.task.constants import (
@@ -78,26 +78,26 @@ def put(column: ti.template(), ant, value):
 
 
 @ti.func
-def row_seen(c: ti.template(), v: ti.template(), ant):
-    """The row of its table that an ant looks at."""
-    row = trait(c.percept, ant)
+def state_index_of(c: ti.template(), v: ti.template(), ant):
+    """The state index of an ant."""
+    state = trait(c.percept, ant)
     if ti.static(not v.sees_percept):
-        row = c.state[ant]
-    return row
+        state = c.state[ant]
+    return state
 
 
 @ti.func
 def observe(c: ti.template(), v: ti.template(), w, ant, clock):
-    """What an ant sees: the percept, and the row of its table."""
-    percept, row = 0, 0
+    """What an ant sees: the percept, and the state index."""
+    percept, state = 0, 0
     if ti.static(v.sees_percept):
         percept = see(c, v, w, ant, clock)
-        row = percept
+        state = percept
     else:
-        look = look_around(c, v, w, ant, clock)
-        percept = look.percept
-        row = v.row(look)
-    return percept, row
+        view = view_around(c, v, w, ant, clock)
+        percept = view.percept
+        state = v.encode(view)
+    return percept, state
 
 
 @ti.func
@@ -135,27 +135,27 @@ def strongest_of(c: ti.template(), v: ti.template(), left, forward, right, clock
 
 
 @ti.func
-def look_around(c: ti.template(), v: ti.template(), w, ant, clock):
+def view_around(c: ti.template(), v: ti.template(), w, ant, clock):
     """All that the ant can look at."""
     heading, here = trait(c.heading, ant), w * c.size + c.cell[ant]
     nearer = nearer_from(c.closer[here], heading)
-    look = v.look_type(carries=trait(c.carries, ant), own_level=level_of(c, v, here, clock))
+    view = v.view_type(carries=trait(c.carries, ant), own_level=level_of(c, v, here, clock))
     cells = ti.static(v.observation.cells)
     for k in ti.static(range(len(cells))):
         place = here + step_around(c.compass, heading, cells[k])
         standable = (looks_of(c.ground[place]) == EMPTY) | (c.ground[place] >= ANT_GROUND)
-        look.levels[k] = ti.select(standable, level_of(c, v, place, clock), 0)
-        look.ants[k] = ant_on(c.ground[place])
-        look.nearer[k] = nearer >> (cells[k] % N_HEADINGS) & 1
-        look.codes[k] = looks_of(c.ground[place])
-    look.strongest = strongest_of(
+        view.levels[k] = ti.select(standable, level_of(c, v, place, clock), 0)
+        view.ants[k] = ant_on(c.ground[place])
+        view.nearer[k] = nearer >> (cells[k] % N_HEADINGS) & 1
+        view.codes[k] = looks_of(c.ground[place])
+    view.strongest = strongest_of(
         *(c, v, here + step_towards(c.compass, heading, LEFT)),
         here + step_towards(c.compass, heading, FORWARD),
         here + step_towards(c.compass, heading, RIGHT),
         clock,
     )
-    judge(v.half, look, v.observation)
-    return look
+    judge(v.half, view, v.observation)
+    return view
 
 
 @ti.func
@@ -183,10 +183,10 @@ def table_of(c: ti.template(), v: ti.template(), owner):
 
 
 @ti.func
-def draw_action(c: ti.template(), v: ti.template(), w, ant, row, random_state):
-    """The ant's choice at a row of its table, by a random stream that was advanced for it."""
+def draw_action(c: ti.template(), v: ti.template(), w, ant, state, random_state):
+    """The ant's choice in a state, by a random stream that was advanced for it."""
     table = table_of(c, v, ant if ti.static(v.own_tables) else w)
-    values, bits = values_of(c.q, table, row), bits_of(random_state)
+    values, bits = values_of(c.q, table, state), bits_of(random_state)
     return choose_in_crowd(c.compass, values, bits, c.explore_below)
 
 
@@ -205,7 +205,7 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         action = trait(c.next_action, ant)
     if action < 0:
         random_state = advance(random_state)
-        action = draw_action(c, v, w, ant, row_seen(c, v, ant), random_state)
+        action = draw_action(c, v, w, ant, state_index_of(c, v, ant), random_state)
     heading = turned_by(c.compass, trait(c.heading, ant), action)
     ahead = cell + step_towards(c.compass, heading, FORWARD)
     enters = is_open(code_in_view(percept, ti.min(action, RIGHT)))
@@ -304,7 +304,7 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         put(c.carries, ant, 1)
         c.carried[ant] = 1
         c.ground[base + wanted] = EMPTY
-        take_from_home(c, base + wanted, tick)
+        take_from_source(c, base + wanted, tick)
         deposit(c, v, base + wanted, clock, 0)
         deposit(c, v, base + cell, clock, 0)
         put(c.heading, ant, turn_round(heading))
@@ -317,16 +317,16 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 
 
 @ti.func
-def tally(c: ti.template(), row, chunk, n):
+def tally(c: ti.template(), state, chunk, n):
     """Count in a chunk, whose ants one thread moves; `+=` would be atomic, which takes longer."""
-    c.tallies[chunk * TALLY_WIDTH + row] = c.tallies[chunk * TALLY_WIDTH + row] + n
+    c.tallies[chunk * TALLY_WIDTH + state] = c.tallies[chunk * TALLY_WIDTH + state] + n
 
 
 @ti.func
-def take_from_home(c: ti.template(), place, tick):
-    """If the food of a home lay there, the home waits from now on."""
-    if c.n_homes > 0:
-        home = c.home_of[place]
-        if home >= 0:
-            c.homes[HomeRow.TAKEN, home] = tick
-            c.home_of[place] = -1
+def take_from_source(c: ti.template(), place, tick):
+    """If the food of a source lay there, the source waits from now on."""
+    if c.n_food_sources > 0:
+        source = c.source_of[place]
+        if source >= 0:
+            c.food_sources[FoodSourceRow.TAKEN, source] = tick
+            c.source_of[place] = -1

@@ -178,7 +178,7 @@ class Launcher:
         compile_once(self._kernel, lambda: Arguments().pack(_NO_WORK))
         falls = task.evaporation_in_training if learns else task.evaporation_in_evaluation
         self._values = _NO_WORK | laid_out([world], task, falls)
-        terminates = int(task.delivery != "continuing")
+        terminates = int(task.delivery != "truncates")
         self._values |= {"max_steps": max_steps, "delivery_terminates": terminates}
 
     def launch(self, some: slice, episodes: slice, **arrays: Any) -> None:

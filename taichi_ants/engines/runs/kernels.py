@@ -22,8 +22,8 @@ from taichi_ants.engines.layout import (
     RETURNS,
     STEPS,
 )
+from taichi_ants.engines.plugin_check import checked_plugin
 from taichi_ants.engines.runs.step import EXTRA_CELLS, Ant, act, percept_of, restore, state_seen
-from taichi_ants.engines.trial import tried
 from taichi_ants.learners.hyperparameters import Hyperparameters
 from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.memory import At, LearnerArrays, Transition, read_rates, values_of
@@ -52,14 +52,14 @@ def run_kernel(
 
     Args:
         learner: The learner; None for a fixed policy.
-        observation: What row of its table an ant looks at.
+        observation: What an ant observes.
         deposit: How trails are laid, see `rules.pheromone`.
         half: Whether trails of half the strongest look like one, see `Pheromone.view`.
         traced: Record each step too, in `n_episodes * max_steps` rows for each run.
         arguments: The type of the argument pack, which `engine` lists.
     """
     learns = learner is not None
-    learner = tried(learner) if learns else None
+    learner = checked_plugin(learner) if learns else None
     on_policy = learns and learner.draws_next_action
     begins = learns and learner.begin is not None
     hyperparameters = learner.hyperparameters if learns else Hyperparameters

@@ -77,7 +77,7 @@ class RunState(Record):
         for config, q, epsilon, rate in zip(
             configs, state.q, state.epsilon, state.learning_rate, strict=True
         ):
-            q[..., :N_ACTIONS] = config.initial_value
+            q[..., :N_ACTIONS] = config.initial_q
             epsilon[:], rate[:] = config.epsilon, config.learning_rate
         return state
 

@@ -7,7 +7,7 @@ from typing import Any
 import taichi as ti
 from taichi.math import popcnt
 
-from taichi_ants.engines.looks import is_percept, judge, look_type, row_function
+from taichi_ants.engines.views import encode_function, is_percept, judge, view_type
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task.constants import (
     FORWARD,
@@ -107,27 +107,27 @@ def percept_of(half: ti.template(), a: ti.template(), base, ant, clock):
 
 @cache
 def state_seen(observation: Observation, half: bool) -> Callable[..., Any]:
-    """A `ti.func` (a, base, ant, clock, percept) -> the row of the table that the ant looks at."""
+    """A `ti.func` (a, base, ant, clock, percept) -> the index of the ant's state."""
     if is_percept(observation):
         return _percept_itself
-    view = observation.cells
+    in_view = observation.cells
     left, forward, right = observation.ahead
-    look_of, row = look_type(observation, False), row_function(observation)
+    view_of, encode = view_type(observation, False), encode_function(observation)
 
     @ti.func
     def see(a: ti.template(), base, ant, clock, percept):
         here, nearer = base + ant.cell, nearer_from(a.closer[ant.origin + ant.cell], ant.heading)
-        look = look_of(carries=ant.carries, own_level=level_left(a.cells[here], clock))
-        for k in ti.static(range(len(view))):
-            towards = (ant.heading + view[k] + N_HEADINGS) % N_HEADINGS
+        view = view_of(carries=ant.carries, own_level=level_left(a.cells[here], clock))
+        for k in ti.static(range(len(in_view))):
+            towards = (ant.heading + in_view[k] + N_HEADINGS) % N_HEADINGS
             cell = a.cells[here + step_towards(a.compass, towards, FORWARD)]
-            look.levels[k] = level_left(cell, clock)
-            look.nearer[k] = nearer >> (view[k] % N_HEADINGS) & 1
-            look.codes[k] = ground_of(cell)
-        ahead = ti.max(look.levels[left], look.levels[forward])
-        look.strongest = ti.max(ahead, look.levels[right])
-        judge(half, look, observation)
-        return row(look)
+            view.levels[k] = level_left(cell, clock)
+            view.nearer[k] = nearer >> (in_view[k] % N_HEADINGS) & 1
+            view.codes[k] = ground_of(cell)
+        ahead = ti.max(view.levels[left], view.levels[forward])
+        view.strongest = ti.max(ahead, view.levels[right])
+        judge(half, view, observation)
+        return encode(view)
 
     return see
 

@@ -59,7 +59,7 @@ class Trace(Record):
         cells: int32 (n, 3), cube coordinates in normal form.
         headings: int32 (n,), 0 to 5.
         percepts: int32 (n,), what the ant sees, see `taichi_ants.task.states`.
-        states: int32 (n,), the row of its table that it looks at; by the paper's observation that
+        states: int32 (n,), the index of its state; by the paper's observation that
             is the percept.
         actions: int32 (n,), 0 to 4.
         rewards: int32 (n,).

@@ -43,7 +43,7 @@ class Learner:
     def __init__(
         self, config: TrainingConfig, n_states: int, q_values: np.ndarray | None = None
     ) -> None:
-        """Begin with a copy of a table (n_states, 5), or the initial value; without memories."""
+        """Begin with a copy of a table (n_states, 5) or with `initial_q`; without memories."""
         self.name = config.learner
         given = dict(config.hyperparameters)
         for name in given.keys() - self.hyperparameters.keys():
@@ -52,7 +52,7 @@ class Learner:
         self.learning_rate = np.float32(config.learning_rate)
         self.discount = np.float32(config.discount)
         if q_values is None:
-            q_values = np.full((n_states, N_ACTIONS), config.initial_value)
+            q_values = np.full((n_states, N_ACTIONS), config.initial_q)
         self.rows = [list(row) for row in np.asarray(q_values, np.float32)]
         self.model: dict[Pair, Transition] = {}
         self.begin_run()

@@ -4,19 +4,19 @@ from taichi_ants.task.observations.registry import Observation
 from taichi_ants.task.states import name_of_codes
 
 
-def row(look):
+def encode(view):
     """The load, then a code of each cell as a digit of base 6.
 
     The paper's codes; 4 for an ant with the other load on a better cell, 5 for one on any other. A
     better cell is nearer to the queen, or without food has a stronger trail, than the ant's own.
     """
-    index = look.carries
+    index = view.carries
     for k in range(3):
-        code = look.codes[k]
-        if look.ants[k] == 2 - look.carries:
-            better = look.nearer[k] == 1
-            if look.carries == 0:
-                better = look.levels[k] > look.own_level
+        code = view.codes[k]
+        if view.ants[k] == 2 - view.carries:
+            better = view.nearer[k] == 1
+            if view.carries == 0:
+                better = view.levels[k] > view.own_level
             code = 5
             if better:
                 code = 4
@@ -27,7 +27,7 @@ def row(look):
 ANTS = Observation(
     "ants",
     2 * 6**3,
-    row,
+    encode,
     name_of=name_of_codes(3, "EOTFPA", "EOSQPA"),
     summary="the three cells ahead, ants with the other load told from rocks",
     letters="P ant on a better cell, A ant on no better one",

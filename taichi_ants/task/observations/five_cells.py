@@ -6,18 +6,18 @@ from taichi_ants.task.states import name_of_codes
 CELLS = (-2, -1, 0, 1, 2)
 
 
-def row(look):
+def encode(view):
     """The load, then the codes from behind left to behind right, as digits of base 4."""
-    index = look.carries
+    index = view.carries
     for k in range(5):
-        index = 4 * index + look.codes[k]
+        index = 4 * index + view.codes[k]
     return index
 
 
 FIVE_CELLS = Observation(
     "five_cells",
     2 * 4**5,
-    row,
+    encode,
     CELLS,
     name_of_codes(len(CELLS), "EOTF", "EOSQ"),
     "all cells around but the one behind",

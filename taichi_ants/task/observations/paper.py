@@ -4,15 +4,15 @@ from taichi_ants.task.observations.registry import Observation
 from taichi_ants.task.states import state_name
 
 
-def row(look):
+def encode(view):
     """The paper's state itself."""
-    return look.percept
+    return view.percept
 
 
 PAPER = Observation(
     "paper",
     128,
-    row,
+    encode,
     name_of=state_name,
     summary="the three cells ahead, four codes each",
     shape=(2, 4, 4, 4),

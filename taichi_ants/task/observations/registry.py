@@ -1,6 +1,6 @@
 """The one place where observations are registered.
 
-An observation tells which row of its table of action values an ant looks at. What an ant can do and
+An observation tells the index of the state that an ant sees. What an ant can do and
 what it is paid for never depends on it: these go by the percept, the paper's state. To add one,
 write a file beside this one and a line in `__init__.py`; or call `register` from a file of your
 own.
@@ -24,7 +24,7 @@ from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN, SEES_LURE
 # Tables of this many rows hold 5 * 2**20 values; kernels index many of them by 32 bits.
 MAX_STATES = 1 << 20
 AHEAD = (-1, 0, 1)
-_LOOKS = 3000  # and as many names of rows, in a trial
+_VIEWS = 3000  # and as many names of states, in a check
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,8 @@ class Observation:
 
     Attributes:
         name: The name by which tasks call it.
-        n_states: The rows of a table of action values, at least 1.
-        row: A function of one argument, what the ant can look at, that returns the row, from 0 to
+        n_states: The number of states, at least 1.
+        encode: A function of one argument, the ant's view, that returns the state index, from 0 to
             n_states - 1. It is compiled for the kernels, so it computes with whole numbers alone:
             arithmetic, comparisons, `if`, and `for` over a `range`; no imports and no calls; and it
             ends with its only `return`.
@@ -48,16 +48,17 @@ class Observation:
             `own_level`, the trail on its own cell.
         cells: The cells in view: their headings relative to the ant's, each from -2 to 3; -1, 0
             and 1, the cells ahead, are among them.
-        name_of: The name of a row for people.
+        name_of: The name of a state for people.
         summary: One line for listings.
         letters: What those letters in names mean that are none of the paper's E, O, T, S, F and Q.
-        shape: The sizes of what a row is made of, if it is a number of several parts, as of digits:
-            `np.unravel_index(row, shape)` are the parts. Environments show them to neural networks.
+        shape: The sizes of what a state index is made of, if it is a number of several parts, as
+            of digits: `np.unravel_index(state, shape)` are the parts. Environments show them to
+            neural networks.
     """
 
     name: str
     n_states: int
-    row: Callable[[Any], int]
+    encode: Callable[[Any], int]
     cells: tuple[int, ...] = AHEAD
     name_of: Callable[[int], str] = str
     summary: str = ""
@@ -71,7 +72,7 @@ class Observation:
 
     @property
     def parts(self) -> tuple[int, ...]:
-        """The sizes of the parts of a row: its `shape`, or the row itself."""
+        """The sizes of the parts of a state index: its `shape`, or the index itself."""
         return self.shape or (self.n_states,)
 
     @property
@@ -88,18 +89,20 @@ def register(observation: Observation) -> Observation:
 
     Raises:
         AntsError: The name is that of an observation of the package or not an identifier, a field
-            does not have the form that it must have, or a row lies outside of the table.
+            does not have the form that it must have, or a state index is outside of the range.
     """
     expect("what is registered", observation, Observation)
     name = observation.name
     check_new_name("observation", name, (one for one in _OBSERVATIONS if _is_built_in(one)))
     expect(f"letters of {name!r}", observation.letters, str)
     checked_whole(f"n_states of {name!r}", observation.n_states, 1, MAX_STATES)
-    row, cells = observation.row, observation.cells
-    named = inspect.isfunction(row) and row.__name__ != "<lambda>"  # kernels cannot take lambdas
-    if not named or len(inspect.signature(row).parameters) != 1:
+    encode, cells = observation.encode, observation.cells
+    named = (
+        inspect.isfunction(encode) and encode.__name__ != "<lambda>"
+    )  # kernels cannot take lambdas
+    if not named or len(inspect.signature(encode).parameters) != 1:
         raise AntsError(
-            f"row of {name!r} is {shown(row)}; it must be a function of one argument that is "
+            f"encode of {name!r} is {shown(encode)}; it must be a function of one argument that is "
             "written with def, see taichi_ants.task.Observation."
         )
     known = isinstance(cells, tuple) and all(cell in range(-2, 4) for cell in cells)
@@ -118,14 +121,14 @@ def register(observation: Observation) -> Observation:
             f"shape of {name!r} is {shape}, whose product is not its n_states, "
             f"{observation.n_states}; mend one of them."
         )
-    if not row.__module__.startswith("taichi_ants."):
+    if not encode.__module__.startswith("taichi_ants."):
         _try_functions(observation)
     _OBSERVATIONS[name] = observation
     return observation
 
 
 def _is_built_in(name: str) -> bool:
-    return _OBSERVATIONS[name].row.__module__.startswith("taichi_ants.")
+    return _OBSERVATIONS[name].encode.__module__.startswith("taichi_ants.")
 
 
 def get(name: str) -> Observation:
@@ -148,40 +151,40 @@ def names() -> tuple[str, ...]:
 
 
 def _try_functions(observation: Observation) -> None:
-    """Compute and name many rows, in Python: a kernel would not notice what is wrong."""
+    """Compute and name many states, in Python: a kernel would not notice what is wrong."""
     import numpy as np  # not above: command lines show their help without it
 
-    function, last = "row", observation.n_states - 1
+    function, last = "encode", observation.n_states - 1
     try:
-        (source,) = ast.parse(dedent(inspect.getsource(observation.row))).body
+        (source,) = ast.parse(dedent(inspect.getsource(observation.encode))).body
         returns = [one for one in ast.walk(source) if isinstance(one, ast.Return)]
         if not isinstance(source, ast.FunctionDef) or returns != source.body[-1:]:
             raise ValueError("it needs one return, as its last line")
         with np.errstate(all="raise"):
-            for look in _drawn_looks(observation):
-                row = observation.row(look)
-                if not 0 <= index(row) <= last:
-                    raise ValueError(f"it gives {row}, but it must lie between 0 and {last}")
+            for view in _drawn_views(observation):
+                state = observation.encode(view)
+                if not 0 <= index(state) <= last:
+                    raise ValueError(f"it gives {state}, but it must lie between 0 and {last}")
         function = "name_of"
-        for row in np.linspace(0, last, min(last + 1, _LOOKS), dtype=int).tolist():
-            expect(f"the name of row {row}", observation.name_of(row), str)
+        for state in np.linspace(0, last, min(last + 1, _VIEWS), dtype=int).tolist():
+            expect(f"the name of state {state}", observation.name_of(state), str)
     except Exception as error:
         raise unusable(observation, f"{function} fails ({error})") from error
 
 
-def _drawn_looks(observation: Observation) -> Iterator[SimpleNamespace]:
-    """What ants could look at, in numbers of the types that kernels have."""
+def _drawn_views(observation: Observation) -> Iterator[SimpleNamespace]:
+    """Views of ants, in numbers of the types that kernels have."""
     import numpy as np
 
-    rng, shape = np.random.default_rng(0), (_LOOKS, len(observation.cells))
+    rng, shape = np.random.default_rng(0), (_VIEWS, len(observation.cells))
     ahead = list(observation.ahead)
     ants = rng.integers(0, 3, shape, np.int32) * (rng.random(shape) < 0.3)
     drawn = rng.choice([EMPTY, EMPTY, OBSTACLE, FOOD, QUEEN], shape)
     ground = np.where(ants > 0, OBSTACLE, drawn).astype(np.int32)
     nearer = rng.integers(0, 2, shape, np.int32)
-    carries = rng.integers(0, 2, _LOOKS, np.int32)
+    carries = rng.integers(0, 2, _VIEWS, np.int32)
     trails = rng.integers(0, 2, shape) * 10.0 ** rng.uniform(-1, 6, shape)
-    for n in range(_LOOKS):
+    for n in range(_VIEWS):
         trail = trails[n].astype(np.int32 if n % 2 else np.float32)
         levels = trail * ((ground[n] == EMPTY) | (ants[n] > 0))
         visible = trail * (ground[n] == EMPTY)

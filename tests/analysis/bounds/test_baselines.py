@@ -66,7 +66,7 @@ def test_policies_are_evaluated_as_in_training_with_one_table_for_each_seed() ->
         returns = np.array([[0, 2], [2, 2], [5, 7]])
         return SimpleNamespace(returns=returns, steps=np.full(shape, 9), deliveries=np.eye(3, 2))
 
-    task = Task("five_cells", rewards=Rewards(give=77))
+    task = Task("five_cells", rewards=Rewards(deliver=77))
     rows = policy_rows(paper(), task, record, range(5, 8), rollouts=2, max_steps=77)
     for (q_values, options), policy in zip(calls, (random_policy(), trail_follower()), strict=True):
         np.testing.assert_array_equal(q_values, np.stack([policy] * 3))
@@ -83,7 +83,7 @@ def test_policies_are_evaluated_as_in_training_with_one_table_for_each_seed() ->
 
 
 def test_all_baselines_are_paid_what_the_task_pays() -> None:
-    task = Task(rewards=Rewards(empty=0, failed=-1, lure=2, pick_up=30, give=100))
+    task = Task(rewards=Rewards(empty=0, failed=-1, shaping=2, pick_up=30, deliver=100))
     rows = bound_rows(paper(), task, (0.9,)) + policy_rows(paper(), task, evaluate, [0], 1)
     returns = {row.return_mean for row in rows if row.baseline != "random policy"}
     assert returns == {32 * 2 + 30 + 100}

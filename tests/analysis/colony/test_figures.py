@@ -24,22 +24,22 @@ from taichi_ants.analysis.colony.study import (
 from taichi_ants.analysis.colony.tables import ConditionRow, condition_rows
 from taichi_ants.analysis.style import save_all
 
-ARENAS = ("paper", "open")
+WORLD_KINDS = ("paper", "open")
 
 
 @pytest.fixture(scope="module")
 def rows() -> list[ConditionRow]:
     study = build(
-        lambda rules, way, ants: 20.0 * ants * (1 + list(RULES).index(rules)),
+        lambda rules, regime, ants: 20.0 * ants * (1 + list(RULES).index(rules)),
         seeds=6,
         noise=10,
-        arenas=ARENAS,
+        world_kinds=WORLD_KINDS,
     )
     return condition_rows(study)
 
 
-def column(rows: list, name: str, arena: str, rules: str, way: str = JOINT) -> list[float]:
-    return [r.columns()[name] for r in rows if r.condition[:3] == (arena, rules, way)]
+def column(rows: list, name: str, world_kind: str, rules: str, regime: str = JOINT) -> list[float]:
+    return [r.columns()[name] for r in rows if r.condition[:3] == (world_kind, rules, regime)]
 
 
 def dots(axis: Axes) -> dict[int, float]:
@@ -57,17 +57,17 @@ def dots(axis: Axes) -> dict[int, float]:
 )
 def test_a_line_shows_the_largest_colony_of_a_design(rows, draw, designs) -> None:
     figure = draw(rows)
-    for axis, arena in zip(figure.axes, ARENAS, strict=True):
+    for axis, world_kind in zip(figure.axes, WORLD_KINDS, strict=True):
         means = dots(axis)
         labels = [text.get_text() for text in figure.axes[0].get_yticklabels()]
         assert labels == [RULES[design.rules] for design in designs]
         for place, design in enumerate(designs):
-            *_, low = column(rows, "deliveries_ci_low", arena, *design)
-            *_, mean = column(rows, "deliveries_mean", arena, *design)
+            *_, low = column(rows, "deliveries_ci_low", world_kind, *design)
+            *_, mean = column(rows, "deliveries_mean", world_kind, *design)
             assert means[place] == mean
             interval, spread, bounds = axis.collections[3 * place : 3 * place + 3]
             assert interval.get_segments()[0].min(axis=0).tolist() == [low, place]
-            *_, worst = column(rows, "deliveries_min", arena, *design)
+            *_, worst = column(rows, "deliveries_min", world_kind, *design)
             assert spread.get_segments()[0].min(axis=0).tolist() == [worst, place]
             assert bounds.get_segments()[0][:, 0].tolist() == [200, 200]
             marks = [line for line in axis.lines if line.get_marker() == "|"]
@@ -84,9 +84,9 @@ def test_a_line_shows_the_largest_colony_of_a_design(rows, draw, designs) -> Non
 def test_deliveries_against_the_number_of_ants(rows) -> None:
     axes = np.array(figures.scaling(rows).axes).reshape(2, 2)
     for row, measure in zip(axes, ("deliveries", "per_ant"), strict=True):
-        for axis, arena in zip(row, ARENAS, strict=True):
+        for axis, world_kind in zip(row, WORLD_KINDS, strict=True):
             (line,) = [line for line in axis.lines if line.get_label() == Design(ABC).words]
-            expected = column(rows, f"{measure}_mean", arena, ABC)
+            expected = column(rows, f"{measure}_mean", world_kind, ABC)
             assert line.get_xydata().tolist() == [*map(list, zip(SIZES, expected, strict=True))]
 
 
@@ -94,9 +94,9 @@ def test_files_are_wide_enough_to_read_and_little_data_can_be_drawn(rows, tmp_pa
     save_all(figures.draw_all(rows), tmp_path / "new")
     for name in ("rules", "scaling", "training", "elsewhere"):
         assert Image.open(tmp_path / "new" / f"{name}.png").width == 1620
-    lonely = build(seeds=1, sizes=(1,), ways=(JOINT,), rules=(ABC,))
-    nothing = build(lambda rules, way, ants: 0.0, noise=0, ways=(JOINT, ALONE))
-    elsewhere = build(seeds=2, ways=(ABROAD,), arenas=("rocks",))
+    lonely = build(seeds=1, sizes=(1,), regimes=(JOINT,), rules=(ABC,))
+    nothing = build(lambda rules, regime, ants: 0.0, noise=0, regimes=(JOINT, ALONE))
+    elsewhere = build(seeds=2, regimes=(ABROAD,), world_kinds=("rocks",))
     for study, number in ((lonely, 3), (nothing, 3), (elsewhere, 1)):
         folder = tmp_path / str(len(study))
         save_all(figures.draw_all(condition_rows(study)), folder)

@@ -45,14 +45,14 @@ def answer(question: str, truth: Truth = proportional, **settings: object) -> li
 
 def of_each(each: dict[int, float]) -> Truth:
     """All conditions alike: so much for each ant, by the number of ants."""
-    return lambda rules, way, ants: each[ants] * ants
+    return lambda rules, regime, ants: each[ants] * ants
 
 
-def scaled(factor: float, *, rules: str | None = None, way: str | None = None) -> Truth:
+def scaled(factor: float, *, rules: str | None = None, regime: str | None = None) -> Truth:
     """Twenty for each ant, but `factor` times as much for some, from two ants on."""
 
     def truth(smelled: str, trained: str, ants: int) -> float:
-        chosen = smelled == (rules or smelled) and trained == (way or trained) and ants > 1
+        chosen = smelled == (rules or smelled) and trained == (regime or trained) and ants > 1
         return 20.0 * ants * (factor if chosen else 1.0)
 
     return truth
@@ -103,7 +103,7 @@ PAIRS: dict[str, list[tuple[Design, Design]]] = {
     ],
     TRAINING: [
         (Design(PAPER), Design(PAPER, ALONE)),
-        *((Design(ABC), Design(ABC, way)) for way in (ALONE, FEW, SOME)),
+        *((Design(ABC), Design(ABC, regime)) for regime in (ALONE, FEW, SOME)),
     ],
     ELSEWHERE: [
         (Design(ABC), Design(ABC, ABROAD)),
@@ -122,17 +122,17 @@ def test_conditions_are_compared(question: str) -> None:
 
     several, single = "2, 4, 8", ", ".join(alone) or "-"
     for place, (first, second) in enumerate(PAIRS[question]):
-        better = verdicts(scaled(2.0, rules=first.rules, way=first.way))[place]
+        better = verdicts(scaled(2.0, rules=first.rules, regime=first.regime))[place]
         assert better == [several, "-", single]
-        worse = verdicts(scaled(2.0, rules=second.rules, way=second.way))[place]
+        worse = verdicts(scaled(2.0, rules=second.rules, regime=second.regime))[place]
         assert worse == ["-", several, single]
         assert verdicts(proportional)[place] == ["-", "-", ", ".join([*alone, several])]
     assert len(verdicts(proportional)) == len(PAIRS[question])
 
 
 def test_the_clearest_example_has_the_greatest_ratio() -> None:
-    def truth(rules: str, way: str, ants: int) -> float:
-        return 20.0 * ants * (ants if (rules, way) == (ABC, JOINT) else 1)
+    def truth(rules: str, regime: str, ants: int) -> float:
+        return 20.0 * ants * (ants if (rules, regime) == (ABC, JOINT) else 1)
 
     row, *_ = answer(ADDS, truth, noise=0.0001)
     assert row[-1] == "8: 1280 against 160 (+700 %)"
@@ -173,23 +173,23 @@ def test_without_differences_few_are_told() -> None:
 
 
 def test_missing_conditions_leave_out_only_what_needs_them() -> None:
-    judged = judge_all(build(ways=(JOINT,), rules=(PAPER, SILENT)))
+    judged = judge_all(build(regimes=(JOINT,), rules=(PAPER, SILENT)))
     asked = [series.question for _, series in judged]
     assert asked == [TRAIL, MORE]
-    assert judge_all(build(ways=(JOINT,), rules=(PAPER,), sizes=(1,))) == {}
+    assert judge_all(build(regimes=(JOINT,), rules=(PAPER,), sizes=(1,))) == {}
 
 
 def test_each_arena_and_question_is_judged_for_itself() -> None:
-    judged = judge_all(build(arenas=("paper", "open")))
-    assert {(arena, series.question) for arena, series in judged} == {
-        (arena, question) for arena in ("paper", "open") for question in QUESTIONS
+    judged = judge_all(build(world_kinds=("paper", "open")))
+    assert {(world_kind, series.question) for world_kind, series in judged} == {
+        (world_kind, question) for world_kind in ("paper", "open") for question in QUESTIONS
     }
     for question in QUESTIONS:
         of_question = [
             finding
-            for (arena, series), findings in judged.items()
+            for (world_kind, series), findings in judged.items()
             for finding in findings.values()
-            if (arena, series.question) == ("paper", question)
+            if (world_kind, series.question) == ("paper", question)
         ]
         expected = 1 - 0.05 / len(of_question)
         assert [finding.level for finding in of_question] == pytest.approx(

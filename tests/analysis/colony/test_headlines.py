@@ -15,11 +15,11 @@ def told(truth: Truth = proportional, **settings: object) -> list[list[str]]:
     return [list(row) for row in headlines(*Results.of(build(truth, **settings))).rows]
 
 
-def times(factor: float, rules: str, way: str = JOINT) -> Truth:
+def times(factor: float, rules: str, regime: str = JOINT) -> Truth:
     """Twenty for each ant, but so many times as much for one design."""
 
     def truth(of: str, trained: str, ants: int) -> float:
-        return 20.0 * ants * (factor if (of, trained) == (rules, way) else 1.0)
+        return 20.0 * ants * (factor if (of, trained) == (rules, regime) else 1.0)
 
     return truth
 
@@ -36,7 +36,7 @@ def test_each_line_has_a_verdict(place: int, design: tuple[str, str]) -> None:
 
 
 def test_the_numbers_are_the_means_of_the_largest_colonies() -> None:
-    row = told(times(2, ABC), noise=0, arenas=("paper", "open"))[0]
+    row = told(times(2, ABC), noise=0, world_kinds=("paper", "open"))[0]
     assert row == [
         "Ants with all three rules deliver more than under the paper's rules",
         *["supported\n8: 320 against 160"] * 2,
@@ -51,19 +51,21 @@ def test_few_seeds_have_no_verdict_and_one_ant_no_line() -> None:
 
 
 def test_it_fits_on_one_screen() -> None:
-    study = build(arenas=("paper", "open", "piles", "rocks"))
+    study = build(world_kinds=("paper", "open", "piles", "rocks"))
     found = Results.of(study)
     lines = plain_text(on_one_screen(*found), 79).splitlines()
     assert len(lines) <= 50
     assert max(map(len, lines)) <= 79
     [row] = [line.split() for line in lines if line.startswith("A + B + C  ")]
     means = [
-        one.centres["deliveries"].mean for one in found.rows if one.condition[1:] == (ABC, JOINT, 8)
+        one.estimates["deliveries"].mean
+        for one in found.rows
+        if one.condition[1:] == (ABC, JOINT, 8)
     ]
     assert row[5::4] == [f"{mean:.0f}" for mean in means[:3]]
     assert row[6::4] == [f"({1.5 * mean:.0f})," for mean in means[:3]]
     assert any(line.startswith("  Do the trails help? ") for line in lines)
-    elsewhere = build(ways=("open",), arenas=("rocks",))
+    elsewhere = build(regimes=("open",), world_kinds=("rocks",))
     found = Results.of(elsewhere)
     text = plain_text(on_one_screen(*found), 79)
     assert "rocks" in text

@@ -14,9 +14,9 @@ from taichi_ants.analysis.colony.study import (
     JOINT,
     OF_STUDY,
     PAPER,
+    REGIMES,
     RULES,
     SILENT,
-    WAYS,
     Condition,
     measures_of,
 )
@@ -48,7 +48,7 @@ OUTCOME = {
         ("per_ant", [5, 0]),
         # Episodes without a delivery count with all their ticks.
         ("first_delivery", [200, 500]),
-        ("fruitless", [1 / 3, 1]),
+        ("no_delivery_rate", [1 / 3, 1]),
         # Of all moves, not the mean of shares; no move, none blocked.
         ("blocked", [0.1, 0]),
         ("reward", [200, -20]),
@@ -61,25 +61,32 @@ def test_measures(measure: str, expected: list[float]) -> None:
 def test_every_measure_is_in_the_tables() -> None:
     study = build(seeds=7, noise=20)
     rows = condition_rows(study)
-    assert len(rows) == len(WAYS) * len(RULES) * len(SIZES)
+    assert len(rows) == len(REGIMES) * len(RULES) * len(SIZES)
     (row,) = (row for row in rows if row.condition[1:] == (SILENT, JOINT, 4))
     lines = rows_of_seeds(study, range(3, 10))
     for measure in OF_STUDY:
         values = study[Condition("paper", SILENT, JOINT, 4)][measure]
         low, high = bootstrap_interval(values[None])
-        found = row.centres[measure][:3]
+        found = row.estimates[measure][:3]
         np.testing.assert_allclose(found, [values.mean(), low[0], high[0]])
-        place = {"arena": "paper", "rules": SILENT, "way": JOINT, "ants": 4, "seed": 5}
+        place = {"world_kind": "paper", "rules": SILENT, "regime": JOINT, "ants": 4, "seed": 5}
         (line,) = (line for line in lines if line.items() >= place.items())
         assert line[measure] == values[2]
     values = study[Condition("paper", SILENT, JOINT, 4)]["deliveries"]
     assert row.ranges == {"deliveries": (values.min(), values.max()), "bound": (100, 100)}
     assert row.seeds == 7
-    assert list(row.columns())[:6] == ["arena", "rules", "way", "ants", "seeds", "deliveries_mean"]
+    assert list(row.columns())[:6] == [
+        "world_kind",
+        "rules",
+        "regime",
+        "ants",
+        "seeds",
+        "deliveries_mean",
+    ]
 
 
 def test_the_table_of_differences_holds_what_verdicts_rest_on() -> None:
-    study = build(lambda rules, way, ants: 20.0 * ants * (2 if rules == ABC else 1))
+    study = build(lambda rules, regime, ants: 20.0 * ants * (2 if rules == ABC else 1))
     judged = judge_all(study)
     rows = difference_rows(judged)
     assert len(rows) == sum(len(findings) for findings in judged.values())
@@ -99,10 +106,12 @@ def test_the_table_of_differences_holds_what_verdicts_rest_on() -> None:
 
 
 def test_means_at_a_glance() -> None:
-    study = build(noise=0, arenas=("paper", "rocks"))
+    study = build(noise=0, world_kinds=("paper", "rocks"))
     del study[Condition("paper", PAPER, ALONE, 8)]
-    at_home = {condition: one for condition, one in study.items() if condition.arena == "paper"}
-    at_home = {condition: one for condition, one in at_home.items() if condition.way != ABROAD}
+    at_home = {
+        condition: one for condition, one in study.items() if condition.world_kind == "paper"
+    }
+    at_home = {condition: one for condition, one in at_home.items() if condition.regime != ABROAD}
     abroad = {Condition("rocks", ABC, ABROAD, 8): study[Condition("rocks", ABC, ABROAD, 8)]}
     study = {**at_home, **abroad}
     home, away = means(condition_rows(study))
@@ -118,7 +127,9 @@ def test_means_at_a_glance() -> None:
 
 
 def test_the_worst_seed_stands_beside_the_mean_wherever_a_policy_is_carried() -> None:
-    study = build(noise=0, seeds=10, arenas=("rocks",), ways=(ABROAD,), rules=(ABC,), sizes=(8,))
+    study = build(
+        noise=0, seeds=10, world_kinds=("rocks",), regimes=(ABROAD,), rules=(ABC,), sizes=(8,)
+    )
     study[Condition("rocks", ABC, ABROAD, 8)]["deliveries"][3] = 7.0
     (away,) = means(condition_rows(study))
     (_, cell) = away.rows[0]

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from taichi_ants.analysis.colony.over_time import Moment, draw, rates, save
+from taichi_ants.analysis.colony.over_time import Totals, draw, rates, save
 
-MOMENTS = [Moment(5, 10, 100, 50), Moment(7, 14, 300, 100), Moment(8, 14, 300, 100)]
+TOTALS = [Totals(5, 10, 100, 50), Totals(7, 14, 300, 100), Totals(8, 14, 300, 100)]
 ROWS = [
     {"from_tick": 5, "to_tick": 7, "foods_per_tick": 2.0, "blocked": 0.25},
     {"from_tick": 7, "to_tick": 8, "foods_per_tick": 0.0, "blocked": 0.0},
@@ -17,8 +17,8 @@ ROWS = [
 
 
 def test_rates_are_means_over_spans_even_where_nobody_moves() -> None:
-    assert rates(MOMENTS) == ROWS
-    assert rates(MOMENTS[:1]) == []
+    assert rates(TOTALS) == ROWS
+    assert rates(TOTALS[:1]) == []
 
 
 def test_the_figure_shows_its_rows() -> None:

@@ -115,17 +115,17 @@ def test_every_claim_has_an_opposite_here_and_a_name_of_its_own() -> None:
     assert list(OPPOSITES) == [claim.id for claim in CLAIMS]
 
 
-def verdicts(audit: Audit, setting: str = "continuing") -> dict[str, Verdict]:
+def verdicts(audit: Audit, setting: str = "truncates") -> dict[str, Verdict]:
     return {claim.id: findings[setting].verdict for claim, findings in audit.items()}
 
 
-def untested(audit: Audit, setting: str = "continuing") -> set[str]:
+def untested(audit: Audit, setting: str = "truncates") -> set[str]:
     found = verdicts(audit, setting)
     return {name for name, verdict in found.items() if verdict is Verdict.NOT_TESTED}
 
 
 def test_all_claims_are_supported_where_all_are_true() -> None:
-    found = verdicts(assess(build({"continuing": unchanged})))
+    found = verdicts(assess(build({"truncates": unchanged})))
     assert {name for name, verdict in found.items() if verdict is not Verdict.SUPPORTED} == set()
 
 
@@ -133,10 +133,10 @@ def test_all_claims_are_supported_where_all_are_true() -> None:
 def test_each_claim_is_contradicted_where_it_is_false_and_supported_where_it_is_true(
     name: str,
 ) -> None:
-    comparison = build({"continuing": unchanged, "absorbing": OPPOSITES[name]})
+    comparison = build({"truncates": unchanged, "terminates": OPPOSITES[name]})
     (findings,) = assess(comparison, [BY_ID[name]]).values()
     assert {setting: finding.verdict for setting, finding in findings.items()} == {
-        **{"continuing": Verdict.SUPPORTED, "absorbing": Verdict.CONTRADICTED}
+        **{"truncates": Verdict.SUPPORTED, "terminates": Verdict.CONTRADICTED}
     }
 
 
@@ -151,7 +151,7 @@ def test_where_nothing_differs_no_difference_is_claimed(seeds: int) -> None:
     errors = 0
     for number in range(12):
         comparison = build(
-            {"continuing": unchanged},
+            {"truncates": unchanged},
             seeds=seeds,
             noise=20,
             truth=level_truth,
@@ -163,17 +163,17 @@ def test_where_nothing_differs_no_difference_is_claimed(seeds: int) -> None:
 
 
 def test_one_seed_decides_nothing() -> None:
-    audit = assess(build({"continuing": unchanged}, seeds=1))
+    audit = assess(build({"truncates": unchanged}, seeds=1))
     assert set(verdicts(audit).values()) == {Verdict.UNDECIDED, Verdict.NOT_TESTED}
     assert untested(audit) == {"dyna-below-q-peak"}  # there is no second half
     assert "nan" not in claims_markdown(audit, PAPER_WORLD)
 
 
 def test_claims_that_lack_configurations_are_not_tested_and_the_rest_is() -> None:
-    single = build({"continuing": unchanged}, variants=[Q_LEARNING, SARSA], grid=[FIGURE_1])
+    single = build({"truncates": unchanged}, variants=[Q_LEARNING, SARSA], grid=[FIGURE_1])
     assert untested(assess(single)) == BY_ID.keys()
-    pair = build({"absorbing": unchanged}, variants=[Q_LEARNING, SARSA])
-    missing = untested(assess(pair), "absorbing")
+    pair = build({"terminates": unchanged}, variants=[Q_LEARNING, SARSA])
+    missing = untested(assess(pair), "terminates")
     tested = {"sarsa-much-shorter", "sarsa-more-stable", "discount-q", "sarsa-consistently-direct"}
     assert not missing & {*tested, "q-high-return-long-episodes", "epsilon-q-moderate"}
     assert missing >= {
@@ -183,7 +183,7 @@ def test_claims_that_lack_configurations_are_not_tested_and_the_rest_is() -> Non
 
 
 def test_short_training_leaves_out_what_needs_more() -> None:
-    assert untested(assess(build({"continuing": unchanged}, episodes=60))) == {
+    assert untested(assess(build({"truncates": unchanged}, episodes=60))) == {
         "curves-early-variance",
         "curves-sarsa-falls-fastest",
         "curves-deliveries-quick",
@@ -192,13 +192,13 @@ def test_short_training_leaves_out_what_needs_more() -> None:
         "overall-improvement",
         "overall-improvement-reliable",
     }
-    assert untested(assess(build({"continuing": unchanged}, episodes=49))) == BY_ID.keys()
+    assert untested(assess(build({"truncates": unchanged}, episodes=49))) == BY_ID.keys()
 
 
 def test_other_learners_and_other_values_do_not_disturb_the_claims() -> None:
-    plain = build({"continuing": unchanged})
+    plain = build({"truncates": unchanged})
     wide = build(
-        {"continuing": unchanged},
+        {"truncates": unchanged},
         variants=[Q_LEARNING, SARSA, DYNA_P3, DYNA_P5, Variant("my_learner", "depth=9")],
         grid=[*{row.point for row in plain.rows}, GridPoint(0.5, 0.5, 0.5, 0.5)],
     )
@@ -206,25 +206,25 @@ def test_other_learners_and_other_values_do_not_disturb_the_claims() -> None:
 
 
 def test_the_order_of_rows_does_not_matter() -> None:
-    comparison = build({"continuing": unchanged})
+    comparison = build({"truncates": unchanged})
     order = np.random.default_rng(0).permutation(len(comparison.rows))
     shuffled = subset(comparison, order, len(comparison.seeds), comparison.episodes)
     audit = assess(shuffled)
     for claim, findings in assess(comparison).items():
-        assert findings["continuing"].verdict is audit[claim]["continuing"].verdict
-        assert findings["continuing"].effect == pytest.approx(audit[claim]["continuing"].effect)
+        assert findings["truncates"].verdict is audit[claim]["truncates"].verdict
+        assert findings["truncates"].effect == pytest.approx(audit[claim]["truncates"].effect)
 
 
-def only(comparison: Comparison, name: str, setting: str = "continuing") -> Finding:
+def only(comparison: Comparison, name: str, setting: str = "truncates") -> Finding:
     """What becomes of one claim."""
     return assess(comparison, [BY_ID[name]])[BY_ID[name]][setting]
 
 
 def test_seeds_pair_the_rows() -> None:
     """What a seed adds to all rows alike must not blur their difference."""
-    paired = only(build({"continuing": unchanged}, shared=30), "sarsa-return-slightly-lower")
+    paired = only(build({"truncates": unchanged}, shared=30), "sarsa-return-slightly-lower")
     assert paired.verdict is Verdict.SUPPORTED
-    unpaired = build({"continuing": unchanged}, shared=30)
+    unpaired = build({"truncates": unchanged}, shared=30)
     rows = [n for n, row in enumerate(unpaired.rows) if row.variant == SARSA]
     unpaired.arrays["returns"][rows] = unpaired.arrays["returns"][rows][:, ::-1]
     unpaired = remeasured(unpaired)
@@ -234,9 +234,9 @@ def test_seeds_pair_the_rows() -> None:
 
 
 def test_a_finding_shows_the_weakest_contrast_and_what_it_rests_on() -> None:
-    comparison = build({"continuing": unchanged, "absorbing": P3_HIGH})
+    comparison = build({"truncates": unchanged, "terminates": P3_HIGH})
     true = only(comparison, "q-return-highest")
-    false = only(comparison, "q-return-highest", "absorbing")
+    false = only(comparison, "q-return-highest", "terminates")
     # Returns at the configurations of table 2: 52, SARSA 43, p3 45, p5 48.6.
     assert true.contrast.label == "Q-learning minus Dyna-Q (p5)"
     assert true.effect == pytest.approx(3.4, abs=0.2)
@@ -244,13 +244,13 @@ def test_a_finding_shows_the_weakest_contrast_and_what_it_rests_on() -> None:
     assert false.effect == pytest.approx(-13, abs=0.2)
     assert true.contrast.seeds == 16
     assert true.low < true.effect < true.high
-    assert only(build({"continuing": unchanged}), "dyna-below-q-peak").contrast.seeds == 8
+    assert only(build({"truncates": unchanged}), "dyna-below-q-peak").contrast.seeds == 8
 
 
 def test_levels_are_corrected_for_all_intervals_of_all_tested_claims() -> None:
     claims = [BY_ID["q-return-highest"], BY_ID["discount-q"], BY_ID["greedy-return"]]
-    comparison = build({"continuing": unchanged, "absorbing": unchanged})
-    intervals = 2 * (3 + 1 + 4)  # of the typical run and of the mean
+    comparison = build({"truncates": unchanged, "terminates": unchanged})
+    intervals = 2 * (3 + 1 + 4)  # of the IQM and of the mean
     for findings in assess(comparison, claims).values():
         for one in findings.values():
             assert one.level == pytest.approx(1 - (1 - SIMULTANEOUS_LEVEL) / (2 * intervals))
@@ -259,20 +259,20 @@ def test_levels_are_corrected_for_all_intervals_of_all_tested_claims() -> None:
 
 
 def test_in_another_world_nothing_is_tested() -> None:
-    garden = replace(build({"continuing": unchanged}), world="garden.txt")
+    garden = replace(build({"truncates": unchanged}), world="garden.txt")
     audit = assess(garden)
     assert untested(audit) == BY_ID.keys()
     assert claims_markdown(audit, "garden.txt").startswith("World: garden.txt.\n")
 
 
 def test_intervals_of_shares_end_where_shares_do() -> None:
-    comparison = build({"continuing": change(SARSA, deliveries=-0.2)}, seeds=4, episodes=101)
+    comparison = build({"truncates": change(SARSA, deliveries=-0.2)}, seeds=4, episodes=101)
     comparison.arrays["greedy_returns"][:, 0, 0] += 1  # one seed's rollouts differ
     comparison = remeasured(comparison)
     limits = {"share": (0, 1), "correlation": (-1, 1), "deliveries": (-1, 1)}
     cut = 0
     for claim, findings in assess(comparison).items():
-        quantity, finding = claim.quantity, findings["continuing"]
+        quantity, finding = claim.quantity, findings["truncates"]
         bounds = limits.get(quantity.unit.split()[0])
         if bounds is None:
             assert quantity.possible == UNBOUNDED
@@ -285,18 +285,18 @@ def test_intervals_of_shares_end_where_shares_do() -> None:
 
 
 def test_the_tables_hold_the_findings() -> None:
-    comparison = build({"continuing": unchanged, "absorbing": SARSA_HIGH}, variants=VARIANTS[:3])
+    comparison = build({"truncates": unchanged, "terminates": SARSA_HIGH}, variants=VARIANTS[:3])
     audit = assess(comparison)
     rows = claims_rows(audit)
     assert len(rows) == 2 * len(CLAIMS)
     found = [finding for findings in audit.values() for finding in findings.values()]
     assert [row["verdict"] for row in rows] == [finding.verdict.value for finding in found]
     row = rows[2 * list(BY_ID).index("sarsa-return-slightly-lower")]
-    finding = audit[BY_ID["sarsa-return-slightly-lower"]]["continuing"]
+    finding = audit[BY_ID["sarsa-return-slightly-lower"]]["truncates"]
     assert (row["criterion"], row["effect"]) == ("above 1 and at most 10, margin 1", finding.effect)
-    assert (row["centre"], row["mean_effect"]) == ("interquartile mean", finding.by_mean.effect)
+    assert (row["estimator"], row["mean_effect"]) == ("interquartile mean", finding.by_mean.effect)
     share = rows[2 * list(BY_ID).index("sarsa-consistently-direct")]
-    assert (share["centre"], share["mean_verdict"]) == ("mean", None)
+    assert (share["estimator"], share["mean_verdict"]) == ("mean", None)
     text = claims_markdown(audit, PAPER_WORLD)
     assert all(text.count(f"| {claim.id} |") == 1 for claim in CLAIMS)
     line = next(line for line in text.splitlines() if line.startswith("| sarsa-return-slightly"))

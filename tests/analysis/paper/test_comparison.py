@@ -23,7 +23,7 @@ from taichi_ants.analysis.paper.published import (
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
 
-ROW = Row("continuing", SARSA, FIGURE_1)
+ROW = Row("truncates", SARSA, FIGURE_1)
 
 
 def test_hyperparameters_with_the_same_first_letter_are_named_in_full() -> None:
@@ -96,7 +96,7 @@ def test_short_runs_use_all_episodes_or_say_that_they_cannot() -> None:
 
 
 def test_measures_have_one_number_per_run() -> None:
-    comparison = build({"continuing": unchanged}, seeds=5, variants=[SARSA])
+    comparison = build({"truncates": unchanged}, seeds=5, variants=[SARSA])
     for name in MEASURES:
         values = comparison.measures[name]
         assert values.shape == (16, 5), name
@@ -104,30 +104,32 @@ def test_measures_have_one_number_per_run() -> None:
 
 
 def test_rows_are_found_by_what_they_are() -> None:
-    comparison = build({"absorbing": unchanged, "continuing": unchanged}, seeds=2)
-    assert comparison.delivery_settings == ("absorbing", "continuing")
+    comparison = build({"terminates": unchanged, "truncates": unchanged}, seeds=2)
+    assert comparison.delivery_settings == ("terminates", "truncates")
     assert comparison.variants == VARIANTS
-    position = comparison.position("absorbing", DYNA_P3, FIGURE_1)
-    assert comparison.rows[position] == Row("absorbing", DYNA_P3, FIGURE_1)
-    assert comparison.positions("absorbing", SARSA) == list(range(16, 32))
-    assert comparison.position("absorbing", Variant("dyna_q", "planning_steps=4"), FIGURE_1) is None
+    position = comparison.position("terminates", DYNA_P3, FIGURE_1)
+    assert comparison.rows[position] == Row("terminates", DYNA_P3, FIGURE_1)
+    assert comparison.positions("terminates", SARSA) == list(range(16, 32))
+    assert (
+        comparison.position("terminates", Variant("dyna_q", "planning_steps=4"), FIGURE_1) is None
+    )
     assert comparison.position("elsewhere", DYNA_P3, FIGURE_1) is None
     assert comparison.episodes == 120
     few = subset(comparison, [0, 1, 16, 64], 2, 120)
     assert few.learners == [
-        *(("absorbing", Q_LEARNING), ("absorbing", SARSA), ("continuing", Q_LEARNING)),
+        *(("terminates", Q_LEARNING), ("terminates", SARSA), ("truncates", Q_LEARNING)),
     ]
 
 
 def test_a_training_configuration_becomes_a_row() -> None:
     config = TrainingConfig("dyna_q", 0.01, 0.9, 0.3, 0.995, planning_steps=3)
     row = Row.of(Task(), config)
-    assert row == Row("absorbing", DYNA_P3, FIGURE_1)
+    assert row == Row("terminates", DYNA_P3, FIGURE_1)
     assert (row.variant.label, row.point.label) == ("Dyna-Q (p3)", "0.01 / 0.9 / 0.3 / 0.995")
     assert row.columns() == {
         **{"learner": "dyna_q", "hyperparameters": "planning_steps=3"},
         **FIGURE_1._asdict(),
-        "delivery": "absorbing",
+        "delivery": "terminates",
     }
 
 

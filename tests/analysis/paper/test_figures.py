@@ -37,7 +37,7 @@ from taichi_ants.analysis.paper.published import DYNA_P5, FIGURE_1, SARSA, VARIA
 from taichi_ants.analysis.statistics import interquartile_mean
 from taichi_ants.analysis.style import COLOURS, save_all
 
-SETTINGS = ("continuing", "absorbing")
+SETTINGS = ("truncates", "terminates")
 SARSA_AT = (SARSA, FIGURE_1)
 BASELINES = [
     Baseline(name, discount, figure, None if figure is None else 34.0, deliveries)
@@ -55,7 +55,7 @@ BASELINES = [
 def comparison() -> Made:
     amounts = {"late_return": 200, "deliveries": -1, "greedy_deliveries": -1}
     circles = change(DYNA_P5, lambda point: point.discount == 0.99, **amounts)
-    return build({"continuing": unchanged, "absorbing": circles}, seeds=6, noise=5.0)
+    return build({"truncates": unchanged, "terminates": circles}, seeds=6, noise=5.0)
 
 
 def panels(figure: Figure) -> list[Axes]:
@@ -104,7 +104,7 @@ def test_learning_curves_are_interquartile_means_of_growing_spans(comparison: Ma
             found = labelled(axis).get("shortest delivery")
             assert (list(found.get_ydata()) if found else None) == shortest
     titles = [axis.get_title(loc="left") for axis in axes[0]]
-    assert titles == ["Continuing delivery", "Absorbing delivery"]
+    assert titles == ["Delivery truncates", "Delivery terminates"]
     words = " ".join(words_of(figure).split())
     assert "the learning rate is 0.01, the discount 0.9, epsilon 0.3 and its decay 0.995" in words
 
@@ -157,7 +157,7 @@ def test_returns_against_deliveries_shows_what_runs_do_and_baselines(
         # Optimal policies are optimal where delivery is the end.
         optimal = {name for name in lines if name.startswith("optimal")}
         both = {"optimal policy, discount 0.9", "optimal policy, discount 0.99"}
-        assert optimal == (both if setting == "absorbing" else set())
+        assert optimal == (both if setting == "terminates" else set())
         shortest = lines["shortest delivery"]
         assert (shortest.get_xdata()[0], shortest.get_ydata()[0]) == (1.0, 45.0)
         assert lines["delivers"].get_markersize() < shortest.get_markersize()

@@ -21,10 +21,10 @@ from taichi_ants.analysis.paper.quantities import (
 
 
 def test_a_slice_reads_the_rows_it_is_asked_for() -> None:
-    comparison = build({"absorbing": unchanged, "continuing": unchanged}, seeds=4)
-    part = Slice(comparison, "absorbing")
+    comparison = build({"terminates": unchanged, "truncates": unchanged}, seeds=4)
+    part = Slice(comparison, "terminates")
     values = AT_FIGURE_1.values(part, "return_last50", SARSA)
-    position = comparison.position("absorbing", SARSA, FIGURE_1)
+    position = comparison.position("terminates", SARSA, FIGURE_1)
     np.testing.assert_array_equal(values, comparison.measures["return_last50"][position])
     grid = part.grid("steps_all", Q_LEARNING)
     assert grid.shape == (2, 2, 2, 2, 4)
@@ -34,7 +34,7 @@ def test_a_slice_reads_the_rows_it_is_asked_for() -> None:
         for number, row in enumerate(comparison.rows)
         if row.variant == Q_LEARNING
         and row.point == (0.01, 0.9, 0.5, 0.99)
-        and row.delivery == "absorbing"
+        and row.delivery == "terminates"
     )
     np.testing.assert_array_equal(grid[1, 0, 1, 0], comparison.measures["steps_all"][row])
     pairs = part.pairs("steps_all", Q_LEARNING, "epsilon")
@@ -45,14 +45,14 @@ def test_a_slice_reads_the_rows_it_is_asked_for() -> None:
 
 
 def test_what_is_missing_is_nan() -> None:
-    comparison = build({"continuing": unchanged}, seeds=2, variants=[SARSA], grid=[FIGURE_1])
-    part = Slice(comparison, "continuing")
+    comparison = build({"truncates": unchanged}, seeds=2, variants=[SARSA], grid=[FIGURE_1])
+    part = Slice(comparison, "truncates")
     assert np.isfinite(AT_FIGURE_1.values(part, "return_last50", SARSA)).all()
     assert np.isnan(MEAN_OF_ALL.values(part, "return_last50", SARSA)).all()
     for missing in (
-        Slice(comparison, "absorbing"),
-        Slice(replace(comparison, world="garden.txt"), "continuing"),
-        Slice(subset(comparison, [0], 2, 49), "continuing"),
+        Slice(comparison, "terminates"),
+        Slice(replace(comparison, world="garden.txt"), "truncates"),
+        Slice(subset(comparison, [0], 2, 49), "truncates"),
     ):
         assert np.isnan(AT_FIGURE_1.values(missing, "return_last50", SARSA)).all()
     for quantity in (
@@ -65,22 +65,22 @@ def test_what_is_missing_is_nan() -> None:
 
 def test_the_held_out_half_does_not_choose() -> None:
     """The configuration that shines on odd seeds only is not chosen for them."""
-    comparison = build({"continuing": unchanged}, seeds=6, variants=[SARSA], noise=0.0, shared=0.0)
+    comparison = build({"truncates": unchanged}, seeds=6, variants=[SARSA], noise=0.0, shared=0.0)
     comparison.arrays["returns"][...] = 10
     comparison.arrays["returns"][3, ::2] = 20  # best on the seeds that choose, poor on the others
     comparison.arrays["returns"][3, 1::2] = 0
     comparison.arrays["returns"][5, 1::2] = 99
     comparison = remeasured(comparison)
-    values = Slice(comparison, "continuing").held_out("return_last50", SARSA)
+    values = Slice(comparison, "truncates").held_out("return_last50", SARSA)
     assert values.tolist() == [0.0, 0.0, 0.0]
 
 
 def test_shares_count_ties_by_half() -> None:
-    comparison = build({"continuing": unchanged}, seeds=2, variants=[Q_LEARNING, SARSA])
+    comparison = build({"truncates": unchanged}, seeds=2, variants=[Q_LEARNING, SARSA])
     comparison.arrays["returns"][...] = 10
     comparison.arrays["returns"][:4, 0] = 20  # four of 16 pairs are above, the others tie
     comparison = remeasured(comparison)
-    part = Slice(comparison, "continuing")
+    part = Slice(comparison, "truncates")
     for below, expected in ((False, [10 / 16, 0.5]), (True, [6 / 16, 0.5])):
         quantity = share_above("return_last50", Q_LEARNING, SARSA, below)
         (share,) = (effect(part) for effect in quantity.effects.values())
@@ -90,11 +90,11 @@ def test_shares_count_ties_by_half() -> None:
 def test_the_rank_correlation_is_spearmans_within_each_seed() -> None:
     from scipy.stats import spearmanr
 
-    comparison = build({"continuing": unchanged}, seeds=3, variants=[SARSA], noise=20.0)
+    comparison = build({"truncates": unchanged}, seeds=3, variants=[SARSA], noise=20.0)
     comparison.arrays["steps"][:, 2] = 50  # constant: no correlation
     comparison = remeasured(comparison)
     quantity = rank_correlation("return_last50", "steps_last50", SARSA)
-    (found,) = (effect(Slice(comparison, "continuing")) for effect in quantity.effects.values())
+    (found,) = (effect(Slice(comparison, "truncates")) for effect in quantity.effects.values())
     returns, steps = (comparison.measures[name] for name in ("return_last50", "steps_last50"))
     for seed in (0, 1):
         assert found[seed] == pytest.approx(spearmanr(returns[:, seed], steps[:, seed])[0])
@@ -102,8 +102,8 @@ def test_the_rank_correlation_is_spearmans_within_each_seed() -> None:
 
 
 def test_what_cannot_leave_a_range_rests_on_the_mean() -> None:
-    assert of(MEAN_OF_ALL, "steps_all", SARSA).typical
+    assert of(MEAN_OF_ALL, "steps_all", SARSA).uses_iqm
     assert of(MEAN_OF_ALL, "improved", SARSA).possible == (0, 1)
     pair = (Q_LEARNING, SARSA)
     assert minus(MEAN_OF_ALL, "deliveries_last50", pair).possible == (-1, 1)
-    assert not minus(MEAN_OF_ALL, "deliveries_last50", pair).typical
+    assert not minus(MEAN_OF_ALL, "deliveries_last50", pair).uses_iqm

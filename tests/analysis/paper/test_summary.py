@@ -18,7 +18,7 @@ from taichi_ants.analysis.statistics import bootstrap_interval
 
 
 def test_a_line_by_hand() -> None:
-    comparison = build({"absorbing": unchanged}, seeds=3, variants=[SARSA], grid=[FIGURE_1])
+    comparison = build({"terminates": unchanged}, seeds=3, variants=[SARSA], grid=[FIGURE_1])
     comparison.arrays["returns"][0, :, -50:] = np.array([40, 50, 60])[:, None]
     comparison.arrays["steps"][0, :, :70] = 100
     comparison.arrays["steps"][0, :, 70:] = np.array([30, 40, 50])[:, None]
@@ -33,13 +33,13 @@ def test_a_line_by_hand() -> None:
         "discount": 0.9,
         "epsilon": 0.3,
         "epsilon_decay": 0.995,
-        "delivery": "absorbing",
+        "delivery": "terminates",
         "seeds": 3,
     }
     assert (line["return_last50_ci_low"], line["return_last50_ci_high"]) == (low[0], high[0])
-    centres = {name: value for name, value in line.items() if name.endswith(("mean", "iqm"))}
+    estimates = {name: value for name, value in line.items() if name.endswith(("mean", "iqm"))}
     runs = {name: value for name, value in line.items() if name.startswith("runs_")}
-    assert centres == {
+    assert estimates == {
         "return_last50_mean": 50.0,
         "return_last50_iqm": 50.0,
         "steps_last50_mean": 40.0,
@@ -62,7 +62,7 @@ def test_a_line_by_hand() -> None:
 
 
 def test_a_far_run_moves_the_mean_and_not_the_interquartile_mean() -> None:
-    comparison = build({"absorbing": unchanged}, seeds=16, variants=[SARSA], grid=[FIGURE_1])
+    comparison = build({"terminates": unchanged}, seeds=16, variants=[SARSA], grid=[FIGURE_1])
     comparison.arrays["returns"][0, :, -50:] = np.array([*range(36, 51), 436])[:, None]
     comparison = remeasured(comparison)
     line = summarise(comparison)[0].columns()
@@ -71,7 +71,7 @@ def test_a_far_run_moves_the_mean_and_not_the_interquartile_mean() -> None:
 
 
 def test_one_line_per_row_in_their_order() -> None:
-    comparison = build({"continuing": unchanged, "absorbing": unchanged}, seeds=4)
+    comparison = build({"truncates": unchanged, "terminates": unchanged}, seeds=4)
     lines = [one.columns() for one in summarise(comparison)]
     assert [line["delivery"] for line in lines] == [row.delivery for row in comparison.rows]
     means = comparison.measures["return_last50"].mean(axis=1)
@@ -83,7 +83,7 @@ def test_one_line_per_row_in_their_order() -> None:
 
 
 def test_one_seed_has_means_only() -> None:
-    comparison = subset(build({"continuing": unchanged}), [4], 1, 10)
+    comparison = subset(build({"truncates": unchanged}), [4], 1, 10)
     line = summarise(comparison)[0].columns()
     missing = {name for name, value in line.items() if value != value}
     assert missing == {name for name in line if name.endswith(("ci_low", "ci_high"))}
@@ -92,7 +92,7 @@ def test_one_seed_has_means_only() -> None:
 
 
 def test_runs_that_act_alike_have_means_of_their_own() -> None:
-    comparison = build({"absorbing": unchanged}, seeds=5, variants=[SARSA], grid=[FIGURE_1])
+    comparison = build({"terminates": unchanged}, seeds=5, variants=[SARSA], grid=[FIGURE_1])
     comparison.behaviours[0, [1, 4]] = CIRCLES
     comparison.policy_returns[0] = [45, 210, 45, 45, 220]
     comparison.arrays["returns"][0, :, -50:] = np.array([40, 150, 41, 45, 160])[:, None]
@@ -107,7 +107,7 @@ def test_runs_that_act_alike_have_means_of_their_own() -> None:
         "discount": 0.9,
         "epsilon": 0.3,
         "epsilon_decay": 0.995,
-        "delivery": "absorbing",
+        "delivery": "terminates",
         "behaviour": "circles with food",
         "runs": 2,
         "return_last50_mean": 155.0,
@@ -121,7 +121,7 @@ def test_runs_that_act_alike_have_means_of_their_own() -> None:
 
 
 def test_each_run_is_counted_once() -> None:
-    comparison = build({"continuing": unchanged, "absorbing": unchanged}, seeds=4)
+    comparison = build({"truncates": unchanged, "terminates": unchanged}, seeds=4)
     comparison.behaviours[::3, 2:] = WALKS
     runs = sum(one.runs for one in summarise_behaviours(comparison))
     assert runs == comparison.behaviours.size

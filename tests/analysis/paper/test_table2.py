@@ -38,12 +38,12 @@ def lines_of(comparison: Comparison, draws: int = 50) -> list[Line]:
 
 @pytest.fixture(scope="module")
 def comparison() -> Comparison:
-    return build({"continuing": unchanged, "absorbing": unchanged}, seeds=8, noise=15.0)
+    return build({"truncates": unchanged, "terminates": unchanged}, seeds=8, noise=15.0)
 
 
 def exact_share_at_most(comparison: Comparison, variant: Variant, level: float) -> float:
     """The best of independent runs is at most a level if all are: the product of the shares."""
-    rows = comparison.positions("continuing", variant)
+    rows = comparison.positions("truncates", variant)
     return float((comparison.measures["return_last50"][rows] <= level).mean(axis=1).prod())
 
 
@@ -51,16 +51,16 @@ def exact_share_at_most(comparison: Comparison, variant: Variant, level: float) 
 def test_best_of_16_has_the_distribution_of_the_maximum(
     comparison: Comparison, variant: Variant
 ) -> None:
-    best = best_of(comparison, "continuing", variant, draws=40_000)
-    rows = comparison.positions("continuing", variant)
+    best = best_of(comparison, "truncates", variant, draws=40_000)
+    rows = comparison.positions("truncates", variant)
     for level in np.unique(comparison.measures["return_last50"][rows])[-40::3]:
         share = (best["return_last50"] <= level).mean()
         assert share == pytest.approx(exact_share_at_most(comparison, variant, level), abs=0.01)
 
 
 def test_the_winners_other_figures_belong_to_the_same_run(comparison: Comparison) -> None:
-    best = best_of(comparison, "absorbing", DYNA_P3, draws=500)
-    rows = comparison.positions("absorbing", DYNA_P3)
+    best = best_of(comparison, "terminates", DYNA_P3, draws=500)
+    rows = comparison.positions("terminates", DYNA_P3)
     runs = zip(
         *(
             comparison.measures[name][rows].ravel()
@@ -73,11 +73,11 @@ def test_the_winners_other_figures_belong_to_the_same_run(comparison: Comparison
 
 def test_seeds_of_the_configurations_are_independent() -> None:
     """Two configurations that are good on different seeds: together good with 3/4, not always."""
-    two = subset(build({"continuing": unchanged}, seeds=2), [0, 1], 2, 120)
+    two = subset(build({"truncates": unchanged}, seeds=2), [0, 1], 2, 120)
     two.arrays["returns"][...] = 0
     two.arrays["returns"][0, 0] = two.arrays["returns"][1, 1] = 50
     two = remeasured(two)
-    best = best_of(two, "continuing", Q_LEARNING, draws=20_000)
+    best = best_of(two, "truncates", Q_LEARNING, draws=20_000)
     assert (best["return_last50"] == 50).mean() == pytest.approx(0.75, abs=0.01)
 
 
@@ -92,14 +92,14 @@ def test_percentiles_count_ties_by_half() -> None:
 def test_table2_lines(comparison: Comparison) -> None:
     lines, summary = lines_of(comparison, 2000), summarise(comparison)
     assert [(line.delivery, line.summary.row.variant) for line in lines] == [
-        (delivery, variant) for delivery in ("continuing", "absorbing") for variant in VARIANTS
+        (delivery, variant) for delivery in ("truncates", "terminates") for variant in VARIANTS
     ]
     line = lines[1].columns()
-    position = comparison.position("continuing", SARSA, FIGURE_1)
+    position = comparison.position("truncates", SARSA, FIGURE_1)
     assert summary[position].columns().items() <= line.items()
     assert line["paper_configuration"]
     assert (line["paper_return"], line["paper_steps"], line["paper_deliveries"]) == (47.3, 73, 1)
-    best = best_of(comparison, "continuing", SARSA, draws=2000)
+    best = best_of(comparison, "truncates", SARSA, draws=2000)
     assert line["best_run_of"] == 16
     assert line["best_run_return_last50_median"] == np.median(best["return_last50"])
     for name in ("steps_all", "steps_last50"):
@@ -110,7 +110,7 @@ def test_table2_lines(comparison: Comparison) -> None:
 
 
 def test_what_the_paper_does_not_have_is_nan() -> None:
-    full = build({"absorbing": unchanged}, variants=[SARSA, Variant("mine", "depth=2")], seeds=3)
+    full = build({"terminates": unchanged}, variants=[SARSA, Variant("mine", "depth=2")], seeds=3)
     rows = [n for n, row in enumerate(full.rows) if row.variant != SARSA or row.point != FIGURE_1]
     cut = subset(full, rows, 1, 120)
     sarsa, mine = lines = lines_of(cut)
@@ -123,7 +123,7 @@ def test_what_the_paper_does_not_have_is_nan() -> None:
     (row, *_) = (line for line in text.splitlines() if line.startswith("| mine (d2) *"))
     assert row.endswith("| - | - |")
     assert (
-        f"mine (d2) *, absorbing: {cut.rows[shown_position(cut, *cut.learners[1])].point.label}"
+        f"mine (d2) *, terminates: {cut.rows[shown_position(cut, *cut.learners[1])].point.label}"
         in text
     )
     assert "nan" not in text
@@ -142,17 +142,17 @@ def test_another_world_has_nothing_of_the_paper(comparison: Comparison) -> None:
 
 
 def test_what_stands_for_a_learner(comparison: Comparison) -> None:
-    position = shown_position(comparison, "absorbing", SARSA)
+    position = shown_position(comparison, "terminates", SARSA)
     assert comparison.rows[position].point == FIGURE_1
     garden = replace(comparison, world="garden.txt")
-    rows = garden.positions("absorbing", SARSA)
-    best = shown_position(garden, "absorbing", SARSA)
+    rows = garden.positions("terminates", SARSA)
+    best = shown_position(garden, "terminates", SARSA)
     typical = interquartile_mean(garden.measures["return_last50"][rows])
     assert best == rows[int(typical.argmax())]
     lucky = replace(garden, arrays={name: one.copy() for name, one in garden.arrays.items()})
     lucky.arrays["returns"][rows[3], 0] = 4000  # one far run does not choose
     lucky = remeasured(lucky)
-    assert shown_position(lucky, "absorbing", SARSA) != rows[3] or best == rows[3]
+    assert shown_position(lucky, "terminates", SARSA) != rows[3] or best == rows[3]
 
 
 def test_the_markdown_holds_the_numbers(comparison: Comparison) -> None:
@@ -160,12 +160,12 @@ def test_the_markdown_holds_the_numbers(comparison: Comparison) -> None:
     text = table2_markdown(comparison, lines)
     assert text.startswith("World: the paper's.\n128 configurations, 8 seeds")
     assert "Training without evaporation of trails, greedy evaluation with it." in text
-    row = next(line for line in text.splitlines() if line.startswith("| SARSA | continuing"))
+    row = next(line for line in text.splitlines() if line.startswith("| SARSA | truncates"))
     cells = [cell.strip() for cell in row.strip("|").split("|")]
-    centre = lines[1].summary.centres["return_last50"]
-    assert cells[:2] == ["SARSA", "continuing"]
-    assert cells[2].startswith(f"{centre.mean:.1f} [")
-    assert cells[3].startswith(f"{centre.iqm:.1f} [")
+    estimator = lines[1].summary.estimates["return_last50"]
+    assert cells[:2] == ["SARSA", "truncates"]
+    assert cells[2].startswith(f"{estimator.mean:.1f} [")
+    assert cells[3].startswith(f"{estimator.iqm:.1f} [")
     assert cells[4].startswith(f"{lines[1].best_run['return_last50'].median:.1f} [")
     assert cells[5] == "47.3"
     assert "**Steps, all episodes**" in text
@@ -176,15 +176,15 @@ def test_the_markdown_holds_the_numbers(comparison: Comparison) -> None:
 
 
 def test_a_mean_that_far_runs_have_moved_is_marked() -> None:
-    comparison = build({"continuing": unchanged}, seeds=40)
-    row = comparison.position("continuing", SARSA, FIGURE_1)
-    usual = lines_of(comparison)[1].summary.centres["return_last50"]
+    comparison = build({"truncates": unchanged}, seeds=40)
+    row = comparison.position("truncates", SARSA, FIGURE_1)
+    usual = lines_of(comparison)[1].summary.estimates["return_last50"]
     assert not usual.apart
-    comparison = build({"continuing": unchanged}, seeds=40)
+    comparison = build({"truncates": unchanged}, seeds=40)
     comparison.arrays["returns"][row, 7] = 4000
     comparison = remeasured(comparison)
     lines = lines_of(comparison)
-    moved = lines[1].summary.centres["return_last50"]
+    moved = lines[1].summary.estimates["return_last50"]
     assert moved.apart
     mean = f"{moved.mean:.0f} ! ["
     text = table2_markdown(comparison, lines)
@@ -193,9 +193,9 @@ def test_a_mean_that_far_runs_have_moved_is_marked() -> None:
 
 
 def some_circle(comparison: Comparison) -> Comparison:
-    """In the paper's configuration of absorbing Dyna-Q (p3) three of eight runs circle."""
+    """In the paper's configuration of terminates Dyna-Q (p3) three of eight runs circle."""
     behaviours = comparison.behaviours.copy()
-    behaviours[shown_position(comparison, "absorbing", DYNA_P3), [1, 2, 5]] = CIRCLES
+    behaviours[shown_position(comparison, "terminates", DYNA_P3), [1, 2, 5]] = CIRCLES
     return replace(comparison, behaviours=behaviours)
 
 
@@ -203,19 +203,19 @@ def test_means_of_runs_that_do_different_things_are_marked(comparison: Compariso
     circling = some_circle(comparison)
     text = table2_markdown(circling, lines_of(circling))
     assert "+ the runs do different things, and no run has their mean" in text
-    assert text.count("| Dyna-Q (p3) + | absorbing |") == 5
+    assert text.count("| Dyna-Q (p3) + | terminates |") == 5
     assert text.count(" + |") == 5
     assert "+ the runs" not in table2_markdown(comparison, lines_of(comparison))
 
 
 def test_examples_show_each_behaviour_by_its_median_run(comparison: Comparison) -> None:
     changed = some_circle(comparison)
-    shown = shown_position(comparison, "absorbing", DYNA_P3)
+    shown = shown_position(comparison, "terminates", DYNA_P3)
     returns = changed.measures["return_last50"]
     found = examples(changed)
     whats = [(row, int(changed.behaviours[row, run])) for row, run in found]
     expected = []
-    for setting in ("continuing", "absorbing"):
+    for setting in ("truncates", "terminates"):
         for variant in comparison.variants:
             row = shown_position(comparison, setting, variant)
             expected += [(row, DELIVERS)] + [(row, CIRCLES)] * (row == shown)
@@ -244,8 +244,8 @@ def test_a_behaviour_that_no_shown_configuration_has_gets_an_example(
 
 
 def test_examples_of_learners_outside_of_the_paper(comparison: Comparison) -> None:
-    few = subset(comparison, comparison.positions("absorbing", SARSA)[:2], 3, 120)
+    few = subset(comparison, comparison.positions("terminates", SARSA)[:2], 3, 120)
     ((row, run),) = examples(few)
     means = few.measures["return_last50"]
-    assert row == shown_position(few, "absorbing", SARSA)
+    assert row == shown_position(few, "terminates", SARSA)
     assert means[row, run] == np.median(means[row])

@@ -23,16 +23,16 @@ KERNELS = [
     ("sarsa", "shared", "ants_seen", True),
     ("expected_sarsa", "shared", "five_cells", False),
     ("dyna_q", "shared", "trail_levels", True),
-    ("q_learning", "own", "ants_seen", False),
-    ("dyna_q", "own", "ants_seen", False),
-    ("double_q", "own", "paper", True),
-    ("sarsa_lambda", "own", "paper", False),
-    ("n_step_sarsa", "own", "paper", False),
-    ("prioritized_sweeping", "own", "trail_levels", False),
-    ("q_learning", "fixed", "six_cells", False),
+    ("q_learning", "independent", "ants_seen", False),
+    ("dyna_q", "independent", "ants_seen", False),
+    ("double_q", "independent", "paper", True),
+    ("sarsa_lambda", "independent", "paper", False),
+    ("n_step_sarsa", "independent", "paper", False),
+    ("prioritized_sweeping", "independent", "trail_levels", False),
+    ("q_learning", "frozen", "six_cells", False),
     ("sarsa", "shared", "ants", False, "right_of_way", "strongest"),
     ("q_learning", "shared", "queues", False, "following", "strongest_under_carriers"),
-    ("q_learning", "fixed", "paper", True, "following", "strongest_under_carriers"),
+    ("q_learning", "frozen", "paper", True, "following", "strongest_under_carriers"),
 ]
 
 
@@ -97,11 +97,11 @@ def test_each_learner_and_observation_is_compared():
     assert {kernel[2] for kernel in KERNELS} == set(observations.names())
 
 
-def crowd(look):
+def crowd(view):
     """What stands in each of the six cells around: 0 no ant, 1 one without food, 2 one with it."""
     index = 0
     for k in range(6):
-        index = 3 * index + look.ants[k]
+        index = 3 * index + view.ants[k]
     return index
 
 
@@ -116,11 +116,11 @@ def test_ants_see_which_ants_stand_around_them_and_what_these_carry(seen_crowd):
     """By a registered observation, after moves, pick-ups, gives, births and deaths."""
     loads = np.zeros(3, dtype=int)
     for seed in range(20):
-        drawn = random_colony(seed, sharing="fixed", dense=False, changes=True)
+        drawn = random_colony(seed, sharing="frozen", dense=False, changes=True)
         task = replace(drawn.task, observation="crowd")
         given = (drawn.world, task, drawn.training, drawn.seed)
         table = np.zeros((seen_crowd.n_states, 5), np.float32)  # any action, at random
-        colony = Colony(*given, **drawn.population, sharing="fixed", q_values=table)
+        colony = Colony(*given, **drawn.population, sharing="frozen", q_values=table)
         colony.begin_episode()
         for _ in range(15):
             colony.tick()
@@ -141,7 +141,9 @@ def test_learners_whose_tables_cannot_be_shared_are_refused():
         learner = learners.get(name)
         training = TrainingConfig(name, 0.1, 0.9, 0.1, 1.0)
         if learner.td_error is None:
-            with pytest.raises(AntsError, match=rf"^learner '{name}' .* make sharing \"own\"\.$"):
+            with pytest.raises(
+                AntsError, match=rf"^learner '{name}' .* make sharing \"independent\"\.$"
+            ):
                 Colony(worlds.paper(), Task(), training)
 
 

@@ -15,7 +15,7 @@ TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 0.0, 1.0)
 
 def begun(world: World, ants: int, life: Life = Life()) -> Colony:  # noqa: B008
     """A colony in its first episode whose ants do what they are given."""
-    colony = Colony(world, Task(life=life), None, ants=ants, sharing="fixed")
+    colony = Colony(world, Task(life=life), None, ants=ants, sharing="frozen")
     colony.begin_episode()
     return colony
 

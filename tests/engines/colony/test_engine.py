@@ -12,7 +12,7 @@ from taichi_ants.checks import MAX_ANTS
 from taichi_ants.engines import arguments
 from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.learners.policies import random_policy, trail_follower
-from taichi_ants.rendering import colony_moments
+from taichi_ants.rendering import colony_snapshots
 from taichi_ants.task import Life, Pheromone, Task, foraging
 from taichi_ants.task.constants import FOOD
 
@@ -31,7 +31,7 @@ def levels_after(pheromone: Pheromone, ticks: int, level: int = 400) -> np.ndarr
     )
     training = TrainingConfig("q_learning", 0.1, 0.9, 0.0, 1.0)
     task = Task(pheromone=pheromone)
-    colony = Colony(world, task, training, sharing="fixed", q_values=random_policy())
+    colony = Colony(world, task, training, sharing="frozen", q_values=random_policy())
     colony.begin_episode()
     colony.tick(ticks)
     return colony.snapshot().trail
@@ -128,7 +128,7 @@ def test_births_fill_the_slots_and_no_more():
             {
                 "task": Task("six_cells"),
                 "ants": 2000,
-                "sharing": "own",
+                "sharing": "independent",
                 "start": "spread",
                 "world": worlds.open_world(1, (60, 60, 60)),
                 "seeds": range(30),
@@ -137,7 +137,7 @@ def test_births_fill_the_slots_and_no_more():
         ),
         ({"task": Task("trail_levels"), "q_values": np.zeros((128, 5))}, "(432, 5)"),
         ({"sharing": "some"}, "'some'"),
-        ({"sharing": "fixed"}, "sharing is 'fixed', but q_values is None; nobody learns"),
+        ({"sharing": "frozen"}, "sharing is 'frozen', but q_values is None; nobody learns"),
         ({"world": World((3, 3, 3), (0, 0, 0))}, "the world has no food"),
         ({"seeds": []}, "seeds"),
         ({"seeds": [1, 1]}, "1"),
@@ -183,7 +183,7 @@ def test_a_world_whose_episode_has_ended_stays_as_it_is(schedule, pheromone):
     task = Task(pheromone=pheromone, evaporation_in_evaluation=True)
     colony = Colony(
         *(worlds.paper(), task, TRAINING, (1, 2)),
-        sharing="fixed",
+        sharing="frozen",
         q_values=trail_follower(),
         ends_at_delivery=True,
         schedule=schedule,
@@ -213,13 +213,13 @@ def test_both_schedules_agree_where_places_stay_vacant():
 def test_a_tick_needs_an_episode():
     with pytest.raises(AntsError, match="begin_episode"):
         Colony(worlds.paper(), None, TRAINING).tick()
-    for look in (Colony.snapshot, lambda colony: next(colony_moments(colony))):
+    for look in (Colony.snapshot, lambda colony: next(colony_snapshots(colony))):
         with pytest.raises(AntsError, match="begin_episode"):
             look(Colony(worlds.paper(), None, TRAINING))
 
 
 def test_episodes_may_take_place_in_other_worlds():
-    """Each in a world of its own gives what moving by hand does, and goes on with one table."""
+    """Each in a world of its own gives what moving it does, and goes on with one table."""
     places = [worlds.open_world(seed, ranges=(7, 7, 7)) for seed in range(3)]
     task = Task(life=Life(regrowth=1))
     listed, moved = (Colony(places[0], task, TRAINING, 4, ants=9) for _ in range(2))

@@ -22,7 +22,7 @@ def kept(tmp_path_factory) -> dict[str, np.ndarray]:
     """The arrays of a colony in which everything comes and goes."""
     path = tmp_path_factory.mktemp("kept") / "colony.npz"
     life = Life(births=True, lifespan=150, regrowth=2, wander=9)
-    task = Task(delivery="continuing", evaporation_in_training=True, life=life)
+    task = Task(delivery="truncates", evaporation_in_training=True, life=life)
     world = worlds.open_world(2, (14, 14, 14))
     colony = Colony(world, task, PLANNING, (1, 2), ants=12)
     colony.begin_episode()
@@ -110,11 +110,11 @@ def test_no_colony_at_all(tmp_path, content) -> None:
 )
 def test_what_was_saved_goes_on_bit_for_bit(name, tmp_path) -> None:
     """At many moments of its life: a model, further tables, or traces are part of it."""
-    one = random_colony(7, sharing="own", learner=name, observation="ants_seen")
+    one = random_colony(7, sharing="independent", learner=name, observation="ants_seen")
     colony = Colony(
         *(one.world, one.task, one.training, one.seed),
         **one.population,
-        sharing="own",
+        sharing="independent",
         q_values=one.q_values,
     )
     colony = reread(colony, tmp_path)

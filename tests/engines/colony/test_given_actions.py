@@ -26,7 +26,7 @@ ALL = np.ones(3, bool)
 
 
 def given(seeds=(3, 4, 5), task=LIVELY, **options) -> Colony:
-    return Colony(MEADOW, task, None, seeds, ants=20, sharing="fixed", **options)
+    return Colony(MEADOW, task, None, seeds, ants=20, sharing="frozen", **options)
 
 
 def pass_ticks(colony: Colony, ticks: int = 40, seed: int = 1) -> Colony:
@@ -103,7 +103,7 @@ def test_colonies_that_learn_can_be_copied_too():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("sharing", ["own", "shared"])
+@pytest.mark.parametrize("sharing", ["independent", "shared"])
 def test_worlds_in_which_ants_learn_begin_anew_as_well(sharing):
     """As the reference; epsilon and the learning rate stay, so that it must not decay there."""
     for seed in range(6):
@@ -113,7 +113,7 @@ def test_worlds_in_which_ants_learn_begin_anew_as_well(sharing):
             learner="q_learning",
             dense=False,
             changes=True,
-            observation="ants_seen" if sharing == "own" else "paper",
+            observation="ants_seen" if sharing == "independent" else "paper",
         )
         steady = {"epsilon_decay": 1.0, "learning_rate_decay": 1.0, "min_learning_rate": 0.0}
         training = replace(drawn.training, epsilon=0.3, **steady)
@@ -161,6 +161,10 @@ def test_what_is_not_allowed():
     learning.begin_episode()
     with pytest.raises(AntsError, match=r"^this colony has a training by which ants choose; "):
         learning.act(np.zeros((1, 9), int))
-    for options in ({}, {"sharing": "own"}, {"sharing": "fixed", "q_values": np.zeros((128, 5))}):
+    for options in (
+        {},
+        {"sharing": "independent"},
+        {"sharing": "frozen", "q_values": np.zeros((128, 5))},
+    ):
         with pytest.raises(AntsError, match=r"^training is None; it must be one TrainingConfig, "):
             Colony(MEADOW, Task(), None, ants=9, **options)

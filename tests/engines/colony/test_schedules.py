@@ -158,19 +158,19 @@ def test_the_internal_order_of_the_ants_does_not_matter(learner):
     ("learner", "sharing"),
     [
         ("q_learning", "shared"),
-        ("sarsa", "own"),
+        ("sarsa", "independent"),
         pytest.param("expected_sarsa", "shared", marks=pytest.mark.slow),
         ("dyna_q", "shared"),
-        pytest.param("dyna_q", "own", marks=pytest.mark.slow),
-        pytest.param("double_q", "own", marks=pytest.mark.slow),
-        ("sarsa_lambda", "own"),
-        pytest.param("prioritized_sweeping", "own", marks=pytest.mark.slow),
+        pytest.param("dyna_q", "independent", marks=pytest.mark.slow),
+        pytest.param("double_q", "independent", marks=pytest.mark.slow),
+        ("sarsa_lambda", "independent"),
+        pytest.param("prioritized_sweeping", "independent", marks=pytest.mark.slow),
     ],
 )
 def test_one_ant_equals_the_engine_of_independent_runs(learner, sharing):
     more = {"planning_steps": 2} if learner == "dyna_q" else {}
     training = TrainingConfig(learner, 0.1, 0.9, 0.3, 0.95, hyperparameters=more)
-    for delivery in ("absorbing", "continuing"):
+    for delivery in ("terminates", "truncates"):
         assert_equal_runs(training, Task(delivery=delivery), sharing)
 
 

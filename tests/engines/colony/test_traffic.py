@@ -49,15 +49,15 @@ def after_a_tick(
     queen: tuple[int, int, int] = BEYOND,
     foods: tuple[tuple[int, int, int], ...] = (),
     trails: tuple[tuple[tuple[int, int, int], int], ...] = (),
-    rewards: Rewards = Rewards(empty=0, failed=-1, lure=1),  # noqa: B008
+    rewards: Rewards = Rewards(empty=0, failed=-1, shaping=1),  # noqa: B008
 ) -> list[After]:
     """The ants after one tick, which is the same in both simulators."""
     starts = [((one.x, 3, 0), one.heading) for one in row]
     world = World((12, 8, 1), queen, foods=foods, trails=trails, ants=starts)
     task = Task(traffic=traffic, rewards=rewards, pheromone=Pheromone(deposit="none"))
     given = (world, task, TRAINING, 0, len(row))
-    options = {"sharing": "fixed", "q_values": random_policy()}
-    kernels = Colony(world, task, None, 0, len(row), sharing="fixed")
+    options = {"sharing": "frozen", "q_values": random_policy()}
+    kernels = Colony(world, task, None, 0, len(row), sharing="frozen")
     plain = ReferenceColony(*given, **options)
     kernels.begin_episode()
     plain.begin_episode()
@@ -65,7 +65,7 @@ def after_a_tick(
     for slot, one in enumerate(row):
         ant = plain.ants[slot]
         ant.carries, ant.chosen = one.food, one.action
-        plain.look(ant)
+        plain.observe(ant)
         arrays["carries"][slot], arrays["percept"][slot] = one.food, ant.percept
         if one.food:
             arrays["ground"][arrays["cell"][slot]] = OBSTACLE | STANDS_WITH_FOOD << 4
@@ -100,7 +100,7 @@ def test_a_step_away_from_the_queen_pays_as_on_an_empty_cell():
 
 def test_a_pushed_ant_is_paid_as_for_an_empty_cell():
     row = [Standing(3, food=True), Standing(4, PICK_UP)]
-    paid = Rewards(empty=7, failed=-5, lure=2)
+    paid = Rewards(empty=7, failed=-5, shaping=2)
     assert after_a_tick(RIGHT_OF_WAY, row, rewards=paid) == [After(4, 2), After(3, 7)]
 
 
@@ -193,7 +193,7 @@ def test_a_ring_of_three_ants_stays(traffic):
     steps = [places[(k + 1) % 3] - places[k] for k in range(3)]
     headings = [grid.offsets.tolist().index(step) for step in steps]
     world = World((12, 8, 1), (0, 7, 0), ants=list(zip(cells, headings, strict=True)))
-    colony = Colony(world, Task(traffic=traffic), None, 0, 3, sharing="fixed")
+    colony = Colony(world, Task(traffic=traffic), None, 0, 3, sharing="frozen")
     colony.begin_episode()
     before = colony.arrays["cell"].tolist()
     colony.act(np.full((1, 3), FORWARD))

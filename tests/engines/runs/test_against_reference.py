@@ -27,7 +27,7 @@ from taichi_ants.task.constants import DEPOSIT_LEVEL
 from taichi_ants.task.events import Event
 from taichi_ants.worlds import World, paper
 
-DELIVERIES = ("absorbing", "continuing")
+DELIVERIES = ("terminates", "truncates")
 # Each entry is a kernel of its own, so that there are few: learner, observation, deposit.
 KERNELS = [
     *zip(
@@ -62,7 +62,7 @@ def random_config(seed: int, learner: str) -> TrainingConfig:
         hyperparameters=hyperparameters,
         learning_rate_decay=float(rng.choice([0.5, 0.9, 1.0])),
         min_learning_rate=float(rng.choice([0.0, 0.1])),
-        initial_value=float(rng.choice([0.0, 1.7, -3.0])),
+        initial_q=float(rng.choice([0.0, 1.7, -3.0])),
     )
 
 
@@ -129,7 +129,7 @@ def test_every_step_in_the_papers_world(learner, delivery):
     """Long enough to deliver, so that the end of an episode and the next one are compared too."""
     more = {"planning_steps": 3} if learners.get(learner).plans else {}
     config = TrainingConfig(learner, 0.01, 0.99, 0.3, 0.9, 0.01, more)
-    task = Task(delivery=delivery, evaporation_in_training=delivery == "continuing")
+    task = Task(delivery=delivery, evaporation_in_training=delivery == "truncates")
     plain = assert_equal_steps(paper(), config, 3, 12, 120, task)
     assert sum(plain.deliveries) >= 3
     assert min(plain.steps) < 120

@@ -158,7 +158,7 @@ def test_flags(value):
     """Text such as "none" would count as True."""
     text = f"is {value!r}; it must be True or False"
     says(f"ends_at_delivery {text}", Colony, paper(), None, CONFIG, ends_at_delivery=value)
-    says(f"plain is {value!r}", Scene, paper().grid, plain=value)
+    says(f"overlay is {value!r}", Scene, paper().grid, overlay=value)
 
 
 @pytest.mark.parametrize("task", ["paper", 3, Task])

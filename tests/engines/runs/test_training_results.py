@@ -34,7 +34,7 @@ CONFIGS = (
 )
 SEEDS = (4, -1, 2**63)
 WORLD = worlds.paper().as_dict()
-TASK = Task("trail_levels", delivery="continuing", evaporation_in_training=True)
+TASK = Task("trail_levels", delivery="truncates", evaporation_in_training=True)
 
 
 @pytest.fixture(scope="module")

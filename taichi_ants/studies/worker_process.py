@@ -20,10 +20,10 @@ from taichi_ants.runtime import available_threads
 Given = ParamSpec("Given")
 Answer = TypeVar("Answer")
 
-_SERVE = "from taichi_ants.studies.beside import serve; serve()"
+_SERVE = "from taichi_ants.studies.worker_process import serve; serve()"
 
 
-class Beside:
+class WorkerProcess:
     """A process that does one call after the other, until the `with` block ends.
 
     What it cannot do, this process does when the answer is wanted: where there is one processor
@@ -39,7 +39,7 @@ class Beside:
         self._process: subprocess.Popen[bytes] | None = None
         self._turns = ThreadPoolExecutor(1)  # waits for answers
 
-    def __enter__(self) -> Beside:
+    def __enter__(self) -> WorkerProcess:
         return self
 
     def __exit__(self, kind: object, *raised: object) -> None:

@@ -1,4 +1,4 @@
-"""Observations of a user's own: compiled for the kernels after a trial, or refused."""
+"""Observations of a user's own: compiled for the kernels after a check, or refused."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ def _no_observation_stays(monkeypatch):
     monkeypatch.setattr(registry, "_OBSERVATIONS", dict(registry._OBSERVATIONS))
 
 
-def of_five_cells(look):
+def of_five_cells(view):
     """As the package's `five_cells`, but with the cells in view in another order."""
-    index = look.carries
+    index = view.carries
     for k in range(5):
-        index = 4 * index + look.codes[(k + 3) % 5]
+        index = 4 * index + view.codes[(k + 3) % 5]
     return index
 
 
-def of_trails(look):
+def of_trails(view):
     """Which of the cells ahead have more trail than the ant's own, and which are nearer."""
-    index = look.carries
+    index = view.carries
     for k in range(3):
-        index = 4 * index + 2 * look.nearer[k]
-        if look.levels[k] > look.own_level:
+        index = 4 * index + 2 * view.nearer[k]
+        if view.levels[k] > view.own_level:
             index += 1
     return index
 
@@ -59,31 +59,31 @@ def test_trails_and_distances_are_seen():
     assert set(nearer[trace.percepts < 64].tolist()) == {0, 1, 2}  # without food too
 
 
-def load(look):
-    return look.carries
+def load(view):
+    return view.carries
 
 
-def own_trail(look):
+def own_trail(view):
     on_trail = 0
-    if look.own_level >= 1:
+    if view.own_level >= 1:
         on_trail = 1
-    return 2 * look.carries + on_trail
+    return 2 * view.carries + on_trail
 
 
-def lesser_trail(look):
-    index = 2 * look.percept
-    if look.strongest > 20 and look.levels[1] < look.strongest:
+def lesser_trail(view):
+    index = 2 * view.percept
+    if view.strongest > 20 and view.levels[1] < view.strongest:
         index += 1
     return index
 
 
 @pytest.mark.parametrize(
-    ("row", "n_states"),
+    ("encode", "n_states"),
     [(load, 2), (own_trail, 4), pytest.param(lesser_trail, 256, marks=pytest.mark.slow)],
 )
-def test_a_row_may_leave_any_part_of_a_look_unread(row, n_states):
+def test_a_row_may_leave_any_part_of_a_look_unread(encode, n_states):
     """Taichi's compiler drops what computes the parts that nobody reads."""
-    task = Task(observations.register(Observation("mine", n_states, row)).name)
+    task = Task(observations.register(Observation("mine", n_states, encode)).name)
     assert train(paper(), CONFIG, (0, 1), 20, 80, task).q_values.shape == (1, 2, n_states, 5)
     colony = Colony(paper(), task, CONFIG, ants=5)
     colony.run(2, 30)
@@ -93,79 +93,79 @@ def test_a_row_may_leave_any_part_of_a_look_unread(row, n_states):
 
 def test_a_lambda_is_refused_at_once():
     with pytest.raises(AntsError, match="written with def"):
-        observations.register(Observation("short", 4, lambda look: 0))
+        observations.register(Observation("short", 4, lambda view: 0))
 
 
-def beyond_the_table(look):
-    return look.percept + look.carries
+def beyond_the_table(view):
+    return view.percept + view.carries
 
 
-def below_the_table(look):
-    return look.percept - 1
+def below_the_table(view):
+    return view.percept - 1
 
 
-def of_what_there_is_not(look):
-    return look.smell
+def of_what_there_is_not(view):
+    return view.smell
 
 
-def of_a_cell_too_far(look):
-    return look.codes[4]
+def of_a_cell_too_far(view):
+    return view.codes[4]
 
 
-def of_a_division_by_zero(look):
-    return 100 // look.strongest
+def of_a_division_by_zero(view):
+    return 100 // view.strongest
 
 
-def of_a_vector(look):
-    return look.codes
+def of_a_vector(view):
+    return view.codes
 
 
-def of_what_overflows(look):
-    return (look.percept * 1_000_000_000) % 128
+def of_what_overflows(view):
+    return (view.percept * 1_000_000_000) % 128
 
 
-def of_the_end(look):
-    return look.codes[-1]
+def of_the_end(view):
+    return view.codes[-1]
 
 
-def with_an_early_return(look):
-    if look.carries:
+def with_an_early_return(view):
+    if view.carries:
         return 64
     return 0
 
 
-def with_a_return_in_each_branch(look):
-    if look.carries:
+def with_a_return_in_each_branch(view):
+    if view.carries:
         return 64
     else:
         return 0
 
 
 @pytest.mark.parametrize(
-    ("row", "says"),
+    ("encode", "says"),
     [
-        (beyond_the_table, "row fails (it gives 128, but it must lie between 0 and 127"),
-        (below_the_table, "row fails (it gives -1, but it must lie between 0 and 127"),
+        (beyond_the_table, "encode fails (it gives 128, but it must lie between 0 and 127"),
+        (below_the_table, "encode fails (it gives -1, but it must lie between 0 and 127"),
         (of_what_there_is_not, "has no attribute 'smell'"),
         (of_a_cell_too_far, "index out of range"),
         (of_the_end, "there is no entry -1"),
         (of_a_division_by_zero, "divide by zero"),
-        (of_a_vector, "row fails"),
+        (of_a_vector, "encode fails"),
         (of_what_overflows, "overflow"),
-        (with_an_early_return, "row fails (it needs one return, as its last line)"),
-        (with_a_return_in_each_branch, "row fails (it needs one return, as its last line)"),
+        (with_an_early_return, "encode fails (it needs one return, as its last line)"),
+        (with_a_return_in_each_branch, "encode fails (it needs one return, as its last line)"),
     ],
 )
-def test_what_gives_wrong_rows_is_refused_at_once(row, says):
+def test_what_gives_wrong_rows_is_refused_at_once(encode, says):
     with pytest.raises(AntsError) as caught:
-        observations.register(Observation("mine", 128, row))
+        observations.register(Observation("mine", 128, encode))
     assert str(caught.value).startswith("observation 'mine' cannot be used: ")
     assert says in str(caught.value)
     assert "mine" not in observations.names()
 
 
-def of_a_dictionary(look):
-    return {0: 1, 1: 0}[int(look.carries)]
+def of_a_dictionary(view):
+    return {0: 1, 1: 0}[int(view.carries)]
 
 
 def test_what_taichi_cannot_compile_is_refused_and_taichi_goes_on(capfd):

@@ -1,4 +1,4 @@
-"""Ants in lockstep equal the plain reference: every step, whatever they are told to do."""
+"""Batched environments equal the plain reference: every step, whatever they are told to do."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from random_rewards import random_rewards
 from random_worlds import random_world
 
 from taichi_ants import Life, Pheromone, Task, runtime
-from taichi_ants.engines.runs.lockstep import Lockstep
+from taichi_ants.engines.runs.batched import BatchedEnvironments
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.task.constants import GIVE, PICK_UP
 from taichi_ants.task.events import Event, Reason
@@ -26,12 +26,12 @@ KERNELS = [
 
 def plain(world: World, task: Task, seed: int, ends: str, falls: bool) -> ReferenceColony:
     """A colony of one ant that does what it is told."""
-    life = Life(regrowth=0) if ends == "endless" else Life()
+    life = Life(regrowth=0) if ends == "continues" else Life()
     rules = {name: getattr(task, name) for name in vars(task) if name != "life"}
     rules |= {"evaporation_in_evaluation": falls, "life": life}
     nothing = np.zeros((task.n_states, 5), np.float32)
     return ReferenceColony(
-        world, Task(**rules), training(), seed, sharing="fixed", q_values=nothing
+        world, Task(**rules), training(), seed, sharing="frozen", q_values=nothing
     )
 
 
@@ -65,7 +65,7 @@ def sensible(rng: np.random.Generator, percept: int) -> int:
     return int(rng.choice(lures or [0, 1, 2]))
 
 
-def check_equal(ants: Lockstep, i: int, colony: ReferenceColony, world: World) -> None:
+def check_equal(ants: BatchedEnvironments, i: int, colony: ReferenceColony, world: World) -> None:
     """What the ant is and sees, and how its world looks, is that of the reference."""
     arrays, (ant,) = ants.arrays, colony.ants.values()
     now = ants.snapshot(i)
@@ -87,11 +87,11 @@ def test_each_step_equals_the_reference(kernel):
     for number in range(24):
         world, ends = (
             random_world(1000 + number),
-            ("absorbing", "continuing", "endless")[number % 3],
+            ("terminates", "truncates", "continues")[number % 3],
         )
         task, falls = drawn_task(rng, *kernel), bool(rng.integers(2))
         n, max_steps, seed = 3, int(rng.integers(2, 60)), int(rng.integers(2**60))
-        ants = Lockstep([world], task, n, max_steps, ends, falls)
+        ants = BatchedEnvironments([world], task, n, max_steps, ends, falls)
         ants.seed(range(seed, seed + n), np.arange(n))
         ants.begin(np.ones(n, bool))
         colonies = [plain(world, task, seed + i, ends, falls) for i in range(n)]
@@ -116,8 +116,8 @@ def test_each_step_equals_the_reference(kernel):
                 (step,) = colony.transitions
                 gave = step.event is Event.DELIVERED
                 delivered += gave
-                terminated = gave and ends == "absorbing"
-                last = colony.record.ticks == max_steps or (gave and ends != "endless")
+                terminated = gave and ends == "terminates"
+                last = colony.record.ticks == max_steps or (gave and ends != "continues")
                 assert arrays["rewards_of"][i] == step.reward
                 assert arrays["events"][i] == step.event
                 succeeds = step.event not in (Event.BLOCKED, Event.FAILED)
@@ -160,7 +160,7 @@ BEFORE_QUEEN = """
     ],
 )
 def test_reasons_say_why_nothing_happened(drawing, actions, reasons):
-    ants = Lockstep([from_text(drawing)], Task(), 1, 100, "endless", falls=False)
+    ants = BatchedEnvironments([from_text(drawing)], Task(), 1, 100, "continues", falls=False)
     ants.seed([0], np.arange(1))
     ants.begin(np.ones(1, bool))
     told = []
@@ -180,7 +180,7 @@ def test_ants_of_different_worlds_and_threads_do_not_meet():
     seen = []
     for threads in (1, 2):
         runtime.start(threads)
-        ants = Lockstep(worlds, Task(), n, 20, "absorbing", falls=True)
+        ants = BatchedEnvironments(worlds, Task(), n, 20, "terminates", falls=True)
         ants.seed(range(n), np.arange(n))
         ants.begin(np.ones(n, bool))
         for row in actions:
@@ -189,7 +189,7 @@ def test_ants_of_different_worlds_and_threads_do_not_meet():
     for name, array in seen[0].items():
         np.testing.assert_array_equal(array, seen[1][name], err_msg=name)
     for k, world in enumerate(worlds):
-        alone = Lockstep([world], Task(), 5, 20, "absorbing", falls=True)
+        alone = BatchedEnvironments([world], Task(), 5, 20, "terminates", falls=True)
         mine = np.arange(k, 15, 3)
         alone.seed(mine.tolist(), np.arange(5))
         alone.begin(np.ones(5, bool))

@@ -1,4 +1,4 @@
-"""Moments of ants: a world as it is, and what is said of it beside the picture.
+"""Snapshots of ants: a world as it is, and what is said of it beside the picture.
 
 An episode is played by a colony of one ant, so what is drawn is what the engine has done.
 """
@@ -17,32 +17,32 @@ from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.rendering.observed import name_parts
 from taichi_ants.rendering.panel import Status
 from taichi_ants.rendering.scene import DEFAULT_SIZE, Scene
 from taichi_ants.rendering.snapshot import Snapshot
+from taichi_ants.rendering.state_names import name_parts
 from taichi_ants.task import Task
 from taichi_ants.task.constants import ACTION_NAMES, EPISODE_STEPS
 from taichi_ants.worlds.world import World
 
-Moment = tuple[Snapshot, Status]
+CaptionedSnapshot = tuple[Snapshot, Status]
 
 
 def frames(
-    moments: Iterable[Moment], size: tuple[int, int] = DEFAULT_SIZE, **look: Any
+    snapshots: Iterable[CaptionedSnapshot], size: tuple[int, int] = DEFAULT_SIZE, **look: Any
 ) -> Iterator[np.ndarray]:
-    """The pictures of moments of one world, uint8 (height, width, 3), as they come.
+    """The pictures of snapshots of one world, uint8 (height, width, 3), as they come.
 
     Args:
-        moments: Of an `Episode`, of `colony_moments`, or made by hand.
+        snapshots: Of an `Episode`, of `colony_snapshots`, or made by hand.
         size: Width and height in pixels.
         look: What to draw, see `Scene`.
     """
     scene = None
-    expect("moments", moments, Iterable)
-    for moment in moments:
-        expect("a moment", moment, tuple)
-        snapshot, status = moment
+    expect("snapshots", snapshots, Iterable)
+    for captioned in snapshots:
+        expect("a captioned snapshot", captioned, tuple)
+        snapshot, status = captioned
         expect("the snapshot", snapshot, Snapshot)
         view = getattr(status, "state", None) is not None
         scene = scene or Scene(snapshot.grid, size, view=view, **look)
@@ -92,10 +92,10 @@ class Episode:
         return bool(self.trace.delivered[-1])
 
     def __len__(self) -> int:
-        """The number of its moments, n + 1."""
+        """The number of its snapshots, n + 1."""
         return len(self.trace) + 1
 
-    def moments(self) -> Iterator[Moment]:
+    def snapshots(self) -> Iterator[CaptionedSnapshot]:
         """The world before each step with what the ant is about to do, and the world at the end."""
         colony = colony_of_rollout(self.world, self.task, self.q_values, self.epsilon, self.seed)
         returns = np.concatenate([[0], np.cumsum(self.trace.rewards)]).tolist()
@@ -132,21 +132,21 @@ def colony_of_rollout(
 ) -> Colony:
     """A colony of one ant that will do what it does in `rollout`, since it has the same stream."""
     steady = TrainingConfig("q_learning", 1.0, 0.0, epsilon, 1.0, min_epsilon=0.0)
-    colony = Colony(world, task, steady, seed, sharing="fixed", q_values=q_values)
+    colony = Colony(world, task, steady, seed, sharing="frozen", q_values=q_values)
     colony.begin_episode()
     colony.streams[0, 0] = stream_state(seed, STREAM_ROLLOUT, number)
     return colony
 
 
-def colony_moments(
-    colony: Colony, ticks: int = 0, every: int = 1, follow: int | None = None
-) -> Iterator[Moment]:
+def colony_snapshots(
+    colony: Colony, ticks: int = 0, frame_interval: int = 1, follow: int | None = None
+) -> Iterator[CaptionedSnapshot]:
     """The first world of a colony as it is now, then every few ticks while time passes.
 
     Args:
         colony: In an episode; it is moved on by `ticks`.
-        ticks: How many; 0 gives the moment as it is. The last step is shorter if need be.
-        every: Ticks from one moment to the next, at least 1.
+        ticks: How many; 0 gives the world as it is. The last step is shorter if need be.
+        frame_interval: Ticks from one snapshot to the next, at least 1.
         follow: The number of an ant, from 0, whose view, state and action values are shown while
             it lives; None: of no ant.
 
@@ -155,18 +155,18 @@ def colony_moments(
     """
     expect("colony", colony, Colony)
     ticks = checked_whole("ticks", ticks, least=0)
-    every = checked_whole("every", every)
+    frame_interval = checked_whole("frame_interval", frame_interval)
     if follow is not None:
         follow = checked_whole("follow", follow, least=0)
         if follow >= colony.ants and not colony.task.life.births:
             raise AntsError(f"follow is {follow}; the {colony.ants} ants have numbers from 0.")
-    yield _moment(colony, follow)
-    for done in range(0, ticks, every):
-        colony.tick(min(every, ticks - done))
-        yield _moment(colony, follow)
+    yield _snapshot(colony, follow)
+    for done in range(0, ticks, frame_interval):
+        colony.tick(min(frame_interval, ticks - done))
+        yield _snapshot(colony, follow)
 
 
-def _moment(colony: Colony, follow: int | None) -> Moment:
+def _snapshot(colony: Colony, follow: int | None) -> CaptionedSnapshot:
     snapshot, outcome = colony.snapshot(), colony.outcome()
     blocked = outcome.blocked[0, 0] / max(1, outcome.moves[0, 0])
     lines = [

@@ -1,4 +1,4 @@
-"""What a hand changes in a world between two ticks."""
+"""Interventions: changes of a world between two ticks."""
 
 from __future__ import annotations
 
@@ -6,7 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from taichi_ants.grid.constants import N_HEADINGS, STREAM_ANT, STREAM_HAND, STREAM_START_CELL
+from taichi_ants.grid.constants import (
+    N_HEADINGS,
+    STREAM_ANT,
+    STREAM_INTERVENTION,
+    STREAM_START_CELL,
+)
 from taichi_ants.reference.colony import ReferenceColony
 from taichi_ants.reference.geometry import (
     Cell,
@@ -23,7 +28,7 @@ from taichi_ants.worlds.world import World
 REACH = 8  # cells that an ant is moved aside at most
 
 
-class Hand:
+class Interventions:
     """Changes a colony that is in an episode; ants look around again after each change.
 
     A cell that cannot take what is put there is left as it is. What an ant has drawn to do already
@@ -36,7 +41,7 @@ class Hand:
 
     def __init__(self, colony: ReferenceColony) -> None:
         self.colony, self.ants = colony, colony.n_ants
-        self._stream = RandomStream(stream_state(colony.seed, STREAM_HAND, 0))
+        self._stream = RandomStream(stream_state(colony.seed, STREAM_INTERVENTION, 0))
         self._epsilon: float | None = None  # as they were set
         self._learning_rate: float | None = None
         self._first = colony.start_world
@@ -48,9 +53,9 @@ class Hand:
         self._start |= dict.fromkeys(listed_cells(world.foods), FOOD)
         self._start |= dict.fromkeys(listed_cells(world.obstacles), OBSTACLE)
 
-    def _look(self) -> None:
+    def _observe(self) -> None:
         for ant in self.colony.ants.values():
-            self.colony.look(ant)
+            self.colony.observe(ant)
 
     def put(self, cells: Sequence[Cell], what: int) -> None:
         """Make cells EMPTY, OBSTACLE or FOOD, now and later, but none with an ant or the queen.
@@ -65,11 +70,11 @@ class Hand:
                 continue
             world.ground[cell] = self._start[cell] = what
             if what == FOOD:
-                self.colony.homes.give(cell)
+                self.colony.food_sources.give(cell)
             else:
-                self.colony.homes.end(cell)
+                self.colony.food_sources.end(cell)
         self._new_trail()
-        self._look()
+        self._observe()
 
     def _move_aside(self, cells: Sequence[Cell]) -> None:
         """Move the ants on cells to empty ones next to them, where there are any."""
@@ -90,8 +95,8 @@ class Hand:
         for ground in (world.ground, self._start):
             ground[world.queen], ground[cell] = EMPTY, QUEEN
         world.queen = cell
-        self.colony.homes.end(cell)
-        self._look()
+        self.colony.food_sources.end(cell)
+        self._observe()
 
     def _new_trail(self) -> None:
         """The same levels, where the rocks are now, under the pheromone that there is now."""
@@ -110,7 +115,7 @@ class Hand:
         for cell in cells:
             if world.ground[cell] != OBSTACLE:
                 world.trail.lay(cell, level)
-        self._look()
+        self._observe()
 
     def add_ants(self, cells: Sequence[Cell], heading: int | None = None) -> None:
         """Put ants on those cells that are empty; a heading that is not given is drawn."""
@@ -124,7 +129,7 @@ class Hand:
                 towards = pick(high, N_HEADINGS)
             slot = next(slot for slot in range(colony.slots) if slot not in colony.ants)
             colony.new_ant(cell, towards, slot)
-        self._look()
+        self._observe()
 
     def remove_ants(self, cells: Sequence[Cell]) -> None:
         """Take the ants on these cells away, with their food."""
@@ -132,7 +137,7 @@ class Hand:
             ant = self.colony.world.ants.pop(cell, None)
             if ant is not None:
                 del self.colony.ants[ant.slot]
-        self._look()
+        self._observe()
 
     def set_ants(self, n: int) -> None:
         """Let n ants live now, and start each later episode.
@@ -179,7 +184,7 @@ class Hand:
         self.colony.minds.pace(learning_rate)
 
     def begin_episode(self) -> None:
-        """End the episode, and begin the next one as the hand has left the world."""
+        """End the episode, and begin the next one as the interventions left the world."""
         colony, first = self.colony, self._first
         colony.end_episode()
         if self._epsilon is not None:

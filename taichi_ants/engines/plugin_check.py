@@ -1,4 +1,4 @@
-"""Tries learners from outside of the package before a kernel takes them up.
+"""Checks learners from outside of the package before a kernel takes them up.
 
 Taichi's compiler ends the process where it meets what it does not expect, and compiled code where
 it reads outside an array. So such a learner is compiled, and learns from a thousand steps, in a
@@ -21,14 +21,14 @@ from taichi_ants.learners import registry
 from taichi_ants.learners.learner import Learner
 from taichi_ants.task.constants import N_ACTIONS, ROW
 
-_SECONDS = 30  # until a trial is stopped; it takes less than one
+_SECONDS = 30  # until a check is stopped; it takes less than one
 _UPDATES = 1000
-_STATES = 128  # rows of the tables of a trial
+_STATES = 128  # rows of the tables of a check
 
 
 @cache
-def tried(learner: Learner) -> Learner:
-    """The learner; one from outside of the package has passed a trial.
+def checked_plugin(learner: Learner) -> Learner:
+    """The learner; one from outside of the package has passed the plugin check.
 
     Raises:
         AntsError: It cannot be used; the message says why.
@@ -52,7 +52,7 @@ def _fault_apart(learner: Learner) -> str:
         warnings.simplefilter("ignore", DeprecationWarning)  # Python's, of a fork beside threads
         child = os.fork()
     if child == 0:
-        _try_in_child(learner, writer)
+        _check_in_child(learner, writer)
     os.close(writer)
     try:
         with open(reader, encoding="utf-8") as pipe:
@@ -68,7 +68,7 @@ def _fault_apart(learner: Learner) -> str:
     return fault if code == 0 else "it ends the process, as an index outside of an array does"
 
 
-def _try_in_child(learner: Learner, writer: int) -> None:
+def _check_in_child(learner: Learner, writer: int) -> None:
     """Write what is wrong and end, with 0 if it came to that; whatever happens, do it silently."""
     import resource
 
@@ -79,7 +79,7 @@ def _try_in_child(learner: Learner, writer: int) -> None:
         faulthandler.disable()
         for stream in (1, 2):
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
-        runtime.start_for_trial()
+        runtime.start_for_plugin_check()
         os.write(writer, (_fault_of(learner, False) or _fault_of(learner, True)).encode())
         os._exit(0)
     finally:

@@ -1,4 +1,4 @@
-"""The course of a colony over its episodes: the few numbers that curves show."""
+"""The progress of a colony over its episodes: the few numbers that curves show."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ _MOST = 1000  # points of each kind
 Point = tuple[float, ...]
 
 
-class Course:
+class Progress:
     """Points of one world: at the end of each episode, and within the first one.
 
     Args:
-        colony: In its first episode, as far as the course goes.
+        colony: In its first episode, as far as the progress goes.
         world: Which of its worlds.
     """
 

@@ -61,11 +61,11 @@ def step_kernel(
     """The kernel; it is compiled on first use.
 
     Args:
-        observation: What row of its table an ant looks at.
+        observation: What an ant observes.
         deposit: How trails are laid, see `rules.pheromone`.
         half: Whether trails of half the strongest look like one, see `Pheromone.view`.
         serial: Whether one thread does all, which saves to wake the others.
-        arguments: The type of the argument pack, which `lockstep` lists.
+        arguments: The type of the argument pack, which `batched` lists.
     """
     state_of = state_seen(observation, half)
 
@@ -78,7 +78,7 @@ def step_kernel(
             a.carried[i] = ant.carried
 
     @ti.func
-    def look(a: ti.template(), i, base, ant, clock):
+    def observe(a: ti.template(), i, base, ant, clock):
         """Write down what an ant sees; its cells, or those of its unchanged world, are at base."""
         percept = percept_of(half, a, base, ant, clock)
         a.percepts[i] = ti.cast(percept, ti.u8)
@@ -92,7 +92,7 @@ def step_kernel(
         ant = Ant(origin=origin, cell=a.start_cells[i], heading=a.start_headings[i])
         a.steps[i], a.changed[i] = 0, ti.cast(0, ti.u8)
         put(a, i, ant)
-        look(a, i, origin, ant, 0)
+        observe(a, i, origin, ant, 0)
 
     @ti.func
     def do(a: ti.template(), i, own, origin, action):
@@ -116,7 +116,7 @@ def step_kernel(
         a.changed[i] = ti.cast(changed, ti.u8)
         a.steps[i] = a.steps[i] + 1
         put(a, i, after)
-        look(a, i, ti.select(changed == 1, own, origin), after, clock + a.evaporates)
+        observe(a, i, ti.select(changed == 1, own, origin), after, clock + a.evaporates)
         last = ti.cast(a.steps[i] == a.max_steps, ti.i32)
         terminated, truncated = step_end(
             after.event, a.delivery_terminates, a.delivery_truncates, last

@@ -22,7 +22,7 @@ from taichi_ants.worlds.world import World
 _PER_CHUNK = 256  # ants that one thread steps together
 
 
-class Lockstep:
+class BatchedEnvironments:
     """n ants, each in a world of its own.
 
     An ant depends on its world, the task, its seed and its actions alone.
@@ -32,8 +32,8 @@ class Lockstep:
         task: The rules of the game.
         n: How many ants, at least 1.
         max_steps: Steps after which an episode is truncated.
-        ends: What a delivery does: "absorbing" terminates the episode, "continuing" truncates it,
-            "endless" does neither, and food grows back at once.
+        ends: What a delivery does: "terminates" terminates the episode, "truncates" truncates it,
+            "continues" does neither, and food grows back at once.
         falls: Whether trails evaporate.
 
     Attributes:
@@ -69,9 +69,9 @@ class Lockstep:
             "n": n,
             "per_chunk": _PER_CHUNK,
             "max_steps": max_steps,
-            "regrows": int(ends == "endless"),
-            "delivery_terminates": int(ends == "absorbing"),
-            "delivery_truncates": int(ends == "continuing"),
+            "regrows": int(ends == "continues"),
+            "delivery_terminates": int(ends == "terminates"),
+            "delivery_truncates": int(ends == "truncates"),
             "same_step": 0,
             # The cells of all worlds, then those of each ant.
             "shared_cells": common["world"].size,
@@ -149,7 +149,7 @@ class Lockstep:
     def _compiled(self) -> Any:
         runtime.start()  # Taichi is imported once it is configured
         from taichi_ants.engines.arguments import Arguments, Launch
-        from taichi_ants.engines.runs.lockstep_kernel import step_kernel
+        from taichi_ants.engines.runs.batched_kernel import step_kernel
 
         pheromone, kind = self.task.pheromone, Arguments.type_of(self.arrays)
         deposits, half = pheromone.numbers["deposits"], pheromone.view == "half"

@@ -13,22 +13,22 @@ from taichi_ants.reference.random_stream import RandomStream, stream_state
 from taichi_ants.task.constants import FORWARD, GIVE, PICK_UP
 from taichi_ants.worlds import World
 
-ANT, HOME, QUEEN = (0, 0, 0), (1, 1, 0), (0, 0, 3)
+ANT, SOURCE, QUEEN = (0, 0, 0), (1, 1, 0), (0, 0, 3)
 
 
-def world(*ants, foods=(HOME,), **contents):
+def world(*ants, foods=(SOURCE,), **contents):
     """By default one ant with heading 1 and the food ahead of it."""
     return World((4, 4, 4), QUEEN, foods=foods, ants=ants or [(ANT, 1)], **contents)
 
 
 def waiting(colony):
-    return [home.waiting_since for home in colony.homes.homes]
+    return [source.waiting_since for source in colony.food_sources.food_sources]
 
 
 def turn(colony, heading, slot=0):
     ant = colony.ants[slot]
     ant.heading = heading
-    colony.look(ant)
+    colony.observe(ant)
 
 
 def test_without_regrowth_food_is_gone():
@@ -45,10 +45,10 @@ def test_food_grows_back_so_many_ticks_after_it_was_taken(delay):
     colony = begun(world(), regrowth=delay)
     act(colony, GIVE)  # in vain, so that the clock is not 0
     act(colony, PICK_UP)  # tick 1
-    there = [foods_of(colony) == {HOME}]
+    there = [foods_of(colony) == {SOURCE}]
     for _ in range(4):
         act(colony, GIVE)
-        there.append(foods_of(colony) == {HOME})
+        there.append(foods_of(colony) == {SOURCE})
     assert there == [ticks >= delay for ticks in range(5)]
     assert (colony.record.regrown, waiting(colony)) == (1, [None])
 
@@ -60,7 +60,7 @@ def test_food_that_grows_back_at_once_is_seen_at_once():
     act(colony, GIVE, PICK_UP)
     assert [ant.carries for ant in colony.ants.values()] == [True, True]
     assert colony.record.regrown == 2
-    assert foods_of(colony) == {HOME}
+    assert foods_of(colony) == {SOURCE}
 
 
 def test_food_waits_while_an_ant_stands_on_its_place():
@@ -69,11 +69,11 @@ def test_food_waits_while_an_ant_stands_on_its_place():
     assert waiting(colony) == [0]
     turn(colony, 1)
     act(colony, FORWARD)  # enters the place in the very tick in which it would grow back
-    assert colony.ants[0].cell == HOME
+    assert colony.ants[0].cell == SOURCE
     act(colony, GIVE)
     assert (foods_of(colony), waiting(colony)) == (set(), [0])
     act(colony, FORWARD)  # leaves
-    assert (foods_of(colony), waiting(colony)) == ({HOME}, [None])
+    assert (foods_of(colony), waiting(colony)) == ({SOURCE}, [None])
     assert colony.record.regrown == 1
 
 
@@ -85,14 +85,14 @@ def test_food_waits_under_dropped_food_which_counts_for_nothing_when_taken():
     act(colony, FORWARD, GIVE)
     colony.ants[0].age = 99
     act(colony, GIVE, GIVE)
-    assert (foods_of(colony), waiting(colony)) == ({HOME}, [0])
+    assert (foods_of(colony), waiting(colony)) == ({SOURCE}, [0])
     assert (colony.record.regrown, colony.record.deaths) == (0, 1)
     act(colony, GIVE)
-    assert (foods_of(colony), waiting(colony)) == ({HOME}, [0])
+    assert (foods_of(colony), waiting(colony)) == ({SOURCE}, [0])
     # Taken in tick 4, long after the own food's delay: that grows back in the same tick.
     act(colony, PICK_UP)
     assert colony.ants[1].carries
-    assert (foods_of(colony), waiting(colony), colony.record.regrown) == ({HOME}, [None], 1)
+    assert (foods_of(colony), waiting(colony), colony.record.regrown) == ({SOURCE}, [None], 1)
 
 
 def test_food_dropped_elsewhere_does_not_grow_back():
@@ -106,13 +106,13 @@ def test_food_dropped_elsewhere_does_not_grow_back():
     assert (foods_of(colony), colony.record.regrown) == (set(), 0)
 
 
-def test_homes_are_full_again_at_the_start_of_an_episode():
+def test_food_sources_are_full_again_at_the_start_of_an_episode():
     colony = begun(world())
     act(colony, PICK_UP)
     assert waiting(colony) == [0]
     colony.end_episode()
     colony.begin_episode()
-    assert (foods_of(colony), waiting(colony)) == ({HOME}, [None])
+    assert (foods_of(colony), waiting(colony)) == ({SOURCE}, [None])
 
 
 # Wandering. The ant of these worlds stands aside and does nothing; all is in a large, free world.
@@ -143,7 +143,9 @@ def test_a_pile_moves_as_one(heading):
     act(colony, GIVE)
     assert foods_of(colony) == {neighbour(cell, heading) for cell in LINE}
     assert waiting(colony) == [None] * 3
-    assert [home.cell for home in colony.homes.homes] == [neighbour(c, heading) for c in LINE]
+    assert [source.cell for source in colony.food_sources.food_sources] == [
+        neighbour(c, heading) for c in LINE
+    ]
 
 
 @pytest.mark.parametrize("wander", [1, 2, 3])
@@ -192,57 +194,62 @@ def test_piles_stay_what_they_were_at_the_start():
     assert foods_of(colony) == {(1, 0, 0), (4, 0, 0)}
 
 
-def test_homes_whose_food_is_missing_go_along():
+def test_food_sources_whose_food_is_missing_go_along():
     # The ant takes the food at (1, 0, 0) of a pile of two and goes away. The pile moves along 0:
     # the place (1, 0, 0) moves onto (2, 0, 0), which the other food has left.
     foods = [(1, 0, 0), (2, 0, 0)]
     colony = wandering(foods, 0, ants=[((0, 0, 0), 0)], wander=2, regrowth=3)
     act(colony, PICK_UP)
     act(colony, GIVE)
-    assert [home.cell for home in colony.homes.homes] == [(2, 0, 0), (3, 0, 0)]
+    assert [source.cell for source in colony.food_sources.food_sources] == [(2, 0, 0), (3, 0, 0)]
     assert (foods_of(colony), waiting(colony)) == ({(3, 0, 0)}, [0, None])
     act(colony, GIVE)
     assert foods_of(colony) == {(3, 0, 0)}
-    before = [home.cell for home in colony.homes.homes]
-    act(colony, GIVE)  # tick 3: it grows back where its home is, and then all wander once more
+    before = [source.cell for source in colony.food_sources.food_sources]
+    act(
+        colony, GIVE
+    )  # tick 3: it grows back where its food source is, and then all wander once more
     assert colony.record.regrown == 1
-    moved = [home.cell for home in colony.homes.homes]
+    moved = [source.cell for source in colony.food_sources.food_sources]
     second = headings(seed_of(0), 2)[1]
     assert moved == [neighbour(cell, second) for cell in before]
     assert foods_of(colony) == set(moved)
 
 
 @pytest.mark.parametrize("ahead", ["queen", "outside"])
-def test_a_waiting_home_stays_before_queen_and_worlds_end(ahead):
+def test_a_waiting_food_source_stays_before_queen_and_worlds_end(ahead):
     cell, heading = {"queen": ((0, 0, 4), 4), "outside": ((6, 0, 0), 0)}[ahead]
     ant = (neighbour(cell, 2), 5)
     colony = wandering([cell], heading, ants=[ant], regrowth=50)
     act(colony, PICK_UP)
-    assert (colony.homes.homes[0].cell, waiting(colony)) == (cell, [0])
+    assert (colony.food_sources.food_sources[0].cell, waiting(colony)) == (cell, [0])
 
 
-def test_a_waiting_home_walks_over_ants_and_food_but_not_over_rocks():
-    # The taken food's home at (1, 0, 0) comes to lie under the ant, or stays beside a rock.
+def test_a_waiting_food_source_walks_over_ants_and_food_but_not_over_rocks():
+    # The taken food's food source at (1, 0, 0) comes to lie under the ant, or stays beside a rock.
     for obstacles, expected in (((), (0, 0, 0)), ([neighbour((1, 0, 0), 5)], (1, 0, 0))):
         heading = 5 if obstacles else 3
         colony = wandering(
             [(1, 0, 0)], heading, ants=[((0, 0, 0), 0)], obstacles=obstacles, regrowth=50
         )
         act(colony, PICK_UP)
-        assert [home.cell for home in colony.homes.homes] == [expected]
-    # The front food is blocked by a rock; the waiting home behind it moves onto the same cell.
+        assert [source.cell for source in colony.food_sources.food_sources] == [expected]
+    # The front food is blocked by a rock; the waiting food source behind it moves onto the same
+    # cell.
     colony = wandering(
         [(1, 0, 0), (2, 0, 0)], 0, obstacles=[(3, 0, 0)], ants=[((0, 0, 0), 0)], regrowth=1
     )
     act(colony, PICK_UP)
-    assert [home.cell for home in colony.homes.homes] == [(2, 0, 0), (2, 0, 0)]
+    assert [source.cell for source in colony.food_sources.food_sources] == [(2, 0, 0), (2, 0, 0)]
     assert (foods_of(colony), waiting(colony)) == ({(2, 0, 0)}, [0, None])
 
 
 def test_food_taken_after_it_wandered_grows_back_where_it_was_taken():
     colony = wandering([(0, 0, 0)], 0, ants=[((2, 0, 0), 3)], wander=100, regrowth=1)
     # As after an earlier walk of the pile, from (0, 0, 0) to (1, 0, 0).
-    colony.homes.wander(colony.world, RandomStream(stream_state(seed_of(0), STREAM_QUEEN, 0)))
+    colony.food_sources.wander(
+        colony.world, RandomStream(stream_state(seed_of(0), STREAM_QUEEN, 0))
+    )
     turn(colony, 3)
     act(colony, PICK_UP)
     assert (foods_of(colony), waiting(colony)) == (set(), [0])

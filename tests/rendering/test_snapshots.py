@@ -36,15 +36,15 @@ def check(world: World, seed: int, evaporation: bool, epsilon: float) -> int:
     trace = rollout(world, table, seed, 0, 120, task, epsilon)
     episode = Episode.play(world, table, seed=seed, max_steps=120, task=task, epsilon=epsilon)
     assert episode.trace == trace
-    moments = list(episode.moments())
-    assert len(moments) == len(trace) + 1
+    snapshots = list(episode.snapshots())
+    assert len(snapshots) == len(trace) + 1
 
     colony = reference.follower(world, table, seed, 0, task, epsilon)
     colony.begin_episode()
     existing = list(colony.world.ground)
     index = world.grid.index(np.array(existing))
     choices = 0
-    for step, (snapshot, status) in enumerate(moments):
+    for step, (snapshot, status) in enumerate(snapshots):
         ant = colony.ants[0]
         assert snapshot.ground[index].tolist() == [colony.world.ground[cell] for cell in existing]
         assert snapshot.trail[index].tolist() == [colony.world.level(cell) for cell in existing]
@@ -80,14 +80,14 @@ def test_random_worlds(seed) -> None:
 
 
 def test_moments_do_not_share_their_arrays() -> None:
-    snapshots = [snapshot for snapshot, _ in Episode.play(paper(), trail_follower()).moments()]
+    snapshots = [snapshot for snapshot, _ in Episode.play(paper(), trail_follower()).snapshots()]
     assert (snapshots[0].ground == paper().ground()).all()
     assert not (snapshots[-1].ground == paper().ground()).all()
 
 
 def test_what_the_lines_say() -> None:
     episode = Episode.play(paper(), trail_follower())
-    said = [dict(status.lines) for _, status in episode.moments()]
+    said = [dict(status.lines) for _, status in episode.snapshots()]
     assert len(said) == len(episode) == 35
     assert [one["step"] for one in said] == [str(step) for step in range(35)]
     assert [said[0]["return"], said[-1]["return"]] == ["0", "45"]
@@ -97,7 +97,7 @@ def test_what_the_lines_say() -> None:
     assert not any("outcome" in one for one in said[:-1])
     lost = Episode.play(paper(), random_policy(), max_steps=5)
     assert not lost.delivered
-    *_, (_, last) = lost.moments()
+    *_, (_, last) = lost.snapshots()
     assert {"outcome", "action"}.isdisjoint(dict(last.lines))
 
 

@@ -14,8 +14,8 @@ from command_lines import promptly
 from taichi_ants import evaluate
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.policies import random_policy
-from taichi_ants.studies import beside as module
-from taichi_ants.studies.beside import Beside
+from taichi_ants.studies import worker_process as module
+from taichi_ants.studies.worker_process import WorkerProcess
 from taichi_ants.worlds import build
 
 several = pytest.mark.skipif(
@@ -25,9 +25,9 @@ several = pytest.mark.skipif(
 
 @several
 def test_calls_are_done_in_another_process_one_after_the_other() -> None:
-    with Beside() as beside:
-        first, changes = beside.begin(os.getpid), beside.begin(os.putenv, "NAME", "value")
-        second, sums = beside.begin(os.getpid), beside.begin(np.add, np.arange(100_000), 1)
+    with WorkerProcess() as worker:
+        first, changes = worker.begin(os.getpid), worker.begin(os.putenv, "NAME", "value")
+        second, sums = worker.begin(os.getpid), worker.begin(np.add, np.arange(100_000), 1)
         assert first() == second() != os.getpid()
         assert changes() is None
         np.testing.assert_array_equal(sums(), np.arange(1, 100_001))
@@ -36,30 +36,30 @@ def test_calls_are_done_in_another_process_one_after_the_other() -> None:
 
 @several
 def test_what_is_printed_there_is_no_answer(capfd: pytest.CaptureFixture[str]) -> None:
-    with Beside() as beside:
-        assert beside.begin(print, "hello")() is None
-        assert beside.begin(os.system, "echo hello")() == 0
+    with WorkerProcess() as worker:
+        assert worker.begin(print, "hello")() is None
+        assert worker.begin(os.system, "echo hello")() == 0
     assert capfd.readouterr() == ("", "")
 
 
 @pytest.mark.parametrize("second", [False, True])
 def test_what_a_call_raises_is_raised_here(second: bool) -> None:
-    with Beside(second) as beside:
-        wrong, right = beside.begin(build, "no such world"), beside.begin(build, "paper")
+    with WorkerProcess(second) as worker:
+        wrong, right = worker.begin(build, "no such world"), worker.begin(build, "paper")
         with pytest.raises(AntsError, match="no such world"):
             wrong()
         assert right() == build("paper")
 
 
 def test_without_a_second_process_calls_are_done_here() -> None:
-    with Beside(second=False) as beside:
-        assert beside.begin(os.getpid)() == os.getpid()
+    with WorkerProcess(second=False) as worker:
+        assert worker.begin(os.getpid)() == os.getpid()
 
 
 def test_what_cannot_be_sent_is_done_here() -> None:
-    with Beside() as beside:
-        assert beside.begin(lambda: os.getpid())() == os.getpid()
-        assert beside.begin(_known_here_alone)() == os.getpid()
+    with WorkerProcess() as worker:
+        assert worker.begin(lambda: os.getpid())() == os.getpid()
+        assert worker.begin(_known_here_alone)() == os.getpid()
 
 
 def _known_here_alone() -> int:
@@ -69,26 +69,26 @@ def _known_here_alone() -> int:
 def test_where_no_process_can_be_started_calls_are_done_here(monkeypatch) -> None:
     for program in ("/no/such/program", "/bin/false", ""):
         monkeypatch.setattr(module.sys, "executable", program)
-        with Beside() as beside:
-            assert beside.begin(os.getpid)() == os.getpid()
+        with WorkerProcess() as worker:
+            assert worker.begin(os.getpid)() == os.getpid()
 
 
 @several
 def test_a_process_that_ends_loses_no_call() -> None:
-    with Beside() as beside:
-        other = beside.begin(os.getpid)()
-        ended, after = beside.begin(os.kill, other, signal.SIGKILL), beside.begin(os.getpid)
+    with WorkerProcess() as worker:
+        other = worker.begin(os.getpid)()
+        ended, after = worker.begin(os.kill, other, signal.SIGKILL), worker.begin(os.getpid)
         assert ended() is None
         assert after() == os.getpid()
-        assert beside.begin(os.getpid)() == os.getpid()
+        assert worker.begin(os.getpid)() == os.getpid()
 
 
 @several
 def test_it_ends_when_nothing_more_will_begin() -> None:
-    with Beside() as beside:
-        other, late = beside.begin(os.getpid), beside.begin(time.sleep, 0.1)
-        beside.finish()
-        after = beside.begin(os.getpid)
+    with WorkerProcess() as worker:
+        other, late = worker.begin(os.getpid), worker.begin(time.sleep, 0.1)
+        worker.finish()
+        after = worker.begin(os.getpid)
         assert other() != os.getpid()
         assert late() is None
         assert after() == os.getpid()
@@ -99,10 +99,10 @@ def test_an_error_ends_it_at_once() -> None:
     others = []
 
     def fail() -> None:
-        with Beside() as beside:
-            others.append(beside.begin(os.getpid)())
+        with WorkerProcess() as worker:
+            others.append(worker.begin(os.getpid)())
             for _ in range(2):
-                beside.begin(time.sleep, 60)
+                worker.begin(time.sleep, 60)
             raise KeyboardInterrupt
 
     began = time.perf_counter()
@@ -118,9 +118,9 @@ def test_it_ends_with_the_block_and_keeps_what_it_has_compiled(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("TI_OFFLINE_CACHE_FILE_PATH", str(tmp_path))
-    with Beside() as beside:
-        other = beside.begin(os.getpid)()
-        beside.begin(evaluate, build("paper"), random_policy(), 1)()
+    with WorkerProcess() as worker:
+        other = worker.begin(os.getpid)()
+        worker.begin(evaluate, build("paper"), random_policy(), 1)()
     with pytest.raises(ProcessLookupError):
         os.kill(other, 0)
     assert list(tmp_path.rglob("*.tic"))

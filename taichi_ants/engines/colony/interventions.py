@@ -1,4 +1,4 @@
-"""What a hand changes in a colony of one world, between two ticks.
+"""Interventions: changes of a colony of one world between two ticks.
 
 Rocks, food and the queen stay for the episodes that follow; trails, and ants that are added or
 removed one by one, are of this one. After each change the ants look around again. What an ant has
@@ -19,9 +19,14 @@ import numpy as np
 
 from taichi_ants import files
 from taichi_ants.engines.colony import food_sources
-from taichi_ants.engines.colony.layout import ANT_GROUND, HomeRow, Stage, WorldRow
+from taichi_ants.engines.colony.layout import ANT_GROUND, FoodSourceRow, Stage, WorldRow
 from taichi_ants.errors import AntsError, count
-from taichi_ants.grid.constants import N_HEADINGS, STREAM_BORN, STREAM_HAND, STREAM_START_CELL
+from taichi_ants.grid.constants import (
+    N_HEADINGS,
+    STREAM_BORN,
+    STREAM_INTERVENTION,
+    STREAM_START_CELL,
+)
 from taichi_ants.grid.hexgrid import AxialGrid, axial
 from taichi_ants.grid.randomness import Stream, choose, stream_state
 from taichi_ants.task import Task
@@ -46,7 +51,7 @@ def _steps() -> np.ndarray:
 _STEPS = _steps()
 
 
-class Hand:
+class Interventions:
     """Changes a colony, and knows how its later episodes begin.
 
     Cells are flat indices of cells of the world, int (n,), each once. Where a cell cannot take what
@@ -66,13 +71,13 @@ class Hand:
     def __init__(self, colony: Colony) -> None:
         if len(colony.worlds) != 1:
             raise AntsError(
-                f"the colony has {len(colony.worlds)} worlds; a Hand changes a single one, so make "
+                f"the colony has {len(colony.worlds)} worlds; interventions need one; make "
                 "the colony with one seed."
             )
         self.colony, self.ants = colony, colony.ants
         (self._first,) = colony.worlds
         self._start = self._first.ground()
-        self._stream = Stream(colony.seeds[0], STREAM_HAND)
+        self._stream = Stream(colony.seeds[0], STREAM_INTERVENTION)
         self._changed = False  # whether the next episode begins otherwise than the present one
 
     @property
@@ -84,7 +89,7 @@ class Hand:
         """Make cells EMPTY, OBSTACLE or FOOD, except the queen's and those of ants that stay.
 
         Ants stay where a cell is made EMPTY; rock and food move them aside. A food that is put
-        somewhere has its home there: it grows back and wanders with the foods next to it. Rocks
+        somewhere has its source there: it grows back and wanders with the foods next to it. Rocks
         hold no trail.
 
         Raises:
@@ -104,8 +109,8 @@ class Hand:
         arrays["walls"][cells] = what == OBSTACLE
         if what == OBSTACLE:
             self._lay(cells, 0)
-        self._change_homes(cells, what)
-        self.colony.look()
+        self._change_food_sources(cells, what)
+        self.colony.observe()
 
     def _aside(self, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The slots of the ants on cells that can be moved aside, and the cells to move them to."""
@@ -146,13 +151,13 @@ class Hand:
         arrays["ground"][old], arrays["ground"][cell] = EMPTY, QUEEN
         arrays["worlds"][WorldRow.QUEEN_CELL, 0] = cell
         arrays["closer"][:] = World(grid.ranges, grid.cells(cell).tolist()).closer()
-        self._change_homes(np.array([cell]), QUEEN)
-        self.colony.look()
+        self._change_food_sources(np.array([cell]), QUEEN)
+        self.colony.observe()
 
     def lay_trail(self, cells: np.ndarray, level: int) -> None:
         """Set the trail of cells that are no rocks."""
         self._lay(cells[self.colony.arrays["walls"][cells] == 0], level)
-        self.colony.look()
+        self.colony.observe()
 
     def _lay(self, cells: np.ndarray, level: int) -> None:
         arrays = self.colony.arrays
@@ -197,7 +202,7 @@ class Hand:
         arrays["ground"][cells] = ANT_GROUND
         world[WorldRow.NEXT_NUMBER] += n
         self._count_ants()
-        colony.look()
+        colony.observe()
 
     def remove_ants(self, cells: np.ndarray) -> None:
         """Take the ants on these cells away, with the food that they carry."""
@@ -212,7 +217,7 @@ class Hand:
         arrays["ground"][arrays["cell"][slots]] = EMPTY
         arrays["stage"][slots] = Stage.VACANT
         self._count_ants()
-        self.colony.look()
+        self.colony.observe()
 
     def _count_ants(self) -> None:
         world = self.colony.arrays["worlds"][:, 0]
@@ -320,34 +325,39 @@ class Hand:
             raise AntsError("this would take the last food, but ants learn from it; leave some.")
         self._start, self._changed = start, True
 
-    def _change_homes(self, cells: np.ndarray, what: int) -> None:
-        """Give foods that were put on cells a home there; where anything else is put, none is left.
+    def _change_food_sources(self, cells: np.ndarray, what: int) -> None:
+        """Give foods that were put on cells a food source there; where anything else is put, none
+        is left.
 
-        A home that waits there has its food again. A new one belongs to the pile of the first home
-        beside it; if there is none, it is a pile of its own.
+        A food source that waits there has its food again. A new one belongs to the pile of the
+        first food source beside it; if there is none, it is a pile of its own.
         """
         colony, arrays = self.colony, self.colony.arrays
         if not colony.food_changes:
             return
-        homes = arrays["homes"][:, : arrays["worlds"][WorldRow.HOMES, 0]]
+        known = arrays["food_sources"][:, : arrays["worlds"][WorldRow.FOOD_SOURCES, 0]]
         if what != FOOD:
-            homes = homes[:, ~np.isin(homes[HomeRow.CELL], cells)]
-        at, taken, pile = homes[[HomeRow.CELL, HomeRow.TAKEN, HomeRow.PILE]].tolist()
+            known = known[:, ~np.isin(known[FoodSourceRow.CELL], cells)]
+        at, taken, pile = known[
+            [FoodSourceRow.CELL, FoodSourceRow.TAKEN, FoodSourceRow.PILE]
+        ].tolist()
         on: dict[int, list[int]] = {}
-        for home, cell in enumerate(at):
-            on.setdefault(cell, []).append(home)
+        for source, cell in enumerate(at):
+            on.setdefault(cell, []).append(source)
         for cell in cells.tolist() if what == FOOD else ():
             here = on.setdefault(cell, [])
             if not here:
                 around = [on.get(cell + step, ()) for step in colony.grid.offsets.tolist()]
-                first = min((home for there in around for home in there), default=None)
+                first = min((source for there in around for source in there), default=None)
                 here.append(len(at))
                 at.append(cell)
                 taken.append(0)
                 pile.append(max(pile, default=-1) + 1 if first is None else pile[first])
-            if all(taken[home] >= 0 for home in here):
+            if all(taken[source] >= 0 for source in here):
                 taken[here[0]] = -1
         _, pile = np.unique(np.array(pile, int), return_inverse=True)  # without those that are gone
-        colony.n_homes = max(len(at), int(np.count_nonzero(self._start == FOOD)))
+        colony.n_food_sources = max(len(at), int(np.count_nonzero(self._start == FOOD)))
         sources = [np.array([at, taken, pile], int).reshape(3, -1)]
-        arrays |= food_sources.arrays(sources, arrays["worlds"], colony.n_homes, colony.grid.size)
+        arrays |= food_sources.arrays(
+            sources, arrays["worlds"], colony.n_food_sources, colony.grid.size
+        )
