@@ -48,7 +48,10 @@ class Policy(NamedTuple):
         try:
             task = Task.from_dict(self.metadata.get("task", {}))
         except AntsError as error:
-            raise AntsError(f"the task in the policy's metadata cannot be used: {error}") from error
+            raise AntsError(
+                f"the task in the policy's metadata cannot be used: {error} If another version "
+                "wrote the file, train the policy again."
+            ) from error
         return replace(task, observation=self.observation)
 
     def actions(self, states: npt.ArrayLike, rng: np.random.Generator) -> npt.NDArray[np.int64]:
