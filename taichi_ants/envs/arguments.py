@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,7 +14,6 @@ from gymnasium.vector import AutoresetMode
 
 from taichi_ants import checks
 from taichi_ants.errors import AntsError, checked_whole, count, shown
-from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.worlds import World, build, from_text
 
@@ -66,11 +65,6 @@ def lower_limit(max_steps: int, max_episode_steps: int | None) -> int:
     if max_episode_steps is None:
         return max_steps
     return min(checked_whole("max_episode_steps", max_episode_steps), max_steps)
-
-
-def task_of(task: Any) -> Any:
-    """The task of a mapping, which JSON can hold; others as they are."""
-    return Task.from_dict(task) if isinstance(task, Mapping) else task
 
 
 def seeds_of(seed: Any, n: int) -> Sequence[int | None]:

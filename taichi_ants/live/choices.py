@@ -119,18 +119,8 @@ class Choices:
             AntsError: Something is not allowed, or is not there.
         """
         expect("the choice", chosen, dict)
-        known = (
-            "world",
-            "map",
-            "world_seed",
-            "size",
-            "settings",
-            "policy",
-            "ants",
-            "seed",
-            "ticks",
-        )
-        for name in (*known, "ants", "seed", "ticks"):
+        needed = {"world", "map", "world_seed", "size", "settings", "policy"}
+        for name in sorted({*needed, "ants", "seed", "ticks"}):
             if name not in chosen:
                 raise AntsError(f"{name} is not chosen; choose it.")
         world, policy, table, name = chosen["world"], chosen["policy"], None, ""

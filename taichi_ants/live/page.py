@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from functools import cache
 from importlib import resources
 
@@ -36,10 +35,3 @@ def live_page(server: str) -> str:
         script="\n".join(map(_text, SCRIPTS)),
         connect=server,
     )
-
-
-def policy_of(page: str) -> str:
-    """Return the policy of a page as a header has it, which also keeps it out of frames."""
-    found = re.search('Content-Security-Policy" content="([^"]*)"', page)
-    assert found is not None
-    return f"{found[1]}; frame-ancestors 'none'"
