@@ -89,23 +89,19 @@ def learning_checkpoints(
     """Train one ant, and roll its policy out whenever it has had a given number of episodes.
 
     Args:
-        world: The world.
-        config: The learner and its settings.
+        world, config: Where and how it learns.
         seed: Of training and rollouts.
         checkpoints: Numbers of episodes, ascending; 0 is before learning.
-        max_steps: Step limit of a rollout.
+        max_steps, epsilon: Of a rollout.
         task: The rules of the game; None is the paper's.
-        epsilon: Probability of a random action in the rollouts.
         progress: Called with the share of the work that is done.
 
     Raises:
         AntsError: An argument is not allowed; the message names it.
     """
     checks.check_progress(progress)
-    task, checkpoints = (
-        checks.checked_task(Task() if task is None else task),
-        _checked_checkpoints(checkpoints),
-    )
+    task = checks.checked_task(Task() if task is None else task)
+    checkpoints = _checked_checkpoints(checkpoints)
     played = []
     for n in checkpoints:
         table = _tables(world, config, [seed], n, task)[0]
@@ -147,10 +143,8 @@ def typical_seed(
         AntsError: An argument is not allowed; the message names it.
     """
     checks.check_progress(progress)
-    task, checkpoints = (
-        checks.checked_task(Task() if task is None else task),
-        _checked_checkpoints(checkpoints),
-    )
+    task = checks.checked_task(Task() if task is None else task)
+    checkpoints = _checked_checkpoints(checkpoints)
     chosen = checks.checked_seeds(seeds)
     distances, deliver = np.zeros(len(chosen)), []
     for done, n in enumerate(checkpoints, start=1):

@@ -8,11 +8,11 @@ from types import ModuleType
 import numpy as np
 
 from taichi_ants import runtime
+from taichi_ants.engines.records import Snapshot
 from taichi_ants.grid import hexgrid
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import colours
 from taichi_ants.rendering.marks import DOT, DOTS_BELOW, Mark, ants, marks, thing
-from taichi_ants.rendering.snapshot import Snapshot
 from taichi_ants.task.constants import DEPOSIT_LEVEL, EMPTY, FOOD, OBSTACLE, QUEEN
 
 # From this size on, food and queen are drawings on a light floor. In smaller cells food is a dot

@@ -71,12 +71,8 @@ def assemble(
 ) -> str:
     """The page with a recording, or with what is needed besides to show what runs now.
 
-    Args:
-        title: Plain text.
-        recording: In base64.
-        controls: Markup at the side of the world.
-        style, script: Behind those of the viewer.
-        connect: The one address to which the page may connect; "" for none.
+    `recording` is in base64, `controls` the markup at the side of the world; `style` and `script`
+    stand behind those of the viewer, and `connect` is as in `content_policy`.
     """
     styles = "\n".join([*map(part, STYLES), style])
     scripts = "\n".join([*map(part, SCRIPTS), script])
@@ -124,12 +120,9 @@ def save_page(path: files.PathLike, recording: Recording) -> None:
 
 def frame(recording: Recording) -> str:
     """The page inside a frame, for notebooks; raises as `page` does."""
-    whole = page(recording)
-    return (
-        f'<iframe title="{html.escape(recording.header["title"])}" width="100%" '
-        f'height="{_NOTEBOOK_HEIGHT}" style="border: 0" '
-        f'srcdoc="{html.escape(whole)}"></iframe>'
-    )
+    whole, title = html.escape(page(recording)), html.escape(recording.header["title"])
+    size = f'width="100%" height="{_NOTEBOOK_HEIGHT}" style="border: 0"'
+    return f'<iframe title="{title}" {size} srcdoc="{whole}"></iframe>'
 
 
 def notebook(shown: Any) -> str | None:
