@@ -89,12 +89,8 @@ class ColonyWorlds:
         if (which & ~new).any():
             self.colony.begin_some(which & ~new)
 
-    def stop(self, which: np.ndarray) -> None:
-        """Let some worlds, bool (W,), stand still until they begin again."""
-        self.colony.stop(which)
-
     def step(self, actions: np.ndarray) -> None:
-        """Let each ant do what is given, integers 0 to 4; worlds that were stopped stand still."""
+        """Let each ant do what is given, integers 0 to 4; stopped worlds stand still."""
         colony = self.colony
         self.acted = colony.living & colony.running[:, None]
         colony.act(actions)

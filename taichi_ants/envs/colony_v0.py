@@ -172,7 +172,7 @@ class HexColonyParallelEnv(ParallelEnv):
         worlds.step(given)
         living, ended = worlds.colony.living[0], bool(worlds.ended[0])
         if ended:
-            worlds.stop(worlds.ended)
+            worlds.colony.stop(worlds.ended)
         born = np.flatnonzero(living & ~worlds.acted[0] & (not ended)).tolist()
         told, seen = acting + self._names(born), slots + born
         observations, infos = self._told(told, seen)

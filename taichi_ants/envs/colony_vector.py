@@ -206,7 +206,7 @@ class HexColonyVectorEnv(StepLimit, VectorEnv):
                 final |= {"final_info": self._infos(over, events), "_final_info": over.copy()}
                 events = np.where(over, Event.NONE, events)
         else:
-            worlds.stop(ended)
+            worlds.colony.stop(ended)
             begins, self._ended = waited, ended
         if begins.any():
             worlds.begin(begins)

@@ -21,9 +21,8 @@ def tabulate(
 ) -> npt.NDArray[np.float32]:
     """The table of a policy that is a function of what an ant sees.
 
-    There are few states, so the function is asked about all of them, once. Its table does what the
-    function does, but greedily: of a policy with probabilities it keeps the most probable action.
-    It goes wherever a table goes: into `evaluate`, a `Colony`, or with `save_policy` into a file.
+    The function is called once, with all states. Its table does what the function does, but
+    greedily: of a policy with probabilities it keeps the most probable action.
 
         table = tabulate(lambda seen: model.predict(seen, deterministic=True)[0])
         save_policy("ppo.npz", table, {"made by": "PPO"})

@@ -23,6 +23,8 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
+from functools import cache
+from importlib import resources
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -30,12 +32,15 @@ from taichi_ants.errors import AntsError
 from taichi_ants.live.choices import Choices
 from taichi_ants.live.exports import LOAD, QUICK, SLOW, Making
 from taichi_ants.live.log import Log
-from taichi_ants.live.page import live_page
 from taichi_ants.live.session import Session
+from taichi_ants.viewer.page import assemble
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
     from websockets.http11 import Request, Response
+
+SCRIPTS = ("token.js", "source.js", "tools.js", "controls.js")  # a part uses those before it
+PARTS = ("controls.html", "live.css", *SCRIPTS)
 
 HOST = "127.0.0.1"
 FRAMES_A_SECOND = 30
@@ -56,6 +61,20 @@ _LONGEST_WAIT = 0.2  # seconds, for a request, before it looks whether it is to 
 _QUIET = logging.getLogger("taichi_ants.live")  # what strangers send is no news for the terminal
 _QUIET.addHandler(logging.NullHandler())
 _QUIET.propagate = False
+
+
+@cache
+def live_page(server: str) -> str:
+    """The viewer with controls beside the world, as HTML; it connects to `server` alone."""
+    folder = resources.files(__package__)
+    controls, style, *scripts = (folder.joinpath(name).read_text("utf-8") for name in PARTS)
+    return assemble(
+        "Taichi Ants, live",
+        controls=controls,
+        style=style,
+        script="\n".join(scripts),
+        connect=server,
+    )
 
 
 class Closed(Exception):  # noqa: N818
@@ -214,12 +233,12 @@ class Room:
 
     @property
     def _runs(self) -> bool:
-        """Whether time passes: it stands still while another session is replayed."""
+        """Whether time passes."""
         return self.playing and not self._replays
 
     @property
     def _replays(self) -> bool:
-        """Whether another session is about to take the place of the present one."""
+        """Whether another session is being replayed, to take the place of the present one."""
         return self._replay is not None or self._loading is not None
 
     def _go_on(self, replay: _Replay) -> None:
@@ -274,9 +293,8 @@ class Room:
     def _leap(self) -> int:
         """The steps that fill the time of a frame, as far as is known.
 
-        Where these are a large part of an episode, frames would show it at any of its moments. Then
-        each shows another episode, some ticks later in it than the one before: pages see the slow
-        course of an episode, as a stroboscope shows a wheel.
+        Where these are a large part of an episode, each frame shows another episode, some ticks
+        later in it than the one before: pages see the slow course of an episode.
         """
         steps, length = int(self._piece), self.session.setup.ticks_per_episode
         if not length or _FEW * steps < length:
@@ -298,12 +316,8 @@ class Room:
             self._tell(page, _say("error", words=_words(error)))
 
         def answer() -> None:
-            if answered.done():  # as where the page has gone
-                return
-            if refused is None:
-                answered.set_result(None)
-            else:
-                answered.set_exception(refused)
+            if not answered.done():  # as where the page has gone
+                answered.set_exception(refused) if refused else answered.set_result(None)
 
         self._post(answer)
         self._tells = min(self._tells, time.monotonic() + 1 / FRAMES_A_SECOND)

@@ -1,8 +1,4 @@
-"""Files of pictures: they appear when they are whole, or not at all.
-
-Frames are written as they come and then forgotten, so that the length of an animation takes room on
-the disk alone.
-"""
+"""Files of pictures: they appear when they are whole. Frames are written as they come."""
 
 from __future__ import annotations
 
