@@ -111,11 +111,10 @@ class _Ants:
         self, seeds: Sequence[int | None], which: np.ndarray, chance: np.random.Generator
     ) -> None:
         """Seed those ants, of bool (n,), that are given a seed; by chance if none ever was."""
-        if not self._seeded and any(seed is None for seed in seeds):
+        if not self._seeded and None in seeds:
             first = int(chance.integers(2**62))
             seeds = [first + i if seed is None else seed for i, seed in enumerate(seeds)]
-        pairs = ((i, seeds[i]) for i in np.flatnonzero(which).tolist())
-        given = {i: seed for i, seed in pairs if seed is not None}
+        given = {i: one for i, one in enumerate(seeds) if which[i] and one is not None}
         if given:
             self.batched.seed(list(given.values()), np.array(list(given)))
         self._seeded = True

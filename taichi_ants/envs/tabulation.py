@@ -25,13 +25,11 @@ def tabulate(
     greedily: of a policy with probabilities it keeps the most probable action.
 
         table = tabulate(lambda seen: model.predict(seen, deterministic=True)[0])
-        save_policy("ppo.npz", table, {"made by": "PPO"})
 
     Args:
         function: Takes all states as an environment shows them, (n_states, ...) of the dtype of its
-            observation space. Returns a number for each action, which is the larger the better the
-            action is (action values, logits, probabilities), real (n_states, 5); or the action in
-            each state, integers (n_states,).
+            observation space. Returns action values, logits or probabilities, real (n_states, 5);
+            or the action in each state, integers (n_states,).
         observation: Name of the registered observation.
         observation_format: The environment's: "cells", "index" or "one_hot".
 

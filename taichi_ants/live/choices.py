@@ -75,13 +75,9 @@ def _field(one: Setting) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Choices:
-    """What pages can choose from.
+    """What pages can choose from."""
 
-    Attributes:
-        policies: By their names, besides learning and the one that is made by hand.
-    """
-
-    policies: Mapping[str, Policy]
+    policies: Mapping[str, Policy]  # besides learning and the one that is made by hand
 
     def as_dict(self) -> dict[str, Any]:
         """What a page offers, as JSON can hold it."""

@@ -45,18 +45,12 @@ _FIELDS = {
 
 
 class Value(NamedTuple):
-    """A number that "set" changes.
+    """A number that "set" changes."""
 
-    Attributes:
-        value: What it is now.
-        least, most: What it may be.
-        step: By which a slider moves it; only whole numbers are allowed if this is one.
-    """
-
-    value: float
+    value: float  # now
     least: float
     most: float
-    step: float
+    step: float  # of a slider; only whole numbers are allowed if this is one
 
 
 def values(interventions: Interventions) -> dict[str, Value]:

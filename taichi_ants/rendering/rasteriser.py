@@ -123,10 +123,7 @@ class Rasteriser:
         return frame
 
     def draw_cells(self, of_cells: np.ndarray) -> np.ndarray:
-        """The picture of the cells in the given colours, uint32 (grid.size,).
-
-        The last one is kept: where an ant lays no trail, cells look as they did.
-        """
+        """The picture of the cells in the given colours, uint32 (grid.size,); the last is kept."""
         if self._drawn is None or not np.array_equal(self._drawn[0], of_cells):
             self._drawn = of_cells.copy(), self._cells(of_cells)
         return self._drawn[1].copy()

@@ -114,8 +114,7 @@ def save_page(path: files.PathLike, recording: Recording) -> None:
     Raises:
         AntsError: The file does not end in .html, or cannot be written.
     """
-    target = check_page(path)
-    write(target, page(recording).encode())
+    write(check_page(path), page(recording).encode())
 
 
 def frame(recording: Recording) -> str:

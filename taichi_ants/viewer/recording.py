@@ -118,19 +118,17 @@ def record_trace(trace: Trace, title: str = "") -> Recording:
     # A colony of one ant with a table of its own learns as it did.
     options: dict[str, Any] = {"sharing": "independent", "ends_at_delivery": True}
     colony = Colony(made.world, made.task, made.config, made.seed, 1, **options)
-    recorder, frames = None, []
+    colony.begin_episode(made.max_steps)
+    recorder, frames = Recorder(colony, 0, title, 0), []
     errors = np.zeros(len(trace)) if trace.td_errors is None else trace.td_errors
-    for step, error in zip(trace.steps.tolist(), errors.tolist(), strict=True):
-        if step == 0:
-            if recorder is not None:
-                recorder.progress.note(ended=True)
-                colony.end_episode()
+    for number, (step, error) in enumerate(zip(trace.steps.tolist(), errors, strict=True)):
+        if step == 0 and number:
+            recorder.progress.note(ended=True)
+            colony.end_episode()
             colony.begin_episode(made.max_steps)
-            recorder = recorder or Recorder(colony, 0, title, 0)
+        if step == 0:
             frames.append(recorder.snapshot())
-        assert recorder is not None  # the first step is number 0
         frames.append(recorder.tick(td_errors=np.array([error])))
-    assert recorder is not None
     return Recording(recorder.header(), frames)
 
 
