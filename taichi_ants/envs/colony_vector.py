@@ -36,10 +36,6 @@ class HexColonyVectorEnv(StepLimit, VectorEnv):
     vector environment so trains one policy that all ants follow ("parameter sharing"). Actions,
     observations and rewards are those of `HexForageEnv`; each ant gets what its own action pays.
 
-    ## Starting State
-    The world as it is drawn. The ants that it lists come first; all others start where `start`
-    says, on cells and with headings that the seed of the world decides.
-
     ## Episode End
     After `max_steps` steps all ants of a world are truncated at once. A delivery ends nothing in
     the world; its ant goes on from where it stands. If the task's delivery is "terminates", the
@@ -66,10 +62,7 @@ class HexColonyVectorEnv(StepLimit, VectorEnv):
         ranges: world number w is number w modulo their number.
     task: The rules; None: the paper's. Ants are neither born nor do they die here.
     ants: How many live in each world.
-    start: "nest", near the queen, or "spread", anywhere.
-    max_steps: Steps of an episode.
-    observation_format: "cells", "index" or "one_hot".
-    evaporation: Whether trails fall; None: as the task says for training.
+    start, max_steps, observation_format, evaporation: As of `HexColonyParallelEnv`.
     autoreset_mode: `SAME_STEP`, `NEXT_STEP` or `DISABLED` of `gymnasium.vector.AutoresetMode`.
     render_mode: "rgb_array": `render` gives a picture of each world. None: it is not called.
     max_episode_steps: Another step limit, which `gymnasium.make_vec` gives; the lower one counts.

@@ -116,12 +116,7 @@ def checked(edit: object, interventions: Interventions) -> Edit:
 
 
 def apply(edit: Edit, interventions: Interventions, length: int | None) -> None:
-    """Do an edit that `checked` gave.
-
-    Args:
-        edit: What to do.
-        interventions: Whose colony is in an episode.
-        length: Of an episode that begins.
+    """Do an edit that `checked` gave; an episode that it begins has this length.
 
     Raises:
         AntsError: There is no room for it; nothing has changed.

@@ -187,11 +187,9 @@ class Room:
     def run(
         self, seconds: float | None = None, each_turn: Callable[[], object] = lambda: None
     ) -> None:
-        """Serve pages and let time pass, until somebody ends it, or for some seconds.
+        """Serve pages and let time pass, for some `seconds` or until somebody ends it.
 
-        Args:
-            seconds: How many; None: until it is ended.
-            each_turn: Called several times a second; what it raises ends it, too.
+        `each_turn` is called several times a second; what it raises ends it, too.
         """
         sockets = threading.Thread(target=self._serve, name="sockets", daemon=True)
         sockets.start()

@@ -212,9 +212,7 @@ class Session:
     def load(cls, path: files.PathLike, progress: Callable[[float], None] | None = None) -> Session:
         """Replay a session that `save` wrote, up to its end.
 
-        Args:
-            path: The file.
-            progress: Called now and then with the share of the ticks that have passed.
+        `progress` is called now and then with the share of the ticks that have passed.
 
         Raises:
             AntsError: The file is missing, damaged or altered, or its end is another one here.
@@ -291,10 +289,8 @@ class Session:
     def snapshots(cls, log: Log, most: int = 1000) -> Iterator[tuple[Session, bytes]]:
         """Replay a session from its beginning, snapshot by snapshot.
 
-        Args:
-            log: Of the session.
-            most: About how many snapshots there are at most. If there are fewer steps and edits,
-                each step has a snapshot, and so does each intervention.
+        There are about `most` snapshots. If there are fewer steps and edits, each step has a
+        snapshot, and so does each intervention.
 
         Yields:
             The session at that moment, and a frame of what has changed since the last one.

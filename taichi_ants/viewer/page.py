@@ -43,12 +43,8 @@ def page(recording: Recording) -> str:
 def content_policy(script: str, style: str, connect: str = "") -> str:
     """Return the Content-Security-Policy of a page with one inline script and one inline style.
 
-    Nothing else runs, loads or connects. Style attributes are allowed, since bars and drawings
-    have their places and colours there.
-
-    Args:
-        script, style: All that is between the tags of the element.
-        connect: The one address to which the page may connect; "" for none.
+    Nothing else runs or loads, and it connects to the address `connect` alone, "" for none. Style
+    attributes are allowed, because bars and drawings have their places and colours there.
     """
     digests = [hashlib.sha256(text.encode()).digest() for text in (script, style)]
     scripts, styles = (f"'sha256-{base64.b64encode(one).decode()}'" for one in digests)

@@ -131,9 +131,7 @@ class Recorder:
     def tick(self, n: int = 1, td_errors: np.ndarray | None = None) -> bytes:
         """Let n ticks pass and return a frame; what ants did is in it only where n is 1.
 
-        Args:
-            n: At least 1.
-            td_errors: Of each ant, in the order of their numbers, if they are known.
+        `td_errors` are of each ant, in the order of their numbers, if they are known.
         """
         if n > 1:
             self.colony.tick(n)
