@@ -12,7 +12,7 @@ import pytest
 from command_lines import ROOT, assert_one_sentence, environment
 
 from taichi_ants.commands import COMMANDS
-from taichi_ants.live.page import PARTS
+from taichi_ants.live.server import PARTS
 from taichi_ants.viewer.page import SCRIPTS, STYLES
 
 BUILD = """

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,8 +13,7 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
 
 from taichi_ants import checks
-from taichi_ants.errors import AntsError, checked_whole, count, shown
-from taichi_ants.task import Task
+from taichi_ants.errors import AntsError, check_one_of, checked_whole, count, shown
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.worlds import World, build, from_text
 
@@ -28,18 +27,18 @@ def worlds_of(world: Any, most: int) -> tuple[World, ...]:
         )
     if len(given) > most:
         raise AntsError(f"world lists {count(len(given), 'world')}; there is room for {most}.")
-    several = tuple(checks.checked_world(_built(one)) for one in given)
+    several = tuple(map(_built, given))
     ranges = {one.ranges for one in several}
     if len(ranges) > 1:
         raise AntsError(f"the worlds have the ranges {sorted(ranges)}; all must have the same.")
     return several
 
 
-def _built(world: Any) -> Any:
-    """The world of a name, a path or the text of a map; others as they are."""
-    if not isinstance(world, str):
-        return world
-    return from_text(world) if "\n" in world else build(world)
+def _built(world: Any) -> World:
+    """The world of a name, a path or the text of a map, or itself."""
+    if isinstance(world, str):
+        world = from_text(world) if "\n" in world else build(world)
+    return checks.checked_world(world)
 
 
 class StepLimit:
@@ -68,11 +67,6 @@ def lower_limit(max_steps: int, max_episode_steps: int | None) -> int:
     return min(checked_whole("max_episode_steps", max_episode_steps), max_steps)
 
 
-def task_of(task: Any) -> Any:
-    """The task of a mapping, which JSON can hold; others as they are."""
-    return Task.from_dict(task) if isinstance(task, Mapping) else task
-
-
 def seeds_of(seed: Any, n: int) -> Sequence[int | None]:
     """The seed of each of n environments, None for those that go on, as Gymnasium counts them."""
     if seed is None:
@@ -82,10 +76,11 @@ def seeds_of(seed: Any, n: int) -> Sequence[int | None]:
     if not isinstance(seed, (list, tuple, np.ndarray)) or np.shape(seed)[:1] != (n,):
         raise ValueError(f"seed is {shown(seed)}; give a whole number, or a list of {n}.")
     for one in seed:
-        if one is not None and not isinstance(one, (int, np.integer)):
+        if one is None:
+            continue
+        if not isinstance(one, (int, np.integer)):
             raise ValueError(f"a seed is {shown(one)}; it must be a whole number from 0 on.")
-        if one is not None:
-            seeding.np_random(int(one))  # says what Gymnasium says of negative ones
+        seeding.np_random(int(one))  # says what Gymnasium says of negative ones
     return [None if one is None else int(one) for one in seed]
 
 
@@ -105,11 +100,9 @@ def checked_reset_mask(options: dict[str, Any] | None, n: int) -> np.ndarray:
 
 def checked_autoreset(mode: Any) -> AutoresetMode:
     """The mode of a name, or itself."""
-    try:
-        return AutoresetMode(mode)
-    except ValueError:
-        allowed = ", ".join(repr(one.value) for one in AutoresetMode)
-        raise AntsError(f"autoreset_mode is {shown(mode)}; choose one of {allowed}.") from None
+    names = [one.value for one in AutoresetMode]
+    check_one_of("autoreset_mode", getattr(mode, "value", mode), names)
+    return AutoresetMode(mode)
 
 
 def checked_actions(actions: Any, n: int) -> np.ndarray:

@@ -55,10 +55,8 @@ class ColonyWorlds:
             falls = checked_flag("evaporation", evaporation)
         if render_mode is not None:
             check_one_of("render_mode", render_mode, METADATA["render_modes"])
-        self.max_steps, worlds = (
-            checks.checked_max_steps(max_steps, task),
-            worlds_of(world, n_worlds),
-        )
+        self.max_steps = checks.checked_max_steps(max_steps, task)
+        worlds = worlds_of(world, n_worlds)
         self.shown = Shown(task.sees, observation_format)
         self.colony = Colony(
             [worlds[w % len(worlds)] for w in range(n_worlds)],
@@ -76,33 +74,23 @@ class ColonyWorlds:
         self._scene: Any = None
 
     def begin(self, which: np.ndarray, seeds: Sequence[int | None] | None = None) -> None:
-        """Begin an episode in some worlds, bool (W,).
+        """Begin an episode in some worlds, `which` bool (W,).
 
-        Args:
-            which: These worlds.
-            seeds: One for each of all W worlds, of which those of `which` count. A world with a
-                seed begins a new life; one with None goes on, with other random numbers.
+        A world with a seed, of all W, begins a new life; one with None goes on, with other random
+        numbers.
         """
         if seeds is None:
             seeds = [None] * len(which)
         new = np.array([seed is not None for seed in seeds]) & which
         if new.any():
             # As for one ant, only 64 bits of a seed count.
-            given = [
-                seed % 2**64
-                for seed, begins in zip(seeds, which, strict=True)
-                if begins and seed is not None
-            ]
+            given = [seed % 2**64 for seed, one in zip(seeds, new, strict=True) if one]  # type: ignore[operator]
             self.colony.begin_some(new, given)
         if (which & ~new).any():
             self.colony.begin_some(which & ~new)
 
-    def stop(self, which: np.ndarray) -> None:
-        """Let some worlds, bool (W,), stand still until they begin again."""
-        self.colony.stop(which)
-
     def step(self, actions: np.ndarray) -> None:
-        """Let each ant do what is given, integers 0 to 4; worlds that were stopped stand still."""
+        """Let each ant do what is given, integers 0 to 4; stopped worlds stand still."""
         colony = self.colony
         self.acted = colony.living & colony.running[:, None]
         colony.act(actions)

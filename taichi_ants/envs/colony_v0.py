@@ -29,25 +29,10 @@ except ImportError as error:
 class HexColonyParallelEnv(ParallelEnv):
     """The ants of one world, as agents of a `pettingzoo.ParallelEnv`.
 
-    ## Description
-    Ants on a hexagonal grid search food and carry it to the queen. Agent `"ant_7"` is ant number 7.
-    The ants that start an episode have the numbers 0, 1, ...; each ant that is born has the next
-    one, is in `agents` from then on, and acts from the next step on. All agents act at once.
-
-    ## Action Space
-    `Discrete(5)`: 0 left, 1 forward, 2 right are moves, relative to the heading; 3 picks up food in
-    view; 4 gives food to a queen in view. `info["action_mask"]` tells which can succeed.
-
-    ## Observation Space
-    What an ant sees is a state of the task's observation: a number, made of its load and a code for
-    each cell in view. `observation_format` shows it: "cells" as `MultiDiscrete` (load and codes,
-    int64), "index" as `Discrete` (the number), "one_hot" as `Box` (float32). `state()` is a map of
-    the whole world, for centralised critics.
-
-    ## Rewards
-    Each ant gets what its own action pays by the task's `Rewards`: by default 0 for a move onto an
-    empty cell, 1 onto one with a trail (with food: one nearer to the queen), -1 for what cannot be
-    done, 3 for a food picked up, 10 for a food given.
+    Agent `"ant_7"` is ant number 7. The ants that start an episode have the numbers 0, 1, ...; each
+    ant that is born has the next one, is in `agents` from then on, and acts from the next step on.
+    All agents act at once. Actions, observations and rewards are those of `HexForageEnv`; each ant
+    gets what its own action pays. `state()` is a map of the whole world, for centralised critics.
 
     ## Starting State
     The world as it is drawn. The ants that it lists come first; all others start where `start`
@@ -187,7 +172,7 @@ class HexColonyParallelEnv(ParallelEnv):
         worlds.step(given)
         living, ended = worlds.colony.living[0], bool(worlds.ended[0])
         if ended:
-            worlds.stop(worlds.ended)
+            worlds.colony.stop(worlds.ended)
         born = np.flatnonzero(living & ~worlds.acted[0] & (not ended)).tolist()
         told, seen = acting + self._names(born), slots + born
         observations, infos = self._told(told, seen)

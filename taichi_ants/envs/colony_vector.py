@@ -31,30 +31,10 @@ from taichi_ants.worlds import World
 class HexColonyVectorEnv(StepLimit, VectorEnv):
     """Ants of one or more worlds, each of them an environment of a `gymnasium.vector.VectorEnv`.
 
-    ## Description
-    Ants on a hexagonal grid search food and carry it to the queen of their world. Environment
-    number w * ants + i is ant number i of world number w. The ants of a world share its cells, its
-    food and its trails, and act at the same time. Any library that trains one agent on a vector
-    environment so trains one policy that all ants follow ("parameter sharing").
-
-    ## Action Space
-    `Discrete(5)` for each ant: 0 left, 1 forward, 2 right are moves, relative to the heading; 3
-    picks up food in view; 4 gives food to a queen in view. `info["action_mask"]` tells which can
-    succeed.
-
-    ## Observation Space
-    What an ant sees is a state of the task's observation: a number, made of its load and a code for
-    each cell in view. `observation_format` shows it: "cells" as `MultiDiscrete` (load and codes,
-    int64), "index" as `Discrete` (the number), "one_hot" as `Box` (float32).
-
-    ## Rewards
-    Each ant gets what its own action pays by the task's `Rewards`: by default 0 for a move onto an
-    empty cell, 1 onto one with a trail (with food: one nearer to the queen), -1 for what cannot be
-    done, 3 for a food picked up, 10 for a food given.
-
-    ## Starting State
-    The world as it is drawn. The ants that it lists come first; all others start where `start`
-    says, on cells and with headings that the seed of the world decides.
+    Environment number w * ants + i is ant number i of world number w. The ants of a world share its
+    cells, its food and its trails, and act at the same time. Any library that trains one agent on a
+    vector environment so trains one policy that all ants follow ("parameter sharing"). Actions,
+    observations and rewards are those of `HexForageEnv`; each ant gets what its own action pays.
 
     ## Episode End
     After `max_steps` steps all ants of a world are truncated at once. A delivery ends nothing in
@@ -71,10 +51,8 @@ class HexColonyVectorEnv(StepLimit, VectorEnv):
     ## Info
     Arrays with an entry for each ant, and for each key `_key`, bool, which ants have one:
 
-    - `state`: int64, the state as a number.
-    - `action_mask`: int8 (num_envs, 5), 1 for what can succeed if no other ant is faster; in a
-      dead end for the moves, which turn the ant.
-    - `event`: int64, the result of the action, a `taichi_ants.envs.Event`; NONE after `reset`.
+    - `state`, `action_mask`, `event`: As of `HexForageEnv`; the mask is 1 for what can succeed if
+      no other ant is faster.
     - `final_obs`, `final_info`: with `SAME_STEP`, the last observation and info of the ants whose
       episode has ended in this step; `event` is in `final_info` then, and NONE outside of it.
 
@@ -84,10 +62,7 @@ class HexColonyVectorEnv(StepLimit, VectorEnv):
         ranges: world number w is number w modulo their number.
     task: The rules; None: the paper's. Ants are neither born nor do they die here.
     ants: How many live in each world.
-    start: "nest", near the queen, or "spread", anywhere.
-    max_steps: Steps of an episode.
-    observation_format: "cells", "index" or "one_hot".
-    evaporation: Whether trails fall; None: as the task says for training.
+    start, max_steps, observation_format, evaporation: As of `HexColonyParallelEnv`.
     autoreset_mode: `SAME_STEP`, `NEXT_STEP` or `DISABLED` of `gymnasium.vector.AutoresetMode`.
     render_mode: "rgb_array": `render` gives a picture of each world. None: it is not called.
     max_episode_steps: Another step limit, which `gymnasium.make_vec` gives; the lower one counts.
@@ -224,7 +199,7 @@ class HexColonyVectorEnv(StepLimit, VectorEnv):
                 final |= {"final_info": self._infos(over, events), "_final_info": over.copy()}
                 events = np.where(over, Event.NONE, events)
         else:
-            worlds.stop(ended)
+            worlds.colony.stop(ended)
             begins, self._ended = waited, ended
         if begins.any():
             worlds.begin(begins)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
@@ -21,20 +21,38 @@ from taichi_ants.envs.arguments import (
     checked_reset_mask,
     lower_limit,
     seeds_of,
-    task_of,
     worlds_of,
 )
-from taichi_ants.envs.drawing import Drawing
 from taichi_ants.envs.formats import ObservationFormat, Shown
 from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, shown
 from taichi_ants.task import Task
-from taichi_ants.task.constants import EPISODE_STEPS, GIVE, N_ACTIONS, N_STATES, PICK_UP
+from taichi_ants.task.constants import (
+    EMPTY,
+    EPISODE_STEPS,
+    FOOD,
+    GIVE,
+    N_ACTIONS,
+    N_STATES,
+    OBSTACLE,
+    PICK_UP,
+    QUEEN,
+)
 from taichi_ants.task.events import Event, Reason
 from taichi_ants.task.states import state_from_index
-from taichi_ants.worlds import World
+from taichi_ants.worlds import World, text_map
+
+if TYPE_CHECKING:
+    from taichi_ants.engines.records import Snapshot
+    from taichi_ants.rendering import Scene
 
 DELIVERIES = ("terminates", "truncates", "continues")
 RENDER_MODES = ("rgb_array", "ansi")
+_GROUNDS = {
+    EMPTY: text_map.EMPTY,
+    OBSTACLE: text_map.OBSTACLE,
+    FOOD: text_map.FOOD,
+    QUEEN: text_map.QUEEN,
+}
 # Of all environments together, with room for some more: 4 GiB.
 _MOST_CELLS = (1 << 30) - (1 << 24)
 
@@ -70,7 +88,8 @@ class _Ants:
         observation_format: ObservationFormat,
         render_mode: str | None,
     ) -> None:
-        self.task = checks.checked_runs_task(task_of(task))
+        task = Task.from_dict(task) if isinstance(task, Mapping) else task  # as JSON holds it
+        self.task = checks.checked_runs_task(task)
         delivery = self.task.delivery if delivery is None else delivery
         check_one_of("delivery", delivery, DELIVERIES)
         falls = self.task.evaporation_in_training
@@ -85,18 +104,17 @@ class _Ants:
         if n > most:
             raise AntsError(f"num_envs is {n}; of this world there can be at most {most} at once.")
         self.batched = BatchedEnvironments(worlds, self.task, n, max_steps, delivery, falls)
-        self._seeded = False
-        self.drawing = Drawing(self.batched, render_mode)
+        self._seeded, self._render_mode = False, render_mode
+        self._scene: Scene | None = None
 
     def seed(
         self, seeds: Sequence[int | None], which: np.ndarray, chance: np.random.Generator
     ) -> None:
         """Seed those ants, of bool (n,), that are given a seed; by chance if none ever was."""
-        if not self._seeded and any(seed is None for seed in seeds):
+        if not self._seeded and None in seeds:
             first = int(chance.integers(2**62))
             seeds = [first + i if seed is None else seed for i, seed in enumerate(seeds)]
-        pairs = ((i, seeds[i]) for i in np.flatnonzero(which).tolist())
-        given = {i: seed for i, seed in pairs if seed is not None}
+        given = {i: one for i, one in enumerate(seeds) if which[i] and one is not None}
         if given:
             self.batched.seed(list(given.values()), np.array(list(given)))
         self._seeded = True
@@ -104,6 +122,41 @@ class _Ants:
     def observations(self) -> np.ndarray:
         """What the ants see, (n, ...)."""
         return self.shown.show(self.batched.arrays["states"])
+
+    def draw(self, number: int) -> Any:
+        """The world of an ant: uint8 (720, 1280, 3), or text; None without a render mode."""
+        if self._render_mode is None:
+            return None
+        arrays, sees = self.batched.arrays, self.task.sees
+        now, state = self.batched.snapshot(number), int(arrays["states"][number])
+        facts = (
+            ("step", str(arrays["steps"][number])),
+            ("reward", f"{arrays['rewards_of'][number]:g}"),
+            ("state", sees.name_of(state)),
+        )
+        if self._render_mode == "ansi":
+            return f"; {', '.join(map(' '.join, facts))}\n{_text_of(now)}"
+        from taichi_ants import rendering
+
+        if self._scene is None:
+            strongest = self.task.pheromone.level
+            self._scene = rendering.Scene(now.grid, view=True, strongest=strongest)
+        return self._scene.draw(now, rendering.Status(facts, state, observation=sees))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "_scene": None}  # it is drawn anew
+
+
+def _text_of(now: Snapshot) -> str:
+    """A text map, see `worlds.text_map`; the ant is its heading."""
+    ground = np.where(now.grid.exists, now.ground, -1)
+    where = [(ground == kind, mark) for kind, mark in _GROUNDS.items()]
+    where.append(((now.trail > 0) & (now.ground == EMPTY), text_map.TRAIL))
+    marks = [(now.grid.cells(np.flatnonzero(cells)), mark) for cells, mark in where]
+    on_trail = now.trail[now.ant_cells[0]] > 0
+    letters = text_map.ANTS_ON_TRAIL if on_trail else text_map.ANTS
+    marks.append((now.grid.cells(now.ant_cells), letters[now.ant_headings[0]]))
+    return text_map.drawing(now.grid.ranges, marks)
 
 
 class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
@@ -241,7 +294,7 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         """
         if not self._begun:
             raise ResetNeeded("no episode is under way; call reset() before render().")
-        return self._ants.drawing.draw(0)
+        return self._ants.draw(0)
 
 
 class HexForageVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
@@ -378,7 +431,7 @@ class HexForageVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
             return None
         if self._over is None:
             raise ResetNeeded("no episode is under way; call reset() before render().")
-        return tuple(self._ants.drawing.draw(number) for number in range(self.num_envs))
+        return tuple(self._ants.draw(number) for number in range(self.num_envs))
 
 
 def _infos(

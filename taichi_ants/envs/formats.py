@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import cached_property
 from itertools import pairwise
 from typing import Literal, get_args
@@ -21,9 +20,8 @@ _MOST_NUMBERS = 1 << 25  # of the table of all states
 class Shown:
     """What an ant sees, in one of the formats.
 
-    A state is an index into a table of action values, see `taichi_ants.task.Observation`. In the
-    paper's, and in all others of this package, it is made of the load (1 with food) and a code for
-    each cell in view.
+    A state is an index into a table of action values, see `taichi_ants.task.Observation`; in those
+    of this package it is made of the load (1 with food) and a code for each cell in view.
 
     Attributes:
         space: The space of one ant. "cells": MultiDiscrete (k,), int64: the k parts of a state.
@@ -76,9 +74,6 @@ class Shown:
             return shown.astype(np.int64)
         if self.form == "one_hot":
             begins = np.cumsum((0, *self.observation.parts))
-            pieces = [shown[..., a:b].argmax(axis=-1) for a, b in pairwise(begins)]
-            shown = np.stack(pieces, axis=-1)
-        # Digits, the last part the least significant.
-        sizes = self.observation.parts
-        weights = [math.prod(sizes[k + 1 :]) for k in range(len(sizes))]
-        return shown.astype(np.int64) @ np.array(weights)
+            shown = np.stack([shown[..., a:b].argmax(-1) for a, b in pairwise(begins)], axis=-1)
+        digits = tuple(np.moveaxis(shown.astype(np.int64), -1, 0))
+        return np.ravel_multi_index(digits, self.observation.parts)

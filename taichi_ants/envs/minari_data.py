@@ -62,9 +62,8 @@ def to_minari(
     for first, end in zip(data.begins[:-1], data.begins[1:], strict=True):
         rows = slice(first, end)
         infos = {name: np.append(getattr(data, name)[rows], 0) for name in _INFOS}
-        for name in ("run", "agent"):
-            infos[name][-1] = infos[name][0]
-        infos["step"][-1] = infos["step"][-2] + 1
+        for name in ("run", "agent", "step"):
+            infos[name][-1] = infos[name][-2] + (name == "step")
         infos["behaviour_probability"][-1] = np.nan
         buffers.append(
             EpisodeBuffer(
@@ -127,15 +126,17 @@ def from_minari(
     """
     minari = _minari()
     try:
-        if isinstance(dataset, str):
-            path = Path(minari.storage.get_dataset_path(dataset))
-        else:
-            path = Path(dataset.storage.data_path)
-        there_is_one = path.is_dir()
+        path = Path(
+            minari.storage.get_dataset_path(dataset)
+            if isinstance(dataset, str)
+            else dataset.storage.data_path
+        )
+        if not path.is_dir():
+            raise FileNotFoundError
     except (OSError, ValueError, AttributeError):
-        there_is_one = False
-    if not there_is_one:
-        raise AntsError(f"Minari has no data set {shown(dataset)}; see `minari list local`.")
+        raise AntsError(
+            f"Minari has no data set {shown(dataset)}; see `minari list local`."
+        ) from None
     with _reading(path):
         source = minari.load_dataset(dataset) if isinstance(dataset, str) else dataset
         facts = source.storage.metadata.get(_FACTS)

@@ -24,19 +24,15 @@ class SB3VecEnv(VecEnv):
         envs = HexForageVectorEnv(64, observation_format="one_hot", autoreset_mode="SameStep")
         PPO("MlpPolicy", SB3VecEnv(envs)).learn(100_000)
 
-    Infos are empty but where an episode has ended: there `terminal_observation` is what was seen at
-    its end, and `TimeLimit.truncated` tells whether the step limit ended it, so that its value is
-    that of going on. All else that Gymnasium's infos tell is in `envs`, see below. Wrap it in
-    SB3's `VecMonitor` for returns and lengths of episodes.
+    Infos are empty except where an episode has ended: there `terminal_observation` is what was seen
+    at its end, and `TimeLimit.truncated` is True if the step limit ended it. Wrap it in SB3's
+    `VecMonitor` for returns and lengths of episodes.
 
     All environments are one object: attributes are those of `envs`, the same for each, and the only
     method of single environments is `action_masks`, which MaskablePPO of sb3-contrib calls.
 
-    Args:
-        envs: The environments, with autoreset_mode "SameStep".
-
     Attributes:
-        envs: The same.
+        envs: The environments, with autoreset_mode "SameStep".
         infos: What they said in the last step, or at the reset, in Gymnasium's form.
 
     Raises:

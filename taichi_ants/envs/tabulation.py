@@ -21,18 +21,15 @@ def tabulate(
 ) -> npt.NDArray[np.float32]:
     """The table of a policy that is a function of what an ant sees.
 
-    There are few states, so the function is asked about all of them, once. Its table does what the
-    function does, but greedily: of a policy with probabilities it keeps the most probable action.
-    It goes wherever a table goes: into `evaluate`, a `Colony`, or with `save_policy` into a file.
+    The function is called once, with all states. Its table does what the function does, but
+    greedily: of a policy with probabilities it keeps the most probable action.
 
         table = tabulate(lambda seen: model.predict(seen, deterministic=True)[0])
-        save_policy("ppo.npz", table, {"made by": "PPO"})
 
     Args:
         function: Takes all states as an environment shows them, (n_states, ...) of the dtype of its
-            observation space. Returns a number for each action, which is the larger the better the
-            action is (action values, logits, probabilities), real (n_states, 5); or the action in
-            each state, integers (n_states,).
+            observation space. Returns action values, logits or probabilities, real (n_states, 5);
+            or the action in each state, integers (n_states,).
         observation: Name of the registered observation.
         observation_format: The environment's: "cells", "index" or "one_hot".
 

@@ -75,13 +75,9 @@ def _field(one: Setting) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Choices:
-    """What pages can choose from.
+    """What pages can choose from."""
 
-    Attributes:
-        policies: By their names, besides learning and the one that is made by hand.
-    """
-
-    policies: Mapping[str, Policy]
+    policies: Mapping[str, Policy]  # besides learning and the one that is made by hand
 
     def as_dict(self) -> dict[str, Any]:
         """What a page offers, as JSON can hold it."""
@@ -119,18 +115,8 @@ class Choices:
             AntsError: Something is not allowed, or is not there.
         """
         expect("the choice", chosen, dict)
-        known = (
-            "world",
-            "map",
-            "world_seed",
-            "size",
-            "settings",
-            "policy",
-            "ants",
-            "seed",
-            "ticks",
-        )
-        for name in (*known, "ants", "seed", "ticks"):
+        needed = {"world", "map", "world_seed", "size", "settings", "policy"}
+        for name in sorted({*needed, "ants", "seed", "ticks"}):
             if name not in chosen:
                 raise AntsError(f"{name} is not chosen; choose it.")
         world, policy, table, name = chosen["world"], chosen["policy"], None, ""

@@ -17,7 +17,7 @@ food move ants aside. See `taichi_ants.engines.colony.interventions` for how, an
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -45,18 +45,12 @@ _FIELDS = {
 
 
 class Value(NamedTuple):
-    """A number that "set" changes.
+    """A number that "set" changes."""
 
-    Attributes:
-        value: What it is now.
-        least, most: What it may be.
-        step: By which a slider moves it; only whole numbers are allowed if this is one.
-    """
-
-    value: float
+    value: float  # now
     least: float
     most: float
-    step: float
+    step: float  # of a slider; only whole numbers are allowed if this is one
 
 
 def values(interventions: Interventions) -> dict[str, Value]:
@@ -117,17 +111,12 @@ def checked(edit: object, interventions: Interventions) -> Edit:
         )
     plain: Edit = {"kind": kind}
     for name in _FIELDS[kind]:
-        plain[name] = _CHECKS[name](edit[name], edit, interventions)
+        plain[name] = _checked(name, edit[name], edit, interventions)
     return plain
 
 
 def apply(edit: Edit, interventions: Interventions, length: int | None) -> None:
-    """Do an edit that `checked` gave.
-
-    Args:
-        edit: What to do.
-        interventions: Whose colony is in an episode.
-        length: Of an episode that begins.
+    """Do an edit that `checked` gave; an episode that it begins has this length.
 
     Raises:
         AntsError: There is no room for it; nothing has changed.
@@ -149,9 +138,9 @@ def apply(edit: Edit, interventions: Interventions, length: int | None) -> None:
         interventions.begin_episode(length)
 
 
-def _set(name: str, value: float, interventions: Interventions) -> None:
-    if name in _SETS:
-        _SETS[name](interventions, value)
+def _set(name: str, value: Any, interventions: Interventions) -> None:
+    if name in ("ants", "epsilon", "learning_rate"):
+        getattr(interventions, f"set_{name}")(value)
         return
     task = interventions.colony.task
     pheromone = task.pheromone
@@ -167,19 +156,27 @@ def _set(name: str, value: float, interventions: Interventions) -> None:
     interventions.set_task(replace(task, pheromone=pheromone))
 
 
-_SETS: dict[str, Callable[[Interventions, Any], None]] = {
-    "ants": Interventions.set_ants,
-    "epsilon": Interventions.set_epsilon,
-    "learning_rate": Interventions.set_learning_rate,
-}
+def _checked(name: str, given: Any, edit: Mapping, interventions: Interventions) -> Any:
+    """The value of a field of an edit."""
+    if name == "cells":
+        return _checked_cells(given, interventions)
+    if name == "cell":
+        return _checked_cells([given], interventions)[0]
+    if name == "level":
+        return _number(name, given, Value(0, 0, MAX_DEPOSIT, 1))
+    if name == "heading":
+        allowed = Value(0, 0, N_HEADINGS - 1, 1)
+        return None if given is None else _number(name, given, allowed, ", or None")
+    if name == "value":
+        return _number(edit["name"], given, values(interventions)[edit["name"]])
+    if name == "what":
+        check_one_of(name, given, tuple(_GROUNDS))
+    else:
+        check_one_of("the name of a value", given, tuple(values(interventions)))
+    return given
 
 
-def _checked_what(what: Any, edit: Mapping, interventions: Interventions) -> str:
-    check_one_of("what", what, tuple(_GROUNDS))
-    return what
-
-
-def _checked_cells(cells: Any, edit: Mapping, interventions: Interventions) -> list[int]:
+def _checked_cells(cells: Any, interventions: Interventions) -> list[int]:
     """Cells of the world, in the order given, each once."""
     most = interventions.colony.grid.count
     if not isinstance(cells, list) or not 1 <= len(cells) <= most:
@@ -193,29 +190,6 @@ def _checked_cells(cells: Any, edit: Mapping, interventions: Interventions) -> l
     return list(dict.fromkeys(cells))
 
 
-def _checked_cell(cell: Any, edit: Mapping, interventions: Interventions) -> int:
-    return _checked_cells([cell], edit, interventions)[0]
-
-
-def _checked_level(level: Any, edit: Mapping, interventions: Interventions) -> int:
-    return int(_number("level", level, Value(0, 0, MAX_DEPOSIT, 1)))
-
-
-def _checked_heading(heading: Any, edit: Mapping, interventions: Interventions) -> int | None:
-    if heading is None:
-        return None
-    return int(_number("heading", heading, Value(0, 0, N_HEADINGS - 1, 1), ", or None"))
-
-
-def _checked_name(name: Any, edit: Mapping, interventions: Interventions) -> str:
-    check_one_of("the name of a value", name, tuple(values(interventions)))
-    return name
-
-
-def _checked_value(value: Any, edit: Mapping, interventions: Interventions) -> float:
-    return _number(edit["name"], value, values(interventions)[edit["name"]])
-
-
 def _number(name: str, value: Any, allowed: Value, otherwise: str = "") -> float:
     whole = isinstance(allowed.step, int)
     if type(value) not in ((int,) if whole else (int, float)) or not (
@@ -226,14 +200,3 @@ def _number(name: str, value: Any, allowed: Value, otherwise: str = "") -> float
             f"{allowed.least:g} to {allowed.most:g}{otherwise}."
         )
     return value if whole else float(value)
-
-
-_CHECKS: dict[str, Callable[[Any, Mapping, Interventions], Any]] = {
-    "what": _checked_what,
-    "cells": _checked_cells,
-    "cell": _checked_cell,
-    "level": _checked_level,
-    "heading": _checked_heading,
-    "name": _checked_name,
-    "value": _checked_value,
-}

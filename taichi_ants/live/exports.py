@@ -31,11 +31,6 @@ def recording(log: Log, most_frames: int = 1000, progress: Progress | None = Non
     return Recording(session.header(), frames)
 
 
-def page_bytes(log: Log, progress: Progress | None = None) -> bytes:
-    """The page that plays it, as a file holds it."""
-    return page(recording(log, progress=progress)).encode()
-
-
 def gif_bytes(log: Log, progress: Progress | None = None, most_frames: int = 300) -> bytes:
     """An animation of the session, see `Session.snapshots`."""
     from taichi_ants.rendering import colony_snapshots, frames, save_animation
@@ -63,7 +58,7 @@ QUICK: dict[str, tuple[str, Callable[[Session], bytes]]] = {
     "colony": ("colony.npz", Session.colony_bytes),
 }
 SLOW: dict[str, tuple[str, Callable[[Log, Progress], bytes]]] = {
-    "page": ("session.html", page_bytes),
+    "page": ("session.html", lambda log, told: page(recording(log, progress=told)).encode()),
     "gif": ("session.gif", gif_bytes),
 }
 
@@ -85,12 +80,8 @@ _MAKES: dict[str, Callable[[Log, Progress], bytes | Session]] = {
 class Making:
     """A file of `SLOW` that a worker process makes, or a session that it replays (`LOAD`).
 
-    Args:
-        kind: Of `SLOW`, or `LOAD`.
-        content: The session, as its file holds it.
-        total: The ticks that it is about.
-        prepare: Called first in that process, as to load a plugin.
-        end: Called in a new thread with `made`; not if it was cancelled.
+    `content` is the session as its file holds it, `total` its ticks, `prepare` what the process
+    calls first, as to load a plugin. `end` is called in a new thread with `made`, unless cancelled.
 
     Attributes:
         done: How many of the ticks have passed.

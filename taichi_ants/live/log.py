@@ -38,25 +38,15 @@ def check_room(n_edits: int, n_cells: int) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """What a session was up to some moment; see `Session.replay`.
-
-    Attributes:
-        setup: How it begins.
-        edits: (steps, edit) of each edit, in order, see `edits`.
-        steps: How many steps time has made, see `Session`.
-        ticks: How many ticks have passed; None if that is not known.
-        state: What `Interventions.state` gives then; None if that is not known.
-        name: What messages call it.
-        changes: As in `Session`.
-    """
+    """What a session was up to some moment; see `Session.replay`."""
 
     setup: Setup
-    edits: tuple[tuple[int, Any], ...]
-    steps: int
-    ticks: int | None
-    state: str | None
-    name: str = "the session"
-    changes: tuple[int, ...] = ()
+    edits: tuple[tuple[int, Any], ...]  # (steps, edit) of each, in order, see `edits`
+    steps: int  # that time has made, see `Session`
+    ticks: int | None  # that have passed, if that is known
+    state: str | None  # of `Interventions.state` then, if that is known
+    name: str = "the session"  # in messages
+    changes: tuple[int, ...] = ()  # as in `Session`
 
     def write(self, path: files.PathLike) -> None:
         """Write the log; raises as `archives.write` does."""
@@ -71,11 +61,7 @@ class Log:
 
     @classmethod
     def read(cls, path: files.PathLike, content: bytes | None = None) -> Log:
-        """The log in a file; arguments as of `archives.read`.
-
-        Raises:
-            AntsError: The file is missing, damaged, too large, or of another kind.
-        """
+        """The log in a file; arguments and errors are those of `archives.read`."""
         with KIND.reading(path, content) as (arrays, facts):
             expect("state", facts["state"], str)
             steps = checked_whole("steps", facts["steps"], 0, MOST_TICKS)

@@ -23,6 +23,8 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
+from functools import cache
+from importlib import resources
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -30,14 +32,15 @@ from taichi_ants.errors import AntsError
 from taichi_ants.live.choices import Choices
 from taichi_ants.live.exports import LOAD, QUICK, SLOW, Making
 from taichi_ants.live.log import Log
-from taichi_ants.live.page import live_page, policy_of
 from taichi_ants.live.session import Session
+from taichi_ants.viewer.page import assemble
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
     from websockets.http11 import Request, Response
 
-    from taichi_ants.live.methods import Connection
+SCRIPTS = ("token.js", "source.js", "tools.js", "controls.js")  # a part uses those before it
+PARTS = ("controls.html", "live.css", *SCRIPTS)
 
 HOST = "127.0.0.1"
 FRAMES_A_SECOND = 30
@@ -58,6 +61,20 @@ _LONGEST_WAIT = 0.2  # seconds, for a request, before it looks whether it is to 
 _QUIET = logging.getLogger("taichi_ants.live")  # what strangers send is no news for the terminal
 _QUIET.addHandler(logging.NullHandler())
 _QUIET.propagate = False
+
+
+@cache
+def live_page(server: str) -> str:
+    """The viewer with controls beside the world, as HTML; it connects to `server` alone."""
+    folder = resources.files(__package__)
+    controls, style, *scripts = (folder.joinpath(name).read_text("utf-8") for name in PARTS)
+    return assemble(
+        "Taichi Ants, live",
+        controls=controls,
+        style=style,
+        script="\n".join(scripts),
+        connect=server,
+    )
 
 
 class Closed(Exception):  # noqa: N818
@@ -140,9 +157,8 @@ class Room:
         self._pace, self._piece, self._due = 0.0, 1.0, 0.0  # see _pass
         self._prepare = prepare
         self._former: Session | None = None  # whose place the present one has taken
-        self._undone: tuple[int, int] | None = (
-            None  # steps and edits, where it is one in part undone
-        )
+        # Steps and edits, where it is one in part undone.
+        self._undone: tuple[int, int] | None = None
         self._stroke: tuple[Page, float] | None = None  # by whom, and which, of the last edit
         self._replay: _Replay | None = None  # of a session that is in part undone
         self._loading: Making | None = None  # of a session that somebody has sent
@@ -171,11 +187,9 @@ class Room:
     def run(
         self, seconds: float | None = None, each_turn: Callable[[], object] = lambda: None
     ) -> None:
-        """Serve pages and let time pass, until somebody ends it, or for some seconds.
+        """Serve pages and let time pass, for some `seconds` or until somebody ends it.
 
-        Args:
-            seconds: How many; None: until it is ended.
-            each_turn: Called several times a second; what it raises ends it, too.
+        `each_turn` is called several times a second; what it raises ends it, too.
         """
         sockets = threading.Thread(target=self._serve, name="sockets", daemon=True)
         sockets.start()
@@ -217,12 +231,12 @@ class Room:
 
     @property
     def _runs(self) -> bool:
-        """Whether time passes: it stands still while another session is replayed."""
+        """Whether time passes."""
         return self.playing and not self._replays
 
     @property
     def _replays(self) -> bool:
-        """Whether another session is about to take the place of the present one."""
+        """Whether another session is being replayed, to take the place of the present one."""
         return self._replay is not None or self._loading is not None
 
     def _go_on(self, replay: _Replay) -> None:
@@ -233,14 +247,11 @@ class Room:
                 replay.session = session
                 if time.monotonic() > until:
                     return
-        except (AntsError, MemoryError) as error:
-            self._replay = None
-            self._tell_all(_say("error", words=_words(error)))
-        else:
-            self._replay = None
             assert replay.session is not None
             self._begin(replay.session, undoes=True)
-        self._tells = 0.0
+        except (AntsError, MemoryError) as error:
+            self._tell_all(_say("error", words=_words(error)))
+        self._replay, self._tells = None, 0.0
 
     def _works(self) -> list[dict[str, Any]]:
         """What goes on that takes long: what it is, and how many of its ticks are done."""
@@ -280,9 +291,8 @@ class Room:
     def _leap(self) -> int:
         """The steps that fill the time of a frame, as far as is known.
 
-        Where these are a large part of an episode, frames would show it at any of its moments. Then
-        each shows another episode, some ticks later in it than the one before: pages see the slow
-        course of an episode, as a stroboscope shows a wheel.
+        Where these are a large part of an episode, each frame shows another episode, some ticks
+        later in it than the one before: pages see the slow course of an episode.
         """
         steps, length = int(self._piece), self.session.setup.ticks_per_episode
         if not length or _FEW * steps < length:
@@ -304,12 +314,8 @@ class Room:
             self._tell(page, _say("error", words=_words(error)))
 
         def answer() -> None:
-            if answered.done():  # as where the page has gone
-                return
-            if refused is None:
-                answered.set_result(None)
-            else:
-                answered.set_exception(refused)
+            if not answered.done():  # as where the page has gone
+                answered.set_exception(refused) if refused else answered.set_result(None)
 
         self._post(answer)
         self._tells = min(self._tells, time.monotonic() + 1 / FRAMES_A_SECOND)
@@ -356,15 +362,15 @@ class Room:
         self._tell_all(_say("cancelled", kind=kind))
 
     def _leave_room(self, page: Page, request: dict[str, Any]) -> None:
-        """Nobody waits for the file of a page that has gone; the others learn of it, too."""
+        """Cancel the file of a page that has gone; the others are told, too."""
         if self._making is not None and self._for is page:
             self._making.cancel()
 
     def _begin(self, session: Session, undoes: bool = False) -> None:
-        """Go on with another session; all pages are shown it, and can go back to the one before.
+        """Go on with another session; pages can go back to the one before.
 
-        That is the one before several in a row, if nothing would be lost: where each undoes a
-        change of the last one, or where a session begins that stands as the present one does.
+        That is the one before several in a row, where each undoes a change of the last one, or
+        where a session begins that stands as the present one does: nothing would be lost.
         """
         before = self.session
         in_a_row = undoes and self._undone == (before.steps, len(before.edits))
@@ -459,15 +465,11 @@ class Room:
         kind = request.get("kind")
         if not isinstance(kind, str) or kind not in {**QUICK, **SLOW}:
             raise Closed("there is no file of this kind")
-        if kind in SLOW:
-            self._make(page, kind)
+        name = {**QUICK, **SLOW}[kind][0]
+        if kind in QUICK:
+            content = QUICK[kind][1](self.session)
+            self._post(lambda: page.tell(_say("file", name=name), content))
             return
-        name, make = QUICK[kind]
-        content = make(self.session)
-        self._post(lambda: page.tell(_say("file", name=name), content))
-
-    def _make(self, page: Page, kind: str) -> None:
-        """Begin to make a file, for a page; time goes on."""
         if self._making is not None and not self._making.over:
             raise AntsError("another file is being made; wait for it, or cancel it.")
 
@@ -475,7 +477,7 @@ class Room:
             if isinstance(made, str):
                 self._tell(page, _say("error", words=made))
             else:
-                self._post(lambda: page.tell(_say("file", name=SLOW[kind][0]), made))
+                self._post(lambda: page.tell(_say("file", name=name), made))
 
         content, ticks = self.session.to_bytes(), self.session.ticks
         self._making, self._for = Making(kind, content, ticks, self._prepare, end), page
@@ -537,24 +539,28 @@ class Room:
     async def _listen(self) -> None:
         from websockets.asyncio.server import serve
 
-        from taichi_ants.live.methods import Connection
-
         settings: dict[str, Any] = {
             **{"max_size": _MOST_UPLOAD, "max_queue": 4, "compression": None},
             **{"open_timeout": 10, "ping_interval": 20, "ping_timeout": 20, "close_timeout": 0.3},
             **{"process_request": self._open, "logger": _QUIET},
-            "create_connection": Connection,
         }
         async with serve(self._hear, sock=self._socket, **settings):
             await self._leave.wait()
             for page in self._pages:
                 page.tell(_say("over"))
 
-    def _open(self, connection: Connection, request: Request) -> Response | None:
-        """Answer a request: with the page, with a refusal, or None, which opens a socket.
+    def _open(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Answer a request: with the page, with a refusal, or None, which opens a socket."""
+        response = self._answer_to(connection, request)
+        if response is not None:
+            for name, value in _HEADERS.items():
+                response.headers[name] = value
+            if _method(request) == "HEAD":
+                response.body = b""
+        return response
 
-        The page itself holds no secret; only who knows the token gets a socket.
-        """
+    def _answer_to(self, connection: ServerConnection, request: Request) -> Response | None:
+        """As `_open`, without headers. The page holds no secret; a socket needs the token."""
         asked = urlsplit(request.path)
         hosts = {f"{name}:{self.port}" for name in (HOST, "localhost")}
         host, origins = request.headers.get_all("Host"), request.headers.get_all("Origin")
@@ -563,21 +569,20 @@ class Room:
         # A page of ours has the origin that it was asked for at; the page itself is asked for by
         # nobody's page.
         mine = mine and (origins == [f"http://{host[0]}"] or (not origins and not opens))
-        first = tokens[0] if tokens else ""
-        knows = hmac.compare_digest(first.encode(), self.token.encode())
+        knows = hmac.compare_digest("".join(tokens[:1]).encode(), self.token.encode())
+        if _method(request) not in ("GET", "HEAD")[: 1 if opens else 2]:
+            return connection.respond(405, "Only GET is allowed here.\n")
         if not mine or not (knows or (asked.path == "/" and not tokens)):
-            return _respond(connection, 403, "Open the address that was printed.\n")
-        if opens and connection.head:
-            return _respond(connection, 405, "", Allow="GET")
-        if opens and self._joined >= _MOST_PAGES:
-            return _respond(connection, 503, "Too many pages are open.\n")
+            return connection.respond(403, "Open the address that was printed.\n")
         if opens:
-            return None
+            full = self._joined >= _MOST_PAGES
+            return connection.respond(503, "Too many pages are open.\n") if full else None
         if asked.path != "/":
-            return _respond(connection, 404, "There is nothing here.\n")
-        page = live_page(f"ws://{host[0]}")
-        rules = {"Content_Security_Policy": policy_of(page)}
-        return _respond(connection, 200, page, Content_Type="text/html; charset=utf-8", **rules)
+            return connection.respond(404, "There is nothing here.\n")
+        response = connection.respond(200, live_page(f"ws://{host[0]}"))
+        del response.headers["Content-Type"]
+        response.headers["Content-Type"] = "text/html; charset=utf-8"
+        return response
 
     async def _hear(self, connection: ServerConnection) -> None:
         """All that one page says; what it asks for is done before it is heard further."""
@@ -629,18 +634,12 @@ class Room:
 
 
 class _Replay:
-    """The present session, while it is made once more without its last change.
-
-    Attributes:
-        pieces: What makes it.
-        steps: How many steps time has made at its end.
-        session: The new session so far.
-    """
+    """The present session, while `pieces` make it once more without its last change."""
 
     def __init__(self, session: Session) -> None:
         self.pieces = session.undone()
-        self.steps, _ = session.edits[session.changes[-1]]
-        self.session: Session | None = None
+        self.steps, _ = session.edits[session.changes[-1]]  # at its end
+        self.session: Session | None = None  # so far
 
 
 REQUESTS: dict[str, Callable[[Room, Page, Any], None]] = {
@@ -666,8 +665,9 @@ _INWARD = ("join", "leave", "catch up", LOAD)
 _CHANGES = (LOAD, "play", "step", "edit", "undo", "back", "begin", "restart")
 
 _HEADERS = {
+    "Allow": "GET, HEAD",
     "Cache-Control": "no-store",
-    "Content-Security-Policy": "default-src 'none'; frame-ancestors 'none'",
+    "Content-Security-Policy": "frame-ancestors 'none'",  # the page has its other rules in itself
     "Cross-Origin-Opener-Policy": "same-origin",
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
@@ -676,17 +676,9 @@ _HEADERS = {
 }
 
 
-def _respond(connection: Connection, status: int, text: str, **headers: str) -> Response:
-    """An answer with the headers of all answers, and others; without the text if HEAD asked."""
-    response = connection.respond(status, text)
-    for name, value in {**_HEADERS, **headers}.items():
-        name = name.replace("_", "-")
-        with contextlib.suppress(KeyError):
-            del response.headers[name]
-        response.headers[name] = value
-    if connection.head:
-        response.body = b""
-    return response
+def _method(request: Request) -> str:
+    """The method; versions of websockets before 17 close all but GET themselves."""
+    return getattr(request, "method", "GET")
 
 
 def _log_or_fault(content: bytes) -> Log | AntsError:
@@ -704,9 +696,8 @@ def _of_page(fault: object) -> AntsError:
 
 
 def _words(error: Exception) -> str:
-    if isinstance(error, MemoryError):
-        return "this needs more memory than there is."
-    return str(error)
+    no_memory = isinstance(error, MemoryError)
+    return "this needs more memory than there is." if no_memory else str(error)
 
 
 def _say(kind: str, /, **facts: Any) -> str:

@@ -28,17 +28,11 @@ _LARGEST = 1 << 26  # bytes of a colony of which snapshots are taken
 
 
 class _Snapshot(NamedTuple):
-    """A session as it was before one of its changes.
+    """A session as it was before one of its changes."""
 
-    Attributes:
-        edits: How many edits it had.
-        spent: How many seconds of simulation it had taken.
-        content: The session without its edits, pickled and compressed.
-    """
-
-    edits: int
-    spent: float
-    content: bytes
+    edits: int  # that it had
+    spent: float  # seconds of simulation
+    content: bytes  # the session without its edits, pickled and compressed
 
 
 class Session:
@@ -107,8 +101,7 @@ class Session:
     def advance(self, n: int = 1) -> bytes:
         """Let n ticks pass, fewer where the episode ends before; a frame of what has changed.
 
-        If the episode has ended, the next one begins instead, and no tick passes: so pages see both
-        the end of an episode and the beginning of the next.
+        If the episode has ended, the next one begins instead, and no tick passes.
 
         Raises:
             AntsError: n is not allowed.
@@ -152,11 +145,8 @@ class Session:
     def apply(self, edit: object, goes_on: bool = False) -> bytes:
         """Do an edit now, see `edits`, and record it; a frame of what has changed.
 
-        If the episode has ended, what is of this episode alone goes with it.
-
-        Args:
-            edit: What to do.
-            goes_on: Whether it belongs to the same change as the edit before, see `undone`.
+        If the episode has ended, what is of this episode alone goes with it. An edit that `goes_on`
+        belongs to the same change as the one before, see `undone`.
 
         Raises:
             AntsError: It is none, or there is no room for it; nothing has changed.
@@ -222,9 +212,7 @@ class Session:
     def load(cls, path: files.PathLike, progress: Callable[[float], None] | None = None) -> Session:
         """Replay a session that `save` wrote, up to its end.
 
-        Args:
-            path: The file.
-            progress: Called now and then with the share of the ticks that have passed.
+        `progress` is called now and then with the share of the ticks that have passed.
 
         Raises:
             AntsError: The file is missing, damaged or altered, or its end is another one here.
@@ -237,10 +225,7 @@ class Session:
 
     @classmethod
     def replay(cls, log: Log) -> Iterator[Session]:
-        """Make a session once more, in pieces, so that one can do something else between them.
-
-        Args:
-            log: Of the session.
+        """Make the session of a log once more, in pieces, so that others get their turn.
 
         Yields:
             The session as far as it has come, some times a second at least; at last all of it.
@@ -304,10 +289,8 @@ class Session:
     def snapshots(cls, log: Log, most: int = 1000) -> Iterator[tuple[Session, bytes]]:
         """Replay a session from its beginning, snapshot by snapshot.
 
-        Args:
-            log: Of the session.
-            most: About how many snapshots there are at most. If there are fewer steps and edits,
-                each step has a snapshot, and so does each intervention.
+        There are about `most` snapshots. If there are fewer steps and edits, each step has a
+        snapshot, and so does each intervention.
 
         Yields:
             The session at that moment, and a frame of what has changed since the last one.
@@ -321,7 +304,8 @@ class Session:
                 if every == 1:
                     yield session, session.advance()
                     continue
-                session._go(min(steps, session.steps + every - session.steps % every))
+                for _ in session._pieces(min(steps, session.steps + every - session.steps % every)):
+                    pass
                 if session.steps % every == 0:
                     yield session, session._recorder.snapshot()
             wanted = [edit for _, edit in edits_then if edit is not None]
@@ -338,11 +322,6 @@ class Session:
             self._pass(min(ticks, steps - self.steps), self.colony.tick)
             ticks = max(1, 2 * ticks if time.perf_counter() - began < _PIECE else ticks // 2)
             yield
-
-    def _go(self, steps: int) -> None:
-        """Let time pass until it has made so many steps."""
-        for _ in self._pieces(steps):
-            pass
 
     def policy_bytes(self) -> bytes:
         """The action values as they are now, as a policy file holds them.

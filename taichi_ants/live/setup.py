@@ -148,11 +148,9 @@ class Setup:
 
     @classmethod
     def from_json(cls, facts: object, table: np.ndarray | None = None) -> Setup:
-        """The setup of `to_json`.
+        """The setup of `to_json`; what is left out is as usual.
 
-        Args:
-            facts: What `to_json` gave; what is left out is as usual.
-            table: The action values, if the policy is "table".
+        `table` holds the action values, if the policy is "table".
 
         Raises:
             AntsError: A value is not allowed.
@@ -163,19 +161,13 @@ class Setup:
         for name in facts:
             if name not in known:
                 raise AntsError(f"a setup has no {shown(name)}; choose among {', '.join(known)}.")
-        policy = facts.get("policy")
-        if policy == "table" and table is not None:
-            policy = table
-        elif isinstance(policy, Mapping):
-            try:
-                policy = TrainingConfig(**policy)
-            except TypeError:  # other names than it has
-                raise AntsError(f"policy is {shown(policy)}; it must be a training.") from None
-        else:
-            raise AntsError(f"policy is {shown(policy)}; it must be a training.")
+        policy: Any = facts.get("policy")
+        try:
+            policy = TrainingConfig(**policy) if policy != "table" or table is None else table
+        except TypeError:  # no mapping, or other names than it has
+            raise AntsError(f"policy is {shown(policy)}; it must be a training.") from None
         task = Task.from_dict(facts.get("task", {}))
-        given = {"world": "paper", **facts, "task": task, "policy": policy}
-        return cls(**given)
+        return cls(**{"world": "paper", **facts, "task": task, "policy": policy})
 
 
 def _check_cells(ranges: tuple[int, int, int]) -> None:

@@ -1,14 +1,13 @@
 """Pictures of worlds and their ants, without a display: stills, GIF, MP4.
 
-- A picture shows a `Snapshot` of a world, as `Colony.snapshot` or `at_start` give it, with a
-  `Status`, what is said of it. `Episode.snapshots` and `colony_snapshots` yield them.
-- `frames` draws snapshots as arrays, one at a time; `Scene` does so with one.
-- `learning_checkpoints` and `learning_frames` show one ant after more and more episodes, side by
-  side; `typical_seed` returns the seed of the median ant.
+- `frames` draws snapshots, which `Episode.snapshots` and `colony_snapshots` yield, as arrays;
+  `Scene` draws one.
+- `learning_frames` shows one ant after more and more episodes, side by side.
 - `policy_sheet` shows what a policy does in each state.
 - `save_picture` and `save_animation` write arrays; a file appears when it is whole.
 """
 
+from taichi_ants.engines.records import Snapshot
 from taichi_ants.rendering.learning import (
     Checkpoint,
     learning_checkpoints,
@@ -18,8 +17,7 @@ from taichi_ants.rendering.learning import (
 from taichi_ants.rendering.panel import Status
 from taichi_ants.rendering.scene import Scene
 from taichi_ants.rendering.sheet import policy_sheet
-from taichi_ants.rendering.snapshot import Snapshot, at_start
-from taichi_ants.rendering.snapshots import Episode, colony_snapshots, frames
+from taichi_ants.rendering.snapshots import Episode, at_start, colony_snapshots, frames
 from taichi_ants.rendering.writers import (
     PAUSE,
     check_animation,

@@ -40,19 +40,12 @@ _SOURCES = (
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """How an ant does after so many episodes of training.
-
-    Attributes:
-        episodes: How many.
-        episode: What it does then.
-        note: The words beside its return at its end.
-        among: A line below its title: the outcome of other seeds.
-    """
+    """How an ant does after so many episodes of training."""
 
     episodes: int
     episode: Episode
-    note: str = ""
-    among: str = ""
+    note: str = ""  # beside its return at its end
+    among: str = ""  # a line below its title: the outcome of other seeds
 
     @property
     def title(self) -> str:
@@ -89,23 +82,19 @@ def learning_checkpoints(
     """Train one ant, and roll its policy out whenever it has had a given number of episodes.
 
     Args:
-        world: The world.
-        config: The learner and its settings.
+        world, config: Where and how it learns.
         seed: Of training and rollouts.
         checkpoints: Numbers of episodes, ascending; 0 is before learning.
-        max_steps: Step limit of a rollout.
+        max_steps, epsilon: Of a rollout.
         task: The rules of the game; None is the paper's.
-        epsilon: Probability of a random action in the rollouts.
         progress: Called with the share of the work that is done.
 
     Raises:
         AntsError: An argument is not allowed; the message names it.
     """
     checks.check_progress(progress)
-    task, checkpoints = (
-        checks.checked_task(Task() if task is None else task),
-        _checked_checkpoints(checkpoints),
-    )
+    task = checks.checked_task(Task() if task is None else task)
+    checkpoints = _checked_checkpoints(checkpoints)
     played = []
     for n in checkpoints:
         table = _tables(world, config, [seed], n, task)[0]
@@ -133,24 +122,15 @@ def typical_seed(
 
     Each run is ranked among all seeds by the return and by the steps of its rollout at each
     checkpoint; equal values share the middle rank. The typical run is the one whose largest
-    distance from the middle rank is smallest; of several, the first.
-
-    Args:
-        world, config, checkpoints, max_steps, task, epsilon, progress: As in
-            `learning_checkpoints`.
-        seeds: The seeds to choose from.
+    distance from the middle rank is smallest; of several, the first. Arguments and errors are those
+    of `learning_checkpoints`, but for the `seeds` to choose from.
 
     Returns:
         The seed, and for each checkpoint the number of seeds that deliver within `max_steps`.
-
-    Raises:
-        AntsError: An argument is not allowed; the message names it.
     """
     checks.check_progress(progress)
-    task, checkpoints = (
-        checks.checked_task(Task() if task is None else task),
-        _checked_checkpoints(checkpoints),
-    )
+    task = checks.checked_task(Task() if task is None else task)
+    checkpoints = _checked_checkpoints(checkpoints)
     chosen = checks.checked_seeds(seeds)
     distances, deliver = np.zeros(len(chosen)), []
     for done, n in enumerate(checkpoints, start=1):
@@ -189,13 +169,12 @@ def _tables(
 def learning_frames(
     checkpoints: Sequence[Checkpoint], size: tuple[int, int] = DEFAULT_SIZE, title: str = ""
 ) -> Iterator[np.ndarray]:
-    """The pictures of all checkpoints side by side, uint8 (height, width, 3), until the last one
-    ends.
+    """The pictures of checkpoints of one world side by side, uint8 (height, width, 3).
 
-    A checkpoint that has ended stays as it ended.
+    A checkpoint that has ended stays as it ended, until the last one does.
 
     Args:
-        checkpoints: At least one, all in one world.
+        checkpoints: At least one.
         size: Width and height in pixels.
         title: A line above all.
 

@@ -91,9 +91,7 @@ def draw_legend(
 ) -> None:
     """Draw what colours, shapes and letters mean, `LEGEND_HEIGHT` sizes of the text high.
 
-    `hexagon` is the size of the world's hexagons in pixels, on which the look of its ants depends,
-    `strongest` the trail level of the darkest colour.
-    The rest is as in `draw_status`.
+    The world's hexagons have `hexagon` pixels, trails of the level `strongest` the darkest colour.
     """
     pitch, radius = round(1.55 * size), 0.82 * size
     for row, (kind, carries, letter, label) in enumerate(_LEGEND):

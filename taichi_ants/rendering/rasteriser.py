@@ -8,11 +8,11 @@ from types import ModuleType
 import numpy as np
 
 from taichi_ants import runtime
+from taichi_ants.engines.records import Snapshot
 from taichi_ants.grid import hexgrid
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import colours
 from taichi_ants.rendering.marks import DOT, DOTS_BELOW, Mark, ants, marks, thing
-from taichi_ants.rendering.snapshot import Snapshot
 from taichi_ants.task.constants import DEPOSIT_LEVEL, EMPTY, FOOD, OBSTACLE, QUEEN
 
 # From this size on, food and queen are drawings on a light floor. In smaller cells food is a dot
@@ -123,10 +123,7 @@ class Rasteriser:
         return frame
 
     def draw_cells(self, of_cells: np.ndarray) -> np.ndarray:
-        """The picture of the cells in the given colours, uint32 (grid.size,).
-
-        The last one is kept: where an ant lays no trail, cells look as they did.
-        """
+        """The picture of the cells in the given colours, uint32 (grid.size,); the last is kept."""
         if self._drawn is None or not np.array_equal(self._drawn[0], of_cells):
             self._drawn = of_cells.copy(), self._cells(of_cells)
         return self._drawn[1].copy()

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from taichi_ants.engines.records import Snapshot
 from taichi_ants.errors import AntsError, checked_flag, checked_whole, expect, shown
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import colours, panel, text
 from taichi_ants.rendering.panel import Status
 from taichi_ants.rendering.rasteriser import Rasteriser
-from taichi_ants.rendering.snapshot import Snapshot
 from taichi_ants.rendering.state_names import name_parts
 from taichi_ants.task.constants import DEPOSIT_LEVEL, FOOD, QUEEN
 

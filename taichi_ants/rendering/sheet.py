@@ -1,8 +1,7 @@
-"""A policy on one sheet: what the ant does in each state.
+"""A policy on one sheet: what the ant does in each state in which something was learned.
 
-The states stand in two parts, foraging and carrying, or in one if their names tell no task, ordered
-by the cell ahead, then by the other cells in view. A sheet shows the states in which something was
-learned; of very many the first.
+The states stand in two parts, foraging and carrying, or in one if their names have no task, ordered
+by the cell ahead, then by the other cells in view.
 """
 
 from __future__ import annotations

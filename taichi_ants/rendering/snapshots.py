@@ -5,13 +5,14 @@ An episode is played by a colony of one ant, so what is drawn is what the engine
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from taichi_ants.engines.colony.colony import Colony
+from taichi_ants.engines.records import Snapshot
 from taichi_ants.engines.runs.traces import Trace, rollout
 from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.grid.constants import STREAM_ROLLOUT
@@ -19,13 +20,20 @@ from taichi_ants.grid.randomness import stream_state
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.rendering.panel import Status
 from taichi_ants.rendering.scene import DEFAULT_SIZE, Scene
-from taichi_ants.rendering.snapshot import Snapshot
 from taichi_ants.rendering.state_names import name_parts
-from taichi_ants.task import Task
+from taichi_ants.task import Observation, Task
 from taichi_ants.task.constants import ACTION_NAMES, EPISODE_STEPS
 from taichi_ants.worlds.world import World
 
 CaptionedSnapshot = tuple[Snapshot, Status]
+
+
+def at_start(world: World, seed: int = 0, n: int = 1) -> Snapshot:
+    """A world with n ants as an episode starts; raises as `World.start` does."""
+    expect("world", world, World)
+    cells, headings = world.start(seed, n)
+    nothing = np.zeros(n, dtype=bool)
+    return Snapshot(world.grid, world.ground(), world.trail_levels(), cells, headings, nothing)
 
 
 def frames(
@@ -105,21 +113,17 @@ class Episode:
             yield colony.snapshot(), self._status(step, gained)
 
     def _status(self, step: int, gained: int) -> Status:
-        trace, observation = self.trace, self.task.sees
-        going_on = step < len(trace)
+        trace, going_on = self.trace, step < len(self.trace)
         state = int(trace.states[step] if going_on else trace.next_states[-1])
         action = int(trace.actions[step]) if going_on else None
-        task, seen, _ = name_parts(observation, state)
         lines = [("episode", self.name), ("step", str(step)), ("return", str(gained))]
-        lines += [("task", task), ("sees", seen)] if task else [("state", seen)]
-        lines += [("", observation.letters)] if observation.letters else []
+        last = []
         if action is not None:
-            lines.append(("action", ACTION_NAMES[action]))
+            last = [("action", ACTION_NAMES[action])]
         elif self.delivered:
-            lines.append(("outcome", "delivered"))
-        low, high = float(trace.q_values.min(initial=0)), float(trace.q_values.max(initial=0))
-        q_range = (low, high) if low < high else (0.0, 1.0)
-        return Status(tuple(lines), state, self.q_values[state], action, q_range, observation)
+            last = [("outcome", "delivered")]
+        table, sees = self.q_values, self.task.sees
+        return _status_of(sees, state, table[state], action, trace.q_values, lines, last)
 
 
 def colony_of_rollout(
@@ -153,17 +157,23 @@ def colony_snapshots(
     Raises:
         AntsError: A number is not allowed, or no episode has begun.
     """
+    between = intervals(colony, ticks, frame_interval, follow)
+    yield _snapshot(colony, follow)
+    for n in between:
+        colony.tick(n)
+        yield _snapshot(colony, follow)
+
+
+def intervals(colony: Colony, ticks: int, frame_interval: int, follow: int | None) -> list[int]:
+    """The ticks between snapshots; arguments and errors are those of `colony_snapshots`."""
     expect("colony", colony, Colony)
     ticks = checked_whole("ticks", ticks, least=0)
-    frame_interval = checked_whole("frame_interval", frame_interval)
+    every = checked_whole("frame_interval", frame_interval)
     if follow is not None:
-        follow = checked_whole("follow", follow, least=0)
+        checked_whole("follow", follow, least=0)
         if follow >= colony.ants and not colony.task.life.births:
             raise AntsError(f"follow is {follow}; the {colony.ants} ants have numbers from 0.")
-    yield _snapshot(colony, follow)
-    for done in range(0, ticks, frame_interval):
-        colony.tick(min(frame_interval, ticks - done))
-        yield _snapshot(colony, follow)
+    return [min(every, ticks - done) for done in range(0, ticks, every)]
 
 
 def _snapshot(colony: Colony, follow: int | None) -> CaptionedSnapshot:
@@ -190,17 +200,25 @@ def _snapshot(colony: Colony, follow: int | None) -> CaptionedSnapshot:
     )
     # There is no room for all lines.
     lines = [lines[0], lines[3], ("ant", str(follow))]
-    return snapshot, _status_of(colony, int(slots[order[0]]), lines)
-
-
-def _status_of(colony: Colony, slot: int, lines: list[tuple[str, str]]) -> Status:
-    """The lines, then what the ant in a slot of the first world sees, and its action values."""
-    observation, table = colony.task.sees, colony.q_values[0]
+    slot, table = int(slots[order[0]]), colony.q_values[0]
     state = int(colony.states[0, slot])
+    q_values = (table[slot] if colony.one_a_slot else table)[state]
+    return snapshot, _status_of(colony.task.sees, state, q_values, None, table, lines)
+
+
+def _status_of(
+    observation: Observation,
+    state: int,
+    q_values: np.ndarray,
+    action: int | None,
+    table: np.ndarray,
+    lines: list[tuple[str, str]],
+    last: Sequence[tuple[str, str]] = (),
+) -> Status:
+    """The lines, with what an ant sees; its action values on the scale of the table."""
     task, seen, _ = name_parts(observation, state)
     lines += [("task", task), ("sees", seen)] if task else [("state", seen)]
     lines += [("", observation.letters)] if observation.letters else []
-    low, high = min(float(table.min()), 0.0), max(float(table.max()), 0.0)
+    low, high = float(table.min(initial=0)), float(table.max(initial=0))
     q_range = (low, high) if low < high else (0.0, 1.0)
-    q_values = (table[slot] if colony.one_a_slot else table)[state]
-    return Status(tuple(lines), state, q_values, None, q_range, observation)
+    return Status((*lines, *last), state, q_values, action, q_range, observation)

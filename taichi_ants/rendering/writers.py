@@ -1,8 +1,4 @@
-"""Files of pictures: they appear when they are whole, or not at all.
-
-Frames are written as they come and then forgotten, so that the length of an animation takes room on
-the disk alone.
-"""
+"""Files of pictures: they appear when they are whole. Frames are written as they come."""
 
 from __future__ import annotations
 
@@ -67,11 +63,14 @@ def check_animation(path: files.PathLike, fps: float = DEFAULT_FPS) -> Path:
         raise AntsError(f"fps is {shown(fps)}; it must be a number from 0.1 to 50.")
     if target.suffix.lower() == ".mp4":
         _import_av()
-    if not target.suffix and os.path.lexists(target) and not _can_be_replaced(target):
-        raise AntsError(
-            f"{str(path)!r} exists already and is no empty folder; name a new folder, or a file "
-            "that ends in .gif or .mp4."
-        )
+    if not target.suffix and os.path.lexists(target):
+        files.check_writable_folder(target.absolute().parent)
+        named = target.name not in ("", "..") and not target.is_symlink()
+        if not (named and target.is_dir() and not any(target.iterdir())):
+            raise AntsError(
+                f"{str(path)!r} exists already and is no empty folder; name a new folder, or a "
+                "file that ends in .gif or .mp4."
+            )
     return target
 
 
@@ -128,13 +127,6 @@ def save_picture(path: files.PathLike, frame: np.ndarray) -> None:
     target = check_picture(path)
     _check_frame(frame)
     write(target, _png(frame, optimize=True))
-
-
-def _can_be_replaced(folder: Path) -> bool:
-    """Whether what is there is an empty folder that can be made anew."""
-    files.check_writable_folder(folder.absolute().parent)
-    named = folder.name not in ("", "..") and not folder.is_symlink()
-    return named and folder.is_dir() and not any(folder.iterdir())
 
 
 def write(target: Path, content: bytes) -> None:

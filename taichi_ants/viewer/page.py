@@ -43,12 +43,8 @@ def page(recording: Recording) -> str:
 def content_policy(script: str, style: str, connect: str = "") -> str:
     """Return the Content-Security-Policy of a page with one inline script and one inline style.
 
-    Nothing else runs, loads or connects. Style attributes are allowed, since bars and drawings
-    have their places and colours there.
-
-    Args:
-        script, style: All that is between the tags of the element.
-        connect: The one address to which the page may connect; "" for none.
+    Nothing else runs or loads, and it connects to the address `connect` alone, "" for none. Style
+    attributes are allowed, because bars and drawings have their places and colours there.
     """
     digests = [hashlib.sha256(text.encode()).digest() for text in (script, style)]
     scripts, styles = (f"'sha256-{base64.b64encode(one).decode()}'" for one in digests)
@@ -71,12 +67,8 @@ def assemble(
 ) -> str:
     """The page with a recording, or with what is needed besides to show what runs now.
 
-    Args:
-        title: Plain text.
-        recording: In base64.
-        controls: Markup at the side of the world.
-        style, script: Behind those of the viewer.
-        connect: The one address to which the page may connect; "" for none.
+    `recording` is in base64, `controls` the markup at the side of the world; `style` and `script`
+    stand behind those of the viewer, and `connect` is as in `content_policy`.
     """
     styles = "\n".join([*map(part, STYLES), style])
     scripts = "\n".join([*map(part, SCRIPTS), script])
@@ -118,18 +110,14 @@ def save_page(path: files.PathLike, recording: Recording) -> None:
     Raises:
         AntsError: The file does not end in .html, or cannot be written.
     """
-    target = check_page(path)
-    write(target, page(recording).encode())
+    write(check_page(path), page(recording).encode())
 
 
 def frame(recording: Recording) -> str:
     """The page inside a frame, for notebooks; raises as `page` does."""
-    whole = page(recording)
-    return (
-        f'<iframe title="{html.escape(recording.header["title"])}" width="100%" '
-        f'height="{_NOTEBOOK_HEIGHT}" style="border: 0" '
-        f'srcdoc="{html.escape(whole)}"></iframe>'
-    )
+    whole, title = html.escape(page(recording)), html.escape(recording.header["title"])
+    size = f'width="100%" height="{_NOTEBOOK_HEIGHT}" style="border: 0"'
+    return f'<iframe title="{title}" {size} srcdoc="{whole}"></iframe>'
 
 
 def notebook(shown: Any) -> str | None:

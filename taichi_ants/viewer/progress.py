@@ -13,12 +13,7 @@ Point = tuple[float, ...]
 
 
 class Progress:
-    """Points of one world: at the end of each episode, and within the first one.
-
-    Args:
-        colony: In its first episode, as far as the progress goes.
-        world: Which of its worlds.
-    """
+    """Points of one world of a colony: at the end of each episode, and within the first one."""
 
     def __init__(self, colony: Colony, world: int) -> None:
         self._colony, self._world, self._first = colony, world, colony.episode

@@ -12,7 +12,6 @@ from taichi_ants import learners
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.errors import count, expect
 from taichi_ants.rendering.state_names import name_parts
-from taichi_ants.task import Observation
 from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS
 from taichi_ants.task.events import Event
 from taichi_ants.viewer.frames import pack, types_of
@@ -42,29 +41,23 @@ class Recorder:
         self.colony, self.world, self._title, self._follow = colony, world, title, follow
         start = colony.snapshot(world)
         self.grid = start.grid
-        self._size, self._n_states = self.grid.size, colony.task.n_states
-        self.types = types_of(self._size, self._n_states, colony.pheromone.dense)
+        self._n_states = colony.task.n_states
+        self.types = types_of(self.grid.size, self._n_states, colony.pheromone.dense)
         self._learns = colony.sharing != "frozen"
         learner = learners.get(colony.training.learner)
         self._has_td_errors = learner.td_error is not None and not learner.plans
         self._draws_ahead = self._learns and learner.draws_next_action
         # What a page that has read all frames so far knows.
         self._numbers = np.zeros(0, np.int32)
-        self._ground = np.zeros(self._size, np.uint8)
-        self._trail = np.zeros(self._size, start.trail.dtype)  # as it is stored
+        self._ground = np.zeros(self.grid.size, np.uint8)
+        self._trail = np.zeros(self.grid.size, start.trail.dtype)  # as it is stored
         owners = colony.capacity if colony.one_a_slot else 1
         self._known = np.zeros(owners * self._n_states, bool)  # rows of tables
         self._table = np.full((owners * self._n_states, N_ACTIONS), np.nan, np.float32)
         self._owners = np.full(owners, -1 if colony.one_a_slot else 0)
         self._fixed: np.ndarray | None = None  # the tables where nobody learns
-        if not self._learns:
-            self._fixed = self._tables()
+        self._fixed = None if self._learns else self._tables()
         self.progress = Progress(colony, world)
-
-    @property
-    def observation(self) -> Observation:
-        """What the ants see."""
-        return self.colony.task.sees
 
     def header(self) -> dict[str, Any]:
         """What all frames are about.
@@ -83,8 +76,8 @@ class Recorder:
             "strongest": int(task.pheromone.level),
             "n_states": self._n_states,
             "names": self.names(),
-            "view": list(self.observation.cells),
-            "letters": self.observation.letters,
+            "view": list(self.colony.task.sees.cells),
+            "letters": self.colony.task.sees.letters,
             "actions": ACTION_NAMES,
             "events": [event.name for event in Event],
             "rewards": task.rewards.by_event().tolist(),
@@ -96,15 +89,11 @@ class Recorder:
         }
 
     def names(self, known: Collection[int] = ()) -> dict[int, tuple[str, str, list[str]]]:
-        """The names of the states that have been seen, of all states if they are few.
-
-        Args:
-            known: States whose names are left out.
-        """
+        """The names of the states seen, of all if they are few, but not of those `known`."""
         few = self._n_states <= _MOST_NAMES
         seen = np.unique(np.flatnonzero(self._known) % self._n_states).tolist()
         named = range(self._n_states) if few else seen
-        return {s: name_parts(self.observation, s) for s in named if s not in known}
+        return {s: name_parts(self.colony.task.sees, s) for s in named if s not in known}
 
     def _about(self) -> list[tuple[str, str]]:
         """Lines about the colony, names and values."""
@@ -114,15 +103,14 @@ class Recorder:
             ("world", f"{self.grid.count} cells, ranges {x}, {y}, {z}"),
             ("ants at first", str(colony.ants)),
             ("seed", str(colony.seeds[self.world])),
-            ("they see", f"{self.observation.name}, {self._n_states} states"),
+            ("they see", f"{self.colony.task.sees.name}, {self._n_states} states"),
         ]
         if not self._learns:
             return [*lines, ("policy", "frozen"), ("epsilon", f"{colony.epsilon:g}")]
-        tables = "each has its own" if colony.one_a_slot else "one for all"
         return [
             *lines,
             ("learner", learners.label(config.learner)),
-            ("table", tables),
+            ("table", "each has its own" if colony.one_a_slot else "one for all"),
             ("learning rate", f"{config.learning_rate:g}"),
             ("discount", f"{config.discount:g}"),
         ]
@@ -143,9 +131,7 @@ class Recorder:
     def tick(self, n: int = 1, td_errors: np.ndarray | None = None) -> bytes:
         """Let n ticks pass and return a frame; what ants did is in it only where n is 1.
 
-        Args:
-            n: At least 1.
-            td_errors: Of each ant, in the order of their numbers, if they are known.
+        `td_errors` are of each ant, in the order of their numbers, if they are known.
         """
         if n > 1:
             self.colony.tick(n)

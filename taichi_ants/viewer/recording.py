@@ -17,12 +17,10 @@ import numpy as np
 from taichi_ants.checks import check_progress
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.traces import Trace
-from taichi_ants.errors import AntsError, checked_whole, expect
-from taichi_ants.rendering.snapshots import Episode, colony_of_rollout
-from taichi_ants.task import Task
+from taichi_ants.errors import AntsError, expect
+from taichi_ants.rendering.snapshots import Episode, colony_of_rollout, intervals
 from taichi_ants.viewer.frames import unpack
 from taichi_ants.viewer.recorder import Recorder
-from taichi_ants.worlds.world import World
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,29 +76,24 @@ def record_colony(
     Raises:
         AntsError: A number is not allowed, or no episode has begun.
     """
-    ticks = checked_whole("ticks", ticks, least=0)
-    frame_interval = checked_whole("frame_interval", frame_interval)
+    between, done = intervals(colony, ticks, frame_interval, follow), 0
     check_progress(progress)
-    if follow is not None:
-        follow = checked_whole("follow", follow, least=0)
     recorder = Recorder(colony, world, title, follow)
-    if follow is not None and follow >= colony.ants and not colony.task.life.births:
-        raise AntsError(f"follow is {follow}; the {colony.ants} ants have numbers from 0.")
     frames = [recorder.snapshot()]
-    for done in range(0, ticks, frame_interval):
-        frames.append(recorder.tick(min(frame_interval, ticks - done)))
+    for n in between:
+        frames.append(recorder.tick(n))
+        done += n
         if progress is not None:
-            progress(min(done + frame_interval, ticks) / ticks)
+            progress(done / ticks)
     return Recording(recorder.header(), frames)
 
 
 def record_episode(episode: Episode, title: str = "") -> Recording:
     """An episode in which one ant follows a policy."""
     expect("episode", episode, Episode)
-    return _record_rollout(
-        *(episode.world, episode.task, episode.q_values, episode.epsilon),
-        *(episode.seed, 0, len(episode.trace), title),
-    )
+    one = episode
+    colony = colony_of_rollout(one.world, one.task, one.q_values, one.epsilon, one.seed)
+    return _record_rollout(colony, len(one.trace), title)
 
 
 def record_trace(trace: Trace, title: str = "") -> Recording:
@@ -118,40 +111,27 @@ def record_trace(trace: Trace, title: str = "") -> Recording:
         )
     if made.config is None:
         assert made.q_values is not None  # one of the two it has
-        return _record_rollout(
-            *(made.world, made.task, made.q_values, made.epsilon),
-            *(made.seed, made.number, len(trace), title),
+        colony = colony_of_rollout(
+            made.world, made.task, made.q_values, made.epsilon, made.seed, made.number
         )
+        return _record_rollout(colony, len(trace), title)
     # A colony of one ant with a table of its own learns as it did.
     options: dict[str, Any] = {"sharing": "independent", "ends_at_delivery": True}
     colony = Colony(made.world, made.task, made.config, made.seed, 1, **options)
-    recorder, frames = None, []
+    colony.begin_episode(made.max_steps)
+    recorder, frames = Recorder(colony, 0, title, 0), []
     errors = np.zeros(len(trace)) if trace.td_errors is None else trace.td_errors
-    for step, error in zip(trace.steps.tolist(), errors.tolist(), strict=True):
-        if step == 0:
-            if recorder is not None:
-                recorder.progress.note(ended=True)
-                colony.end_episode()
+    for number, (step, error) in enumerate(zip(trace.steps.tolist(), errors, strict=True)):
+        if step == 0 and number:
+            recorder.progress.note(ended=True)
+            colony.end_episode()
             colony.begin_episode(made.max_steps)
-            recorder = recorder or Recorder(colony, 0, title, 0)
+        if step == 0:
             frames.append(recorder.snapshot())
-        assert recorder is not None  # the first step is number 0
         frames.append(recorder.tick(td_errors=np.array([error])))
-    assert recorder is not None
     return Recording(recorder.header(), frames)
 
 
-def _record_rollout(
-    world: World,
-    task: Task,
-    q_values: np.ndarray,
-    epsilon: float,
-    seed: int,
-    number: int,
-    n: int,
-    title: str,
-) -> Recording:
-    """n ticks of one ant, played again by a colony of one, which has the same random stream."""
+def _record_rollout(colony: Colony, ticks: int, title: str) -> Recording:
     expect("title", title, str)
-    colony = colony_of_rollout(world, task, q_values, epsilon, seed, number)
-    return record_colony(colony, n, title=title or "One ant that follows a policy", follow=0)
+    return record_colony(colony, ticks, title=title or "One ant that follows a policy", follow=0)

@@ -138,7 +138,7 @@ def test_worlds_that_are_stopped_stand_still_until_they_begin_again():
     worlds.begin(np.ones(2, bool), [1, 2])
     actions = np.ones((2, 5), int)
     worlds.step(actions)
-    worlds.stop(np.array([True, False]))
+    worlds.colony.stop(np.array([True, False]))
     before = worlds.colony.snapshot(0)
     worlds.step(actions)
     assert worlds.colony.snapshot(0) == before

@@ -299,7 +299,7 @@ def test_steps_in_the_wrong_order_and_wrong_actions():
         ({"ants": 0}, "ants is 0; "),
         ({"task": Task(life=Life(births=True))}, "life of the task is Life.*leave out births"),
         ({"task": Task(life=Life(lifespan=9))}, "life of the task is Life.*lifespan"),
-        ({"autoreset_mode": "never"}, "autoreset_mode is 'never'; choose one of 'NextStep'"),
+        ({"autoreset_mode": "never"}, "autoreset_mode is 'never'; it must be one of NextStep"),
         ({"task": Task(), "autoreset_mode": NEXT}, "autoreset_mode is 'NextStep', but an ant that"),
         ({"task": "paper"}, "task is 'paper'; it must be a Task"),
         ({"world": "nowhere"}, "there is no world named 'nowhere'"),
