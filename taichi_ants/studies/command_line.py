@@ -10,11 +10,14 @@ import sys
 from collections.abc import Callable, Container, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from taichi_ants.errors import AntsError, without_middle
 from taichi_ants.settings import Setting, Settings, declared, nested
 from taichi_ants.studies.interruption import stop_if_noted, stoppable
+
+if TYPE_CHECKING:
+    from taichi_ants import World
 
 EXIT_BAD_INPUT = 2
 
@@ -138,22 +141,6 @@ WORLDS = (
 )
 
 
-def _named_number(text: str) -> tuple[str, float]:
-    name, _, value = text.partition("=")
-    try:
-        return name, int(value) if value.lstrip("+-").isdecimal() else float(value)
-    except ValueError:
-        words = f"{text!r} is no name and number, write it as planning_steps=3"
-        raise argparse.ArgumentTypeError(words) from None
-
-
-# The option of commands that train one learner; `dict(settings.hyperparameter)` has its numbers.
-HYPERPARAMETER: dict[str, Any] = {
-    **{"type": _named_number, "action": "extend", "nargs": 1, "default": []},
-    **{"metavar": "NAME=VALUE", "help": "of the learner; may be given several times"},
-}
-
-
 def add_settings(parser: argparse.ArgumentParser, base: Settings, but: Container[str] = ()) -> None:
     """Add an option for each setting of a class, named as in sweep files.
 
@@ -199,6 +186,16 @@ def given_settings(settings: argparse.Namespace) -> dict[str, Any]:
     The names of the world and the task, `--world` and `--task`, are left out.
     """
     return nested({path: value for path, value in vars(settings).items() if "." in path})
+
+
+def given_world(settings: argparse.Namespace) -> World:
+    """Return the world of `--world`, with what `--world.NAME` options change."""
+    from taichi_ants import worlds
+
+    given = given_settings(settings).get("world", {})
+    if "seed" in given:
+        worlds.check_seed_counts(settings.world)
+    return worlds.build(settings.world, **given)
 
 
 def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> NoReturn:
