@@ -15,6 +15,7 @@ import os
 import secrets
 import shutil
 import stat
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -25,6 +26,11 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from taichi_ants.errors import AntsError, expect, shown
+
+if sys.version_info >= (3, 11):
+    import tomllib as tomllib
+else:
+    import tomli as tomllib  # noqa: F401
 
 PathLike = str | os.PathLike[str]
 _ABANDONED = 3600.0  # seconds after which an unfinished file is that of a process that was killed

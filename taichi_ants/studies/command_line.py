@@ -48,7 +48,11 @@ class Parser(argparse.ArgumentParser):
         settings: Those of `argparse.ArgumentParser`.
     """
 
-    open_settings = ("world", "task", "training")  # of which any --world.NAME is taken
+    open_settings: tuple[str, ...] = (
+        "world",
+        "task",
+        "training",
+    )  # of which any --world.NAME is taken
     program: str | None = None  # what --help calls it; None: the name of the script
 
     def __init__(self, about: str | None = None, **settings: Any) -> None:

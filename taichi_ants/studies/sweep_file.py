@@ -6,7 +6,6 @@ import difflib
 import itertools
 import math
 import re
-import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -18,11 +17,6 @@ from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.settings import all_of, declared, flat, nested
 from taichi_ants.studies.runner import ColonyPoint, Point, RunPoint, Study
 from taichi_ants.task import Task
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
 _OF_FILE = ("kind", "seeds", "measures", "margin", "against", "vary")
@@ -67,7 +61,7 @@ def read_sweep(path: Path, measures: Mapping[str, Mapping[str, Any]]) -> Sweep:
     """
     text = files.read_text(path)
     try:
-        file = tomllib.loads(text)
+        file = files.tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise AntsError(f"{str(path)!r} is no TOML: {error}; mend the file.") from error
     try:

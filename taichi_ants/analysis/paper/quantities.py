@@ -204,6 +204,9 @@ def share_above(measure: str, first: Variant, second: Variant, below: bool = Fal
     return Quantity(words, "share of 16 pairs", {label: share}, SHARE)
 
 
+share_below = partial(share_above, below=True)
+
+
 def growth(later: str, earlier: str, *variants: Variant) -> Quantity:
     """One measure minus another of each learner, mean over all configurations."""
 
