@@ -245,7 +245,7 @@ def make_page(
     results: Results | None,
     made: Mapping[str, Any],
 ) -> str:
-    """The page of the results in a folder, which are read from there if they are not given."""
+    """Return the page of the results in a folder, which are read from there if not given."""
     from taichi_ants import files
     from taichi_ants.analysis.colony.figures import draw_all
     from taichi_ants.analysis.colony.results import Results

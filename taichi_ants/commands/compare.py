@@ -165,7 +165,7 @@ def world_name(settings: argparse.Namespace, study: Study[RunPoint]) -> str:
 def what_policies_do(
     point: RunPoint, seeds: Sequence[int], q_values: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """What an ant does that follows each final policy, and what it earns; integer (C, S) both.
+    """Return behaviours and returns of ants that follow final policies; integer (C, S) both.
 
     The policies (C, S, n_states, 5) are of points that differ from this one in their learners.
     """
@@ -185,10 +185,7 @@ def what_policies_do(
 
 
 def compile_kernels(points: Sequence[RunPoint], where: Mapping[str, Any]) -> None:
-    """Have all kernels ready before the first of them trains.
-
-    One thread compiles, and another process has its own to compile beside it at that time.
-    """
+    """Compile all kernels first, on one thread, while the other process compiles its own."""
     for point in {point.training.learner: point for point in points}.values():
         short = replace(point, episodes=1, max_steps=1, rollouts=1)
         outcome = short.do((short,), (0,), None, lambda share: None, where)
@@ -243,8 +240,7 @@ def write_policies(
 ) -> list[Callable[[], None]]:
     """Write the final Q-tables of the examples, with what an ant that follows them does.
 
-    Returns:
-        Of each animation of them that is being drawn beside, what waits for it.
+    Returns what waits for each animation that the worker draws.
     """
     from taichi_ants import files, save_policy
     from taichi_ants.analysis.behaviour import BEHAVIOURS
@@ -330,11 +326,7 @@ def comparison_of(
 def with_curves(
     study: Study[RunPoint], blocks: Path, comparison: Comparison
 ) -> tuple[Comparison, dict[tuple[int, int], np.ndarray]]:
-    """Read what is shown from finished blocks: learning curves, and tables of the examples.
-
-    Returns:
-        The comparison with its curves, and the final tables by row and place of the seed.
-    """
+    """Read curves and the examples' tables, by row and place of the seed, from finished blocks."""
     from taichi_ants.analysis.paper.best_of import examples
     from taichi_ants.analysis.paper.curves import curve_row, learning_curves
 
@@ -351,13 +343,7 @@ def with_curves(
 
 
 def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draws: bool) -> None:
-    """Prepare a process for what it will show, while there is nothing to show yet.
-
-    Args:
-        point: What is trained.
-        plugin, where: As on the command line.
-        draws: Whether it will draw figures, too.
-    """
+    """Prepare a process for what it will show, and draw, while there is nothing to show yet."""
     import io
 
     import numpy as np
@@ -440,14 +426,9 @@ def see(
     play: Begin = partial,
     draw: Begin = partial,
 ) -> Callable[[], Seen]:
-    """The pictures of the page, of which there are none without figures.
+    """Return what waits for the pictures of the page, of which there are none without figures.
 
-    Args:
-        settings, folder, study, comparison, baselines: What was done, and what came of it.
-        play, draw: Begin players and figures, as `WorkerProcess.begin`.
-
-    Returns:
-        What waits for them.
+    `play` and `draw` begin players and figures, as `WorkerProcess.begin`.
     """
     from taichi_ants.report.players import Seen, draw_all_for_page, what_is_seen
 
@@ -465,7 +446,7 @@ def make_page(
     found: tuple[Results, Seen] | None,
     made: Mapping[str, Any],
 ) -> str:
-    """The page of the results in a folder, which are read from there if they are not given."""
+    """Return the page of the results in a folder, which are read from there if not given."""
     from taichi_ants import files
     from taichi_ants.analysis.bounds.baselines import Baseline
     from taichi_ants.analysis.paper.results import Results

@@ -89,12 +89,9 @@ def do_sweep(settings: argparse.Namespace, asked: Sweep, blocks: Path, ready: Pa
 
 
 def findings(asked: Sweep, values: np.ndarray) -> dict[int, dict[str, Any]]:
-    """By point, how it differs from the one that is the same but for the setting of `against`.
+    """Return by point how it differs from the one that is the same except for `against`.
 
-    The intervals of all differences of one [vary] hold at once, with a probability of 95 %.
-
-    Args:
-        values: The first measure, float64 (points, seeds).
+    Intervals of the first measure, float64 (points, seeds), hold at once within a [vary].
     """
     from taichi_ants.analysis.findings import Contrast, above, judge
 

@@ -32,14 +32,7 @@ def comparison_page(
     facts: Mapping[str, str],
     files: Sequence[str],
 ) -> str:
-    """The page as HTML.
-
-    Args:
-        results: What was found.
-        seen: Its pictures.
-        facts: How it was done, names and words.
-        files: The names of the files and folders beside the page.
-    """
+    """Return the page as HTML; `facts` say how it was done, `files` what lies beside it."""
     comparison = results.comparison
     first, *others = all_tables(comparison, results.lines, results.behaviours, results.baselines)
     # The notes explain the first four tables, of which one is shown at once.

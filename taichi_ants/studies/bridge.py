@@ -154,17 +154,15 @@ def _followed(
 def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0) -> np.ndarray:
     """Run an episode, and count who has crossed the bridge by which branch.
 
-    An ant has crossed when it comes to one room and was in the other one before; its branch is the
-    one in which it was last. Foragers are ants without food that come to the food, carriers ants
-    with food that come to the queen; others are not counted.
+    An ant has crossed when it comes to one room from the other; its branch is the one in which it
+    was last. Foragers come to the food without food, carriers to the queen with food.
 
     Args:
-        colony: On the bridge in all of its worlds, with the schedule "by_world", in which ants keep
-            their slots.
+        colony: On the bridge in all worlds; schedule "by_world", in which ants keep their slots.
         bridge: The arguments of `double_bridge`.
         ticks: Length of the episode.
-        opens: Tick after which the short branch can be entered; until then it is rock. Other than
-            0, the colony must have one world.
+        opens: Tick after which the short branch, rock until then, can be entered; 0 if it always
+            can. Otherwise the colony must have one world.
 
     Returns:
         int64 (WINDOWS, loads, branches, worlds): foragers then carriers, short branch then long.

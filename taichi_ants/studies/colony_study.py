@@ -58,16 +58,11 @@ def plan(
     ticks: int,
     rollouts: int,
 ) -> Plan:
-    """The conditions of some kinds of world.
+    """Return the conditions of some kinds of world, which are names in `WORLDS`.
 
-    Args:
-        world_kinds: Names in `WORLDS`.
-        sizes: Numbers of ants, ascending; ants that were trained elsewhere are as many as the last.
-        seeds: A seed gives its world to all conditions of a kind of world.
-        training: The learner. Its epsilon is that of the first episode; it decays to
-            `EVALUATION_EPSILON` while its learning rate decays to a tenth, and both stay there for
-            the last 30 % of the episodes.
-        episodes, ticks, rollouts: As of a `ColonyPoint`.
+    The sizes ascend; ants that were trained elsewhere are as many as the last. The epsilon of the
+    training is that of the first episode: it decays to `EVALUATION_EPSILON` while the learning rate
+    decays to a tenth, and both stay there for the last 30 % of the episodes.
 
     Raises:
         AntsError: There is no such kind of world, or ants cannot learn together with the learner.
@@ -212,10 +207,9 @@ def bounds_of(conditions: Plan, seeds: int) -> dict[Condition, np.ndarray]:
 def median_policies(
     conditions: Plan, seeds: Sequence[int], found: Measured, outcomes: Mapping[Any, Outcome]
 ) -> Iterator[tuple[str, np.ndarray, dict[str, Any], str]]:
-    """Policies worth keeping: of the compared rules those of median seeds, trained jointly.
+    """Yield for each jointly trained, compared condition the policy of its median seed.
 
-    Yields:
-        A name, the action values float32 (n_states, 5), what made them, and their observation.
+    As a name, action values float32 (n_states, 5), what made them, and their observation.
     """
     for condition, point in conditions.items():
         world_kind, rules, regime, ants = condition

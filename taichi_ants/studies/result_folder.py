@@ -28,14 +28,12 @@ def work_or_show(
 ) -> None:
     """Do the work of a command, or show the results that its folder holds; print the report.
 
-    If the page of finished results is missing, it is made again from the other files.
-
     Args:
         settings: The command's `out`, `force`, `no_figures`, `plugin` and `arch`.
         determines: All else that determines the results.
         work: Called with a folder for blocks and one for the results, among them the report.
         leading: Settings from which others follow, see `ResultFolder`.
-        page: Makes the page of the results, if they have one.
+        page: Makes the page of the results, which is made again if it is missing.
 
     Raises:
         AntsError: The folder holds something else, cannot be written, or was altered.

@@ -31,12 +31,11 @@ class Sweep:
     """What a file asks for.
 
     Attributes:
-        kind: "runs" or "colony".
         study: The points over the seeds, in the order of `settings`.
         settings: What varies, for each point of the study.
         grids: Which of these each [vary] makes.
         measures: Names of measures, the first of which is drawn.
-        against: The setting and its value with which all others are compared, if any.
+        against: The setting and its value with which all others are compared.
         margin: The difference in the first measure that does not matter.
     """
 
@@ -50,11 +49,7 @@ class Sweep:
 
 
 def read_sweep(path: Path, measures: Mapping[str, Mapping[str, Any]]) -> Sweep:
-    """The sweep of a file.
-
-    Args:
-        path: The file.
-        measures: All measures, by kind and name; their `episodes` are the fewest that they need.
+    """Read a sweep; `measures` are all measures by kind and name, with the `episodes` they need.
 
     Raises:
         AntsError: The file cannot be read, or asks for something that cannot be.

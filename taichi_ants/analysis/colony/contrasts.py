@@ -17,17 +17,15 @@ Sizes = tuple[int, int]
 
 @dataclass(frozen=True)
 class Series:
-    """Differences of one kind, for several numbers of ants.
+    """Differences of one kind, for several numbers of ants: the first minus the second design.
 
     Attributes:
         question: What it helps to answer.
         statement: What is so where the differences are above 0.
-        first, second: The difference is first minus second.
         measure: A name in `MEASURES`.
-        against: With how many ants of the second each number of ants of the first is compared:
-            with the same number or with each smaller one.
-        least: The smallest number of ants that is compared with the same. For one ant all regimes
-            are alike, and so are rules for several.
+        against: With how many ants of the second each number of ants of the first is compared.
+        least: The smallest number of ants that is compared with the same: for one ant all regimes,
+            and rules for several, are alike.
         main: Whether it is one of the main findings.
     """
 
@@ -75,8 +73,7 @@ Judged = dict[tuple[str, Series], dict[Sizes, Finding]]
 
 
 def judge_all(measured: Measured) -> Judged:
-    """Return the findings on all contrasts; those of one question in one kind of world are judged
-    together.
+    """Return the findings on all contrasts; a question in a kind of world is judged at once.
 
     With fewer than `LEAST_SEEDS` seeds none has a verdict.
     """

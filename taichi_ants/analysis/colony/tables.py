@@ -53,11 +53,8 @@ def _stacked(measured: Measured) -> dict[str, np.ndarray]:
 class ConditionRow(NamedTuple):
     """A condition over all seeds, a row of conditions.csv.
 
-    Attributes:
-        condition: The condition.
-        seeds: The number of seeds.
-        estimates: The measures of `OF_STUDY` over seeds.
-        ranges: The least and the greatest value of deliveries and bounds over seeds.
+    `estimates` are the measures of `OF_STUDY`; `ranges` the least and greatest value of deliveries
+    and bounds.
     """
 
     condition: Condition
@@ -121,10 +118,9 @@ def difference_rows(judged: Judged) -> list[dict[str, Any]]:
 
 
 def means(rows: Sequence[ConditionRow]) -> list[Table]:
-    """Return tables of mean deliveries.
+    """Return tables of mean deliveries: for each kind of world, designs down, ants across.
 
-    One for each kind of world in which ants were trained, designs down, ants across; then one of
-    the policies of open worlds in others, with intervals and the worst seed.
+    The last is of the policies of open worlds in others, with intervals and the worst seed.
     """
     tables, seeds = [], f"{_basis(rows)}: {MEASURES['deliveries']}"
     for world_kind in WORLD_KINDS:
@@ -179,10 +175,7 @@ def _spread(row: ConditionRow) -> str:
 
 
 def glance(rows: Sequence[ConditionRow]) -> Table:
-    """Return what the largest colonies deliver: designs down, kinds of world across.
-
-    It has no rows where none are trained.
-    """
+    """Return what the largest colonies deliver: designs down, kinds of world across."""
     largest = max((one.condition.ants for one in rows if one.design.regime != ABROAD), default=0)
     shown = {
         (one.condition.world_kind, one.design): one

@@ -62,12 +62,7 @@ class Slice(NamedTuple):
 
 
 class Read(NamedTuple):
-    """How a learner's number is read.
-
-    Attributes:
-        words: From which configurations.
-        values: (slice, measure, learner) -> float64 (seeds,).
-    """
+    """A learner's number, (slice, measure, learner) -> float64 (seeds,), and its words."""
 
     words: str
     values: Callable[[Slice, str, Variant], np.ndarray]
@@ -129,7 +124,6 @@ class Quantity:
 
     Attributes:
         words: What is computed, without what is subtracted from what, from which configurations.
-        unit: The unit.
         effects: What reads them, by label, such as "Q-learning minus SARSA".
         possible: The range that the numbers cannot leave.
         of_estimates: As of a `Contrast`; then `effects` read float64 (k, seeds).
