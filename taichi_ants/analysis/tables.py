@@ -115,11 +115,7 @@ def _drawn(table: Table) -> RichTable:
     from rich.table import Table as RichTable
 
     drawn = RichTable(
-        title=table.title,
-        title_justify="left",
-        box=SIMPLE_HEAD,
-        show_edge=False,
-        padding=0,
+        title=table.title, title_justify="left", box=SIMPLE_HEAD, show_edge=False, padding=0
     )
     for position, header in enumerate(table.columns):
         justify: Literal["left", "right"] = "left" if position < table.text_columns else "right"

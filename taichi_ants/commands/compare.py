@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from taichi_ants import World
     from taichi_ants.analysis.bounds.baselines import Baseline
     from taichi_ants.analysis.paper.comparison import Comparison
-    from taichi_ants.analysis.paper.results import Results
+    from taichi_ants.analysis.paper.report import Results
     from taichi_ants.rendering import Episode
     from taichi_ants.report.players import Seen
     from taichi_ants.studies.blocks import Outcome
@@ -137,8 +137,7 @@ def build_study(settings: argparse.Namespace) -> Study[RunPoint]:
     from taichi_ants import AntsError
     from taichi_ants.studies.runner import Study
 
-    if settings.plugin:
-        load_plugin(settings.plugin)
+    load_plugin(settings.plugin)
     world = given_world(settings)
     grid = points(settings, world)
     if not world.reachable_foods().any():
@@ -355,8 +354,7 @@ def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draw
     from taichi_ants.task.constants import N_ACTIONS
     from taichi_ants.viewer import record_colony
 
-    if plugin:
-        load_plugin(plugin)
+    load_plugin(plugin)
     runtime.start(**where)
     nothing = np.zeros((point.task.n_states, N_ACTIONS), np.float32)
     colony = colony_of_rollout(point.world, point.task, nothing)
@@ -384,7 +382,7 @@ def do_comparison(
     """Do what is not done yet, and write all results."""
     from taichi_ants import files
     from taichi_ants.analysis.bounds.baselines import bound_rows, policy_rows
-    from taichi_ants.analysis.paper.results import Results
+    from taichi_ants.analysis.paper.report import Results
     from taichi_ants.engines.runs.training import evaluate
     from taichi_ants.files import archives
 
@@ -449,7 +447,7 @@ def make_page(
     """Return the page of the results in a folder, which are read from there if not given."""
     from taichi_ants import files
     from taichi_ants.analysis.bounds.baselines import Baseline
-    from taichi_ants.analysis.paper.results import Results
+    from taichi_ants.analysis.paper.report import Results
     from taichi_ants.files import archives
     from taichi_ants.files.results import MANIFEST
     from taichi_ants.report.comparison import comparison_page

@@ -157,8 +157,7 @@ def show(settings: argparse.Namespace) -> None:
         check_animation(settings.out, settings.fps)
     if settings.kind != "sheet":
         check_size(settings.size)
-    if settings.plugin:
-        load_plugin(settings.plugin)
+    load_plugin(settings.plugin)
     kinds = (show_episode, show_colony, show_learning, show_sheet)
     dict(zip(KINDS, kinds, strict=True))[settings.kind](settings, given_world(settings))
 

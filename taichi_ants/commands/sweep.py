@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from taichi_ants.studies.command_line import (
+    AGAIN,
     Parser,
     add_common,
     add_results,
@@ -53,8 +54,7 @@ def sweep(settings: argparse.Namespace) -> None:
     from taichi_ants.studies.result_folder import work_or_show
     from taichi_ants.studies.sweep_file import read_sweep
 
-    if settings.plugin:
-        load_plugin(settings.plugin)
+    load_plugin(settings.plugin)
     asked = read_sweep(settings.file, {kind: measures(kind) for kind in ("runs", "colony")})
     facts = {
         **asked.study.settings(),
@@ -149,11 +149,7 @@ def measured(
 
 
 def measures_of_block(
-    kind: str,
-    names: Sequence[str],
-    points: Sequence[Any],
-    seeds: Sequence[int],
-    outcome: Outcome,
+    kind: str, names: Sequence[str], points: Sequence[Any], seeds: Sequence[int], outcome: Outcome
 ) -> dict[str, np.ndarray]:
     """Return measures of points that were done together, float64 (points, seeds) by name."""
     from taichi_ants.analysis.colony.study import measures_of
@@ -171,5 +167,4 @@ def main(
     arguments: list[str] | None = None, file: Path | None = None, about: str | None = None
 ) -> None:
     """Run the command line; the arguments are those of `parse_arguments`."""
-    again = "Stopped; finished parts are kept, and the same command goes on from there."
-    run_command(lambda: sweep(parse_arguments(arguments, file, about)), again)
+    run_command(lambda: sweep(parse_arguments(arguments, file, about)), AGAIN)

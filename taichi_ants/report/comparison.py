@@ -12,25 +12,15 @@ from taichi_ants.analysis.paper.published import (
     Q_LEARNING,
     TABLE_2,
 )
-from taichi_ants.analysis.paper.report import all_tables, behaviour_table
-from taichi_ants.analysis.paper.results import Results
+from taichi_ants.analysis.paper.report import Results, all_tables, behaviour_table
 from taichi_ants.analysis.tables import sentence, thousands
 from taichi_ants.errors import count
-from taichi_ants.report.page import (
-    Statement,
-    Statements,
-    fill,
-    judged,
-)
+from taichi_ants.report.page import Statement, Statements, fill, judged
 from taichi_ants.report.players import Seen
 
 
 def comparison_page(
-    results: Results,
-    seen: Seen,
-    *,
-    facts: Mapping[str, str],
-    files: Sequence[str],
+    results: Results, seen: Seen, *, facts: Mapping[str, str], files: Sequence[str]
 ) -> str:
     """Return the page as HTML; `facts` say how it was done, `files` what lies beside it."""
     comparison = results.comparison

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -100,7 +99,7 @@ def followed(
     ticks: int,
     where: tuple[int | None, str | None],
 ) -> dict[str, np.ndarray]:
-    """What `crossings` counts on each bridge while nobody learns; a file keeps it.
+    """Return what `crossings` counts on each bridge while nobody learns; a file keeps it.
 
     Args:
         path: Of the file (.npz); if it is there, nothing is left to do.
@@ -110,19 +109,6 @@ def followed(
         ticks: Length of the episode on each bridge, and its half on `LATE`.
         where: Threads and arch, as of a `Colony`.
     """
-    about = {**settings_of([learned], seeds), "design": asdict(design), "ticks": ticks}
-    make = partial(_followed, design, learned, seeds, q_values, ticks, where)
-    return kept(path, about, make)
-
-
-def _followed(
-    design: Design,
-    learned: ColonyPoint,
-    seeds: Sequence[int],
-    q_values: np.ndarray,
-    ticks: int,
-    where: tuple[int | None, str | None],
-) -> dict[str, np.ndarray]:
     from taichi_ants.engines.colony.colony import Colony
 
     least = learned.training.least_epsilon
@@ -141,14 +127,19 @@ def _followed(
         )
         return crossings(colony, bridge, n, opens)
 
-    found, each = {}, [slice(s, s + 1) for s in range(len(seeds))]
-    for name, bridge in bridges(design).items():
-        n = length(name, ticks)
-        if name == LATE:  # interventions act on colonies of one world
-            found[name] = np.concatenate([count(bridge, one, n, ticks) for one in each], axis=-1)
-        else:
-            found[name] = count(bridge, slice(None), n)
-    return found
+    def counted() -> dict[str, np.ndarray]:
+        found, each = {}, [slice(s, s + 1) for s in range(len(seeds))]
+        for name, bridge in bridges(design).items():
+            n = length(name, ticks)
+            if name == LATE:  # interventions act on colonies of one world
+                late = [count(bridge, one, n, ticks) for one in each]
+                found[name] = np.concatenate(late, axis=-1)
+            else:
+                found[name] = count(bridge, slice(None), n)
+        return found
+
+    about = {**settings_of([learned], seeds), "design": asdict(design), "ticks": ticks}
+    return kept(path, about, counted)
 
 
 def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0) -> np.ndarray:
@@ -188,9 +179,7 @@ def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0
         crossed = inside & (now != room)
         useful = crossed & (carries == (now == _QUEEN_ROOM))
         np.add.at(
-            counts[window],
-            (carries[useful].astype(int), branch[useful] - _SHORT, world[useful]),
-            1,
+            counts[window], (carries[useful].astype(int), branch[useful] - _SHORT, world[useful]), 1
         )
         room = np.where(inside, now, room)
         branch = np.where(inside, branch, now)

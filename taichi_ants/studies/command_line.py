@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from taichi_ants import World
 
 EXIT_BAD_INPUT = 2
+AGAIN = "Stopped; finished parts are kept, and the same command goes on from there."
 
 
 class _HelpFormatter(argparse.ArgumentDefaultsHelpFormatter):
@@ -205,12 +206,14 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
     sys.exit(status)
 
 
-def load_plugin(path: str) -> None:
-    """Execute a Python file, which registers learners, observations or worlds.
+def load_plugin(path: str | None) -> None:
+    """Execute a Python file, if there is one, which registers learners, observations or worlds.
 
     Raises:
         AntsError: The file cannot be read, raises or exits.
     """
+    if path is None:
+        return
     spec = importlib.util.spec_from_file_location(f"plugin_{Path(path).stem}", path)
     if spec is None or spec.loader is None or not Path(path).is_file():
         raise AntsError(f"cannot read the plugin {path!r}; name a Python file (.py).")

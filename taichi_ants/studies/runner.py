@@ -8,6 +8,7 @@ any order without changing anything.
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -23,7 +24,6 @@ from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.settings import flat
 from taichi_ants.studies import blocks
 from taichi_ants.studies.blocks import Outcome, kept
-from taichi_ants.studies.provenance import world_facts
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EPISODE_STEPS, EPISODES, MAX_STEPS, N_ACTIONS, ROW
 from taichi_ants.worlds.world import World
@@ -446,6 +446,18 @@ def settings_of(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Any]
             for name, values in columns.items()
         },
     }
+
+
+def world_facts(world: World) -> dict[str, Any]:
+    """A world in a few numbers, and a hash of all of it."""
+    digest, numbers = hashlib.sha256(), {}
+    for name in ("foods", "obstacles", "trails", "ants"):
+        array = getattr(world, name)
+        numbers[name] = len(array)
+        digest.update(repr(array.shape).encode())
+        digest.update(array.tobytes())
+    where = {"ranges": list(world.ranges), "queen": list(world.queen)}
+    return {**where, **numbers, "sha256": digest.hexdigest()}
 
 
 def _in_order(points: Sequence[AnyPoint]) -> tuple[AnyPoint, ...]:

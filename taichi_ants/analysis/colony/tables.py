@@ -8,7 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from taichi_ants.analysis.colony.contrasts import QUESTIONS, SERIES, Judged, Series, Sizes
+from taichi_ants.analysis.colony.contrasts import (
+    QUESTIONS,
+    SERIES,
+    Judged,
+    Series,
+    Sizes,
+    judge_all,
+)
 from taichi_ants.analysis.colony.study import (
     ABC,
     ABROAD,
@@ -349,3 +356,29 @@ def _verdicts(
     example += "" if less == n else f" with {less}"
     example += f" ({100 * (one / other - 1):+.0f} %)" if min(one, other) > 0 else ""
     return [*cells, example]
+
+
+class Results(NamedTuple):
+    """The conditions over all seeds, and the findings."""
+
+    rows: Sequence[ConditionRow]
+    judged: Judged
+
+    @classmethod
+    def of(cls, measured: Measured) -> Results:
+        """Return the results that follow from all measures."""
+        return cls(condition_rows(measured), judge_all(measured))
+
+    @classmethod
+    def read(cls, seeds: Sequence[Mapping]) -> Results:
+        """Return the same from the rows of seeds.csv."""
+        by_condition: dict[Condition, list[Mapping]] = {}
+        for row in seeds:
+            condition = Condition(row["world_kind"], row["rules"], row["regime"], int(row["ants"]))
+            by_condition.setdefault(condition, []).append(row)
+        return cls.of(
+            {  # an empty field is None, which is nan as a float
+                one: {name: np.array([row[name] for row in rows], float) for name in OF_STUDY}
+                for one, rows in by_condition.items()
+            }
+        )

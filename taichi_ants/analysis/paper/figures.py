@@ -139,9 +139,5 @@ def _baseline_marks(axis: Axes, baselines: Sequence[Baseline], setting: str) -> 
         x, y = row.deliveries_mean, row.return_mean
         if x is not None and y is not None and counts_here:
             axis.plot(
-                *(x, y, marker),
-                color=INK,
-                markerfacecolor="none",
-                markersize=11,
-                label=row.label,
+                *(x, y, marker), color=INK, markerfacecolor="none", markersize=11, label=row.label
             )

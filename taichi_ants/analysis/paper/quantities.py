@@ -175,10 +175,7 @@ def _reader(read: Read, measure: str, variant: Variant) -> Effect:
 
 
 def _quantity(
-    scope: str,
-    measure: str,
-    effects: dict[str, Effect],
-    bounds: tuple[float, float] = UNBOUNDED,
+    scope: str, measure: str, effects: dict[str, Effect], bounds: tuple[float, float] = UNBOUNDED
 ) -> Quantity:
     """A quantity in the unit of a measure; the bounds are those of a share or a count."""
     one = MEASURES[measure]

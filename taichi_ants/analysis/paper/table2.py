@@ -166,7 +166,7 @@ def _notes(lines: Sequence[Line], seeds: int, beside: bool) -> list[str]:
     if 1 < seeds < FEW_SEEDS:
         notes += [
             f"Few seeds ({seeds}): where one run in a hundred is far off, the interval of the mean "
-            "misses it more often than not. The IQM's holds from 10 seeds on (docs/statistics.md).",
+            "misses it more often than not. The IQM's holds from 10 seeds on (docs/statistics.md)."
         ]
     starred = [
         f"  {line.label}, {line.delivery}: {line.summary.row.point.label}"

@@ -6,7 +6,6 @@ import pytest
 from synthetic_colony_study import Truth, build, proportional
 
 from taichi_ants.analysis.colony.contrasts import QUESTIONS, judge_all
-from taichi_ants.analysis.colony.results import Results
 from taichi_ants.analysis.colony.study import (
     ABC,
     ABC_SILENT,
@@ -22,7 +21,7 @@ from taichi_ants.analysis.colony.study import (
     A,
     Design,
 )
-from taichi_ants.analysis.colony.tables import condition_rows, found
+from taichi_ants.analysis.colony.tables import Results, condition_rows, found
 from taichi_ants.analysis.findings import Verdict
 from taichi_ants.analysis.tables import Table
 
