@@ -62,17 +62,8 @@ WIDTH = 79  # of the report, in columns
 COUNT: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
 SEEDS, CONDITIONS = "seeds.csv", "conditions.csv"
 FIGURES, POLICIES = "figures", "policies"
-_OF_RESUMED = (
-    "resume",
-    "ticks",
-    "save",
-    "render",
-    "frame_interval",
-    "figure",
-    "plugin",
-    "threads",
-    "arch",
-)
+_FILES = ("save", "render", "figure")
+_OF_RESUMED = ("resume", "ticks", "frame_interval", "plugin", "threads", "arch", *_FILES)
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:

@@ -143,24 +143,19 @@ def measured(
     asked: Sweep, blocks: Path, threads: int | None, arch: str | None
 ) -> dict[str, np.ndarray]:
     """Return each measure of each point and seed, float64 (points, seeds)."""
-    reduce = partial(measures_of_block, asked.kind, asked.measures)
-    with progress_bar("sweep") as progress:
-        return asked.study.reduced(blocks, reduce, threads, arch, progress)
-
-
-def measures_of_block(
-    kind: str, names: Sequence[str], points: Sequence[Any], seeds: Sequence[int], outcome: Outcome
-) -> dict[str, np.ndarray]:
-    """Return measures of points that were done together, float64 (points, seeds) by name."""
     from taichi_ants.analysis.colony.study import measures_of
     from taichi_ants.analysis.paper.measures import measures_of_runs
 
-    if kind == "runs":
-        return measures_of_runs(outcome, names)
-    (point,) = points
-    arrays = {key: array[0] for key, array in outcome.items()}
-    found = measures_of(arrays, point.ants, point.ticks)
-    return {name: found[name][None] for name in names}
+    def reduce(points: Sequence[Any], seeds: Sequence[int], outcome: Outcome) -> Outcome:
+        if asked.kind == "runs":
+            return measures_of_runs(outcome, asked.measures)
+        (point,) = points
+        arrays = {key: array[0] for key, array in outcome.items()}
+        found = measures_of(arrays, point.ants, point.ticks)
+        return {name: found[name][None] for name in asked.measures}
+
+    with progress_bar("sweep") as progress:
+        return asked.study.reduced(blocks, reduce, threads, arch, progress)
 
 
 def main(

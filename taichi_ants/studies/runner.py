@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -62,6 +62,9 @@ class RunPoint:
     episodes: int = EPISODES
     max_steps: int = EPISODE_STEPS
     rollouts: int = 50
+    ants: ClassVar[int] = 1
+    pool: ClassVar[None] = None
+    after: ClassVar[None] = None
 
     def __post_init__(self) -> None:
         (config,) = checks.checked_configs(self.training)
@@ -70,10 +73,6 @@ class RunPoint:
         checked_whole("episodes", self.episodes)
         checks.checked_max_steps(self.max_steps, self.task)
         checked_whole("rollouts", self.rollouts)
-
-    @property
-    def ants(self) -> int:
-        return 1
 
     @property
     def alike(self) -> tuple:
@@ -275,7 +274,7 @@ class Study(Generic[PointKind]):
                 raise AntsError(f"there are {len(several)} worlds for {len(self.seeds)} seeds.")
             for one, seed in zip(several, self.seeds, strict=False):
                 checks.checked_world(one, learns=True).start(seed, ants)
-        for pool, ants in dict.fromkeys((_pool(point), point.ants) for point in self.points):
+        for pool, ants in dict.fromkeys((point.pool, point.ants) for point in self.points):
             for one in pool or ():
                 checks.checked_world(one, learns=True).start(0, ants)
 
@@ -365,12 +364,12 @@ class Study(Generic[PointKind]):
         weights = [sum(p.weight for p in order[some]) * len(self.seeds[at]) for some, at in pieces]
         begun, total = 0.0, sum(weights)
         # What others go on from is kept, in as many pieces as these points have blocks.
-        befores = {getattr(point, "after", None) for point in order}
+        befores = {point.after for point in order}
         tables: dict[Any, list[np.ndarray]] = {}
         progress(0.0)
         for number, ((some, at), weight) in enumerate(zip(pieces, weights, strict=True)):
             points, seeds = tuple(one.of_seeds(at) for one in order[some]), self.seeds[at]
-            after = getattr(points[0], "after", None)
+            after = points[0].after
             learned = np.concatenate(tables[after])[at] if after else None
             part = _part(progress, begun / total, weight / total)
             where = {"threads": threads, "arch": arch}
@@ -430,7 +429,7 @@ def settings_of(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Any]
     What all points have in common is there once, all else as a list with an entry for each.
     """
     points = _in_order(points)
-    places: list[Any] = [place for one in points for place in (one.world, _pool(one)) if place]
+    places: list[Any] = [place for one in points for place in (one.world, one.pool) if place]
     worlds = list(dict.fromkeys(places))
     rows = [_facts(point, worlds, points) for point in points]
     columns = {name: [row.get(name) for row in rows] for row in rows for name in row}
@@ -461,7 +460,7 @@ def world_facts(world: World) -> dict[str, Any]:
 
 
 def _in_order(points: Sequence[AnyPoint]) -> tuple[AnyPoint, ...]:
-    pairs = ((getattr(point, "after", None), point) for point in points)
+    pairs: Any = ((point.after, point) for point in points)
     return tuple(dict.fromkeys(point for pair in pairs for point in pair if point))
 
 
@@ -478,10 +477,6 @@ def _pieces(first: int, end: int, size: int) -> Iterator[slice]:
 def _path(folder: Path, number: int) -> Path:
     """The file of a block."""
     return folder / f"{number:06d}.npz"
-
-
-def _pool(point: Point) -> tuple[World, ...] | None:
-    return getattr(point, "pool", None)
 
 
 def _facts(point: Point, worlds: list, points: Sequence[Point]) -> dict[str, Any]:

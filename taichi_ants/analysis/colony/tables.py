@@ -212,13 +212,14 @@ def glance(rows: Sequence[ConditionRow]) -> Table:
             for world_kind in world_kinds
         ]
         cells.append(["Mean bound, right of way [range]", *map(_bounds, bounds)])
-    headers = (
-        "",
-        *(sentence(WORLD_KINDS[world_kind]).replace(" (", "\n(") for world_kind in world_kinds),
-    )
+    headers = ("", *_headers(world_kinds))
     title = f"{sentence(MEASURES['deliveries'])} of {count(largest, 'ant')}"
     note = f"{_basis(rows)}; in brackets: 0. %: of each world's own bound."
     return Table(title, headers, cells, [note] if cells else [])
+
+
+def _headers(world_kinds: Sequence[str]) -> list[str]:
+    return [sentence(WORLD_KINDS[one]).replace(" (", "\n(") for one in world_kinds]
 
 
 def _delivered(row: ConditionRow | None, digits: int) -> str:
@@ -256,10 +257,7 @@ def headlines(rows: Sequence[ConditionRow], judged: Judged) -> Table:
                 line.append(f"{verdict}\n{n}: {' against '.join(means)}")
         if len(line) == len(world_kinds) > 0:
             cells.append([sentence(series.statement), *line])
-    headers = (
-        "Statement",
-        *(sentence(WORLD_KINDS[world_kind]).replace(" (", "\n(") for world_kind in world_kinds),
-    )
+    headers = ("Statement", *_headers(world_kinds))
     note = (
         "Below the verdict: the number of ants, and the means compared, in "
         f"{MEASURES['deliveries']}. {_basis(rows)}."
