@@ -41,7 +41,7 @@ typedef struct {
     float discount;
     uint64_t explore_below;
     const float *weights;   /* (n + 1) */
-    const int32_t *rewards; /* (5) by event */
+    const int32_t *rewards; /* (5) in the order of the fields of Rewards, as events are here */
     int64_t counts[4];      /* returns, deliveries, moves, blocked: what came of it */
 } Colony;
 

@@ -13,6 +13,7 @@ import ctypes
 import subprocess
 import tempfile
 from collections.abc import Sequence
+from dataclasses import astuple
 from pathlib import Path
 from typing import NamedTuple
 
@@ -98,7 +99,7 @@ def live_in_c(library: ctypes.CDLL, colony: Colony, ticks: int, threads: int) ->
         "random": arrays["streams"].copy(),
         "q": arrays["q"].copy(),
         "weights": arrays["weights"][np.minimum(np.arange(colony.ants + 1), last)],
-        "rewards": arrays["rewards"].astype(np.int32),
+        "rewards": np.array(astuple(colony.task.rewards), np.int32),
     }
     names = ("evaporates", "slope", "fades_after", "discount")
     in_c = CColony(

@@ -8,7 +8,6 @@ import argparse
 import gymnasium
 import numpy as np
 
-import taichi_ants
 import taichi_ants.envs  # registers the environments
 
 

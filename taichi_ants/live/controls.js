@@ -101,7 +101,7 @@ class Controls {
       byId("task").innerHTML = options([...Object.entries(choices.tasks).map(([name, { words }]) => [name, words]), ["", "other settings"]]);
       byId("settings").innerHTML = this.fields();
       byId("policy").innerHTML = `<optgroup label="Learn now">${options(Object.entries(choices.learners).map(([name, { words }]) => [`learn ${name}`, words]))}</optgroup>
-        <optgroup label="Follow a policy">${options([["by interventions", "the trail, by interventions"], ...Object.keys(choices.policies).map((name) => [`file ${name}`, name.replaceAll("_", " ")])])}</optgroup>`;
+        <optgroup label="Follow a policy">${options([["by hand", "the trail, by hand"], ...Object.keys(choices.policies).map((name) => [`file ${name}`, name.replaceAll("_", " ")])])}</optgroup>`;
       byId("ants").max = choices.most.ants;
       [byId("size").min, byId("size").max] = choices.sizes;
       byId("map").value = MAP;
@@ -154,7 +154,7 @@ class Controls {
       }
     }
     for (const group of document.querySelectorAll("#settings fieldset")) group.hidden = !group.querySelector("label:not([hidden])");
-    const follows = policy === "by interventions" ? "They follow a trail, with values set by interventions." : `They follow ${name}, and do not learn.`;
+    const follows = policy === "by hand" ? "They follow a trail, with values set by hand." : `They follow ${name}, and do not learn.`;
     byId("policy-help").textContent = policy.startsWith("learn ") ? `They learn: ${choices.learners[name]?.summary ?? ""}.` : follows;
   }
 
@@ -235,14 +235,14 @@ class Controls {
     byId("task").value = name;
   }
 
-  /* A policy of a file has a task of its own; one that was set by interventions reads what it knows. */
+  /* A policy of a file has a task of its own; one that was set by hand reads what it knows. */
   showPolicy(brings = true) {
     const { policies, by_hand: known, settings } = this.live.choices, value = byId("policy").value, policy = policies[value.replace(/^file /, "")];
     const sees = byId(`setting-${settings.findIndex(({ path }) => path === "task.observation")}`);
     if (value.startsWith("file ") && policy) {
       if (brings) this.set({ ...this.settings(), ...policy });
       sees.value = policy["task.observation"];
-    } else if (value === "by interventions" && !known.includes(sees.value)) sees.value = known[0];
+    } else if (value === "by hand" && !known.includes(sees.value)) sees.value = known[0];
     this.nameTask();
   }
 

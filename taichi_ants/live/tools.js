@@ -24,7 +24,7 @@ class Tools {
     bar.innerHTML = Object.entries(TOOLS).map(([name, [label, does, drawing]], number) =>
       `<button type="button" class="icon" data-tool="${name}" aria-pressed="false" aria-label="${label}: ${does}" title="${label}: ${does} (${number + 1})">
         <svg viewBox="0 0 20 20" aria-hidden="true">${drawing}</svg><span>${label}</span></button>`).join("")
-      + `<button type="button" class="icon" id="undo" disabled title="Undo: back to the moment before the last change by interventions (Ctrl+Z)">
+      + `<button type="button" class="icon" id="undo" disabled title="Undo: back to the moment before the last change (Ctrl+Z)">
         <svg viewBox="0 0 20 20" aria-hidden="true"><path d="M7.5 4.5 4 8l3.5 3.5M4.4 8h7.1a4.2 4.2 0 0 1 0 8.4H8"/></svg><span>Undo</span></button>`
       + `<label class="brush" title="Brush size ([ and ])"><span class="unseen">Brush size</span>
         <input type="range" id="brush" min="1" max="${MOST_RADIUS + 1}" value="1" step="1"></label>`;

@@ -131,7 +131,7 @@ def test_a_phone_sorts_by_a_choice_that_the_heads_share(opened):
     order = shown(tab)
     choice = tab.locator(".filters [name=order]")
     assert not tab.locator(".statements thead").is_visible()
-    choice.select_option("Continuing ↓")
+    choice.select_option("Truncates ↓")
     verdicts = [VERDICTS.index(cells[2]) for cells in shown(tab)]
     assert verdicts == sorted(verdicts, reverse=True) != sorted(verdicts)
     tab.set_viewport_size({"width": 1280, "height": 800})
