@@ -53,6 +53,8 @@ def test_the_wheel_holds_the_package_and_nothing_else(built):
     templates = ("base.html", "parts.html", "comparison.html", "colony.html")
     page |= {f"taichi_ants/report/{name}" for name in (*templates, "report.css", "report.js")}
     page |= {f"taichi_ants/live/{name}" for name in PARTS}
+    data = ("paper/claims.toml", "colony/series.toml", "taichi_ants.mplstyle")
+    page |= {f"taichi_ants/analysis/{name}" for name in data}
     assert set(names) == sources("taichi_ants") | {"taichi_ants/py.typed"} | page
 
 

@@ -1,9 +1,8 @@
 """What an ant does that follows its final policy: deliver, or collect small rewards without end.
 
-The step onto a trail (T), and with food the step nearer to the queen (S), are paid. A policy can
-live on them: walk to and fro on the trail, or carry the food in a circle, often beside the queen,
-and come nearer to her again and again. Returns of such runs and of runs that deliver have no common
-mean that means anything, so that runs are counted by what they do.
+The step onto a trail (T), and with food the step nearer to the queen (S), are paid, so that a
+policy can live on walking to and fro, or in circles. Returns of such runs and of runs that deliver
+have no common mean that means anything: runs are counted by what they do.
 """
 
 from __future__ import annotations
@@ -34,12 +33,10 @@ _PAID_SHARE = 0.25
 
 
 def classify(trace: Trace, max_steps: int) -> tuple[np.ndarray, np.ndarray]:
-    """What the ant does in each episode of a trace, see `DEFINITIONS`, and what it earns.
+    """Return what the ant does in each of m episodes, and what it earns, whatever steps are paid.
 
-    Rewards play no part in it, so it holds whatever the steps are paid.
-
-    Of m episodes, places in `BEHAVIOURS`, int8 (m,), and returns, int64 (m,). An episode without
-    delivery uses all of its steps, `max_steps`.
+    Places in `BEHAVIOURS`, int8 (m,), and returns, int64 (m,); see `DEFINITIONS`. An episode
+    without delivery uses all of its steps, `max_steps`.
     """
     episode = np.asarray(trace.episodes) - trace.episodes[0]
     late = np.asarray(trace.steps) >= max_steps // 2

@@ -35,7 +35,6 @@ class Design:
     Attributes:
         rules: "queueing" or "foraging", see `taichi_ants.task`.
         aside: Of the bridge, see `worlds.double_bridge`.
-        ants: How many.
         slope: Of the trail; its level is such that an ant lays it for 50 ticks.
         evaporation: "linear", by 1 a tick, "none", or the half-life in ticks as a number.
     """
@@ -128,10 +127,7 @@ def report(found: Crossings, ticks: int) -> str:
 
 
 def _since_opening(crossed: np.ndarray) -> Iterator[tuple[str, list[str]]]:
-    """For each load, the shares since the opening, and how many colonies prefer the short branch.
-
-    The last share has an interval.
-    """
+    """Yield for each load the shares since the opening, and how many colonies prefer it."""
     for k, load in enumerate(LOADS):
         shares = _shares(crossed)[WINDOWS // 2 :, k]
         *first, last = shares
@@ -156,11 +152,7 @@ def _means(seeds: int) -> str:
 
 
 def draw(path: Path, found: Crossings, ticks: int) -> None:
-    """Draw the shares over time on three bridges, and what else moves them.
-
-    Raises:
-        AntsError: The file cannot be written.
-    """
+    """Draw the shares over time on three bridges, and what else moves them."""
     with style.styled():
         figure = style.new_figure(5.6)
         above, below = figure.subplots(2, len(PANELS), sharey=True)
@@ -188,11 +180,7 @@ def draw(path: Path, found: Crossings, ticks: int) -> None:
 
 
 def draw_late(path: Path, found: Crossings, ticks: int) -> None:
-    """Draw the shares before and after the short branch opens, for three designs.
-
-    Raises:
-        AntsError: The file cannot be written.
-    """
+    """Draw the shares before and after the short branch opens, for three designs."""
     panels = {
         "Food aside": Design(),
         "Food ahead": Design(aside=0),
@@ -259,10 +247,7 @@ def _shares(crossed: np.ndarray) -> np.ndarray:
 
 
 def _centre(values: np.ndarray) -> tuple[float, float, float]:
-    """The mean over the seeds in which ants crossed, and the ends of its interval.
-
-    nan for what too few seeds do not give.
-    """
+    """Return the mean over seeds in which ants crossed, and its interval; nan for too few seeds."""
     there = values[np.isfinite(values)]
     if len(there) < LEAST_SEEDS:
         return float(there.mean()) if there.size else np.nan, np.nan, np.nan

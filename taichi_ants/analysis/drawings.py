@@ -31,12 +31,7 @@ _MANY = 500  # marks
 
 
 class Drawing(NamedTuple):
-    """A figure for a page.
-
-    Attributes:
-        name, title, caption: What it is called, and what is said above and below it.
-        svg: The rest of the figure.
-    """
+    """A figure for a page: its name, title and caption, and the rest as SVG."""
 
     name: str
     title: str

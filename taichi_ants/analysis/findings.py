@@ -1,10 +1,8 @@
 """Contrasts judged: what the seeds say of a difference, and how surely.
 
-A contrast is a number of each seed, mostly the difference of two conditions, with a criterion that
-it shall fulfil. Contrasts that are judged together get intervals at a level corrected for the
-number of intervals (Bonferroni): with a probability of at least 95 % all of them hold at once,
-however they depend on each other. A contrast in reward or steps may rest on the IQM: then
-the interquartile mean decides, and the mean is judged beside it.
+Contrasts that are judged together get intervals at a level corrected for their number (Bonferroni):
+with a probability of at least 95 % all hold at once, however they depend on each other. Where a
+contrast rests on the IQM, that decides, and the mean is judged besides.
 """
 
 from __future__ import annotations
@@ -34,9 +32,7 @@ UNBOUNDED = (-np.inf, np.inf)
 class Verdict(str, Enum):
     """What the data say, the strongest objection first.
 
-    "Equivalent" is a finding, "undecided" is none: where a criterion asks for a difference, the
-    first says that it is smaller than matters, the second that the data leave open whether there
-    is one.
+    "Equivalent" is a finding: the difference is smaller than matters. "Undecided" is none.
     """
 
     NOT_TESTED = "not tested"
@@ -53,8 +49,7 @@ class Criterion:
 
     A verdict is the region that holds the whole interval: the range (supported), the margin on
     either side of 0 (equivalent), or what is neither (contradicted). If the interval reaches into
-    two of them, the contrast is undecided. So an effect that is too small to matter neither
-    supports nor contradicts a claim.
+    two of them, the contrast is undecided.
 
     Attributes:
         low, high: The ends of the range. A difference must exceed `low`.
@@ -105,9 +100,8 @@ class Contrast:
         criterion: The condition on the estimate over seeds.
         uses_iqm: Whether it rests on the interquartile mean (IQM) over seeds.
         possible: The range that the estimate cannot leave; its interval is cut off there.
-        of_estimates: For a question about the estimates themselves (how unequal are the effects of
-            8 configurations?), as the noise of single seeds would be taken for the answer: a smooth
-            function of them, float (k, ...) -> float (...).
+        of_estimates: For a question about the estimates themselves (how unequal are 8 effects?), as
+            seeds' noise would count too: a smooth function of them, float (k, ...) -> float (...).
     """
 
     label: str
@@ -137,15 +131,10 @@ class Contrast:
 
 @dataclass(frozen=True)
 class Finding:
-    """What became of a contrast.
+    """What became of a contrast: verdict, estimate over seeds, and interval at `level`.
 
-    Attributes:
-        contrast: The contrast.
-        verdict: The verdict; not tested if values of the contrast are missing.
-        effect: The estimate over seeds; nan if it was not tested.
-        low, high: Its interval at the corrected level; nan for one seed.
-        level: Confidence level of that one interval.
-        by_mean: What the mean says of a contrast that rests on the IQM, else None.
+    Numbers are nan where they are not tested, ends of the interval also for one seed. `by_mean` is
+    what the mean says of a contrast that rests on the IQM.
     """
 
     contrast: Contrast
@@ -189,10 +178,7 @@ def judge(contrasts: Sequence[Contrast]) -> list[Finding]:
 
 
 def seeds_in_words(seeds: int) -> str:
-    """Return the number of seeds for a table, with a warning if they are fewer than `LEAST_SEEDS`.
-
-    For example "20 seeds", or "8 seeds, too few for a verdict".
-    """
+    """Return such as "20 seeds", with a warning if they are fewer than `LEAST_SEEDS`."""
     return count(seeds, "seed") + (", too few for a verdict" if seeds < LEAST_SEEDS else "")
 
 

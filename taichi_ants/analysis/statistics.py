@@ -101,8 +101,7 @@ def interquartile_values(values: np.ndarray) -> np.ndarray:
 def estimates(values: np.ndarray, uses_iqm: bool = True) -> dict[str, np.ndarray]:
     """Columns of a table, float64 (rows,) each: estimates of values (rows, seeds) with intervals.
 
-    "mean", "ci_low" and "ci_high", then "iqm", "iqm_ci_low" and "iqm_ci_high" if there is a typical
-    run; of shares and counts there is none.
+    "mean", "ci_low", "ci_high"; with the IQM also "iqm", "iqm_ci_low", "iqm_ci_high".
     """
     values = np.asarray(values, float)
     columns = {"mean": values.mean(axis=1)}
@@ -127,8 +126,6 @@ def bootstrap_interval(
     Args:
         values: Float (rows, seeds); rows are treated separately, but with the same resamples.
         level: Confidence level of each interval.
-        resamples: Number of bootstrap resamples.
-        iqm: Whether the interval is for the interquartile mean.
 
     Returns:
         Lower and upper ends, float64 (rows,) each. nan for fewer than two seeds and for rows
@@ -146,11 +143,7 @@ def bootstrap_interval(
 
 
 def _rows(values: np.ndarray) -> np.ndarray:
-    """Return the values as float64 (rows, seeds).
-
-    Raises:
-        AntsError: They do not have two axes.
-    """
+    """Return the values as float64 (rows, seeds); raises AntsError without two axes."""
     rows = np.asarray(values, float)
     if rows.ndim != 2:
         raise AntsError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,41 +27,20 @@ INK, GREY, PALE = "#222222", "#767676", "#E4E4E4"
 # Of lines, in this order.
 COLOURS = (BLUE, ORANGE, RED, WINE, SKY, "#CC79A7", INK, "#009E73", "#999933", GREY)
 
-_SETTINGS: dict[Any, Any] = {
-    "font.size": 9,
-    "axes.titlesize": 10,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.labelsize": 9,
-    "axes.edgecolor": GREY,
-    "axes.labelcolor": INK,
-    "axes.linewidth": 0.7,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.axisbelow": True,
-    "axes.grid": True,
-    "grid.color": PALE,
-    "grid.linewidth": 0.7,
-    "text.color": INK,
-    "xtick.color": GREY,
-    "ytick.color": GREY,
-    "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK,
-    "xtick.labelsize": 8,
-    "ytick.labelsize": 8,
-    "legend.fontsize": 9,
-    "legend.frameon": False,
-    "lines.linewidth": 1.5,
-    "lines.solid_capstyle": "round",
-    "figure.constrained_layout.use": True,
-}
+
+@cache
+def _settings() -> Mapping[Any, Any]:
+    from matplotlib import rc_params_from_file
+
+    path = Path(__file__).with_name("taichi_ants.mplstyle")
+    return rc_params_from_file(path, use_default_template=False)
 
 
 def styled() -> AbstractContextManager:
     """The context in which figures are made and saved."""
     from matplotlib import rc_context
 
-    return rc_context(_SETTINGS)
+    return rc_context(dict(_settings()))
 
 
 def use() -> None:
@@ -68,7 +48,7 @@ def use() -> None:
     from matplotlib import rcParams
     from matplotlib.rcsetup import cycler
 
-    rcParams.update(_SETTINGS)
+    rcParams.update(_settings())
     colours = cycler(color=COLOURS)
     rcParams.update({"axes.prop_cycle": colours, "figure.figsize": (8.0, 3.0), "figure.dpi": 110})
 

@@ -27,23 +27,14 @@ _WIDE = 20  # a ratio of numbers from which their axis is logarithmic
 def seed_rows(
     settings: Sequence[Settings], seeds: Sequence[int], values: Mapping[str, np.ndarray]
 ) -> Iterator[dict[str, Any]]:
-    """A row for each point and seed: what varies, the seed, the measures.
-
-    Args:
-        settings: What varies, of P points.
-        seeds: S seeds.
-        values: Measures by name, float64 (P, S).
-    """
+    """Yield a row for each point and seed: what varies, the seed, measures float64 (P, S)."""
     for p, one in enumerate(settings):
         for s, seed in enumerate(seeds):
             yield {**one, "seed": seed, **{n: float(array[p, s]) for n, array in values.items()}}
 
 
 class Estimator(NamedTuple):
-    """A measure over seeds: its mean, its IQM if it has a typical run, and 95 % intervals.
-
-    Intervals of one seed are nan.
-    """
+    """A measure over seeds: mean, IQM if it has one, and 95 % intervals, nan of one seed."""
 
     mean: float
     ci_low: float
@@ -71,11 +62,9 @@ def centre_columns(found: Mapping[str, Estimator]) -> dict[str, float]:
 def centres_of(
     values: Mapping[str, np.ndarray], with_iqm: Sequence[str] = ()
 ) -> list[dict[str, Estimator]]:
-    """Return the measures of each point over its seeds, by name.
+    """Return the measures of each point over its seeds, by name, from float64 (points, seeds).
 
-    Args:
-        values: Measures by name, float64 (points, seeds).
-        typical: The measures that have an interquartile mean.
+    Those of `with_iqm` have an interquartile mean.
     """
     columns = {name: estimates(array, name in with_iqm).values() for name, array in values.items()}
     rows = {name: np.transpose([*several]).tolist() for name, several in columns.items()}
@@ -105,7 +94,7 @@ def report(
     against: tuple[str, Any] | None = None,
     notes: Sequence[str] = (),
 ) -> str:
-    """The means with their intervals as a table for a terminal.
+    """Return the means with their intervals as a table for a terminal.
 
     Notes say of each point how its first measure compares with that at the value `against`.
     """
@@ -160,13 +149,9 @@ def draw(
 
 
 def draw_lines(axes: Axes, lines: Mapping[str, Sequence[tuple[Any, ...]]]) -> None:
-    """Draw means with their intervals, a line for each label.
+    """Draw means with intervals: by label, of each point its place, mean and the interval's ends.
 
     Where places are no numbers there are no lines, but points beside each other.
-
-    Args:
-        axes: Where to draw.
-        lines: By label, of each point its place, the mean and the ends of its interval.
     """
     places = [place for points in lines.values() for place, *_ in points]
     numbers = all(isinstance(one, (int, float)) and not isinstance(one, bool) for one in places)

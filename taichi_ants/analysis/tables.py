@@ -56,14 +56,9 @@ def sentence(words: str) -> str:
 
 @dataclass(frozen=True)
 class Table:
-    """A table of text.
+    """A table of text; headers and cells may have several lines, where they may break.
 
-    Attributes:
-        title: What it shows.
-        columns: The headers. They and the cells may have several lines, where they may break.
-        rows: The cells.
-        notes: Lines that explain it, below.
-        text_columns: How many columns stand to the left; those of numbers stand to the right.
+    The first `text_columns` are aligned left, others, of numbers, right; notes stand below.
     """
 
     title: str
@@ -97,10 +92,7 @@ def markdown(blocks: Sequence[Block]) -> str:
 
 
 def plain_text(blocks: Sequence[Block], width: int) -> str:
-    """Blocks as plain text of at most so many columns, empty lines between them.
-
-    A table without rows shows its notes alone, and nothing without these.
-    """
+    """Return blocks as plain text of at most so many columns, empty lines between them."""
     from rich.console import Console
 
     text = io.StringIO()
@@ -123,11 +115,7 @@ def _drawn(table: Table) -> RichTable:
     from rich.table import Table as RichTable
 
     drawn = RichTable(
-        title=table.title,
-        title_justify="left",
-        box=SIMPLE_HEAD,
-        show_edge=False,
-        padding=0,
+        title=table.title, title_justify="left", box=SIMPLE_HEAD, show_edge=False, padding=0
     )
     for position, header in enumerate(table.columns):
         justify: Literal["left", "right"] = "left" if position < table.text_columns else "right"

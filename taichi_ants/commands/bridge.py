@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from taichi_ants.studies.command_line import (
+    AGAIN,
     Parser,
     add_common,
     add_results,
@@ -58,8 +59,7 @@ def bridge(settings: argparse.Namespace) -> None:
     from taichi_ants.studies.result_folder import work_or_show
     from taichi_ants.studies.runner import Study
 
-    if settings.plugin:
-        load_plugin(settings.plugin)
+    load_plugin(settings.plugin)
     seeds = tuple(range(settings.seed, settings.seed + settings.seeds))
     points = tuple(point(design, settings.episodes, settings.ticks) for design in DESIGNS)
     study = Study(points, seeds)
@@ -94,5 +94,4 @@ def do_bridge(settings: argparse.Namespace, study: Study, blocks: Path, ready: P
 
 def main(arguments: list[str] | None = None) -> None:
     """The command line."""
-    again = "Stopped; finished parts are kept, and the same command goes on from there."
-    run_command(lambda: bridge(parse_arguments(arguments)), again)
+    run_command(lambda: bridge(parse_arguments(arguments)), AGAIN)

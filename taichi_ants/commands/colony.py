@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.command_line import (
+    AGAIN,
     WORLDS,
     Parser,
     add_common,
@@ -34,7 +35,7 @@ from taichi_ants.task import Task
 
 if TYPE_CHECKING:
     from taichi_ants import Colony
-    from taichi_ants.analysis.colony.results import Results
+    from taichi_ants.analysis.colony.tables import Results
     from taichi_ants.learners.policies import Policy
     from taichi_ants.studies.colony_study import Plan
     from taichi_ants.studies.runner import Study
@@ -61,18 +62,8 @@ WIDTH = 79  # of the report, in columns
 COUNT: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
 SEEDS, CONDITIONS = "seeds.csv", "conditions.csv"
 FIGURES, POLICIES = "figures", "policies"
-AGAIN = "Stopped; finished parts are kept, and the same command goes on from there."
-_OF_RESUMED = (
-    "resume",
-    "ticks",
-    "save",
-    "render",
-    "frame_interval",
-    "figure",
-    "plugin",
-    "threads",
-    "arch",
-)
+_FILES = ("save", "render", "figure")
+_OF_RESUMED = ("resume", "ticks", "frame_interval", "plugin", "threads", "arch", *_FILES)
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -210,7 +201,7 @@ def do_study(
     from taichi_ants.analysis import style
     from taichi_ants.analysis.colony import tables
     from taichi_ants.analysis.colony.figures import draw_all
-    from taichi_ants.analysis.colony.results import Results
+    from taichi_ants.analysis.colony.tables import Results
     from taichi_ants.analysis.tables import markdown, plain_text
     from taichi_ants.files.results import REPORT
     from taichi_ants.studies.colony_study import measured, median_policies
@@ -245,10 +236,10 @@ def make_page(
     results: Results | None,
     made: Mapping[str, Any],
 ) -> str:
-    """The page of the results in a folder, which are read from there if they are not given."""
+    """Return the page of the results in a folder, which are read from there if not given."""
     from taichi_ants import files
     from taichi_ants.analysis.colony.figures import draw_all
-    from taichi_ants.analysis.colony.results import Results
+    from taichi_ants.analysis.colony.tables import Results
     from taichi_ants.analysis.drawings import drawings
     from taichi_ants.files.results import MANIFEST
     from taichi_ants.report.colony import colony_page
@@ -337,8 +328,7 @@ def rules(settings: argparse.Namespace, policy: Policy | None) -> Task:
 
 def start(settings: argparse.Namespace) -> None:
     """The study, or one colony."""
-    if settings.plugin:
-        load_plugin(settings.plugin)
+    load_plugin(settings.plugin)
     if settings.kind == "live":
         live(settings)
     else:

@@ -15,18 +15,22 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from taichi_ants.settings import all_of
 from taichi_ants.studies.command_line import (
-    HYPERPARAMETER,
     WORLDS,
     Parser,
     add_common,
     add_results,
+    add_settings,
+    given_settings,
+    given_world,
     load_plugin,
     progress_bar,
     run_command,
     whole_number,
     with_folder,
 )
+from taichi_ants.task import Task
 
 if TYPE_CHECKING:
     import numpy as np
@@ -34,7 +38,7 @@ if TYPE_CHECKING:
     from taichi_ants import World
     from taichi_ants.analysis.bounds.baselines import Baseline
     from taichi_ants.analysis.paper.comparison import Comparison
-    from taichi_ants.analysis.paper.results import Results
+    from taichi_ants.analysis.paper.report import Results
     from taichi_ants.rendering import Episode
     from taichi_ants.report.players import Seen
     from taichi_ants.studies.blocks import Outcome
@@ -51,6 +55,8 @@ SIZE = 720, 480  # of animations
 MOST_SEEDS = 10_000
 RUNS, BASELINES = "runs.npz", "baselines.csv"
 FIGURES, POLICIES, RENDERS = "figures", "policies", "renders"
+# Of these, bounds and behaviours know no other values.
+_FIXED = [one.path for one in all_of(Task) if "evaporation_in" not in one.path]
 _DEPTH = "planning_steps"  # the one hyperparameter that the paper varies
 _CURVE = "curve_"  # begins the names of learning curves in RUNS
 
@@ -75,16 +81,12 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--epsilon-decays", **few, default=(0.99, 0.995))
     several: dict[str, Any] = {"nargs": "+", "type": whole_number(1), "metavar": "N"}
     add("--planning-steps", **several, default=(3, 5), help="one or more, for learners that plan")
-    words = "of all learners that have it; may be given several times"
-    add("--hyperparameter", **{**HYPERPARAMETER, "help": words})
-    switch: dict[str, Any] = {"choices": ("on", "off"), "metavar": "on|off"}
-    add("--train-evaporation", **switch, default="off", help="of trails; off in the paper")
-    add("--eval-evaporation", **switch, default="on", help="in the greedy evaluation")
     add("--world", default="paper", help=WORLDS)
-    add("--world-seed", type=whole_number(), metavar="N", help="seed of a world drawn at random")
     add_common(parser)
     add("--quick", action="store_true", help=f"at most {QUICK_SEEDS} seeds, no animations")
     add_results(parser, "compare")
+    parser.open_settings = ("world", "training")
+    add_settings(parser, Task(), but=_FIXED)
     settings = parser.parse_args(arguments)
     if settings.quick:
         settings.seeds = min(settings.seeds, QUICK_SEEDS)
@@ -95,14 +97,14 @@ def variants(settings: argparse.Namespace) -> list[tuple[str, dict[str, Any]]]:
     """The learners, each with what it has of the hyperparameters, once for each planning depth."""
     from taichi_ants import AntsError, learners
 
-    given: dict[str, Any] = dict(settings.hyperparameter)
+    given = given_settings(settings).get("training", {})
     if _DEPTH in given:
-        raise AntsError(f"{_DEPTH} is an option of its own; write --planning-steps.")
+        raise AntsError(f"training.{_DEPTH} has its own option; write --planning-steps.")
     kinds = {name: fields(learners.get(name).hyperparameters) for name in settings.learners}
     own = {name: [field.name for field in kind] for name, kind in kinds.items()}
     for one in given:
         if not any(one in names for names in own.values()):
-            raise AntsError(f"{one!r} is no hyperparameter of {', '.join(own)}; leave it out.")
+            raise AntsError(f"`training.{one}` is not a hyperparameter of {', '.join(own)}.")
     return [
         (name, {one: value for one, value in {**given, _DEPTH: n}.items() if one in names})
         for name, names in own.items()
@@ -112,17 +114,12 @@ def variants(settings: argparse.Namespace) -> list[tuple[str, dict[str, Any]]]:
 
 def points(settings: argparse.Namespace, world: World) -> tuple[RunPoint, ...]:
     """The grid: tasks, learners and planning steps, times rates, discounts and exploration."""
-    from taichi_ants import Task, TrainingConfig
+    from taichi_ants import TrainingConfig
     from taichi_ants.studies.runner import RunPoint
 
-    tasks = [
-        Task(
-            delivery=delivery,  # type: ignore[arg-type]
-            evaporation_in_training=settings.train_evaporation == "on",
-            evaporation_in_evaluation=settings.eval_evaporation == "on",
-        )
-        for delivery in (DELIVERIES if settings.delivery == "both" else (settings.delivery,))
-    ]
+    deliveries = DELIVERIES if settings.delivery == "both" else (settings.delivery,)
+    given = given_settings(settings).get("task", {})
+    tasks = [Task().but(delivery=delivery, **given) for delivery in deliveries]
     numbers = itertools.product(
         settings.learning_rates, settings.discounts, settings.epsilons, settings.epsilon_decays
     )
@@ -137,14 +134,11 @@ def points(settings: argparse.Namespace, world: World) -> tuple[RunPoint, ...]:
 
 def build_study(settings: argparse.Namespace) -> Study[RunPoint]:
     """The work, checked as a whole before any of it is done."""
-    from taichi_ants import AntsError, worlds
+    from taichi_ants import AntsError
     from taichi_ants.studies.runner import Study
 
-    if settings.plugin:
-        load_plugin(settings.plugin)
-    if settings.world_seed is not None:
-        worlds.check_seed_counts(settings.world, "--world-seed")
-    world = worlds.build(settings.world, settings.world_seed or 0)
+    load_plugin(settings.plugin)
+    world = given_world(settings)
     grid = points(settings, world)
     if not world.reachable_foods().any():
         raise AntsError(
@@ -162,14 +156,15 @@ def world_name(settings: argparse.Namespace, study: Study[RunPoint]) -> str:
     if study.points[0].world == worlds.paper():
         return PAPER_WORLD
     if settings.world in worlds.names():
-        return f"{settings.world}, world seed {settings.world_seed or 0}"
+        of_world = {"seed": 0, **given_settings(settings).get("world", {})}
+        return ", ".join([settings.world, *(f"world {n} {value}" for n, value in of_world.items())])
     return Path(settings.world).name
 
 
 def what_policies_do(
     point: RunPoint, seeds: Sequence[int], q_values: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """What an ant does that follows each final policy, and what it earns; integer (C, S) both.
+    """Return behaviours and returns of ants that follow final policies; integer (C, S) both.
 
     The policies (C, S, n_states, 5) are of points that differ from this one in their learners.
     """
@@ -189,10 +184,7 @@ def what_policies_do(
 
 
 def compile_kernels(points: Sequence[RunPoint], where: Mapping[str, Any]) -> None:
-    """Have all kernels ready before the first of them trains.
-
-    One thread compiles, and another process has its own to compile beside it at that time.
-    """
+    """Compile all kernels first, on one thread, while the other process compiles its own."""
     for point in {point.training.learner: point for point in points}.values():
         short = replace(point, episodes=1, max_steps=1, rollouts=1)
         outcome = short.do((short,), (0,), None, lambda share: None, where)
@@ -247,8 +239,7 @@ def write_policies(
 ) -> list[Callable[[], None]]:
     """Write the final Q-tables of the examples, with what an ant that follows them does.
 
-    Returns:
-        Of each animation of them that is being drawn beside, what waits for it.
+    Returns what waits for each animation that the worker draws.
     """
     from taichi_ants import files, save_policy
     from taichi_ants.analysis.behaviour import BEHAVIOURS
@@ -334,11 +325,7 @@ def comparison_of(
 def with_curves(
     study: Study[RunPoint], blocks: Path, comparison: Comparison
 ) -> tuple[Comparison, dict[tuple[int, int], np.ndarray]]:
-    """Read what is shown from finished blocks: learning curves, and tables of the examples.
-
-    Returns:
-        The comparison with its curves, and the final tables by row and place of the seed.
-    """
+    """Read curves and the examples' tables, by row and place of the seed, from finished blocks."""
     from taichi_ants.analysis.paper.best_of import examples
     from taichi_ants.analysis.paper.curves import curve_row, learning_curves
 
@@ -355,13 +342,7 @@ def with_curves(
 
 
 def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draws: bool) -> None:
-    """Prepare a process for what it will show, while there is nothing to show yet.
-
-    Args:
-        point: What is trained.
-        plugin, where: As on the command line.
-        draws: Whether it will draw figures, too.
-    """
+    """Prepare a process for what it will show, and draw, while there is nothing to show yet."""
     import io
 
     import numpy as np
@@ -373,8 +354,7 @@ def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draw
     from taichi_ants.task.constants import N_ACTIONS
     from taichi_ants.viewer import record_colony
 
-    if plugin:
-        load_plugin(plugin)
+    load_plugin(plugin)
     runtime.start(**where)
     nothing = np.zeros((point.task.n_states, N_ACTIONS), np.float32)
     colony = colony_of_rollout(point.world, point.task, nothing)
@@ -402,7 +382,7 @@ def do_comparison(
     """Do what is not done yet, and write all results."""
     from taichi_ants import files
     from taichi_ants.analysis.bounds.baselines import bound_rows, policy_rows
-    from taichi_ants.analysis.paper.results import Results
+    from taichi_ants.analysis.paper.report import Results
     from taichi_ants.engines.runs.training import evaluate
     from taichi_ants.files import archives
 
@@ -444,14 +424,9 @@ def see(
     play: Begin = partial,
     draw: Begin = partial,
 ) -> Callable[[], Seen]:
-    """The pictures of the page, of which there are none without figures.
+    """Return what waits for the pictures of the page, of which there are none without figures.
 
-    Args:
-        settings, folder, study, comparison, baselines: What was done, and what came of it.
-        play, draw: Begin players and figures, as `WorkerProcess.begin`.
-
-    Returns:
-        What waits for them.
+    `play` and `draw` begin players and figures, as `WorkerProcess.begin`.
     """
     from taichi_ants.report.players import Seen, draw_all_for_page, what_is_seen
 
@@ -469,10 +444,10 @@ def make_page(
     found: tuple[Results, Seen] | None,
     made: Mapping[str, Any],
 ) -> str:
-    """The page of the results in a folder, which are read from there if they are not given."""
+    """Return the page of the results in a folder, which are read from there if not given."""
     from taichi_ants import files
     from taichi_ants.analysis.bounds.baselines import Baseline
-    from taichi_ants.analysis.paper.results import Results
+    from taichi_ants.analysis.paper.report import Results
     from taichi_ants.files import archives
     from taichi_ants.files.results import MANIFEST
     from taichi_ants.report.comparison import comparison_page

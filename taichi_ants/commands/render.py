@@ -21,6 +21,7 @@ from taichi_ants.studies.command_line import (
     Parser,
     add_settings,
     given_settings,
+    given_world,
     load_plugin,
     progress_bar,
     run_command,
@@ -143,7 +144,6 @@ def is_page(settings: argparse.Namespace) -> bool:
 
 def show(settings: argparse.Namespace) -> None:
     """Make what was asked for, and say what it is."""
-    from taichi_ants import worlds
     from taichi_ants.rendering import check_animation, check_picture
     from taichi_ants.rendering.scene import check_size
     from taichi_ants.rendering.writers import is_picture
@@ -157,14 +157,9 @@ def show(settings: argparse.Namespace) -> None:
         check_animation(settings.out, settings.fps)
     if settings.kind != "sheet":
         check_size(settings.size)
-    if settings.plugin:
-        load_plugin(settings.plugin)
-    of_world = given_settings(settings).get("world", {})
-    if "seed" in of_world:
-        worlds.check_seed_counts(settings.world)
-    world = worlds.build(settings.world, **of_world)
+    load_plugin(settings.plugin)
     kinds = (show_episode, show_colony, show_learning, show_sheet)
-    dict(zip(KINDS, kinds, strict=True))[settings.kind](settings, world)
+    dict(zip(KINDS, kinds, strict=True))[settings.kind](settings, given_world(settings))
 
 
 def show_episode(settings: argparse.Namespace, world: World) -> None:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from taichi_ants.studies.command_line import (
+    AGAIN,
     Parser,
     add_common,
     add_results,
@@ -53,8 +54,7 @@ def sweep(settings: argparse.Namespace) -> None:
     from taichi_ants.studies.result_folder import work_or_show
     from taichi_ants.studies.sweep_file import read_sweep
 
-    if settings.plugin:
-        load_plugin(settings.plugin)
+    load_plugin(settings.plugin)
     asked = read_sweep(settings.file, {kind: measures(kind) for kind in ("runs", "colony")})
     facts = {
         **asked.study.settings(),
@@ -89,12 +89,9 @@ def do_sweep(settings: argparse.Namespace, asked: Sweep, blocks: Path, ready: Pa
 
 
 def findings(asked: Sweep, values: np.ndarray) -> dict[int, dict[str, Any]]:
-    """By point, how it differs from the one that is the same but for the setting of `against`.
+    """Return by point how it differs from the one that is the same except for `against`.
 
-    The intervals of all differences of one [vary] hold at once, with a probability of 95 %.
-
-    Args:
-        values: The first measure, float64 (points, seeds).
+    Intervals of the first measure, float64 (points, seeds), hold at once within a [vary].
     """
     from taichi_ants.analysis.findings import Contrast, above, judge
 
@@ -146,33 +143,23 @@ def measured(
     asked: Sweep, blocks: Path, threads: int | None, arch: str | None
 ) -> dict[str, np.ndarray]:
     """Return each measure of each point and seed, float64 (points, seeds)."""
-    reduce = partial(measures_of_block, asked.kind, asked.measures)
-    with progress_bar("sweep") as progress:
-        return asked.study.reduced(blocks, reduce, threads, arch, progress)
-
-
-def measures_of_block(
-    kind: str,
-    names: Sequence[str],
-    points: Sequence[Any],
-    seeds: Sequence[int],
-    outcome: Outcome,
-) -> dict[str, np.ndarray]:
-    """Return measures of points that were done together, float64 (points, seeds) by name."""
     from taichi_ants.analysis.colony.study import measures_of
     from taichi_ants.analysis.paper.measures import measures_of_runs
 
-    if kind == "runs":
-        return measures_of_runs(outcome, names)
-    (point,) = points
-    arrays = {key: array[0] for key, array in outcome.items()}
-    found = measures_of(arrays, point.ants, point.ticks)
-    return {name: found[name][None] for name in names}
+    def reduce(points: Sequence[Any], seeds: Sequence[int], outcome: Outcome) -> Outcome:
+        if asked.kind == "runs":
+            return measures_of_runs(outcome, asked.measures)
+        (point,) = points
+        arrays = {key: array[0] for key, array in outcome.items()}
+        found = measures_of(arrays, point.ants, point.ticks)
+        return {name: found[name][None] for name in asked.measures}
+
+    with progress_bar("sweep") as progress:
+        return asked.study.reduced(blocks, reduce, threads, arch, progress)
 
 
 def main(
     arguments: list[str] | None = None, file: Path | None = None, about: str | None = None
 ) -> None:
     """Run the command line; the arguments are those of `parse_arguments`."""
-    again = "Stopped; finished parts are kept, and the same command goes on from there."
-    run_command(lambda: sweep(parse_arguments(arguments, file, about)), again)
+    run_command(lambda: sweep(parse_arguments(arguments, file, about)), AGAIN)

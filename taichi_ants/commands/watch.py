@@ -70,8 +70,7 @@ def watch(settings: argparse.Namespace) -> None:
     from taichi_ants.live.server import Room
     from taichi_ants.live.session import Session
 
-    if settings.plugin:
-        load_plugin(settings.plugin)
+    load_plugin(settings.plugin)
     choices = Choices(policies(settings.policy))
     runtime.start(settings.threads)
     if settings.session:

@@ -15,6 +15,7 @@ import os
 import secrets
 import shutil
 import stat
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -26,6 +27,11 @@ import numpy as np
 
 from taichi_ants.errors import AntsError, expect, shown
 
+if sys.version_info >= (3, 11):
+    import tomllib as tomllib
+else:
+    import tomli as tomllib  # noqa: F401
+
 PathLike = str | os.PathLike[str]
 _ABANDONED = 3600.0  # seconds after which an unfinished file is that of a process that was killed
 
@@ -33,9 +39,7 @@ _ABANDONED = 3600.0  # seconds after which an unfinished file is that of a proce
 def write_atomically(path: PathLike, writer: Callable[[BinaryIO], object]) -> None:
     """Write a file so that readers see the old content or all of the new one, never a part.
 
-    Args:
-        path: The file. One that exists is replaced; a symbolic link is followed.
-        writer: Called once with a binary file to write to.
+    An existing file is replaced, a symbolic link followed; `writer` is called with a binary file.
 
     Raises:
         AntsError: The file cannot be written. Other exceptions of the writer pass through.
@@ -50,10 +54,10 @@ def write_atomically(path: PathLike, writer: Callable[[BinaryIO], object]) -> No
 
 @contextmanager
 def unfinished(target: Path) -> Iterator[Path]:
-    """A free path in the target's folder, to write to and to move to the target when complete.
+    """Yield a free path in the target's folder, to be moved to the target when complete.
 
-    What is still there at the end is removed. If the process is killed, it stays, until the same
-    target is written an hour or more later.
+    What is still there at the end is removed; after a kill, when the target is next written an hour
+    or more later.
     """
     # A hash, because the name itself can already have the greatest length that is allowed.
     name = hashlib.sha256(os.fsencode(target.name)).hexdigest()[:16]
@@ -79,8 +83,7 @@ def _remove(path: Path) -> None:
 def check_writable_file(path: PathLike) -> Path:
     """Check before long work that `write_atomically` can write a file; return its path.
 
-    Nothing is written. The folder of the file may be missing if it can be made; that of the target
-    of a symbolic link may not.
+    Nothing is written. The folder may be missing if it can be made, unless the path is a link.
 
     Raises:
         AntsError: The path is that of a folder, a device or a pipe, or it cannot be written.
@@ -118,14 +121,9 @@ def _plain(value: Any) -> Any:
 
 
 def write_csv(path: PathLike, rows: Iterable[Mapping[str, Any]], columns: Sequence[str]) -> None:
-    """Write rows as comma-separated values with a header.
+    """Write rows, numbers and text by column, as comma-separated values with a header.
 
-    Args:
-        path: The file.
-        rows: Numbers and text by column, read one by one, so they need not fit into memory.
-            Floats are written so that they read back exactly. None, NaN and missing keys become
-            an empty field.
-        columns: The columns, in order.
+    Rows are read one by one. Floats read back exactly; None, NaN and missing keys are empty fields.
 
     Raises:
         AntsError: As `write_atomically`.
@@ -263,10 +261,7 @@ def _target_of(path: PathLike) -> Path:
 
 
 def _try_to_write(folder: Path) -> None:
-    """Write to a folder, and leave nothing there.
-
-    Permission bits are not enough: root passes them, but not a read-only mount or a full disk.
-    """
+    """Write to a folder and leave nothing there; root passes permission bits, a full disk not."""
     with tempfile.TemporaryFile(dir=folder) as file:
         file.write(bytes(4096))
 

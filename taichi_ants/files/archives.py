@@ -53,8 +53,7 @@ def read(
     """Read all arrays of an .npz file, without executing anything that it holds.
 
     Args:
-        path: The file.
-        content: The bytes of the file, if they are known; `path` is then its name in messages.
+        path: The file, or its name in messages if its bytes are given as `content`.
         most: The largest size of the file and of its arrays, in bytes.
         foreign: Whether to read a file without a checksum, too.
 
@@ -121,8 +120,7 @@ class Kind:
         name: The name of its content, such as "colony".
         version: The version of its format; files of other versions are refused.
         writer: The function that writes it, for messages.
-        most: The largest size of a file, packed or unpacked, in bytes.
-        foreign: Whether files without a checksum, as other programs write them, are read too.
+        most, foreign: As of `read`.
         most_lists: The largest number of lists in the facts.
     """
 

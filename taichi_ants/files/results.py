@@ -1,8 +1,7 @@
 """A folder of results: finished once, never mixed with others, never lost.
 
-While the work goes on, everything lies in the subfolder `unfinished`: finished blocks, results that
-are ready, and a manifest with the settings. At the end the results move up, the manifest last: the
-work is finished if the manifest lies in the folder itself.
+Work lies in the subfolder `unfinished`: blocks, ready results, a manifest with the settings.
+At the end the results move up, the manifest last: then the work is finished.
 """
 
 from __future__ import annotations
@@ -31,9 +30,6 @@ class ResultFolder:
         path: The folder; it need not exist.
         settings: All that determines the results, as `files.to_json` knows it.
         leading: Settings from which others follow: where these differ, only they are named.
-
-    Attributes:
-        seconds_before: The time of earlier processes, each until its last block, known in `work`.
     """
 
     def __init__(
@@ -73,10 +69,7 @@ class ResultFolder:
         return False
 
     def check(self, may_lack: str | None = None) -> None:
-        """Check that no file of finished results is missing or altered.
-
-        Args:
-            may_lack: The name of a file that may be missing.
+        """Check that no file of finished results is altered, or missing except `may_lack`.
 
         Raises:
             AntsError: A file is missing or altered.
@@ -135,7 +128,7 @@ class ResultFolder:
                     folder.rmdir()
 
     def publish(self, ready: Path, manifest: Mapping[str, Any]) -> None:
-        """Move the results that are ready into the folder, and then a manifest with the settings.
+        """Move ready results into the folder, then a manifest with the settings.
 
         Files that an older manifest lists are removed; others stay unless they have the same name.
         """
@@ -175,8 +168,7 @@ class ResultFolder:
     def _seconds_so_far(self) -> float:
         """Return the time of all processes that have worked here, even if they were killed.
 
-        Each process writes the manifest when it starts, with the time of those before it. Its own
-        time is from then to its last block.
+        Each begins by writing the manifest, with the time before it, and ends with its last block.
         """
         manifest = self._unfinished / MANIFEST
         if not manifest.exists():

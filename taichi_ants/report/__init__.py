@@ -1,8 +1,7 @@
-"""The reports of studies as web pages: one file each, without a network.
+"""Reports of studies as web pages: one file each, without a network.
 
-- `comparison_page` tells the paper's comparison, `colony_page` the study of the colony.
-- Both are filled into templates (`*.html`) with one style (`report.css`) and one script
-  (`report.js`); what moves on them is played by the viewer's script.
+Templates (`*.html`) share one style (`report.css`) and one script (`report.js`); the viewer's
+script plays what moves on them.
 """
 
 from taichi_ants.report.colony import colony_page

@@ -6,13 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from taichi_ants.analysis.colony.contrasts import Judged
 from taichi_ants.analysis.colony.study import EVALUATION_EPSILON, MEASURES, WORLD_KINDS, WORLDS
-from taichi_ants.analysis.colony.tables import (
-    ConditionRow,
-    glance,
-    headlines,
-    means,
-    of_largest,
-)
+from taichi_ants.analysis.colony.tables import ConditionRow, glance, headlines, means, of_largest
 from taichi_ants.analysis.drawings import Drawing
 from taichi_ants.analysis.findings import seeds_in_words
 from taichi_ants.analysis.tables import sentence
@@ -29,16 +23,7 @@ def colony_page(
     facts: Mapping[str, str],
     files: Sequence[str],
 ) -> str:
-    """The page as HTML.
-
-    Args:
-        rows: From `tables.condition_rows`.
-        findings: From `contrasts.judge_all`.
-        drawings: The figures.
-        players: Colonies at work.
-        facts: How it was done, names and words.
-        files: The names of the files and folders beside the page.
-    """
+    """Return the page as HTML; `facts` say how it was done, `files` what lies beside it."""
     world_kinds = list(dict.fromkeys(row.condition.world_kind for row in rows))
     trained = [world_kind for world_kind in WORLD_KINDS if world_kind in world_kinds]
     seeds = seeds_in_words(rows[0].seeds)

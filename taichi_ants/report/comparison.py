@@ -12,34 +12,17 @@ from taichi_ants.analysis.paper.published import (
     Q_LEARNING,
     TABLE_2,
 )
-from taichi_ants.analysis.paper.report import all_tables, behaviour_table
-from taichi_ants.analysis.paper.results import Results
+from taichi_ants.analysis.paper.report import Results, all_tables, behaviour_table
 from taichi_ants.analysis.tables import sentence, thousands
 from taichi_ants.errors import count
-from taichi_ants.report.page import (
-    Statement,
-    Statements,
-    fill,
-    judged,
-)
+from taichi_ants.report.page import Statement, Statements, fill, judged
 from taichi_ants.report.players import Seen
 
 
 def comparison_page(
-    results: Results,
-    seen: Seen,
-    *,
-    facts: Mapping[str, str],
-    files: Sequence[str],
+    results: Results, seen: Seen, *, facts: Mapping[str, str], files: Sequence[str]
 ) -> str:
-    """The page as HTML.
-
-    Args:
-        results: What was found.
-        seen: Its pictures.
-        facts: How it was done, names and words.
-        files: The names of the files and folders beside the page.
-    """
+    """Return the page as HTML; `facts` say how it was done, `files` what lies beside it."""
     comparison = results.comparison
     first, *others = all_tables(comparison, results.lines, results.behaviours, results.baselines)
     # The notes explain the first four tables, of which one is shown at once.

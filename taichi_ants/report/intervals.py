@@ -16,16 +16,11 @@ _LETTERS = 58  # of a line that is as wide as the drawing
 
 
 def interval_drawing(finding: Finding, label: str, unit: str = "") -> str:
-    """Return an SVG element, or nothing if there are no numbers.
+    """Return a finding as an SVG element, empty without numbers; `label` and `unit` name the axis.
 
-    The line is the interval, the dot the effect. One band is the range in which the criterion
-    wants the effect, another one the differences that are too small to matter: they are the regions
-    by which `Criterion.judge` decides. The text below names the axis.
-
-    Args:
-        finding: The finding.
-        label: The name of its effect.
-        unit: The unit of its effect.
+    The line is the interval, the dot the effect. One band is the range in which the criterion wants
+    the effect, another one the differences that are too small to matter: the regions by which
+    `Criterion.judge` decides.
     """
     if finding.verdict is Verdict.NOT_TESTED or not math.isfinite(finding.low + finding.high):
         return ""

@@ -66,12 +66,7 @@ def fill(template: str, **parts: Any) -> str:
 
 
 class Player(NamedTuple):
-    """A recording that plays on the page.
-
-    Attributes:
-        title, words: What stands below it.
-        recording: The recording.
-    """
+    """A recording that plays on the page, with a title and words below it."""
 
     title: str
     words: str
@@ -105,14 +100,7 @@ class Picture(NamedTuple):
 
 
 class Judged(NamedTuple):
-    """What became of a statement in one setting.
-
-    Attributes:
-        setting: Which one.
-        verdict: The verdict.
-        words: Effect, interval, and on what it rests.
-        drawing: The same as a picture, SVG.
-    """
+    """A verdict in one setting: effect and interval in words, and as a picture (SVG)."""
 
     setting: str
     verdict: Verdict
@@ -121,14 +109,7 @@ class Judged(NamedTuple):
 
 
 def judged(setting: str, finding: Finding, label: str, unit: str = "") -> Judged:
-    """Return a finding as a page shows it.
-
-    Args:
-        setting: The setting that it is of.
-        finding: The finding.
-        label: The name of its effect.
-        unit: The unit of its effect.
-    """
+    """Return a finding as a page shows it; `label` and `unit` are those of its effect."""
     words, by_mean = _measured(finding, label, unit), finding.by_mean
     if by_mean and by_mean.verdict is not finding.verdict:  # it may rest on another contrast
         told = _measured(by_mean, by_mean.contrast.label, unit)
@@ -151,12 +132,8 @@ def _measured(finding: Finding, label: str, unit: str) -> str:
 class Statement:
     """A line of the table that can be sorted and filtered.
 
-    Attributes:
-        text: What is claimed.
-        place: Of the paper, or of the world: what the second column says.
-        verdicts: One for each column of verdicts.
-        facts: Names and words that are told on demand.
-        judged: The findings that are told on demand.
+    `place` is the second column: of the paper, or of the world. There is a verdict for each column
+    of verdicts; facts and findings are shown on demand.
     """
 
     text: str
@@ -167,13 +144,7 @@ class Statement:
 
 
 class Statements(NamedTuple):
-    """A table of statements.
-
-    Attributes:
-        headers: Of the statement, of its place, and of each column of verdicts.
-        lines: The statements.
-        noun: What they are called.
-    """
+    """A table of statements, which `noun` calls them; a header for each column."""
 
     headers: Sequence[str]
     lines: Sequence[Statement]

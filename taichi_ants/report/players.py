@@ -33,12 +33,8 @@ TICKS, MOST_ANTS = 240, 1000  # of a colony: how long, and how many ants are sho
 
 
 class Seen(NamedTuple):
-    """The pictures of a comparison's page.
-
-    Attributes:
-        drawings: The figures.
-        players: What the ants do, a recording of each behaviour.
-        sheet: A policy that delivers, if one does.
+    """Pictures of a comparison's page: figures, a recording of each behaviour, and the sheet of a
+    policy that delivers, if one does.
     """
 
     drawings: Sequence[Drawing] = ()
@@ -71,17 +67,10 @@ def what_is_seen(
     comparison: Comparison,
     begin: Callable[..., Callable[[], Any]] = partial,
 ) -> Callable[[], tuple[list[Player], Picture | None]]:
-    """A recording of each behaviour, and the sheet of a policy that delivers, if one does.
+    """Return what waits for a recording of each behaviour and the sheet of a policy that delivers.
 
-    Ants are followed here, where the kernel for that is known; `begin` is for drawing.
-
-    Args:
-        policies: The folder of the examples' policies; those that it lacks are left out.
-        study, comparison: What was done, and what came of it.
-        begin: Begins a call and gives what waits for its end, as `WorkerProcess.begin`.
-
-    Returns:
-        What waits for them.
+    Examples whose policies are not in the folder are left out. Ants are followed here, where the
+    kernel for that is compiled; `begin` is for drawing, as `WorkerProcess.begin`.
     """
     first: dict[int, tuple[int, int]] = {}
     for row, run in examples(comparison):

@@ -18,12 +18,9 @@ _ABOUT = "about"
 
 
 def kept(path: Path, about: Any, make: Callable[[], Outcome]) -> Outcome:
-    """Return the arrays of a block; make and keep them if they are missing or damaged.
+    """Return the arrays of a block (.npz); make and keep them if they are missing or damaged.
 
-    Args:
-        path: The file of the block (.npz).
-        about: All that determines it, as `files.to_json` knows it.
-        make: Makes the arrays.
+    `about` is all that determines them, as `files.to_json` knows it.
 
     Raises:
         AntsError: The file cannot be written.
@@ -43,9 +40,5 @@ def kept(path: Path, about: Any, make: Callable[[], Outcome]) -> Outcome:
 
 
 def read(path: Path) -> Outcome:
-    """Return the arrays of a finished block.
-
-    Raises:
-        AntsError: The file cannot be read any more.
-    """
+    """Return the arrays of a finished block; raises AntsError if it cannot be read any more."""
     return {name: array for name, array in archives.read(path).items() if name != _ABOUT}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -100,7 +99,7 @@ def followed(
     ticks: int,
     where: tuple[int | None, str | None],
 ) -> dict[str, np.ndarray]:
-    """What `crossings` counts on each bridge while nobody learns; a file keeps it.
+    """Return what `crossings` counts on each bridge while nobody learns; a file keeps it.
 
     Args:
         path: Of the file (.npz); if it is there, nothing is left to do.
@@ -110,19 +109,6 @@ def followed(
         ticks: Length of the episode on each bridge, and its half on `LATE`.
         where: Threads and arch, as of a `Colony`.
     """
-    about = {**settings_of([learned], seeds), "design": asdict(design), "ticks": ticks}
-    make = partial(_followed, design, learned, seeds, q_values, ticks, where)
-    return kept(path, about, make)
-
-
-def _followed(
-    design: Design,
-    learned: ColonyPoint,
-    seeds: Sequence[int],
-    q_values: np.ndarray,
-    ticks: int,
-    where: tuple[int | None, str | None],
-) -> dict[str, np.ndarray]:
     from taichi_ants.engines.colony.colony import Colony
 
     least = learned.training.least_epsilon
@@ -141,30 +127,33 @@ def _followed(
         )
         return crossings(colony, bridge, n, opens)
 
-    found, each = {}, [slice(s, s + 1) for s in range(len(seeds))]
-    for name, bridge in bridges(design).items():
-        n = length(name, ticks)
-        if name == LATE:  # interventions act on colonies of one world
-            found[name] = np.concatenate([count(bridge, one, n, ticks) for one in each], axis=-1)
-        else:
-            found[name] = count(bridge, slice(None), n)
-    return found
+    def counted() -> dict[str, np.ndarray]:
+        found, each = {}, [slice(s, s + 1) for s in range(len(seeds))]
+        for name, bridge in bridges(design).items():
+            n = length(name, ticks)
+            if name == LATE:  # interventions act on colonies of one world
+                late = [count(bridge, one, n, ticks) for one in each]
+                found[name] = np.concatenate(late, axis=-1)
+            else:
+                found[name] = count(bridge, slice(None), n)
+        return found
+
+    about = {**settings_of([learned], seeds), "design": asdict(design), "ticks": ticks}
+    return kept(path, about, counted)
 
 
 def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0) -> np.ndarray:
     """Run an episode, and count who has crossed the bridge by which branch.
 
-    An ant has crossed when it comes to one room and was in the other one before; its branch is the
-    one in which it was last. Foragers are ants without food that come to the food, carriers ants
-    with food that come to the queen; others are not counted.
+    An ant has crossed when it comes to one room from the other; its branch is the one in which it
+    was last. Foragers come to the food without food, carriers to the queen with food.
 
     Args:
-        colony: On the bridge in all of its worlds, with the schedule "by_world", in which ants keep
-            their slots.
+        colony: On the bridge in all worlds; schedule "by_world", in which ants keep their slots.
         bridge: The arguments of `double_bridge`.
         ticks: Length of the episode.
-        opens: Tick after which the short branch can be entered; until then it is rock. Other than
-            0, the colony must have one world.
+        opens: Tick after which the short branch, rock until then, can be entered; 0 if it always
+            can. Otherwise the colony must have one world.
 
     Returns:
         int64 (WINDOWS, loads, branches, worlds): foragers then carriers, short branch then long.
@@ -190,9 +179,7 @@ def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0
         crossed = inside & (now != room)
         useful = crossed & (carries == (now == _QUEEN_ROOM))
         np.add.at(
-            counts[window],
-            (carries[useful].astype(int), branch[useful] - _SHORT, world[useful]),
-            1,
+            counts[window], (carries[useful].astype(int), branch[useful] - _SHORT, world[useful]), 1
         )
         room = np.where(inside, now, room)
         branch = np.where(inside, branch, now)

@@ -15,26 +15,8 @@ import numpy as np
 
 from taichi_ants import learners, worlds
 from taichi_ants.analysis.bounds.limits import limits_of
-from taichi_ants.analysis.colony.study import (
-    ABC,
-    ABC_SILENT,
-    ABROAD,
-    ALONE,
-    BC,
-    EVALUATION_EPSILON,
-    FEW,
-    JOINT,
-    PAPER,
-    QUEUES,
-    SILENT,
-    SOME,
-    WORLD_KINDS,
-    WORLDS,
-    A,
-    Condition,
-    Measured,
-    measures_of,
-)
+from taichi_ants.analysis.colony import study
+from taichi_ants.analysis.colony.study import Condition, Measured, measures_of
 from taichi_ants.errors import AntsError, check_one_of
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.runner import ColonyPoint, Outcome, Study
@@ -46,18 +28,18 @@ _SILENT, _LIVELY = Pheromone(deposit="none"), Life(regrowth=0)
 TASKS: dict[str, Task] = {
     rules: replace(task, evaporation_in_training=True, life=_LIVELY)
     for rules, task in {
-        PAPER: paper(),
-        SILENT: replace(paper(), pheromone=_SILENT),
-        A: replace(paper(), pheromone=foraging().pheromone),
-        BC: replace(foraging(), pheromone=paper().pheromone),
-        ABC: foraging(),
-        ABC_SILENT: replace(foraging(), pheromone=_SILENT),
-        QUEUES: queueing(),
+        study.PAPER: paper(),
+        study.SILENT: replace(paper(), pheromone=_SILENT),
+        study.A: replace(paper(), pheromone=foraging().pheromone),
+        study.BC: replace(foraging(), pheromone=paper().pheromone),
+        study.ABC: foraging(),
+        study.ABC_SILENT: replace(foraging(), pheromone=_SILENT),
+        study.QUEUES: queueing(),
     }.items()
 }
 # Of these, copies of fewer ants are evaluated, and all in other worlds than those of the training.
-COMPARED = (PAPER, ABC, QUEUES)
-TRAINED_WITH = {ALONE: 1, FEW: 4, SOME: 16}
+COMPARED = (study.PAPER, study.ABC, study.QUEUES)
+TRAINED_WITH = {study.ALONE: 1, study.FEW: 4, study.SOME: 16}
 OPEN, LARGE_SIZE = "open", 1000
 POOL, FIRST_OF_POOL = 64, 1 << 20  # worlds for training, and the seed of the first of them
 EXPLORING = 0.7  # of the training episodes, until epsilon and the learning rate have fallen
@@ -76,29 +58,24 @@ def plan(
     ticks: int,
     rollouts: int,
 ) -> Plan:
-    """The conditions of some kinds of world.
+    """Return the conditions of some kinds of world, which are names in `WORLDS`.
 
-    Args:
-        world_kinds: Names in `WORLDS`.
-        sizes: Numbers of ants, ascending; ants that were trained elsewhere are as many as the last.
-        seeds: A seed gives its world to all conditions of a kind of world.
-        training: The learner. Its epsilon is that of the first episode; it decays to
-            `EVALUATION_EPSILON` while its learning rate decays to a tenth, and both stay there for
-            the last 30 % of the episodes.
-        episodes, ticks, rollouts: As of a `ColonyPoint`.
+    The sizes ascend; ants that were trained elsewhere are as many as the last. The epsilon of the
+    training is that of the first episode: it decays to `EVALUATION_EPSILON` while the learning rate
+    decays to a tenth, and both stay there for the last 30 % of the episodes.
 
     Raises:
         AntsError: There is no such kind of world, or ants cannot learn together with the learner.
     """
     for world_kind in world_kinds:
-        check_one_of("the kind of world", world_kind, tuple(WORLDS))
+        check_one_of("the kind of world", world_kind, tuple(study.WORLDS))
     if learners.get(training.learner).td_error is None:
         able = [name for name in learners.names() if learners.get(name).td_error]
         raise AntsError(
             f"learner {training.learner!r} has no TD error that can be summed over ants, and here "
             f"they learn together; choose one of {', '.join(able)}."
         )
-    training = scheduled(replace(training, min_epsilon=EVALUATION_EPSILON), episodes)
+    training = scheduled(replace(training, min_epsilon=study.EVALUATION_EPSILON), episodes)
     places = {
         world_kind: worlds.paper()
         if world_kind == "paper"
@@ -117,10 +94,10 @@ def plan(
 
     conditions: Plan = {}
     for world_kind in world_kinds:
-        for rules, n in product(TASKS, sizes if world_kind in WORLD_KINDS else ()):
-            conditions[Condition(world_kind, rules, JOINT, n)] = trained(world_kind, rules, n)
+        for rules, n in product(TASKS, sizes if world_kind in study.WORLD_KINDS else ()):
+            conditions[Condition(world_kind, rules, study.JOINT, n)] = trained(world_kind, rules, n)
         for rules, (regime, few), n in product(COMPARED, TRAINED_WITH.items(), sizes):
-            if world_kind in WORLD_KINDS and n > few:
+            if world_kind in study.WORLD_KINDS and n > few:
                 after = trained(world_kind, rules, few)
                 copies = replace(after, ants=n, episodes=0, after=after)
                 conditions[Condition(world_kind, rules, regime, n)] = copies
@@ -135,7 +112,7 @@ def plan(
                 episodes=0,
                 after=after,
             )
-            conditions[Condition(world_kind, rules, ABROAD, abroad.ants)] = abroad
+            conditions[Condition(world_kind, rules, study.ABROAD, abroad.ants)] = abroad
     return conditions
 
 
@@ -162,7 +139,7 @@ def place(world_kind: str, seed: int) -> World:
 
 def _pool(world_kind: str) -> tuple[World, ...] | None:
     """Worlds for training, other ones than for evaluation; the paper's is the only one."""
-    if world_kind not in WORLD_KINDS or world_kind == "paper":
+    if world_kind not in study.WORLD_KINDS or world_kind == "paper":
         return None
     return tuple(place(world_kind, FIRST_OF_POOL + n) for n in range(POOL))
 
@@ -230,14 +207,13 @@ def bounds_of(conditions: Plan, seeds: int) -> dict[Condition, np.ndarray]:
 def median_policies(
     conditions: Plan, seeds: Sequence[int], found: Measured, outcomes: Mapping[Any, Outcome]
 ) -> Iterator[tuple[str, np.ndarray, dict[str, Any], str]]:
-    """Policies worth keeping: of the compared rules those of median seeds, trained jointly.
+    """Yield for each jointly trained, compared condition the policy of its median seed.
 
-    Yields:
-        A name, the action values float32 (n_states, 5), what made them, and their observation.
+    As a name, action values float32 (n_states, 5), what made them, and their observation.
     """
     for condition, point in conditions.items():
         world_kind, rules, regime, ants = condition
-        if rules not in COMPARED or regime != JOINT:
+        if rules not in COMPARED or regime != study.JOINT:
             continue
         deliveries = found[condition]["deliveries"]
         run = int(np.argsort(deliveries, kind="stable")[(len(seeds) - 1) // 2])

@@ -10,13 +10,17 @@ import sys
 from collections.abc import Callable, Container, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from taichi_ants.errors import AntsError, without_middle
 from taichi_ants.settings import Setting, Settings, declared, nested
 from taichi_ants.studies.interruption import stop_if_noted, stoppable
 
+if TYPE_CHECKING:
+    from taichi_ants import World
+
 EXIT_BAD_INPUT = 2
+AGAIN = "Stopped; finished parts are kept, and the same command goes on from there."
 
 
 class _HelpFormatter(argparse.ArgumentDefaultsHelpFormatter):
@@ -39,13 +43,15 @@ class _OneOrList(argparse.Action):
 class Parser(argparse.ArgumentParser):
     """A parser whose errors are one sentence on standard error.
 
-    Args:
-        about: The docstring of the command's module, whose first line stands above the options and
-            the rest below them; `python -OO` leaves out docstrings, so None is one, too.
-        settings: Those of `argparse.ArgumentParser`.
+    `about` is a module's docstring: its first line stands above the options, the rest below. It is
+    None under `python -OO`.
     """
 
-    open_settings = ("world", "task", "training")  # of which any --world.NAME is taken
+    open_settings: tuple[str, ...] = (
+        "world",
+        "task",
+        "training",
+    )  # of which any --world.NAME is taken
     program: str | None = None  # what --help calls it; None: the name of the script
 
     def __init__(self, about: str | None = None, **settings: Any) -> None:
@@ -61,10 +67,7 @@ class Parser(argparse.ArgumentParser):
         return self.parse_args(words), {flag[2:].replace("-", "_"): flag for flag in flags}
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
-        """As usual; a word that is empty, such as that of a variable that is not set, is refused.
-
-        It would count as no file, and another thing would be done than was asked for.
-        """
+        """Parse; refuse an empty word, such as an unset variable, which would count as no file."""
         words = sys.argv[1:] if args is None else list(args)
         for before, word in zip(["", *words], words, strict=False):
             if word == "" or (word.startswith("--") and word.endswith("=")):
@@ -73,10 +76,7 @@ class Parser(argparse.ArgumentParser):
         return super().parse_known_args(words, namespace)
 
     def _add_setting(self, flag: str) -> None:
-        """Take an option such as --world.piles, which depends on the world, or is misspelt.
-
-        Whether there is such a setting is known where it is used.
-        """
+        """Take an option such as --world.piles, which is checked where it is used."""
         part = flag[2:].partition(".")[0]
         if "." in flag and part in self.open_settings and flag not in self._option_string_actions:
             path = flag[2:].replace("-", "_")
@@ -97,13 +97,7 @@ def add_common(parser: argparse.ArgumentParser) -> None:
 
 
 def add_results(parser: argparse.ArgumentParser, name: str, quick: bool = True) -> None:
-    """Add the options of commands with a folder of results; `with_folder` chooses its place.
-
-    Args:
-        parser: The parser.
-        name: The name of the folder.
-        quick: Whether the command has --quick.
-    """
+    """Add the options of commands with a folder of results; `with_folder` chooses its place."""
     add, place = parser.add_argument, f"results/{name}"
     default = f"{place}, with --quick {place}-quick" if quick else place
     add("--out", type=Path, metavar="FOLDER", help=f"for the results (default: {default})")
@@ -138,29 +132,10 @@ WORLDS = (
 )
 
 
-def _named_number(text: str) -> tuple[str, float]:
-    name, _, value = text.partition("=")
-    try:
-        return name, int(value) if value.lstrip("+-").isdecimal() else float(value)
-    except ValueError:
-        words = f"{text!r} is no name and number, write it as planning_steps=3"
-        raise argparse.ArgumentTypeError(words) from None
-
-
-# The option of commands that train one learner; `dict(settings.hyperparameter)` has its numbers.
-HYPERPARAMETER: dict[str, Any] = {
-    **{"type": _named_number, "action": "extend", "nargs": 1, "default": []},
-    **{"metavar": "NAME=VALUE", "help": "of the learner; may be given several times"},
-}
-
-
 def add_settings(parser: argparse.ArgumentParser, base: Settings, but: Container[str] = ()) -> None:
-    """Add an option for each setting of a class, named as in sweep files.
+    """Add an option for each setting of a class, named as in sweep files; `base` has the defaults.
 
-    Args:
-        parser: The parser.
-        base: Settings whose values are the defaults.
-        but: Full names of settings that the command determines itself.
+    `but` are full names of settings that the command determines itself.
     """
     parser.usage = "%(prog)s [options]"  # there are too many to list them twice
     group = parser.add_argument_group(f"{base.path} settings")
@@ -194,18 +169,25 @@ def _literal(text: str) -> Any:
 
 
 def given_settings(settings: argparse.Namespace) -> dict[str, Any]:
-    """The settings that options have given, as mappings in mappings, see `settings.nested`.
+    """Return what options have given, as mappings in mappings (`settings.nested`).
 
     The names of the world and the task, `--world` and `--task`, are left out.
     """
     return nested({path: value for path, value in vars(settings).items() if "." in path})
 
 
-def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> NoReturn:
-    """Run a command line to its exit: mistakes end in one sentence, never in a traceback.
+def given_world(settings: argparse.Namespace) -> World:
+    """Return the world of `--world`, with what `--world.NAME` options change."""
+    from taichi_ants import worlds
 
-    After Ctrl-C or SIGTERM it says what `interrupted` says.
-    """
+    given = given_settings(settings).get("world", {})
+    if "seed" in given:
+        worlds.check_seed_counts(settings.world)
+    return worlds.build(settings.world, **given)
+
+
+def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> NoReturn:
+    """Run a command line to its exit; mistakes end in one sentence, as does an interruption."""
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="replace")  # a terminal that lacks a character shows "?"
     status = 0
@@ -224,12 +206,14 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
     sys.exit(status)
 
 
-def load_plugin(path: str) -> None:
-    """Execute a Python file of the user's, which registers learners, observations or worlds.
+def load_plugin(path: str | None) -> None:
+    """Execute a Python file, if there is one, which registers learners, observations or worlds.
 
     Raises:
         AntsError: The file cannot be read, raises or exits.
     """
+    if path is None:
+        return
     spec = importlib.util.spec_from_file_location(f"plugin_{Path(path).stem}", path)
     if spec is None or spec.loader is None or not Path(path).is_file():
         raise AntsError(f"cannot read the plugin {path!r}; name a Python file (.py).")
@@ -246,11 +230,10 @@ def load_plugin(path: str) -> None:
 
 @contextmanager
 def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
-    """A progress bar with the time left on standard error; nothing where that is no terminal.
+    """Show a progress bar with the time left on standard error, if that is a terminal.
 
-    Yields:
-        To be called with the share of the work that is done, 0 to 1. It raises KeyboardInterrupt
-        if a signal to stop came, but a library has swallowed it; so does the beginning.
+    Yields a function of the share of the work that is done, 0 to 1. It raises KeyboardInterrupt if
+    a signal to stop came, but a library has swallowed it; so does the beginning.
     """
     from rich.console import Console
     from rich.progress import Progress

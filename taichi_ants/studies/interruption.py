@@ -1,8 +1,7 @@
 """Ctrl-C and SIGTERM: they end a command in one line, whatever it is doing.
 
-A signal is noted besides raising KeyboardInterrupt, since libraries swallow that at some moments,
-and turn it into errors of their own at others. The imports are few, so that a command can be
-stopped from its first moment on.
+A signal is noted besides raising KeyboardInterrupt, which libraries may swallow or turn into errors
+of their own. The imports are few, so that a command can be stopped from its first moment on.
 """
 
 from __future__ import annotations
@@ -32,12 +31,10 @@ def _forget(unraisable: sys.UnraisableHookArgs) -> None:
 
 @contextmanager
 def stoppable(message: str = "Stopped.") -> Iterator[None]:
-    """Ctrl-C and SIGTERM end what is done inside, and the process with status 128 + their number.
+    """End what is inside at Ctrl-C and SIGTERM, with status 128 + the signal's number.
 
-    What the parent process ignores, as nohup does, stays ignored.
-
-    Args:
-        message: What to say on standard error, if the interruption has no message of its own.
+    It prints the message of the interruption, or `message`. What the parent ignores, as nohup does,
+    stays ignored.
     """
     usual: dict[int, Any] = {
         signal.SIGINT: signal.default_int_handler,
@@ -65,11 +62,7 @@ def stoppable(message: str = "Stopped.") -> Iterator[None]:
 
 @contextmanager
 def held() -> Iterator[Callable[[], bool]]:
-    """A signal waits until what is inside is done, which must be whole; a third one does not.
-
-    Yields:
-        Whether a signal has come.
-    """
+    """Hold signals, up to the third, until what is inside is done; yield whether one came."""
     global _holds
     _holds = True
     try:

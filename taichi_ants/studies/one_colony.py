@@ -46,9 +46,8 @@ def live(
 ) -> None:
     """Let time pass in a colony, then write its files; it ends early once `stopped()` is true.
 
-    It is saved even if its picture (.png) or animation (.gif, .mp4, a folder) cannot be written. An
-    animation has a picture every `frame_interval` ticks. A figure (.png) shows what was delivered
-    over time, and has its numbers beside it (.csv).
+    It is saved even if its picture (.png) or animation (.gif, .mp4, a folder) cannot be written. A
+    figure (.png) shows what was delivered over time, and has its numbers beside it (.csv).
     """
     from taichi_ants.rendering import colony_snapshots, frames, save_animation, save_picture
     from taichi_ants.rendering.writers import is_picture
@@ -99,7 +98,7 @@ def _pieces(
 ) -> Iterator[int]:
     """Move a colony on by short pieces, after which it can be stopped.
 
-    Yields after each piece, or with `every` above 0 after so many ticks; in any case after every
+    Yields after each piece, or every `frame_interval` ticks if above 0; in any case after every
     `span` ticks and at the end.
     """
     begun, piece, passed, ends = colony.ticks, 1, 0, stopped()

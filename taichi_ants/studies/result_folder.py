@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import datetime
+import os
+import platform
+import shlex
+import subprocess
 import sys
 import time
 from argparse import Namespace
 from collections.abc import Callable, Mapping, Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeVar
 
-from taichi_ants import files
+from taichi_ants import __version__, files
 from taichi_ants.files.results import PAGE, REPORT, ResultFolder, checksum_of, read_manifest
-from taichi_ants.studies.provenance import provenance
 
+_PACKAGES = ("taichi", "numpy", "scipy", "matplotlib")
 Results = TypeVar("Results")
 # Returns the page, as HTML, from a folder of results, from the results of the work if it was done
 # just now, and from the manifest.
@@ -28,14 +34,12 @@ def work_or_show(
 ) -> None:
     """Do the work of a command, or show the results that its folder holds; print the report.
 
-    If the page of finished results is missing, it is made again from the other files.
-
     Args:
         settings: The command's `out`, `force`, `no_figures`, `plugin` and `arch`.
         determines: All else that determines the results.
         work: Called with a folder for blocks and one for the results, among them the report.
         leading: Settings from which others follow, see `ResultFolder`.
-        page: Makes the page of the results, if they have one.
+        page: Makes the page of the results, which is made again if it is missing.
 
     Raises:
         AntsError: The folder holds something else, cannot be written, or was altered.
@@ -75,3 +79,31 @@ def _show(settings: Namespace, folder: ResultFolder, page: Pages[Results] | None
         print("They were made with --no-figures; to have figures, too, give --force.")
     if page and is_missing:
         print(f"{PAGE} was missing, and is written again from the other files.")
+
+
+def provenance(arguments: Sequence[str]) -> dict[str, Any]:
+    """What made results: command, versions, machine, time and commit."""
+    return {
+        "command": shlex.join(arguments),
+        "finished": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
+        "commit": commit(),
+        "python": platform.python_version(),
+        "packages": {"taichi_ants": __version__, **{name: version(name) for name in _PACKAGES}},
+        "platform": platform.platform(),
+        "cpus": os.cpu_count(),
+    }
+
+
+def commit() -> str | None:
+    """The commit of the source, "-dirty" behind it if files differ; None outside a checkout."""
+    root = Path(__file__).resolve().parents[2]
+    if not (root / ".git").exists():
+        return None
+    command = ["git", "describe", "--always", "--abbrev=40", "--exclude=*", "--dirty"]
+    try:
+        done = subprocess.run(
+            command, cwd=root, capture_output=True, text=True, timeout=10, check=True
+        )
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return done.stdout.strip()

@@ -8,12 +8,13 @@ any order without changing anything.
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -23,7 +24,6 @@ from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.settings import flat
 from taichi_ants.studies import blocks
 from taichi_ants.studies.blocks import Outcome, kept
-from taichi_ants.studies.provenance import world_facts
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EPISODE_STEPS, EPISODES, MAX_STEPS, N_ACTIONS, ROW
 from taichi_ants.worlds.world import World
@@ -43,17 +43,14 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True)
 class RunPoint:
-    """An ant that is alone: trained, then its final policy is followed greedily.
+    """A lone ant: trained, then its final policy is followed greedily.
 
-    Its outcome: `returns`, `steps`, `deliveries` of training, integer (seeds, episodes); the same
-    as `greedy_returns` ... of the rollouts, integer (seeds, rollouts); `q_values`, float32 (seeds,
-    n_states, 5); `seconds` of CPU time that the training took, float64 (seeds,).
+    Outcome: `returns`, `steps`, `deliveries` of training, integer (seeds, episodes); the same as
+    `greedy_returns` ... of the rollouts, integer (seeds, rollouts); `q_values`, float32 (seeds,
+    n_states, 5); `seconds` of CPU time for training, float64 (seeds,).
 
     Attributes:
-        world, task, training: The world, the rules of the game, and the learner.
-        episodes: Training episodes.
         max_steps: Step limit of episodes and rollouts.
-        rollouts: Greedy rollouts.
 
     Raises:
         AntsError: A value is not allowed.
@@ -65,6 +62,9 @@ class RunPoint:
     episodes: int = EPISODES
     max_steps: int = EPISODE_STEPS
     rollouts: int = 50
+    ants: ClassVar[int] = 1
+    pool: ClassVar[None] = None
+    after: ClassVar[None] = None
 
     def __post_init__(self) -> None:
         (config,) = checks.checked_configs(self.training)
@@ -75,10 +75,6 @@ class RunPoint:
         checked_whole("rollouts", self.rollouts)
 
     @property
-    def ants(self) -> int:
-        return 1
-
-    @property
     def alike(self) -> tuple:
         """What the points of a block have in common."""
         which = self.training.learner, self.training.planning_steps
@@ -86,7 +82,7 @@ class RunPoint:
 
     @property
     def runs_of_a_block(self) -> int:
-        """How many runs: enough that starting a block costs little, few enough to stop soon."""
+        """Runs of a block: so many that it starts cheaply, so few that it can stop soon."""
         return min(max(1, _STEPS_OF_A_BLOCK // (self.episodes * self.max_steps)), _RUNS_OF_A_BLOCK)
 
     @property
@@ -135,22 +131,18 @@ class RunPoint:
 class ColonyPoint:
     """A colony: it learns, then nobody does, and epsilon stays at its minimum.
 
-    Its outcome: `deliveries`, `first_delivery`, `moves`, `blocked` and `returns` of the evaluation,
+    Outcome: `deliveries`, `first_delivery`, `moves`, `blocked` and `returns` of the evaluation,
     integer (seeds, rollouts), as in `ColonyEpisodes`; where it learned into one table `q_values`,
     float32 (seeds, n_states, 5).
 
     Attributes:
         world: The world, or one for each seed, all of the same ranges.
-        task, training: The rules of the game, and the learner.
-        pool: Worlds of the same ranges; each training episode of each seed takes place in one that
-            is drawn from these by the seed, so that evaluation in `world` tells what was learned
-            for worlds that no ant has seen. None: training takes place in `world`.
-        ants: How many.
+        pool: Worlds of the same ranges, from which each seed draws one for each training episode;
+            so no ant has seen `world`. None: training takes place in `world`.
         sharing: "shared" or "independent", of tables while the ants learn.
         start, capacity: As of a `Colony`.
         episodes: Training episodes; with 0 the ants follow what the ants of `after` have learned.
         ticks: Of each episode, of training and evaluation.
-        rollouts: Evaluation episodes.
         after: The point whose shared table learning goes on from; None: from zeros.
 
     Raises:
@@ -263,11 +255,7 @@ AnyPoint = TypeVar("AnyPoint", bound=Point)
 
 @dataclass(frozen=True)
 class Study(Generic[PointKind]):
-    """What to do.
-
-    Attributes:
-        points: The points.
-        seeds: The seeds of each; they pair the points.
+    """Points over seeds, which pair them.
 
     Raises:
         AntsError: A world has no room for the ants, or not as many worlds as seeds are given.
@@ -286,7 +274,7 @@ class Study(Generic[PointKind]):
                 raise AntsError(f"there are {len(several)} worlds for {len(self.seeds)} seeds.")
             for one, seed in zip(several, self.seeds, strict=False):
                 checks.checked_world(one, learns=True).start(seed, ants)
-        for pool, ants in dict.fromkeys((_pool(point), point.ants) for point in self.points):
+        for pool, ants in dict.fromkeys((point.pool, point.ants) for point in self.points):
             for one in pool or ():
                 checks.checked_world(one, learns=True).start(0, ants)
 
@@ -296,7 +284,7 @@ class Study(Generic[PointKind]):
         return _in_order(self.points)
 
     def blocks(self) -> Iterator[tuple[slice, slice]]:
-        """Which of the points in order, and which seeds, are in each block.
+        """Yield which of the points in order, and which seeds, are in each block.
 
         Put after each other, the blocks are an array (points, seeds).
         """
@@ -320,10 +308,7 @@ class Study(Generic[PointKind]):
         arch: str | None = None,
         progress: Progress = lambda share: None,
     ) -> dict[PointKind, Outcome]:
-        """Do the blocks that the folder does not hold yet; the outcome of each point, in memory.
-
-        Arguments and errors are those of `in_blocks`.
-        """
+        """Do the blocks that the folder lacks; return all outcomes. Arguments as of `in_blocks`."""
         order = self.in_order
         parts: dict[PointKind, list[Outcome]] = {point: [] for point in order}
         for block in self.in_blocks(folder, threads, arch, progress):
@@ -341,9 +326,8 @@ class Study(Generic[PointKind]):
     ) -> dict[str, np.ndarray]:
         """Return numbers of each run, arrays (points, seeds) by name; only these stay in memory.
 
-        Args:
-            folder, threads, arch, progress: As of `in_blocks`, which also says what is raised.
-            reduce: Called with points, seeds and outcome of a block; returns such arrays of it.
+        `reduce` is called with points, seeds and outcome of a block, and returns such arrays of it;
+        the other arguments and errors are those of `in_blocks`.
         """
         order = self.in_order
         found: dict[str, np.ndarray] = {}
@@ -365,28 +349,27 @@ class Study(Generic[PointKind]):
         arch: str | None = None,
         progress: Progress = lambda share: None,
     ) -> Iterator[Block]:
-        """Do the blocks that the folder does not hold yet; all of them, one at a time in memory.
+        """Do the blocks that the folder lacks; yield all of them, one at a time in memory.
 
         Args:
-            folder: Where finished blocks are kept; it must belong to this study alone.
+            folder: Where finished blocks are kept, of this study alone.
             threads, arch: As in `train`.
-            progress: Called now and then with the share of the work that is done.
+            progress: Called with the share of the work that is done.
 
         Raises:
-            AntsError: The disk has no room for all of it, which is known at the beginning; a block
-                cannot be written, or an argument is not allowed.
+            AntsError: The disk has no room for all of it, or an argument is not allowed.
         """
         files.check_room(folder, self._bytes(folder))
         order, pieces = self.in_order, list(self.blocks())
         weights = [sum(p.weight for p in order[some]) * len(self.seeds[at]) for some, at in pieces]
         begun, total = 0.0, sum(weights)
         # What others go on from is kept, in as many pieces as these points have blocks.
-        befores = {getattr(point, "after", None) for point in order}
+        befores = {point.after for point in order}
         tables: dict[Any, list[np.ndarray]] = {}
         progress(0.0)
         for number, ((some, at), weight) in enumerate(zip(pieces, weights, strict=True)):
             points, seeds = tuple(one.of_seeds(at) for one in order[some]), self.seeds[at]
-            after = getattr(points[0], "after", None)
+            after = points[0].after
             learned = np.concatenate(tables[after])[at] if after else None
             part = _part(progress, begun / total, weight / total)
             where = {"threads": threads, "arch": arch}
@@ -409,14 +392,9 @@ class Study(Generic[PointKind]):
         )
 
     def read(self, folder: Path, points: Iterable[int]) -> Iterator[tuple[int, Outcome]]:
-        """Read some points from finished blocks, one block at a time in memory.
+        """Yield points, by their places in order, with their outcomes, from finished blocks.
 
-        Args:
-            folder: The folder of `in_blocks`, after all blocks are done.
-            points: Places among the points in order.
-
-        Yields:
-            The place of each point, in order, and its outcome.
+        One block at a time is in memory.
 
         Raises:
             AntsError: A block cannot be read any more.
@@ -438,13 +416,7 @@ def _joined(parts: Sequence[Outcome]) -> Outcome:
 
 
 class Block(NamedTuple):
-    """A part of a study.
-
-    Attributes:
-        points: Which of the points in order.
-        seeds: Which of the seeds.
-        outcome: Theirs, arrays (points, seeds, ...).
-    """
+    """Slices of the points in order and of the seeds; their outcome (points, seeds, ...)."""
 
     points: slice
     seeds: slice
@@ -457,7 +429,7 @@ def settings_of(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Any]
     What all points have in common is there once, all else as a list with an entry for each.
     """
     points = _in_order(points)
-    places: list[Any] = [place for one in points for place in (one.world, _pool(one)) if place]
+    places: list[Any] = [place for one in points for place in (one.world, one.pool) if place]
     worlds = list(dict.fromkeys(places))
     rows = [_facts(point, worlds, points) for point in points]
     columns = {name: [row.get(name) for row in rows] for row in rows for name in row}
@@ -475,8 +447,20 @@ def settings_of(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Any]
     }
 
 
+def world_facts(world: World) -> dict[str, Any]:
+    """A world in a few numbers, and a hash of all of it."""
+    digest, numbers = hashlib.sha256(), {}
+    for name in ("foods", "obstacles", "trails", "ants"):
+        array = getattr(world, name)
+        numbers[name] = len(array)
+        digest.update(repr(array.shape).encode())
+        digest.update(array.tobytes())
+    where = {"ranges": list(world.ranges), "queen": list(world.queen)}
+    return {**where, **numbers, "sha256": digest.hexdigest()}
+
+
 def _in_order(points: Sequence[AnyPoint]) -> tuple[AnyPoint, ...]:
-    pairs = ((getattr(point, "after", None), point) for point in points)
+    pairs: Any = ((point.after, point) for point in points)
     return tuple(dict.fromkeys(point for pair in pairs for point in pair if point))
 
 
@@ -493,10 +477,6 @@ def _pieces(first: int, end: int, size: int) -> Iterator[slice]:
 def _path(folder: Path, number: int) -> Path:
     """The file of a block."""
     return folder / f"{number:06d}.npz"
-
-
-def _pool(point: Point) -> tuple[World, ...] | None:
-    return getattr(point, "pool", None)
 
 
 def _facts(point: Point, worlds: list, points: Sequence[Point]) -> dict[str, Any]:

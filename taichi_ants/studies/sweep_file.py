@@ -6,7 +6,6 @@ import difflib
 import itertools
 import math
 import re
-import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -18,11 +17,6 @@ from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.settings import all_of, declared, flat, nested
 from taichi_ants.studies.runner import ColonyPoint, Point, RunPoint, Study
 from taichi_ants.task import Task
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
 _OF_FILE = ("kind", "seeds", "measures", "margin", "against", "vary")
@@ -37,12 +31,11 @@ class Sweep:
     """What a file asks for.
 
     Attributes:
-        kind: "runs" or "colony".
         study: The points over the seeds, in the order of `settings`.
         settings: What varies, for each point of the study.
         grids: Which of these each [vary] makes.
         measures: Names of measures, the first of which is drawn.
-        against: The setting and its value with which all others are compared, if any.
+        against: The setting and its value with which all others are compared.
         margin: The difference in the first measure that does not matter.
     """
 
@@ -56,18 +49,14 @@ class Sweep:
 
 
 def read_sweep(path: Path, measures: Mapping[str, Mapping[str, Any]]) -> Sweep:
-    """The sweep of a file.
-
-    Args:
-        path: The file.
-        measures: All measures, by kind and name; their `episodes` are the fewest that they need.
+    """Read a sweep; `measures` are all measures by kind and name, with the `episodes` they need.
 
     Raises:
         AntsError: The file cannot be read, or asks for something that cannot be.
     """
     text = files.read_text(path)
     try:
-        file = tomllib.loads(text)
+        file = files.tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise AntsError(f"{str(path)!r} is no TOML: {error}; mend the file.") from error
     try:

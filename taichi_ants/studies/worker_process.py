@@ -26,12 +26,8 @@ _SERVE = "from taichi_ants.studies.worker_process import serve; serve()"
 class WorkerProcess:
     """A process that does one call after the other, until the `with` block ends.
 
-    What it cannot do, this process does when the answer is wanted: where there is one processor
-    only, where no second process can be had, and where the call raises. So calls must be such that
-    they can be done twice.
-
-    Args:
-        second: Whether there is a second process at all.
+    This process does what that one cannot: where there is one processor, where no process can be
+    started, and where a call raises. So a call may be done twice.
     """
 
     def __init__(self, second: bool = True) -> None:
@@ -54,11 +50,7 @@ class WorkerProcess:
     def begin(
         self, call: Callable[Given, Answer], *arguments: Given.args, **named: Given.kwargs
     ) -> Callable[[], Answer]:
-        """Have a call done, of a function of a module, after those that have begun before.
-
-        Returns:
-            A function that waits for what the call returns; it raises what the call raises.
-        """
+        """Have a call of a module's function done after those before; return what waits for it."""
         here = partial(call, *arguments, **named)
         if not self._second:
             return here

@@ -264,7 +264,8 @@ def test_behaviours_are_those_of_the_policies(finished):
 
 @pytest.mark.parametrize(("training", "greedy"), [("on", "off"), ("off", "off")])
 def test_evaporation_is_chosen_told_and_kept_apart(training, greedy, tmp_path, compare):
-    flags = ["--train-evaporation", training, "--eval-evaporation", greedy]
+    flags = ["--task.evaporation-in-training", str(training == "on").lower()]
+    flags += ["--task.evaporation-in-evaluation", str(greedy == "on").lower()]
     out = tmp_path / "out"
     assert compare(*TINY, "--episodes", 30, *flags, "--out", out)[0] == 0
     (row,) = read_csv(out / "summary.csv")
@@ -440,7 +441,7 @@ def test_altered_results_are_not_shown_as_if_whole(name, copy, compare):
         (["--episodes", 61], "episodes"),
         (["--max-steps", 46], "max_steps"),
         (["--discounts", 0.9], "training.discount"),
-        (["--world", "open", "--world-seed", 3], "worlds"),
+        (["--world", "open", "--world.seed", 3], "worlds"),
     ],
 )
 def test_other_settings_do_not_mix_with_results(change, named, copy, compare):
@@ -480,7 +481,7 @@ def test_quick_takes_few_seeds_and_a_folder_of_its_own(tmp_path, compare, monkey
 
 @pytest.mark.parametrize("world", ["open", "garden"])
 def test_other_worlds(world, tmp_path, compare):
-    chosen = ["--world", GARDEN] if world == "garden" else ["--world", "open", "--world-seed", 5]
+    chosen = ["--world", GARDEN] if world == "garden" else ["--world", "open", "--world.seed", 5]
     status, _, err = compare(*TINY, *chosen, "--out", tmp_path / "out")
     assert (status, err) == (0, "")
     name = "garden.txt" if world == "garden" else "open, world seed 5"
@@ -522,7 +523,7 @@ def test_a_learner_of_ones_own_and_a_discount_of_one_are_reported(tmp_path, comp
 
 def test_all_learners_of_the_library_can_be_compared(tmp_path, compare):
     names = ["expected_sarsa", "dyna_q", "sarsa_lambda"]
-    more = ["--hyperparameter", "trace_decay=0.5"]
+    more = ["--training.trace-decay", "0.5"]
     status, out, _ = compare(*TINY, "--learners", *names, *more, "--out", tmp_path / "out")
     rows = read_csv(tmp_path / "out" / "summary.csv")
     assert status == 0

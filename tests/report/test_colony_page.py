@@ -9,8 +9,7 @@ from finished_pages import colony_html, study_results
 from pages import addresses, tables
 from synthetic_colony_study import build
 
-from taichi_ants.analysis.colony.results import Results
-from taichi_ants.analysis.colony.tables import difference_rows, rows_of_seeds
+from taichi_ants.analysis.colony.tables import Results, difference_rows, rows_of_seeds
 from taichi_ants.analysis.tables import number, sentence
 from taichi_ants.report.colony import colony_page
 from taichi_ants.report.page import signed

@@ -13,7 +13,7 @@ from synthetic_comparison import build, subset, unchanged
 
 from taichi_ants.analysis.paper.audit import HEADLINES, claims_rows
 from taichi_ants.analysis.paper.comparison import Variant
-from taichi_ants.analysis.paper.results import Results
+from taichi_ants.analysis.paper.report import Results
 from taichi_ants.analysis.tables import number
 from taichi_ants.report.comparison import comparison_page
 from taichi_ants.report.page import setting_facts, signed

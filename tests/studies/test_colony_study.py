@@ -98,8 +98,6 @@ def test_a_colony_is_held_against_the_bound_of_its_own_world(planned) -> None:
     assert np.isnan(found[elsewhere]["of_bound"]).all()
 
 
-def test_an_unknown_arena_is_named() -> None:
-    with pytest.raises(
-        AntsError, match="the kind of world is 'moon'; it must be one of paper, open"
-    ):
+def test_an_unknown_kind_of_world_is_named() -> None:
+    with pytest.raises(AntsError, match="kind of world is 'moon'; it must be one of paper, open"):
         plan(["moon"], (1,), SEEDS, SARSA, 2, 10, 1)

@@ -11,8 +11,8 @@ import pytest
 from taichi_ants import AntsError, Colony, TrainingConfig, evaluate, train
 from taichi_ants.files import archives
 from taichi_ants.studies import runner
-from taichi_ants.studies.provenance import commit, provenance, world_facts
-from taichi_ants.studies.runner import EVALUATION_SEEDS, ColonyPoint, RunPoint, Study
+from taichi_ants.studies.result_folder import commit, provenance
+from taichi_ants.studies.runner import EVALUATION_SEEDS, ColonyPoint, RunPoint, Study, world_facts
 from taichi_ants.task import Life, Pheromone, Rewards, Task
 from taichi_ants.worlds import World, open_world, paper
 

@@ -11,11 +11,11 @@ from synthetic_comparison import build, change, unchanged
 from taichi_ants import Colony, Task, TrainingConfig, worlds
 from taichi_ants.analysis.bounds.baselines import Baseline
 from taichi_ants.analysis.colony.figures import draw_all as draw_study
-from taichi_ants.analysis.colony.results import Results as StudyResults
+from taichi_ants.analysis.colony.tables import Results as StudyResults
 from taichi_ants.analysis.drawings import drawings
 from taichi_ants.analysis.paper.figures import draw_all
 from taichi_ants.analysis.paper.published import DYNA_P5
-from taichi_ants.analysis.paper.results import Results
+from taichi_ants.analysis.paper.report import Results
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.rendering import Episode
 from taichi_ants.report.colony import colony_page

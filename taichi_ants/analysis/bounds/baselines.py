@@ -19,11 +19,8 @@ from taichi_ants.worlds.world import World
 class Baseline(NamedTuple):
     """What a policy brings in an episode, a row of baselines.csv.
 
-    Attributes:
-        baseline: Its name.
-        discount: The discount factor for which it is optimal; None for other policies.
-        return_mean, steps_mean, deliveries_mean: Its outcome; None if it is not known.
-        note: How it was computed, or why it is not known.
+    `discount` is the one for which it is optimal; means are None if unknown; `note` says how they
+    were computed, or why they are not known.
     """
 
     baseline: str
@@ -56,13 +53,7 @@ def policy_rows(
 ) -> list[Baseline]:
     """Return what the random policy and the trail follower bring.
 
-    Args:
-        world: The world.
-        task: What is paid, and whether trails evaporate in training; so they do here.
-        evaluate: What rolls out policies, such as `taichi_ants.evaluate`.
-        seeds: The seeds of the rollouts.
-        rollouts: Rollouts for each seed.
-        max_steps: The step limit of an episode.
+    Trails evaporate as in training; `evaluate` rolls out policies, such as `taichi_ants.evaluate`.
     """
     rows = []
     # Both policies are tables of the paper's observation.
@@ -92,11 +83,8 @@ def bound_rows(
 ) -> list[Baseline]:
     """Return the exact bounds, or one row whose note says why there are none.
 
-    Args:
-        world: The world.
-        task: What is paid, and whether trails evaporate in training; so they do here.
-        discounts: Discount factors whose optimal policies are wanted.
-        max_steps: The step limit of an episode.
+    Trails evaporate as in training; the optimal policies of the discounts are followed for
+    `max_steps`.
     """
     try:
         bounds = EpisodeBounds(world, task)

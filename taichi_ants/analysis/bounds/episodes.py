@@ -41,13 +41,7 @@ _ABSOLUTE_TOLERANCE = 1e-14
 
 @dataclass(frozen=True)
 class Outcome:
-    """What an episode yields; means where a pick-up chooses among several foods.
-
-    Attributes:
-        episode_return: Undiscounted sum of rewards, the episode's return.
-        steps: Length of the episode, in steps.
-        deliveries: 1 if it ends with a delivery, 0 if at the step limit.
-    """
+    """Undiscounted return, steps and deliveries (0 or 1) of an episode; means over chances."""
 
     episode_return: float
     steps: float

@@ -7,24 +7,8 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from taichi_ants.analysis import style
-from taichi_ants.analysis.colony.study import (
-    ABC,
-    ABROAD,
-    ALONE,
-    BC,
-    EVALUATION_EPSILON,
-    FEW,
-    JOINT,
-    MEASURES,
-    PAPER,
-    QUEUES,
-    RULES,
-    SOME,
-    WORLD_KINDS,
-    WORLDS,
-    A,
-    Design,
-)
+from taichi_ants.analysis.colony import study
+from taichi_ants.analysis.colony.study import Design
 from taichi_ants.analysis.colony.tables import ConditionRow
 from taichi_ants.analysis.findings import seeds_in_words
 from taichi_ants.analysis.sweeps import draw_lines
@@ -45,27 +29,29 @@ def draw_all(rows: Rows) -> dict[str, Figure]:
 
 def rules(rows: Rows) -> Figure | None:
     """What the largest colony delivers under each of the rules."""
-    designs = [Design(rules) for rules in RULES]
+    designs = [Design(rules) for rules in study.RULES]
     return _dots(rows, designs, "What each rule adds")
 
 
 def training(rows: Rows) -> Figure | None:
     """What the largest colony delivers after training with so many ants."""
     designs = [
-        Design(rules, regime) for rules in (PAPER, ABC) for regime in (ALONE, FEW, SOME, JOINT)
+        Design(rules, regime)
+        for rules in (study.PAPER, study.ABC)
+        for regime in (study.ALONE, study.FEW, study.SOME, study.JOINT)
     ]
     return _dots(rows, designs, "With how many ants to train")
 
 
 def elsewhere(rows: Rows) -> Figure | None:
     """What ants deliver in other worlds than those of their training."""
-    designs = [Design(rules, ABROAD) for rules in (PAPER, ABC, QUEUES)]
+    designs = [Design(rules, study.ABROAD) for rules in (study.PAPER, study.ABC, study.QUEUES)]
     return _dots(rows, designs, "Trained in open worlds, in others")
 
 
 def scaling(rows: Rows) -> Figure | None:
     """Deliveries against the number of ants."""
-    designs = [Design(rules) for rules in (PAPER, A, BC, ABC, QUEUES)]
+    designs = [Design(rules) for rules in (study.PAPER, study.A, study.BC, study.ABC, study.QUEUES)]
     return _lines(rows, designs, ("deliveries", "per_ant"), "More ants: what a colony delivers")
 
 
@@ -88,12 +74,12 @@ def _dots(rows: Rows, designs: Sequence[Design], title: str) -> Figure | None:
     across = min(3, len(panels))
     down = -(-len(panels) // across)
     alike = len({one.regime for one in designs}) == 1  # then the title says it
-    names = [RULES[one.rules] if alike else one.words for one in designs]
+    names = [study.RULES[one.rules] if alike else one.words for one in designs]
     with style.styled():
         figure = style.new_figure(1.3 + down * (0.9 + 0.28 * len(designs)))
         axes = figure.subplots(down, across, sharey=True, squeeze=False)
         for axis, (world_kind, lines) in zip(axes.flat, panels.items(), strict=False):
-            axis.set_title(textwrap.fill(sentence(WORLDS[world_kind]), 32), fontsize=9)
+            axis.set_title(textwrap.fill(sentence(study.WORLDS[world_kind]), 32), fontsize=9)
             for design, row in lines.items():
                 _dot(axis, designs.index(design), row)
             axis.set_xlim(left=0)
@@ -108,7 +94,7 @@ def _dots(rows: Rows, designs: Sequence[Design], title: str) -> Figure | None:
             f"{sizes}. {_spread(rows)} Thin line: from the worst seed to the best. Grey: the "
             "bounds of the worlds, from the lowest to the highest; bar: their mean."
         )
-        title = f"{title}: {MEASURES['deliveries']}"
+        title = f"{title}: {study.MEASURES['deliveries']}"
         style.frame(figure, title, textwrap.fill(caption, 120), {})
     return figure
 
@@ -132,7 +118,7 @@ def _lines(
 ) -> Figure | None:
     """Measures against the number of ants, a column of panels for each kind of world."""
     world_kinds = [
-        one for one in WORLD_KINDS if any(row.condition.world_kind == one for row in rows)
+        one for one in study.WORLD_KINDS if any(row.condition.world_kind == one for row in rows)
     ]
     if not world_kinds:
         return None
@@ -141,14 +127,14 @@ def _lines(
         shape = len(measures), len(world_kinds)
         axes = figure.subplots(*shape, sharex="col", sharey="row", squeeze=False)
         for line_of_axes, measure in zip(axes, measures, strict=True):
-            line_of_axes[0].set_ylabel(textwrap.fill(sentence(MEASURES[measure]), 30))
+            line_of_axes[0].set_ylabel(textwrap.fill(sentence(study.MEASURES[measure]), 30))
             for axis, world_kind in zip(line_of_axes, world_kinds, strict=True):
                 of_world_kind = [row for row in rows if row.condition.world_kind == world_kind]
                 draw_lines(
                     axis, {one.words: _points(of_world_kind, one, measure) for one in designs}
                 )
         for column, world_kind in zip(axes.T, world_kinds, strict=True):
-            column[0].set_title(sentence(WORLD_KINDS[world_kind]), fontsize=9)
+            column[0].set_title(sentence(study.WORLD_KINDS[world_kind]), fontsize=9)
             column[-1].set_xlabel("Ants")
         style.frame(figure, title, _spread(rows), style.legend_entries(axes.flat))
     return figure
@@ -158,7 +144,7 @@ def _spread(rows: Rows) -> str:
     """The seeds, the intervals and the exploration rate, for a caption."""
     seeds = rows[0].seeds
     means = f"Means over {seeds_in_words(seeds)}, with 95 % intervals" if seeds > 1 else "One seed"
-    return f"{means}. Exploration rate {EVALUATION_EPSILON:g}."
+    return f"{means}. Exploration rate {study.EVALUATION_EPSILON:g}."
 
 
 def _points(rows: Rows, design: Design, measure: str) -> list[tuple[float, ...]]:

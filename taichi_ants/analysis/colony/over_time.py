@@ -38,16 +38,7 @@ def rates(totals: Sequence[Totals]) -> Rates:
 
 
 def save(rows: Rates, who: str, path: PathLike) -> None:
-    """Write the figure (.png), and its rows beside it (.csv).
-
-    Args:
-        rows: Of `rates`.
-        who: Whose deliveries these are, for the title.
-        path: The figure.
-
-    Raises:
-        AntsError: A file cannot be written.
-    """
+    """Write the figure (.png) of `rates`, and its rows beside it (.csv); the title says whose."""
     check_writable_folder(Path(path).parent)
     write_csv(numbers_beside(path), rows, COLUMNS)
     style.save(draw(rows, who), Path(path))

@@ -1,9 +1,8 @@
 """What the study of the colony compares, and what it measures.
 
-A condition is so many ants of a design in one kind of world. A design is the rules of the game and
-a training regime. Seeds are the unit of all statistics; they pair the conditions of a kind of
-world, since a seed gives all of them the same world. But in the paper's world, ants are evaluated
-in worlds that none has seen before.
+A condition is so many ants of a design (rules and a training regime) in one kind of world. A seed
+gives all conditions of a kind of world the same world, and so pairs them; except in the paper's,
+no ant has seen it before.
 """
 
 from __future__ import annotations
@@ -100,16 +99,11 @@ Measured = Mapping[Condition, Mapping[str, np.ndarray]]
 
 
 def measures_of(outcome: Mapping[str, np.ndarray], ants: int, ticks: int) -> dict[str, np.ndarray]:
-    """Return the `MEASURES` of each seed, float64 (seeds,).
+    """Return the `MEASURES` of each seed, float64 (seeds,), from the outcome of a `ColonyPoint`.
 
     An episode without a delivery counts with all its ticks for `first_delivery`: the mean is that
     of the time to the first delivery or the end, whichever comes first (the restricted mean of
     survival analysis), and never too large. `no_delivery_rate` tells how often this was so.
-
-    Args:
-        outcome: That of a `ColonyPoint`, integer arrays (seeds, episodes) by name.
-        ants: How many there are.
-        ticks: Ticks of each episode.
     """
     deliveries, rewards = (
         outcome[name].mean(axis=1, dtype=float) * 1000 / ticks for name in ("deliveries", "returns")

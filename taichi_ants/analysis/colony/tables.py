@@ -8,7 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from taichi_ants.analysis.colony.contrasts import QUESTIONS, SERIES, Judged, Series, Sizes
+from taichi_ants.analysis.colony.contrasts import (
+    QUESTIONS,
+    SERIES,
+    Judged,
+    Series,
+    Sizes,
+    judge_all,
+)
 from taichi_ants.analysis.colony.study import (
     ABC,
     ABROAD,
@@ -53,11 +60,8 @@ def _stacked(measured: Measured) -> dict[str, np.ndarray]:
 class ConditionRow(NamedTuple):
     """A condition over all seeds, a row of conditions.csv.
 
-    Attributes:
-        condition: The condition.
-        seeds: The number of seeds.
-        estimates: The measures of `OF_STUDY` over seeds.
-        ranges: The least and the greatest value of deliveries and bounds over seeds.
+    `estimates` are the measures of `OF_STUDY`; `ranges` the least and greatest value of deliveries
+    and bounds.
     """
 
     condition: Condition
@@ -121,10 +125,9 @@ def difference_rows(judged: Judged) -> list[dict[str, Any]]:
 
 
 def means(rows: Sequence[ConditionRow]) -> list[Table]:
-    """Return tables of mean deliveries.
+    """Return tables of mean deliveries: for each kind of world, designs down, ants across.
 
-    One for each kind of world in which ants were trained, designs down, ants across; then one of
-    the policies of open worlds in others, with intervals and the worst seed.
+    The last is of the policies of open worlds in others, with intervals and the worst seed.
     """
     tables, seeds = [], f"{_basis(rows)}: {MEASURES['deliveries']}"
     for world_kind in WORLD_KINDS:
@@ -179,10 +182,7 @@ def _spread(row: ConditionRow) -> str:
 
 
 def glance(rows: Sequence[ConditionRow]) -> Table:
-    """Return what the largest colonies deliver: designs down, kinds of world across.
-
-    It has no rows where none are trained.
-    """
+    """Return what the largest colonies deliver: designs down, kinds of world across."""
     largest = max((one.condition.ants for one in rows if one.design.regime != ABROAD), default=0)
     shown = {
         (one.condition.world_kind, one.design): one
@@ -212,13 +212,14 @@ def glance(rows: Sequence[ConditionRow]) -> Table:
             for world_kind in world_kinds
         ]
         cells.append(["Mean bound, right of way [range]", *map(_bounds, bounds)])
-    headers = (
-        "",
-        *(sentence(WORLD_KINDS[world_kind]).replace(" (", "\n(") for world_kind in world_kinds),
-    )
+    headers = ("", *_headers(world_kinds))
     title = f"{sentence(MEASURES['deliveries'])} of {count(largest, 'ant')}"
     note = f"{_basis(rows)}; in brackets: 0. %: of each world's own bound."
     return Table(title, headers, cells, [note] if cells else [])
+
+
+def _headers(world_kinds: Sequence[str]) -> list[str]:
+    return [sentence(WORLD_KINDS[one]).replace(" (", "\n(") for one in world_kinds]
 
 
 def _delivered(row: ConditionRow | None, digits: int) -> str:
@@ -256,10 +257,7 @@ def headlines(rows: Sequence[ConditionRow], judged: Judged) -> Table:
                 line.append(f"{verdict}\n{n}: {' against '.join(means)}")
         if len(line) == len(world_kinds) > 0:
             cells.append([sentence(series.statement), *line])
-    headers = (
-        "Statement",
-        *(sentence(WORLD_KINDS[world_kind]).replace(" (", "\n(") for world_kind in world_kinds),
-    )
+    headers = ("Statement", *_headers(world_kinds))
     note = (
         "Below the verdict: the number of ants, and the means compared, in "
         f"{MEASURES['deliveries']}. {_basis(rows)}."
@@ -356,3 +354,29 @@ def _verdicts(
     example += "" if less == n else f" with {less}"
     example += f" ({100 * (one / other - 1):+.0f} %)" if min(one, other) > 0 else ""
     return [*cells, example]
+
+
+class Results(NamedTuple):
+    """The conditions over all seeds, and the findings."""
+
+    rows: Sequence[ConditionRow]
+    judged: Judged
+
+    @classmethod
+    def of(cls, measured: Measured) -> Results:
+        """Return the results that follow from all measures."""
+        return cls(condition_rows(measured), judge_all(measured))
+
+    @classmethod
+    def read(cls, seeds: Sequence[Mapping]) -> Results:
+        """Return the same from the rows of seeds.csv."""
+        by_condition: dict[Condition, list[Mapping]] = {}
+        for row in seeds:
+            condition = Condition(row["world_kind"], row["rules"], row["regime"], int(row["ants"]))
+            by_condition.setdefault(condition, []).append(row)
+        return cls.of(
+            {  # an empty field is None, which is nan as a float
+                one: {name: np.array([row[name] for row in rows], float) for name in OF_STUDY}
+                for one, rows in by_condition.items()
+            }
+        )

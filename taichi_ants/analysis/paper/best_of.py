@@ -1,8 +1,7 @@
 """What choosing the best of several configurations does to a reported figure.
 
-The paper trains each configuration once and reports, for each algorithm, the one of its 16 with
-the highest return. `best_of` repeats exactly that with every seed we have: how far would the
-reported figures have varied by luck?
+The paper trains each configuration once, and reports for each algorithm the best of 16 by return.
+`best_of` repeats that with every seed: how far would the figures have varied by luck?
 """
 
 from __future__ import annotations
@@ -57,11 +56,10 @@ def shown_position(comparison: Comparison, delivery: str, variant: Variant) -> i
 
 
 def examples(comparison: Comparison) -> list[tuple[int, int]]:
-    """Runs to look at: for each delivery setting and learner one of each behaviour.
+    """Return runs to look at, as row and place of the seed: one of each behaviour of each learner.
 
-    They are of the configuration that stands for the learner. A behaviour that none of these shows
-    is shown by the configuration in which it is most frequent. Of the runs that behave alike, the
-    one of median return is taken. Each is told by its row and the position of its seed.
+    They are of the configuration that stands for the learner, else of the one in which the
+    behaviour is most frequent; of the runs that behave alike, the one of median return.
     """
     codes = comparison.behaviours
     shown = [shown_position(comparison, *learner) for learner in comparison.learners]

@@ -80,14 +80,10 @@ class Comparison:
     """Configurations times seeds, trained and evaluated.
 
     Attributes:
-        rows: The configurations, each once.
-        seeds: The seeds, at least one.
         measures: `MEASURES` of each run by name, float64 (rows, seeds).
-        behaviours: What each final policy does, places in `behaviour.BEHAVIOURS`, integer
-            (rows, seeds).
+        behaviours: What each final policy does, places in `BEHAVIOURS`, integer (rows, seeds).
         policy_returns: What the ant earned in the episode that told so, integer (rows, seeds).
-        episodes: Training episodes of a run.
-        rollouts: Greedy rollouts of a run.
+        episodes, rollouts: Training episodes and greedy rollouts of a run.
         max_steps: Limit of an episode in steps.
         curves: Learning curves of the learners, see `curves.learning_curves`.
         task: The rules of all rows, except the delivery.

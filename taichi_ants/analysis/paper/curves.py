@@ -37,13 +37,8 @@ def learning_curves(
     """Return the curves of all `comparison.learners`, float64 (learners, 3, spans) by name.
 
     The second axis is the interquartile mean over seeds and the ends of the middle half of the
-    seeds. Of deliveries it is the mean: a run of an episode delivers or does not, so that there is
-    no typical half to average.
-
-    Args:
-        comparison: The comparison.
-        outcomes: Rows in any order, each with its arrays (seeds, episodes) by name; those of
-            `curve_row` must be among them.
+    seeds; of deliveries the mean, as a run of an episode delivers or does not. `outcomes` are rows
+    with arrays (seeds, episodes) by name, those of `curve_row` among them.
     """
     places = [curve_row(comparison, *learner) for learner in comparison.learners]
     edges = spans(comparison.episodes)

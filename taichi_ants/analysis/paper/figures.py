@@ -1,9 +1,4 @@
-"""The figures of a comparison.
-
-Each function takes data and returns a matplotlib Figure; `style` writes them as files, and as
-markup for pages. Figures are made without pyplot, so nothing global changes and no window system is
-needed.
-"""
+"""The figures of a comparison; without pyplot, so that nothing global changes."""
 
 from __future__ import annotations
 
@@ -44,10 +39,8 @@ BEHAVIOUR_LOOKS = ((BLUE, "o"), (ORANGE, "^"), (WINE, "s"), (INK, "x"))
 def learning_curves(comparison: Comparison, baselines: Sequence[Baseline] = ()) -> Figure:
     """Return, length and deliveries per episode, a column for each delivery setting.
 
-    Learners are shown at the configuration that stands for the paper's figure 1, one that lacks it
-    at the one that stands for it in table 2. A point is the mean over a span of episodes; lines are
-    interquartile means over seeds, bands the middle half of the seeds. Of the rows of baselines.csv
-    the shortest delivery is drawn.
+    Learners are shown at the configuration of figure 1, else of table 2. A point is the mean over a
+    span of episodes; lines are interquartile means over seeds, bands the middle half of the seeds.
     """
     colours = dict(zip(comparison.variants, cycle(COLOURS)))
     settings = comparison.delivery_settings
@@ -91,11 +84,7 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Baseline] = ()) 
 
 
 def return_against_deliveries(comparison: Comparison, baselines: Sequence[Baseline] = ()) -> Figure:
-    """Who earns reward by delivering, and what the others do instead: a mark for each run.
-
-    Of the rows of baselines.csv the optimal policies, for which delivery is the end, are shown only
-    in the panel of deliveries that terminate.
-    """
+    """Who earns reward by delivering, and what the others do instead: a mark for each run."""
     settings = comparison.delivery_settings
     returns = comparison.measures["return_last50"]
     deliveries = comparison.measures["deliveries_last50"]
@@ -150,9 +139,5 @@ def _baseline_marks(axis: Axes, baselines: Sequence[Baseline], setting: str) -> 
         x, y = row.deliveries_mean, row.return_mean
         if x is not None and y is not None and counts_here:
             axis.plot(
-                *(x, y, marker),
-                color=INK,
-                markerfacecolor="none",
-                markersize=11,
-                label=row.label,
+                *(x, y, marker), color=INK, markerfacecolor="none", markersize=11, label=row.label
             )

@@ -36,11 +36,7 @@ Compute = Callable[[Outcome], np.ndarray]
 class Measure:
     """A number of a run.
 
-    Attributes:
-        words: What it is, for readers.
-        unit: Its unit.
-        compute: Outcome -> float64 (...).
-        episodes: The fewest training episodes that it needs.
+    `compute` is outcome -> float64 (...); `episodes` the fewest training episodes.
     """
 
     words: str
@@ -55,13 +51,9 @@ class Measure:
 
 
 def measures_of_runs(outcome: Outcome, names: Iterable[str] | None = None) -> dict[str, np.ndarray]:
-    """Return measures of runs by name, float64 (points, seeds).
+    """Return measures of runs by name, float64 (points, seeds), from arrays (points, seeds, ...).
 
-    They are nan where the runs have fewer episodes than a measure needs.
-
-    Args:
-        outcome: Arrays (points, seeds, episodes or rollouts) by name, as of a `RunPoint`.
-        names: Names in `MEASURES`; None: all of them.
+    They are nan where the runs have fewer episodes than a measure needs. None: all of them.
     """
     *shape, episodes = outcome["returns"].shape
     return {

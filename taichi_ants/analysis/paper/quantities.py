@@ -62,12 +62,7 @@ class Slice(NamedTuple):
 
 
 class Read(NamedTuple):
-    """How a learner's number is read.
-
-    Attributes:
-        words: From which configurations.
-        values: (slice, measure, learner) -> float64 (seeds,).
-    """
+    """A learner's number, (slice, measure, learner) -> float64 (seeds,), and its words."""
 
     words: str
     values: Callable[[Slice, str, Variant], np.ndarray]
@@ -129,7 +124,6 @@ class Quantity:
 
     Attributes:
         words: What is computed, without what is subtracted from what, from which configurations.
-        unit: The unit.
         effects: What reads them, by label, such as "Q-learning minus SARSA".
         possible: The range that the numbers cannot leave.
         of_estimates: As of a `Contrast`; then `effects` read float64 (k, seeds).
@@ -181,10 +175,7 @@ def _reader(read: Read, measure: str, variant: Variant) -> Effect:
 
 
 def _quantity(
-    scope: str,
-    measure: str,
-    effects: dict[str, Effect],
-    bounds: tuple[float, float] = UNBOUNDED,
+    scope: str, measure: str, effects: dict[str, Effect], bounds: tuple[float, float] = UNBOUNDED
 ) -> Quantity:
     """A quantity in the unit of a measure; the bounds are those of a share or a count."""
     one = MEASURES[measure]
@@ -202,6 +193,9 @@ def share_above(measure: str, first: Variant, second: Variant, below: bool = Fal
     label = f"{first.label} {'below' if below else 'above'} {second.label}"
     words = f"{MEASURES[measure].words}, in which share of 16 matched configurations of a seed"
     return Quantity(words, "share of 16 pairs", {label: share}, SHARE)
+
+
+share_below = partial(share_above, below=True)
 
 
 def growth(later: str, earlier: str, *variants: Variant) -> Quantity:

@@ -6,22 +6,21 @@ It shows what the other tables hold, and computes nothing.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS, counts
 from taichi_ants.analysis.bounds.baselines import Baseline
-from taichi_ants.analysis.paper.audit import Audit, claims_tallies, headlines
+from taichi_ants.analysis.paper.audit import Audit, assess, claims_tallies, headlines
 from taichi_ants.analysis.paper.comparison import Comparison
 from taichi_ants.analysis.paper.published import GREEDY_RETURN, GREEDY_STEPS
-from taichi_ants.analysis.paper.summary import BehaviourMeans
-from taichi_ants.analysis.paper.table2 import APART, Line, figure_tables
-from taichi_ants.analysis.tables import (
-    Block,
-    Table,
-    markdown,
-    number,
-    plain_text,
-    thousands,
+from taichi_ants.analysis.paper.summary import (
+    BehaviourMeans,
+    Summary,
+    summarise,
+    summarise_behaviours,
 )
+from taichi_ants.analysis.paper.table2 import APART, Line, figure_tables, table2
+from taichi_ants.analysis.tables import Block, Table, markdown, number, plain_text, thousands
 from taichi_ants.errors import count
 
 WIDTH = 79  # columns: what the narrowest common terminal shows
@@ -98,7 +97,7 @@ def _glance(lines: Sequence[Line]) -> Table:
         )
     notes = [
         "Return and food of the last 50 episodes, steps of all. IQM: interquartile mean, the "
-        "IQM. Best run: best by return of all configurations, one run each.",
+        "IQM. Best run: best by return of all configurations, one run each."
     ]
     if any(line.summary.estimates["return_last50"].apart for line in shown):
         notes.append(f"{APART} a few far runs have moved the mean away from the IQM.")
@@ -174,3 +173,21 @@ def _baselines(baselines: Sequence[Baseline]) -> Table:
             rows.append([one.label, *lengths, number(one.deliveries_mean, 2)])
     headers = ("Behaviour", "Return", "Steps", "Deliveries")
     return Table("Baselines, with evaporation as in training", headers, rows, notes)
+
+
+class Results(NamedTuple):
+    """A comparison, the rows of `bounds.baselines`, and the tables that follow from them."""
+
+    comparison: Comparison
+    baselines: Sequence[Baseline]
+    summaries: Sequence[Summary]
+    behaviours: Sequence[BehaviourMeans]
+    lines: Sequence[Line]
+    audit: Audit
+
+    @classmethod
+    def of(cls, comparison: Comparison, baselines: Sequence[Baseline]) -> Results:
+        """Return the results of a comparison."""
+        summaries = summarise(comparison)
+        lines, behaviours = table2(comparison, summaries), summarise_behaviours(comparison)
+        return cls(comparison, baselines, summaries, behaviours, lines, assess(comparison))

@@ -19,11 +19,7 @@ _MEASURES = ("return_last50", "steps_last50", "steps_all", "deliveries_last50", 
 class Summary(NamedTuple):
     """A configuration over all seeds, a row of summary.csv.
 
-    Attributes:
-        row: The configuration.
-        seeds: The number of seeds.
-        estimates: Measures over seeds, by name.
-        runs: The number of runs by what their final policies do, a place in `BEHAVIOURS`.
+    `estimates` are measures over seeds; `runs` the number of runs by place in `BEHAVIOURS`.
     """
 
     row: Row
@@ -47,15 +43,9 @@ class Summary(NamedTuple):
 
 
 class BehaviourMeans(NamedTuple):
-    """The runs of a configuration that do the same, a row of behaviours.csv.
+    """The runs of a configuration with one behaviour, a row of behaviours.csv.
 
-    Attributes:
-        row: The configuration.
-        behaviour: A place in `BEHAVIOURS`.
-        runs: The number of runs.
-        return_last50_mean: Return of the last 50 training episodes.
-        policy_return_mean: Return of the episode that told the behaviour.
-        greedy_return_mean, greedy_steps_mean, greedy_deliveries_mean: Means of greedy rollouts.
+    Means: of the last 50 training episodes, of the episode that told the behaviour, of rollouts.
     """
 
     row: Row

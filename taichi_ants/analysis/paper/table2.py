@@ -1,8 +1,7 @@
 """The paper's table 2, beside ours.
 
-Two answers to each of its rows, for each delivery setting: the same configuration over all our
-seeds, and what the paper's way of reporting (train each configuration once, report the best by
-return) would have given had it been repeated with other seeds.
+Each row twice, for each delivery setting: the same configuration over all our seeds, and the
+paper's way (train each configuration once, report the best by return) with other seeds.
 """
 
 from __future__ import annotations
@@ -37,9 +36,8 @@ APART = "!"  # marks a mean that the interval of the IQM excludes
 class BestRun(NamedTuple):
     """A figure of the best run of all configurations, had each been trained once.
 
-    Attributes:
-        median, low, high: Over repetitions with other seeds, and the range from 2.5 % to 97.5 %.
-        paper_percentile: The percentage of them below the paper's figure; nan without one.
+    Over repetitions with other seeds: median, range from 2.5 % to 97.5 %, and the percentage below
+    the paper's figure, nan without one.
     """
 
     median: float
@@ -168,7 +166,7 @@ def _notes(lines: Sequence[Line], seeds: int, beside: bool) -> list[str]:
     if 1 < seeds < FEW_SEEDS:
         notes += [
             f"Few seeds ({seeds}): where one run in a hundred is far off, the interval of the mean "
-            "misses it more often than not. The IQM's holds from 10 seeds on (docs/statistics.md).",
+            "misses it more often than not. The IQM's holds from 10 seeds on (docs/statistics.md)."
         ]
     starred = [
         f"  {line.label}, {line.delivery}: {line.summary.row.point.label}"

@@ -5,16 +5,7 @@ from __future__ import annotations
 import pytest
 from synthetic_colony_study import Truth, build, proportional
 
-from taichi_ants.analysis.colony.contrasts import (
-    ADDS,
-    ELSEWHERE,
-    MORE,
-    QUESTIONS,
-    TRAIL,
-    TRAINING,
-    judge_all,
-)
-from taichi_ants.analysis.colony.results import Results
+from taichi_ants.analysis.colony.contrasts import QUESTIONS, judge_all
 from taichi_ants.analysis.colony.study import (
     ABC,
     ABC_SILENT,
@@ -30,9 +21,11 @@ from taichi_ants.analysis.colony.study import (
     A,
     Design,
 )
-from taichi_ants.analysis.colony.tables import condition_rows, found
+from taichi_ants.analysis.colony.tables import Results, condition_rows, found
 from taichi_ants.analysis.findings import Verdict
 from taichi_ants.analysis.tables import Table
+
+ADDS, TRAIL, MORE, TRAINING, ELSEWHERE = QUESTIONS
 
 
 def answer(question: str, truth: Truth = proportional, **settings: object) -> list[list[str]]:

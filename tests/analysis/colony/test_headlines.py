@@ -5,9 +5,8 @@ from __future__ import annotations
 import pytest
 from synthetic_colony_study import Truth, build, proportional
 
-from taichi_ants.analysis.colony.results import Results
 from taichi_ants.analysis.colony.study import ABC, JOINT, PAPER
-from taichi_ants.analysis.colony.tables import headlines, on_one_screen
+from taichi_ants.analysis.colony.tables import Results, headlines, on_one_screen
 from taichi_ants.analysis.tables import plain_text
 
 

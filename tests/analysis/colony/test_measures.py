@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from synthetic_colony_study import SIZES, build
 
-from taichi_ants.analysis.colony.contrasts import ADDS, MORE, judge_all
+from taichi_ants.analysis.colony.contrasts import QUESTIONS, judge_all
 from taichi_ants.analysis.colony.study import (
     ABC,
     ABROAD,
@@ -39,6 +39,8 @@ OUTCOME = {
     "blocked": np.array([[10, 10, 20], [0, 0, 0]], np.uint8),
     "returns": np.array([[600, 900, -300], [-30, -30, -60]], np.int16),
 }
+
+ADDS, _, MORE, *_ = QUESTIONS
 
 
 @pytest.mark.parametrize(
