@@ -17,12 +17,7 @@ def prepare_for_taichi() -> None:
     with one that cannot be written it crashes at exit: then HOME becomes a temporary folder for
     this process.
     """
-    warnings.filterwarnings(
-        "ignore",
-        ".*getlocale",
-        DeprecationWarning,
-        r"taichi\._lib\.utils",
-    )
+    warnings.filterwarnings("ignore", ".*getlocale", DeprecationWarning, r"taichi\._lib\.utils")
     if hasattr(os, "register_at_fork"):
         os.register_at_fork(after_in_child=_mark_forked_taichi)
     os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")

@@ -176,10 +176,7 @@ def _choices(rule: Rule, carries: bool, view: Sequence[str]) -> list[int]:
 
 
 def save_policy(
-    path: PathLike,
-    q_values: npt.ArrayLike,
-    metadata: Mapping[str, Any],
-    observation: str = "paper",
+    path: PathLike, q_values: npt.ArrayLike, metadata: Mapping[str, Any], observation: str = "paper"
 ) -> None:
     """Write a policy file: an .npz with the action values, their observation and what made them.
 

@@ -11,14 +11,7 @@ from taichi_ants import checks, runtime
 from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.engines.colony.state import ColonyEpisodes, ColonyState
 from taichi_ants.engines.colony.stepping import Stepper, chunks_of, usual_schedule
-from taichi_ants.errors import (
-    AntsError,
-    array_of,
-    check_one_of,
-    checked_whole,
-    entries_of,
-    shown,
-)
+from taichi_ants.errors import AntsError, array_of, check_one_of, checked_whole, entries_of, shown
 from taichi_ants.learners import get as get_learner
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task

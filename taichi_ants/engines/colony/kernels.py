@@ -16,13 +16,7 @@ import taichi as ti
 
 from taichi_ants.engines import views
 from taichi_ants.engines.colony import learning, life, steps, trail
-from taichi_ants.engines.colony.layout import (
-    GAVE_UP,
-    Barrier,
-    Order,
-    Stage,
-    WorldRow,
-)
+from taichi_ants.engines.colony.layout import GAVE_UP, Barrier, Order, Stage, WorldRow
 from taichi_ants.engines.plugin_check import checked_plugin
 from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.memory import read_rates

@@ -10,11 +10,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import runtime
-from taichi_ants.engines.colony.layout import (
-    GAVE_UP,
-    Barrier,
-    Order,
-)
+from taichi_ants.engines.colony.layout import GAVE_UP, Barrier, Order
 from taichi_ants.engines.colony.state import ColonyState
 
 # Slots from which threads share the ants of a world: of a single one, and of each of many.

@@ -16,24 +16,11 @@ from taichi_ants.engines.colony.layout import (
     FoodSourceRow,
     Tally,
 )
-from taichi_ants.engines.colony.trail import (
-    deposit,
-    level_in_view,
-    level_of,
-    level_that_counts,
-)
+from taichi_ants.engines.colony.trail import deposit, level_in_view, level_of, level_that_counts
 from taichi_ants.engines.views import judge
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.learners.memory import values_of
-from taichi_ants.task.constants import (
-    EMPTY,
-    FORWARD,
-    LEFT,
-    OBSTACLE,
-    PICK_UP,
-    RIGHT,
-    ROW,
-)
+from taichi_ants.task.constants import EMPTY, FORWARD, LEFT, OBSTACLE, PICK_UP, RIGHT, ROW
 from taichi_ants.task.events import Event
 from taichi_ants.task.rules.actions import (
     is_open,

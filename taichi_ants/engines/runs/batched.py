@@ -45,13 +45,7 @@ class BatchedEnvironments:
     """
 
     def __init__(
-        self,
-        worlds: Sequence[World],
-        task: Task,
-        n: int,
-        max_steps: int,
-        ends: str,
-        falls: bool,
+        self, worlds: Sequence[World], task: Task, n: int, max_steps: int, ends: str, falls: bool
     ) -> None:
         self.worlds, self.task, self.n = tuple(worlds), task, n
         self.arrays = self._laid_out(max_steps, ends, falls)

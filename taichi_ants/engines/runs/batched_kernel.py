@@ -19,12 +19,7 @@ from taichi_ants.engines.runs.step import (
     restore,
     state_seen,
 )
-from taichi_ants.task.constants import (
-    FOOD,
-    FORWARD,
-    PICK_UP,
-    QUEEN,
-)
+from taichi_ants.task.constants import FOOD, FORWARD, PICK_UP, QUEEN
 from taichi_ants.task.events import Event, Reason
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.rules.actions import step_towards

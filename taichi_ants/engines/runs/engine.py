@@ -172,8 +172,7 @@ class Launcher:
         learns, pheromone = runs.learner is not None, task.pheromone
         deposits, half = pheromone.numbers["deposits"], pheromone.view == "half"
         self._kernel = run_kernel(
-            *(runs.learner, task.sees, deposits, half, traced),
-            self._arguments.type_of(_NO_WORK),
+            *(runs.learner, task.sees, deposits, half, traced), self._arguments.type_of(_NO_WORK)
         )
         compile_once(self._kernel, lambda: Arguments().pack(_NO_WORK))
         falls = task.evaporation_in_training if learns else task.evaporation_in_evaluation

@@ -184,8 +184,7 @@ def run_kernel(
                 a.outcomes[DELIVERIES, i, episode] = ti.cast(ant.event == Event.DELIVERED, ti.i32)
                 restore(a, base, 0, a.cells[base + a.size], a.cells[base + a.size + 1])
                 exploration = ti.max(
-                    a.settings[first + MIN_EPSILON],
-                    exploration * a.settings[first + EPSILON_DECAY],
+                    a.settings[first + MIN_EPSILON], exploration * a.settings[first + EPSILON_DECAY]
                 )
                 rate = ti.max(
                     a.settings[first + MIN_LEARNING_RATE],

@@ -9,21 +9,10 @@ from taichi.math import popcnt
 
 from taichi_ants.engines.views import encode_function, is_percept, judge, view_type
 from taichi_ants.grid.constants import N_HEADINGS
-from taichi_ants.task.constants import (
-    FORWARD,
-    LEFT,
-    PICK_UP,
-    RIGHT,
-)
+from taichi_ants.task.constants import FORWARD, LEFT, PICK_UP, RIGHT
 from taichi_ants.task.events import Event
 from taichi_ants.task.observations import Observation
-from taichi_ants.task.rules.actions import (
-    is_open,
-    move_event,
-    step_towards,
-    turn,
-    turn_round,
-)
+from taichi_ants.task.rules.actions import is_open, move_event, step_towards, turn, turn_round
 from taichi_ants.task.rules.delivery import can_give, heading_after_delivery
 from taichi_ants.task.rules.pheromone import FADING, NONE, level_after_deposit, level_left
 from taichi_ants.task.rules.policy import bit_number, lowest_bit_number
