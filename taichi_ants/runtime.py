@@ -63,23 +63,19 @@ def _quota(places: tuple[tuple[str, ...], ...]) -> int:
 
 
 def start(threads: int | None = None, arch: str | None = None) -> Runtime:
-    """Start Taichi, or restart it if other settings are asked for.
+    """Start Taichi, or restart it if other settings are asked for, and return those in force.
 
-    All that launches kernels calls this first, since the caller may have reset Taichi in between. A
-    Taichi that the caller has started, or that holds the caller's fields, is used as it is.
+    All that launches kernels calls this first, because the caller may have reset Taichi in between.
+    A Taichi that the caller has started, or that holds the caller's fields, is used as it is.
 
     Args:
         threads: CPU threads, 1 to 1024; None keeps what runs, or takes all that are available.
         arch: "cpu" or "cuda"; None keeps what runs, or takes the CPU.
 
-    Returns:
-        The settings in force.
-
     Raises:
-        AntsError: A setting is not allowed, or "cuda" finds no device; the Taichi that runs has
-            other settings and is not ours alone to restart; it has fast_math on, which would change
-            results in the last bit, or runs on hardware that was never tried; or this process was
-            forked from one in which Taichi ran.
+        AntsError: A setting is not allowed, or "cuda" finds no device; the Taichi that runs cannot
+            be restarted, has fast_math on, which would change results in the last bit, or runs on
+            hardware that was never tried; or this process was forked from one in which Taichi ran.
     """
     if arch is not None:
         check_one_of("arch", arch, ARCHITECTURES)

@@ -55,15 +55,12 @@ _KINDS: dict[type, str] = {
 
 @dataclass(frozen=True)
 class Is:
-    """What holds for a setting besides its type.
-
-    Several of them in one annotation add up: `Ticks = Annotated[int, Is(unit="ticks", least=1)]`.
+    """What holds for a setting besides its type; several of them in one annotation add up.
 
     Attributes:
         help: A phrase or sentence that says what the setting does.
         unit: Of the number, such as "ticks".
-        least, most: Bounds that are allowed themselves.
-        above: A bound that is not.
+        least, most, above: Bounds; the first two are allowed themselves.
         only: The name of another setting of the class, and the values of it with which this one
             means something; with others it has its default.
         usual: The value it takes where it means something and is None.
@@ -89,14 +86,9 @@ class Is:
 class Setting(NamedTuple):
     """One setting as it was declared.
 
-    Attributes:
-        name: Of the field.
-        path: The full name, as sweep files have it, such as "task.pheromone.half_life".
-        kind: bool, int, float, str, list, or a class of settings.
-        words: The words that are allowed, where they are fixed.
-        optional: Whether it may be None.
-        default: As in the class; MISSING if it has none.
-        rule: All that was said of it.
+    `path` is its full name, as in sweep files; `kind` is bool, int, float, str, list, or a class of
+    settings; `words` are those that are allowed, where they are fixed; `default` is MISSING if it
+    has none; `rule` is all that was declared of it.
     """
 
     name: str
@@ -136,11 +128,7 @@ class Setting(NamedTuple):
         return "; ".join(parts) + (given.lower() if self.kind is bool else given)
 
     def checked(self, value: Any) -> Any:
-        """A value as a Python object of the setting's kind.
-
-        Raises:
-            AntsError: The value is not allowed; names the setting by its path.
-        """
+        """A value as a Python object of the setting's kind; AntsError if it is not allowed."""
         if self.optional and (value is None or (value == "none" and self.kind is not str)):
             return None  # files and command lines have no None, so they write "none"
         found = self._converted(value)
@@ -241,11 +229,7 @@ class Settings:
         return {}
 
     def check(self) -> None:
-        """Take each value as one of its kind.
-
-        Raises:
-            AntsError: A value is not allowed, or would change nothing.
-        """
+        """Take each value as one of its kind; AntsError if one is wrong, or changes nothing."""
         for one in declared(type(self)):
             object.__setattr__(self, one.name, one.checked(getattr(self, one.name)))
         for one in declared(type(self)):
@@ -269,11 +253,8 @@ class Settings:
     def but(self: Self, **changes: Any) -> Self:
         """The same with some changes; settings that mean nothing any more have their defaults.
 
-        A group can be changed by a mapping of its own settings, in which "" is the name of the
-        value to start from.
-
-        Raises:
-            AntsError: As for the class, or there is no such setting.
+        A group can be changed by a mapping of its own settings, in which "" names the value to
+        start from. AntsError as for the class, or if there is no such setting.
         """
         return self._changed(changes)
 
@@ -298,11 +279,7 @@ class Settings:
 
     @classmethod
     def from_dict(cls: type[Self], facts: Any) -> Self:
-        """The settings of a mapping of names to values, with groups as mappings or names.
-
-        Raises:
-            AntsError: A value is not allowed, or there is no such setting.
-        """
+        """The settings of a mapping, with groups as mappings or names, checked."""
         if not isinstance(facts, Mapping):
             raise AntsError(f"`{cls.path}` is {shown(facts)}; it must be a table of settings.")
         return cls()._changed(facts)
@@ -430,11 +407,7 @@ def flat(tree: Mapping[str, Any], before: str = "") -> dict[str, Any]:
 
 
 def nested(named: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings by their full names as mappings in mappings, as `Settings.but` takes them.
-
-    {"task.traffic": "following", "task.traffic.grant": False} becomes
-    {"task": {"traffic": {"": "following", "grant": False}}}.
-    """
+    """Settings by their full names as mappings in mappings, as `Settings.but` takes them."""
     tree: dict[str, Any] = {}
     for path, value in named.items():
         *outer, last = path.split(".")

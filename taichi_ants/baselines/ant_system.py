@@ -49,12 +49,9 @@ _MAX_ENTRIES = 1 << 28  # of the arrays of tours: a gibibyte each
 class Search:
     """What colonies found.
 
-    Attributes:
-        shortest: Steps from the queen to the nearest food.
-        best: int32 (colonies, iterations): the shortest tour of each iteration; 0 if no ant found
-            food.
-        mean: float64 (colonies, iterations): the mean length of the tours; NaN if there was none.
-        lost: int32 (colonies, iterations): ants that gave up.
+    Steps from the queen to the nearest food (`shortest`); by (colonies, iterations), int32, the
+    shortest tour of each iteration (`best`), 0 if no ant found food; the `mean` length, float64,
+    NaN if there was none; and the ants that gave up (`lost`).
     """
 
     shortest: int
@@ -157,11 +154,9 @@ class _Bounds:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """What each ant deposits (colonies, ants), and the bounds of tau (colonies,).
 
-        Args:
-            lengths: Of the tours, (colonies, ants), 0 for none.
-            best: The shortest of each colony, 0 for none.
-            tau: Set to its first level where a colony has found food for the first time: what ants
-                would keep up if they all went that way. Until then it is equal everywhere.
+        Where a colony has found food for the first time, `tau` is set to what ants would keep up if
+        they all went that way. Until then it is equal everywhere. `lengths` of tours are 0 for
+        none.
         """
         first = (self._best == 0) & (best > 0)
         shorter = first | ((best > 0) & (best < self._best))

@@ -30,9 +30,8 @@ class Arguments:
     def type_of(values: Mapping[str, Any]) -> Any:
         """The type of the pack of these values, to annotate the kernel's argument.
 
-        Args:
-            values: By name: NumPy arrays, which kernels work on in place; whole numbers, for
-                kernels i32, or u64 if they are `np.uint64`; and floats, for kernels f32.
+        NumPy arrays, on which kernels work in place; whole numbers, for kernels i32, or u64 if they
+        are `np.uint64`; and floats, for kernels f32.
         """
         return _pack_type(tuple((name, _kind(value)) for name, value in values.items()))
 

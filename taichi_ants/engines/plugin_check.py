@@ -89,10 +89,8 @@ def _check_in_child(learner: Learner, writer: int) -> None:
 def _fault_of(learner: Learner, wide: bool) -> str:
     """Learn from a thousand steps with the memory of a second run; that of the first must stay.
 
-    Args:
-        learner: The learner.
-        wide: Start from action values up to ten thousand of either sign, not from zeros, to find
-            an index that depends on them and is right only while they are small.
+    If `wide`, action values are up to ten thousand of either sign at the start, to find an index
+    that depends on them and is right only while they are small.
     """
     import taichi as ti
 

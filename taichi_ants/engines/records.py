@@ -11,11 +11,10 @@ from taichi_ants.grid.hexgrid import AxialGrid
 
 
 class Record:
-    """What dataclasses of arrays have in common; to be used with `eq=False, repr=False`.
+    """Base of dataclasses of arrays; to be used with `eq=False, repr=False`.
 
-    Two records of a type are equal if all their fields are that are not marked `compare=False`:
-    arrays by type, shape and content, where NaN equals NaN. Arrays can be written to, so records
-    have no hash.
+    Two are equal if all their fields are that are not marked `compare=False`: arrays by type, shape
+    and content, where NaN equals NaN. Arrays can be written to, so records have no hash.
     """
 
     __hash__ = None  # type: ignore[assignment]

@@ -41,16 +41,9 @@ def _words(name: str, values: object) -> np.ndarray:
 def stream_state(seed: int | np.ndarray, purpose: int, number: int | np.ndarray) -> Any:
     """The state at which the stream of (seed, purpose, number) starts.
 
-    Args:
-        seed: Any whole number, taken modulo 2^64, or an integer array or list of them.
-        purpose: What the stream is for, one of the `STREAM_...` constants.
-        number: Which stream of that purpose, or an integer array or list; broadcast with `seed`.
-
-    Returns:
-        An integer if all three are numbers, else a uint64 array of the broadcast shape.
-
-    Raises:
-        AntsError: An argument is not whole.
+    Purpose is one of the `STREAM_...` constants. Seed and number are whole numbers modulo 2^64, or
+    integer arrays or lists of them; then the states are uint64 of the broadcast shape. AntsError if
+    an argument is not whole.
     """
     state = np.array(0, dtype=np.uint64)
     for name, values in (("seed", seed), ("purpose", purpose), ("number", number)):

@@ -26,12 +26,10 @@ _KIND = Kind("policy", 2, "save_policy", most=1 << 26, foreign=True)
 
 
 class Policy(NamedTuple):
-    """What a policy file holds.
+    """The contents of a policy file.
 
-    Attributes:
-        q_values: Action values, float32 (n_states, 5).
-        observation: Name of the registered observation whose states index the rows.
-        metadata: What made the policy.
+    Action values, float32 (n_states, 5); the name of the registered observation whose states index
+    the rows; and what made the policy.
     """
 
     q_values: ActionValues
@@ -40,11 +38,7 @@ class Policy(NamedTuple):
 
     @property
     def task(self) -> Task:
-        """The rules for which it was made, as its metadata say; the paper's if they do not.
-
-        Raises:
-            AntsError: The metadata name other rules than there are.
-        """
+        """The rules in its metadata, or the paper's; AntsError if they are not allowed."""
         try:
             task = Task.from_dict(self.metadata.get("task", {}))
         except AntsError as error:
@@ -55,17 +49,11 @@ class Policy(NamedTuple):
         return replace(task, observation=self.observation)
 
     def actions(self, states: npt.ArrayLike, rng: np.random.Generator) -> npt.NDArray[np.int64]:
-        """A best action in each state, ties at random, for the environments of this package:
+        """A best action in each state, ties by `rng`, for the environments of this package:
 
-            observations, infos = envs.reset(seed=0)
-            envs.step(policy.actions(infos["state"], rng))
+        observations, infos = envs.reset(seed=0) envs.step(policy.actions(infos["state"], rng))
 
-        Args:
-            states: State indices, integers of any shape; one state gives one action.
-            rng: Decides ties.
-
-        Raises:
-            AntsError: There is no such state.
+        States are integers of any shape, also a single one; AntsError if there is no such state.
         """
         expect("rng", rng, np.random.Generator)
         states = np.asarray(states)
@@ -85,15 +73,7 @@ def random_policy(observation: str = "paper") -> ActionValues:
 
 
 def action_probabilities(q_values: np.ndarray, epsilon: float = 0.0) -> np.ndarray:
-    """With which probability an epsilon-greedy ant takes each action, to the bit as in kernels.
-
-    Args:
-        q_values: Action values (..., 5), in which the best are chosen with equal probability.
-        epsilon: Probability of any action.
-
-    Returns:
-        float64 (..., 5).
-    """
+    """Probabilities of epsilon-greedy actions, float64 (..., 5), to the bit as in kernels."""
     explores = np.floor(epsilon * 2.0**32) / 2.0**32
     best = q_values >= q_values.max(axis=-1, keepdims=True)
     return explores / N_ACTIONS + best * ((1.0 - explores) / best.sum(axis=-1, keepdims=True))
@@ -125,23 +105,17 @@ FOLLOWED = tuple(RULES)
 
 
 def trail_follower(observation: str = "paper") -> ActionValues:
-    """Return a policy that is written by hand, the table of one of the `RULES`.
+    """Return a policy that is written by hand, a table of the `RULES`, float32 (n_states, 5).
 
     Without food, an ant picks up the food that it sees, follows a trail, and otherwise walks
     straight over open ground and turns at random beside anything that blocks it. With food, it
     gives it to the queen, moves nearer to her, pushes ants without food out of the way, and
-    otherwise walks at random until a nearer cell comes into view. An ant without food that sees
-    an ant with food on a stronger trail (P) waits to be pushed along that trail. In queues, it does
-    so only by moving against that ant, and it waits behind an ant that is further up the trail (p).
-
-    Args:
-        observation: The observation whose states index the rows, one of `FOLLOWED`.
-
-    Returns:
-        Float32 (n_states, 5): 1 for the actions that it takes, 0 for the others.
+    otherwise walks at random until a nearer cell comes into view. An ant without food that sees an
+    ant with food on a stronger trail (P) waits to be pushed along that trail. In queues, it does so
+    only by moving against that ant, and it waits behind an ant that is further up the trail (p).
 
     Raises:
-        AntsError: There is no rule for the observation.
+        AntsError: There is no rule for the observation; `FOLLOWED` lists those that have one.
     """
     check_one_of("observation", observation, FOLLOWED)
     name_of, q_values = observations.get(observation).name_of, random_policy(observation)
@@ -153,10 +127,7 @@ def trail_follower(observation: str = "paper") -> ActionValues:
 
 
 def _choices(rule: Rule, carries: bool, view: Sequence[str]) -> list[int]:
-    """The actions among which a rule chooses at random.
-
-    `view` has the letters of the cells in the order of the moves: left, forward, right.
-    """
+    """The actions among which a rule chooses, by the letters seen left, forward and right."""
     takes, fails = (GIVE, PICK_UP) if carries else (PICK_UP, GIVE)
     for letters, action in rule:
         cells = [move for move in (LEFT, FORWARD, RIGHT) if view[move] in letters]
@@ -183,13 +154,11 @@ def save_policy(
     Args:
         path: The file; the whole name, no ending is added.
         q_values: Action values of shape (n_states, 5), finite as float32.
-        metadata: What made the policy (configuration, seed, world ...), anything that
-            JSON can hold.
+        metadata: What made the policy (configuration, seed, world ...), as JSON can hold it.
         observation: Name of the registered observation whose states index the rows.
 
     Raises:
-        AntsError: The observation is unknown, the values are no policy of it, the metadata cannot
-            be written as JSON, or the file cannot be written.
+        AntsError: An argument is not allowed, or the file cannot be written.
     """
     table = _checked(q_values, observation, "q_values")
     if not isinstance(metadata, Mapping):

@@ -31,12 +31,11 @@ class PolicyValues(Record):
     Attributes:
         value: The discounted return that is to be expected.
         low, high: The ends of its bootstrap interval over episodes (percentiles); nan without
-            resamples. It tells what other episodes would have said, not how wrong the method is.
-        effective_sample_size: (sum of weights)^2 / sum of squared weights, where the weights are
-            those of whole episodes: how many episodes of the target policy tell as much (Kong, A
-            note on importance sampling using standardized weights, 1992). nan where none is
-            weighted. 0: the target policy would have done no whole episode of the data, so that
-            the value stands on the beginnings of episodes alone; do not believe it.
+            resamples. It covers the choice of episodes, not the error of the method.
+        effective_sample_size: (sum of weights)^2 / sum of squared weights of whole episodes: how
+            many episodes of the target policy tell as much (Kong, A note on importance sampling
+            using standardized weights, 1992). nan where none is weighted. 0: the target policy
+            would have done no whole episode of the data; do not believe the value.
     """
 
     value: np.ndarray

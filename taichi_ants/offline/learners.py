@@ -121,21 +121,17 @@ def pessimistic_q_iteration(
 
 @dataclass(frozen=True, eq=False)
 class EmpiricalModel:
-    """What the data say of the world: how often which pair of state and action led where.
+    """The Markov decision process of maximum likelihood: which pair led where how often.
 
-    The Markov decision process of maximum likelihood. Whether the states that ants see are Markov
-    is another question: where they are not, it depends on the behaviour policy too.
+    Where the states that ants see are not Markov, it depends on the behaviour policy too.
 
     Attributes:
-        n_states: The number of states.
-        largest: What the task pays, or takes, at most.
+        largest: The largest absolute reward of the task.
         groups: int32 (groups + 1,), where the pairs of a group of rows begin.
         pairs: int32 (pairs,), state * 5 + action, ascending in a group.
-        counts: int64 (pairs,), transitions.
-        rewards: float64 (pairs,), mean rewards.
+        counts, rewards: int64, float64 (pairs,), transitions and their mean rewards.
         begins: int32 (pairs + 1,), where the successors of a pair begin.
-        successors: int32 (k,), states, ascending in a pair; none stands for those of transitions
-            that terminated.
+        successors: int32 (k,), states, ascending in a pair; none for transitions that terminated.
         probabilities: float64 (k,), which may add up to less than 1 for a pair.
     """
 
@@ -211,19 +207,11 @@ class EmpiricalModel:
         lowest: float = -np.inf,
         threads: int | None = None,
     ) -> np.ndarray:
-        """Iterate Q until it stays, each group for itself.
+        """Iterate Q until it stays, each group for itself: float64 (groups, n_states, 5).
 
-        Args:
-            discount: Discount factor gamma, below 1.
-            rewards: float64 (pairs,), expected.
-            initial_q: Of all pairs before; of those that the data lack, after.
-            policy: The probabilities of the actions (n_states, 5) of the policy whose values are
-                asked for; None: the greedy one.
-            lowest: No value falls below it.
-            threads: CPU threads; None keeps what runs, or takes all.
-
-        Returns:
-            float64 (groups, n_states, 5).
+        `rewards` are those expected of the pairs; `initial_q` is the value of all pairs before, and
+        of those that the data lack after; the values are those of the `policy` with these
+        probabilities of actions (n_states, 5), None: the greedy one. No value falls below `lowest`.
         """
         discount, n_groups = checked_discount(discount), len(self.groups) - 1
         q = np.full((n_groups, self.n_states, N_ACTIONS), initial_q, np.float64)
@@ -243,11 +231,10 @@ class EmpiricalModel:
 
 
 def _tally(data: Dataset, pair: np.ndarray) -> tuple[np.ndarray, ...]:
-    """How often each pair led to each state, ascending.
+    """How often each pair led to each state, ascending; the n_states-th stands for termination.
 
     Returns:
-        Pairs, next states (n_states where the transition terminated), counts, sums of rewards, and
-        for each row which of these it is.
+        Pairs, next states, counts, sums of rewards, and for each row which of these it is.
     """
     ends = data.task.n_states
     key = pair * (ends + 1) + np.where(data.terminated, ends, data.next_state)

@@ -151,10 +151,8 @@ def record_colony(
 def _tick(colony: Colony, tables: np.ndarray, before: np.ndarray) -> dict[str, np.ndarray]:
     """Let a tick pass; what each ant did in it.
 
-    Args:
-        colony: The colony, whose ants choose by `tables`; actions that they have drawn already, by
-            those of the tick before.
-        tables, before: As `Colony.q_values`.
+    Ants choose by `tables`, see `Colony.q_values`; those that have drawn ahead, by the ones
+    `before`.
     """
     step, acting = colony.ticks, colony.living & colony.running[:, None]
     run, slot = np.nonzero(acting)

@@ -39,11 +39,7 @@ _SETTING = re.compile(r"\s*([A-Za-z]\w*)\s*=(.*)")
 
 
 def load_map(path: str | os.PathLike[str]) -> World:
-    """The world drawn in a text file (UTF-8), see `from_text`.
-
-    Raises:
-        AntsError: The file cannot be read, or its map is damaged.
-    """
+    """The world drawn in a text file (UTF-8), see `from_text`; AntsError if it cannot be read."""
     return from_text(files.read_text(path), str(path))
 
 
@@ -51,11 +47,7 @@ def from_text(text: str, source: str = "the map") -> World:
     """The world drawn in `text`, in the form that the module's docstring describes.
 
     The ranges are those of the smallest world that holds the drawn cells; cells of it that are not
-    drawn become obstacles.
-
-    Args:
-        text: The map.
-        source: What error messages call it.
+    drawn become obstacles. Messages call the text `source`.
 
     Raises:
         AntsError: The map is damaged; names line, column, what stands there and what is allowed.
@@ -86,10 +78,7 @@ def from_text(text: str, source: str = "the map") -> World:
 
 
 def ranges_of(text: str, source: str = "the map") -> tuple[int, int, int]:
-    """Return the ranges of the world drawn in `text`, without the work and memory to build it.
-
-    Arguments and errors as of `from_text`.
-    """
+    """Return the ranges of the world drawn in `text`, without building it."""
     _, drawn = _read(text, source)
     return smallest_world(_axials(drawn, source))[0]
 
@@ -202,12 +191,7 @@ def to_text(world: World) -> str:
 
 
 def drawing(ranges: tuple[int, int, int], marks: Iterable[tuple[np.ndarray, str]]) -> str:
-    """Characters on the cells of a world of these ranges.
-
-    Args:
-        ranges: Of the world.
-        marks: Cells (n, 3), in normal form, and the character on them; later ones lie above.
-    """
+    """Characters on cells (n, 3), in normal form, of a world; later ones lie above."""
     size_x, size_y, size_z = ranges
     page = np.full((2 * size_x + size_y + size_z - 3, 2 * (size_y + size_z) - 3), " ")
     for cells, mark in marks:

@@ -128,10 +128,9 @@ class Colony(ColonyState):
         """Set worlds and ants to their start; the ants look around.
 
         Args:
-            length: How many ticks there will be. Learners that need to know which tick is the last
-                are told then.
-            world: As of the class: where the colonies live from now on, so that what they learn
-                does not depend on one world. None: where they are.
+            length: How many ticks there will be, for learners that need to know which tick is the
+                last.
+            world: As of the class: where the colonies live from now on. None: where they are.
 
         Raises:
             AntsError: A world is not allowed.
@@ -146,15 +145,12 @@ class Colony(ColonyState):
         self._stepper.launch(self, "begin_phases")
 
     def begin_some(self, which: np.ndarray, seeds: Sequence[int] | None = None) -> None:
-        """Let some worlds begin their next episode, while the others go on with theirs.
+        """Let some worlds, bool (W,), begin their next episode, while the others go on with theirs.
 
         For these it is as `end_episode` and `begin_episode`; epsilon and the learning rate stay.
-
-        Args:
-            which: bool (W,).
-            seeds: One for each of these worlds, which then begin a new life, as in a new `Colony`;
-                tables and memories of learners go on. Seeds of a colony may repeat then, but
-                `save` refuses them. None: their streams go on.
+        With `seeds`, one for each of these worlds, they begin a new life, as in a new `Colony`;
+        tables and memories of learners go on. Such seeds may repeat, but then `save` refuses the
+        colony.
 
         Raises:
             AntsError: There are other numbers of worlds or seeds, or a seed is not allowed.
@@ -177,11 +173,7 @@ class Colony(ColonyState):
         self._stepper.launch(self, "begin_phases")
 
     def observe(self) -> None:
-        """Let the ants see what interventions have changed since the last tick.
-
-        Raises:
-            AntsError: No episode has begun.
-        """
+        """Let the ants see what interventions have changed since the last tick."""
         self.check_begun()
         self._stepper.launch(self, "intervention_phases")
 
@@ -252,8 +244,6 @@ class Colony(ColonyState):
         """Whole episodes of a fixed number of ticks.
 
         Args:
-            episodes: How many.
-            ticks: Ticks of each.
             progress: Called now and then with the share of the work that is done.
             worlds: Of each episode, see `begin_episode`; None: all take place where the colonies
                 are.

@@ -57,16 +57,8 @@ _PROGRESS = ("epsilon", "learning_rate", "length", "ticks")
 class ColonyEpisodes(Record):
     """Results of episodes, arrays of shape (episodes, worlds).
 
-    Attributes:
-        returns: int64, rewards of all ants.
-        ticks: int32, length.
-        deliveries: int32, food items given to the queen.
-        first_delivery: int32, ticks until the first delivery; -1 if there was none.
-        moves: int64, moves that ants tried.
-        blocked: int64, moves that failed.
-        births, deaths: int32, ants.
-        regrown: int32, food items that grew back.
-        living: int32, ants at the end.
+    `first_delivery` is -1 if there was none; `blocked` are the moves that failed, `living` the ants
+    at the end. Returns, moves and blocked are int64, all others int32.
     """
 
     returns: np.ndarray
@@ -85,15 +77,11 @@ class ColonyState:
     """The state of a colony of W worlds with `capacity` slots each, in which ants live.
 
     Attributes:
-        worlds, seeds: Of each world.
-        grid: Where the cells lie in the arrays of a world.
         task, training, ants, capacity, start, ends_at_delivery, sharing: As given to `Colony`.
-        schedule: "by_world" or "by_chunk".
-        is_given_actions: Whether ants do what `Colony.act` is given, so that nobody chooses.
+        is_given_actions: Whether ants do what `Colony.act` is given.
         one_a_slot: Whether each slot has its own table of action values, not each world.
         memory: What the learner keeps with each table.
         pheromone: The pheromone of the task, which evaporates as the task says of this colony.
-        epsilon, learning_rate: Those of the present episode.
         length: Of the episode in ticks; 0 if it is not known.
         ticks: Since an episode began for all worlds.
         delivered: int64 (W,), food items that were delivered in the episodes before this one.
@@ -197,10 +185,7 @@ class ColonyState:
 
     @property
     def numbers(self) -> np.ndarray:
-        """Number of the ant in each slot, int32 (W, capacity); -1 if never used; a view.
-
-        As all that is known of an ant, it stays when the ant dies, until another one is born.
-        """
+        """Number of the last ant in each slot, int32 (W, capacity), -1 for none; a view."""
         return self._by_slot("number")
 
     @property
@@ -225,10 +210,7 @@ class ColonyState:
 
     @property
     def states(self) -> np.ndarray:
-        """State index of each ant as it is now, int32 (W, capacity).
-
-        In a slot whose ant has died it is what the ant saw last.
-        """
+        """State index of each ant, of dead ones the last, int32 (W, capacity)."""
         return self._by_slot("state" if "state" in self.arrays else "percept").astype(np.int32)
 
     @property
@@ -244,10 +226,7 @@ class ColonyState:
 
     @property
     def next_actions(self) -> np.ndarray:
-        """Actions that are drawn already for the next tick, int8 (W, capacity), else -1; a view.
-
-        Only for learners that draw ahead.
-        """
+        """Actions that were drawn ahead of the next tick, int8 (W, capacity), else -1; a view."""
         return self._by_slot("next_action")
 
     @property
@@ -257,10 +236,7 @@ class ColonyState:
 
     @property
     def streams(self) -> np.ndarray:
-        """State of the random stream of each ant, uint64 (W, capacity).
-
-        A view that may be written to between two ticks.
-        """
+        """State of the random stream of each ant, uint64 (W, capacity); a writable view."""
         return self._by_slot("streams")
 
     @property
@@ -327,13 +303,10 @@ class ColonyState:
         )
 
     def stored_trail(self, world: int = 0) -> tuple[np.ndarray, int]:
-        """Return the trail of world number `world` as kernels store it, and the clock.
+        """Return a copy of the trail of world number `world` as kernels store it, and the clock.
 
-        The level of a cell is what is stored less the clock, not below 0.
-
-        Returns:
-            A copy of the expiry clocks, int32 (grid.size,), and the clock as it is now; or of the
-            levels, float32 (grid.size,), and 0, if the pheromone is dense.
+        These are expiry clocks, int32 (grid.size,); or levels, float32, and 0, if the pheromone is
+        dense. The level of a cell is what is stored less the clock, not below 0.
         """
         cells = slice(world * self.grid.size, (world + 1) * self.grid.size)
         if self.pheromone.dense:
@@ -357,11 +330,7 @@ class ColonyState:
     # Changes
 
     def lay_out(self, worlds: tuple[World, ...]) -> None:
-        """Make the arrays that depend on the worlds.
-
-        Raises:
-            AntsError: A world has too few free cells for the ants.
-        """
+        """Make the arrays that depend on the worlds; AntsError if they have too few free cells."""
         self.worlds, self.grid = worlds, worlds[0].grid
         most = max(len(world.foods) for world in worlds)
         self.make_room_for_food(most if self.food_changes else 0)
@@ -375,10 +344,7 @@ class ColonyState:
         self._changing = tuple(changing)
 
     def begin(self, which: Which = ALL) -> None:
-        """Set these worlds, bool (W,), to the start of an episode.
-
-        Tables, memories and random streams stay.
-        """
+        """Set these worlds to the start of an episode; tables, memories and streams stay."""
         self.delivered[which] += self.deliveries[which]
         self.rounds[:, which] = 0
         self.set_learning_rate(self.learning_rate)
@@ -428,9 +394,8 @@ class ColonyState:
     def sort_ants(self) -> None:
         """Store the ants of a world about in the order of their cells: neighbours share caches.
 
-        Their order changes nothing but the speed: ants have numbers. Slots do matter where ants are
-        born, have tables of their own or are given actions, and vacant ones stay behind the others;
-        there the order stays.
+        Ants have numbers, so that their order changes nothing; but it stays where slots matter, and
+        where some are vacant, which must stay behind the others.
         """
         slots_matter = self.ants_change or self.one_a_slot or self.is_given_actions
         if slots_matter or self.arrays["worlds"][WorldRow.LIVING].min() < self.capacity:
@@ -450,11 +415,7 @@ class ColonyState:
     # Arrays
 
     def _start_of_episode(self) -> Arrays:
-        """Make what each episode begins with, as short as it can be told; see `_set_to_start`.
-
-        Raises:
-            AntsError: A world has too few free cells for the ants.
-        """
+        """Make what each episode begins with, as short as it can be told; see `_set_to_start`."""
         worlds, n = self.worlds, self.ants
         starts = [
             world.start(seed, n, self.start) for world, seed in zip(worlds, self.seeds, strict=True)
@@ -528,11 +489,7 @@ class ColonyState:
         column["stage"][which, :n] = Stage.LIVING
 
     def _lasting(self, q_values: np.ndarray | None) -> Arrays:
-        """Make the arrays that outlive an episode.
-
-        Raises:
-            AntsError: Tables or memories are too large, or `q_values` has not their shape.
-        """
+        """Make the arrays that outlive an episode."""
         slots, memory, n_worlds = self.capacity, self.memory, len(self.seeds)
         owners = n_worlds * (slots if self.one_a_slot else 1)
         sizes = ((1 + memory.tables) * self.task.n_states * ROW, memory.floats, memory.integers)

@@ -25,23 +25,16 @@ _PER_CHUNK = 256  # ants that one thread steps together
 class BatchedEnvironments:
     """n ants, each in a world of its own.
 
-    An ant depends on its world, the task, its seed and its actions alone.
-
-    Args:
-        worlds: Worlds of the same ranges; ant i lives in number i modulo their number.
-        task: The rules of the game.
-        n: How many ants, at least 1.
-        max_steps: Steps after which an episode is truncated.
-        ends: What a delivery does: "terminates" terminates the episode, "truncates" truncates it,
-            "continues" does neither, and food grows back at once.
-        falls: Whether trails evaporate.
+    An ant depends on its world, the task, its seed and its actions alone. Worlds have the same
+    ranges; ant i lives in number i modulo their number. A delivery (`ends`) "terminates" the
+    episode, "truncates" it, or "continues": then food grows back at once. If it `falls`, a trail
+    evaporates.
 
     Attributes:
         arrays: By name, one row for each ant: percepts uint8 and states int32, what it sees;
             rewards_of float64, terminations and truncations uint8, events uint8 (`Event`) and
             reasons uint8 (`Reason`), the result of its last action; final_states int32 and
-            final_percepts uint8, what it saw when the episode ended that `step` has restarted; and
-            where it stands.
+            final_percepts uint8, what it saw when the episode ended that `step` has restarted.
     """
 
     def __init__(

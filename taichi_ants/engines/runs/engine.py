@@ -119,10 +119,7 @@ class Runs:
     def following(
         cls, tables: np.ndarray, seeds: np.ndarray, numbers: np.ndarray, epsilon: float
     ) -> Runs:
-        """Runs that follow tables (n, n_states, 5) with a constant epsilon.
-
-        They do the rollouts of these `numbers` (episodes,), each with a stream of its own.
-        """
+        """Runs that follow tables (n, n_states, 5), in the rollouts of these `numbers`."""
         state = RunState.empty((len(tables),), tables.shape[-2])
         state.q[:, 0, :, :N_ACTIONS] = tables
         state.epsilon[:] = epsilon
@@ -137,10 +134,7 @@ class Runs:
 
 
 def laid_out(worlds: Sequence[World], task: Task, falls: bool) -> dict[str, Any]:
-    """What kernels read of a task, and of worlds of one grid, one behind the other.
-
-    `falls` tells whether trails evaporate.
-    """
+    """What kernels read of a task, and of worlds of one grid; trails evaporate if `falls`."""
     grid = worlds[0].grid
     return {
         "size": grid.size,
@@ -212,12 +206,7 @@ def do_episodes(
     outcomes: np.ndarray,
     progress: Progress | None = None,
 ) -> float:
-    """Do the next episodes of n runs, whose state is moved on.
-
-    Args:
-        world, task, max_steps, runs: What is done.
-        outcomes: int32 (3, n, episodes), into which returns, steps and deliveries are written.
-        progress: As of `train`.
+    """Do the next episodes of n runs, move their state on, and write `outcomes` (3, n, episodes).
 
     Returns:
         What it took without compilation, in CPU seconds of all threads together, or wall-clock
@@ -247,15 +236,10 @@ def do_episodes(
 def size_of_launch(
     workers: int, episodes: int, max_steps: int, cost: float, cells: int, widest: int
 ) -> tuple[int, int]:
-    """How many runs, and how many episodes of each, go into one launch.
+    """Runs, and episodes of each, in one launch, if `workers` runs progress at the same time.
 
-    Args:
-        workers: Runs that progress at the same time (CPU threads).
-        episodes: Episodes of each run.
-        max_steps: Most steps of an episode.
-        cost: What a step takes, 1 for one of Q-learning.
-        cells: i32 cells that each run of a launch needs for its world.
-        widest: The most numbers that the state of a run has in one array.
+    A step costs `cost`, 1 for one of Q-learning; a run needs so many `cells`, and `widest` is the
+    most numbers that its state has in one array.
     """
     steps_each = _SECONDS * 1e9 / (_STEP_NS * cost)
     rounds = int(steps_each // (episodes * max_steps))

@@ -106,19 +106,13 @@ def memory_for(configs: Sequence[TrainingConfig], n_states: int) -> Memory:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TrainingResult(Record):
-    """What `train` returns.
+    """The result of `train`: C configurations, S seeds, E episodes.
 
-    C configurations, S seeds, E episodes. Two results are equal if all but their seconds are.
+    Two results are equal if all but their seconds are.
 
     Attributes:
-        world: The world trained in.
-        configs: The configurations, in the order of the arrays' first axis.
-        seeds: The seeds, in the order of the second axis.
-        max_steps: The step limit of an episode.
-        task: The rules of the game.
-        returns: int32 (C, S, E), undiscounted sum of the rewards of each episode.
-        steps: int32 (C, S, E), length of each episode.
-        deliveries: int32 (C, S, E), 1 where the food was given to the queen.
+        returns, steps, deliveries: int32 (C, S, E), of each episode the undiscounted sum of
+            rewards, the length, and 1 if the food was given to the queen.
         seconds: What the last training took without compilation: CPU seconds of all threads
             together, or wall-clock seconds on a GPU.
         state: Where the runs stopped, leading axes (C, S).

@@ -51,11 +51,7 @@ def restore(a: ti.template(), base, origin, first, last):
 
 @ti.func
 def lay(kind: ti.template(), a: ti.template(), base, cell, clock, expiry, carried):
-    """Lay a trail on an empty cell.
-
-    `kind` is the deposit, see `rules.pheromone`, `expiry` the clock that is stored there so far,
-    `carried` for how many ticks the ant has carried its food.
-    """
+    """Lay a trail on an empty cell, where `expiry` is stored so far; see `rules.pheromone`."""
     level = level_after_deposit(a, kind, level_left(expiry, clock), carried)
     a.cells[base + cell] = clock + level
     a.cells[base + a.size] = ti.min(a.cells[base + a.size], cell)

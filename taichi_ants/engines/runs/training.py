@@ -91,18 +91,10 @@ def continue_training(
     arch: str | None = None,
     progress: Progress | None = None,
 ) -> TrainingResult:
-    """Train every run of a result for more episodes.
+    """Train every run of a result, which is left as it is, for more episodes.
 
-    The outcome is, bit for bit, that of a single training with the sum of the episodes; the given
-    result is left as it is.
-
-    Args:
-        result: What `train` or this function returned.
-        episodes: Further episodes of each run, at least 1.
-        threads, arch, progress: As in `train`, which tells the errors, too.
-
-    Returns:
-        All episodes, old and new; `seconds` is what the new ones took.
+    The outcome is, bit for bit, that of a single training with the sum of the episodes; `seconds`
+    is what the new ones took. Further arguments and errors are those of `train`.
     """
     if not isinstance(result, TrainingResult):
         raise AntsError(f"result is {shown(result)}; give what train has returned.")

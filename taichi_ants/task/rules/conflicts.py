@@ -133,12 +133,9 @@ def settle(
     """Where an ant is after the tick, whether another one takes its place, and its event.
 
     It moves on an empty way; or, with food, it changes places with the ant in its way; or it gives
-    way to an ant with food that wins its cell; or it stays.
-
-    Args:
-        wanted: The cell that it wins; else its own, `cell`.
-        ahead: The cell that it faces.
-        moves: Whether its action is a move, which has the event `entered` if it succeeds.
+    way to an ant with food that wins its cell; or it stays. `wanted` is the cell that it wins, else
+    its own; `ahead` the one that it faces. If its action `moves` and succeeds, the event is
+    `entered`.
 
     Returns:
         Its cell; whether another ant enters the cell that it leaves; its event; whether it enters
