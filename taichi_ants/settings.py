@@ -26,7 +26,7 @@ import math
 import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, replace
-from functools import wraps
+from functools import partial, wraps
 from inspect import signature
 from numbers import Real
 from types import NoneType, UnionType
@@ -81,6 +81,12 @@ class Is:
         given = {one.name: getattr(other, one.name) for one in fields(other)}
         usual = vars(Is())
         return replace(self, **{k: v for k, v in given.items() if v is not usual[k] and v != ""})
+
+
+Share = Annotated[float, Is(least=0, most=1)]
+Count = Annotated[int, Is(least=1, most=2**31 - 1)]
+Seed = Annotated[int, Is("any whole number")]
+Flag = Annotated[bool, Is()]
 
 
 class Setting(NamedTuple):
@@ -324,17 +330,13 @@ def _defaults(cls: Any) -> Iterator[tuple[str, Any]]:
             yield name, MISSING if argument.default is argument.empty else argument.default
 
 
-def setting(cls: Any, name: str) -> Setting:
-    """One setting of a class, for arguments of functions that are the same."""
-    return next(one for one in declared(cls) if one.name == name)
-
-
-def checked(function: Function) -> Function:
+def checked(function: Function, path: str = "world") -> Function:
     """Check the arguments of a function that are declared, whenever it is called: a decorator.
 
-    The function makes a world, so that messages name its arguments `world.NAME`.
+    Messages name them below `path`, by default `world.NAME`, because most such functions make one.
     """
     form = signature(function)
+    function.path = path  # type: ignore[attr-defined]
 
     @wraps(function)
     def calls(*positional: Any, **named: Any) -> Any:
@@ -347,6 +349,9 @@ def checked(function: Function) -> Function:
         return function(**given)
 
     return calls  # type: ignore[return-value]
+
+
+checked_arguments = partial(checked, path="")  # of functions that do not make worlds
 
 
 def all_of(cls: Any) -> Iterator[Setting]:

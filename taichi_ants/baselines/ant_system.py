@@ -23,17 +23,17 @@ never meet, and the food is never used up. They show what trails alone can find.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from numbers import Real
-from typing import Literal, get_args
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 
 from taichi_ants import runtime
 from taichi_ants.baselines.open_cells import open_cells, shortest_way
 from taichi_ants.checks import checked_world
-from taichi_ants.errors import AntsError, check_one_of, checked_whole, shown, whole
+from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_TOUR
 from taichi_ants.grid.randomness import stream_state
+from taichi_ants.settings import Count, Is, Seed, checked_arguments
 from taichi_ants.worlds.world import World
 
 Method = Literal["ant_system", "max_min"]
@@ -66,17 +66,18 @@ class Search:
         return np.where(hits.any(axis=1), hits.argmax(axis=1) + 1, 0)
 
 
+@checked_arguments
 def search(
     world: World,
-    method: Method = "max_min",
+    method: Annotated[Method, Is()] = "max_min",
     *,
-    iterations: int = 200,
-    ants: int = 32,
-    colonies: int = 20,
-    alpha: int = 1,
-    evaporation: float | None = None,
-    max_steps: int = 100_000,
-    seed: int = 0,
+    iterations: Count = 200,
+    ants: Count = 32,
+    colonies: Count = 20,
+    alpha: Annotated[int, Is(least=1, most=8)] = 1,
+    evaporation: Annotated[float | None, Is(above=0, most=1)] = None,
+    max_steps: Count = 100_000,
+    seed: Seed = 0,
     threads: int | None = None,
 ) -> Search:
     """Let colonies look for the shortest way, each for itself.
@@ -97,14 +98,7 @@ def search(
     Raises:
         AntsError: An argument is not allowed, or no food can be reached.
     """
-    check_one_of("method", method, METHODS)
-    for name, value in (("iterations", iterations), ("ants", ants), ("colonies", colonies)):
-        checked_whole(name, value)
-    checked_whole("alpha", alpha, 1, 8)
-    checked_whole("max_steps", max_steps)
     rho = EVAPORATION[method] if evaporation is None else evaporation
-    if not (isinstance(rho, Real) and not isinstance(rho, bool) and 0 < rho <= 1):
-        raise AntsError(f"evaporation is {shown(rho)}; it must be above 0 and at most 1.")
     _, neighbours, is_food, start = open_cells(checked_world(world, learns=True))
     n, n_ants = len(neighbours), colonies * ants
     if n * n_ants > _MAX_ENTRIES:
@@ -114,7 +108,7 @@ def search(
         )
     shortest = shortest_way(neighbours, is_food, start)
     numbers = np.arange(colonies)[:, None] * 2**32 + np.arange(ants)
-    states = stream_state(whole("seed", seed), STREAM_TOUR, numbers).reshape(-1)
+    states = stream_state(seed, STREAM_TOUR, numbers).reshape(-1)
 
     runtime.start(threads)
     # Taichi is imported once it is configured.
@@ -123,7 +117,7 @@ def search(
     tau = np.ones((colonies, N_HEADINGS * n))
     place, tours = np.zeros((2, n_ants, n), np.int32)
     lengths = np.zeros(n_ants, np.int32)
-    bounds = _Bounds(method, float(rho), ants, _ways(neighbours), colonies)
+    bounds = _Bounds(method, rho, ants, _ways(neighbours), colonies)
     best, lost = np.zeros((2, colonies, iterations), np.int32)
     mean = np.full((colonies, iterations), np.nan)
     with runtime.quiet():
@@ -138,7 +132,7 @@ def search(
             best[:, i] = np.where(has, np.where(by_colony, by_colony, n).min(axis=1), 0)
             mean[has, i] = by_colony[has].sum(axis=1) / (ants - lost[has, i])
             deposits, lowest, highest = bounds.after(by_colony, best[:, i], tau)
-            lay(tau, float(rho), tours, lengths, deposits.reshape(-1), lowest, highest)
+            lay(tau, rho, tours, lengths, deposits.reshape(-1), lowest, highest)
     return Search(shortest, best, mean, lost)
 
 

@@ -24,15 +24,16 @@ reading all 15 come out within 3 points, and the five of a short branch that ope
 from __future__ import annotations
 
 from collections.abc import Mapping
-from numbers import Real
 from types import MappingProxyType
+from typing import Annotated
 
 import numpy as np
 
 from taichi_ants import runtime
-from taichi_ants.errors import AntsError, checked_whole, shown, whole
+from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.grid.constants import STREAM_BRIDGE
 from taichi_ants.grid.randomness import stream_state
+from taichi_ants.settings import Count, Is, Seed, checked_arguments
 
 # Percent of colonies by ratio r of the branches, in five classes of the share of ants on the short
 # branch: 0-20 %, 20-40 %, 40-60 %, 60-80 %, 80-100 %.
@@ -48,30 +49,29 @@ MAX_EXPONENT = 8
 _LAUNCH = 1 << 14  # colonies at once: less than half a second
 
 
-def crossing_steps(ratio: float) -> tuple[int, int]:
+@checked_arguments
+def crossing_steps(ratio: Annotated[float, Is(least=1, most=100)]) -> tuple[int, int]:
     """Steps to cross the short branch, and one that is `ratio` times as long, at least 1."""
-    if not (isinstance(ratio, Real) and 1 <= ratio <= 100):
-        raise AntsError(f"ratio is {shown(ratio)}; it must be a number from 1 to 100.")
-    return SHORT_CELLS - 1, round(SHORT_CELLS * float(ratio)) - 1
+    return SHORT_CELLS - 1, round(SHORT_CELLS * ratio) - 1
 
 
+@checked_arguments
 def choices(
-    short: int,
+    short: Count,
     long: int,
-    colonies: int = 10_000,
+    colonies: Count = 10_000,
     *,
-    ants: int = 1000,
-    k: float = 20.0,
-    n: int = 2,
+    ants: Count = 1000,
+    k: Annotated[float, Is(above=0, most=1e9)] = 20.0,
+    n: Annotated[int, Is(least=1, most=MAX_EXPONENT)] = 2,
     opens: int = 0,
-    seed: int = 0,
+    seed: Seed = 0,
     threads: int | None = None,
 ) -> np.ndarray:
     """Return the branch that each ant takes, in many colonies.
 
     Args:
-        short: Steps to cross the short branch, see `crossing_steps`; a step is 2 seconds.
-        long: Steps to cross the long one.
+        short, long: Steps to cross the branches, see `crossing_steps`; a step is 2 seconds.
         colonies: How many; the first ones stay the same if there are more.
         ants: How many choose, in turn one at the nest and one at the food, as many of both.
         k: How many marks a branch seems to have more than there are; more than 0.
@@ -88,16 +88,11 @@ def choices(
     Raises:
         AntsError: An argument is not allowed.
     """
-    checked_whole("short", short)
-    checked_whole("long", long, short)
-    checked_whole("colonies", colonies)
-    if checked_whole("ants", ants, 2) % 2:
-        raise AntsError(f"ants is {ants}; it must be even, as many leave the nest as the food.")
-    if not (isinstance(k, Real) and not isinstance(k, bool) and 0 < k <= 1e9):
-        raise AntsError(f"k is {shown(k)}; it must be a number above 0 and at most 1e9.")
-    checked_whole("n", n, 1, MAX_EXPONENT)
-    checked_whole("opens", opens, 0, ants)
-    states = stream_state(whole("seed", seed), STREAM_BRIDGE, np.arange(colonies))
+    checked_whole("`long`", long, short)
+    if ants % 2:
+        raise AntsError(f"`ants` is {ants}; it must be even, as many leave the nest as the food.")
+    checked_whole("`opens`", opens, 0, ants)
+    states = stream_state(seed, STREAM_BRIDGE, np.arange(colonies))
     runtime.start(threads)
     # Taichi is imported once it is configured.
     from taichi_ants.baselines.goss_kernel import cross
@@ -106,24 +101,16 @@ def choices(
     with runtime.quiet():
         for first in range(0, colonies, _LAUNCH):
             some = slice(first, first + _LAUNCH)
-            cross(took[some], states[some], short, long, float(k), n, opens)
+            cross(took[some], states[some], short, long, k, n, opens)
     return took
 
 
 def class_shares(took: np.ndarray, first: int = 501, last: int = 1000) -> np.ndarray:
     """The distribution of colonies over the five classes of the share on the short branch.
 
-    Args:
-        took: What `choices` returns.
-        first: Number of the first ant that counts, from 1.
-        last: Number of the last one; at most the number of ants.
-
-    Returns:
-        float64 (5,): percent of the colonies with 0-20 %, ... 80-100 % of these ants on the short
-        branch. A share on a border belongs to the class above.
-
-    Raises:
-        AntsError: There are no such ants.
+    Percent, float64 (5,), of the colonies with 0-20 %, ... 80-100 % of the ants `first` to `last`,
+    counted from 1, on the short branch; `took` is from `choices`. A share on a border belongs to
+    the class above. AntsError if there are no such ants.
     """
     checked_whole("last", last, 1, took.shape[1])
     checked_whole("first", first, 1, last)

@@ -9,14 +9,13 @@ from numbers import Real
 from typing import TYPE_CHECKING, Annotated, Any
 
 from taichi_ants.errors import AntsError, shown
-from taichi_ants.settings import Is, Settings, declared, setting
+from taichi_ants.settings import Is, Settings, Share, declared
 
 if TYPE_CHECKING:
     import numpy as np
 
-Share = Annotated[float, Is(least=0, most=1)]
 Factor = Annotated[float, Is(above=0, most=1)]
-MOST_VALUE = 1_000_000  # of an action before learning
+InitialValue = Annotated[float, Is(least=-1_000_000, most=1_000_000)]  # of an action
 
 
 @dataclass(frozen=True, init=False)
@@ -49,9 +48,8 @@ class TrainingConfig(Settings, path="training"):
         Share, Is("value below which the learning rate does not decay")
     ] = 0.0
     initial_q: Annotated[
-        float,
+        InitialValue,
         Is("value of each action before learning; high ones make ants try every action"),
-        Is(least=-MOST_VALUE, most=MOST_VALUE),
     ] = 0.0
     hyperparameters: tuple[tuple[str, float], ...] = ()
 
@@ -122,9 +120,6 @@ class TrainingConfig(Settings, path="training"):
     def as_dict(self) -> dict[str, Any]:
         """The settings as names and numbers, for files; `TrainingConfig(**facts)` reads them."""
         return {**asdict(self), "hyperparameters": dict(self.hyperparameters)}
-
-
-INITIAL_VALUE = setting(TrainingConfig, "initial_q")
 
 
 def share_of_one(value: Any) -> bool:

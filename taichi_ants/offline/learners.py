@@ -13,29 +13,30 @@ perspectives on open problems, 2020) survey the remedies.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from numbers import Real
+from typing import Annotated
 
 import numpy as np
 
 from taichi_ants import runtime
-from taichi_ants.checks import checked_share
-from taichi_ants.errors import AntsError, checked_flag, checked_whole, expect, shown
-from taichi_ants.learners.config import INITIAL_VALUE
+from taichi_ants.errors import expect
+from taichi_ants.learners.config import InitialValue
 from taichi_ants.offline.dataset import Dataset
+from taichi_ants.settings import Count, Flag, Is, Share, checked_arguments
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.task.events import Event
 
-_MOST_PENALTY = 1e9
-_MOST_DISCOUNT = 0.9999  # with which Q iteration takes half a second
+# Values of endless episodes stay finite; with the largest one Q iteration takes half a second.
+Discount = Annotated[Share, Is(most=0.9999)]
 
 
+@checked_arguments
 def batch_q_learning(
     data: Dataset,
-    discount: float = 0.9,
-    learning_rate: float = 0.1,
-    sweeps: int = 100,
-    initial_q: float = 0.0,
-    by_run: bool = False,
+    discount: Share = 0.9,
+    learning_rate: Share = 0.1,
+    sweeps: Count = 100,
+    initial_q: InitialValue = 0.0,
+    by_run: Flag = False,
     threads: int | None = None,
 ) -> np.ndarray:
     """Q-learning that goes over the data again and again, in the order in which they stand.
@@ -55,11 +56,8 @@ def batch_q_learning(
     Raises:
         AntsError: An argument is not allowed.
     """
-    expect("data", data, Dataset)
-    rates = checked_share("learning_rate", learning_rate), checked_share("discount", discount)
-    sweeps, groups = checked_whole("sweeps", sweeps), _groups(data, by_run)
-    first = INITIAL_VALUE.checked(initial_q)
-    q = np.full((len(groups) - 1, data.task.n_states, N_ACTIONS), first, np.float32)
+    groups, rates = _groups(data, by_run), (learning_rate, discount)
+    q = np.full((len(groups) - 1, data.task.n_states, N_ACTIONS), initial_q, np.float32)
     runtime.start(threads)
     from taichi_ants.offline.kernels import replay  # imports Taichi
 
@@ -69,11 +67,12 @@ def batch_q_learning(
     return q if by_run else q[0]
 
 
+@checked_arguments
 def fitted_q_iteration(
     data: Dataset,
-    discount: float = 0.9,
-    initial_q: float = 0.0,
-    by_run: bool = False,
+    discount: Discount = 0.9,
+    initial_q: InitialValue = 0.0,
+    by_run: Flag = False,
     threads: int | None = None,
 ) -> np.ndarray:
     """The best action values of the empirical model of the data, see `EmpiricalModel`.
@@ -84,17 +83,17 @@ def fitted_q_iteration(
     Pairs that the data lack keep `initial_q`. Arguments and errors are those of
     `batch_q_learning`, but the discount must be at most 0.9999.
     """
-    initial_q = INITIAL_VALUE.checked(initial_q)
     model = EmpiricalModel.of(data, _groups(data, by_run))
     q = model.solve(discount, model.rewards, initial_q, threads=threads).astype(np.float32)
     return q if by_run else q[0]
 
 
+@checked_arguments
 def pessimistic_q_iteration(
     data: Dataset,
-    discount: float = 0.9,
-    penalty: float = 1.0,
-    by_run: bool = False,
+    discount: Discount = 0.9,
+    penalty: Annotated[float, Is(least=0, most=1e9)] = 1.0,
+    by_run: Flag = False,
     threads: int | None = None,
 ) -> np.ndarray:
     """Action values from below: the fewer data a pair has, the less it is worth.
@@ -107,14 +106,10 @@ def pessimistic_q_iteration(
     Args:
         penalty: From 0 to 1e9, in rewards; the others, and errors, as of `fitted_q_iteration`.
     """
-    if not (isinstance(penalty, Real) and 0 <= penalty <= _MOST_PENALTY):
-        raise AntsError(
-            f"penalty is {shown(penalty)}; it must be a number from 0 to {_MOST_PENALTY:g}."
-        )
     model = EmpiricalModel.of(data, _groups(data, by_run))
     worst = data.task.rewards.by_event()[Event.ENTERED_EMPTY :].min()
-    lowest = worst / (1.0 - checked_discount(discount))
-    rewards = model.rewards - float(penalty) / np.sqrt(model.counts)
+    lowest = worst / (1.0 - discount)
+    rewards = model.rewards - penalty / np.sqrt(model.counts)
     q = model.solve(discount, rewards, lowest, lowest=lowest, threads=threads).astype(np.float32)
     return q if by_run else q[0]
 
@@ -213,7 +208,7 @@ class EmpiricalModel:
         of those that the data lack after; the values are those of the `policy` with these
         probabilities of actions (n_states, 5), None: the greedy one. No value falls below `lowest`.
         """
-        discount, n_groups = checked_discount(discount), len(self.groups) - 1
+        n_groups = len(self.groups) - 1
         q = np.full((n_groups, self.n_states, N_ACTIONS), initial_q, np.float64)
         values = np.empty((n_groups, self.n_states))
         greedy = np.zeros((self.n_states, N_ACTIONS)) if policy is None else policy
@@ -248,19 +243,9 @@ def tolerance(largest: float, discount: float, initial_q: float) -> float:
     return 1e-12 * max(1.0, largest / (1.0 - discount), abs(initial_q))
 
 
-def checked_discount(discount: float) -> float:
-    """A discount factor with which values of endless episodes are finite."""
-    if checked_share("discount", discount) > _MOST_DISCOUNT:
-        raise AntsError(
-            f"discount is {discount}; where episodes need not end it must be at most "
-            f"{_MOST_DISCOUNT}."
-        )
-    return float(discount)
-
-
 def _groups(data: Dataset, by_run: bool) -> np.ndarray:
     """Where the rows of each run begin, and end; of all runs together without `by_run`."""
     expect("data", data, Dataset)
     n = len(data.seeds)
-    runs = np.arange(n + 1) if checked_flag("by_run", by_run) else np.array([0, n])
+    runs = np.arange(n + 1) if by_run else np.array([0, n])
     return np.searchsorted(data.run, runs).astype(np.int32)
