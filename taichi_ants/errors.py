@@ -143,6 +143,14 @@ def array_of(name: str, values: object) -> np.ndarray:
         raise AntsError(f"{name} is {shown(values)}; it must be an array.") from None
 
 
+def check_array(name: str, value: Any, dtype: str | np.dtype, shape: tuple[int, ...]) -> None:
+    """Raises AntsError, naming the value `name`, unless it is an array of this type and shape."""
+    if (getattr(value, "dtype", None), getattr(value, "shape", None)) != (dtype, shape):
+        raise AntsError(
+            f"{name} is {shown(value)}; it must be an array of shape {shape} and type {dtype}."
+        )
+
+
 def expect(name: str, value: object, *kinds: type) -> None:
     """Raises AntsError, naming the value `name`, if it is of none of the kinds."""
     if not isinstance(value, kinds):

@@ -160,7 +160,7 @@ def save_policy(
     Raises:
         AntsError: An argument is not allowed, or the file cannot be written.
     """
-    table = _checked(q_values, observation, "q_values")
+    table = _checked(q_values, observation)
     if not isinstance(metadata, Mapping):
         raise AntsError(f"metadata is {shown(metadata)}; it must be a mapping of names to values.")
     try:
@@ -184,31 +184,39 @@ def load_policy(path: PathLike) -> Policy:
     with _KIND.reading(path) as (arrays, facts):
         observation, metadata = facts["observation"], facts["metadata"]
         expect("metadata", metadata, dict)
-        table = _checked(arrays["q_values"], observation, "q_values")
+        table = _checked(arrays["q_values"], observation)
         return Policy(table, observation, metadata)
 
 
-def _checked(q_values: npt.ArrayLike, observation: str, what: str) -> ActionValues:
-    """A float32 copy of action values, or an AntsError that says what is wrong with them."""
+def _checked(q_values: npt.ArrayLike, observation: str) -> ActionValues:
+    """The action values of one policy."""
+    table = checked_values(q_values, observation)
+    if table.ndim != 2:
+        raise AntsError(f"q_values has shape {table.shape}; it must be {table.shape[-2:]}.")
+    return table
+
+
+def checked_values(q_values: Any, observation: str) -> np.ndarray:
+    """Action values as float32 (..., n_states, 5); AntsError unless they are finite numbers."""
     shape = (observations.get(observation).n_states, N_ACTIONS)
     try:
-        table = np.asarray(q_values)
-    except ValueError as error:  # rows of different lengths
-        raise AntsError(f"{what} is no array ({error}); it must hold real numbers.") from error
-    if table.dtype.kind not in "fiu":
-        raise AntsError(f"{what} has the type {table.dtype}; it must hold real numbers.")
-    if table.shape != shape:
+        values = np.asarray(q_values)
+    except ValueError:  # rows of different lengths
+        values = np.empty(0, object)
+    if values.dtype.kind not in "fiu":
+        raise AntsError(f"q_values is {shown(q_values)}; it must be an array of real numbers.")
+    if values.shape[-2:] != shape or values.size == 0:
         raise AntsError(
-            f"{what} has the shape {table.shape}; for the observation {observation!r} it must be "
-            f"{shape}."
+            f"q_values has shape {values.shape}; for the observation {observation!r} it must end "
+            f"in {shape}."
         )
     # A float64 beyond the range of float32 becomes infinite, which the next check reports.
     with np.errstate(over="ignore"):
-        table = table.astype(np.float32)
-    if not np.isfinite(table).all():
-        state, action = np.argwhere(~np.isfinite(table))[0]
+        tables = values.astype(np.float32, copy=False)
+    if not np.isfinite(tables).all():
+        *_, state, action = where = np.argwhere(~np.isfinite(tables))[0]
         raise AntsError(
-            f"{what} is {table[state, action]} for state {state} and action {action}; "
-            "it must be finite."
+            f"q_values is {tables[tuple(where)]} for state {state} and action {action}; it must "
+            "be finite."
         )
-    return table
+    return tables

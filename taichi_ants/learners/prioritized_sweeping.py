@@ -23,9 +23,7 @@ from taichi_ants.task.constants import N_ACTIONS, ROW
 
 @dataclass(frozen=True)
 class Sweeping(Planning):
-    """Attributes:
-    threshold: Errors up to this size wait for no update.
-    """
+    """The hyperparameters of prioritized sweeping."""
 
     threshold: Annotated[float, Is("size of errors that wait for no update", least=0, most=1e9)] = (
         0.0001

@@ -10,7 +10,7 @@ import numpy as np
 
 from taichi_ants.checks import checked_seeds, checked_share
 from taichi_ants.engines.records import Record
-from taichi_ants.errors import AntsError, checked_whole, expect, shown
+from taichi_ants.errors import AntsError, check_array, checked_whole, expect
 from taichi_ants.files import PathLike, smallest
 from taichi_ants.files.archives import Kind
 from taichi_ants.task import Task
@@ -80,11 +80,7 @@ class Dataset(Record):
             raise AntsError("a data set has no transitions; record at least one.")
         for name, dtype in COLUMNS.items():
             array = getattr(self, name)
-            if not isinstance(array, np.ndarray) or (array.dtype, array.shape) != (dtype, (n,)):
-                raise AntsError(
-                    f"{name} of a data set is {shown(array)}; it must be an array of shape ({n},) "
-                    f"and type {dtype}."
-                )
+            check_array(f"{name} of a data set", array, dtype, (n,))
             array = np.ascontiguousarray(array).view()
             array.flags.writeable = False
             object.__setattr__(self, name, array)

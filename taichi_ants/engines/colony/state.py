@@ -26,10 +26,10 @@ from taichi_ants.engines.colony.layout import (
 )
 from taichi_ants.engines.packing import compass_of, padded
 from taichi_ants.engines.records import Record, Snapshot, same
-from taichi_ants.errors import AntsError, checked_whole
+from taichi_ants.errors import AntsError, check_array, checked_whole
 from taichi_ants.files.archives import Kind
 from taichi_ants.grid.constants import STREAM_ANT, STREAM_QUEEN
-from taichi_ants.grid.randomness import stream_state
+from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.learners.config import TrainingConfig, update_weights
 from taichi_ants.learners.learner import Learner, Memory
 from taichi_ants.task import Task
@@ -357,7 +357,7 @@ class ColonyState:
         (places,) = np.nonzero(which)
         changed = dict(zip(places.tolist(), seeds, strict=True))
         self.seeds = tuple(changed.get(w, seed) for w, seed in enumerate(self.seeds))
-        self.arrays["seeds"][:] = _words(self.seeds)
+        self.arrays["seeds"][:] = words_of(self.seeds)
         self.at_start = self._start_of_episode()
         self._copy_worlds(self.arrays, self._seeded(), which)
 
@@ -510,7 +510,7 @@ class ColonyState:
 
     def _seeded(self) -> Arrays:
         """Make what the seeds of the worlds decide, and what goes on through all episodes."""
-        seeds = _words(self.seeds)
+        seeds = words_of(self.seeds)
         numbers = np.arange(self.capacity, dtype=np.uint64)  # more ants may start later episodes
         first_streams = stream_state(seeds[:, None], STREAM_ANT, numbers[None, :])
         return {
@@ -549,7 +549,7 @@ class ColonyState:
             # A bit for each heading that leads nearer to the queen.
             "closer": self._of_each(World.closer).reshape(-1),
             "compass": compass_of(self.grid),  # see `rules.actions`
-            "seeds": _words(self.seeds),
+            "seeds": words_of(self.seeds),
             "rewards": self.task.rewards.by_event(),
             "hyperparameters": np.array([*dict(self.training.hyperparameters).values(), 0.0]),
             # How far the mean of n errors moves a value, by n; see `set_learning_rate`.
@@ -652,8 +652,7 @@ class ColonyState:
                 colony.make_room_for_food(facts["food_sources"])
             for name in colony.stored:
                 array, kept = colony.arrays[name], arrays[f"array_{name}"]
-                if kept.shape != array.shape or kept.dtype != array.dtype:
-                    raise ValueError(f"{name} has another shape or type")
+                check_array(name, kept, array.dtype, array.shape)
                 array[:] = kept
         return colony
 
@@ -673,8 +672,3 @@ class ColonyState:
 
 def _walls(world: World) -> np.ndarray:
     return (world.ground() == OBSTACLE).astype(np.uint8)
-
-
-def _words(seeds: Sequence[int]) -> np.ndarray:
-    """Return the 64 bits of each seed that count, uint64."""
-    return np.array([seed % 2**64 for seed in seeds], dtype=np.uint64)

@@ -14,12 +14,21 @@ from taichi_ants.engines.packing import unpack_cells
 from taichi_ants.engines.records import Snapshot
 from taichi_ants.engines.runs.engine import laid_out
 from taichi_ants.grid.constants import STREAM_ANT
-from taichi_ants.grid.randomness import stream_state
+from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.task import Task
 from taichi_ants.worlds.starts import first_starts
 from taichi_ants.worlds.world import World
 
 _PER_CHUNK = 256  # ants that one thread steps together
+# The arrays with a number for each ant.
+_OF_ANTS: dict[type, tuple[str, ...]] = {
+    np.int32: ("start_cells", "start_headings", "ant_cells", "carried", "steps", "states")
+    + ("final_states",),
+    np.uint8: ("commands", "actions", "headings", "carries", "changed", "percepts", "events")
+    + ("terminations", "truncations", "reasons", "final_percepts"),
+    np.uint64: ("random_states",),
+    np.float64: ("rewards_of",),
+}
 
 
 class BatchedEnvironments:
@@ -64,26 +73,7 @@ class BatchedEnvironments:
             "shared_cells": common["world"].size,
             "cells": np.concatenate([common["world"], own.reshape(-1)]),
             "worlds": number,
-            "start_cells": np.zeros(n, np.int32),
-            "start_headings": np.zeros(n, np.int32),
-            "random_states": np.zeros(n, np.uint64),
-            "commands": np.full(n, Command.BEGIN, np.uint8),
-            "actions": np.zeros(n, np.uint8),
-            "ant_cells": np.zeros(n, np.int32),
-            "headings": np.zeros(n, np.uint8),
-            "carries": np.zeros(n, np.uint8),
-            "carried": np.zeros(n, np.int32),
-            "steps": np.zeros(n, np.int32),
-            "changed": np.zeros(n, np.uint8),
-            "percepts": np.zeros(n, np.uint8),
-            "states": np.zeros(n, np.int32),
-            "rewards_of": np.zeros(n, np.float64),
-            "terminations": np.zeros(n, np.uint8),
-            "truncations": np.zeros(n, np.uint8),
-            "events": np.zeros(n, np.uint8),
-            "reasons": np.zeros(n, np.uint8),
-            "final_states": np.zeros(n, np.int32),
-            "final_percepts": np.zeros(n, np.uint8),
+            **{name: np.zeros(n, kind) for kind, names in _OF_ANTS.items() for name in names},
         }
 
     def seed(self, seeds: Sequence[int], which: np.ndarray) -> None:
@@ -92,7 +82,7 @@ class BatchedEnvironments:
         A seed decides where an ant starts if its world lists none, and which food it takes if it
         sees several; both for all episodes to come.
         """
-        words = np.array([seed % 2**64 for seed in seeds], dtype=np.uint64)
+        words = words_of(seeds)
         self.arrays["random_states"][which] = stream_state(words, STREAM_ANT, 0)
         for number, world in enumerate(self.worlds):
             here = self.arrays["worlds"][which] == number

@@ -19,7 +19,7 @@ from taichi_ants.engines.layout import EPSILON_DECAY, N_SETTINGS, OUTCOMES, SETT
 from taichi_ants.engines.packing import compass_of, pack_cells
 from taichi_ants.engines.runs.results import RunState
 from taichi_ants.grid.constants import STREAM_ROLLOUT
-from taichi_ants.grid.randomness import stream_state
+from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.learner import Learner
 from taichi_ants.task import Pheromone, Task
@@ -123,8 +123,7 @@ class Runs:
         state = RunState.empty((len(tables),), tables.shape[-2])
         state.q[:, 0, :, :N_ACTIONS] = tables
         state.epsilon[:] = epsilon
-        words = np.array([seed % 2**64 for seed in seeds.tolist()], dtype=np.uint64)
-        streams = stream_state(words[:, None], STREAM_ROLLOUT, numbers[None, :])
+        streams = stream_state(words_of(seeds)[:, None], STREAM_ROLLOUT, numbers[None, :])
         settings = np.zeros((len(tables), N_SETTINGS))
         settings[:, EPSILON_DECAY] = 1.0
         return cls(None, seeds, settings, state, streams)
@@ -160,8 +159,7 @@ class Launcher:
         from taichi_ants.engines.runs.step import EXTRA_CELLS
 
         self._runs, self._arguments = runs, Arguments()
-        words = np.array([seed % 2**64 for seed in runs.seeds.tolist()], dtype=np.uint64)
-        self._cells, self._headings = first_starts(world, words)
+        self._cells, self._headings = first_starts(world, words_of(runs.seeds))
         self.cells_of_a_run = world.grid.size + EXTRA_CELLS
         learns, pheromone = runs.learner is not None, task.pheromone
         deposits, half = pheromone.numbers["deposits"], pheromone.view == "half"

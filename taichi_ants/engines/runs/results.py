@@ -13,11 +13,11 @@ from taichi_ants.checks import checked_max_steps, checked_seeds
 from taichi_ants.engines.layout import OUTCOMES
 from taichi_ants.engines.packing import padded
 from taichi_ants.engines.records import Record
-from taichi_ants.errors import AntsError, shown
+from taichi_ants.errors import AntsError, check_array, shown
 from taichi_ants.files import PathLike
 from taichi_ants.files.archives import Kind
 from taichi_ants.grid.constants import STREAM_ANT
-from taichi_ants.grid.randomness import stream_state
+from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.learner import Memory
 from taichi_ants.task import Task
@@ -72,8 +72,7 @@ class RunState(Record):
     ) -> RunState:
         """Of runs that have not begun, leading axes (configurations, seeds)."""
         state = cls.empty((len(configs), len(seeds)), n_states, memory_for(configs, n_states))
-        words = np.array([seed % 2**64 for seed in seeds], dtype=np.uint64)
-        state.random_states[:] = stream_state(words, STREAM_ANT, 0)
+        state.random_states[:] = stream_state(words_of(seeds), STREAM_ANT, 0)
         for config, q, epsilon, rate in zip(
             configs, state.q, state.epsilon, state.learning_rate, strict=True
         ):
@@ -150,11 +149,7 @@ class TrainingResult(Record):
         arrays = {**vars(self), **vars(state)}
         for name, (kind, shape) in forms.items():
             array = arrays[name]
-            if not isinstance(array, np.ndarray) or (array.dtype, array.shape) != (kind, shape):
-                raise AntsError(
-                    f"{name} of a result is {shown(array)}; for {runs[0]} configurations and "
-                    f"{runs[1]} seeds it must be an array of shape {shape} and type {kind}."
-                )
+            check_array(f"{name} of a result", array, kind, shape)
 
     @property
     def episodes(self) -> int:
