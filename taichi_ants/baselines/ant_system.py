@@ -7,17 +7,10 @@
 
 In each iteration, every ant walks at random from the queen until it comes to food; then the loops
 are taken out of its walk, and what remains is its *tour*. The pheromone tau lies on *arcs*, steps
-from a cell to a neighbour, in one direction. Of the arcs that leave its cell an ant takes one with
-a probability proportional to tau^alpha; it goes straight back only out of a dead end (as in Dorigo
-and Stuetzle, Ant Colony Optimization, 2004, section 1.3). Then all tau lose the share rho, and
-tours of length L add 1 / L to each of their arcs.
-
-There is no heuristic eta: both methods were made for problems where an ant knows how far it is to
-the next city. Here all steps are equally long and nobody knows where the food is, so eta would be
-1 and beta would change nothing.
-
-Unlike the ants of this package, these deposit after they know how long the tour was, all at once,
-never meet, and the food is never used up. They show what trails alone can find.
+from a cell to a neighbour. Of the arcs that leave its cell an ant takes one with a probability
+proportional to tau^alpha; it goes straight back only out of a dead end (as in Dorigo and Stuetzle,
+Ant Colony Optimization, 2004, section 1.3). Then all tau lose the share rho, and tours of length L
+add 1 / L to each of their arcs. There is no heuristic eta, because nobody knows where the food is.
 """
 
 from __future__ import annotations
@@ -86,14 +79,11 @@ def search(
         world: Where; rocks block, trails and listed ants do not matter.
         method: "ant_system": all ants deposit. "max_min": the best of the iteration does, and tau
             stays between bounds that follow from the best length so far.
-        iterations: Rounds of tours.
-        ants: Of each colony.
+        iterations, ants: Rounds of tours, and ants of each colony.
         colonies: How many; the first ones stay the same if there are more.
-        alpha: How strongly pheromone attracts, a whole number from 1 to 8.
-        evaporation: rho, above 0 and at most 1; None takes 0.5, with "max_min" 0.02.
+        alpha: How strongly pheromone attracts.
+        evaporation: rho; None takes 0.5, with "max_min" 0.02.
         max_steps: After so many an ant gives up and deposits nothing.
-        seed: Any whole number.
-        threads: CPU threads; None keeps what runs, or takes all.
 
     Raises:
         AntsError: An argument is not allowed, or no food can be reached.

@@ -3,22 +3,17 @@
 Goss, Aron, Deneubourg and Pasteels: Self-organized shortcuts in the Argentine ant.
 Naturwissenschaften 76 (1989), 579-581.
 
-A colony crosses a bridge with two branches in both directions. At either end, 0.5 ants leave each
-second, in a regular flow: one every 2 seconds, which is a *step* of the model. An ant that finds S
-marks of the short branch and L of the long one at its end takes the short one with probability
+At either end of a bridge, one ant leaves every 2 seconds, which is a *step* of the model. If it
+finds S marks of the short branch and L of the long one there, it takes the short one with
+probability
 
     (k + S)^n / ((k + S)^n + (k + L)^n),  k = 20, n = 2.
 
 It leaves one mark of its branch at the end where it chooses, and one at the other end when it
-arrives there. Marks stay. Nothing but the time of a crossing tells the branches apart: at each end,
-the marks of those who come by the short branch are there earlier.
-
-The short branch takes 20 seconds, the long one 20 r: 10 and 10 r cells, each of 2 seconds. An ant
-that chooses stands in the first cell; one that arrives in the last. So a branch of c cells is
-crossed in c - 1 steps. The figures that were published are the shares of colonies by how many of
-the 501st to 1000th ant, those of both ends counted together, took the short branch. Under this
-reading all 15 come out within 3 points, and the five of a short branch that opens late do too;
-`docs/baselines.md` lists the readings that were tried.
+arrives there. Marks stay. The short branch takes 20 seconds, the long one 20 r: 10 and 10 r cells,
+each of 2 seconds; an ant that chooses stands in the first cell, one that arrives in the last. The
+published figures are the shares of colonies by how many of the 501st to 1000th ant took the short
+branch; `docs/baselines.md` lists the readings of the paper that were tried.
 """
 
 from __future__ import annotations
@@ -68,22 +63,18 @@ def choices(
     seed: Seed = 0,
     threads: int | None = None,
 ) -> np.ndarray:
-    """Return the branch that each ant takes, in many colonies.
+    """Return the branch that each ant takes: uint8 (colonies, ants), 1 for the short one.
+
+    Ants with even numbers choose at the nest, the others at the food.
 
     Args:
         short, long: Steps to cross the branches, see `crossing_steps`; a step is 2 seconds.
         colonies: How many; the first ones stay the same if there are more.
         ants: How many choose, in turn one at the nest and one at the food, as many of both.
-        k: How many marks a branch seems to have more than there are; more than 0.
-        n: How strongly marks attract, a whole number from 1 to 8.
+        k: How many marks a branch seems to have more than there are.
+        n: How strongly marks attract.
         opens: Number of ants that choose before the short branch opens; until then all ants take
             the long one. From 0 (it is open from the start) to `ants`.
-        seed: Any whole number.
-        threads: CPU threads; None keeps what runs, or takes all.
-
-    Returns:
-        uint8 (colonies, ants): 1 where an ant takes the short branch, 0 where the long one. Ants
-        with even numbers choose at the nest.
 
     Raises:
         AntsError: An argument is not allowed.

@@ -38,13 +38,13 @@ _MAX_ENTRIES = 1 << 27  # of the utilities: a gibibyte
 
 @dataclass(frozen=True)
 class Foraging:
-    """What colonies did.
+    """Results of colonies.
 
     Attributes:
         shortest: Steps from the queen to the nearest food and back.
         deliveries: int32 (colonies, ticks): foods that come to the nest in each tick.
-        lengths: int32 (colonies, ticks // 10): steps of the path found, after every 10 ticks: of a
-            walk to food and back that always takes the highest utility; 0 if it does not get there.
+        lengths: int32 (colonies, ticks // 10): after every 10 ticks, steps of a walk to food and
+            back that always takes the highest utility; 0 if it does not get there.
         utilities: float64 (colonies, 2, grid.size): of the nest and of food, at the end.
     """
 
@@ -86,16 +86,13 @@ def forage(
 
     Args:
         world: Where; rocks block, trails and listed ants do not matter.
-        ticks: How long.
         ants: Of each colony; all start in the nest.
         colonies: How many; the first ones stay the same if there are more.
         capacity: How many ants fit into a cell; the nest has room for all.
         discount: What a step costs, above 0 and below 1.
-        evaporation: The share of all utilities that is lost per tick, 0 to 1.
+        evaporation: The share of all utilities that is lost per tick.
         exploration: The probability of a random step, where an ant has something to follow.
         momentum: The probability to go straight on, if it can, where it has not.
-        seed: Any whole number.
-        threads: CPU threads; None keeps what runs, or takes all.
 
     Raises:
         AntsError: An argument is not allowed, or no food can be reached.

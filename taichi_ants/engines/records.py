@@ -36,11 +36,9 @@ class Snapshot(Record):
     """One world at one moment, as `taichi_ants.rendering` draws it.
 
     Attributes:
-        grid: Where the cells lie in the arrays.
         ground: uint8 (grid.size,), EMPTY, OBSTACLE, FOOD or QUEEN; EMPTY under ants.
         trail: int32 or float32 (grid.size,), trail levels.
-        ant_cells: int32 (n,), flat indices of the living ants.
-        ant_headings: int32 (n,), 0 to 5.
+        ant_cells, ant_headings: int32 (n,), flat indices of the living ants, and 0 to 5.
         ant_carries: bool (n,).
     """
 

@@ -65,10 +65,7 @@ def importance_sampling(
     of episodes.
 
     Args:
-        data: The data set, whose behaviour policy is known.
-        q_values: float (..., n_states, 5), the target policies.
-        discount: Discount factor gamma, from 0 to 1.
-        epsilon: Probability of a random action of the target policies.
+        q_values: float (..., n_states, 5), the target policies, with `epsilon`.
         weighted: Divide by the sum of the weights, not by the number of episodes: for each step of
             an episode (Thomas, Safe reinforcement learning, 2015, section 3.8; an episode that has
             ended keeps its weight). It is biased, but its variance is far smaller.
@@ -120,12 +117,8 @@ def model_based(
 
     The direct method, as Jiang and Li (Doubly robust off-policy value evaluation for reinforcement
     learning, ICML 2016) call it: little variance, but wrong however many data there are where the
-    states that ants see are not Markov. A resample has a model of its own.
-
-    Args:
-        initial_q: Value of the pairs that the data lack.
-
-    Others, and errors, are those of `importance_sampling`; the discount must be at most 0.9999.
+    states that ants see are not Markov. A resample has a model of its own. Pairs that the data lack
+    have the value `initial_q`. Other arguments are those of `importance_sampling`.
     """
     policies, shape = _policies(data, q_values, epsilon)
     times = _times(data, resamples)

@@ -42,16 +42,8 @@ def batch_q_learning(
     """Q-learning that goes over the data again and again, in the order in which they stand.
 
     Lin (Self-improving reactive agents, Machine Learning 8, 1992) calls it experience replay. The
-    last transitions of a sweep count most; the smaller the learning rate, the less.
-
-    Args:
-        data: The data set.
-        discount: Discount factor gamma, from 0 to 1.
-        learning_rate: Step size alpha, from 0 to 1.
-        sweeps: How often it goes over the data, at least 1.
-        initial_q: Of all pairs before; of those that the data lack, after.
-        by_run: Whether to learn a table from the data of each run.
-        threads: CPU threads; None keeps what runs, or takes all.
+    last transitions of a sweep count most; the smaller the learning rate, the less. Pairs that the
+    data lack keep `initial_q`. With `by_run`, a table is learned from the data of each run.
 
     Raises:
         AntsError: An argument is not allowed.

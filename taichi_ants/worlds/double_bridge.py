@@ -4,15 +4,11 @@ The experiment of Goss, Aron, Deneubourg and Pasteels (Naturwissenschaften 76, 1
 The queen, the junction at the nest, the junction at the food and the middle of the food lie on one
 line, along heading 0. A branch leads away from this line, along it, and back to it: between
 junctions that are D steps apart, k steps to the side, D - k ahead and k to the other side are D + k
-steps. So the branches differ in k alone, both turn off by one heading at a junction, and where they
-are equally long the world is its own mirror image.
+steps. So the branches differ in k alone, and both turn off by one heading at a junction. The food
+and its junction can lie aside of that line, away from the short branch; lengths and turns stay.
 
-The food and its junction can lie aside of that line, away from the short branch. Lengths and turns
-at the junctions stay, but a carrier at the food then has the nest on the side of the short branch.
-
-Corridors are two cells wide, so that ants that meet can pass. In a corridor of one cell they would
-stand in front of each other for ever, except where carriers have right of way. The second lane lies
-around the first, so that no way over it is shorter.
+Corridors are two cells wide, so that ants that meet can pass. The second lane lies around the
+first, so that no way over it is shorter.
 """
 
 from __future__ import annotations

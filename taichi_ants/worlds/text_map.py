@@ -161,23 +161,16 @@ def _axials(drawn: list[_Drawn], source: str) -> np.ndarray:
 
 
 def smallest_world(axials: np.ndarray) -> tuple[tuple[int, int, int], tuple[int, int]]:
-    """The ranges with the fewest cells that hold the given cells, and where their origin lies.
+    """The ranges with the fewest cells that hold the given cells, and their origin (q0, r0).
 
-    A world of ranges (a + 1, b + 1, c + 1) with its origin at (q0, r0) holds the cells with
+    A world of ranges (a + 1, b + 1, c + 1) with its origin at (q0, r0) holds the cells (q, r) with
     -c <= q - q0 <= a, -c <= r - r0 <= b and -b <= (q - r) - (q0 - r0) <= a. So the extremes of q, r
-    and d = q - r decide. An origin exists if and only if
-        a + c >= width of q, b + c >= width of r, a + b >= width of d, and
-        a + b + c >= q_max - r_min - d_min and a + b + c >= d_max - q_min + r_max.
+    and d = q - r decide. An origin exists if and only if a + c >= width of q, b + c >= width of r,
+    a + b >= width of d, a + b + c >= q_max - r_min - d_min and a + b + c >= d_max - q_min + r_max.
     The number of cells grows with s = a + b + c, so the smallest possible s is best; for that s it
     is a constant less (a^2 + b^2 + c^2) / 2, so one of a, b, c should be as large as possible, then
-    the next.
-
-    Args:
-        axials: int64 (n, 2) = (q, r), n >= 1.
-
-    Returns:
-        (ranges, (q0, r0)). Of equally small worlds the one of the largest X, then the largest Y; of
-        its origins the one of the smallest q, then the smallest r.
+    the next. Of equally small worlds it is the one of the largest X, then the largest Y; of its
+    origins the one of the smallest q, then the smallest r.
     """
     q, r = axials[:, 0], axials[:, 1]
     q_min, q_max = int(q.min()), int(q.max())

@@ -40,10 +40,9 @@ class Colony(ColonyState):
         training: The learner and its settings. None, with sharing "frozen": ants do what `act` is
             given, and there are no action values.
         seeds: One seed for each of the W worlds.
-        ants: How many start each episode, 1 to 2**24: the listed ants of the World first, then
-            others on free cells, see `start`.
-        capacity: How many ants can live at once, at least `ants`; more than these changes nothing
-            where none are born. None: `ants` if none are born, else 2 * `ants` + 64.
+        ants: How many start each episode, 1 to 2**24: the listed ants of the World first.
+        capacity: How many ants can live at once. None: `ants` if none are born, else 2 * `ants` +
+            64.
         start: Where ants start that the World does not list: "nest", on the free cells nearest to
             the queen; "spread", on free cells anywhere. The seed decides which, and the headings.
         ends_at_delivery: Whether an episode ends at its first delivery, as when an ant trains
@@ -53,8 +52,7 @@ class Colony(ColonyState):
         q_values: Action values to start from, float (n_states, 5) or (W, n_states, 5); None: zeros,
             but if nobody learns they must be given, unless `training` is None. If tables are not
             shared, (W, slots, n_states, 5) too.
-        threads: CPU threads; None keeps what runs, or takes all.
-        arch: "cpu" or "cuda"; None keeps what runs, or takes the CPU.
+        threads, arch: As in `train`.
         schedule: "by_world" hands worlds to threads, "by_chunk" groups of ants; None chooses by
             size. Both give the same numbers; by chunk, ants are stored in another order.
 

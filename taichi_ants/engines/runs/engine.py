@@ -81,10 +81,9 @@ _NO_WORK: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Runs:
-    """Runs of one learner.
+    """Runs of one learner, or that follow tables without learning.
 
     Attributes:
-        learner: The learner; None to follow the tables without learning.
         seeds: The seed of each run, Python integers (n,), for worlds that do not list their ant.
         settings: float64 (n, columns), `layout.SETTINGS` and the hyperparameters of the learner.
         state: Where the runs stand, arrays (n, ...), contiguous; the kernel moves it on.

@@ -30,14 +30,13 @@ _SUMMED_UP, _LISTED = 50, 6  # episodes and configurations that a result shows
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RunState(Record):
-    """Where runs stopped; training goes on from it bit for bit.
+    """The state of runs where they stopped; training goes on from it bit for bit.
 
     Attributes (leading axes: the runs, for example (configurations, seeds)):
         q: float32 (..., 1 + tables, n_states, 8), the table that the ant acts by and the further
             ones of its learner; 5 action values and 3 unused.
-        floats: float32 (..., k), as many as any learner here needs, up to the next multiple of 8;
-            see `taichi_ants.learners.Memory`.
-        integers: int32 (..., k), likewise.
+        floats, integers: float32 and int32 (..., k), as many as any learner here needs, up to the
+            next multiple of 8; see `taichi_ants.learners.Memory`.
         random_states: uint64 (...,), the ants' random streams.
         epsilon, learning_rate: float64 (...,), of the next episode.
     """
