@@ -368,25 +368,13 @@ def table(cls: Any) -> str:
     for one in all_of(cls):
         if not one.is_group:
             unit = f", in {one.rule.unit}" if one.rule.unit else ""
-            rows.append(
-                f"| `{one.path}` | {one.allowed}{unit} | {_default(one)} | {_meaning(one)} |"
-            )
+            usual = one.default if one.rule.usual is None else one.rule.usual
+            default, meaning = "none" if usual is MISSING else f"`{usual!r}`", one.rule.help
+            if one.rule.only is not None:
+                other, *values = one.rule.only
+                meaning += f"; only with `{other}` {' or '.join(map(repr, values))}"
+            rows.append(f"| `{one.path}` | {one.allowed}{unit} | {default} | {meaning} |")
     return "\n".join(rows)
-
-
-def _default(one: Setting) -> str:
-    if one.default is MISSING:
-        return "none"
-    if one.rule.usual is not None:
-        return f"`{one.rule.usual!r}`"
-    return f"`{one.default!r}`"
-
-
-def _meaning(one: Setting) -> str:
-    if one.rule.only is None:
-        return one.rule.help
-    other, *values = one.rule.only
-    return f"{one.rule.help}; only with `{other}` {' or '.join(map(repr, values))}"
 
 
 def not_a_setting(name: object, known: Iterable[str], group: str = "") -> str:

@@ -48,7 +48,6 @@ def compass_of(grid: AxialGrid) -> np.ndarray:
 def padded(memory: Memory) -> Memory:
     """A memory of which kernels can address many, one behind the other.
 
-    They count its numbers by 8: then compilers know that neighbouring addresses differ in their
-    last bits alone, which saves Dyna-Q a tenth of its time.
+    Counted by 8: compilers then know that neighbouring addresses differ in their last bits alone.
     """
     return replace(memory, floats=-(-memory.floats // 8) * 8, integers=-(-memory.integers // 8) * 8)

@@ -28,11 +28,7 @@ _STATES = 128  # rows of the tables of a check
 
 @cache
 def checked_plugin(learner: Learner) -> Learner:
-    """The learner; one from outside of the package has passed the plugin check.
-
-    Raises:
-        AntsError: It cannot be used; the message says why.
-    """
+    """The learner; AntsError if one from outside of the package does not pass the plugin check."""
     if learner.name in registry.BUILT_IN:
         return learner
     arch = runtime.start().arch

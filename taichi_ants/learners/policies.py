@@ -175,12 +175,7 @@ def save_policy(
 
 
 def load_policy(path: PathLike) -> Policy:
-    """Read a policy file that `save_policy` wrote.
-
-    Raises:
-        AntsError: The file is missing, damaged, no policy file, of an observation that is not
-            registered, or its values are no policy of it.
-    """
+    """Read a policy file that `save_policy` wrote; AntsError if it cannot be used."""
     with _KIND.reading(path) as (arrays, facts):
         observation, metadata = facts["observation"], facts["metadata"]
         expect("metadata", metadata, dict)

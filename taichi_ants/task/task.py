@@ -95,12 +95,9 @@ def queueing() -> Task:
     Where the trail that leads to food lies under an ant with food, no weaker one looks like it.
     Ants turn round at the queen, back towards where they came from.
     """
-    return Task(
-        observation="queues",
-        pheromone=Pheromone(deposit="fading", level=500, view="strongest_under_carriers"),
-        traffic=Traffic.named()["following"],
-        turns_at_queen=True,
-        evaporation_in_training=True,
+    view = {"view": "strongest_under_carriers"}
+    return foraging().but(
+        observation="queues", pheromone=view, traffic="following", turns_at_queen=True
     )
 
 

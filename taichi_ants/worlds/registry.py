@@ -22,11 +22,8 @@ def register(name: str, builder: Builder, *, drawn: bool = True) -> None:
 
     The builder is called with settings of the world by name and returns a `World`. Its arguments
     need defaults, except `seed`: a builder with such an argument gets a whole number, and must
-    return the same world for the same number. It replaces your own world of the same name.
-
-    Raises:
-        AntsError: The name is that of a world of the package or not text, or the builder cannot be
-            called so.
+    return the same world for the same number. It replaces your own world of the same name;
+    AntsError if that is of the package or not text, or the builder cannot be called so.
     """
     if not isinstance(name, str) or not name.strip():
         raise AntsError(f"the world name {shown(name)} is not allowed; it must be text.")
@@ -78,9 +75,7 @@ def build(name_or_path: str | os.PathLike[str], seed: int = 0, **given: Any) -> 
     """The world of a registered name, or, if there is none, of the text map in a file.
 
     The seed is any whole number, which only some builders use; `given` are settings of the world.
-
-    Raises:
-        AntsError: There is neither such a name nor such a file, or building fails.
+    AntsError if there is neither such a name nor such a file, or building fails.
     """
     seed = whole("seed", seed)
     expect("the world", name_or_path, str, os.PathLike)

@@ -195,9 +195,7 @@ def smallest_world(axials: np.ndarray) -> tuple[tuple[int, int, int], tuple[int,
 def to_text(world: World) -> str:
     """The map of a world; `from_text` gives it back, its ants numbered in reading order.
 
-    Raises:
-        AntsError: The world has trails of several levels, or under food or the queen, which a map
-            cannot show.
+    AntsError if a map cannot show its trails: of several levels, or under food or the queen.
     """
     expect("world", world, World)
     levels = np.unique(world.trails[:, 3])

@@ -104,10 +104,7 @@ class World:
         return bits * self.grid.exists
 
     def reachable_foods(self) -> np.ndarray:
-        """bool (F,): whether an ant that starts beside the queen can come to stand beside a food.
-
-        Ants walk over empty cells; obstacles and other foods block.
-        """
+        """bool (F,): whether an ant can walk from beside the queen to beside a food."""
         beside_queen = self.grid.index(self.queen) + self.grid.offsets
         found = geometry.walkable(self.grid, self.ground(), beside_queen)
         return found[self.grid.index(self.foods)[:, None] + self.grid.offsets].any(axis=1)

@@ -176,11 +176,7 @@ class Colony(ColonyState):
         self._stepper.launch(self, "intervention_phases")
 
     def tick(self, n: int = 1) -> None:
-        """Let n ticks pass; worlds whose episode has ended stand still.
-
-        Raises:
-            AntsError: No episode has begun, or actions are given to this colony, see `act`.
-        """
+        """Let n ticks pass; worlds whose episode has ended stand still."""
         self.check_begun()
         if self.is_given_actions:
             raise AntsError(
@@ -192,12 +188,9 @@ class Colony(ColonyState):
     def act(self, actions: np.ndarray) -> None:
         """Let one tick pass in which each ant does what is given; for colonies without training.
 
-        Args:
-            actions: Whole numbers 0 to 4 (W, capacity): left, forward, right, pick up, give; those
-                of vacant slots, and of worlds whose episode has ended, are ignored.
-
-        Raises:
-            AntsError: No episode has begun, the colony has a training, or an action is not allowed.
+        Actions are whole numbers 0 to 4 (W, capacity): left, forward, right, pick up, give; those
+        of vacant slots, and of worlds whose episode has ended, are ignored. AntsError if no episode
+        has begun, the colony has a training, or an action is not allowed.
         """
         self.check_begun()
         if not self.is_given_actions:
@@ -222,11 +215,7 @@ class Colony(ColonyState):
         self._stepper.advance(self, 1)
 
     def end_episode(self) -> None:
-        """Keep the streams of the ants that start an episode; epsilon and learning rate decay.
-
-        Raises:
-            AntsError: The learner has made action values that are not finite.
-        """
+        """Keep the streams of the ants that start an episode; epsilon and learning rate decay."""
         self.check_finite()
         self.keep_streams()
         self.epsilon = self.training.next_epsilon(self.epsilon)

@@ -167,10 +167,7 @@ def share_of(c: ti.template(), chunk, n):
 
 
 def shared_out(phases: Iterator[Phase]) -> list[tuple[Phase, ...]]:
-    """Phases in groups that threads can go through without waiting for each other.
-
-    Phases of whole worlds that follow each other are a group: one thread does all of a world's.
-    """
+    """Phases in groups that need no barrier inside: of single worlds, all that follow."""
     groups: list[tuple[Phase, ...]] = []
     for phase in phases:
         if groups and phase.of == groups[-1][0].of == WORLD:

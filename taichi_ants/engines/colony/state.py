@@ -263,11 +263,7 @@ class ColonyState:
         return (tables if self.one_a_slot else tables[:, 0]).copy()
 
     def outcome(self) -> ColonyEpisodes:
-        """Return the results of the episode so far, arrays (1, W).
-
-        Raises:
-            AntsError: The learner has made action values that are not finite.
-        """
+        """Return the results of the episode so far, arrays (1, W), see `check_finite`."""
         self.check_finite()
         counts = {
             row.name.lower(): self.arrays["worlds"][row][None].copy()
@@ -279,11 +275,7 @@ class ColonyState:
         return ColonyEpisodes(returns=self.arrays["returns"][None].copy(), **counts)
 
     def snapshot(self, world: int = 0) -> Snapshot:
-        """Return world number `world` as it is now; arrays are copies.
-
-        Raises:
-            AntsError: There is no such world, or no episode has begun.
-        """
+        """Return world number `world` as it is now; arrays are copies."""
         self.check_begun()
         world = checked_whole("world", world, most=len(self.seeds) - 1, least=0)
         cells = slice(world * self.grid.size, (world + 1) * self.grid.size)
@@ -545,7 +537,7 @@ class ColonyState:
         sums, cells = max(1, chunks * pairs), len(self.seeds) * self.grid.size
         return {
             # 1 for rocks and outside.
-            "walls": self._of_each(_walls).reshape(-1),
+            "walls": (self._of_each(World.ground) == OBSTACLE).astype(np.uint8).reshape(-1),
             # A bit for each heading that leads nearer to the queen.
             "closer": self._of_each(World.closer).reshape(-1),
             "compass": compass_of(self.grid),  # see `rules.actions`
@@ -603,9 +595,7 @@ class ColonyState:
     def save(self, path: files.PathLike) -> None:
         """Write the colony as it is now; `load` resumes it, bit for bit.
 
-        Raises:
-            AntsError: The learner has made action values that are not finite, so that `load` would
-                refuse the file; seeds repeat; or it cannot be written.
+        AntsError if an action value is not finite, seeds repeat, or the file cannot be written.
         """
         self.check_finite()
         checks.checked_seeds(self.seeds)
@@ -622,9 +612,7 @@ class ColonyState:
     ) -> State:
         """Read a colony that `save` wrote.
 
-        Raises:
-            AntsError: The file is missing, damaged, or holds no colony; or its learner or
-                observation is not registered.
+        AntsError if the file cannot be used, or its learner or observation is not registered.
         """
         runtime.start(threads, arch)  # its errors are not about the file
         with _KIND.reading(path) as (arrays, facts):
@@ -668,7 +656,3 @@ class ColonyState:
         )
 
     __hash__ = None  # type: ignore[assignment]  # it changes with each tick
-
-
-def _walls(world: World) -> np.ndarray:
-    return (world.ground() == OBSTACLE).astype(np.uint8)

@@ -77,11 +77,7 @@ class BatchedEnvironments:
         }
 
     def seed(self, seeds: Sequence[int], which: np.ndarray) -> None:
-        """Give some ants, int (k,), new random streams and start places.
-
-        A seed decides where an ant starts if its world lists none, and which food it takes if it
-        sees several; both for all episodes to come.
-        """
+        """Give some ants, int (k,), new random streams and start places, by their seeds."""
         words = words_of(seeds)
         self.arrays["random_states"][which] = stream_state(words, STREAM_ANT, 0)
         for number, world in enumerate(self.worlds):
@@ -97,10 +93,7 @@ class BatchedEnvironments:
     def step(
         self, actions: np.ndarray, begins: np.ndarray | int = 0, same_step: bool = False
     ) -> None:
-        """Let all ants do these actions, 0 .. 4; but where `begins` is 1 an episode begins.
-
-        With `same_step` an ant whose episode ends begins the next one at once.
-        """
+        """Let all ants do these actions; but where `begins` is 1 an episode begins."""
         self.arrays["actions"][:] = actions
         self._go(begins, same_step)
 

@@ -161,11 +161,7 @@ class TrainingResult(Record):
         return self.state.q[:, :, 0, :, :N_ACTIONS].copy()
 
     def save(self, path: PathLike) -> None:
-        """Write the result; training goes on from what `load` reads, bit for bit.
-
-        Raises:
-            AntsError: The file cannot be written.
-        """
+        """Write the result; training goes on from what `load` reads, bit for bit."""
         facts = {
             "world": self.world.as_dict(),
             "task": self.task.as_dict(),
@@ -180,11 +176,7 @@ class TrainingResult(Record):
 
     @classmethod
     def load(cls, path: PathLike) -> TrainingResult:
-        """Read a result that `save` wrote; its learners need not be registered.
-
-        Raises:
-            AntsError: The file is missing, damaged, of another kind, or its observation is unknown.
-        """
+        """Read a result that `save` wrote; its learners need not be registered."""
         with _KIND.reading(path) as (arrays, facts):
             task = Task.from_dict(facts["task"])
             outcomes: dict[str, Any] = {name: arrays[name] for name in OUTCOMES}

@@ -47,9 +47,6 @@ def train(
         threads: CPU threads; None keeps what runs, or takes all.
         arch: "cpu" or "cuda"; None keeps what runs, or takes the CPU.
         progress: Called now and then with the share of the work that is done.
-
-    Raises:
-        AntsError: An argument is not allowed; the message names it.
     """
     configs = checks.checked_configs(configs)
     seeds = checks.checked_seeds(seeds)
@@ -109,7 +106,10 @@ def _train(
     groups: dict[tuple, list[int]] = {}
     for c, config in enumerate(result.configs):
         groups.setdefault((config.learner, config.hyperparameters), []).append(c)
-    costs = [_cost(result.configs[group[0]]) * len(group) for group in groups.values()]
+    costs = []
+    for group in groups.values():
+        learner = learners.get(result.configs[group[0]].learner)
+        costs.append(learner.cost(learner.settings(result.configs[group[0]])) * len(group))
     done, seconds = 0.0, 0.0
     for group, cost in zip(groups.values(), costs, strict=True):
         chosen, where = [result.configs[c] for c in group], _place(group)
@@ -123,7 +123,7 @@ def _train(
         state.put(where, runs.state)
         done += share
     returns, steps, deliveries = (
-        _joined(before, new)
+        np.concatenate([before, new], axis=2) if before.shape[2] else new
         for before, new in zip(
             (result.returns, result.steps, result.deliveries), outcomes, strict=True
         )
@@ -131,20 +131,10 @@ def _train(
     return replace(result, returns=returns, steps=steps, deliveries=deliveries, seconds=seconds)
 
 
-def _cost(config: TrainingConfig) -> float:
-    learner = learners.get(config.learner)
-    return learner.cost(learner.settings(config))
-
-
 def _place(group: list[int]) -> slice | list[int]:
     """Where configurations are: a slice, which copies nothing, if one follows the other."""
     first, end = group[0], group[-1] + 1
     return slice(first, end) if end - first == len(group) else group
-
-
-def _joined(before: np.ndarray, new: np.ndarray) -> np.ndarray:
-    """The outcomes of old and new episodes."""
-    return np.concatenate([before, new], axis=2) if before.shape[2] else new
 
 
 def _report(progress: Progress, done: float, share: float, part: float) -> None:

@@ -85,9 +85,8 @@ _OBSERVATIONS: dict[str, Observation] = {}
 def register(observation: Observation) -> Observation:
     """Make an observation known by its name; it replaces your own observation of the same name.
 
-    Raises:
-        AntsError: The name is that of an observation of the package or not an identifier, a field
-            does not have the form that it must have, or a state index is outside of the range.
+    AntsError if the name is that of an observation of the package or not an identifier, a field
+    does not have the form that it must have, or a state index is outside of the range.
     """
     expect("what is registered", observation, Observation)
     name = observation.name
