@@ -126,9 +126,9 @@ def holds_data() -> bool:
 def quiet() -> Iterator[None]:
     """Compile kernels of ours inside: without Taichi's warnings, whatever the caller has set.
 
-    Numbers are narrowed there on purpose; a Taichi that the caller has started warns of each.
-    Errors tell the line that they are in, without a mark below the place in it: Taichi would draw
-    one for each expression, which takes half of its time for a kernel that it has in its cache.
+    Numbers are narrowed there on purpose. Errors name their line without a mark below the place in
+    it: to draw one for each expression takes half of Taichi's time for a kernel that it has in its
+    cache.
     """
     from taichi._lib import core
     from taichi.lang.ast.ast_transformer_utils import ASTTransformerContext as Context

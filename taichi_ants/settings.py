@@ -215,9 +215,8 @@ class Setting(NamedTuple):
 class Settings:
     """Base of the classes of settings, which are frozen dataclasses.
 
-    `path` is the full name of the settings, as in sweep files; messages name a setting by it.
-    A class whose common values have names returns them from `named`; a name is then taken for the
-    value wherever the class is a setting of another one.
+    `path` is the full name of the settings, as in sweep files and messages. The names that a class
+    returns from `named` are taken for their values wherever the class is a setting of another one.
     """
 
     path: ClassVar[str] = ""

@@ -1,8 +1,7 @@
 """How the engine of independent runs lays a world out in memory.
 
-A cell is one i32: the stored trail (0 or more) if it is empty, else its ground less 16, which is
-negative and still shows in its lower four bits how the cell looks. One load tells all that an ant
-can see of a cell.
+A cell is one i32, so that one load tells all of it: the stored trail (0 or more) if it is empty,
+else its ground less 16, which is negative; its lower four bits still show how the cell looks.
 """
 
 from __future__ import annotations

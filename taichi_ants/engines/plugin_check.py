@@ -1,8 +1,7 @@
 """Checks learners from outside of the package before a kernel takes them up.
 
-Taichi's compiler ends the process where it meets what it does not expect, and compiled code where
-it reads outside an array. So such a learner is compiled, and learns from a thousand steps, in a
-forked process first.
+Taichi's compiler ends the process at what it does not expect, and compiled code where it reads
+outside an array. So a learner is compiled, and learns a thousand steps, in a forked process first.
 """
 
 import faulthandler

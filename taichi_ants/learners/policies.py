@@ -1,8 +1,7 @@
 """Policies: tables of action values, two that need no learning, and their files.
 
-A policy is a float32 array of shape (n_states, 5): the value of each action in each state of an
-observation. An ant takes a best action, ties at random with equal probability. So a table can state
-a random choice, but no other probabilities.
+A policy is a float32 array (n_states, 5), the value of each action in each state of an observation.
+An ant takes a best action, ties at random with equal probability.
 """
 
 from __future__ import annotations

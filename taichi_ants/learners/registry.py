@@ -1,8 +1,7 @@
 """The one place where learners are registered.
 
-A learner is a function that updates a table of action values after each step, and what it needs
-besides. To add one, write a file beside this one and add its name to `BUILT_IN`; or call `register`
-from a file of your own.
+To add one, write a file beside this one and add its name to `BUILT_IN`; or call `register` from a
+file of your own.
 """
 
 from __future__ import annotations

@@ -1,13 +1,11 @@
 """Offline learners: tables of action values from a data set alone.
 
 Tables are float32 (n_states, 5), or (runs, n_states, 5) with a table from the data of each run.
-They are policies as all others are: `save_policy` writes one, `evaluate` tries it in the world.
 
-Such learners never see what their policy brings about. Where data lack a pair of state and action,
-its value is a guess, and a policy that maximises goes where guesses are too high: the extrapolation
-error of Fujimoto, Meger and Precup (Off-policy deep reinforcement learning without exploration,
-ICML 2019); Levine, Kumar, Tucker and Fu (Offline reinforcement learning: tutorial, review, and
-perspectives on open problems, 2020) survey the remedies.
+Where data lack a pair of state and action, its value is a guess, and a policy that maximises goes
+where guesses are too high: the extrapolation error of Fujimoto, Meger and Precup (Off-policy deep
+reinforcement learning without exploration, ICML 2019); Levine, Kumar, Tucker and Fu (Offline
+reinforcement learning: tutorial, review, and perspectives on open problems, 2020) survey remedies.
 """
 
 from __future__ import annotations

@@ -77,10 +77,7 @@ class Task(Settings, path="task"):
 
 
 def foraging() -> Task:
-    """A task in which the trails of a colony help.
-
-    Trails rise towards food, ants with food have right of way, and ants see each other.
-    """
+    """A task: trails rise towards food, carriers have right of way, ants see each other."""
     return Task(
         observation="ants",
         pheromone=Pheromone(deposit="fading", level=500, view="strongest"),
@@ -93,7 +90,6 @@ def queueing() -> Task:
     """As `foraging`; besides, queues move as one, and ants see which ones are worth following.
 
     Where the trail that leads to food lies under an ant with food, no weaker one looks like it.
-    Ants turn round at the queen, back towards where they came from.
     """
     view = {"view": "strongest_under_carriers"}
     return foraging().but(

@@ -1,8 +1,7 @@
 """A world and a task laid out for the kernel of independent runs, and the loop over launches.
 
-A launch cannot be interrupted, so that Ctrl-C, progress and checkpoints wait for its end: even if
-every episode uses all of its steps, a launch should take about a second. Within that bound few
-large launches are best, since threads wait for the last run of each.
+A launch cannot be interrupted, so it should take about a second even if every episode uses all of
+its steps. Within that bound few large launches are best: threads wait for the last run of each.
 """
 
 from __future__ import annotations

@@ -7,10 +7,12 @@ import operator
 from collections.abc import Sequence
 from dataclasses import astuple, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from taichi_ants import checks, learners, runtime
+from taichi_ants.engines.layout import OUTCOMES
 from taichi_ants.engines.runs.engine import Progress, Runs, do_episodes
 from taichi_ants.engines.runs.results import Rollouts, RunState, TrainingResult, memory_for
 from taichi_ants.errors import AntsError, checked_whole, shown
@@ -122,13 +124,10 @@ def _train(
         checks.check_finite(runs.state.q, chosen, result.seeds)
         state.put(where, runs.state)
         done += share
-    returns, steps, deliveries = (
-        np.concatenate([before, new], axis=2) if before.shape[2] else new
-        for before, new in zip(
-            (result.returns, result.steps, result.deliveries), outcomes, strict=True
-        )
-    )
-    return replace(result, returns=returns, steps=steps, deliveries=deliveries, seconds=seconds)
+    joined: dict[str, Any] = dict(zip(OUTCOMES, outcomes, strict=True))
+    if result.episodes:
+        joined = {n: np.concatenate([getattr(result, n), a], axis=2) for n, a in joined.items()}
+    return replace(result, **joined, seconds=seconds)
 
 
 def _place(group: list[int]) -> slice | list[int]:

@@ -1,9 +1,8 @@
 """The one place where observations are registered.
 
-An observation tells the index of the state that an ant sees. What an ant can do and
-what it is paid for never depends on it: these go by the percept, the paper's state. To add one,
-write a file beside this one and a line in `__init__.py`; or call `register` from a file of your
-own.
+An observation gives the index of the state that an ant sees. Actions and rewards never depend on
+it: these go by the percept, the paper's state. To add one, write a file beside this one and a line
+in `__init__.py`; or call `register` from a file of your own.
 """
 
 from __future__ import annotations

@@ -86,8 +86,8 @@ def heading_wanted(c: ti.template(), place):
 def way_is_free(c: ti.template(), traffic: ti.template(), base, cell, wanted):
     """Whether the winner on `cell` enters a cell that is empty, or whose ant moves on as it does.
 
-    The winners of cells with ants form queues; one moves if its head enters an empty cell. A queue
-    that bites its own tail is a ring, which stays.
+    Winners of cells with ants form queues; one moves if its head enters an empty cell; a ring
+    stays.
     """
     ahead = wanted
     if ti.static(traffic.follow):
