@@ -55,7 +55,7 @@ _KINDS: dict[type, str] = {
 
 @dataclass(frozen=True)
 class Is:
-    """What holds for a setting besides its type; several of them in one annotation add up.
+    """Facts about a setting besides its type; several of them in one annotation add up.
 
     Attributes:
         help: A phrase or sentence that says what the setting does.

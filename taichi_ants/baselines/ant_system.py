@@ -40,7 +40,7 @@ _MAX_ENTRIES = 1 << 28  # of the arrays of tours: a gibibyte each
 
 @dataclass(frozen=True)
 class Search:
-    """What colonies found.
+    """Results of colonies.
 
     Steps from the queen to the nearest food (`shortest`); by (colonies, iterations), int32, the
     shortest tour of each iteration (`best`), 0 if no ant found food; the `mean` length, float64,

@@ -1,4 +1,4 @@
-"""How the engine of independent runs lays a world out in memory.
+"""The memory layout of a world in the engine of independent runs.
 
 A cell is one i32, so that one load tells all of it: the stored trail (0 or more) if it is empty,
 else its ground less 16, which is negative; its lower four bits still show how the cell looks.

@@ -70,7 +70,7 @@ def centre_of(cells: object, size: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class AxialGrid:
-    """How the cells of a world of `ranges` (X, Y, Z) lie in a flat array.
+    """The cells of a world of `ranges` (X, Y, Z) in a flat array.
 
     The array holds the axial bounding box with a border of one void cell, row by row (r), so that a
     step to a neighbour is an addition and needs no bounds check: index = (r + Z) * width + (q + Z).

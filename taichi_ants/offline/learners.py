@@ -216,7 +216,7 @@ class EmpiricalModel:
 
 
 def _tally(data: Dataset, pair: np.ndarray) -> tuple[np.ndarray, ...]:
-    """How often each pair led to each state, ascending; the n_states-th stands for termination.
+    """Count the states to which each pair led, ascending; n_states stands for termination.
 
     Returns:
         Pairs, next states, counts, sums of rewards, and for each row which of these it is.

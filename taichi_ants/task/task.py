@@ -20,7 +20,7 @@ DELIVERIES: tuple[str, ...] = get_args(Delivery)
 
 @dataclass(frozen=True, repr=False)
 class Task(Settings, path="task"):
-    """What an ant perceives, may do and is paid for; the paper's by default.
+    """The rules of perception, action and reward; the paper's by default.
 
     `observation` and the kind of pheromone are compiled into the kernels; all else is numbers that
     kernels read. `traffic` may be one of the names of `Traffic.named`. A delivery that "terminates"

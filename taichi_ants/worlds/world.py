@@ -110,7 +110,7 @@ class World:
         return found[self.grid.index(self.foods)[:, None] + self.grid.offsets].any(axis=1)
 
     def start(self, seed: int, n: int = 1, where: str = "nest") -> tuple[np.ndarray, np.ndarray]:
-        """Where n ants start: flat indices and headings, int32 (n,), the listed ants first.
+        """Flat indices and headings, int32 (n,), of n ants at the start, the listed ants first.
 
         Args:
             seed: Any whole number; decides cells (ties of distance), and headings of placed ants.

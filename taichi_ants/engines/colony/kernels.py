@@ -41,7 +41,7 @@ class Phase(NamedTuple):
 
 
 class Variant:
-    """What is compiled into a kernel; all functions of the colony call it `v`.
+    """The properties compiled into a kernel; all functions of the colony call it `v`.
 
     With `own_tables` there is a table for each slot, not one for each world; the others are as in
     `ColonyState` and `Pheromone`. To leave out what comes and goes saves time, more so while

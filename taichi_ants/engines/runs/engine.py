@@ -131,7 +131,7 @@ class Runs:
 
 
 def laid_out(worlds: Sequence[World], task: Task, falls: bool) -> dict[str, Any]:
-    """What kernels read of a task, and of worlds of one grid; trails evaporate if `falls`."""
+    """Arrays and numbers of a task and of worlds of one grid; trails evaporate if `falls`."""
     grid = worlds[0].grid
     return {
         "size": grid.size,

@@ -29,7 +29,7 @@ MAX_TABLE_ROWS = 12_800_000  # of 32 bytes; each step of training keeps its tabl
 
 @dataclass(frozen=True, eq=False)
 class Made:
-    """What a trace was made with, so that it can be played again; see `rollout`, `trace_training`.
+    """The arguments of a trace, by which it can be played again; see `rollout`, `trace_training`.
 
     `number` is that of the rollout; `q_values`, float (n_states, 5), the table that the ant
     followed with `epsilon`, None if it learned; `config` is how it learned.

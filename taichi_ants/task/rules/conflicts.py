@@ -130,7 +130,7 @@ def gives_way(c: ti.template(), traffic: ti.template(), base, cell):
 def settle(
     c: ti.template(), traffic: ti.template(), base, cell, wanted, ahead, carries, moves, entered
 ):
-    """Where an ant is after the tick, whether another one takes its place, and its event.
+    """Return the cell of an ant after the tick, whether it is filled again, and the event.
 
     It moves on an empty way; or, with food, it changes places with the ant in its way; or it gives
     way to an ant with food that wins its cell; or it stays. `wanted` is the cell that it wins, else
