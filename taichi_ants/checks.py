@@ -192,4 +192,4 @@ def checked_q_values(q_values: Any, task: Task) -> np.ndarray:
 
     Also accepts an object with `q_values`: a `TrainingResult`, a `Policy` or a `Colony`.
     """
-    return checked_values(getattr(q_values, "q_values", q_values), task.observation)
+    return checked_values(getattr(q_values, "q_values", q_values), task)

@@ -184,15 +184,15 @@ def load_policy(path: PathLike) -> Policy:
 
 def _checked(q_values: npt.ArrayLike, observation: str) -> ActionValues:
     """The action values of one policy."""
-    table = checked_values(q_values, observation)
+    table = checked_values(q_values, Task(observations.get(observation).name))
     if table.ndim != 2:
         raise AntsError(f"q_values has shape {table.shape}; it must be {table.shape[-2:]}.")
     return table
 
 
-def checked_values(q_values: Any, observation: str) -> np.ndarray:
+def checked_values(q_values: Any, task: Task) -> np.ndarray:
     """Action values as float32 (..., n_states, 5); AntsError unless they are finite numbers."""
-    shape = (observations.get(observation).n_states, N_ACTIONS)
+    shape = (task.n_states, N_ACTIONS)
     try:
         values = np.asarray(q_values)
     except ValueError:  # rows of different lengths
@@ -201,8 +201,8 @@ def checked_values(q_values: Any, observation: str) -> np.ndarray:
         raise AntsError(f"q_values is {shown(q_values)}; it must be an array of real numbers.")
     if values.shape[-2:] != shape or values.size == 0:
         raise AntsError(
-            f"q_values has shape {values.shape}; for the observation {observation!r} it must end "
-            f"in {shape}."
+            f"q_values has shape {values.shape}; for the observation {task.observation!r} it must "
+            f"end in {shape}."
         )
     # A float64 beyond the range of float32 becomes infinite, which the next check reports.
     with np.errstate(over="ignore"):
