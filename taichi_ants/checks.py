@@ -20,8 +20,9 @@ from taichi_ants.errors import (
     whole,
 )
 from taichi_ants.learners.config import TrainingConfig, share_of_one
+from taichi_ants.learners.policies import checked_values
 from taichi_ants.task import Task
-from taichi_ants.task.constants import MAX_STEPS, N_ACTIONS
+from taichi_ants.task.constants import MAX_STEPS
 from taichi_ants.worlds.starts import STARTS
 from taichi_ants.worlds.world import World
 
@@ -191,21 +192,4 @@ def checked_q_values(q_values: Any, task: Task) -> np.ndarray:
 
     Also accepts an object with `q_values`: a `TrainingResult`, a `Policy` or a `Colony`.
     """
-    q_values = getattr(q_values, "q_values", q_values)
-    try:
-        if np.iscomplexobj(q_values):
-            raise TypeError
-        tables = np.asarray(q_values, dtype=np.float32)
-    except (OverflowError, TypeError, ValueError):
-        raise AntsError(
-            "q_values is not an array of numbers; give a float "
-            f"(..., {task.n_states}, {N_ACTIONS}) array."
-        ) from None
-    if tables.shape[-2:] != (task.n_states, N_ACTIONS) or tables.size == 0:
-        raise AntsError(
-            f"q_values has shape {tables.shape}; for the observation {task.observation!r} it must "
-            f"end in ({task.n_states}, {N_ACTIONS})."
-        )
-    if not np.isfinite(tables).all():
-        raise AntsError("q_values holds numbers that are not finite; action values must be finite.")
-    return tables
+    return checked_values(getattr(q_values, "q_values", q_values), task)

@@ -11,18 +11,11 @@ from contextlib import suppress
 def prepare_for_taichi() -> None:
     """Set what Taichi reads from the environment when it is imported, unless the user has set it.
 
-    No banner on standard output, no thread that asks a server for newer versions, no warning about
-    an old function that Taichi calls, no message that this is a notebook (what kernels print is
-    shown there all the same: Jupyter reads the process's own output). Without a HOME Taichi aborts,
-    with one that cannot be written it crashes at exit: then HOME becomes a temporary folder for
-    this process.
+    No banner, no search for newer versions, no warning about an old function that Taichi calls, no
+    message that this is a notebook. Without a HOME Taichi aborts, with one that cannot be written
+    it crashes at exit: then HOME becomes a temporary folder for this process.
     """
-    warnings.filterwarnings(
-        "ignore",
-        ".*getlocale",
-        DeprecationWarning,
-        r"taichi\._lib\.utils",
-    )
+    warnings.filterwarnings("ignore", ".*getlocale", DeprecationWarning, r"taichi\._lib\.utils")
     if hasattr(os, "register_at_fork"):
         os.register_at_fork(after_in_child=_mark_forked_taichi)
     os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")

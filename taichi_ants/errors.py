@@ -93,23 +93,14 @@ def check_new_name(kind: str, name: object, built_in: Iterable[str]) -> None:
 
 
 def checked_flag(name: str, value: object) -> bool:
-    """True or False as a Python bool; text such as "off" would count as True.
-
-    Raises:
-        AntsError: `value` is neither; names it `name`.
-    """
+    """True or False as a Python bool; AntsError for all else, such as the true text "off"."""
     if not is_flag(value):
         raise AntsError(f"{name} is {shown(value)}; it must be True or False.")
     return bool(value)
 
 
 def whole(name: str, value: object, otherwise: str = "") -> int:
-    """`value` as a Python integer.
-
-    Raises:
-        AntsError: `value` is not a whole number (booleans and floats are none); names it `name`,
-            and adds what is allowed otherwise.
-    """
+    """`value` as a Python integer; AntsError if it is not one (booleans and floats are not)."""
     try:
         if is_flag(value):
             raise TypeError
@@ -143,17 +134,21 @@ def entries_of(values: object) -> list | None:
 
 
 def array_of(name: str, values: object) -> np.ndarray:
-    """`values` as an array of whatever type they have.
-
-    Raises:
-        AntsError: They have no form that an array can have; names them `name`.
-    """
+    """`values` as an array of whatever type they have; AntsError if they have no form."""
     import numpy as np
 
     try:
         return np.asarray(values)
     except ValueError:
         raise AntsError(f"{name} is {shown(values)}; it must be an array.") from None
+
+
+def check_array(name: str, value: Any, dtype: str | np.dtype, shape: tuple[int, ...]) -> None:
+    """Raises AntsError, naming the value `name`, unless it is an array of this type and shape."""
+    if (getattr(value, "dtype", None), getattr(value, "shape", None)) != (dtype, shape):
+        raise AntsError(
+            f"{name} is {shown(value)}; it must be an array of shape {shape} and type {dtype}."
+        )
 
 
 def expect(name: str, value: object, *kinds: type) -> None:

@@ -63,23 +63,19 @@ def _quota(places: tuple[tuple[str, ...], ...]) -> int:
 
 
 def start(threads: int | None = None, arch: str | None = None) -> Runtime:
-    """Start Taichi, or restart it if other settings are asked for.
+    """Start Taichi, or restart it if other settings are asked for, and return those in force.
 
-    All that launches kernels calls this first, since the caller may have reset Taichi in between. A
-    Taichi that the caller has started, or that holds the caller's fields, is used as it is.
+    All that launches kernels calls this first, because the caller may have reset Taichi in between.
+    A Taichi that the caller has started, or that holds the caller's fields, is used as it is.
 
     Args:
         threads: CPU threads, 1 to 1024; None keeps what runs, or takes all that are available.
         arch: "cpu" or "cuda"; None keeps what runs, or takes the CPU.
 
-    Returns:
-        The settings in force.
-
     Raises:
-        AntsError: A setting is not allowed, or "cuda" finds no device; the Taichi that runs has
-            other settings and is not ours alone to restart; it has fast_math on, which would change
-            results in the last bit, or runs on hardware that was never tried; or this process was
-            forked from one in which Taichi ran.
+        AntsError: A setting is not allowed, or "cuda" finds no device; the Taichi that runs cannot
+            be restarted, has fast_math on, which would change results in the last bit, or runs on
+            hardware that was never tried; or this process was forked from one in which Taichi ran.
     """
     if arch is not None:
         check_one_of("arch", arch, ARCHITECTURES)
@@ -130,9 +126,9 @@ def holds_data() -> bool:
 def quiet() -> Iterator[None]:
     """Compile kernels of ours inside: without Taichi's warnings, whatever the caller has set.
 
-    Numbers are narrowed there on purpose; a Taichi that the caller has started warns of each.
-    Errors tell the line that they are in, without a mark below the place in it: Taichi would draw
-    one for each expression, which takes half of its time for a kernel that it has in its cache.
+    Numbers are narrowed there on purpose. Errors name their line without a mark below the place in
+    it: to draw one for each expression takes half of Taichi's time for a kernel that it has in its
+    cache.
     """
     from taichi._lib import core
     from taichi.lang.ast.ast_transformer_utils import ASTTransformerContext as Context

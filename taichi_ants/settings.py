@@ -26,7 +26,7 @@ import math
 import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, replace
-from functools import wraps
+from functools import partial, wraps
 from inspect import signature
 from numbers import Real
 from types import NoneType, UnionType
@@ -55,15 +55,12 @@ _KINDS: dict[type, str] = {
 
 @dataclass(frozen=True)
 class Is:
-    """What holds for a setting besides its type.
-
-    Several of them in one annotation add up: `Ticks = Annotated[int, Is(unit="ticks", least=1)]`.
+    """Facts about a setting besides its type; several of them in one annotation add up.
 
     Attributes:
         help: A phrase or sentence that says what the setting does.
         unit: Of the number, such as "ticks".
-        least, most: Bounds that are allowed themselves.
-        above: A bound that is not.
+        least, most, above: Bounds; the first two are allowed themselves.
         only: The name of another setting of the class, and the values of it with which this one
             means something; with others it has its default.
         usual: The value it takes where it means something and is None.
@@ -86,17 +83,18 @@ class Is:
         return replace(self, **{k: v for k, v in given.items() if v is not usual[k] and v != ""})
 
 
+Share = Annotated[float, Is(least=0, most=1)]
+Count = Annotated[int, Is(least=1, most=2**31 - 1)]
+Seed = Annotated[int, Is("any whole number")]
+Flag = Annotated[bool, Is()]
+
+
 class Setting(NamedTuple):
     """One setting as it was declared.
 
-    Attributes:
-        name: Of the field.
-        path: The full name, as sweep files have it, such as "task.pheromone.half_life".
-        kind: bool, int, float, str, list, or a class of settings.
-        words: The words that are allowed, where they are fixed.
-        optional: Whether it may be None.
-        default: As in the class; MISSING if it has none.
-        rule: All that was said of it.
+    `path` is its full name, as in sweep files; `kind` is bool, int, float, str, list, or a class of
+    settings; `words` are those that are allowed, where they are fixed; `default` is MISSING if it
+    has none; `rule` is all that was declared of it.
     """
 
     name: str
@@ -136,11 +134,7 @@ class Setting(NamedTuple):
         return "; ".join(parts) + (given.lower() if self.kind is bool else given)
 
     def checked(self, value: Any) -> Any:
-        """A value as a Python object of the setting's kind.
-
-        Raises:
-            AntsError: The value is not allowed; names the setting by its path.
-        """
+        """A value as a Python object of the setting's kind; AntsError if it is not allowed."""
         if self.optional and (value is None or (value == "none" and self.kind is not str)):
             return None  # files and command lines have no None, so they write "none"
         found = self._converted(value)
@@ -221,9 +215,8 @@ class Setting(NamedTuple):
 class Settings:
     """Base of the classes of settings, which are frozen dataclasses.
 
-    `path` is the full name of the settings, as in sweep files; messages name a setting by it.
-    A class whose common values have names returns them from `named`; a name is then taken for the
-    value wherever the class is a setting of another one.
+    `path` is the full name of the settings, as in sweep files and messages. The names that a class
+    returns from `named` are taken for their values wherever the class is a setting of another one.
     """
 
     path: ClassVar[str] = ""
@@ -241,11 +234,7 @@ class Settings:
         return {}
 
     def check(self) -> None:
-        """Take each value as one of its kind.
-
-        Raises:
-            AntsError: A value is not allowed, or would change nothing.
-        """
+        """Take each value as one of its kind; AntsError if one is wrong, or changes nothing."""
         for one in declared(type(self)):
             object.__setattr__(self, one.name, one.checked(getattr(self, one.name)))
         for one in declared(type(self)):
@@ -269,11 +258,8 @@ class Settings:
     def but(self: Self, **changes: Any) -> Self:
         """The same with some changes; settings that mean nothing any more have their defaults.
 
-        A group can be changed by a mapping of its own settings, in which "" is the name of the
-        value to start from.
-
-        Raises:
-            AntsError: As for the class, or there is no such setting.
+        A group can be changed by a mapping of its own settings, in which "" names the value to
+        start from. AntsError as for the class, or if there is no such setting.
         """
         return self._changed(changes)
 
@@ -298,11 +284,7 @@ class Settings:
 
     @classmethod
     def from_dict(cls: type[Self], facts: Any) -> Self:
-        """The settings of a mapping of names to values, with groups as mappings or names.
-
-        Raises:
-            AntsError: A value is not allowed, or there is no such setting.
-        """
+        """The settings of a mapping, with groups as mappings or names, checked."""
         if not isinstance(facts, Mapping):
             raise AntsError(f"`{cls.path}` is {shown(facts)}; it must be a table of settings.")
         return cls()._changed(facts)
@@ -347,17 +329,13 @@ def _defaults(cls: Any) -> Iterator[tuple[str, Any]]:
             yield name, MISSING if argument.default is argument.empty else argument.default
 
 
-def setting(cls: Any, name: str) -> Setting:
-    """One setting of a class, for arguments of functions that are the same."""
-    return next(one for one in declared(cls) if one.name == name)
-
-
-def checked(function: Function) -> Function:
+def checked(function: Function, path: str = "world") -> Function:
     """Check the arguments of a function that are declared, whenever it is called: a decorator.
 
-    The function makes a world, so that messages name its arguments `world.NAME`.
+    Messages name them below `path`, by default `world.NAME`, because most such functions make one.
     """
     form = signature(function)
+    function.path = path  # type: ignore[attr-defined]
 
     @wraps(function)
     def calls(*positional: Any, **named: Any) -> Any:
@@ -370,6 +348,9 @@ def checked(function: Function) -> Function:
         return function(**given)
 
     return calls  # type: ignore[return-value]
+
+
+checked_arguments = partial(checked, path="")  # of functions that do not make worlds
 
 
 def all_of(cls: Any) -> Iterator[Setting]:
@@ -386,25 +367,13 @@ def table(cls: Any) -> str:
     for one in all_of(cls):
         if not one.is_group:
             unit = f", in {one.rule.unit}" if one.rule.unit else ""
-            rows.append(
-                f"| `{one.path}` | {one.allowed}{unit} | {_default(one)} | {_meaning(one)} |"
-            )
+            usual = one.default if one.rule.usual is None else one.rule.usual
+            default, meaning = "none" if usual is MISSING else f"`{usual!r}`", one.rule.help
+            if one.rule.only is not None:
+                other, *values = one.rule.only
+                meaning += f"; only with `{other}` {' or '.join(map(repr, values))}"
+            rows.append(f"| `{one.path}` | {one.allowed}{unit} | {default} | {meaning} |")
     return "\n".join(rows)
-
-
-def _default(one: Setting) -> str:
-    if one.default is MISSING:
-        return "none"
-    if one.rule.usual is not None:
-        return f"`{one.rule.usual!r}`"
-    return f"`{one.default!r}`"
-
-
-def _meaning(one: Setting) -> str:
-    if one.rule.only is None:
-        return one.rule.help
-    other, *values = one.rule.only
-    return f"{one.rule.help}; only with `{other}` {' or '.join(map(repr, values))}"
 
 
 def not_a_setting(name: object, known: Iterable[str], group: str = "") -> str:
@@ -430,11 +399,7 @@ def flat(tree: Mapping[str, Any], before: str = "") -> dict[str, Any]:
 
 
 def nested(named: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings by their full names as mappings in mappings, as `Settings.but` takes them.
-
-    {"task.traffic": "following", "task.traffic.grant": False} becomes
-    {"task": {"traffic": {"": "following", "grant": False}}}.
-    """
+    """Settings by their full names as mappings in mappings, as `Settings.but` takes them."""
     tree: dict[str, Any] = {}
     for path, value in named.items():
         *outer, last = path.split(".")

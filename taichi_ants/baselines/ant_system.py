@@ -7,33 +7,26 @@
 
 In each iteration, every ant walks at random from the queen until it comes to food; then the loops
 are taken out of its walk, and what remains is its *tour*. The pheromone tau lies on *arcs*, steps
-from a cell to a neighbour, in one direction. Of the arcs that leave its cell an ant takes one with
-a probability proportional to tau^alpha; it goes straight back only out of a dead end (as in Dorigo
-and Stuetzle, Ant Colony Optimization, 2004, section 1.3). Then all tau lose the share rho, and
-tours of length L add 1 / L to each of their arcs.
-
-There is no heuristic eta: both methods were made for problems where an ant knows how far it is to
-the next city. Here all steps are equally long and nobody knows where the food is, so eta would be
-1 and beta would change nothing.
-
-Unlike the ants of this package, these deposit after they know how long the tour was, all at once,
-never meet, and the food is never used up. They show what trails alone can find.
+from a cell to a neighbour. Of the arcs that leave its cell an ant takes one with a probability
+proportional to tau^alpha; it goes straight back only out of a dead end (as in Dorigo and Stuetzle,
+Ant Colony Optimization, 2004, section 1.3). Then all tau lose the share rho, and tours of length L
+add 1 / L to each of their arcs. There is no heuristic eta, because nobody knows where the food is.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from numbers import Real
-from typing import Literal, get_args
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 
 from taichi_ants import runtime
 from taichi_ants.baselines.open_cells import open_cells, shortest_way
 from taichi_ants.checks import checked_world
-from taichi_ants.errors import AntsError, check_one_of, checked_whole, shown, whole
+from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_TOUR
 from taichi_ants.grid.randomness import stream_state
+from taichi_ants.settings import Count, Is, Seed, checked_arguments
 from taichi_ants.worlds.world import World
 
 Method = Literal["ant_system", "max_min"]
@@ -47,14 +40,11 @@ _MAX_ENTRIES = 1 << 28  # of the arrays of tours: a gibibyte each
 
 @dataclass(frozen=True)
 class Search:
-    """What colonies found.
+    """Results of colonies.
 
-    Attributes:
-        shortest: Steps from the queen to the nearest food.
-        best: int32 (colonies, iterations): the shortest tour of each iteration; 0 if no ant found
-            food.
-        mean: float64 (colonies, iterations): the mean length of the tours; NaN if there was none.
-        lost: int32 (colonies, iterations): ants that gave up.
+    Steps from the queen to the nearest food (`shortest`); by (colonies, iterations), int32, the
+    shortest tour of each iteration (`best`), 0 if no ant found food; the `mean` length, float64,
+    NaN if there was none; and the ants that gave up (`lost`).
     """
 
     shortest: int
@@ -69,17 +59,18 @@ class Search:
         return np.where(hits.any(axis=1), hits.argmax(axis=1) + 1, 0)
 
 
+@checked_arguments
 def search(
     world: World,
-    method: Method = "max_min",
+    method: Annotated[Method, Is()] = "max_min",
     *,
-    iterations: int = 200,
-    ants: int = 32,
-    colonies: int = 20,
-    alpha: int = 1,
-    evaporation: float | None = None,
-    max_steps: int = 100_000,
-    seed: int = 0,
+    iterations: Count = 200,
+    ants: Count = 32,
+    colonies: Count = 20,
+    alpha: Annotated[int, Is(least=1, most=8)] = 1,
+    evaporation: Annotated[float | None, Is(above=0, most=1)] = None,
+    max_steps: Count = 100_000,
+    seed: Seed = 0,
     threads: int | None = None,
 ) -> Search:
     """Let colonies look for the shortest way, each for itself.
@@ -88,26 +79,16 @@ def search(
         world: Where; rocks block, trails and listed ants do not matter.
         method: "ant_system": all ants deposit. "max_min": the best of the iteration does, and tau
             stays between bounds that follow from the best length so far.
-        iterations: Rounds of tours.
-        ants: Of each colony.
+        iterations, ants: Rounds of tours, and ants of each colony.
         colonies: How many; the first ones stay the same if there are more.
-        alpha: How strongly pheromone attracts, a whole number from 1 to 8.
-        evaporation: rho, above 0 and at most 1; None takes 0.5, with "max_min" 0.02.
+        alpha: How strongly pheromone attracts.
+        evaporation: rho; None takes 0.5, with "max_min" 0.02.
         max_steps: After so many an ant gives up and deposits nothing.
-        seed: Any whole number.
-        threads: CPU threads; None keeps what runs, or takes all.
 
     Raises:
         AntsError: An argument is not allowed, or no food can be reached.
     """
-    check_one_of("method", method, METHODS)
-    for name, value in (("iterations", iterations), ("ants", ants), ("colonies", colonies)):
-        checked_whole(name, value)
-    checked_whole("alpha", alpha, 1, 8)
-    checked_whole("max_steps", max_steps)
     rho = EVAPORATION[method] if evaporation is None else evaporation
-    if not (isinstance(rho, Real) and not isinstance(rho, bool) and 0 < rho <= 1):
-        raise AntsError(f"evaporation is {shown(rho)}; it must be above 0 and at most 1.")
     _, neighbours, is_food, start = open_cells(checked_world(world, learns=True))
     n, n_ants = len(neighbours), colonies * ants
     if n * n_ants > _MAX_ENTRIES:
@@ -117,7 +98,7 @@ def search(
         )
     shortest = shortest_way(neighbours, is_food, start)
     numbers = np.arange(colonies)[:, None] * 2**32 + np.arange(ants)
-    states = stream_state(whole("seed", seed), STREAM_TOUR, numbers).reshape(-1)
+    states = stream_state(seed, STREAM_TOUR, numbers).reshape(-1)
 
     runtime.start(threads)
     # Taichi is imported once it is configured.
@@ -126,7 +107,7 @@ def search(
     tau = np.ones((colonies, N_HEADINGS * n))
     place, tours = np.zeros((2, n_ants, n), np.int32)
     lengths = np.zeros(n_ants, np.int32)
-    bounds = _Bounds(method, float(rho), ants, _ways(neighbours), colonies)
+    bounds = _Bounds(method, rho, ants, _ways(neighbours), colonies)
     best, lost = np.zeros((2, colonies, iterations), np.int32)
     mean = np.full((colonies, iterations), np.nan)
     with runtime.quiet():
@@ -141,7 +122,7 @@ def search(
             best[:, i] = np.where(has, np.where(by_colony, by_colony, n).min(axis=1), 0)
             mean[has, i] = by_colony[has].sum(axis=1) / (ants - lost[has, i])
             deposits, lowest, highest = bounds.after(by_colony, best[:, i], tau)
-            lay(tau, float(rho), tours, lengths, deposits.reshape(-1), lowest, highest)
+            lay(tau, rho, tours, lengths, deposits.reshape(-1), lowest, highest)
     return Search(shortest, best, mean, lost)
 
 
@@ -157,11 +138,9 @@ class _Bounds:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """What each ant deposits (colonies, ants), and the bounds of tau (colonies,).
 
-        Args:
-            lengths: Of the tours, (colonies, ants), 0 for none.
-            best: The shortest of each colony, 0 for none.
-            tau: Set to its first level where a colony has found food for the first time: what ants
-                would keep up if they all went that way. Until then it is equal everywhere.
+        Where a colony has found food for the first time, `tau` is set to what ants would keep up if
+        they all went that way. Until then it is equal everywhere. `lengths` of tours are 0 for
+        none.
         """
         first = (self._best == 0) & (best > 0)
         shorter = first | ((best > 0) & (best < self._best))

@@ -3,36 +3,32 @@
 Goss, Aron, Deneubourg and Pasteels: Self-organized shortcuts in the Argentine ant.
 Naturwissenschaften 76 (1989), 579-581.
 
-A colony crosses a bridge with two branches in both directions. At either end, 0.5 ants leave each
-second, in a regular flow: one every 2 seconds, which is a *step* of the model. An ant that finds S
-marks of the short branch and L of the long one at its end takes the short one with probability
+At either end of a bridge, one ant leaves every 2 seconds, which is a *step* of the model. If it
+finds S marks of the short branch and L of the long one there, it takes the short one with
+probability
 
     (k + S)^n / ((k + S)^n + (k + L)^n),  k = 20, n = 2.
 
 It leaves one mark of its branch at the end where it chooses, and one at the other end when it
-arrives there. Marks stay. Nothing but the time of a crossing tells the branches apart: at each end,
-the marks of those who come by the short branch are there earlier.
-
-The short branch takes 20 seconds, the long one 20 r: 10 and 10 r cells, each of 2 seconds. An ant
-that chooses stands in the first cell; one that arrives in the last. So a branch of c cells is
-crossed in c - 1 steps. The figures that were published are the shares of colonies by how many of
-the 501st to 1000th ant, those of both ends counted together, took the short branch. Under this
-reading all 15 come out within 3 points, and the five of a short branch that opens late do too;
-`docs/baselines.md` lists the readings that were tried.
+arrives there. Marks stay. The short branch takes 20 seconds, the long one 20 r: 10 and 10 r cells,
+each of 2 seconds; an ant that chooses stands in the first cell, one that arrives in the last. The
+published figures are the shares of colonies by how many of the 501st to 1000th ant took the short
+branch; `docs/baselines.md` lists the readings of the paper that were tried.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from numbers import Real
 from types import MappingProxyType
+from typing import Annotated
 
 import numpy as np
 
 from taichi_ants import runtime
-from taichi_ants.errors import AntsError, checked_whole, shown, whole
+from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.grid.constants import STREAM_BRIDGE
 from taichi_ants.grid.randomness import stream_state
+from taichi_ants.settings import Count, Is, Seed, checked_arguments
 
 # Percent of colonies by ratio r of the branches, in five classes of the share of ants on the short
 # branch: 0-20 %, 20-40 %, 40-60 %, 60-80 %, 80-100 %.
@@ -48,56 +44,46 @@ MAX_EXPONENT = 8
 _LAUNCH = 1 << 14  # colonies at once: less than half a second
 
 
-def crossing_steps(ratio: float) -> tuple[int, int]:
+@checked_arguments
+def crossing_steps(ratio: Annotated[float, Is(least=1, most=100)]) -> tuple[int, int]:
     """Steps to cross the short branch, and one that is `ratio` times as long, at least 1."""
-    if not (isinstance(ratio, Real) and 1 <= ratio <= 100):
-        raise AntsError(f"ratio is {shown(ratio)}; it must be a number from 1 to 100.")
-    return SHORT_CELLS - 1, round(SHORT_CELLS * float(ratio)) - 1
+    return SHORT_CELLS - 1, round(SHORT_CELLS * ratio) - 1
 
 
+@checked_arguments
 def choices(
-    short: int,
+    short: Count,
     long: int,
-    colonies: int = 10_000,
+    colonies: Count = 10_000,
     *,
-    ants: int = 1000,
-    k: float = 20.0,
-    n: int = 2,
+    ants: Count = 1000,
+    k: Annotated[float, Is(above=0, most=1e9)] = 20.0,
+    n: Annotated[int, Is(least=1, most=MAX_EXPONENT)] = 2,
     opens: int = 0,
-    seed: int = 0,
+    seed: Seed = 0,
     threads: int | None = None,
 ) -> np.ndarray:
-    """Return the branch that each ant takes, in many colonies.
+    """Return the branch that each ant takes: uint8 (colonies, ants), 1 for the short one.
+
+    Ants with even numbers choose at the nest, the others at the food.
 
     Args:
-        short: Steps to cross the short branch, see `crossing_steps`; a step is 2 seconds.
-        long: Steps to cross the long one.
+        short, long: Steps to cross the branches, see `crossing_steps`; a step is 2 seconds.
         colonies: How many; the first ones stay the same if there are more.
         ants: How many choose, in turn one at the nest and one at the food, as many of both.
-        k: How many marks a branch seems to have more than there are; more than 0.
-        n: How strongly marks attract, a whole number from 1 to 8.
+        k: How many marks a branch seems to have more than there are.
+        n: How strongly marks attract.
         opens: Number of ants that choose before the short branch opens; until then all ants take
             the long one. From 0 (it is open from the start) to `ants`.
-        seed: Any whole number.
-        threads: CPU threads; None keeps what runs, or takes all.
-
-    Returns:
-        uint8 (colonies, ants): 1 where an ant takes the short branch, 0 where the long one. Ants
-        with even numbers choose at the nest.
 
     Raises:
         AntsError: An argument is not allowed.
     """
-    checked_whole("short", short)
-    checked_whole("long", long, short)
-    checked_whole("colonies", colonies)
-    if checked_whole("ants", ants, 2) % 2:
-        raise AntsError(f"ants is {ants}; it must be even, as many leave the nest as the food.")
-    if not (isinstance(k, Real) and not isinstance(k, bool) and 0 < k <= 1e9):
-        raise AntsError(f"k is {shown(k)}; it must be a number above 0 and at most 1e9.")
-    checked_whole("n", n, 1, MAX_EXPONENT)
-    checked_whole("opens", opens, 0, ants)
-    states = stream_state(whole("seed", seed), STREAM_BRIDGE, np.arange(colonies))
+    checked_whole("`long`", long, short)
+    if ants % 2:
+        raise AntsError(f"`ants` is {ants}; it must be even, as many leave the nest as the food.")
+    checked_whole("`opens`", opens, 0, ants)
+    states = stream_state(seed, STREAM_BRIDGE, np.arange(colonies))
     runtime.start(threads)
     # Taichi is imported once it is configured.
     from taichi_ants.baselines.goss_kernel import cross
@@ -106,24 +92,16 @@ def choices(
     with runtime.quiet():
         for first in range(0, colonies, _LAUNCH):
             some = slice(first, first + _LAUNCH)
-            cross(took[some], states[some], short, long, float(k), n, opens)
+            cross(took[some], states[some], short, long, k, n, opens)
     return took
 
 
 def class_shares(took: np.ndarray, first: int = 501, last: int = 1000) -> np.ndarray:
     """The distribution of colonies over the five classes of the share on the short branch.
 
-    Args:
-        took: What `choices` returns.
-        first: Number of the first ant that counts, from 1.
-        last: Number of the last one; at most the number of ants.
-
-    Returns:
-        float64 (5,): percent of the colonies with 0-20 %, ... 80-100 % of these ants on the short
-        branch. A share on a border belongs to the class above.
-
-    Raises:
-        AntsError: There are no such ants.
+    Percent, float64 (5,), of the colonies with 0-20 %, ... 80-100 % of the ants `first` to `last`,
+    counted from 1, on the short branch; `took` is from `choices`. A share on a border belongs to
+    the class above. AntsError if there are no such ants.
     """
     checked_whole("last", last, 1, took.shape[1])
     checked_whole("first", first, 1, last)

@@ -24,17 +24,10 @@ def cross(
     n: ti.i32,
     opens: ti.i32,
 ):
-    """Let the ants of all colonies choose.
+    """Let the ants of all colonies choose, see `goss.choices`; writes `took`.
 
-    Args:
-        took: (colonies, ants), written: whether an ant takes the short branch. It is all that the
-            ants under way are known by: who arrives has chosen so many steps ago.
-        states: (colonies,) random streams; one draw a step, the high word for the nest.
-        short: Steps to cross the short branch.
-        long: Steps to cross the long one.
-        k: Marks that every branch seems to have more.
-        n: The exponent.
-        opens: Ants that choose while there is no short branch; they draw, and take the long one.
+    Ants under way are known by it alone: an ant that arrives has chosen so many steps ago. The
+    streams `states` give one draw a step, the high word for the nest. Ants before `opens` draw too.
     """
     for colony in range(took.shape[0]):
         state = states[colony]

@@ -57,17 +57,9 @@ def walk(
 ):
     """Let all ants walk from the start until they come to food, and take the loops out.
 
-    Args:
-        neighbours: (n, 6), the neighbour of each cell, -1 where there is none.
-        is_food: (n,), 1 where a walk ends.
-        start: The queen's cell.
-        tau: (colonies, 6 n), the pheromone of each arc.
-        alpha: How strongly it attracts.
-        max_steps: After so many steps an ant gives up.
-        states: (ants,) random streams of the ants of all colonies, moved on.
-        place: (ants, n), 0 before and after: 1 + the place in the tour of each cell on it.
-        tours: (ants, n), written: the arcs of each tour, from the queen to the food.
-        lengths: (ants,), written: the number of these arcs; 0 for an ant that gave up.
+    Moves the streams `states` on; writes the arcs of the `tours` (ants, n) and their `lengths`, 0
+    for an ant that gave up. `neighbours` are -1 where there is none. Before and after, `place`
+    (ants, n) is 0; else 1 + the place in the tour of each cell on it.
     """
     ti.loop_config(block_dim=1)
     for ant in range(states.shape[0]):
@@ -111,17 +103,7 @@ def lay(
     lowest: f64_1d,
     highest: f64_1d,
 ):
-    """Evaporate, add what each ant deposits on the arcs of its tour, and keep within bounds.
-
-    Args:
-        tau: (colonies, 6 n), changed.
-        evaporation: The share that evaporates.
-        tours: As `walk` writes them.
-        lengths: As `walk` writes them.
-        deposits: (ants,), what each ant adds to each arc of its tour.
-        lowest: (colonies,), the lower bound.
-        highest: (colonies,), the upper bound.
-    """
+    """Evaporate, add what each ant deposits on each arc of its tour, and keep within bounds."""
     for colony in range(tau.shape[0]):
         n_ants = lengths.shape[0] // tau.shape[0]
         for arc in range(tau.shape[1]):

@@ -17,16 +17,19 @@ where, and what was chosen.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from taichi_ants import runtime
 from taichi_ants.baselines.open_cells import open_cells, shortest_way
-from taichi_ants.checks import checked_share, checked_world
-from taichi_ants.errors import AntsError, checked_whole, whole
+from taichi_ants.checks import checked_world
+from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_FORAGER
 from taichi_ants.grid.randomness import stream_state
+from taichi_ants.settings import Count, Is, Seed, Share, checked_arguments
 from taichi_ants.worlds.world import World
 
 EVERY = 10  # ticks between two looks at the path
@@ -35,13 +38,13 @@ _MAX_ENTRIES = 1 << 27  # of the utilities: a gibibyte
 
 @dataclass(frozen=True)
 class Foraging:
-    """What colonies did.
+    """Results of colonies.
 
     Attributes:
         shortest: Steps from the queen to the nearest food and back.
         deliveries: int32 (colonies, ticks): foods that come to the nest in each tick.
-        lengths: int32 (colonies, ticks // 10): steps of the path found, after every 10 ticks: of a
-            walk to food and back that always takes the highest utility; 0 if it does not get there.
+        lengths: int32 (colonies, ticks // 10): after every 10 ticks, steps of a walk to food and
+            back that always takes the highest utility; 0 if it does not get there.
         utilities: float64 (colonies, 2, grid.size): of the nest and of food, at the end.
     """
 
@@ -64,46 +67,36 @@ class Foraging:
         return EVERY * _first(self.lengths == self.shortest)
 
 
+@checked_arguments
 def forage(
     world: World,
     *,
-    ticks: int = 1000,
-    ants: int = 64,
-    colonies: int = 20,
-    capacity: int = 10,
-    discount: float = 0.9,
-    evaporation: float = 0.001,
-    exploration: float = 0.1,
-    momentum: float = 0.8,
-    seed: int = 0,
+    ticks: Count = 1000,
+    ants: Count = 64,
+    colonies: Count = 20,
+    capacity: Count = 10,
+    discount: Annotated[float, Is(above=0, most=math.nextafter(1, 0))] = 0.9,
+    evaporation: Share = 0.001,
+    exploration: Share = 0.1,
+    momentum: Share = 0.8,
+    seed: Seed = 0,
     threads: int | None = None,
 ) -> Foraging:
     """Let colonies collect food, each for itself; food grows back at once.
 
     Args:
         world: Where; rocks block, trails and listed ants do not matter.
-        ticks: How long.
         ants: Of each colony; all start in the nest.
         colonies: How many; the first ones stay the same if there are more.
         capacity: How many ants fit into a cell; the nest has room for all.
         discount: What a step costs, above 0 and below 1.
-        evaporation: The share of all utilities that is lost per tick, 0 to 1.
+        evaporation: The share of all utilities that is lost per tick.
         exploration: The probability of a random step, where an ant has something to follow.
         momentum: The probability to go straight on, if it can, where it has not.
-        seed: Any whole number.
-        threads: CPU threads; None keeps what runs, or takes all.
 
     Raises:
         AntsError: An argument is not allowed, or no food can be reached.
     """
-    counts = {"ticks": ticks, "ants": ants, "colonies": colonies, "capacity": capacity}
-    for name, value in counts.items():
-        checked_whole(name, value)
-    if not 0 < checked_share("discount", discount) < 1:
-        raise AntsError(f"discount is {discount}; it must be above 0 and below 1.")
-    kept = 1 - checked_share("evaporation", evaporation)
-    exploration = checked_share("exploration", exploration)
-    momentum = checked_share("momentum", momentum)
     cells, neighbours, is_food, nest = open_cells(checked_world(world, learns=True))
     if colonies * max(2 * world.grid.size, ticks, ants) > _MAX_ENTRIES:
         raise AntsError(
@@ -112,14 +105,14 @@ def forage(
         )
     shortest = 2 * shortest_way(neighbours, is_food, nest)
     numbers = np.arange(colonies)[:, None] * 2**32 + np.arange(ants)
-    states = stream_state(whole("seed", seed), STREAM_FORAGER, numbers)
+    states = stream_state(seed, STREAM_FORAGER, numbers)
 
     runtime.start(threads)
     # Taichi is imported once it is configured.
     from taichi_ants.baselines.utility_kernels import live, measure
 
     goals = np.stack([np.arange(len(cells)) == nest, is_food == 1]).astype(np.int32)
-    settings = capacity, float(discount), kept, exploration, momentum
+    settings = capacity, discount, 1 - evaporation, exploration, momentum
     of_ants = np.zeros((colonies, ants, 3), np.int32)
     of_ants[..., 0] = nest
     of_ants[..., 1] = np.arange(ants) % N_HEADINGS

@@ -65,19 +65,12 @@ def live(
     utilities: f64_3d,
     deliveries: i32_2d,
 ):
-    """Let some ticks pass in all colonies; what is not told here is as of `utility.forage`.
+    """Let the ticks from `first` to before `last` pass in all colonies, see `utility.forage`.
 
-    Args:
-        neighbours: (n, 6), the neighbour of each cell, -1 where there is none.
-        goals: (2, n), 1 where a goal is.
-        kept: The share of all utilities that a tick leaves.
-        first: The first tick.
-        last: The tick after the last one.
-        states: (colonies, ants) random streams, moved on; one draw an ant and tick.
-        ants: (colonies, ants, 3), changed: cell, heading, the goal that the ant comes from.
-        standing: (colonies, n), changed: how many ants stand in each cell.
-        utilities: (colonies, 2, n), changed.
-        deliveries: (colonies, ticks), written.
+    `goals` (2, n) are 1 where a goal is; a tick leaves the share `kept` of all utilities. Moves the
+    streams `states` on, one draw an ant and tick; changes the `ants` (colonies, ants, 3): cell,
+    heading, the goal that the ant comes from; how many are `standing` in each cell; and the
+    `utilities` (colonies, 2, n). Writes `deliveries` (colonies, ticks).
     """
     ti.loop_config(block_dim=1)
     for colony in range(states.shape[0]):
@@ -139,13 +132,7 @@ def measure(
 ):
     """Walk from the nest to food and back, always to the highest utility, in all colonies.
 
-    Args:
-        neighbours: As of `live`.
-        goals: As of `live`.
-        nest: The cell of the nest.
-        utilities: As of `live`.
-        span: The column of `lengths`.
-        lengths: (colonies, spans), written: steps of the way out and back; 0 if there is none.
+    Writes the steps of the way out and back, 0 if there is none, into column `span` of `lengths`.
     """
     ti.loop_config(block_dim=1)
     for colony in range(lengths.shape[0]):

@@ -17,8 +17,7 @@ from taichi_ants import runtime
 class Arguments:
     """Arrays and numbers, as the one argument by which kernels find them by their names.
 
-    To make a pack takes over a millisecond, so that it is kept; it dies with the Taichi that it
-    was made in.
+    It takes over a millisecond to make a pack, so that it is kept until its Taichi ends.
     """
 
     def __init__(self) -> None:
@@ -30,9 +29,8 @@ class Arguments:
     def type_of(values: Mapping[str, Any]) -> Any:
         """The type of the pack of these values, to annotate the kernel's argument.
 
-        Args:
-            values: By name: NumPy arrays, which kernels work on in place; whole numbers, for
-                kernels i32, or u64 if they are `np.uint64`; and floats, for kernels f32.
+        NumPy arrays, on which kernels work in place; whole numbers, for kernels i32, or u64 if they
+        are `np.uint64`; and floats, for kernels f32.
         """
         return _pack_type(tuple((name, _kind(value)) for name, value in values.items()))
 
@@ -57,8 +55,7 @@ class Arguments:
 class Launch:
     """A kernel of one argument pack, launched again and again.
 
-    For each launch Taichi looks at every array of the pack anew, 10 microseconds each. On the CPU
-    what it finds is kept here, so that a launch takes 10 in all.
+    For each launch Taichi looks at every array anew, 10 microseconds each; here, on the CPU, once.
     """
 
     def __init__(self, kernel: Callable[[Any], None]) -> None:
@@ -70,10 +67,7 @@ class Launch:
         self._known: dict[str, Any] = {}  # the values that it has
 
     def __call__(self, values: Mapping[str, Any]) -> None:
-        """Launch on these values; names and types are the same in each call.
-
-        Arrays are C-contiguous, as all of the engines are.
-        """
+        """Launch on these values, arrays C-contiguous; names and types stay the same."""
         if self._taichi() is not ti.lang.impl.get_runtime():
             runtime.start()  # somebody may have reset Taichi
             self._prepare(values)

@@ -16,18 +16,8 @@ RETURNS, STEPS, DELIVERIES = range(len(OUTCOMES))
 
 # The columns of a trace, one row a step; the fields of `Trace` of these names.
 TRACE = (
-    "episodes",
-    "steps",
-    "cells",
-    "headings",
-    "percepts",
-    "states",
-    "actions",
-    "rewards",
-    "next_percepts",
-    "next_states",
-    "terminated",
-    "events",
+    *("episodes", "steps", "cells", "headings", "percepts", "states", "actions", "rewards"),
+    *("next_percepts", "next_states", "terminated", "events"),
 )
 
 

@@ -1,8 +1,7 @@
-"""How the engine of independent runs lays a world out in memory.
+"""The memory layout of a world in the engine of independent runs.
 
-A cell is one i32: the stored trail (0 or more) if it is empty, else its ground less 16, which is
-negative and still shows in its lower four bits how the cell looks. One load tells all that an ant
-can see of a cell.
+A cell is one i32, so that one load tells all of it: the stored trail (0 or more) if it is empty,
+else its ground less 16, which is negative; its lower four bits still show how the cell looks.
 """
 
 from __future__ import annotations
@@ -48,7 +47,6 @@ def compass_of(grid: AxialGrid) -> np.ndarray:
 def padded(memory: Memory) -> Memory:
     """A memory of which kernels can address many, one behind the other.
 
-    They count its numbers by 8: then compilers know that neighbouring addresses differ in their
-    last bits alone, which saves Dyna-Q a tenth of its time.
+    Counted by 8: compilers then know that neighbouring addresses differ in their last bits alone.
     """
     return replace(memory, floats=-(-memory.floats // 8) * 8, integers=-(-memory.integers // 8) * 8)

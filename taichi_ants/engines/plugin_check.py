@@ -1,8 +1,7 @@
 """Checks learners from outside of the package before a kernel takes them up.
 
-Taichi's compiler ends the process where it meets what it does not expect, and compiled code where
-it reads outside an array. So such a learner is compiled, and learns from a thousand steps, in a
-forked process first.
+Taichi's compiler ends the process at what it does not expect, and compiled code where it reads
+outside an array. So a learner is compiled, and learns a thousand steps, in a forked process first.
 """
 
 import faulthandler
@@ -28,11 +27,7 @@ _STATES = 128  # rows of the tables of a check
 
 @cache
 def checked_plugin(learner: Learner) -> Learner:
-    """The learner; one from outside of the package has passed the plugin check.
-
-    Raises:
-        AntsError: It cannot be used; the message says why.
-    """
+    """The learner; AntsError if one from outside of the package does not pass the plugin check."""
     if learner.name in registry.BUILT_IN:
         return learner
     arch = runtime.start().arch
@@ -89,10 +84,8 @@ def _check_in_child(learner: Learner, writer: int) -> None:
 def _fault_of(learner: Learner, wide: bool) -> str:
     """Learn from a thousand steps with the memory of a second run; that of the first must stay.
 
-    Args:
-        learner: The learner.
-        wide: Start from action values up to ten thousand of either sign, not from zeros, to find
-            an index that depends on them and is right only while they are small.
+    If `wide`, action values are up to ten thousand of either sign at the start, to find an index
+    that depends on them and is right only while they are small.
     """
     import taichi as ti
 

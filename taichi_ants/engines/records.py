@@ -11,11 +11,10 @@ from taichi_ants.grid.hexgrid import AxialGrid
 
 
 class Record:
-    """What dataclasses of arrays have in common; to be used with `eq=False, repr=False`.
+    """Base of dataclasses of arrays; to be used with `eq=False, repr=False`.
 
-    Two records of a type are equal if all their fields are that are not marked `compare=False`:
-    arrays by type, shape and content, where NaN equals NaN. Arrays can be written to, so records
-    have no hash.
+    Two are equal if all their fields are that are not marked `compare=False`: arrays by type, shape
+    and content, where NaN equals NaN. Arrays can be written to, so records have no hash.
     """
 
     __hash__ = None  # type: ignore[assignment]
@@ -37,11 +36,9 @@ class Snapshot(Record):
     """One world at one moment, as `taichi_ants.rendering` draws it.
 
     Attributes:
-        grid: Where the cells lie in the arrays.
         ground: uint8 (grid.size,), EMPTY, OBSTACLE, FOOD or QUEEN; EMPTY under ants.
         trail: int32 or float32 (grid.size,), trail levels.
-        ant_cells: int32 (n,), flat indices of the living ants.
-        ant_headings: int32 (n,), 0 to 5.
+        ant_cells, ant_headings: int32 (n,), flat indices of the living ants, and 0 to 5.
         ant_carries: bool (n,).
     """
 

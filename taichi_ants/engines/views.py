@@ -61,11 +61,7 @@ def is_percept(observation: Observation) -> bool:
 
 @cache
 def encode_function(observation: Observation) -> Callable[..., Any]:
-    """`encode` of an observation for kernels.
-
-    Raises:
-        AntsError: Taichi cannot compile it; the message says why.
-    """
+    """`encode` of an observation for kernels; AntsError if Taichi cannot compile it."""
     encode, view_of = ti.func(observation.encode), view_type(observation, False)
 
     @ti.kernel

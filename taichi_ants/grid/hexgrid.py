@@ -58,15 +58,10 @@ def cube(axials: np.ndarray) -> np.ndarray:
 
 
 def centre_of(cells: object, size: float) -> np.ndarray:
-    """Pixel coordinates of the centres of flat-topped hexagons.
+    """Pixel coordinates (x to the right, y downwards) of the centres of flat-topped hexagons.
 
-    Args:
-        cells: Cube coordinates (..., 3).
-        size: Pixels from a hexagon's centre to its corners.
-
-    Returns:
-        float64 (..., 2) = (pixel x to the right, pixel y downwards). The origin (0, 0, 0) lies at
-        (0, 0), heading 0 points up (towards lower y), heading 1 up and to the right.
+    `size` is from a hexagon's centre to its corners. The origin lies at (0, 0), heading 0 points
+    up, heading 1 up and to the right. float64 (..., 2).
     """
     qr = axial(cells)
     q, r = qr[..., 0], qr[..., 1]
@@ -75,17 +70,11 @@ def centre_of(cells: object, size: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class AxialGrid:
-    """How the cells of a world lie in a flat array.
+    """The cells of a world of `ranges` (X, Y, Z) in a flat array.
 
-    The array holds the axial bounding box with a border of one void cell, row by row (r), so that
-    a step to a neighbour is an addition and needs no bounds check:
-    index = (r + Z) * width + (q + Z).
-
-    Attributes:
-        ranges: (X, Y, Z), each at least 1.
-
-    Raises:
-        AntsError: The array would have more than `MAX_ARRAY_CELLS` cells.
+    The array holds the axial bounding box with a border of one void cell, row by row (r), so that a
+    step to a neighbour is an addition and needs no bounds check: index = (r + Z) * width + (q + Z).
+    AntsError if it would have more than `MAX_ARRAY_CELLS` cells.
     """
 
     ranges: tuple[int, int, int]
@@ -146,11 +135,7 @@ class AxialGrid:
         return q[None, :], r[:, None]
 
     def index(self, cells: object) -> np.ndarray:
-        """Flat indices, int32 (...), of cells (..., 3) in any form.
-
-        Raises:
-            AntsError: A cell lies beyond the array (cells of the void border do not).
-        """
+        """Flat indices, int32 (...), of cells (..., 3) in any form, in the world or its border."""
         qr = axial(cells) + self.ranges[2]
         beyond = ((qr < 0) | (qr >= (self.width, self.height))).any(axis=-1)
         if beyond.any():
@@ -159,11 +144,7 @@ class AxialGrid:
         return (qr[..., 1] * self.width + qr[..., 0]).astype(np.int32)
 
     def cells(self, index: object) -> np.ndarray:
-        """Normal forms, int32 (..., 3), of flat indices (...).
-
-        Raises:
-            AntsError: An index is not in [0, size).
-        """
+        """Normal forms, int32 (..., 3), of flat indices (...)."""
         flat = array_of("index", index)
         if flat.dtype.kind not in "iu" or ((flat < 0) | (flat >= self.size)).any():
             raise AntsError(f"flat indices must be whole numbers from 0 to {self.size - 1}.")
@@ -175,11 +156,7 @@ class AxialGrid:
         return np.stack([q - low, r - low, -low], axis=-1)
 
     def number(self, cells: object) -> np.ndarray:
-        """The cell numbers, int64 (...), of existing cells (..., 3) in any form.
-
-        A cell's number is its position among all existing cells in lexicographic order of the
-        normal form (x, y, z).
-        """
+        """The places, int64 (...), of cells (..., 3) in the lexicographic order of the world."""
         normal = normal_form(cells)
         _, y_range, z_range = self.ranges
         x, y, z = normal[..., 0], normal[..., 1], normal[..., 2]

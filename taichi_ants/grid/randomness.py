@@ -7,6 +7,7 @@ version of NumPy. All arithmetic is modulo 2^64.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -29,11 +30,11 @@ def mix(words: np.ndarray) -> np.ndarray:
     return mixed
 
 
-def _words(name: str, values: object) -> np.ndarray:
-    """Whole numbers modulo 2^64, as uint64."""
+def words_of(values: Any, name: str = "a seed") -> np.ndarray:
+    """Whole numbers, or an array or sequence of them, modulo 2^64, as uint64."""
     if isinstance(values, np.ndarray) and values.dtype.kind in "iu":
         return values.astype(np.uint64)
-    if isinstance(values, (list, tuple)):
+    if isinstance(values, (Sequence, np.ndarray)) and not isinstance(values, str):
         return np.array([whole(name, value) & _MASK for value in values], dtype=np.uint64)
     return np.array(whole(name, values) & _MASK, dtype=np.uint64)
 
@@ -41,21 +42,14 @@ def _words(name: str, values: object) -> np.ndarray:
 def stream_state(seed: int | np.ndarray, purpose: int, number: int | np.ndarray) -> Any:
     """The state at which the stream of (seed, purpose, number) starts.
 
-    Args:
-        seed: Any whole number, taken modulo 2^64, or an integer array or list of them.
-        purpose: What the stream is for, one of the `STREAM_...` constants.
-        number: Which stream of that purpose, or an integer array or list; broadcast with `seed`.
-
-    Returns:
-        An integer if all three are numbers, else a uint64 array of the broadcast shape.
-
-    Raises:
-        AntsError: An argument is not whole.
+    Purpose is one of the `STREAM_...` constants. Seed and number are whole numbers modulo 2^64, or
+    integer arrays or lists of them; then the states are uint64 of the broadcast shape. AntsError if
+    an argument is not whole.
     """
     state = np.array(0, dtype=np.uint64)
     for name, values in (("seed", seed), ("purpose", purpose), ("number", number)):
         with np.errstate(over="ignore"):  # NumPy warns of single numbers that overflow
-            state = mix((state ^ _words(name, values)) + np.uint64(GAMMA))
+            state = mix((state ^ words_of(values, name)) + np.uint64(GAMMA))
     return state if state.ndim else int(state)
 
 

@@ -9,42 +9,29 @@ from numbers import Real
 from typing import TYPE_CHECKING, Annotated, Any
 
 from taichi_ants.errors import AntsError, shown
-from taichi_ants.settings import Is, Settings, declared, setting
+from taichi_ants.settings import Is, Settings, Share, declared
 
 if TYPE_CHECKING:
     import numpy as np
 
-Share = Annotated[float, Is(least=0, most=1)]
 Factor = Annotated[float, Is(above=0, most=1)]
-MOST_VALUE = 1_000_000  # of an action before learning
+InitialValue = Annotated[float, Is(least=-1_000_000, most=1_000_000)]  # of an action
 
 
 @dataclass(frozen=True, init=False)
 class TrainingConfig(Settings, path="training"):
-    """The settings of one learner.
+    """The settings of one learner, each declared with its range and meaning.
 
-    Attributes:
-        learner: Name of a registered learner, for example "q_learning".
-        learning_rate: Step size alpha of the tabular update in the first episode, in [1e-37, 1].
-        discount: Discount factor gamma, in [0, 1].
-        epsilon: Probability of a random action in the first episode, in [0, 1].
-        epsilon_decay: Factor on epsilon after each episode, in (0, 1].
-        min_epsilon: Lower bound of the decay of epsilon, in [0, 1]. It never raises epsilon: if it
-            is larger than `epsilon`, epsilon stays as it is.
-        learning_rate_decay: Factor on the learning rate after each episode, in (0, 1].
-        min_learning_rate: Lower bound of the decay of the learning rate, in [0, 1]. If it is
-            larger than `learning_rate`, the learning rate stays as it is.
-        initial_q: Of each action in each state before learning, from -1e6 to 1e6. Values above
-            what can be reached ("optimistic") make ants try all actions.
-        hyperparameters: What this learner has besides, (name, number) pairs by name; given as a
-            mapping, or as keywords: `TrainingConfig("dyna_q", ..., planning_steps=5)`. Those that
-            are left out have default values, see
-            `taichi_ants.learners.get(name).hyperparameters()`.
+    Bounds of a decay never raise a value: if `min_epsilon` is larger than `epsilon`, epsilon stays
+    as it is. An `initial_q` above what can be reached ("optimistic") makes ants try all actions.
+    `hyperparameters` are the learner's own, (name, number) pairs by name; given as a mapping, or as
+    keywords: `TrainingConfig("dyna_q", ..., planning_steps=5)`. Those that are left out have
+    default values, see `taichi_ants.learners.get(name).hyperparameters()`.
 
     Raises:
-        AntsError: A value is outside its range. Whether the learner exists, and has these
-            hyperparameters, is checked when training starts, so that configurations can be
-            written down before a learner is registered.
+        AntsError: A value is outside its range. Training checks whether the learner exists and has
+            these hyperparameters, so that you can write configurations before you register a
+            learner.
     """
 
     learner: Annotated[str, Is("name of a learner")]
@@ -61,9 +48,8 @@ class TrainingConfig(Settings, path="training"):
         Share, Is("value below which the learning rate does not decay")
     ] = 0.0
     initial_q: Annotated[
-        float,
+        InitialValue,
         Is("value of each action before learning; high ones make ants try every action"),
-        Is(least=-MOST_VALUE, most=MOST_VALUE),
     ] = 0.0
     hyperparameters: tuple[tuple[str, float], ...] = ()
 
@@ -136,9 +122,6 @@ class TrainingConfig(Settings, path="training"):
         return {**asdict(self), "hyperparameters": dict(self.hyperparameters)}
 
 
-INITIAL_VALUE = setting(TrainingConfig, "initial_q")
-
-
 def share_of_one(value: Any) -> bool:
     """Whether a value is a number from 0 to 1; booleans, text and arrays are none."""
     number = isinstance(value, Real) and not isinstance(value, bool)
@@ -146,12 +129,11 @@ def share_of_one(value: Any) -> bool:
 
 
 def update_weights(alpha: float, most: int) -> np.ndarray:
-    """How far the mean of n TD errors moves a shared value: 1 - (1 - alpha)^n, by n up to `most`.
+    """Return by how much the mean of n TD errors moves a shared value: 1 - (1 - alpha)^n, by n.
 
     So far n updates in turn, each with learning rate alpha, go towards one target. Kernels and
-    reference take these numbers from here, since powers differ in the last bit between libraries.
-    float32 (at most most + 1,); at 1 it is alpha itself, as float32. The last number is that of all
-    larger n as well: from some n on they are 1, or 0 where 1 - alpha is 1.
+    reference take these float32 numbers (at most most + 1,) from here, because powers differ in the
+    last bit between libraries. The last number is that of all larger n as well.
     """
     import numpy as np
 

@@ -2,16 +2,8 @@
 
 import taichi as ti
 
+from taichi_ants.learners import model
 from taichi_ants.learners.learner import Learner
-from taichi_ants.learners.model import (
-    Planning,
-    error_of,
-    model_memory,
-    pack_transition,
-    recall,
-    remember,
-    visited,
-)
 from taichi_ants.learners.q_learning import td_error
 from taichi_ants.task.constants import ROW
 from taichi_ants.task.rules.random_bits import advance, below, bits_of, high_word
@@ -20,7 +12,7 @@ from taichi_ants.task.rules.random_bits import advance, below, bits_of, high_wor
 @ti.func
 def update(memory: ti.template(), at, rates, pair, transition):
     """Update a pair by its TD error, which is returned."""
-    error = error_of(memory, at, rates, pair, transition)
+    error = model.error_of(memory, at, rates, pair, transition)
     memory.q[at.table + pair] = memory.q[at.table + pair] + rates.learning_rate * error
     return error
 
@@ -29,13 +21,13 @@ def update(memory: ti.template(), at, rates, pair, transition):
 def learn(memory: ti.template(), at, step, rates, random_state):
     """Q-learning from the step, then from pairs of the model that are drawn."""
     pair = step.state * ROW + step.action
-    transition = pack_transition(step.next_state, step.reward, step.terminated)
+    transition = model.pack_transition(step.next_state, step.reward, step.terminated)
     error = update(memory, at, rates, pair, transition)
-    remember(memory, at, pair, transition)
-    rng, n_visited = random_state, visited(memory, at)
+    model.remember(memory, at, pair, transition)
+    rng, n_visited = random_state, model.visited(memory, at)
     for _ in range(rates.planning_steps):
         rng = advance(rng)
-        drawn, seen = recall(memory, at, below(high_word(bits_of(rng)), n_visited))
+        drawn, seen = model.recall(memory, at, below(high_word(bits_of(rng)), n_visited))
         update(memory, at, rates, drawn, seen)
     return error, rng
 
@@ -45,8 +37,8 @@ DYNA_Q = Learner(
     learn,
     td_error=td_error,
     plans=True,
-    hyperparameters=Planning,
-    memory=lambda settings, n_states: model_memory(n_states),
+    hyperparameters=model.Planning,
+    memory=lambda settings, n_states: model.model_memory(n_states),
     cost=lambda settings: 1 + 0.25 * settings.planning_steps,
     summary="Q-learning that replays a model of the world",
 )

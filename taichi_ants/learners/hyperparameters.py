@@ -12,11 +12,8 @@ from taichi_ants.settings import Settings, declared
 class Hyperparameters(Settings, path="training"):
     """Base of the hyperparameters of a learner; as such, none.
 
-    Each field is declared as `Annotated[int, Is(...)]` or `Annotated[float, Is(...)]`; kernels get
-    the first as i32 and the second as f32.
-
-    Raises:
-        AntsError: A value is outside its range, or a field is not declared so.
+    Each field is declared as `Annotated[int, Is(...)]` or `Annotated[float, Is(...)]`, for kernels
+    i32 and f32. AntsError if a value is outside its range, or a field is not declared so.
     """
 
     def __post_init__(self) -> None:

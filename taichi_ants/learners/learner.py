@@ -15,12 +15,10 @@ from taichi_ants.learners.hyperparameters import Hyperparameters
 
 @dataclass(frozen=True)
 class Memory:
-    """What a learner remembers of each run, besides the table that the ant acts by.
+    """Numbers that a learner keeps for each run, besides the table that the ant acts by.
 
-    Attributes:
-        tables: Further tables of action values, which start as copies of that one.
-        floats: Further f32 numbers, which start as 0.
-        integers: Further i32 numbers, which start as 0.
+    Further `tables` of action values start as copies of that one; f32 `floats` and i32 `integers`
+    as 0.
     """
 
     tables: int = 0
@@ -41,17 +39,16 @@ class Learner:
         learn: A `ti.func` (memory, at, step, rates, random_state) -> (TD error f32, random_state
             u64) that is called after each step; see `taichi_ants.learners.memory` for the
             arguments, the first of which is a `ti.template()`. It changes the memory of one run,
-            which begins at `at`, and returns the TD error of the step, for traces.
+            which begins at `at`.
         begin: A `ti.func` (memory, at) that is called at the start of each episode, or None.
         td_error: The TD error, if all ants of a world can share a table, see `td_learner`.
         draws_next_action: The next action is drawn before the update and then taken (on-policy
             learners); only then has a step one.
         plans: The learner keeps `taichi_ants.learners.model` and has the hyperparameter
-            `planning_steps`; ants that share a table share the model. Its updates from the model
-            have no next action, so td_error may not look at it.
-        hyperparameters: What it has besides the settings of all learners: a dataclass whose fields
-            `number` of `taichi_ants.learners` makes, all with usual values.
-        memory: A function (hyperparameters, n_states) -> Memory, where a table has n_states rows.
+            `planning_steps`; ants that share a table share the model, and td_error may not look at
+            the next action.
+        hyperparameters: Its own, besides the settings of all learners, all with default values.
+        memory: A function (hyperparameters, n_states) -> Memory.
         cost: A function (hyperparameters) -> float: the time of a step of one ant, in that of
             Q-learning. Launches of kernels are cut by it.
         summary: One line for listings.
@@ -83,18 +80,16 @@ def td_learner(
     """A learner that adds learning_rate * TD error to the value of the pair; ants can share it.
 
     Args:
-        name: The name by which configurations call it.
+        name, draws_next_action, summary: See `Learner`.
         td_error: A `ti.func` (value, reward, discount, next_values, next_action, epsilon) -> float:
             the value of the state-action pair that is updated, the reward, the discount (0 where
             the step terminated), the vector of the five action values of the next state, the next
-            action and the current epsilon; all f32 but next_action (i32).
-        draws_next_action: See `Learner`; only then may td_error look at next_action, which is 0 to
-            4, and 0 where the step terminated.
-        summary: One line for listings.
+            action and the current epsilon; all f32 but next_action (i32), which is 0 where the step
+            terminated, and may be looked at only if it is drawn.
 
     Raises:
-        AntsError: The TD error is no `ti.func`, does not take six arguments, or looks at a next
-            action that is not drawn. What it computes is tried when it is first used.
+        AntsError: The TD error is not a `ti.func` of six arguments, or looks at a next action that
+            is not drawn. What it computes is tried when it is first used.
     """
     check_td_error(name, td_error, draws_next_action)
     from taichi_ants.learners.td_errors import learn_by  # Taichi starts to be imported

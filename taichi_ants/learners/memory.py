@@ -13,12 +13,9 @@ from taichi_ants.task.constants import N_ACTIONS, ROW
 class LearnerArrays(NamedTuple):
     """The memory of many runs, or ants, one behind the other.
 
-    Attributes:
-        q: f32 array, tables of n_states rows of `ROW` numbers, the first 5 of them action values.
-            The first table of a run is the one that it acts by; its further ones follow.
-        floats: f32 array.
-        integers: i32 array.
-        n_states: The number of states, a number of Python's.
+    In `q`, f32, tables of n_states (a number of Python's) rows of `ROW` numbers, the first 5 of
+    them action values; that by which a run acts comes before its further ones. Then the f32
+    `floats` and the i32 `integers`.
     """
 
     q: Any
@@ -47,9 +44,8 @@ Transition = ti.types.struct(
 def read_rates(kind: type[Hyperparameters]) -> Callable[..., Any]:
     """A `ti.func` (learning_rate, discount, epsilon, numbers, begin) -> the rates of a learner.
 
-    The rates are a struct: learning_rate, discount and epsilon as f32, and the hyperparameters by
-    their names, whole ones as i32, others as f32. These are read from `numbers`, an f64 array that
-    holds them from `begin` on, in the order of the dataclass.
+    The rates are a struct of these, f32, and the hyperparameters by their names, i32 if whole, else
+    f32; they are read from the f64 array `numbers` from `begin` on.
     """
     more = {one.name: ti.i32 if one.kind is int else ti.f32 for one in declared(kind)}
     rates_type = ti.types.struct(learning_rate=ti.f32, discount=ti.f32, epsilon=ti.f32, **more)

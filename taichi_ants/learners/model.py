@@ -26,9 +26,7 @@ _PAIRS = (ROW << _REWARD_AT) - 1
 
 @dataclass(frozen=True)
 class Planning(Hyperparameters):
-    """Attributes:
-    planning_steps: Updates from the model after each step, at most.
-    """
+    """The hyperparameters of learners that plan."""
 
     planning_steps: Annotated[
         int, Is("updates from the model after each step", least=1, most=1000)

@@ -14,9 +14,7 @@ from taichi_ants.task.constants import ROW
 
 @dataclass(frozen=True)
 class Steps(Hyperparameters):
-    """Attributes:
-    n_steps: Rewards in a target, unless the episode ends before.
-    """
+    """The hyperparameter of n-step SARSA; targets end with the episode."""
 
     n_steps: Annotated[int, Is("rewards in a target", least=1, most=64)] = 4
 

@@ -1,8 +1,7 @@
 """Policies: tables of action values, two that need no learning, and their files.
 
-A policy is a float32 array of shape (n_states, 5): the value of each action in each state of an
-observation. An ant takes a best action, ties at random with equal probability. So a table can state
-a random choice, but no other probabilities.
+A policy is a float32 array (n_states, 5), the value of each action in each state of an observation.
+An ant takes a best action, ties at random with equal probability.
 """
 
 from __future__ import annotations
@@ -26,12 +25,10 @@ _KIND = Kind("policy", 2, "save_policy", most=1 << 26, foreign=True)
 
 
 class Policy(NamedTuple):
-    """What a policy file holds.
+    """The contents of a policy file.
 
-    Attributes:
-        q_values: Action values, float32 (n_states, 5).
-        observation: Name of the registered observation whose states index the rows.
-        metadata: What made the policy.
+    Action values, float32 (n_states, 5); the name of the registered observation whose states index
+    the rows; and what made the policy.
     """
 
     q_values: ActionValues
@@ -40,11 +37,7 @@ class Policy(NamedTuple):
 
     @property
     def task(self) -> Task:
-        """The rules for which it was made, as its metadata say; the paper's if they do not.
-
-        Raises:
-            AntsError: The metadata name other rules than there are.
-        """
+        """The rules in its metadata, or the paper's; AntsError if they are not allowed."""
         try:
             task = Task.from_dict(self.metadata.get("task", {}))
         except AntsError as error:
@@ -55,17 +48,11 @@ class Policy(NamedTuple):
         return replace(task, observation=self.observation)
 
     def actions(self, states: npt.ArrayLike, rng: np.random.Generator) -> npt.NDArray[np.int64]:
-        """A best action in each state, ties at random, for the environments of this package:
+        """A best action in each state, ties by `rng`, for the environments of this package:
 
-            observations, infos = envs.reset(seed=0)
-            envs.step(policy.actions(infos["state"], rng))
+        observations, infos = envs.reset(seed=0) envs.step(policy.actions(infos["state"], rng))
 
-        Args:
-            states: State indices, integers of any shape; one state gives one action.
-            rng: Decides ties.
-
-        Raises:
-            AntsError: There is no such state.
+        States are integers of any shape, also a single one; AntsError if there is no such state.
         """
         expect("rng", rng, np.random.Generator)
         states = np.asarray(states)
@@ -85,15 +72,7 @@ def random_policy(observation: str = "paper") -> ActionValues:
 
 
 def action_probabilities(q_values: np.ndarray, epsilon: float = 0.0) -> np.ndarray:
-    """With which probability an epsilon-greedy ant takes each action, to the bit as in kernels.
-
-    Args:
-        q_values: Action values (..., 5), in which the best are chosen with equal probability.
-        epsilon: Probability of any action.
-
-    Returns:
-        float64 (..., 5).
-    """
+    """Probabilities of epsilon-greedy actions, float64 (..., 5), to the bit as in kernels."""
     explores = np.floor(epsilon * 2.0**32) / 2.0**32
     best = q_values >= q_values.max(axis=-1, keepdims=True)
     return explores / N_ACTIONS + best * ((1.0 - explores) / best.sum(axis=-1, keepdims=True))
@@ -125,23 +104,17 @@ FOLLOWED = tuple(RULES)
 
 
 def trail_follower(observation: str = "paper") -> ActionValues:
-    """Return a policy that is written by hand, the table of one of the `RULES`.
+    """Return a policy that is written by hand, a table of the `RULES`, float32 (n_states, 5).
 
     Without food, an ant picks up the food that it sees, follows a trail, and otherwise walks
     straight over open ground and turns at random beside anything that blocks it. With food, it
     gives it to the queen, moves nearer to her, pushes ants without food out of the way, and
-    otherwise walks at random until a nearer cell comes into view. An ant without food that sees
-    an ant with food on a stronger trail (P) waits to be pushed along that trail. In queues, it does
-    so only by moving against that ant, and it waits behind an ant that is further up the trail (p).
-
-    Args:
-        observation: The observation whose states index the rows, one of `FOLLOWED`.
-
-    Returns:
-        Float32 (n_states, 5): 1 for the actions that it takes, 0 for the others.
+    otherwise walks at random until a nearer cell comes into view. An ant without food that sees an
+    ant with food on a stronger trail (P) waits to be pushed along that trail. In queues, it does so
+    only by moving against that ant, and it waits behind an ant that is further up the trail (p).
 
     Raises:
-        AntsError: There is no rule for the observation.
+        AntsError: There is no rule for the observation; `FOLLOWED` lists those that have one.
     """
     check_one_of("observation", observation, FOLLOWED)
     name_of, q_values = observations.get(observation).name_of, random_policy(observation)
@@ -153,10 +126,7 @@ def trail_follower(observation: str = "paper") -> ActionValues:
 
 
 def _choices(rule: Rule, carries: bool, view: Sequence[str]) -> list[int]:
-    """The actions among which a rule chooses at random.
-
-    `view` has the letters of the cells in the order of the moves: left, forward, right.
-    """
+    """The actions among which a rule chooses, by the letters seen left, forward and right."""
     takes, fails = (GIVE, PICK_UP) if carries else (PICK_UP, GIVE)
     for letters, action in rule:
         cells = [move for move in (LEFT, FORWARD, RIGHT) if view[move] in letters]
@@ -176,25 +146,20 @@ def _choices(rule: Rule, carries: bool, view: Sequence[str]) -> list[int]:
 
 
 def save_policy(
-    path: PathLike,
-    q_values: npt.ArrayLike,
-    metadata: Mapping[str, Any],
-    observation: str = "paper",
+    path: PathLike, q_values: npt.ArrayLike, metadata: Mapping[str, Any], observation: str = "paper"
 ) -> None:
     """Write a policy file: an .npz with the action values, their observation and what made them.
 
     Args:
         path: The file; the whole name, no ending is added.
         q_values: Action values of shape (n_states, 5), finite as float32.
-        metadata: What made the policy (configuration, seed, world ...), anything that
-            JSON can hold.
+        metadata: What made the policy (configuration, seed, world ...), as JSON can hold it.
         observation: Name of the registered observation whose states index the rows.
 
     Raises:
-        AntsError: The observation is unknown, the values are no policy of it, the metadata cannot
-            be written as JSON, or the file cannot be written.
+        AntsError: An argument is not allowed, or the file cannot be written.
     """
-    table = _checked(q_values, observation, "q_values")
+    table = _checked(q_values, observation)
     if not isinstance(metadata, Mapping):
         raise AntsError(f"metadata is {shown(metadata)}; it must be a mapping of names to values.")
     try:
@@ -209,40 +174,43 @@ def save_policy(
 
 
 def load_policy(path: PathLike) -> Policy:
-    """Read a policy file that `save_policy` wrote.
-
-    Raises:
-        AntsError: The file is missing, damaged, no policy file, of an observation that is not
-            registered, or its values are no policy of it.
-    """
+    """Read a policy file that `save_policy` wrote; AntsError if it cannot be used."""
     with _KIND.reading(path) as (arrays, facts):
         observation, metadata = facts["observation"], facts["metadata"]
         expect("metadata", metadata, dict)
-        table = _checked(arrays["q_values"], observation, "q_values")
+        table = _checked(arrays["q_values"], observation)
         return Policy(table, observation, metadata)
 
 
-def _checked(q_values: npt.ArrayLike, observation: str, what: str) -> ActionValues:
-    """A float32 copy of action values, or an AntsError that says what is wrong with them."""
-    shape = (observations.get(observation).n_states, N_ACTIONS)
+def _checked(q_values: npt.ArrayLike, observation: str) -> ActionValues:
+    """The action values of one policy."""
+    table = checked_values(q_values, Task(observations.get(observation).name))
+    if table.ndim != 2:
+        raise AntsError(f"q_values has shape {table.shape}; it must be {table.shape[-2:]}.")
+    return table
+
+
+def checked_values(q_values: Any, task: Task) -> np.ndarray:
+    """Action values as float32 (..., n_states, 5); AntsError unless they are finite numbers."""
+    shape = (task.n_states, N_ACTIONS)
     try:
-        table = np.asarray(q_values)
-    except ValueError as error:  # rows of different lengths
-        raise AntsError(f"{what} is no array ({error}); it must hold real numbers.") from error
-    if table.dtype.kind not in "fiu":
-        raise AntsError(f"{what} has the type {table.dtype}; it must hold real numbers.")
-    if table.shape != shape:
+        values = np.asarray(q_values)
+    except ValueError:  # rows of different lengths
+        values = np.empty(0, object)
+    if values.dtype.kind not in "fiu":
+        raise AntsError(f"q_values is {shown(q_values)}; it must be an array of real numbers.")
+    if values.shape[-2:] != shape or values.size == 0:
         raise AntsError(
-            f"{what} has the shape {table.shape}; for the observation {observation!r} it must be "
-            f"{shape}."
+            f"q_values has shape {values.shape}; for the observation {task.observation!r} it must "
+            f"end in {shape}."
         )
     # A float64 beyond the range of float32 becomes infinite, which the next check reports.
     with np.errstate(over="ignore"):
-        table = table.astype(np.float32)
-    if not np.isfinite(table).all():
-        state, action = np.argwhere(~np.isfinite(table))[0]
+        tables = values.astype(np.float32, copy=False)
+    if not np.isfinite(tables).all():
+        *_, state, action = where = np.argwhere(~np.isfinite(tables))[0]
         raise AntsError(
-            f"{what} is {table[state, action]} for state {state} and action {action}; "
-            "it must be finite."
+            f"q_values is {tables[tuple(where)]} for state {state} and action {action}; it must "
+            "be finite."
         )
-    return table
+    return tables

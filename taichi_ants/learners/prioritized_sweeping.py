@@ -5,27 +5,15 @@ from typing import Annotated
 
 import taichi as ti
 
+from taichi_ants.learners import model
 from taichi_ants.learners.learner import Learner
-from taichi_ants.learners.model import (
-    Planning,
-    error_of,
-    model_memory,
-    next_state_of,
-    pack_transition,
-    recall,
-    remember,
-    terminated_of,
-    visited,
-)
 from taichi_ants.settings import Is
 from taichi_ants.task.constants import N_ACTIONS, ROW
 
 
 @dataclass(frozen=True)
-class Sweeping(Planning):
-    """Attributes:
-    threshold: Errors up to this size wait for no update.
-    """
+class Sweeping(model.Planning):
+    """The hyperparameters of prioritized sweeping."""
 
     threshold: Annotated[float, Is("size of errors that wait for no update", least=0, most=1e9)] = (
         0.0001
@@ -36,7 +24,7 @@ class Sweeping(Planning):
 def most_urgent(memory: ti.template(), at):
     """The slot of the model with the largest priority, the lowest of several; the priority."""
     first, largest = 0, memory.floats[at.floats]
-    for slot in range(1, visited(memory, at)):
+    for slot in range(1, model.visited(memory, at)):
         priority = memory.floats[at.floats + slot]
         if priority > largest:
             first, largest = slot, priority
@@ -50,23 +38,23 @@ def learn(memory: ti.template(), at, step, rates, random_state):
     The integers are the model, the floats the priority of each of its slots.
     """
     pair = step.state * ROW + step.action
-    transition = pack_transition(step.next_state, step.reward, step.terminated)
-    error = error_of(memory, at, rates, pair, transition)
-    slot = remember(memory, at, pair, transition)
+    transition = model.pack_transition(step.next_state, step.reward, step.terminated)
+    error = model.error_of(memory, at, rates, pair, transition)
+    slot = model.remember(memory, at, pair, transition)
     if ti.abs(error) > rates.threshold:
         memory.floats[at.floats + slot] = ti.abs(error)
     planned = 0
     urgent, priority = most_urgent(memory, at)
     while planned < rates.planning_steps and priority > 0:
         memory.floats[at.floats + urgent] = 0.0
-        updated, seen = recall(memory, at, urgent)
-        change = error_of(memory, at, rates, updated, seen)
+        updated, seen = model.recall(memory, at, urgent)
+        change = model.error_of(memory, at, rates, updated, seen)
         memory.q[at.table + updated] = memory.q[at.table + updated] + rates.learning_rate * change
         # Pairs that lead to its state may have got an error by this.
-        for before in range(visited(memory, at)):
-            leading, led_to = recall(memory, at, before)
-            if terminated_of(led_to) == 0 and next_state_of(led_to) == updated // ROW:
-                size = ti.abs(error_of(memory, at, rates, leading, led_to))
+        for before in range(model.visited(memory, at)):
+            leading, led_to = model.recall(memory, at, before)
+            if model.terminated_of(led_to) == 0 and model.next_state_of(led_to) == updated // ROW:
+                size = ti.abs(model.error_of(memory, at, rates, leading, led_to))
                 if size > rates.threshold and size > memory.floats[at.floats + before]:
                     memory.floats[at.floats + before] = size
         planned += 1
@@ -78,7 +66,7 @@ PRIORITIZED_SWEEPING = Learner(
     "prioritized_sweeping",
     learn,
     hyperparameters=Sweeping,
-    memory=lambda settings, n_states: model_memory(n_states, floats=N_ACTIONS * n_states),
+    memory=lambda settings, n_states: model.model_memory(n_states, floats=N_ACTIONS * n_states),
     cost=lambda settings: 1 + 12 * settings.planning_steps,
     summary="updates from a model of the world, the largest errors first",
 )

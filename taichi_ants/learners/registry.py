@@ -1,8 +1,7 @@
 """The one place where learners are registered.
 
-A learner is a function that updates a table of action values after each step, and what it needs
-besides. To add one, write a file beside this one and add its name to `BUILT_IN`; or call `register`
-from a file of your own.
+To add one, write a file beside this one and add its name to `BUILT_IN`; or call `register` from a
+file of your own.
 """
 
 from __future__ import annotations
@@ -35,11 +34,9 @@ _LEARNERS: dict[str, Learner] = {}
 def register(learner: Learner) -> Learner:
     """Make a learner known by its name; it replaces your own learner of the same name.
 
-    Results, colonies and kernels that exist keep the learner with which they were made.
-
-    Raises:
-        AntsError: The name is that of a learner of the package or not an identifier, or a field is
-            not as `Learner` says. The functions are tried when the learner is first used.
+    Results, colonies and kernels that exist keep theirs. AntsError if the name is that of a learner
+    of the package or not an identifier, or a field is not as `Learner` says. The functions are
+    tried when the learner is first used.
     """
     expect("what is registered", learner, Learner)
     name = learner.name
@@ -78,11 +75,7 @@ def _try_sizes(learner: Learner) -> None:
 
 
 def get(name: str) -> Learner:
-    """The learner of that name.
-
-    Raises:
-        AntsError: There is none; the message lists those that exist.
-    """
+    """The learner of that name; AntsError, which lists those that exist, if there is none."""
     expect("the learner", name, str)
     if name in BUILT_IN:
         return getattr(import_module(f"taichi_ants.learners.{name}"), name.upper())
@@ -95,11 +88,7 @@ def get(name: str) -> Learner:
 
 
 def label(name: str) -> str:
-    """What readers know a learner as, for example "Dyna-Q"; one of a plugin by its own name.
-
-    Raises:
-        AntsError: The name is no text.
-    """
+    """The learner's name for readers, such as "Dyna-Q"; one of a plugin by its own name."""
     expect("name", name, str)
     return BUILT_IN.get(name, name)
 
@@ -107,9 +96,7 @@ def label(name: str) -> str:
 def settle(config: TrainingConfig) -> TrainingConfig:
     """The configuration with all hyperparameters of its learner.
 
-    Raises:
-        AntsError: There is no such learner, it has no such hyperparameter, or a value is outside
-            its range.
+    AntsError if there is no such learner or hyperparameter, or a value is outside its range.
     """
     expect("the configuration", config, TrainingConfig)
     kind = get(config.learner).hyperparameters

@@ -14,10 +14,7 @@ from taichi_ants.task.constants import ROW
 
 @dataclass(frozen=True)
 class Traces(Hyperparameters):
-    """Attributes:
-    trace_decay: Lambda: what a trace keeps in each step, besides the discount.
-    trace_length: How many pairs have a trace; the oldest one gives way.
-    """
+    """The hyperparameters of SARSA(lambda); the oldest trace gives way."""
 
     trace_decay: Annotated[float, Is("what a trace keeps per step", least=0, most=1)] = 0.9
     trace_length: Annotated[int, Is("pairs that have a trace", least=1, most=256)] = 32

@@ -10,7 +10,7 @@ import numpy as np
 
 from taichi_ants.checks import checked_seeds, checked_share
 from taichi_ants.engines.records import Record
-from taichi_ants.errors import AntsError, checked_whole, expect, shown
+from taichi_ants.errors import AntsError, check_array, checked_whole, expect
 from taichi_ants.files import PathLike, smallest
 from taichi_ants.files.archives import Kind
 from taichi_ants.task import Task
@@ -35,27 +35,23 @@ class Dataset(Record):
 
     An *episode* is what one ant does from the step in which it appears to the one with which its
     data end: terminated by a delivery that is a terminal state, or truncated, by its death, by a
-    delivery that is not terminal but ends the ant's episode, or since nobody looked on. The
-    *behaviour policy* is the one that chose the actions. The arrays are read-only.
+    delivery that is not terminal but ends the ant's episode, or by the end of the recording. The
+    *behaviour policy* is the one that chose the actions. The arrays (n,) are read-only.
 
     Attributes:
-        world: The world that the ants started in.
-        task: The rules of the game.
+        world, task: The world that the ants started in, and the rules.
         seeds: One for each run.
         behaviour: What chose the actions: names and numbers, as JSON knows them.
-        run: int32 (n,), the number of the seed, ascending.
-        episode: int32 (n,), from 0, ascending: in a run, those that began first come first. The
-            steps of an episode come in order.
-        agent: int32 (n,), the number of the ant in its colony, 0 of an ant that is alone.
-        step: int32 (n,), the tick of its world, from 0. A newborn's first is larger.
-        state: int32 (n,), the state index.
-        action: int32 (n,), 0 to 4.
-        reward: int32 (n,).
-        next_state: int32 (n,).
-        terminated: bool (n,), whether there is nothing to gain after this step.
-        truncated: bool (n,), whether the episode ends with this step all the same.
-        behaviour_probability: float64 (n,), with which the behaviour policy took the action; nan if
-            nobody knows.
+        run: int32, the number of the seed, ascending.
+        episode: int32, from 0, ascending: in a run, those that began first come first. The steps of
+            an episode come in order.
+        agent: int32, the number of the ant in its colony, 0 of an ant that is alone.
+        step: int32, the tick of its world, from 0. A newborn's first is larger.
+        state, action, reward, next_state: int32; actions are 0 to 4.
+        terminated: bool, whether there is nothing to gain after this step.
+        truncated: bool, whether the episode ends with this step all the same.
+        behaviour_probability: float64, with which the behaviour policy took the action; nan if it
+            is not known.
 
     Raises:
         AntsError: The arrays do not belong together.
@@ -84,11 +80,7 @@ class Dataset(Record):
             raise AntsError("a data set has no transitions; record at least one.")
         for name, dtype in COLUMNS.items():
             array = getattr(self, name)
-            if not isinstance(array, np.ndarray) or (array.dtype, array.shape) != (dtype, (n,)):
-                raise AntsError(
-                    f"{name} of a data set is {shown(array)}; it must be an array of shape ({n},) "
-                    f"and type {dtype}."
-                )
+            check_array(f"{name} of a data set", array, dtype, (n,))
             array = np.ascontiguousarray(array).view()
             array.flags.writeable = False
             object.__setattr__(self, name, array)
@@ -137,21 +129,13 @@ class Dataset(Record):
         return np.concatenate([[0], np.flatnonzero(self.terminated | self.truncated) + 1])
 
     def returns(self, discount: float = 1.0) -> np.ndarray:
-        """The discounted return of each episode from its first step, float64 (e,).
-
-        Raises:
-            AntsError: The discount is no number from 0 to 1.
-        """
+        """The discounted return of each episode from its first step, float64 (e,)."""
         discount = checked_share("discount", discount)
         ages = np.arange(len(self)) - self.begins[self.episode]
         return np.bincount(self.episode, weights=discount**ages * self.reward)
 
     def first(self, transitions: int | None = None, episodes: int | None = None) -> Dataset:
-        """The first rows, or episodes, of each run; a last episode that is cut is truncated.
-
-        Raises:
-            AntsError: A number is not whole or below 1.
-        """
+        """The first rows, or episodes, of each run; a last episode that is cut is truncated."""
         keep = np.ones(len(self), bool)
         # Where the run of each row begins.
         where = np.searchsorted(self.run, np.arange(len(self.seeds)))[self.run]
@@ -183,11 +167,7 @@ class Dataset(Record):
 
     @classmethod
     def load(cls, path: PathLike) -> Dataset:
-        """Read a data set that `save` wrote.
-
-        Raises:
-            AntsError: The file is missing, damaged, of another kind, or its observation is unknown.
-        """
+        """Read a data set that `save` wrote; AntsError if it cannot be used."""
         with _KIND.reading(path) as (arrays, facts):
             rows: dict[str, Any] = {n: arrays[n].astype(kind) for n, kind in COLUMNS.items()}
             return cls(**cls.described(facts), **rows)

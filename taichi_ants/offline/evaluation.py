@@ -8,20 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from taichi_ants import runtime
 from taichi_ants.analysis.statistics import resampling_counts
-from taichi_ants.checks import checked_q_values, checked_share
+from taichi_ants.checks import checked_q_values
 from taichi_ants.engines.records import Record
-from taichi_ants.errors import AntsError, checked_flag, checked_whole, expect
-from taichi_ants.learners.config import INITIAL_VALUE
+from taichi_ants.errors import AntsError, expect
+from taichi_ants.learners.config import InitialValue
 from taichi_ants.learners.policies import action_probabilities
 from taichi_ants.offline.dataset import Dataset
-from taichi_ants.offline.learners import EmpiricalModel
+from taichi_ants.offline.learners import Discount, EmpiricalModel
+from taichi_ants.settings import Flag, Is, Share, checked_arguments
 
-RESAMPLES = 200
+Resamples = Annotated[int, Is(least=0, most=100_000)]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -31,12 +33,11 @@ class PolicyValues(Record):
     Attributes:
         value: The discounted return that is to be expected.
         low, high: The ends of its bootstrap interval over episodes (percentiles); nan without
-            resamples. It tells what other episodes would have said, not how wrong the method is.
-        effective_sample_size: (sum of weights)^2 / sum of squared weights, where the weights are
-            those of whole episodes: how many episodes of the target policy tell as much (Kong, A
-            note on importance sampling using standardized weights, 1992). nan where none is
-            weighted. 0: the target policy would have done no whole episode of the data, so that
-            the value stands on the beginnings of episodes alone; do not believe it.
+            resamples. It covers the choice of episodes, not the error of the method.
+        effective_sample_size: (sum of weights)^2 / sum of squared weights of whole episodes: how
+            many episodes of the target policy tell as much (Kong, A note on importance sampling
+            using standardized weights, 1992). nan where none is weighted. 0: the target policy
+            would have done no whole episode of the data; do not believe the value.
     """
 
     value: np.ndarray
@@ -45,14 +46,15 @@ class PolicyValues(Record):
     effective_sample_size: np.ndarray
 
 
+@checked_arguments
 def importance_sampling(
     data: Dataset,
     q_values: np.ndarray,
-    discount: float = 0.9,
-    epsilon: float = 0.0,
-    weighted: bool = True,
-    resamples: int = RESAMPLES,
-    level: float = 0.95,
+    discount: Share = 0.9,
+    epsilon: Share = 0.0,
+    weighted: Flag = True,
+    resamples: Resamples = 200,
+    level: Share = 0.95,
     threads: int | None = None,
 ) -> PolicyValues:
     """Per-decision importance sampling (Precup, Sutton and Singh, ICML 2000).
@@ -63,10 +65,7 @@ def importance_sampling(
     of episodes.
 
     Args:
-        data: The data set, whose behaviour policy is known.
-        q_values: float (..., n_states, 5), the target policies.
-        discount: Discount factor gamma, from 0 to 1.
-        epsilon: Probability of a random action of the target policies.
+        q_values: float (..., n_states, 5), the target policies, with `epsilon`.
         weighted: Divide by the sum of the weights, not by the number of episodes: for each step of
             an episode (Thomas, Safe reinforcement learning, 2015, section 3.8; an episode that has
             ended keeps its weight). It is biased, but its variance is far smaller.
@@ -78,14 +77,12 @@ def importance_sampling(
     Raises:
         AntsError: An argument is not allowed, or the data do not know their probabilities.
     """
-    expect("data", data, Dataset)
-    discount, weighted = checked_share("discount", discount), checked_flag("weighted", weighted)
+    policies, shape = _policies(data, q_values, epsilon)
     if np.isnan(data.behaviour_probability).any():
         raise AntsError(
             "the data do not tell with which probability their actions were taken; record them "
             "with record, or use model_based."
         )
-    policies, shape = _policies(data, q_values, epsilon)
     runtime.start(threads)
     from taichi_ants.offline.kernels import add_up, weigh  # imports Taichi
 
@@ -105,30 +102,26 @@ def importance_sampling(
     return _values(outcomes, shape)
 
 
+@checked_arguments
 def model_based(
     data: Dataset,
     q_values: np.ndarray,
-    discount: float = 0.9,
-    epsilon: float = 0.0,
-    initial_q: float = 0.0,
-    resamples: int = RESAMPLES,
-    level: float = 0.95,
+    discount: Discount = 0.9,
+    epsilon: Share = 0.0,
+    initial_q: InitialValue = 0.0,
+    resamples: Resamples = 200,
+    level: Share = 0.95,
     threads: int | None = None,
 ) -> PolicyValues:
     """The value that target policies have in the empirical model of the data.
 
     The direct method, as Jiang and Li (Doubly robust off-policy value evaluation for reinforcement
     learning, ICML 2016) call it: little variance, but wrong however many data there are where the
-    states that ants see are not Markov. A resample has a model of its own.
-
-    Args:
-        initial_q: Value of the pairs that the data lack.
-
-    Others, and errors, are those of `importance_sampling`; the discount must be at most 0.9999.
+    states that ants see are not Markov. A resample has a model of its own. Pairs that the data lack
+    have the value `initial_q`. Other arguments are those of `importance_sampling`.
     """
-    expect("data", data, Dataset)
     policies, shape = _policies(data, q_values, epsilon)
-    times, initial_q = _times(data, resamples), INITIAL_VALUE.checked(initial_q)
+    times = _times(data, resamples)
     model, first = EmpiricalModel.resampled(data, times), data.state[data.begins[:-1]]
     starts = times / times.sum(axis=1, keepdims=True, dtype=np.int64)  # of each episode
     outcomes = []
@@ -147,8 +140,9 @@ def _values(outcomes: Sequence[tuple[float, ...]], shape: tuple[int, ...]) -> Po
 
 def _policies(data: Dataset, q_values: np.ndarray, epsilon: float) -> tuple[np.ndarray, tuple]:
     """The probabilities of actions (policies, n_states, 5), and the leading shape of the tables."""
+    expect("data", data, Dataset)
     tables = checked_q_values(q_values, data.task)
-    probabilities = action_probabilities(tables, checked_share("epsilon", epsilon))
+    probabilities = action_probabilities(tables, epsilon)
     return probabilities.reshape(-1, *tables.shape[-2:]), tables.shape[:-2]
 
 
@@ -156,14 +150,13 @@ def _times(data: Dataset, resamples: int) -> np.ndarray:
     """How often each episode counts, uint8 (1 + resamples, episodes): once, then as drawn."""
     n = len(data.begins) - 1
     once = np.ones((1, n), np.uint8)
-    drawn = checked_whole("resamples", resamples, 0, 100_000)
-    return np.concatenate([once, resampling_counts(n, drawn)]) if drawn else once
+    return np.concatenate([once, resampling_counts(n, resamples)]) if resamples else once
 
 
 def _interval(estimates: np.ndarray, level: float) -> tuple[float, float, float]:
     """The first estimate, and the percentile interval of the others."""
     if len(estimates) == 1:
         return estimates[0], np.nan, np.nan
-    tail = (1.0 - checked_share("level", level)) / 2.0
+    tail = (1.0 - level) / 2.0
     low, high = np.quantile(estimates[1:], (tail, 1.0 - tail))
     return estimates[0], low, high

@@ -36,14 +36,7 @@ def replay(
     learning_rate: ti.f32,
     discount: ti.f32,
 ):
-    """Q-learning over the rows of each group, from the first to the last.
-
-    Args:
-        q: (groups * n_states * 5,), moved on.
-        begins: (groups + 1,) rows.
-        states, actions, rewards, next_states, terminated: (rows,).
-        n_states, learning_rate, discount: Numbers.
-    """
+    """Q-learning over the rows of each group, from the first to the last; moves `q` on."""
     ti.loop_config(block_dim=1)
     for group in range(begins.shape[0] - 1):
         table = group * n_states * N_ACTIONS
@@ -72,21 +65,10 @@ def iterate(
     lowest: ti.f64,
     tolerance: ti.f64,
 ):
-    """Back up all pairs of each group at once, until no action value changes by more.
+    """Back up all pairs of each group at once, until no value changes by more than `tolerance`.
 
-    Args:
-        q: (groups * n_states * 5,), moved on; what is no pair stays.
-        values: (groups * n_states,), of states, written.
-        policy: (n_states * 5,), probabilities of actions, of the policy to evaluate.
-        greedy: 1 if the best action counts instead.
-        pairs_begin: (groups + 1,), which pairs are of a group.
-        pairs: (pairs,), state * 5 + action.
-        rewards: (pairs,), expected.
-        successors_begin: (pairs + 1,), which successors are of a pair.
-        successors: (successors,), states; those after which nothing comes are left out.
-        probabilities: (successors,).
-        n_states, discount, tolerance: Numbers.
-        lowest: No action value falls below it.
+    Moves `q` (groups * n_states * 5,) on and writes the `values` of states; see `EmpiricalModel`.
+    If `greedy`, the best action counts, else those of the `policy` (n_states * 5,).
     """
     ti.loop_config(block_dim=1)
     for group in range(pairs_begin.shape[0] - 1):
@@ -134,19 +116,12 @@ def add_up(
     weighted: ti.i32,
     discount: ti.f64,
 ):
-    """Per-decision importance sampling, of each resample of the episodes.
+    """Per-decision importance sampling, of each resample of the episodes (`counts`).
 
-    Args:
-        sums, mass, ended: (resamples, steps + 1), zeros; written, by the step of an episode: the
-            sum of weight * reward, that of the weights, and the last weights of the episodes that
-            have just ended.
-        estimates: (resamples,), written.
-        begins: (episodes + 1,) rows.
-        rewards, weights: (rows,).
-        counts: (resamples, episodes), how often an episode is in the resample.
-        weighted: 1 to divide by the sum of the weights, where an episode that has ended keeps its
-            last one; 0 by the number of episodes.
-        discount: A number.
+    By the step of an episode, it writes into zeros (resamples, steps + 1) the `sums` of weight *
+    reward, the `mass` of the weights, and the last weights of the episodes that have just `ended`;
+    then the `estimates`. `weighted` divides by the sum of the weights, where an episode that has
+    ended keeps its last one, not by the number of episodes.
     """
     ti.loop_config(block_dim=1)
     for r in range(counts.shape[0]):

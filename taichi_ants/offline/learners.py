@@ -1,65 +1,53 @@
 """Offline learners: tables of action values from a data set alone.
 
 Tables are float32 (n_states, 5), or (runs, n_states, 5) with a table from the data of each run.
-They are policies as all others are: `save_policy` writes one, `evaluate` tries it in the world.
 
-Such learners never see what their policy brings about. Where data lack a pair of state and action,
-its value is a guess, and a policy that maximises goes where guesses are too high: the extrapolation
-error of Fujimoto, Meger and Precup (Off-policy deep reinforcement learning without exploration,
-ICML 2019); Levine, Kumar, Tucker and Fu (Offline reinforcement learning: tutorial, review, and
-perspectives on open problems, 2020) survey the remedies.
+Where data lack a pair of state and action, its value is a guess, and a policy that maximises goes
+where guesses are too high: the extrapolation error of Fujimoto, Meger and Precup (Off-policy deep
+reinforcement learning without exploration, ICML 2019); Levine, Kumar, Tucker and Fu (Offline
+reinforcement learning: tutorial, review, and perspectives on open problems, 2020) survey remedies.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from numbers import Real
+from typing import Annotated
 
 import numpy as np
 
 from taichi_ants import runtime
-from taichi_ants.checks import checked_share
-from taichi_ants.errors import AntsError, checked_flag, checked_whole, expect, shown
-from taichi_ants.learners.config import INITIAL_VALUE
+from taichi_ants.errors import expect
+from taichi_ants.learners.config import InitialValue
 from taichi_ants.offline.dataset import Dataset
+from taichi_ants.settings import Count, Flag, Is, Share, checked_arguments
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.task.events import Event
 
-_MOST_PENALTY = 1e9
-_MOST_DISCOUNT = 0.9999  # with which Q iteration takes half a second
+# Values of endless episodes stay finite; with the largest one Q iteration takes half a second.
+Discount = Annotated[Share, Is(most=0.9999)]
 
 
+@checked_arguments
 def batch_q_learning(
     data: Dataset,
-    discount: float = 0.9,
-    learning_rate: float = 0.1,
-    sweeps: int = 100,
-    initial_q: float = 0.0,
-    by_run: bool = False,
+    discount: Share = 0.9,
+    learning_rate: Share = 0.1,
+    sweeps: Count = 100,
+    initial_q: InitialValue = 0.0,
+    by_run: Flag = False,
     threads: int | None = None,
 ) -> np.ndarray:
     """Q-learning that goes over the data again and again, in the order in which they stand.
 
     Lin (Self-improving reactive agents, Machine Learning 8, 1992) calls it experience replay. The
-    last transitions of a sweep count most; the smaller the learning rate, the less.
-
-    Args:
-        data: The data set.
-        discount: Discount factor gamma, from 0 to 1.
-        learning_rate: Step size alpha, from 0 to 1.
-        sweeps: How often it goes over the data, at least 1.
-        initial_q: Of all pairs before; of those that the data lack, after.
-        by_run: Whether to learn a table from the data of each run.
-        threads: CPU threads; None keeps what runs, or takes all.
+    last transitions of a sweep count most; the smaller the learning rate, the less. Pairs that the
+    data lack keep `initial_q`. With `by_run`, a table is learned from the data of each run.
 
     Raises:
         AntsError: An argument is not allowed.
     """
-    expect("data", data, Dataset)
-    rates = checked_share("learning_rate", learning_rate), checked_share("discount", discount)
-    sweeps, groups = checked_whole("sweeps", sweeps), _groups(data, by_run)
-    first = INITIAL_VALUE.checked(initial_q)
-    q = np.full((len(groups) - 1, data.task.n_states, N_ACTIONS), first, np.float32)
+    groups, rates = _groups(data, by_run), (learning_rate, discount)
+    q = np.full((len(groups) - 1, data.task.n_states, N_ACTIONS), initial_q, np.float32)
     runtime.start(threads)
     from taichi_ants.offline.kernels import replay  # imports Taichi
 
@@ -69,11 +57,12 @@ def batch_q_learning(
     return q if by_run else q[0]
 
 
+@checked_arguments
 def fitted_q_iteration(
     data: Dataset,
-    discount: float = 0.9,
-    initial_q: float = 0.0,
-    by_run: bool = False,
+    discount: Discount = 0.9,
+    initial_q: InitialValue = 0.0,
+    by_run: Flag = False,
     threads: int | None = None,
 ) -> np.ndarray:
     """The best action values of the empirical model of the data, see `EmpiricalModel`.
@@ -84,17 +73,17 @@ def fitted_q_iteration(
     Pairs that the data lack keep `initial_q`. Arguments and errors are those of
     `batch_q_learning`, but the discount must be at most 0.9999.
     """
-    initial_q = INITIAL_VALUE.checked(initial_q)
     model = EmpiricalModel.of(data, _groups(data, by_run))
     q = model.solve(discount, model.rewards, initial_q, threads=threads).astype(np.float32)
     return q if by_run else q[0]
 
 
+@checked_arguments
 def pessimistic_q_iteration(
     data: Dataset,
-    discount: float = 0.9,
-    penalty: float = 1.0,
-    by_run: bool = False,
+    discount: Discount = 0.9,
+    penalty: Annotated[float, Is(least=0, most=1e9)] = 1.0,
+    by_run: Flag = False,
     threads: int | None = None,
 ) -> np.ndarray:
     """Action values from below: the fewer data a pair has, the less it is worth.
@@ -107,35 +96,27 @@ def pessimistic_q_iteration(
     Args:
         penalty: From 0 to 1e9, in rewards; the others, and errors, as of `fitted_q_iteration`.
     """
-    if not (isinstance(penalty, Real) and 0 <= penalty <= _MOST_PENALTY):
-        raise AntsError(
-            f"penalty is {shown(penalty)}; it must be a number from 0 to {_MOST_PENALTY:g}."
-        )
     model = EmpiricalModel.of(data, _groups(data, by_run))
     worst = data.task.rewards.by_event()[Event.ENTERED_EMPTY :].min()
-    lowest = worst / (1.0 - checked_discount(discount))
-    rewards = model.rewards - float(penalty) / np.sqrt(model.counts)
+    lowest = worst / (1.0 - discount)
+    rewards = model.rewards - penalty / np.sqrt(model.counts)
     q = model.solve(discount, rewards, lowest, lowest=lowest, threads=threads).astype(np.float32)
     return q if by_run else q[0]
 
 
 @dataclass(frozen=True, eq=False)
 class EmpiricalModel:
-    """What the data say of the world: how often which pair of state and action led where.
+    """The Markov decision process of maximum likelihood: which pair led where how often.
 
-    The Markov decision process of maximum likelihood. Whether the states that ants see are Markov
-    is another question: where they are not, it depends on the behaviour policy too.
+    Where the states that ants see are not Markov, it depends on the behaviour policy too.
 
     Attributes:
-        n_states: The number of states.
-        largest: What the task pays, or takes, at most.
+        largest: The largest absolute reward of the task.
         groups: int32 (groups + 1,), where the pairs of a group of rows begin.
         pairs: int32 (pairs,), state * 5 + action, ascending in a group.
-        counts: int64 (pairs,), transitions.
-        rewards: float64 (pairs,), mean rewards.
+        counts, rewards: int64, float64 (pairs,), transitions and their mean rewards.
         begins: int32 (pairs + 1,), where the successors of a pair begin.
-        successors: int32 (k,), states, ascending in a pair; none stands for those of transitions
-            that terminated.
+        successors: int32 (k,), states, ascending in a pair; none for transitions that terminated.
         probabilities: float64 (k,), which may add up to less than 1 for a pair.
     """
 
@@ -211,21 +192,13 @@ class EmpiricalModel:
         lowest: float = -np.inf,
         threads: int | None = None,
     ) -> np.ndarray:
-        """Iterate Q until it stays, each group for itself.
+        """Iterate Q until it stays, each group for itself: float64 (groups, n_states, 5).
 
-        Args:
-            discount: Discount factor gamma, below 1.
-            rewards: float64 (pairs,), expected.
-            initial_q: Of all pairs before; of those that the data lack, after.
-            policy: The probabilities of the actions (n_states, 5) of the policy whose values are
-                asked for; None: the greedy one.
-            lowest: No value falls below it.
-            threads: CPU threads; None keeps what runs, or takes all.
-
-        Returns:
-            float64 (groups, n_states, 5).
+        `rewards` are those expected of the pairs; `initial_q` is the value of all pairs before, and
+        of those that the data lack after; the values are those of the `policy` with these
+        probabilities of actions (n_states, 5), None: the greedy one. No value falls below `lowest`.
         """
-        discount, n_groups = checked_discount(discount), len(self.groups) - 1
+        n_groups = len(self.groups) - 1
         q = np.full((n_groups, self.n_states, N_ACTIONS), initial_q, np.float64)
         values = np.empty((n_groups, self.n_states))
         greedy = np.zeros((self.n_states, N_ACTIONS)) if policy is None else policy
@@ -243,11 +216,10 @@ class EmpiricalModel:
 
 
 def _tally(data: Dataset, pair: np.ndarray) -> tuple[np.ndarray, ...]:
-    """How often each pair led to each state, ascending.
+    """Count the states to which each pair led, ascending; n_states stands for termination.
 
     Returns:
-        Pairs, next states (n_states where the transition terminated), counts, sums of rewards, and
-        for each row which of these it is.
+        Pairs, next states, counts, sums of rewards, and for each row which of these it is.
     """
     ends = data.task.n_states
     key = pair * (ends + 1) + np.where(data.terminated, ends, data.next_state)
@@ -261,19 +233,9 @@ def tolerance(largest: float, discount: float, initial_q: float) -> float:
     return 1e-12 * max(1.0, largest / (1.0 - discount), abs(initial_q))
 
 
-def checked_discount(discount: float) -> float:
-    """A discount factor with which values of endless episodes are finite."""
-    if checked_share("discount", discount) > _MOST_DISCOUNT:
-        raise AntsError(
-            f"discount is {discount}; where episodes need not end it must be at most "
-            f"{_MOST_DISCOUNT}."
-        )
-    return float(discount)
-
-
 def _groups(data: Dataset, by_run: bool) -> np.ndarray:
     """Where the rows of each run begin, and end; of all runs together without `by_run`."""
     expect("data", data, Dataset)
     n = len(data.seeds)
-    runs = np.arange(n + 1) if checked_flag("by_run", by_run) else np.array([0, n])
+    runs = np.arange(n + 1) if by_run else np.array([0, n])
     return np.searchsorted(data.run, runs).astype(np.int32)

@@ -44,19 +44,13 @@ def record(
     `evaluate`, to the bit.
 
     Args:
-        world: The world; each episode starts from exactly this.
         behaviour: The behaviour policy. None: any action, at random. Action values (n_states, 5),
             or (seeds, n_states, 5) for a table of each run: epsilon-greedy, ties at random. A
             TrainingConfig: a learner, while it learns.
-        episodes: Episodes of each run, at least 1.
-        seeds: One seed or several different ones.
-        max_steps: Steps after which an episode is truncated.
         task: The rules of the game; None is the paper's. Learners have its evaporation in training,
             others that in evaluation.
         epsilon: Probability of a random action, of a table; a learner has its own.
-        threads: CPU threads; None keeps what runs, or takes all.
-        arch: "cpu" or "cuda"; None keeps what runs, or takes the CPU.
-        progress: Called now and then with the share of the work that is done.
+        world, episodes, seeds, max_steps, threads, arch, progress: As in `train`.
 
     Raises:
         AntsError: An argument is not allowed; the message names it.
@@ -105,18 +99,12 @@ _GIVEN = {name: dtype for name, dtype in COLUMNS.items() if name != "truncated"}
 def record_colony(
     colony: Colony, episodes: int = 1, ticks: int = 1000, progress: Progress | None = None
 ) -> Dataset:
-    """Record what the ants of a colony do, while it goes on for some episodes.
+    """Record what the ants of a colony do, while it goes on for some episodes of so many ticks.
 
     A run is a world of the colony. An episode of the data is what one ant does until it dies, until
     the colony's episode ends, or, if a delivery terminates the episode, until it gives its food;
     then another one of the same ant begins. The colony acts and learns as in `Colony.run`, to the
-    bit.
-
-    Args:
-        colony: The colony; it may learn, or follow fixed tables. All its worlds are the same one.
-        episodes: How many episodes of the colony, at least 1.
-        ticks: Ticks of each.
-        progress: Called now and then with the share of the work that is done.
+    bit; all its worlds must be the same one.
 
     Raises:
         AntsError: An argument is not allowed, or the colony lives in different worlds.
@@ -151,10 +139,8 @@ def record_colony(
 def _tick(colony: Colony, tables: np.ndarray, before: np.ndarray) -> dict[str, np.ndarray]:
     """Let a tick pass; what each ant did in it.
 
-    Args:
-        colony: The colony, whose ants choose by `tables`; actions that they have drawn already, by
-            those of the tick before.
-        tables, before: As `Colony.q_values`.
+    Ants choose by `tables`, see `Colony.q_values`; those that have drawn ahead, by the ones
+    `before`.
     """
     step, acting = colony.ticks, colony.living & colony.running[:, None]
     run, slot = np.nonzero(acting)

@@ -8,10 +8,7 @@ from taichi_ants.task.constants import SEES_EMPTY, SEES_LURE
 
 
 class Event(IntEnum):
-    """The result of an ant's last action, by which rewards go; `Event(code).name` is its name.
-
-    That of a move is how the entered cell looked, plus 1.
-    """
+    """The result of an ant's last action; of a move, the looks of the cell plus 1."""
 
     NONE = 0  # the ant has not acted in this episode
     ENTERED_EMPTY = SEES_EMPTY + 1

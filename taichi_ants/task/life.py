@@ -13,15 +13,10 @@ Ticks = Annotated[int | None, Is(unit="ticks", least=1, most=MAX_STEPS)]
 
 @dataclass(frozen=True)
 class Life(Settings, path="task.life"):
-    """What comes and goes; by default nothing does. Colonies only.
+    """The ants and food that come and go; by default none do. Colonies only.
 
-    Attributes:
-        births: Whether the queen turns each food that she is given into an ant.
-        lifespan: Ticks after which an ant dies, at least 1. None: ants do not die.
-        regrowth: Ticks after which a food that was taken grows back at its place, at least 0 (in
-            the same tick). None: it does not.
-        wander: Each pile of food moves by one cell every so many ticks, at least 1. None: food
-            stays.
+    None means that ants do not die, food does not grow back, or food stays. With `regrowth` 0, food
+    grows back in the same tick.
 
     Raises:
         AntsError: A value is outside its range.

@@ -25,27 +25,17 @@ Level = Annotated[int | None, Is(unit="ticks of linear evaporation", least=1, mo
 
 @dataclass(frozen=True)
 class Pheromone(Settings, path="task.pheromone"):
-    """How trails are laid, fall and spread.
+    """The rules by which trails are laid, evaporate and spread.
 
-    Attributes:
-        evaporation: "linear": a trail falls by 1 per tick, not below 0. "exponential": it halves
-            every `half_life` ticks, and what falls below 1 becomes 0. "none": it stays.
-        half_life: In ticks, above 0; of exponential evaporation only, there 50 if None.
-        diffusion: Share of a cell's trail that it gives to its six neighbours per tick, a sixth
-            of it to each, in [0, 1]. The share aimed at an obstacle or out of the world stays.
-        deposit: "set": a carrying ant sets the trail of a cell to `level`. "add": it adds `level`,
-            up to `cap`. "fading": it raises the trail to `level` less `slope` for each tick that it
-            has carried its food, so that trails rise towards food. "none": it lays nothing.
-        level: What a deposit sets or adds, in ticks of linear evaporation, 1 .. 1 000 000; where
-            nothing is laid, the usual one.
-        slope: How much less an ant lays after each tick with food, 1 .. 1 000 000; of "fading"
-            only, there 10 if None. Trails rise towards food if it is above what evaporates.
-        cap: No deposit that adds leaves a trail above this, 1 .. 1 000 000; of "add" only, there
-            1000 if None.
-        view: Which trails an ant without food sees as T, of those of at least 1 on the empty cells
-            in view. "half": those of at least half the strongest. "strongest": the strongest, all
-            of them if several are. "strongest_under_carriers": the same, but a trail on the cell of
-            an ant with food counts for the strongest too.
+    Evaporation is "linear": a trail loses 1 per tick; "exponential": it halves every `half_life`
+    ticks, and what is below 1 becomes 0; or "none". Of the share `diffusion`, each neighbour gets a
+    sixth; what is aimed at an obstacle or out of the world stays. A deposit is "set": an ant with
+    food sets the trail of a cell to `level`; "add": it adds `level`, up to `cap`; "fading": it
+    raises the trail to `level` less `slope` for each tick that it has carried its food, so that
+    trails rise towards food if `slope` is above what evaporates; or "none". By `view`, an ant
+    without food sees as T, of the trails of at least 1 on the empty cells in view, "half": those of
+    at least half the strongest; "strongest": the strongest ones; "strongest_under_carriers": the
+    same, but a trail on the cell of an ant with food counts for the strongest too.
 
     Raises:
         AntsError: A value is outside its range, or would change nothing.

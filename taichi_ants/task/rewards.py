@@ -17,15 +17,7 @@ Reward = Annotated[int, Is(least=-MOST_REWARD, most=MOST_REWARD)]
 
 @dataclass(frozen=True)
 class Rewards(Settings, path="task.rewards"):
-    """The reward of each event, whole numbers from -1000 to 1000; the paper's table 1 by default.
-
-    Attributes:
-        empty: A move onto a cell that was seen as E.
-        failed: A blocked move, or a pick-up or give that cannot be done.
-        shaping: A move onto a cell that was seen as T or S.
-        pick_up: A food picked up.
-        deliver: A food given to the queen.
-    """
+    """The reward of each event, a whole number; the paper's table 1 by default."""
 
     empty: Annotated[Reward, Is("of a move onto a cell seen as empty (E)")] = 0
     failed: Annotated[Reward, Is("of a blocked move, or a pick-up or give that fails")] = -1

@@ -35,11 +35,7 @@ class State(NamedTuple):
 
 
 def state_from_index(index: int) -> State:
-    """The state of an index 64 * carries + 16 * left + 4 * forward + right, in 0..127.
-
-    Raises:
-        AntsError: The index lies outside 0..127.
-    """
+    """The state of an index 64 * carries + 16 * left + 4 * forward + right, 0..127."""
     if not isinstance(index, Integral) or not 0 <= index < N_STATES:
         raise AntsError(
             f"the state index is {shown(index)}; it must be a whole number from 0 to "
@@ -50,11 +46,9 @@ def state_from_index(index: int) -> State:
 
 
 def name_of_codes(n_cells: int, foraging: str, carrying: str) -> Callable[[int], str]:
-    """A function that names states, such as "foraging E T O".
+    """A function that names states, such as "foraging E T O", of n cells in view.
 
-    Args:
-        n_cells: How many cells are in view; the row is the load, then their codes as digits.
-        foraging, carrying: The letter of each code for an ant without and with food.
+    The letters of the codes are given for an ant without and with food.
     """
 
     def name_of(row: int) -> str:

@@ -20,27 +20,12 @@ DELIVERIES: tuple[str, ...] = get_args(Delivery)
 
 @dataclass(frozen=True, repr=False)
 class Task(Settings, path="task"):
-    """What an ant perceives, may do and is paid for; the paper's by default.
+    """The rules of perception, action and reward; the paper's by default.
 
-    `observation` and what kind of pheromone there is are compiled into the kernels; all else is
-    numbers that kernels read.
-
-    Attributes:
-        observation: Name of a registered observation, which gives the state index that an ant
-            sees, see `taichi_ants.task.observations`.
-        rewards: What each event pays.
-        pheromone: How trails are laid, fall and spread.
-        traffic: Who may enter a cell on which another ant stands: a `Traffic`, or the name of one.
-            "blocking": nobody. "right_of_way": an ant with food changes places with one without.
-            "following": besides, queues move as one.
-        turns_at_queen: Whether an ant turns round when it has given its food, as it does when it
-            has picked one up.
-        delivery: "terminates": the delivery is a terminal state, its target is the reward alone.
-            "truncates": the update at delivery bootstraps from what the ant then sees. An episode
-            of one ant ends in both.
-        evaporation_in_training: Whether trails fall, as the pheromone says, while ants learn.
-        evaporation_in_evaluation: Whether they do while nobody learns.
-        life: What comes and goes; colonies only.
+    `observation` and the kind of pheromone are compiled into the kernels; all else is numbers that
+    kernels read. `traffic` may be one of the names of `Traffic.named`. A delivery that "terminates"
+    is a terminal state, so its target is the reward alone; the update of one that "truncates"
+    bootstraps from what the ant then sees. An episode of one ant ends in both.
 
     Raises:
         AntsError: A value is not allowed; the message names it.
@@ -92,10 +77,7 @@ class Task(Settings, path="task"):
 
 
 def foraging() -> Task:
-    """A task in which the trails of a colony help.
-
-    Trails rise towards food, ants with food have right of way, and ants see each other.
-    """
+    """A task: trails rise towards food, carriers have right of way, ants see each other."""
     return Task(
         observation="ants",
         pheromone=Pheromone(deposit="fading", level=500, view="strongest"),
@@ -108,14 +90,10 @@ def queueing() -> Task:
     """As `foraging`; besides, queues move as one, and ants see which ones are worth following.
 
     Where the trail that leads to food lies under an ant with food, no weaker one looks like it.
-    Ants turn round at the queen, back towards where they came from.
     """
-    return Task(
-        observation="queues",
-        pheromone=Pheromone(deposit="fading", level=500, view="strongest_under_carriers"),
-        traffic=Traffic.named()["following"],
-        turns_at_queen=True,
-        evaporation_in_training=True,
+    view = {"view": "strongest_under_carriers"}
+    return foraging().but(
+        observation="queues", pheromone=view, traffic="following", turns_at_queen=True
     )
 
 

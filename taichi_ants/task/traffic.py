@@ -12,24 +12,17 @@ from taichi_ants.settings import Is, Settings
 
 @dataclass(frozen=True)
 class Traffic(Settings, path="task.traffic"):
-    """Who may enter a cell on which another ant stands; nobody by default, as in the paper.
+    """The ants that may enter a cell on which another ant stands; none by default, as in the paper.
 
-    Where somebody may, every ant that tries to move claims the cell ahead of it, unless a rock,
-    food, the queen or the end of the world is there. Of several claims to a cell the one with the
-    smallest hash wins, see `docs/colony.md`.
-
-    Attributes:
-        swap: Right of way. An ant with food that wins a cell changes places with the ant on it, if
-            that ant has no food, does not move itself, and does not pick up a food in view. The
-            ant that is pushed is paid as for a move onto an empty cell.
-        follow: A cell that its ant leaves in the same tick can be entered. So a queue moves as one.
-            A ring of ants that want each other's cells stays where it is.
-        carriers_first: An ant with food wins a cell against all ants without.
-        grant: A pushed ant that wanted the cell onto which it is pushed is paid for the move that
-            it wanted; with `swap` only.
+    Where some may, every ant that tries to move claims the cell ahead of it, unless a rock, food,
+    the queen or the end of the world is there. Of several claims to a cell the one with the
+    smallest hash wins, see `docs/colony.md`. With `swap`, an ant with food that wins a cell changes
+    places with the ant on it, if that ant has no food, does not move itself, and does not pick up a
+    food in view; the ant that is pushed is paid as for a move onto an empty cell. With `follow`, a
+    queue moves as one; a ring of ants that want each other's cells stays where it is.
 
     Raises:
-        AntsError: A value is no flag, or would change nothing.
+        AntsError: A value is not a flag, or would change nothing.
     """
 
     swap: Annotated[bool, Is("let ants with food change places with ants without")] = False

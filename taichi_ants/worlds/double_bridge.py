@@ -4,15 +4,11 @@ The experiment of Goss, Aron, Deneubourg and Pasteels (Naturwissenschaften 76, 1
 The queen, the junction at the nest, the junction at the food and the middle of the food lie on one
 line, along heading 0. A branch leads away from this line, along it, and back to it: between
 junctions that are D steps apart, k steps to the side, D - k ahead and k to the other side are D + k
-steps. So the branches differ in k alone, both turn off by one heading at a junction, and where they
-are equally long the world is its own mirror image.
+steps. So the branches differ in k alone, and both turn off by one heading at a junction. The food
+and its junction can lie aside of that line, away from the short branch; lengths and turns stay.
 
-The food and its junction can lie aside of that line, away from the short branch. Lengths and turns
-at the junctions stay, but a carrier at the food then has the nest on the side of the short branch.
-
-Corridors are two cells wide, so that ants that meet can pass. In a corridor of one cell they would
-stand in front of each other for ever, except where carriers have right of way. The second lane lies
-around the first, so that no way over it is shorter.
+Corridors are two cells wide, so that ants that meet can pass. The second lane lies around the
+first, so that no way over it is shorter.
 """
 
 from __future__ import annotations
@@ -55,16 +51,10 @@ def double_bridge(
     """A short and a long branch between nest and food, walled by rocks.
 
     The queen is at the origin, in the middle of a room; the food is a pile in the middle of another
-    one. No trail, no listed ants: they start around the queen.
-
-    Args:
-        short: Length of the shorter branch, in steps from junction to junction, 4 to 1000.
-        long: Length of the other one, from `short` to 2 * short - 3 - aside.
-        mirrored: The short branch lies to the left of an ant that leaves the nest, not to the
-            right.
-        aside: Steps by which the food and its junction lie to the side of the long branch. With 0
-            the first cells of both branches are as far from the queen as the food's junction; with
-            more, that of the short branch is nearer to her, that of the long one is not.
+    one. No trail, no listed ants. Lengths are steps from junction to junction; `long` is at most 2
+    * short - 3 - aside. With `aside` 0 the first cells of both branches are as far from the queen
+    as the food's junction; with more, that of the short branch is nearer to her, that of the long
+    one is not.
 
     Raises:
         AntsError: A length is not whole or not allowed, or mirrored is not True or False.
@@ -117,10 +107,7 @@ def junction_cells(
 def branch_cells(
     short: Short = 23, long: Long = 36, mirrored: Mirrored = False, aside: Aside = 0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The cells of the short and of the long branch, int64 (n, 3) each, junctions left out.
-
-    With them, one can count who takes which branch. Arguments and errors are those of the world.
-    """
+    """The cells of the short and of the long branch, int64 (n, 3) each, junctions left out."""
     ahead = _ahead(short, long, aside)
     right = _corridor(short - ahead - aside, ahead, -aside)
     left = _corridor(long - ahead, ahead + aside, aside)
@@ -145,10 +132,7 @@ def _ahead(short: int, long: int, aside: int) -> int:
 
 
 def _corridor(side: int, ahead: int, shift: int) -> np.ndarray:
-    """The two lanes of a branch to the right that leads `side` steps to the side.
-
-    The food's junction is `ahead` steps ahead of the one at the nest, and `shift` to the right.
-    """
+    """The two lanes of a branch that leads `side` steps to the right and `ahead` ahead."""
     cells = []
     for outer in (0, 1):
         start, end = _NEST_JUNCTION - outer, _NEST_JUNCTION + ahead + outer

@@ -12,13 +12,7 @@ _NEIGHBOURS = np.array([[1, 1, 0], [1, 1, 1], [0, 1, 1]])
 
 
 def walkable(grid: AxialGrid, ground: np.ndarray, starts: np.ndarray) -> np.ndarray:
-    """bool (grid.size,): empty cells to which a way over empty cells leads.
-
-    Args:
-        grid: The world's grid.
-        ground: uint8 (grid.size,), what the cells hold.
-        starts: Flat indices of cells; the way begins on any of them that is empty.
-    """
+    """bool (grid.size,): empty cells that can be reached from an empty one of `starts`."""
     # Importing scipy.ndimage takes longer than all else here, and most worlds never need it.
     from scipy.ndimage import label
 

@@ -45,20 +45,14 @@ def open_world(
 
     Rocks are hexagons of a radius from 0 to max(1, min(X, Y, Z) // 20), placed until their share of
     the cells is reached. Piles are hexagons of radius max(1, n // 16), three quarters along each
-    range n; they replace rocks. Everything within distance 3 of the queen is free.
-    No trail, no listed ants.
-
-    Args:
-        seed: Any whole number; the same arguments give the same world.
-        ranges: (X, Y, Z); drawn from 10 to 100 each if None.
-        rock_share: Share of the cells that rocks cover before the clearing and the piles.
-        food_share: Number of single foods as a share of all cells (piles come on top); where fewer
-            cells are free, these.
-        piles: How many piles there are, 0 to 3, along the ranges in their order.
+    range n, in the order of the ranges; they replace rocks. Everything within distance 3 of the
+    queen is free. Where too few cells are free for the share of single foods, all of these have
+    food. Ranges of None are drawn from 10 to 100. No trail, no listed ants; the same seed gives the
+    same world.
 
     Raises:
-        AntsError: A share is not a number, below 0 or both above 0.9 together; the ranges or the
-            piles are not allowed; or no food could be reached from the queen in 100 worlds drawn.
+        AntsError: An argument is not allowed; the shares are above 0.9 together; or no food could
+            be reached from the queen in 100 worlds drawn.
     """
     seed = whole("seed", seed)
     if rock_share + food_share > MAX_SHARE:
@@ -87,10 +81,7 @@ def far_piles(
     rock_share: RockShare = 0.15,
     piles: Annotated[Piles, Is(least=1)] = 3,
 ) -> World:
-    """An open world without single foods: all food lies in piles far from the queen.
-
-    Arguments and errors as of `open_world`; with at least one pile.
-    """
+    """An open world without single foods: all food lies in piles far from the queen."""
     return open_world(seed, ranges, rock_share, 0.0, piles)
 
 
@@ -129,8 +120,8 @@ def _draw(
 def scatter_rocks(grid: AxialGrid, share: float, stream: Stream) -> np.ndarray:
     """bool (grid.size,): cells under random hexagons, placed one by one until `share` is covered.
 
-    Each hexagon takes one draw: the high word chooses its centre among the cells, the low word its
-    radius. Placing them in batches changes nothing, whatever the batches are.
+    Each takes one draw, the high word for its centre, the low word for its radius; so batches
+    change nothing.
     """
     max_radius = max(1, min(grid.ranges) // 20)
     largest = 1 + 3 * max_radius * (max_radius + 1)
@@ -156,12 +147,7 @@ def scatter_rocks(grid: AxialGrid, share: float, stream: Stream) -> np.ndarray:
 def _hexagons(
     grid: AxialGrid, centres: np.ndarray, radii: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The existing cells of hexagons around cells (n, 3) with radii (n,) in steps.
-
-    Returns:
-        (hexagon, cell): for each covered cell the hexagon's place in `centres`, ascending, and the
-        cell's flat index; cells outside the world are left out.
-    """
+    """Return the places in `centres`, ascending, and the existing cells of these hexagons."""
     disc = _disc(int(radii.max()))
     sizes = 1 + 3 * radii * (radii + 1)
     hexagon = np.repeat(np.arange(len(radii)), sizes)

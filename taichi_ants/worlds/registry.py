@@ -20,15 +20,10 @@ _BUILDERS: dict[str, Builder] = {}
 def register(name: str, builder: Builder, *, drawn: bool = True) -> None:
     """Give a world a name, by which `build` and the command lines find it.
 
-    Args:
-        name: A new name, or that of your own world, which it replaces.
-        builder: Called with settings of the world by name, returns a `World`. Its arguments need
-            defaults, except `seed`: a builder with such an argument gets a whole number, and must
-            return the same world for the same number.
-
-    Raises:
-        AntsError: The name is that of a world of the package or not text, or the builder cannot be
-            called so.
+    The builder is called with settings of the world by name and returns a `World`. Its arguments
+    need defaults, except `seed`: a builder with such an argument gets a whole number, and must
+    return the same world for the same number. It replaces your own world of the same name;
+    AntsError if that is of the package or not text, or the builder cannot be called so.
     """
     if not isinstance(name, str) or not name.strip():
         raise AntsError(f"the world name {shown(name)} is not allowed; it must be text.")
@@ -77,15 +72,10 @@ def check_seed_counts(name_or_path: str, option: str = "--world.seed") -> None:
 
 
 def build(name_or_path: str | os.PathLike[str], seed: int = 0, **given: Any) -> World:
-    """The world of a registered name, or of the text map in a file.
+    """The world of a registered name, or, if there is none, of the text map in a file.
 
-    Args:
-        name_or_path: A registered name (it goes before a file of that name) or a path.
-        seed: Any whole number; what it changes is up to the builder, a file ignores it.
-        given: Settings of a registered world, see `register`.
-
-    Raises:
-        AntsError: There is neither such a name nor such a file, or building fails.
+    The seed is any whole number, which only some builders use; `given` are settings of the world.
+    AntsError if there is neither such a name nor such a file, or building fails.
     """
     seed = whole("seed", seed)
     expect("the world", name_or_path, str, os.PathLike)

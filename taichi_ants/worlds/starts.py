@@ -37,11 +37,7 @@ def place(world: World, seed: int, n: int, where: str) -> tuple[np.ndarray, np.n
 
 
 def first_starts(world: World, seeds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where the first ant starts by each of many seeds, uint64 (n,), as `place` with "nest".
-
-    Returns:
-        Flat indices and headings, both int32 (n,).
-    """
+    """Cell and heading, int32 (n,), of the first ant by each seed, uint64 (n,), in the nest."""
     if len(world.ants) or not len(seeds):
         listed = world.grid.index(world.ants[:1, :3]), world.ants[:1, 3]
         cells, headings = (np.broadcast_to(one, len(seeds)) for one in listed)
@@ -58,11 +54,7 @@ def first_starts(world: World, seeds: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def _free_cells(world: World, seed: int, n: int, taken: np.ndarray, where: str) -> np.ndarray:
-    """The first n free cells by their distance to the queen ("nest" only), then by a hash.
-
-    Returns:
-        Flat indices, in this order.
-    """
+    """The first n free cells by their distance to the queen ("nest" only), then by a hash."""
     free = world.ground() == EMPTY
     free[taken] = False
     index = np.flatnonzero(free)

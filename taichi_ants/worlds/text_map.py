@@ -18,6 +18,7 @@ import os
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import permutations
 
 import numpy as np
 
@@ -25,7 +26,6 @@ from taichi_ants import files
 from taichi_ants.errors import AntsError, expect, shown
 from taichi_ants.grid.hexgrid import AxialGrid, cube
 from taichi_ants.task.constants import MAX_TRAIL_LEVEL
-from taichi_ants.worlds.map_fit import smallest_world
 from taichi_ants.worlds.world import World
 
 DEFAULT_TRAIL_LEVEL = 25
@@ -39,11 +39,7 @@ _SETTING = re.compile(r"\s*([A-Za-z]\w*)\s*=(.*)")
 
 
 def load_map(path: str | os.PathLike[str]) -> World:
-    """The world drawn in a text file (UTF-8), see `from_text`.
-
-    Raises:
-        AntsError: The file cannot be read, or its map is damaged.
-    """
+    """The world drawn in a text file (UTF-8), see `from_text`; AntsError if it cannot be read."""
     return from_text(files.read_text(path), str(path))
 
 
@@ -51,11 +47,7 @@ def from_text(text: str, source: str = "the map") -> World:
     """The world drawn in `text`, in the form that the module's docstring describes.
 
     The ranges are those of the smallest world that holds the drawn cells; cells of it that are not
-    drawn become obstacles.
-
-    Args:
-        text: The map.
-        source: What error messages call it.
+    drawn become obstacles. Messages call the text `source`.
 
     Raises:
         AntsError: The map is damaged; names line, column, what stands there and what is allowed.
@@ -86,10 +78,7 @@ def from_text(text: str, source: str = "the map") -> World:
 
 
 def ranges_of(text: str, source: str = "the map") -> tuple[int, int, int]:
-    """Return the ranges of the world drawn in `text`, without the work and memory to build it.
-
-    Arguments and errors as of `from_text`.
-    """
+    """Return the ranges of the world drawn in `text`, without building it."""
     _, drawn = _read(text, source)
     return smallest_world(_axials(drawn, source))[0]
 
@@ -171,12 +160,42 @@ def _axials(drawn: list[_Drawn], source: str) -> np.ndarray:
     return np.stack([(r - rows + grid % 2) // 2, r], axis=1)
 
 
+def smallest_world(axials: np.ndarray) -> tuple[tuple[int, int, int], tuple[int, int]]:
+    """The ranges with the fewest cells that hold the given cells, and their origin (q0, r0).
+
+    A world of ranges (a + 1, b + 1, c + 1) with its origin at (q0, r0) holds the cells (q, r) with
+    -c <= q - q0 <= a, -c <= r - r0 <= b and -b <= (q - r) - (q0 - r0) <= a. So the extremes of q, r
+    and d = q - r decide. An origin exists if and only if a + c >= width of q, b + c >= width of r,
+    a + b >= width of d, a + b + c >= q_max - r_min - d_min and a + b + c >= d_max - q_min + r_max.
+    The number of cells grows with s = a + b + c, so the smallest possible s is best; for that s it
+    is a constant less (a^2 + b^2 + c^2) / 2, so one of a, b, c should be as large as possible, then
+    the next. Of equally small worlds it is the one of the largest X, then the largest Y; of its
+    origins the one of the smallest q, then the smallest r.
+    """
+    q, r = axials[:, 0], axials[:, 1]
+    q_min, q_max = int(q.min()), int(q.max())
+    r_min, r_max = int(r.min()), int(r.max())
+    d_min, d_max = int((q - r).min()), int((q - r).max())
+
+    total = max(q_max - r_min - d_min, d_max - q_min + r_max)
+    most = (total - (r_max - r_min), total - (q_max - q_min), total - (d_max - d_min))
+    fits = []
+    for order in permutations(range(3)):
+        sizes = [0, 0, 0]
+        for place in order:
+            sizes[place] = min(most[place], total - sum(sizes))
+        fits.append(sizes)
+    a, b, c = max(fits, key=lambda fit: (sum(n * n for n in fit), fit))
+
+    q_origin = max(q_max - a, d_max - a + r_max - b)
+    r_origin = max(r_max - b, q_origin - d_min - b)
+    return (a + 1, b + 1, c + 1), (q_origin, r_origin)
+
+
 def to_text(world: World) -> str:
     """The map of a world; `from_text` gives it back, its ants numbered in reading order.
 
-    Raises:
-        AntsError: The world has trails of several levels, or under food or the queen, which a map
-            cannot show.
+    AntsError if a map cannot show its trails: of several levels, or under food or the queen.
     """
     expect("world", world, World)
     levels = np.unique(world.trails[:, 3])
@@ -202,12 +221,7 @@ def to_text(world: World) -> str:
 
 
 def drawing(ranges: tuple[int, int, int], marks: Iterable[tuple[np.ndarray, str]]) -> str:
-    """Characters on the cells of a world of these ranges.
-
-    Args:
-        ranges: Of the world.
-        marks: Cells (n, 3), in normal form, and the character on them; later ones lie above.
-    """
+    """Characters on cells (n, 3), in normal form, of a world; later ones lie above."""
     size_x, size_y, size_z = ranges
     page = np.full((2 * size_x + size_y + size_z - 3, 2 * (size_y + size_z) - 3), " ")
     for cells, mark in marks:

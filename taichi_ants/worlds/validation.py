@@ -13,11 +13,7 @@ _STANDS = ("nothing", "the queen", "a food", "an obstacle")
 
 
 def parse_ranges(ranges: object) -> tuple[int, int, int]:
-    """`ranges` as three integers of at least 1.
-
-    Raises:
-        AntsError: They are not three, not whole, or below 1.
-    """
+    """`ranges` as three integers of at least 1; AntsError if they are not."""
     values = _whole_numbers(ranges)
     if len(values) != 3 or min(values) < 1 or max(values) > MAX_ARRAY_CELLS:
         raise AntsError(
@@ -30,13 +26,7 @@ def parse_ranges(ranges: object) -> tuple[int, int, int]:
 def parse_contents(
     grid: AxialGrid, queen: object, foods: object, obstacles: object, trails: object, ants: object
 ) -> dict[str, tuple[int, ...] | np.ndarray]:
-    """The contents of a world in normal form, checked, by the names of `World`'s fields.
-
-    Foods, obstacles and trails come in lexicographic order of their cells, ants in the order given.
-
-    Raises:
-        AntsError: See `World`.
-    """
+    """The contents of a world, checked and in normal form, by the names of its fields."""
     cell = _inside("queen", np.array([_row("queen", queen, "one cell (x, y, z)", 3)]), grid)
     contents = {
         "foods": _parse("foods", foods, grid),

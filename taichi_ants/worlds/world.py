@@ -21,21 +21,20 @@ _PARTS = ("foods", "obstacles", "trails", "ants")
 class World:
     """A world of hexagonal cells, as it is when an episode starts.
 
-    Cells may be given in any form of cube coordinates, negative ones too; they are stored in normal
-    form. The arrays are read-only copies. Foods, obstacles and trails are sets: they are stored in
-    lexicographic order, so two worlds with the same contents are equal. Ants keep their order, an
-    ant's place is its number. Methods that return arrays return new ones, which may be written.
+    Cells may be given in any form of cube coordinates; they are stored in normal form, in read-only
+    copies. Foods, obstacles and trails are sets, stored in lexicographic order: two worlds with the
+    same contents are equal. Ants keep their order, an ant's place is its number.
 
     Attributes:
         ranges: (X, Y, Z), the numbers of values of each coordinate, in cells, each at least 1.
         queen: (x, y, z), the queen's cell.
-        foods: Cells with food, int32 (F, 3); given as a sequence of (x, y, z) or such an array.
-        obstacles: Cells that cannot be entered, int32 (O, 3); given likewise.
+        foods, obstacles: Cells with food, and that cannot be entered, int32 (n, 3); given as a
+            sequence of (x, y, z) or such an array.
         trails: int32 (T, 4) = x, y, z, trail level (ticks until it has evaporated); given as a
             sequence of ((x, y, z), level) or such an array. Entries of level 0 are left out. Where
             trails are float32 (see `Pheromone.dense`), levels above 2**24 are rounded to that.
-        ants: int32 (A, 4) = x, y, z, heading; given as a sequence of ((x, y, z), heading) or such
-            an array. More ants than these are placed by `start`.
+        ants: int32 (A, 4) = x, y, z, heading; given likewise. More ants than these are placed by
+            `start`.
 
     Raises:
         AntsError: A value has the wrong form, lies outside the world, is listed twice, or stands
@@ -96,10 +95,7 @@ class World:
         return geometry.distances(self.grid, self.queen) * self.grid.exists
 
     def closer(self) -> np.ndarray:
-        """uint8 (grid.size,): bit h is set if the neighbour at heading h is nearer to the queen.
-
-        Pure geometry: the neighbour may be an obstacle or lie outside. 0 for cells outside.
-        """
+        """uint8 (grid.size,): bit h is set if the neighbour at heading h is nearer to the queen."""
         here = geometry.distances(self.grid, self.queen)
         bits = np.zeros(self.grid.size, dtype=np.uint8)
         for heading, offset in enumerate(self.grid.offsets.tolist()):
@@ -108,28 +104,21 @@ class World:
         return bits * self.grid.exists
 
     def reachable_foods(self) -> np.ndarray:
-        """bool (F,): whether an ant that starts beside the queen can come to stand beside a food.
-
-        Ants walk over empty cells; obstacles and other foods block.
-        """
+        """bool (F,): whether an ant can walk from beside the queen to beside a food."""
         beside_queen = self.grid.index(self.queen) + self.grid.offsets
         found = geometry.walkable(self.grid, self.ground(), beside_queen)
         return found[self.grid.index(self.foods)[:, None] + self.grid.offsets].any(axis=1)
 
     def start(self, seed: int, n: int = 1, where: str = "nest") -> tuple[np.ndarray, np.ndarray]:
-        """Where n ants start: the listed ants first, then ants placed on free cells.
+        """Flat indices and headings, int32 (n,), of n ants at the start, the listed ants first.
 
         Args:
             seed: Any whole number; decides cells (ties of distance), and headings of placed ants.
             n: Number of ants, at least 1. If fewer than the listed ants, the first of these.
             where: "nest": on the free cells nearest to the queen. "spread": on any free cells.
 
-        Returns:
-            Flat indices int32 (n,) and headings int32 (n,), in the order of the ant numbers.
-
         Raises:
-            AntsError: n or seed is not whole, n is below 1, too few cells are free, or there is no
-                such `where`.
+            AntsError: An argument is not allowed, or too few cells are free.
         """
         return starts.place(self, seed, n, where)
 
@@ -140,11 +129,7 @@ class World:
 
     @classmethod
     def from_dict(cls, facts: Mapping[str, Any]) -> World:
-        """Return the world of `as_dict`.
-
-        Raises:
-            AntsError, KeyError, TypeError, ValueError: There is no such world.
-        """
+        """Return the world of `as_dict`; raises ValueError, KeyError or TypeError."""
         return cls(facts["ranges"], facts["queen"], *(np.array(facts[n]) for n in _PARTS))
 
     def __eq__(self, other: object) -> bool:

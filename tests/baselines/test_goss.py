@@ -85,16 +85,16 @@ def test_steps_of_a_crossing() -> None:
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"short": 0}, "short is 0; it must lie between 1"),
-        ({"long": 8}, "long is 8; it must lie between 9"),
-        ({"colonies": 1.5}, "colonies is 1.5; it must be a whole number"),
-        ({"ants": 999}, "ants is 999; it must be even"),
-        ({"k": 0}, "k is 0; it must be a number above 0"),
-        ({"k": float("nan")}, "k is nan"),
-        ({"n": 2.5}, "n is 2.5; it must be a whole number"),
-        ({"n": 9}, "n is 9; it must lie between 1 and 8"),
-        ({"opens": 1001}, "opens is 1001; it must lie between 0 and 1000"),
-        ({"seed": None}, "seed is None"),
+        ({"short": 0}, "`short` is 0; it must be between 1"),
+        ({"long": 8}, "`long` is 8; it must lie between 9"),
+        ({"colonies": 1.5}, "`colonies` is 1.5; it must be a whole number"),
+        ({"ants": 999}, "`ants` is 999; it must be even"),
+        ({"k": 0}, "`k` is 0; it must be above 0"),
+        ({"k": float("nan")}, "`k` is nan"),
+        ({"n": 2.5}, "`n` is 2.5; it must be a whole number"),
+        ({"n": 9}, "`n` is 9; it must be between 1 and 8"),
+        ({"opens": 1001}, "`opens` is 1001; it must lie between 0 and 1000"),
+        ({"seed": None}, "`seed` is None"),
     ],
 )
 def test_errors_name_what_is_wrong(given: dict, message: str) -> None:
@@ -109,5 +109,5 @@ def test_windows_and_ratios_are_checked() -> None:
     with pytest.raises(AntsError, match="first is 12; it must lie between 1 and 11"):
         class_shares(took, 12, 11)
     for ratio in (0.9, "2", float("nan")):
-        with pytest.raises(AntsError, match="ratio is"):
+        with pytest.raises(AntsError, match="`ratio` is"):
             crossing_steps(ratio)

@@ -234,7 +234,7 @@ def test_a_policy_of_an_observation_that_nobody_registered_is_refused(tmp_path: 
 def test_a_policy_of_another_size_than_its_observation_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "policy.npz"
     write(path, observation="ants_seen")
-    with pytest.raises(AntsError, match=r"\(128, 5\); .*'ants_seen' it must be \(250, 5\)"):
+    with pytest.raises(AntsError, match=r"\(128, 5\); .*'ants_seen' it must end in \(250, 5\)"):
         load_policy(path)
 
 
@@ -310,8 +310,8 @@ def test_other_archives_are_refused(tmp_path: Path, arrays: dict, said: str) -> 
         (1, random_policy(), {}, "path is 1; it must be text or a path"),
         (None, random_policy(), {}, "path is None"),
         (b"p.npz", random_policy(), {}, "path is b'p.npz'"),
-        ("p.npz", [[1, 2], [3]], {}, "q_values is no array"),
-        ("p.npz", None, {}, "q_values has the type object"),
+        ("p.npz", [[1, 2], [3]], {}, "array of real numbers"),
+        ("p.npz", None, {}, "q_values is None; .* real numbers"),
         ("p.npz", random_policy(), None, "metadata is None; it must be a mapping"),
         ("p.npz", random_policy(), {"a": object}, "which JSON cannot hold"),
     ],

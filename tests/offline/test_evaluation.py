@@ -89,7 +89,7 @@ def test_what_cannot_be_judged():
     assert np.isfinite(model_based(unknown, table).value)
     with pytest.raises(AntsError, match="q_values has shape"):
         model_based(data, np.zeros((3, 5)))
-    with pytest.raises(AntsError, match="discount is 1"):
+    with pytest.raises(AntsError, match="`discount` is 1"):
         model_based(data, table, 1.0)
-    with pytest.raises(AntsError, match="resamples is -1"):
+    with pytest.raises(AntsError, match="`resamples` is -1"):
         importance_sampling(data, table, resamples=-1)

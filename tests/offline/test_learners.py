@@ -152,9 +152,9 @@ def test_what_cannot_be_learned_from(learn, given):
 
 
 def test_arguments_of_single_learners():
-    with pytest.raises(AntsError, match="discount is 1"):
+    with pytest.raises(AntsError, match="`discount` is 1"):
         fitted_q_iteration(by_hand(CHAIN), 1.0)
-    with pytest.raises(AntsError, match="penalty is -1"):
+    with pytest.raises(AntsError, match="`penalty` is -1"):
         pessimistic_q_iteration(by_hand(CHAIN), penalty=-1)
-    with pytest.raises(AntsError, match="sweeps is 0"):
+    with pytest.raises(AntsError, match="`sweeps` is 0"):
         batch_q_learning(by_hand(CHAIN), sweeps=0)

@@ -354,7 +354,7 @@ def test_sheets_that_are_refused() -> None:
     for wrong in (np.zeros((5, 128)), np.full((128, 5), "a")):
         with pytest.raises(AntsError, match="q_values"):
             policy_sheet(wrong)
-    with pytest.raises(AntsError, match="not finite"):
+    with pytest.raises(AntsError, match="must be finite"):
         policy_sheet(np.full((128, 5), np.nan))
 
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from taichi_ants.grid.hexgrid import AxialGrid, cube
 from taichi_ants.worlds import World, from_text, to_text
-from taichi_ants.worlds.map_fit import smallest_world
+from taichi_ants.worlds.text_map import smallest_world
 
 coordinates = st.integers(-5, 5)
 axial_cells = st.lists(st.tuples(coordinates, coordinates), min_size=1, max_size=8)

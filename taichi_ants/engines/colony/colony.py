@@ -11,14 +11,7 @@ from taichi_ants import checks, runtime
 from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.engines.colony.state import ColonyEpisodes, ColonyState
 from taichi_ants.engines.colony.stepping import Stepper, chunks_of, usual_schedule
-from taichi_ants.errors import (
-    AntsError,
-    array_of,
-    check_one_of,
-    checked_whole,
-    entries_of,
-    shown,
-)
+from taichi_ants.errors import AntsError, array_of, check_one_of, checked_whole, entries_of, shown
 from taichi_ants.learners import get as get_learner
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
@@ -47,10 +40,9 @@ class Colony(ColonyState):
         training: The learner and its settings. None, with sharing "frozen": ants do what `act` is
             given, and there are no action values.
         seeds: One seed for each of the W worlds.
-        ants: How many start each episode, 1 to 2**24: the listed ants of the World first, then
-            others on free cells, see `start`.
-        capacity: How many ants can live at once, at least `ants`; more than these changes nothing
-            where none are born. None: `ants` if none are born, else 2 * `ants` + 64.
+        ants: How many start each episode, 1 to 2**24: the listed ants of the World first.
+        capacity: How many ants can live at once. None: `ants` if none are born, else 2 * `ants` +
+            64.
         start: Where ants start that the World does not list: "nest", on the free cells nearest to
             the queen; "spread", on free cells anywhere. The seed decides which, and the headings.
         ends_at_delivery: Whether an episode ends at its first delivery, as when an ant trains
@@ -60,8 +52,7 @@ class Colony(ColonyState):
         q_values: Action values to start from, float (n_states, 5) or (W, n_states, 5); None: zeros,
             but if nobody learns they must be given, unless `training` is None. If tables are not
             shared, (W, slots, n_states, 5) too.
-        threads: CPU threads; None keeps what runs, or takes all.
-        arch: "cpu" or "cuda"; None keeps what runs, or takes the CPU.
+        threads, arch: As in `train`.
         schedule: "by_world" hands worlds to threads, "by_chunk" groups of ants; None chooses by
             size. Both give the same numbers; by chunk, ants are stored in another order.
 
@@ -135,10 +126,9 @@ class Colony(ColonyState):
         """Set worlds and ants to their start; the ants look around.
 
         Args:
-            length: How many ticks there will be. Learners that need to know which tick is the last
-                are told then.
-            world: As of the class: where the colonies live from now on, so that what they learn
-                does not depend on one world. None: where they are.
+            length: How many ticks there will be, for learners that need to know which tick is the
+                last.
+            world: As of the class: where the colonies live from now on. None: where they are.
 
         Raises:
             AntsError: A world is not allowed.
@@ -153,15 +143,12 @@ class Colony(ColonyState):
         self._stepper.launch(self, "begin_phases")
 
     def begin_some(self, which: np.ndarray, seeds: Sequence[int] | None = None) -> None:
-        """Let some worlds begin their next episode, while the others go on with theirs.
+        """Let some worlds, bool (W,), begin their next episode, while the others go on with theirs.
 
         For these it is as `end_episode` and `begin_episode`; epsilon and the learning rate stay.
-
-        Args:
-            which: bool (W,).
-            seeds: One for each of these worlds, which then begin a new life, as in a new `Colony`;
-                tables and memories of learners go on. Seeds of a colony may repeat then, but
-                `save` refuses them. None: their streams go on.
+        With `seeds`, one for each of these worlds, they begin a new life, as in a new `Colony`;
+        tables and memories of learners go on. Such seeds may repeat, but then `save` refuses the
+        colony.
 
         Raises:
             AntsError: There are other numbers of worlds or seeds, or a seed is not allowed.
@@ -184,20 +171,12 @@ class Colony(ColonyState):
         self._stepper.launch(self, "begin_phases")
 
     def observe(self) -> None:
-        """Let the ants see what interventions have changed since the last tick.
-
-        Raises:
-            AntsError: No episode has begun.
-        """
+        """Let the ants see what interventions have changed since the last tick."""
         self.check_begun()
         self._stepper.launch(self, "intervention_phases")
 
     def tick(self, n: int = 1) -> None:
-        """Let n ticks pass; worlds whose episode has ended stand still.
-
-        Raises:
-            AntsError: No episode has begun, or actions are given to this colony, see `act`.
-        """
+        """Let n ticks pass; worlds whose episode has ended stand still."""
         self.check_begun()
         if self.is_given_actions:
             raise AntsError(
@@ -209,12 +188,9 @@ class Colony(ColonyState):
     def act(self, actions: np.ndarray) -> None:
         """Let one tick pass in which each ant does what is given; for colonies without training.
 
-        Args:
-            actions: Whole numbers 0 to 4 (W, capacity): left, forward, right, pick up, give; those
-                of vacant slots, and of worlds whose episode has ended, are ignored.
-
-        Raises:
-            AntsError: No episode has begun, the colony has a training, or an action is not allowed.
+        Actions are whole numbers 0 to 4 (W, capacity): left, forward, right, pick up, give; those
+        of vacant slots, and of worlds whose episode has ended, are ignored. AntsError if no episode
+        has begun, the colony has a training, or an action is not allowed.
         """
         self.check_begun()
         if not self.is_given_actions:
@@ -239,11 +215,7 @@ class Colony(ColonyState):
         self._stepper.advance(self, 1)
 
     def end_episode(self) -> None:
-        """Keep the streams of the ants that start an episode; epsilon and learning rate decay.
-
-        Raises:
-            AntsError: The learner has made action values that are not finite.
-        """
+        """Keep the streams of the ants that start an episode; epsilon and learning rate decay."""
         self.check_finite()
         self.keep_streams()
         self.epsilon = self.training.next_epsilon(self.epsilon)
@@ -259,8 +231,6 @@ class Colony(ColonyState):
         """Whole episodes of a fixed number of ticks.
 
         Args:
-            episodes: How many.
-            ticks: Ticks of each.
             progress: Called now and then with the share of the work that is done.
             worlds: Of each episode, see `begin_episode`; None: all take place where the colonies
                 are.

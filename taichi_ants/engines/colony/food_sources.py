@@ -14,13 +14,10 @@ from taichi_ants.worlds.world import World
 def arrays(
     sources: Iterable[np.ndarray], rows: np.ndarray, room: int, size: int
 ) -> dict[str, np.ndarray]:
-    """Make the arrays of the food sources of all worlds and of their piles.
+    """Make the arrays of the food sources of all worlds, with `room` in each, and of their piles.
 
-    Args:
-        sources: Of each world (3, n): FoodSourceRow.CELL, TAKEN and PILE.
-        rows: By `WorldRow`, (rows, W); the numbers of sources and piles are written into it.
-        room: For sources in each world.
-        size: Cells of a world.
+    `sources` are, of each world, FoodSourceRow.CELL, TAKEN and PILE (3, n). Their numbers and those
+    of piles are written into `rows`, (WorldRow, W). `size` is the number of cells of a world.
     """
     n_worlds = rows.shape[1]
     food_sources = np.zeros((len(FoodSourceRow), max(1, n_worlds * room)), np.int32)

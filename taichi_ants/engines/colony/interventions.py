@@ -52,17 +52,11 @@ _STEPS = _steps()
 
 
 class Interventions:
-    """Changes a colony, and knows how its later episodes begin.
+    """Changes of a colony of one world, and how its later episodes begin.
 
-    Cells are flat indices of cells of the world, int (n,), each once. Where a cell cannot take what
-    is put there, since an ant, a rock or the queen is on it, it is left as it is. Whatever raises
-    an error has changed nothing.
-
-    Args:
-        colony: Of one world; in an episode for everything but `begin_episode`.
-
-    Attributes:
-        ants: How many start each later episode.
+    Cells are flat indices of cells of the world, int (n,), each once. A cell that cannot take what
+    is put there, because an ant, a rock or the queen is on it, is left as it is. A method that
+    raises an error has changed nothing. `ants` is how many start each later episode.
 
     Raises:
         AntsError: The colony has several worlds.
@@ -88,12 +82,9 @@ class Interventions:
     def put(self, cells: np.ndarray, what: int) -> None:
         """Make cells EMPTY, OBSTACLE or FOOD, except the queen's and those of ants that stay.
 
-        Ants stay where a cell is made EMPTY; rock and food move them aside. A food that is put
-        somewhere has its source there: it grows back and wanders with the foods next to it. Rocks
-        hold no trail.
-
-        Raises:
-            AntsError: Later episodes would have no room for the ants, or no food to learn from.
+        Rock and food move ants aside, and rocks hold no trail. A food has its source where it is
+        put: it grows back and wanders with the foods next to it. AntsError if later episodes would
+        have no room for the ants, or no food to learn from.
         """
         arrays = self.colony.arrays
         held = arrays["ground"][cells]
@@ -133,11 +124,7 @@ class Interventions:
         return slots[to >= 0], to[to >= 0]
 
     def move_queen(self, cell: int) -> None:
-        """Let the queen stand on an empty cell.
-
-        Raises:
-            AntsError: Something is on that cell, or it held the last food.
-        """
+        """Let the queen stand on an empty cell; AntsError if it is not, or held the last food."""
         arrays, grid = self.colony.arrays, self.colony.grid
         if arrays["ground"][cell] != EMPTY:
             raise AntsError(
@@ -167,12 +154,9 @@ class Interventions:
             arrays["trail"][cells] = level + self.colony.trail_clock(0) if level else 0
 
     def add_ants(self, cells: np.ndarray, heading: int | None = None) -> None:
-        """Put ants on those cells that are empty; headings are drawn if none is given.
+        """Put newborn ants on those cells that are empty; without a heading, one is drawn.
 
-        An ant begins as if it were born, in the lowest slots that are vacant.
-
-        Raises:
-            AntsError: The colony has no room for so many.
+        AntsError if the colony has no room for so many.
         """
         colony, arrays = self.colony, self.colony.arrays
         world = arrays["worlds"][:, 0]
@@ -227,13 +211,10 @@ class Interventions:
         world[WorldRow.FIRST_VACANT] = np.argmin(taken) if not taken.all() else len(taken)
 
     def set_ants(self, n: int) -> None:
-        """Let n ants live now, and n start each later episode.
+        """Let n ants live now, and n start each later episode; AntsError if there is no room.
 
         New ones stand on the free cells where ants of a World start, see `World.start`; those of
         the highest numbers are removed.
-
-        Raises:
-            AntsError: The colony, or the world, has no room for so many.
         """
         colony = self.colony
         (slots,) = np.nonzero(colony.living[0])
@@ -258,10 +239,7 @@ class Interventions:
         return cells[np.lexsort((words, far * (colony.start == "nest")))]
 
     def set_task(self, task: Task) -> None:
-        """Another task, which differs in numbers of its pheromone and in whether that evaporates.
-
-        Trails stay as they are, and as dense as they are.
-        """
+        """Set a task that differs in numbers of its pheromone and in whether trails evaporate."""
         colony, arrays = self.colony, self.colony.arrays
         levels = np.maximum(arrays["trail"] - colony.trail_clock(0), 0)
         colony.task, colony.pheromone = task, task.pheromone_while(colony.learns)
@@ -326,11 +304,10 @@ class Interventions:
         self._start, self._changed = start, True
 
     def _change_food_sources(self, cells: np.ndarray, what: int) -> None:
-        """Give foods that were put on cells a food source there; where anything else is put, none
-        is left.
+        """Give food that was put on cells a source there; where anything else is put, none is left.
 
-        A food source that waits there has its food again. A new one belongs to the pile of the
-        first food source beside it; if there is none, it is a pile of its own.
+        A source that waits there has its food again. A new one belongs to the pile of the first
+        source beside it; if there is none, it is a pile of its own.
         """
         colony, arrays = self.colony, self.colony.arrays
         if not colony.food_changes:

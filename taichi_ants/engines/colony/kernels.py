@@ -16,13 +16,7 @@ import taichi as ti
 
 from taichi_ants.engines import views
 from taichi_ants.engines.colony import learning, life, steps, trail
-from taichi_ants.engines.colony.layout import (
-    GAVE_UP,
-    Barrier,
-    Order,
-    Stage,
-    WorldRow,
-)
+from taichi_ants.engines.colony.layout import GAVE_UP, Barrier, Order, Stage, WorldRow
 from taichi_ants.engines.plugin_check import checked_plugin
 from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.memory import read_rates
@@ -36,14 +30,10 @@ ANTS, CELLS, WORLD = "ants", "cells", "world"
 
 
 class Phase(NamedTuple):
-    """What happens to all ants, cells or worlds before the next phase begins.
+    """A step of all ants, cells or worlds (`of`: ANTS, CELLS, WORLD) before the next phase begins.
 
-    It must not read what another chunk writes in the same phase.
-
-    Attributes:
-        of: ANTS, all that are in a slot; CELLS; or WORLD, a whole one, where there is little to do.
-        do: A `ti.func` (c, v, w, chunk, ant, tick) of one ant, (c, place) of one cell, or
-            (c, v, w, tick) of one world.
+    It must not read what another chunk writes in the same phase. `do` is a `ti.func` (c, v, w,
+    chunk, ant, tick) of one ant, (c, place) of one cell, or (c, v, w, tick) of one world.
     """
 
     of: str
@@ -51,18 +41,11 @@ class Phase(NamedTuple):
 
 
 class Variant:
-    """What is compiled into a kernel; all functions of the colony call it `v`.
+    """The properties compiled into a kernel; all functions of the colony call it `v`.
 
-    Args:
-        learner: The learner, None if nobody learns.
-        own_tables: Whether there is a table for each slot, not one for each world.
-        is_given_actions: Whether ants do what they are given.
-        observation: The observation.
-        dense: Whether levels are f32, see `trail`.
-        view: Which trails look like one, see `Pheromone`.
-        traffic: Who may enter a cell on which another ant stands.
-        ants_change, food_changes: Whether ants, or foods, come and go; leaving that out saves time,
-            more so while this compiles.
+    With `own_tables` there is a table for each slot, not one for each world; the others are as in
+    `ColonyState` and `Pheromone`. To leave out what comes and goes saves time, more so while
+    compiling.
     """
 
     def __init__(
@@ -184,10 +167,7 @@ def share_of(c: ti.template(), chunk, n):
 
 
 def shared_out(phases: Iterator[Phase]) -> list[tuple[Phase, ...]]:
-    """Phases in groups that threads can go through without waiting for each other.
-
-    Phases of whole worlds that follow each other are a group: one thread does all of a world's.
-    """
+    """Phases in groups that need no barrier inside: of single worlds, all that follow."""
     groups: list[tuple[Phase, ...]] = []
     for phase in phases:
         if groups and phase.of == groups[-1][0].of == WORLD:
@@ -250,15 +230,11 @@ def wait_for_all(c: ti.template(), part, parts, number):
 def ticks(v: Variant, waits: bool, arguments: Any) -> Callable[..., None]:
     """A kernel of whole ticks, as many as ordered, whose work is divided into parts.
 
-    Args:
-        v: What is compiled into it.
-        waits: False: each part is a world of a single chunk, and goes through all ticks by itself.
-            True: each part has its share of the chunks, and when it is done with a group of phases
-            it waits for the others at a barrier. To begin a parallel loop for each group would take
-            20 to 200 microseconds, since threads are put to sleep and woken. If a part does not
-            come, all leave, and another launch begins with the group that follows, see
-            `Order.FIRST`.
-        arguments: The type of the argument pack.
+    Unless it `waits`, each part is a world of a single chunk, and goes through all ticks by itself.
+    Else each part has its share of the chunks, and after each group of phases it waits for the
+    others at a barrier. To begin a parallel loop for each group would take 20 to 200 microseconds,
+    because threads are put to sleep and woken. If a part does not come, all leave, and another
+    launch begins with the group that follows, see `Order.FIRST`.
     """
     groups, planning = shared_out(tick_phases(v)), shared_out(planning_phases(v))
     last = shared_out(last_phases(v))

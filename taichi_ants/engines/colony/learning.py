@@ -8,25 +8,10 @@ in turn towards one target would give. Every chunk of ants sums for itself; noth
 
 import taichi as ti
 
+from taichi_ants.engines.colony import steps
 from taichi_ants.engines.colony.layout import Stage, SumRow
-from taichi_ants.engines.colony.steps import (
-    draw_action,
-    observe,
-    put,
-    state_index_of,
-    table_of,
-    trait,
-)
+from taichi_ants.learners import model
 from taichi_ants.learners.memory import At, LearnerArrays, Transition, discount_of, values_of
-from taichi_ants.learners.model import (
-    next_state_of,
-    pack_transition,
-    recall,
-    remember,
-    reward_of,
-    terminated_of,
-    visited,
-)
 from taichi_ants.task.constants import N_ACTIONS, ROW
 from taichi_ants.task.rules.delivery import step_end, terminates
 from taichi_ants.task.rules.random_bits import advance, draw_below
@@ -37,14 +22,14 @@ _ONE = 4294967296.0  # fixed-point numbers have 32 binary places
 @ti.func
 def see_anew(c: ti.template(), v: ti.template(), w, ant, clock):
     """Note what an ant sees."""
-    percept, state = observe(c, v, w, ant, clock)
+    percept, state = steps.observe(c, v, w, ant, clock)
     note_seen(c, v, ant, percept, state)
 
 
 @ti.func
 def note_seen(c: ti.template(), v: ti.template(), ant, percept, state):
     """Note what an ant has seen."""
-    put(c.percept, ant, percept)
+    steps.put(c.percept, ant, percept)
     if ti.static(not v.sees_percept):
         c.state[ant] = state
 
@@ -60,8 +45,8 @@ def begin(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 @ti.func
 def see_interventions(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Let an ant see what interventions changed; a newly placed ant begins its life."""
-    if trait(c.stage, ant) == Stage.NEWBORN:
-        put(c.stage, ant, Stage.LIVING)
+    if steps.trait(c.stage, ant) == Stage.NEWBORN:
+        steps.put(c.stage, ant, Stage.LIVING)
         if ti.static(v.alone):
             forget(c, v, ant)
     see_anew(c, v, w, ant, tick * c.evaporates)
@@ -70,27 +55,27 @@ def see_interventions(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 @ti.func
 def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Observe, choose the next action where the learner asks for it, and learn."""
-    percept, state = observe(c, v, w, ant, (tick + 1) * c.evaporates)
+    percept, state = steps.observe(c, v, w, ant, (tick + 1) * c.evaporates)
     next_action = -1
-    if trait(c.stage, ant) != Stage.NEWBORN:
+    if steps.trait(c.stage, ant) != Stage.NEWBORN:
         c.wants[w * c.size + c.want[ant]] = 0
         if ti.static(v.draws_next_action):
-            if terminates(trait(c.event, ant), c.delivery_terminates) == 0:
+            if terminates(steps.trait(c.event, ant), c.delivery_terminates) == 0:
                 c.streams[ant] = advance(c.streams[ant])
-                next_action = draw_action(c, v, w, ant, state, c.streams[ant])
+                next_action = steps.draw_action(c, v, w, ant, state, c.streams[ant])
         if ti.static(v.alone):
             learn_alone(c, v, ant, state, next_action, tick)
         elif ti.static(v.together):
             share_error(c, v, w, chunk, ant, state, next_action)
     note_seen(c, v, ant, percept, state)
     if ti.static(v.draws_next_action):
-        put(c.next_action, ant, next_action)
+        steps.put(c.next_action, ant, next_action)
 
 
 @ti.func
 def memory_of(c: ti.template(), v: ti.template(), owner):
     """Where the tables, and what else the learner keeps, of an ant or a world begin."""
-    return At(table_of(c, v, owner), owner * c.floats_by_8 * 8, owner * c.integers_by_8 * 8)
+    return At(steps.table_of(c, v, owner), owner * c.floats_by_8 * 8, owner * c.integers_by_8 * 8)
 
 
 @ti.func
@@ -111,7 +96,7 @@ def begin_to_learn(c: ti.template(), v: ti.template(), ant):
 def forget(c: ti.template(), v: ti.template(), ant):
     """Begin anew the tables and the memory of a slot for the ant that was born into it."""
     at = memory_of(c, v, ant)
-    for i in range(at.table, table_of(c, v, ant + 1)):
+    for i in range(at.table, steps.table_of(c, v, ant + 1)):
         c.q[i] = ti.select(i % ROW < N_ACTIONS, c.initial_q, 0.0)
     for i in range(at.floats, at.floats + c.floats_by_8 * 8):
         c.floats[i] = 0.0
@@ -124,12 +109,12 @@ def forget(c: ti.template(), v: ti.template(), ant):
 def learn_alone(c: ti.template(), v: ti.template(), ant, seen, next_action, tick):
     """Update the ant's own table, as an ant that is alone does."""
     memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
-    event = trait(c.event, ant)
-    last = ti.cast((trait(c.stage, ant) == Stage.DYING) | (tick + 1 == c.length), ti.i32)
+    event = steps.trait(c.event, ant)
+    last = ti.cast((steps.trait(c.stage, ant) == Stage.DYING) | (tick + 1 == c.length), ti.i32)
     terminated, truncated = step_end(event, c.delivery_terminates, c.ends_at_delivery, last)
     step = Transition(
-        state=state_index_of(c, v, ant),
-        action=trait(c.action, ant),
+        state=steps.state_index_of(c, v, ant),
+        action=steps.trait(c.action, ant),
         reward=ti.cast(c.rewards[event], ti.f32),
         next_state=seen,
         next_action=next_action,
@@ -146,7 +131,7 @@ def error_of(
     c: ti.template(), v: ti.template(), w, pair, reward, terminated, seen, next_action
 ):  # fmt: skip
     """The TD error of a pair (its offset in the table) by the shared table of a world."""
-    table = table_of(c, v, w)
+    table = steps.table_of(c, v, w)
     error = v.td_error(
         c.q[table + pair],
         reward,
@@ -163,14 +148,14 @@ def error_of(
 @ti.func
 def share_error(c: ti.template(), v: ti.template(), w, chunk, ant, seen, next_action):
     """Add the TD error of an ant to the sums of its chunk, and what it saw."""
-    event = trait(c.event, ant)
+    event = steps.trait(c.event, ant)
     reward = ti.cast(c.rewards[event], ti.f32)
     terminated = terminates(event, c.delivery_terminates)
-    pair = state_index_of(c, v, ant) * ROW + trait(c.action, ant)
+    pair = steps.state_index_of(c, v, ant) * ROW + steps.trait(c.action, ant)
     error = error_of(c, v, w, pair, reward, terminated, seen, next_action)
     add_to_sums(c, v, chunk, pair, error, fixed(error), 1)
     if ti.static(v.learner.plans):
-        transition = pack_transition(seen, reward, terminated)
+        transition = model.pack_transition(seen, reward, terminated)
         note_transition(c, v.n_pairs * chunk + pair, c.number[ant], transition)
 
 
@@ -255,13 +240,13 @@ def remember_shared(c: ti.template(), v: ti.template(), w):
     for i in range(1, n + 1):
         pair = c.touched[listed + i]
         transition = c.sums_of[SumRow.TRANSITION, v.n_pairs * chunk + pair]
-        remember(memory, memory_of(c, v, w), pair, transition)
+        model.remember(memory, memory_of(c, v, w), pair, transition)
 
 
 @ti.func
 def apply_sums(c: ti.template(), v: ti.template(), w):
     """Move the shared values of a world by their joined errors, and forget these."""
-    chunk, table = w * c.n_chunks, table_of(c, v, w)
+    chunk, table = w * c.n_chunks, steps.table_of(c, v, w)
     listed = list_of(v, chunk)
     for i in range(c.touched[listed]):
         pair = c.touched[listed + 1 + i]
@@ -280,11 +265,11 @@ def apply_sums(c: ti.template(), v: ti.template(), w):
 @ti.func
 def draw_pair(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """One planning draw of an ant: count an update of a visited pair."""
-    if trait(c.stage, ant) != Stage.NEWBORN:
+    if steps.trait(c.stage, ant) != Stage.NEWBORN:
         memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
         at = memory_of(c, v, w)
-        drawn, c.streams[ant] = draw_below(c.streams[ant], visited(memory, at))
-        pair, transition = recall(memory, at, drawn)
+        drawn, c.streams[ant] = draw_below(c.streams[ant], model.visited(memory, at))
+        pair, transition = model.recall(memory, at, drawn)
         add_to_sums(c, v, chunk, pair, 0.0, ti.cast(0, ti.i64), 1)
         note_transition(c, v.n_pairs * chunk + pair, 0, transition)
 
@@ -299,8 +284,8 @@ def plan_together(c: ti.template(), v: ti.template(), w, tick):
         pair = c.touched[listed + 1 + i]
         place = v.n_pairs * chunk + pair
         seen = c.sums_of[SumRow.TRANSITION, place]
-        reward, terminated = reward_of(seen), terminated_of(seen)
-        error = error_of(c, v, w, pair, reward, terminated, next_state_of(seen), -1)
+        reward, terminated = model.reward_of(seen), model.terminated_of(seen)
+        error = error_of(c, v, w, pair, reward, terminated, model.next_state_of(seen), -1)
         c.errors[place] = error
         c.sums[place] = fixed(error) * c.sums_of[SumRow.COUNT, place]
     apply_sums(c, v, w)

@@ -26,10 +26,10 @@ from taichi_ants.engines.colony.layout import (
 )
 from taichi_ants.engines.packing import compass_of, padded
 from taichi_ants.engines.records import Record, Snapshot, same
-from taichi_ants.errors import AntsError, checked_whole
+from taichi_ants.errors import AntsError, check_array, checked_whole
 from taichi_ants.files.archives import Kind
 from taichi_ants.grid.constants import STREAM_ANT, STREAM_QUEEN
-from taichi_ants.grid.randomness import stream_state
+from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.learners.config import TrainingConfig, update_weights
 from taichi_ants.learners.learner import Learner, Memory
 from taichi_ants.task import Task
@@ -57,16 +57,8 @@ _PROGRESS = ("epsilon", "learning_rate", "length", "ticks")
 class ColonyEpisodes(Record):
     """Results of episodes, arrays of shape (episodes, worlds).
 
-    Attributes:
-        returns: int64, rewards of all ants.
-        ticks: int32, length.
-        deliveries: int32, food items given to the queen.
-        first_delivery: int32, ticks until the first delivery; -1 if there was none.
-        moves: int64, moves that ants tried.
-        blocked: int64, moves that failed.
-        births, deaths: int32, ants.
-        regrown: int32, food items that grew back.
-        living: int32, ants at the end.
+    `first_delivery` is -1 if there was none; `blocked` are the moves that failed, `living` the ants
+    at the end. Returns, moves and blocked are int64, all others int32.
     """
 
     returns: np.ndarray
@@ -85,15 +77,11 @@ class ColonyState:
     """The state of a colony of W worlds with `capacity` slots each, in which ants live.
 
     Attributes:
-        worlds, seeds: Of each world.
-        grid: Where the cells lie in the arrays of a world.
         task, training, ants, capacity, start, ends_at_delivery, sharing: As given to `Colony`.
-        schedule: "by_world" or "by_chunk".
-        is_given_actions: Whether ants do what `Colony.act` is given, so that nobody chooses.
+        is_given_actions: Whether ants do what `Colony.act` is given.
         one_a_slot: Whether each slot has its own table of action values, not each world.
         memory: What the learner keeps with each table.
         pheromone: The pheromone of the task, which evaporates as the task says of this colony.
-        epsilon, learning_rate: Those of the present episode.
         length: Of the episode in ticks; 0 if it is not known.
         ticks: Since an episode began for all worlds.
         delivered: int64 (W,), food items that were delivered in the episodes before this one.
@@ -197,10 +185,7 @@ class ColonyState:
 
     @property
     def numbers(self) -> np.ndarray:
-        """Number of the ant in each slot, int32 (W, capacity); -1 if never used; a view.
-
-        As all that is known of an ant, it stays when the ant dies, until another one is born.
-        """
+        """Number of the last ant in each slot, int32 (W, capacity), -1 for none; a view."""
         return self._by_slot("number")
 
     @property
@@ -225,10 +210,7 @@ class ColonyState:
 
     @property
     def states(self) -> np.ndarray:
-        """State index of each ant as it is now, int32 (W, capacity).
-
-        In a slot whose ant has died it is what the ant saw last.
-        """
+        """State index of each ant, of dead ones the last, int32 (W, capacity)."""
         return self._by_slot("state" if "state" in self.arrays else "percept").astype(np.int32)
 
     @property
@@ -244,10 +226,7 @@ class ColonyState:
 
     @property
     def next_actions(self) -> np.ndarray:
-        """Actions that are drawn already for the next tick, int8 (W, capacity), else -1; a view.
-
-        Only for learners that draw ahead.
-        """
+        """Actions that were drawn ahead of the next tick, int8 (W, capacity), else -1; a view."""
         return self._by_slot("next_action")
 
     @property
@@ -257,10 +236,7 @@ class ColonyState:
 
     @property
     def streams(self) -> np.ndarray:
-        """State of the random stream of each ant, uint64 (W, capacity).
-
-        A view that may be written to between two ticks.
-        """
+        """State of the random stream of each ant, uint64 (W, capacity); a writable view."""
         return self._by_slot("streams")
 
     @property
@@ -287,11 +263,7 @@ class ColonyState:
         return (tables if self.one_a_slot else tables[:, 0]).copy()
 
     def outcome(self) -> ColonyEpisodes:
-        """Return the results of the episode so far, arrays (1, W).
-
-        Raises:
-            AntsError: The learner has made action values that are not finite.
-        """
+        """Return the results of the episode so far, arrays (1, W), see `check_finite`."""
         self.check_finite()
         counts = {
             row.name.lower(): self.arrays["worlds"][row][None].copy()
@@ -303,11 +275,7 @@ class ColonyState:
         return ColonyEpisodes(returns=self.arrays["returns"][None].copy(), **counts)
 
     def snapshot(self, world: int = 0) -> Snapshot:
-        """Return world number `world` as it is now; arrays are copies.
-
-        Raises:
-            AntsError: There is no such world, or no episode has begun.
-        """
+        """Return world number `world` as it is now; arrays are copies."""
         self.check_begun()
         world = checked_whole("world", world, most=len(self.seeds) - 1, least=0)
         cells = slice(world * self.grid.size, (world + 1) * self.grid.size)
@@ -327,13 +295,10 @@ class ColonyState:
         )
 
     def stored_trail(self, world: int = 0) -> tuple[np.ndarray, int]:
-        """Return the trail of world number `world` as kernels store it, and the clock.
+        """Return a copy of the trail of world number `world` as kernels store it, and the clock.
 
-        The level of a cell is what is stored less the clock, not below 0.
-
-        Returns:
-            A copy of the expiry clocks, int32 (grid.size,), and the clock as it is now; or of the
-            levels, float32 (grid.size,), and 0, if the pheromone is dense.
+        These are expiry clocks, int32 (grid.size,); or levels, float32, and 0, if the pheromone is
+        dense. The level of a cell is what is stored less the clock, not below 0.
         """
         cells = slice(world * self.grid.size, (world + 1) * self.grid.size)
         if self.pheromone.dense:
@@ -357,11 +322,7 @@ class ColonyState:
     # Changes
 
     def lay_out(self, worlds: tuple[World, ...]) -> None:
-        """Make the arrays that depend on the worlds.
-
-        Raises:
-            AntsError: A world has too few free cells for the ants.
-        """
+        """Make the arrays that depend on the worlds; AntsError if they have too few free cells."""
         self.worlds, self.grid = worlds, worlds[0].grid
         most = max(len(world.foods) for world in worlds)
         self.make_room_for_food(most if self.food_changes else 0)
@@ -375,10 +336,7 @@ class ColonyState:
         self._changing = tuple(changing)
 
     def begin(self, which: Which = ALL) -> None:
-        """Set these worlds, bool (W,), to the start of an episode.
-
-        Tables, memories and random streams stay.
-        """
+        """Set these worlds to the start of an episode; tables, memories and streams stay."""
         self.delivered[which] += self.deliveries[which]
         self.rounds[:, which] = 0
         self.set_learning_rate(self.learning_rate)
@@ -391,7 +349,7 @@ class ColonyState:
         (places,) = np.nonzero(which)
         changed = dict(zip(places.tolist(), seeds, strict=True))
         self.seeds = tuple(changed.get(w, seed) for w, seed in enumerate(self.seeds))
-        self.arrays["seeds"][:] = _words(self.seeds)
+        self.arrays["seeds"][:] = words_of(self.seeds)
         self.at_start = self._start_of_episode()
         self._copy_worlds(self.arrays, self._seeded(), which)
 
@@ -428,9 +386,8 @@ class ColonyState:
     def sort_ants(self) -> None:
         """Store the ants of a world about in the order of their cells: neighbours share caches.
 
-        Their order changes nothing but the speed: ants have numbers. Slots do matter where ants are
-        born, have tables of their own or are given actions, and vacant ones stay behind the others;
-        there the order stays.
+        Ants have numbers, so that their order changes nothing; but it stays where slots matter, and
+        where some are vacant, which must stay behind the others.
         """
         slots_matter = self.ants_change or self.one_a_slot or self.is_given_actions
         if slots_matter or self.arrays["worlds"][WorldRow.LIVING].min() < self.capacity:
@@ -450,11 +407,7 @@ class ColonyState:
     # Arrays
 
     def _start_of_episode(self) -> Arrays:
-        """Make what each episode begins with, as short as it can be told; see `_set_to_start`.
-
-        Raises:
-            AntsError: A world has too few free cells for the ants.
-        """
+        """Make what each episode begins with, as short as it can be told; see `_set_to_start`."""
         worlds, n = self.worlds, self.ants
         starts = [
             world.start(seed, n, self.start) for world, seed in zip(worlds, self.seeds, strict=True)
@@ -528,11 +481,7 @@ class ColonyState:
         column["stage"][which, :n] = Stage.LIVING
 
     def _lasting(self, q_values: np.ndarray | None) -> Arrays:
-        """Make the arrays that outlive an episode.
-
-        Raises:
-            AntsError: Tables or memories are too large, or `q_values` has not their shape.
-        """
+        """Make the arrays that outlive an episode."""
         slots, memory, n_worlds = self.capacity, self.memory, len(self.seeds)
         owners = n_worlds * (slots if self.one_a_slot else 1)
         sizes = ((1 + memory.tables) * self.task.n_states * ROW, memory.floats, memory.integers)
@@ -553,7 +502,7 @@ class ColonyState:
 
     def _seeded(self) -> Arrays:
         """Make what the seeds of the worlds decide, and what goes on through all episodes."""
-        seeds = _words(self.seeds)
+        seeds = words_of(self.seeds)
         numbers = np.arange(self.capacity, dtype=np.uint64)  # more ants may start later episodes
         first_streams = stream_state(seeds[:, None], STREAM_ANT, numbers[None, :])
         return {
@@ -588,11 +537,11 @@ class ColonyState:
         sums, cells = max(1, chunks * pairs), len(self.seeds) * self.grid.size
         return {
             # 1 for rocks and outside.
-            "walls": self._of_each(_walls).reshape(-1),
+            "walls": (self._of_each(World.ground) == OBSTACLE).astype(np.uint8).reshape(-1),
             # A bit for each heading that leads nearer to the queen.
             "closer": self._of_each(World.closer).reshape(-1),
             "compass": compass_of(self.grid),  # see `rules.actions`
-            "seeds": _words(self.seeds),
+            "seeds": words_of(self.seeds),
             "rewards": self.task.rewards.by_event(),
             "hyperparameters": np.array([*dict(self.training.hyperparameters).values(), 0.0]),
             # How far the mean of n errors moves a value, by n; see `set_learning_rate`.
@@ -646,9 +595,7 @@ class ColonyState:
     def save(self, path: files.PathLike) -> None:
         """Write the colony as it is now; `load` resumes it, bit for bit.
 
-        Raises:
-            AntsError: The learner has made action values that are not finite, so that `load` would
-                refuse the file; seeds repeat; or it cannot be written.
+        AntsError if an action value is not finite, seeds repeat, or the file cannot be written.
         """
         self.check_finite()
         checks.checked_seeds(self.seeds)
@@ -665,9 +612,7 @@ class ColonyState:
     ) -> State:
         """Read a colony that `save` wrote.
 
-        Raises:
-            AntsError: The file is missing, damaged, or holds no colony; or its learner or
-                observation is not registered.
+        AntsError if the file cannot be used, or its learner or observation is not registered.
         """
         runtime.start(threads, arch)  # its errors are not about the file
         with _KIND.reading(path) as (arrays, facts):
@@ -695,8 +640,7 @@ class ColonyState:
                 colony.make_room_for_food(facts["food_sources"])
             for name in colony.stored:
                 array, kept = colony.arrays[name], arrays[f"array_{name}"]
-                if kept.shape != array.shape or kept.dtype != array.dtype:
-                    raise ValueError(f"{name} has another shape or type")
+                check_array(name, kept, array.dtype, array.shape)
                 array[:] = kept
         return colony
 
@@ -712,12 +656,3 @@ class ColonyState:
         )
 
     __hash__ = None  # type: ignore[assignment]  # it changes with each tick
-
-
-def _walls(world: World) -> np.ndarray:
-    return (world.ground() == OBSTACLE).astype(np.uint8)
-
-
-def _words(seeds: Sequence[int]) -> np.ndarray:
-    """Return the 64 bits of each seed that count, uint64."""
-    return np.array([seed % 2**64 for seed in seeds], dtype=np.uint64)

@@ -10,11 +10,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import runtime
-from taichi_ants.engines.colony.layout import (
-    GAVE_UP,
-    Barrier,
-    Order,
-)
+from taichi_ants.engines.colony.layout import GAVE_UP, Barrier, Order
 from taichi_ants.engines.colony.state import ColonyState
 
 # Slots from which threads share the ants of a world: of a single one, and of each of many.
@@ -39,11 +35,10 @@ def chunks_of(schedule: str, threads: int) -> int:
 
 
 class ThreadChoice:
-    """All threads share the ticks of a large world, or one does them alone.
+    """All threads share the ticks of a large world, or one does them alone, if that is faster.
 
     Threads that share a tick wait for each other several times in it, and wait long where other
-    programs use the processors; one alone may be faster then. The results are the same, so the
-    faster one is taken, and the other one tried now and then.
+    programs use the processors. So the slower choice is tried now and then.
     """
 
     def __init__(self) -> None:
@@ -128,11 +123,7 @@ class Stepper:
             self.threads.took(threads, (time.perf_counter() - began) / n)
 
     def _launch_ticks(self, state: ColonyState, n: int, parts: int) -> None:
-        """Let n ticks pass in one launch.
-
-        If a thread gave up at the barrier, as there are fewer threads than it was told, all groups
-        of phases up to there are done; a second launch does the rest on one thread.
-        """
+        """Let n ticks pass in one launch; if it gives up at the barrier, another does the rest."""
         orders, barrier = state.arrays["orders"], state.arrays["barrier"]
         orders[:], barrier[:] = (n, parts, 0, _SPINS), 0
         self.launch(state, "ticks")

@@ -16,25 +16,13 @@ from taichi_ants.engines.colony.layout import (
     FoodSourceRow,
     Tally,
 )
-from taichi_ants.engines.colony.trail import (
-    deposit,
-    level_in_view,
-    level_of,
-    level_that_counts,
-)
+from taichi_ants.engines.colony.trail import deposit, level_in_view, level_of, level_that_counts
 from taichi_ants.engines.views import judge
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.learners.memory import values_of
-from taichi_ants.task.constants import (
-    EMPTY,
-    FORWARD,
-    LEFT,
-    OBSTACLE,
-    PICK_UP,
-    RIGHT,
-    ROW,
-)
+from taichi_ants.task.constants import EMPTY, FORWARD, LEFT, OBSTACLE, PICK_UP, RIGHT, ROW
 from taichi_ants.task.events import Event
+from taichi_ants.task.rules import conflicts, vision
 from taichi_ants.task.rules.actions import (
     is_open,
     move_event,
@@ -43,26 +31,9 @@ from taichi_ants.task.rules.actions import (
     turn_round,
     turned_by,
 )
-from taichi_ants.task.rules.conflicts import (
-    ENTER,
-    HAS_FOOD,
-    TAKE,
-    TAKES_FOOD,
-    WINS,
-    had_ant,
-    prevails,
-    settle,
-)
 from taichi_ants.task.rules.delivery import can_give, heading_after_delivery
 from taichi_ants.task.rules.policy import bit_number, choose_in_crowd, lowest_bit_number
 from taichi_ants.task.rules.random_bits import advance, bits_of, draw_below
-from taichi_ants.task.rules.vision import (
-    code_in_view,
-    goals_in_view,
-    nearer_from,
-    percept_carrying,
-    percept_foraging,
-)
 
 
 @ti.func
@@ -111,10 +82,10 @@ def see(c: ti.template(), v: ti.template(), w, ant, clock):
     ground_right = looks_of(c.ground[right])
     percept = 0
     if trait(c.carries, ant) == 1:
-        nearer = nearer_from(c.closer[here], heading)
-        percept = percept_carrying(ground_left, ground_forward, ground_right, nearer)
+        nearer = vision.nearer_from(c.closer[here], heading)
+        percept = vision.percept_carrying(ground_left, ground_forward, ground_right, nearer)
     else:
-        percept = percept_foraging(
+        percept = vision.percept_foraging(
             v.half,
             ground_left,
             ground_forward,
@@ -138,7 +109,7 @@ def strongest_of(c: ti.template(), v: ti.template(), left, forward, right, clock
 def view_around(c: ti.template(), v: ti.template(), w, ant, clock):
     """All that the ant can look at."""
     heading, here = trait(c.heading, ant), w * c.size + c.cell[ant]
-    nearer = nearer_from(c.closer[here], heading)
+    nearer = vision.nearer_from(c.closer[here], heading)
     view = v.view_type(carries=trait(c.carries, ant), own_level=level_of(c, v, here, clock))
     cells = ti.static(v.observation.cells)
     for k in ti.static(range(len(cells))):
@@ -208,26 +179,27 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         action = draw_action(c, v, w, ant, state_index_of(c, v, ant), random_state)
     heading = turned_by(c.compass, trait(c.heading, ant), action)
     ahead = cell + step_towards(c.compass, heading, FORWARD)
-    enters = is_open(code_in_view(percept, ti.min(action, RIGHT)))
+    enters = is_open(vision.code_in_view(percept, ti.min(action, RIGHT)))
     if ti.static(v.traffic.shared):
         enters = enters | (c.ground[w * c.size + ahead] >> 4 != 0)
     enters = enters & (action <= RIGHT)
     wanted = ti.select(enters, ahead, cell)
-    mark = ti.select(enters, ENTER + heading, v.idle)
-    foods = goals_in_view(percept)
+    mark = ti.select(enters, conflicts.ENTER + heading, v.idle)
+    foods = vision.goals_in_view(percept)
     if foods != 0 and action == PICK_UP and carries == 0:
         position = lowest_bit_number(foods)
         if foods & (foods - 1) != 0:  # several foods in view
             k, random_state = draw_below(random_state, popcnt(foods))
             position = bit_number(foods, k)
         wanted = cell + step_towards(c.compass, heading, position)
-        mark = TAKE + (heading + position + N_HEADINGS - 1) % N_HEADINGS
+        mark = conflicts.TAKE + (heading + position + N_HEADINGS - 1) % N_HEADINGS
     c.streams[ant] = random_state
     put(c.heading, ant, heading)
     put(c.action, ant, action)
     c.want[ant] = wanted
     if ti.static(v.traffic.shared):
-        mark |= ti.select(carries == 1, HAS_FOOD, 0) | ti.select(mark >= TAKE, TAKES_FOOD, 0)
+        takes = ti.select(mark >= conflicts.TAKE, conflicts.TAKES_FOOD, 0)
+        mark |= ti.select(carries == 1, conflicts.HAS_FOOD, 0) | takes
     c.wants[w * c.size + cell] = ti.cast(mark, ti.u8)
 
 
@@ -238,8 +210,8 @@ def resolve(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     A move is judged before any ant lays a trail.
     """
     base, cell, wanted = w * c.size, c.cell[ant], c.want[ant]
-    won = prevails(c, v.traffic, base, cell, wanted, tick)
-    c.wants[base + cell] = c.wants[base + cell] | ti.cast(ti.select(won, WINS, 0), ti.u8)
+    won = conflicts.prevails(c, v.traffic, base, cell, wanted, tick)
+    c.wants[base + cell] = c.wants[base + cell] | ti.cast(ti.select(won, conflicts.WINS, 0), ti.u8)
     c.want[ant] = ti.select(won, wanted, cell)
     put(c.event, ant, event_of(c, v, base, ant, tick * c.evaporates))
 
@@ -254,10 +226,10 @@ def step_ahead(c: ti.template(), ant):
 def event_of(c: ti.template(), v: ti.template(), base, ant, clock):
     """The event of a move that succeeds; a cell with an ant is a lure if it is the better one."""
     action, percept = trait(c.action, ant), trait(c.percept, ant)
-    event = move_event(code_in_view(percept, ti.min(action, RIGHT)))
+    event = move_event(vision.code_in_view(percept, ti.min(action, RIGHT)))
     here = base + c.cell[ant]
     ahead = here + step_ahead(c, ant)
-    if had_ant(c, ahead):  # seldom, so that few trails are read
+    if conflicts.had_ant(c, ahead):  # seldom, so that few trails are read
         rises = level_of(c, v, ahead, clock) > level_of(c, v, here, clock)
         nearer = ti.cast(c.closer[here], ti.i32) >> trait(c.heading, ant) & 1 == 1
         better = ti.select(trait(c.carries, ant) == 1, nearer, rises)
@@ -277,15 +249,17 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     takes = False
     if ti.static(v.traffic.shared):
         ahead = cell + step_ahead(c, ant)
-        goes, filled, event, enters = settle(
+        goes, filled, event, enters = conflicts.settle(
             *(c, v.traffic, base, cell, wanted, ahead, carries, moves, trait(c.event, ant))
         )
         takes = not moves and wanted != cell
     else:
-        won = prevails(c, v.traffic, base, cell, wanted, tick)
+        won = conflicts.prevails(c, v.traffic, base, cell, wanted, tick)
         enters, takes = won & moves, won & (not moves)
         goes = ti.select(enters, wanted, cell)
-        event = ti.select(enters, move_event(code_in_view(percept, ti.min(action, RIGHT))), event)
+        event = ti.select(
+            enters, move_event(vision.code_in_view(percept, ti.min(action, RIGHT))), event
+        )
     if not filled:
         c.ground[base + cell] = EMPTY
     c.want[ant] = cell  # where its mark is

@@ -4,19 +4,13 @@ import taichi as ti
 
 from taichi_ants.engines.colony.layout import STANDS_WITH_FOOD
 from taichi_ants.task.constants import EMPTY
-from taichi_ants.task.rules.pheromone import (
-    NONE,
-    diffused,
-    evaporated,
-    level_after_deposit,
-    level_left,
-)
+from taichi_ants.task.rules import pheromone
 
 
 @ti.func
 def level_of(c: ti.template(), v: ti.template(), place, clock):
     """The trail on a cell: i32, or f32 if dense."""
-    return c.level[place] if ti.static(v.dense) else level_left(c.trail[place], clock)
+    return c.level[place] if ti.static(v.dense) else pheromone.level_left(c.trail[place], clock)
 
 
 @ti.func
@@ -39,8 +33,8 @@ def level_that_counts(c: ti.template(), v: ti.template(), place, clock):
 @ti.func
 def deposit(c: ti.template(), v: ti.template(), place, clock, carried):
     """Lay the trail of an ant that has carried its food for so many ticks, as the task says."""
-    if c.deposits != NONE:
-        laid = level_after_deposit(c, c.deposits, level_of(c, v, place, clock), carried)
+    if c.deposits != pheromone.NONE:
+        laid = pheromone.level_after_deposit(c, c.deposits, level_of(c, v, place, clock), carried)
         if ti.static(v.dense):
             c.level[place] = laid
         else:
@@ -50,14 +44,14 @@ def deposit(c: ti.template(), v: ti.template(), place, clock, carried):
 @ti.func
 def evaporate(c: ti.template(), place):
     """One tick of evaporation of a cell in dense mode."""
-    c.level[place] = evaporated(c.level[place], c.decay)
+    c.level[place] = pheromone.evaporated(c.level[place], c.decay)
 
 
 @ti.func
 def diffuse(c: ti.template(), place):
     """Compute the level of a cell after one tick of diffusion."""
     if c.share > 0.0:
-        c.spare[place] = diffused(c.level, c.walls, c.compass, place, c.share)
+        c.spare[place] = pheromone.diffused(c.level, c.walls, c.compass, place, c.share)
 
 
 @ti.func

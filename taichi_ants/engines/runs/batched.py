@@ -14,44 +14,40 @@ from taichi_ants.engines.packing import unpack_cells
 from taichi_ants.engines.records import Snapshot
 from taichi_ants.engines.runs.engine import laid_out
 from taichi_ants.grid.constants import STREAM_ANT
-from taichi_ants.grid.randomness import stream_state
+from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.task import Task
 from taichi_ants.worlds.starts import first_starts
 from taichi_ants.worlds.world import World
 
 _PER_CHUNK = 256  # ants that one thread steps together
+# The arrays with a number for each ant.
+_OF_ANTS: dict[type, tuple[str, ...]] = {
+    np.int32: ("start_cells", "start_headings", "ant_cells", "carried", "steps", "states")
+    + ("final_states",),
+    np.uint8: ("commands", "actions", "headings", "carries", "changed", "percepts", "events")
+    + ("terminations", "truncations", "reasons", "final_percepts"),
+    np.uint64: ("random_states",),
+    np.float64: ("rewards_of",),
+}
 
 
 class BatchedEnvironments:
     """n ants, each in a world of its own.
 
-    An ant depends on its world, the task, its seed and its actions alone.
-
-    Args:
-        worlds: Worlds of the same ranges; ant i lives in number i modulo their number.
-        task: The rules of the game.
-        n: How many ants, at least 1.
-        max_steps: Steps after which an episode is truncated.
-        ends: What a delivery does: "terminates" terminates the episode, "truncates" truncates it,
-            "continues" does neither, and food grows back at once.
-        falls: Whether trails evaporate.
+    An ant depends on its world, the task, its seed and its actions alone. Worlds have the same
+    ranges; ant i lives in number i modulo their number. A delivery (`ends`) "terminates" the
+    episode, "truncates" it, or "continues": then food grows back at once. If it `falls`, a trail
+    evaporates.
 
     Attributes:
         arrays: By name, one row for each ant: percepts uint8 and states int32, what it sees;
             rewards_of float64, terminations and truncations uint8, events uint8 (`Event`) and
             reasons uint8 (`Reason`), the result of its last action; final_states int32 and
-            final_percepts uint8, what it saw when the episode ended that `step` has restarted; and
-            where it stands.
+            final_percepts uint8, what it saw when the episode ended that `step` has restarted.
     """
 
     def __init__(
-        self,
-        worlds: Sequence[World],
-        task: Task,
-        n: int,
-        max_steps: int,
-        ends: str,
-        falls: bool,
+        self, worlds: Sequence[World], task: Task, n: int, max_steps: int, ends: str, falls: bool
     ) -> None:
         self.worlds, self.task, self.n = tuple(worlds), task, n
         self.arrays = self._laid_out(max_steps, ends, falls)
@@ -77,35 +73,12 @@ class BatchedEnvironments:
             "shared_cells": common["world"].size,
             "cells": np.concatenate([common["world"], own.reshape(-1)]),
             "worlds": number,
-            "start_cells": np.zeros(n, np.int32),
-            "start_headings": np.zeros(n, np.int32),
-            "random_states": np.zeros(n, np.uint64),
-            "commands": np.full(n, Command.BEGIN, np.uint8),
-            "actions": np.zeros(n, np.uint8),
-            "ant_cells": np.zeros(n, np.int32),
-            "headings": np.zeros(n, np.uint8),
-            "carries": np.zeros(n, np.uint8),
-            "carried": np.zeros(n, np.int32),
-            "steps": np.zeros(n, np.int32),
-            "changed": np.zeros(n, np.uint8),
-            "percepts": np.zeros(n, np.uint8),
-            "states": np.zeros(n, np.int32),
-            "rewards_of": np.zeros(n, np.float64),
-            "terminations": np.zeros(n, np.uint8),
-            "truncations": np.zeros(n, np.uint8),
-            "events": np.zeros(n, np.uint8),
-            "reasons": np.zeros(n, np.uint8),
-            "final_states": np.zeros(n, np.int32),
-            "final_percepts": np.zeros(n, np.uint8),
+            **{name: np.zeros(n, kind) for kind, names in _OF_ANTS.items() for name in names},
         }
 
     def seed(self, seeds: Sequence[int], which: np.ndarray) -> None:
-        """Give some ants, int (k,), new random streams and start places.
-
-        A seed decides where an ant starts if its world lists none, and which food it takes if it
-        sees several; both for all episodes to come.
-        """
-        words = np.array([seed % 2**64 for seed in seeds], dtype=np.uint64)
+        """Give some ants, int (k,), new random streams and start places, by their seeds."""
+        words = words_of(seeds)
         self.arrays["random_states"][which] = stream_state(words, STREAM_ANT, 0)
         for number, world in enumerate(self.worlds):
             here = self.arrays["worlds"][which] == number
@@ -120,10 +93,7 @@ class BatchedEnvironments:
     def step(
         self, actions: np.ndarray, begins: np.ndarray | int = 0, same_step: bool = False
     ) -> None:
-        """Let all ants do these actions, 0 .. 4; but where `begins` is 1 an episode begins.
-
-        With `same_step` an ant whose episode ends begins the next one at once.
-        """
+        """Let all ants do these actions; but where `begins` is 1 an episode begins."""
         self.arrays["actions"][:] = actions
         self._go(begins, same_step)
 

@@ -19,12 +19,7 @@ from taichi_ants.engines.runs.step import (
     restore,
     state_seen,
 )
-from taichi_ants.task.constants import (
-    FOOD,
-    FORWARD,
-    PICK_UP,
-    QUEEN,
-)
+from taichi_ants.task.constants import FOOD, FORWARD, PICK_UP, QUEEN
 from taichi_ants.task.events import Event, Reason
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.rules.actions import step_towards
@@ -58,15 +53,7 @@ def reason_of(a: ti.template(), base, before, after, action):
 def step_kernel(
     observation: Observation, deposit: int, half: bool, serial: bool, arguments: Any
 ) -> Callable[..., None]:
-    """The kernel; it is compiled on first use.
-
-    Args:
-        observation: What an ant observes.
-        deposit: How trails are laid, see `rules.pheromone`.
-        half: Whether trails of half the strongest look like one, see `Pheromone.view`.
-        serial: Whether one thread does all, which saves to wake the others.
-        arguments: The type of the argument pack, which `batched` lists.
-    """
+    """The kernel, see `run_kernel`; if `serial`, one thread does all and no other one is woken."""
     state_of = state_seen(observation, half)
 
     @ti.func

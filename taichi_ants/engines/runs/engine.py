@@ -1,8 +1,7 @@
 """A world and a task laid out for the kernel of independent runs, and the loop over launches.
 
-A launch cannot be interrupted, so that Ctrl-C, progress and checkpoints wait for its end: even if
-every episode uses all of its steps, a launch should take about a second. Within that bound few
-large launches are best, since threads wait for the last run of each.
+A launch cannot be interrupted, so it should take about a second even if every episode uses all of
+its steps. Within that bound few large launches are best: threads wait for the last run of each.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from taichi_ants.engines.layout import EPSILON_DECAY, N_SETTINGS, OUTCOMES, SETT
 from taichi_ants.engines.packing import compass_of, pack_cells
 from taichi_ants.engines.runs.results import RunState
 from taichi_ants.grid.constants import STREAM_ROLLOUT
-from taichi_ants.grid.randomness import stream_state
+from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.learner import Learner
 from taichi_ants.task import Pheromone, Task
@@ -81,10 +80,9 @@ _NO_WORK: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Runs:
-    """Runs of one learner.
+    """Runs of one learner, or that follow tables without learning.
 
     Attributes:
-        learner: The learner; None to follow the tables without learning.
         seeds: The seed of each run, Python integers (n,), for worlds that do not list their ant.
         settings: float64 (n, columns), `layout.SETTINGS` and the hyperparameters of the learner.
         state: Where the runs stand, arrays (n, ...), contiguous; the kernel moves it on.
@@ -119,15 +117,11 @@ class Runs:
     def following(
         cls, tables: np.ndarray, seeds: np.ndarray, numbers: np.ndarray, epsilon: float
     ) -> Runs:
-        """Runs that follow tables (n, n_states, 5) with a constant epsilon.
-
-        They do the rollouts of these `numbers` (episodes,), each with a stream of its own.
-        """
+        """Runs that follow tables (n, n_states, 5), in the rollouts of these `numbers`."""
         state = RunState.empty((len(tables),), tables.shape[-2])
         state.q[:, 0, :, :N_ACTIONS] = tables
         state.epsilon[:] = epsilon
-        words = np.array([seed % 2**64 for seed in seeds.tolist()], dtype=np.uint64)
-        streams = stream_state(words[:, None], STREAM_ROLLOUT, numbers[None, :])
+        streams = stream_state(words_of(seeds)[:, None], STREAM_ROLLOUT, numbers[None, :])
         settings = np.zeros((len(tables), N_SETTINGS))
         settings[:, EPSILON_DECAY] = 1.0
         return cls(None, seeds, settings, state, streams)
@@ -137,10 +131,7 @@ class Runs:
 
 
 def laid_out(worlds: Sequence[World], task: Task, falls: bool) -> dict[str, Any]:
-    """What kernels read of a task, and of worlds of one grid, one behind the other.
-
-    `falls` tells whether trails evaporate.
-    """
+    """Arrays and numbers of a task and of worlds of one grid; trails evaporate if `falls`."""
     grid = worlds[0].grid
     return {
         "size": grid.size,
@@ -166,14 +157,12 @@ class Launcher:
         from taichi_ants.engines.runs.step import EXTRA_CELLS
 
         self._runs, self._arguments = runs, Arguments()
-        words = np.array([seed % 2**64 for seed in runs.seeds.tolist()], dtype=np.uint64)
-        self._cells, self._headings = first_starts(world, words)
+        self._cells, self._headings = first_starts(world, words_of(runs.seeds))
         self.cells_of_a_run = world.grid.size + EXTRA_CELLS
         learns, pheromone = runs.learner is not None, task.pheromone
         deposits, half = pheromone.numbers["deposits"], pheromone.view == "half"
         self._kernel = run_kernel(
-            *(runs.learner, task.sees, deposits, half, traced),
-            self._arguments.type_of(_NO_WORK),
+            *(runs.learner, task.sees, deposits, half, traced), self._arguments.type_of(_NO_WORK)
         )
         compile_once(self._kernel, lambda: Arguments().pack(_NO_WORK))
         falls = task.evaporation_in_training if learns else task.evaporation_in_evaluation
@@ -213,12 +202,7 @@ def do_episodes(
     outcomes: np.ndarray,
     progress: Progress | None = None,
 ) -> float:
-    """Do the next episodes of n runs, whose state is moved on.
-
-    Args:
-        world, task, max_steps, runs: What is done.
-        outcomes: int32 (3, n, episodes), into which returns, steps and deliveries are written.
-        progress: As of `train`.
+    """Do the next episodes of n runs, move their state on, and write `outcomes` (3, n, episodes).
 
     Returns:
         What it took without compilation, in CPU seconds of all threads together, or wall-clock
@@ -248,15 +232,10 @@ def do_episodes(
 def size_of_launch(
     workers: int, episodes: int, max_steps: int, cost: float, cells: int, widest: int
 ) -> tuple[int, int]:
-    """How many runs, and how many episodes of each, go into one launch.
+    """Runs, and episodes of each, in one launch, if `workers` runs progress at the same time.
 
-    Args:
-        workers: Runs that progress at the same time (CPU threads).
-        episodes: Episodes of each run.
-        max_steps: Most steps of an episode.
-        cost: What a step takes, 1 for one of Q-learning.
-        cells: i32 cells that each run of a launch needs for its world.
-        widest: The most numbers that the state of a run has in one array.
+    A step costs `cost`, 1 for one of Q-learning; a run needs so many `cells`, and `widest` is the
+    most numbers that its state has in one array.
     """
     steps_each = _SECONDS * 1e9 / (_STEP_NS * cost)
     rounds = int(steps_each // (episodes * max_steps))

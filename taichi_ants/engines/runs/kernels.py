@@ -50,13 +50,9 @@ def run_kernel(
 ) -> Callable[..., None]:
     """The kernel for runs that learn, or follow a fixed policy; it is compiled on first use.
 
-    Args:
-        learner: The learner; None for a fixed policy.
-        observation: What an ant observes.
-        deposit: How trails are laid, see `rules.pheromone`.
-        half: Whether trails of half the strongest look like one, see `Pheromone.view`.
-        traced: Record each step too, in `n_episodes * max_steps` rows for each run.
-        arguments: The type of the argument pack, which `engine` lists.
+    `deposit` and `half` are the pheromone's, see `rules.pheromone` and `Pheromone.view`. If
+    `traced`, each step is recorded too, in `n_episodes * max_steps` rows for each run. `arguments`
+    is the type of the argument pack.
     """
     learns = learner is not None
     learner = checked_plugin(learner) if learns else None
@@ -184,8 +180,7 @@ def run_kernel(
                 a.outcomes[DELIVERIES, i, episode] = ti.cast(ant.event == Event.DELIVERED, ti.i32)
                 restore(a, base, 0, a.cells[base + a.size], a.cells[base + a.size + 1])
                 exploration = ti.max(
-                    a.settings[first + MIN_EPSILON],
-                    exploration * a.settings[first + EPSILON_DECAY],
+                    a.settings[first + MIN_EPSILON], exploration * a.settings[first + EPSILON_DECAY]
                 )
                 rate = ti.max(
                     a.settings[first + MIN_LEARNING_RATE],

@@ -13,11 +13,11 @@ from taichi_ants.checks import checked_max_steps, checked_seeds
 from taichi_ants.engines.layout import OUTCOMES
 from taichi_ants.engines.packing import padded
 from taichi_ants.engines.records import Record
-from taichi_ants.errors import AntsError, shown
+from taichi_ants.errors import AntsError, check_array, shown
 from taichi_ants.files import PathLike
 from taichi_ants.files.archives import Kind
 from taichi_ants.grid.constants import STREAM_ANT
-from taichi_ants.grid.randomness import stream_state
+from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.learner import Memory
 from taichi_ants.task import Task
@@ -30,14 +30,13 @@ _SUMMED_UP, _LISTED = 50, 6  # episodes and configurations that a result shows
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RunState(Record):
-    """Where runs stopped; training goes on from it bit for bit.
+    """The state of runs where they stopped; training goes on from it bit for bit.
 
     Attributes (leading axes: the runs, for example (configurations, seeds)):
         q: float32 (..., 1 + tables, n_states, 8), the table that the ant acts by and the further
             ones of its learner; 5 action values and 3 unused.
-        floats: float32 (..., k), as many as any learner here needs, up to the next multiple of 8;
-            see `taichi_ants.learners.Memory`.
-        integers: int32 (..., k), likewise.
+        floats, integers: float32 and int32 (..., k), as many as any learner here needs, up to the
+            next multiple of 8; see `taichi_ants.learners.Memory`.
         random_states: uint64 (...,), the ants' random streams.
         epsilon, learning_rate: float64 (...,), of the next episode.
     """
@@ -72,8 +71,7 @@ class RunState(Record):
     ) -> RunState:
         """Of runs that have not begun, leading axes (configurations, seeds)."""
         state = cls.empty((len(configs), len(seeds)), n_states, memory_for(configs, n_states))
-        words = np.array([seed % 2**64 for seed in seeds], dtype=np.uint64)
-        state.random_states[:] = stream_state(words, STREAM_ANT, 0)
+        state.random_states[:] = stream_state(words_of(seeds), STREAM_ANT, 0)
         for config, q, epsilon, rate in zip(
             configs, state.q, state.epsilon, state.learning_rate, strict=True
         ):
@@ -106,19 +104,13 @@ def memory_for(configs: Sequence[TrainingConfig], n_states: int) -> Memory:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TrainingResult(Record):
-    """What `train` returns.
+    """The result of `train`: C configurations, S seeds, E episodes.
 
-    C configurations, S seeds, E episodes. Two results are equal if all but their seconds are.
+    Two results are equal if all but their seconds are.
 
     Attributes:
-        world: The world trained in.
-        configs: The configurations, in the order of the arrays' first axis.
-        seeds: The seeds, in the order of the second axis.
-        max_steps: The step limit of an episode.
-        task: The rules of the game.
-        returns: int32 (C, S, E), undiscounted sum of the rewards of each episode.
-        steps: int32 (C, S, E), length of each episode.
-        deliveries: int32 (C, S, E), 1 where the food was given to the queen.
+        returns, steps, deliveries: int32 (C, S, E), of each episode the undiscounted sum of
+            rewards, the length, and 1 if the food was given to the queen.
         seconds: What the last training took without compilation: CPU seconds of all threads
             together, or wall-clock seconds on a GPU.
         state: Where the runs stopped, leading axes (C, S).
@@ -156,11 +148,7 @@ class TrainingResult(Record):
         arrays = {**vars(self), **vars(state)}
         for name, (kind, shape) in forms.items():
             array = arrays[name]
-            if not isinstance(array, np.ndarray) or (array.dtype, array.shape) != (kind, shape):
-                raise AntsError(
-                    f"{name} of a result is {shown(array)}; for {runs[0]} configurations and "
-                    f"{runs[1]} seeds it must be an array of shape {shape} and type {kind}."
-                )
+            check_array(f"{name} of a result", array, kind, shape)
 
     @property
     def episodes(self) -> int:
@@ -173,11 +161,7 @@ class TrainingResult(Record):
         return self.state.q[:, :, 0, :, :N_ACTIONS].copy()
 
     def save(self, path: PathLike) -> None:
-        """Write the result; training goes on from what `load` reads, bit for bit.
-
-        Raises:
-            AntsError: The file cannot be written.
-        """
+        """Write the result; training goes on from what `load` reads, bit for bit."""
         facts = {
             "world": self.world.as_dict(),
             "task": self.task.as_dict(),
@@ -192,11 +176,7 @@ class TrainingResult(Record):
 
     @classmethod
     def load(cls, path: PathLike) -> TrainingResult:
-        """Read a result that `save` wrote; its learners need not be registered.
-
-        Raises:
-            AntsError: The file is missing, damaged, of another kind, or its observation is unknown.
-        """
+        """Read a result that `save` wrote; its learners need not be registered."""
         with _KIND.reading(path) as (arrays, facts):
             task = Task.from_dict(facts["task"])
             outcomes: dict[str, Any] = {name: arrays[name] for name in OUTCOMES}

@@ -9,32 +9,15 @@ from taichi.math import popcnt
 
 from taichi_ants.engines.views import encode_function, is_percept, judge, view_type
 from taichi_ants.grid.constants import N_HEADINGS
-from taichi_ants.task.constants import (
-    FORWARD,
-    LEFT,
-    PICK_UP,
-    RIGHT,
-)
+from taichi_ants.task.constants import FORWARD, LEFT, PICK_UP, RIGHT
 from taichi_ants.task.events import Event
 from taichi_ants.task.observations import Observation
-from taichi_ants.task.rules.actions import (
-    is_open,
-    move_event,
-    step_towards,
-    turn,
-    turn_round,
-)
+from taichi_ants.task.rules import vision
+from taichi_ants.task.rules.actions import is_open, move_event, step_towards, turn, turn_round
 from taichi_ants.task.rules.delivery import can_give, heading_after_delivery
 from taichi_ants.task.rules.pheromone import FADING, NONE, level_after_deposit, level_left
 from taichi_ants.task.rules.policy import bit_number, lowest_bit_number
 from taichi_ants.task.rules.random_bits import draw_below
-from taichi_ants.task.rules.vision import (
-    code_in_view,
-    goals_in_view,
-    nearer_from,
-    percept_carrying,
-    percept_foraging,
-)
 
 # An ant, and what came of its last action.
 Ant = ti.types.struct(
@@ -62,11 +45,7 @@ def restore(a: ti.template(), base, origin, first, last):
 
 @ti.func
 def lay(kind: ti.template(), a: ti.template(), base, cell, clock, expiry, carried):
-    """Lay a trail on an empty cell.
-
-    `kind` is the deposit, see `rules.pheromone`, `expiry` the clock that is stored there so far,
-    `carried` for how many ticks the ant has carried its food.
-    """
+    """Lay a trail on an empty cell, where `expiry` is stored so far; see `rules.pheromone`."""
     level = level_after_deposit(a, kind, level_left(expiry, clock), carried)
     a.cells[base + cell] = clock + level
     a.cells[base + a.size] = ti.min(a.cells[base + a.size], cell)
@@ -88,11 +67,13 @@ def percept_of(half: ti.template(), a: ti.template(), base, ant, clock):
     right = a.cells[here + step_towards(a.compass, ant.heading, RIGHT)]
     percept = 0
     if ant.carries == 1:
-        nearer = nearer_from(a.closer[ant.origin + ant.cell], ant.heading)
-        percept = percept_carrying(ground_of(left), ground_of(forward), ground_of(right), nearer)
+        nearer = vision.nearer_from(a.closer[ant.origin + ant.cell], ant.heading)
+        percept = vision.percept_carrying(
+            ground_of(left), ground_of(forward), ground_of(right), nearer
+        )
     else:
         trail_left, trail_forward, trail_right = left - clock, forward - clock, right - clock
-        percept = percept_foraging(
+        percept = vision.percept_foraging(
             half,
             ground_of(left),
             ground_of(forward),
@@ -116,7 +97,8 @@ def state_seen(observation: Observation, half: bool) -> Callable[..., Any]:
 
     @ti.func
     def see(a: ti.template(), base, ant, clock, percept):
-        here, nearer = base + ant.cell, nearer_from(a.closer[ant.origin + ant.cell], ant.heading)
+        here = base + ant.cell
+        nearer = vision.nearer_from(a.closer[ant.origin + ant.cell], ant.heading)
         view = view_of(carries=ant.carries, own_level=level_left(a.cells[here], clock))
         for k in ti.static(range(len(in_view))):
             towards = (ant.heading + in_view[k] + N_HEADINGS) % N_HEADINGS
@@ -144,7 +126,7 @@ def act(deposit: ti.template(), a: ti.template(), base, ant, percept, action, cl
     after.event = Event.FAILED
     if action <= RIGHT:
         after.heading = turn(a.compass, ant.heading, action)
-        code = code_in_view(percept, action)
+        code = vision.code_in_view(percept, action)
         after.event = move_event(code)
         if is_open(code):
             after.cell += step_towards(a.compass, after.heading, FORWARD)
@@ -153,7 +135,7 @@ def act(deposit: ti.template(), a: ti.template(), base, ant, percept, action, cl
                     before = a.cells[base + after.cell]
                     lay(deposit, a, base, after.cell, clock, before, ant.carried)
     else:
-        goals = goals_in_view(percept)
+        goals = vision.goals_in_view(percept)
         if goals != 0 and action == PICK_UP and ant.carries == 0:
             position = lowest_bit_number(goals)
             if goals & (goals - 1) != 0:  # several foods in view

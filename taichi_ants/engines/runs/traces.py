@@ -29,14 +29,10 @@ MAX_TABLE_ROWS = 12_800_000  # of 32 bytes; each step of training keeps its tabl
 
 @dataclass(frozen=True, eq=False)
 class Made:
-    """How a trace was made, so that it can be played again; see `rollout`, `trace_training`.
+    """The arguments of a trace, by which it can be played again; see `rollout`, `trace_training`.
 
-    Attributes:
-        world, task, seed, max_steps: Of the run.
-        number: Of the rollout.
-        q_values: float (n_states, 5), the table that the ant followed; None if it learned.
-        epsilon: With which it followed the table.
-        config: How it learned; None if it did not.
+    `number` is that of the rollout; `q_values`, float (n_states, 5), the table that the ant
+    followed with `epsilon`, None if it learned; `config` is how it learned.
     """
 
     world: World
@@ -53,19 +49,15 @@ class Made:
 class Trace(Record):
     """What happened in each of n steps; position, heading and state are those before the action.
 
-    Attributes:
-        episodes: int32 (n,), number of the episode, from 0; of `trace_policies`, of the policy.
-        steps: int32 (n,), number of the step in its episode, from 0.
+    Attributes (int32 (n,) unless noted):
+        episodes: Number of the episode, from 0; of `trace_policies`, of the policy.
+        steps: Number of the step in its episode, from 0.
         cells: int32 (n, 3), cube coordinates in normal form.
-        headings: int32 (n,), 0 to 5.
-        percepts: int32 (n,), what the ant sees, see `taichi_ants.task.states`.
-        states: int32 (n,), the index of its state; by the paper's observation that
-            is the percept.
-        actions: int32 (n,), 0 to 4.
-        rewards: int32 (n,).
-        next_percepts, next_states: int32 (n,), what the ant sees after the step.
+        headings, percepts, states: 0 to 5; what the ant sees, see `taichi_ants.task.states`; and
+            the index of its state, by the paper's observation the percept.
+        actions, rewards, events: 0 to 4; what they were paid; their results, see `Event`.
+        next_percepts, next_states: What the ant sees after the step.
         terminated: bool (n,), whether the learner took the next state as terminal.
-        events: int32 (n,), the results of the actions, see `Event`.
         q_values: float32 (n, 5), the action values of the state when the action was chosen.
         td_errors: float32 (n,), of the update after the step; None without learning.
         tables: float32 (n, n_states, 5), the Q-table after the step; None without learning.
@@ -130,15 +122,9 @@ def trace_policies(
     max_steps: int = EPISODE_STEPS,
     task: Task | None = None,
 ) -> Iterator[Trace]:
-    """Rollout 0 of each of many policies, some policies at a time.
+    """Yield the traces of rollout 0 of many policies (n, n_states, 5), some policies at a time.
 
-    Args:
-        world, max_steps, task: As in `evaluate`, which tells the errors, too.
-        q_values: float (n, n_states, 5), action values of each policy.
-        seeds: Their seeds (n,); a seed may come several times.
-
-    Yields:
-        The steps of the first policies, of the next ones, and so on, in order.
+    Each policy has a seed; a seed may come several times. Other arguments are those of `evaluate`.
     """
     task = checks.checked_runs_task(task)
     tables = checks.checked_q_values(q_values, task)

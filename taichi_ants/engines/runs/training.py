@@ -7,22 +7,12 @@ import operator
 from collections.abc import Sequence
 from dataclasses import astuple, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
-from taichi_ants import learners, runtime
-from taichi_ants.checks import (
-    check_finite,
-    check_progress,
-    checked_configs,
-    checked_max_steps,
-    checked_q_values,
-    checked_runs_task,
-    checked_seeds,
-    checked_seeds_for,
-    checked_share,
-    checked_world,
-)
+from taichi_ants import checks, learners, runtime
+from taichi_ants.engines.layout import OUTCOMES
 from taichi_ants.engines.runs.engine import Progress, Runs, do_episodes
 from taichi_ants.engines.runs.results import Rollouts, RunState, TrainingResult, memory_for
 from taichi_ants.errors import AntsError, checked_whole, shown
@@ -59,20 +49,17 @@ def train(
         threads: CPU threads; None keeps what runs, or takes all.
         arch: "cpu" or "cuda"; None keeps what runs, or takes the CPU.
         progress: Called now and then with the share of the work that is done.
-
-    Raises:
-        AntsError: An argument is not allowed; the message names it.
     """
-    configs = checked_configs(configs)
-    seeds = checked_seeds(seeds)
-    checked_world(world, learns=True)
-    task = checked_runs_task(task)
+    configs = checks.checked_configs(configs)
+    seeds = checks.checked_seeds(seeds)
+    checks.checked_world(world, learns=True)
+    task = checks.checked_runs_task(task)
     none_yet = np.zeros((len(configs), len(seeds), 0), dtype=np.int32)
     start = TrainingResult(
         world=world,
         configs=configs,
         seeds=seeds,
-        max_steps=checked_max_steps(max_steps, task),
+        max_steps=checks.checked_max_steps(max_steps, task),
         task=task,
         returns=none_yet,
         steps=none_yet,
@@ -91,22 +78,14 @@ def continue_training(
     arch: str | None = None,
     progress: Progress | None = None,
 ) -> TrainingResult:
-    """Train every run of a result for more episodes.
+    """Train every run of a result, which is left as it is, for more episodes.
 
-    The outcome is, bit for bit, that of a single training with the sum of the episodes; the given
-    result is left as it is.
-
-    Args:
-        result: What `train` or this function returned.
-        episodes: Further episodes of each run, at least 1.
-        threads, arch, progress: As in `train`, which tells the errors, too.
-
-    Returns:
-        All episodes, old and new; `seconds` is what the new ones took.
+    The outcome is, bit for bit, that of a single training with the sum of the episodes; `seconds`
+    is what the new ones took. Further arguments and errors are those of `train`.
     """
     if not isinstance(result, TrainingResult):
         raise AntsError(f"result is {shown(result)}; give what train has returned.")
-    checked_configs(result.configs)
+    checks.checked_configs(result.configs)
     _check_memory(result)
     kept = replace(result, state=copy.deepcopy(result.state))
     return _train(kept, episodes, threads, arch, progress)
@@ -121,7 +100,7 @@ def _train(
 ) -> TrainingResult:
     """As `continue_training`, but the state of the given result is moved on."""
     episodes = checked_whole("episodes", episodes)
-    check_progress(progress)
+    checks.check_progress(progress)
     runtime.start(threads, arch)
     state, shape = result.state, (len(result.configs), len(result.seeds))
     outcomes = np.zeros((3, *shape, episodes), dtype=np.int32)
@@ -129,7 +108,10 @@ def _train(
     groups: dict[tuple, list[int]] = {}
     for c, config in enumerate(result.configs):
         groups.setdefault((config.learner, config.hyperparameters), []).append(c)
-    costs = [_cost(result.configs[group[0]]) * len(group) for group in groups.values()]
+    costs = []
+    for group in groups.values():
+        learner = learners.get(result.configs[group[0]].learner)
+        costs.append(learner.cost(learner.settings(result.configs[group[0]])) * len(group))
     done, seconds = 0.0, 0.0
     for group, cost in zip(groups.values(), costs, strict=True):
         chosen, where = [result.configs[c] for c in group], _place(group)
@@ -139,32 +121,19 @@ def _train(
         into = outcomes[:, where].reshape(3, len(runs), episodes)  # a view, or a copy
         seconds += do_episodes(result.world, result.task, result.max_steps, runs, into, part)
         outcomes[:, where] = into.reshape(3, len(group), shape[1], episodes)
-        check_finite(runs.state.q, chosen, result.seeds)
+        checks.check_finite(runs.state.q, chosen, result.seeds)
         state.put(where, runs.state)
         done += share
-    returns, steps, deliveries = (
-        _joined(before, new)
-        for before, new in zip(
-            (result.returns, result.steps, result.deliveries), outcomes, strict=True
-        )
-    )
-    return replace(result, returns=returns, steps=steps, deliveries=deliveries, seconds=seconds)
-
-
-def _cost(config: TrainingConfig) -> float:
-    learner = learners.get(config.learner)
-    return learner.cost(learner.settings(config))
+    joined: dict[str, Any] = dict(zip(OUTCOMES, outcomes, strict=True))
+    if result.episodes:
+        joined = {n: np.concatenate([getattr(result, n), a], axis=2) for n, a in joined.items()}
+    return replace(result, **joined, seconds=seconds)
 
 
 def _place(group: list[int]) -> slice | list[int]:
     """Where configurations are: a slice, which copies nothing, if one follows the other."""
     first, end = group[0], group[-1] + 1
     return slice(first, end) if end - first == len(group) else group
-
-
-def _joined(before: np.ndarray, new: np.ndarray) -> np.ndarray:
-    """The outcomes of old and new episodes."""
-    return np.concatenate([before, new], axis=2) if before.shape[2] else new
 
 
 def _report(progress: Progress, done: float, share: float, part: float) -> None:
@@ -201,32 +170,29 @@ def evaluate(
     """Follow fixed policies without learning.
 
     Args:
-        world: The world; each rollout starts from exactly this.
         q_values: float (..., n_states, 5), action values; the best action is taken, ties at random.
         rollouts: Episodes with each table, at least 1. Rollout k of a seed has a stream of its own.
         seeds: One seed for all tables, or as many as the tables' last leading axis is long. A
             single table takes any number of seeds; then they are the first axis of what comes out.
-        max_steps: Steps after which a rollout is truncated.
-        task: The rules of the game; None is the paper's.
         epsilon: Probability of a random action.
-        threads, arch, progress: As in `train`.
+        world, max_steps, task, threads, arch, progress: As in `train`.
 
     Raises:
         AntsError: An argument is not allowed; the message names it.
     """
-    task = checked_runs_task(task)
-    tables = checked_q_values(q_values, task)
-    if tables.ndim == 2 and (several := len(checked_seeds(seeds))) > 1:
+    task = checks.checked_runs_task(task)
+    tables = checks.checked_q_values(q_values, task)
+    if tables.ndim == 2 and (several := len(checks.checked_seeds(seeds))) > 1:
         tables = np.broadcast_to(tables, (several, *tables.shape))
     shape = tables.shape[:-2]
-    run_seeds = checked_seeds_for(seeds, shape)
+    run_seeds = checks.checked_seeds_for(seeds, shape)
     rollouts = checked_whole("rollouts", rollouts)
-    epsilon = checked_share("epsilon", epsilon)
-    max_steps = checked_max_steps(max_steps, task)
-    check_progress(progress)
+    epsilon = checks.checked_share("epsilon", epsilon)
+    max_steps = checks.checked_max_steps(max_steps, task)
+    checks.check_progress(progress)
     runtime.start(threads, arch)
     flat = tables.reshape(-1, *tables.shape[-2:])
     runs = Runs.following(flat, run_seeds, np.arange(rollouts), epsilon)
     outcomes = np.empty((3, len(runs), rollouts), np.int32)
-    do_episodes(checked_world(world), task, max_steps, runs, outcomes, progress)
+    do_episodes(checks.checked_world(world), task, max_steps, runs, outcomes, progress)
     return Rollouts(*outcomes.reshape(3, *shape, rollouts))

@@ -5,10 +5,9 @@ from taichi_ants.task.states import name_of_codes
 
 
 def encode(view):
-    """The load, then a code of each cell as a digit of base 6.
+    """The load, then a code of each cell as a digit of base 6: the paper's, 4 or 5 for other loads.
 
-    The paper's codes; 4 for an ant with the other load on a better cell, 5 for one on any other. A
-    better cell is nearer to the queen, or without food has a stronger trail, than the ant's own.
+    4 is an ant on a better cell: nearer to the queen, or without food with a stronger trail.
     """
     index = view.carries
     for k in range(3):

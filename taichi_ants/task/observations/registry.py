@@ -1,9 +1,8 @@
 """The one place where observations are registered.
 
-An observation tells the index of the state that an ant sees. What an ant can do and
-what it is paid for never depends on it: these go by the percept, the paper's state. To add one,
-write a file beside this one and a line in `__init__.py`; or call `register` from a file of your
-own.
+An observation gives the index of the state that an ant sees. Actions and rewards never depend on
+it: these go by the percept, the paper's state. To add one, write a file beside this one and a line
+in `__init__.py`; or call `register` from a file of your own.
 """
 
 from __future__ import annotations
@@ -37,23 +36,21 @@ class Observation:
         encode: A function of one argument, the ant's view, that returns the state index, from 0 to
             n_states - 1. It is compiled for the kernels, so it computes with whole numbers alone:
             arithmetic, comparisons, `if`, and `for` over a `range`; no imports and no calls; and it
-            ends with its only `return`.
-            Its argument has, each a whole number (levels are floats where trails halve or spread):
-            `carries`, 1 with food, else 0; `percept`, the paper's state, 0 to 127; `codes`, what
-            each cell in `cells` looks like (0 E, 1 O, 2 T or S, 3 F or Q; T is measured against
-            the strongest trail of the three cells ahead); `levels`, the trail of each if it is
-            empty or an ant stands there, else 0; `strongest`, the largest level of the three cells
-            ahead that counts; `ants`, 0 for no ant there, 1 for one without food, 2 for one with
-            food; `nearer`, 1 if the cell is nearer to the queen than the ant's own; and
-            `own_level`, the trail on its own cell.
-        cells: The cells in view: their headings relative to the ant's, each from -2 to 3; -1, 0
-            and 1, the cells ahead, are among them.
+            ends with its only `return`. The view has, each a whole number (levels are floats where
+            trails halve or spread): `carries`, 1 with food, else 0; `percept`, the paper's state, 0
+            to 127; `codes`, what each cell in `cells` looks like (0 E, 1 O, 2 T or S, 3 F or Q; T
+            is measured against the strongest trail of the three cells ahead); `levels`, the trail
+            of each if it is empty or an ant stands there, else 0; `strongest`, the largest level of
+            the three cells ahead that counts; `ants`, 0 for no ant there, 1 for one without food, 2
+            for one with food; `nearer`, 1 if the cell is nearer to the queen than the ant's own;
+            and `own_level`.
+        cells: The cells in view: their headings relative to the ant's, each from -2 to 3; -1, 0 and
+            1, the cells ahead, are among them.
         name_of: The name of a state for people.
         summary: One line for listings.
-        letters: What those letters in names mean that are none of the paper's E, O, T, S, F and Q.
-        shape: The sizes of what a state index is made of, if it is a number of several parts, as
-            of digits: `np.unravel_index(state, shape)` are the parts. Environments show them to
-            neural networks.
+        letters: What letters in names mean that are not the paper's E, O, T, S, F and Q.
+        shape: The sizes of the parts of a state index, if it has several, as digits; environments
+            show them to neural networks.
     """
 
     name: str
@@ -87,9 +84,8 @@ _OBSERVATIONS: dict[str, Observation] = {}
 def register(observation: Observation) -> Observation:
     """Make an observation known by its name; it replaces your own observation of the same name.
 
-    Raises:
-        AntsError: The name is that of an observation of the package or not an identifier, a field
-            does not have the form that it must have, or a state index is outside of the range.
+    AntsError if the name is that of an observation of the package or not an identifier, a field
+    does not have the form that it must have, or a state index is outside of the range.
     """
     expect("what is registered", observation, Observation)
     name = observation.name
@@ -132,11 +128,7 @@ def _is_built_in(name: str) -> bool:
 
 
 def get(name: str) -> Observation:
-    """The observation of that name.
-
-    Raises:
-        AntsError: There is none; the message lists those that exist.
-    """
+    """The observation of that name; AntsError, which lists those that exist, if there is none."""
     if not isinstance(name, str) or name not in _OBSERVATIONS:
         raise AntsError(
             f"there is no observation {shown(name)}; choose one of {', '.join(names())}, or name "

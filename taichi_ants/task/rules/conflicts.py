@@ -86,8 +86,8 @@ def heading_wanted(c: ti.template(), place):
 def way_is_free(c: ti.template(), traffic: ti.template(), base, cell, wanted):
     """Whether the winner on `cell` enters a cell that is empty, or whose ant moves on as it does.
 
-    The winners of cells with ants form queues; one moves if its head enters an empty cell. A queue
-    that bites its own tail is a ring, which stays.
+    Winners of cells with ants form queues; one moves if its head enters an empty cell; a ring
+    stays.
     """
     ahead = wanted
     if ti.static(traffic.follow):
@@ -130,15 +130,12 @@ def gives_way(c: ti.template(), traffic: ti.template(), base, cell):
 def settle(
     c: ti.template(), traffic: ti.template(), base, cell, wanted, ahead, carries, moves, entered
 ):
-    """Where an ant is after the tick, whether another one takes its place, and its event.
+    """Return the cell of an ant after the tick, whether it is filled again, and the event.
 
     It moves on an empty way; or, with food, it changes places with the ant in its way; or it gives
-    way to an ant with food that wins its cell; or it stays.
-
-    Args:
-        wanted: The cell that it wins; else its own, `cell`.
-        ahead: The cell that it faces.
-        moves: Whether its action is a move, which has the event `entered` if it succeeds.
+    way to an ant with food that wins its cell; or it stays. `wanted` is the cell that it wins, else
+    its own; `ahead` the one that it faces. If its action `moves` and succeeds, the event is
+    `entered`.
 
     Returns:
         Its cell; whether another ant enters the cell that it leaves; its event; whether it enters

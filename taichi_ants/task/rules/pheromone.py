@@ -21,13 +21,9 @@ def level_left(expiry, clock):
 
 @ti.func
 def level_after_deposit(p: ti.template(), kind: ti.template(), level, carried):
-    """The level of a cell on which an ant with food lays its trail.
+    """The level of a cell on which an ant that has `carried` food for so many ticks lays its trail.
 
-    Args:
-        p: Has `Pheromone.numbers`.
-        kind: SET, ADD, FADING or NONE.
-        level: Of the cell before.
-        carried: For how many ticks the ant has carried its food.
+    `p` has `Pheromone.numbers`; `kind` is SET, ADD, FADING or NONE; `level` is that before.
     """
     after = level
     if kind == SET:

@@ -40,10 +40,7 @@ def low_word(bits):
 
 @ti.func
 def below(word, n):
-    """A whole number in [0, n) from a 32-bit word, as i32 (Lemire 2019, without rejection).
-
-    With n up to a few thousand, no number is favoured by more than one part in a million.
-    """
+    """A whole number in [0, n) from a 32-bit word, as i32 (Lemire 2019, without rejection)."""
     return ti.cast((word * ti.cast(n, ti.u64)) >> ti.u64(32), ti.i32)
 
 

@@ -8,11 +8,10 @@ from taichi_ants.task.constants import EMPTY, SEES_LURE
 
 @ti.func
 def see_foraging(half: ti.template(), ground, level, strongest):
-    """The code of a cell for an ant without food.
+    """The code of a cell for an ant without food; `ground` is what the cell holds.
 
-    `ground` is what the cell holds, `level` its trail if it is empty, else 0 or less, and
-    `strongest` the largest level in view that counts. An empty cell is a trail if its level is at
-    least 1 and, if `half`, at least half of the strongest, else as much.
+    An empty cell is a trail if its `level` (else 0 or less) is at least 1 and, if `half`, at least
+    half of the `strongest` in view that counts, else as much.
     """
     lure = 0
     if ti.static(half):
