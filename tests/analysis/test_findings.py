@@ -30,6 +30,7 @@ EQUIVALENT, UNDECIDED = Verdict.EQUIVALENT, Verdict.UNDECIDED
         (0.1, 0.9, EQUIVALENT),
         (-0.9, 0.9, EQUIVALENT),
         (-0.9, -0.1, EQUIVALENT),
+        (-1.0, 1.0, EQUIVALENT),
         (-0.5, 1.5, UNDECIDED),
         (-math.inf, math.inf, UNDECIDED),
         (0.0, 5.0, UNDECIDED),
