@@ -15,7 +15,7 @@ import pytest
 from command_lines import ROOT
 
 from taichi_ants import AntsError, TrainingConfig, learners
-from taichi_ants.settings import Is, Setting, Settings, all_of, declared, table
+from taichi_ants.settings import Is, Setting, Settings, all_of, declared, nested, table
 from taichi_ants.task import Pheromone, Task, Traffic
 from taichi_ants.worlds import double_bridge, open_world
 
@@ -116,6 +116,12 @@ def test_what_depends_on_another_setting():
     assert refused(lambda: replace(Soup("thick"), kind="thin")).endswith(
         "unless `kind` is 'thick'."
     )
+
+
+def test_full_names_become_tables_in_any_order():
+    tree = {"task": {"traffic": {"": "following", "grant": False}}}
+    named = [("task.traffic", "following"), ("task.traffic.grant", False)]
+    assert nested(dict(named)) == nested(dict(named[::-1])) == tree
 
 
 def test_the_rules_of_a_task_that_depend_on_each_other():

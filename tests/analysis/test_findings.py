@@ -30,6 +30,7 @@ EQUIVALENT, UNDECIDED = Verdict.EQUIVALENT, Verdict.UNDECIDED
         (0.1, 0.9, EQUIVALENT),
         (-0.9, 0.9, EQUIVALENT),
         (-0.9, -0.1, EQUIVALENT),
+        (-1.0, 1.0, EQUIVALENT),
         (-0.5, 1.5, UNDECIDED),
         (-math.inf, math.inf, UNDECIDED),
         (0.0, 5.0, UNDECIDED),
@@ -224,3 +225,12 @@ def test_what_is_missing_is_not_tested_and_counts_for_no_level() -> None:
     for finding in (*others, others[0].by_mean, weakest([first, others[0]])):
         assert finding.verdict is Verdict.NOT_TESTED
         assert np.isnan([finding.effect, finding.low, finding.high]).all()
+
+
+def test_an_interval_ends_where_the_estimate_cannot_go() -> None:
+    shares = np.resize([0.0] + [1.0] * 9, 20)
+    free, cut = judge(
+        [Contrast("a", shares, above(), possible=one) for one in (UNBOUNDED, (0.0, 1.0))]
+    )
+    assert free.high > cut.high == 1.0
+    assert free.low == cut.low

@@ -236,7 +236,7 @@ def test_resamples_are_drawn_once_with_each_seed_equally_often() -> None:
 def test_resamples_that_are_too_many_to_be_kept_are_the_same(
     iqm: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    values = np.random.default_rng(1).normal(size=(3, 300))
+    values = np.random.default_rng(1).normal(size=(3, 60))
     expected = bootstrap_interval(values, iqm=iqm)
     resampling_counts.cache_clear()
     monkeypatch.setattr(statistics, "_MOST_KEPT", 0)

@@ -49,7 +49,7 @@ def colonies_of(seed, ticks=TICKS, episodes=2):
 
 
 @given(SEEDS)
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=30, deadline=None, derandomize=True)
 def test_food_is_conserved(seed):
     for drawn, colony, _ in colonies_of(seed):
         carried = sum(ant.carries for ant in colony.ants.values())
@@ -63,7 +63,7 @@ def test_food_is_conserved(seed):
 
 
 @given(SEEDS)
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=30, deadline=None, derandomize=True)
 def test_ants_stand_alone_on_empty_cells(seed):
     for drawn, colony, _ in colonies_of(seed):
         cells = [ant.cell for ant in colony.ants.values()]
@@ -80,7 +80,7 @@ def test_ants_stand_alone_on_empty_cells(seed):
 
 
 @given(SEEDS)
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=30, deadline=None, derandomize=True)
 def test_of_those_that_want_a_free_cell_exactly_one_gets_it(seed):
     for _, colony, before in colonies_of(seed, episodes=1):
         wanting, getting = Counter(), Counter()

@@ -29,6 +29,7 @@ from taichi_ants.viewer import (
     record_episode,
     record_trace,
 )
+from taichi_ants.viewer.frames import types_of
 
 # Each entry takes kernels of its own: learner, sharing, observation, dense, traffic.
 KERNELS = [
@@ -74,7 +75,7 @@ def test_a_recording_is_what_engine_and_reference_do(learner, sharing, sees, den
         recording = unpacked(Recording(recorder.header(), frames).to_bytes())
         moments = list(played(recording))
         rewards = np.array(recording.header["rewards"])
-        before = None
+        before, met = None, set()
         assert len(moments) == len(transitions)
         for moment, snapshot, table, (slots, views), did in zip(
             moments, snapshots, tables, ants, transitions, strict=False
@@ -93,6 +94,8 @@ def test_a_recording_is_what_engine_and_reference_do(learner, sharing, sees, den
                 state = int(moment.states[place])
                 held = moment.row(state, drawn.task.n_states, owner)
                 assert np.array_equal(held, own[state])
+                met.add(owner * drawn.task.n_states + state)
+            assert met == {entry // 5 for entry in moment.values}
             if before is not None:
                 assert before.numbers.tolist() == [one.number for one in did]
                 assert moment.actions.tolist() == [one.action for one in did]
@@ -183,6 +186,12 @@ def test_a_delivery_is_in_the_totals_and_the_events():
     moments = list(played(record_episode(Episode.play(worlds.paper(), trail_follower()))))
     assert [moment.clock[2] for moment in moments[-2:]] == [0, 1]
     assert moments[-1].events.tolist() == [Event.DELIVERED]
+
+
+def test_cells_and_states_take_as_many_bytes_as_they_need():
+    assert types_of(2**16 - 1, 2**16 - 1, True)["cells"] == "u2"
+    assert types_of(2**16, 2**16 - 1, True)["cells"] == "u4"
+    assert types_of(2**16 - 1, 2**16, True)["states"] == "u4"
 
 
 def test_what_cannot_be_recorded_says_why():

@@ -147,7 +147,7 @@ def plain_deliveries(world: World, ticks: int, task: Task) -> list[int]:
 
 
 @given(st.integers(0, 10_000), st.sampled_from([Task(), foraging(), queueing()]))
-@settings(max_examples=30)
+@settings(max_examples=15)
 def test_the_cycle_is_what_a_plain_search_delivers_in_the_long_run(seed: int, task: Task) -> None:
     world = random_world(seed, largest_range=4)
     most = plain_deliveries(world, 240, task)

@@ -141,6 +141,8 @@ def test_whole_trainings_of_a_mixed_sweep():
     for number, world in enumerate((paper(), random_world(12), random_world(13, 8))):
         task = random_task(number)
         configs = [random_config(seed, names[seed % len(names)]) for seed in range(2 * len(names))]
+        # Only this one learns from an episode that is cut off.
+        configs.append(TrainingConfig("n_step_sarsa", 0.37, 0.9, 0.3, 0.99, n_steps=3))
         result = train(
             world, configs, seeds=(5, -1, 2**63 + 5), episodes=9, max_steps=70, task=task
         )

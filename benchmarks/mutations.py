@@ -1,0 +1,255 @@
+"""Plant small mistakes in a copy of the package, and see which of them the quick suite notices.
+
+    python benchmarks/mutations.py                   # all, about ten minutes
+    python benchmarks/mutations.py statistics files  # those whose file or tests contain a word
+
+Each mutation is a wrong change of one line with the tests that must notice it. The script prints
+"noticed", "NOT NOTICED", or "stale" where the old text no longer occurs exactly once, and exits
+with 1 unless all were noticed. The tests must pass without mutations.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+TIMEOUT = 300.0  # seconds; a mutation that makes a test wait that long is noticed
+
+RUNS = "tests/engines/runs/test_against_reference.py"
+COLONY = "tests/engines/colony/test_against_reference.py"
+CONFLICTS = "tests/engines/colony/test_conflicts.py"
+TRAFFIC = "tests/engines/colony/test_traffic.py"
+STATISTICS = "tests/analysis/test_statistics.py"
+FINDINGS = "tests/analysis/test_findings.py"
+ARCHIVES = "tests/files/test_archives.py"
+FILES = "tests/files/test_files.py"
+RESULTS = "tests/files/test_results.py"
+RECORDING = "tests/viewer/test_recording.py"
+SERVER = "tests/live/test_server.py"
+SESSION = "tests/live/test_session.py"
+EDITS = "tests/live/test_edits.py"
+SETTINGS = "tests/test_settings.py"
+
+# (file in taichi_ants/, old text, new text, tests that must notice)
+MUTATIONS = [
+    # Rules.
+    ("task/rules/actions.py", "heading < 3, heading + 3", "heading < 2, heading + 3", RUNS),
+    ("task/rules/actions.py", "return code & 1 == 0", "return code & 2 == 0", RUNS),
+    ("task/rules/conflicts.py", "(other, tick) > own", "(other, tick) < own", CONFLICTS),
+    ("task/rules/conflicts.py", "loaded > other_loaded or", "loaded < other_loaded or", TRAFFIC),
+    ("task/rules/conflicts.py", "stays = had_ant(", "stays = not had_ant(", TRAFFIC),
+    ("task/rules/conflicts.py", "(WINS | TAKES_FOOD) == WINS", "WINS == WINS", TRAFFIC),
+    ("task/rules/conflicts.py", "True, Event.PUSHED", "True, Event.ENTERED_EMPTY", TRAFFIC),
+    ("task/rules/delivery.py", "(action == GIVE) & (", "(action == GIVE) | (", RUNS),
+    ("task/rules/delivery.py", "turns_at_queen == 1", "turns_at_queen == 0", RUNS),
+    ("task/rules/delivery.py", "(is_last | delivered &", "(is_last & delivered &", RUNS),
+    (
+        "task/rules/pheromone.py",
+        "ti.min(level + p.deposit_level, p.cap)",
+        "level + p.deposit_level",
+        COLONY,
+    ),
+    ("task/rules/pheromone.py", "ti.min(carried, p.fades_after)", "carried", COLONY),
+    ("task/rules/pheromone.py", "if after < 1.0:", "if after < 0.5:", COLONY),
+    ("task/rules/pheromone.py", "levels[neighbour] * share", "level * share", COLONY),
+    ("task/rules/policy.py", "larger(values[2], values[3])", "values[2]", RUNS),
+    (
+        "task/rules/policy.py",
+        "    if high_word(bits) < explore_below:",
+        "    if low_word(bits) < explore_below:",
+        RUNS,
+    ),
+    (
+        "task/rules/policy.py",
+        "(1.0 - explores) / ti.cast(ties",
+        "1.0 / ti.cast(ties",
+        "tests/offline/test_recording.py",
+    ),
+    ("task/rules/random_bits.py", "ti.u64(27)", "ti.u64(28)", RUNS),
+    ("task/rules/vision.py", "2 * level >= ti.max", "2 * level > ti.max", COLONY),
+    ("task/rules/vision.py", "ti.max(strongest, 1)", "ti.max(strongest, 0)", RUNS),
+    ("task/rules/vision.py", "nearer >> 1 & 1", "nearer >> 2 & 1", RUNS),
+    ("task/observations/queues.py", "code = 6", "code = 5", COLONY),
+    (
+        "task/observations/trail_levels.py",
+        "level < view.strongest -",
+        "level <= view.strongest -",
+        COLONY,
+    ),
+    ("task/observations/ants_seen.py", "view.ants[k] != 0", "view.ants[k] == 1", COLONY),
+    ("task/rewards.py", "[[Event.ENTERED_EMPTY, Event.PUSHED]]", "[Event.ENTERED_EMPTY]", TRAFFIC),
+    # Engines.
+    ("engines/runs/kernels.py", "step + 1 == a.max_steps", "step == a.max_steps", RUNS),
+    ("engines/runs/kernels.py", "clock += a.evaporates", "clock += 1", RUNS),
+    ("engines/runs/kernels.py", "= percept, taken.state", "= seen, taken.state", RUNS),
+    ("engines/runs/step.py", "a.regrows == 0", "a.regrows == 1", RUNS),
+    ("engines/colony/life.py", "c.age[ant] >= c.lifespan", "c.age[ant] > c.lifespan", COLONY),
+    ("engines/colony/life.py", "tick >= taken + c.regrowth", "tick > taken + c.regrowth", COLONY),
+    ("engines/colony/life.py", "(tick + 1) % c.wander", "tick % c.wander", COLONY),
+    ("engines/colony/life.py", "== 1, FOOD, EMPTY)", "== 1, EMPTY, EMPTY)", COLONY),
+    (
+        "engines/colony/life.py",
+        "FIRST_DELIVERY, w] = tick + 1",
+        "FIRST_DELIVERY, w] = tick",
+        COLONY,
+    ),
+    ("engines/colony/life.py", "c.number[ant] < c.n_ants", "c.number[ant] < c.n_ants - 1", COLONY),
+    ("engines/colony/learning.py", "tick + 1 == c.length", "tick == c.length", COLONY),
+    ("engines/colony/learning.py", "* _ONE + 0.5)", "* _ONE)", COLONY),
+    ("engines/colony/learning.py", "shape[0] - 1)]  #", "shape[0] - 2)]  #", COLONY),
+    ("engines/colony/learning.py", "c.initial_q, 0.0)", "0.0, 0.0)", COLONY),
+    ("engines/colony/learning.py", "if number > c.sums_of", "if number >= c.sums_of", COLONY),
+    ("engines/colony/steps.py", "moves & (not enters), ti", "moves & enters, ti", COLONY),
+    ("engines/colony/steps.py", "clock) > level_of", "clock) >= level_of", TRAFFIC),
+    ("engines/colony/steps.py", "c.carried[ant] = 1", "c.carried[ant] = 0", COLONY),
+    (
+        "engines/colony/interventions.py",
+        "(colony.episode << 32) + numbers",
+        "(colony.episode << 31) + numbers",
+        EDITS,
+    ),
+    ("engines/colony/interventions.py", "epsilon_decay=1.0, min", "min", SESSION),
+    ("engines/colony/interventions.py", "numbers < self.colony.ants ", "numbers < 0 ", EDITS),
+    # Learners.
+    ("learners/expected_sarsa.py", "ti.f32(0.2)", "ti.f32(0.25)", RUNS),
+    ("learners/double_q.py", "next_values[a] > largest", "next_values[a] >= largest", RUNS),
+    ("learners/dyna_q.py", "(bits_of(rng)), n_visited)", "(bits_of(rng)), n_visited - 1)", RUNS),
+    ("learners/model.py", "& 2047)", "& 1023)", RUNS),
+    ("learners/prioritized_sweeping.py", "if ti.abs(error) >", "if error >", RUNS),
+    ("learners/sarsa_lambda.py", "rates.discount * rates.trace_decay", "rates.trace_decay", RUNS),
+    ("learners/n_step_sarsa.py", "(ends == 1 and", "(step.terminated == 1 and", RUNS),
+    # Statistics.
+    (
+        "analysis/statistics.py",
+        "cut = ordered.shape[1] // 4",
+        "cut = ordered.shape[1] // 5",
+        STATISTICS,
+    ),
+    ("analysis/statistics.py", "ddof=1", "ddof=0", STATISTICS),
+    ("analysis/statistics.py", "stdtrit(kept - 1,", "stdtrit(kept,", STATISTICS),
+    ("analysis/statistics.py", "2.0 ** (1 - n) >", "2.0 ** -n >", STATISTICS),
+    ("analysis/statistics.py", "np.minimum(bootstrap", "np.maximum(bootstrap", STATISTICS),
+    ("analysis/statistics.py", "np.sqrt(n / (n - 1))", "np.sqrt((n - 1) / n)", STATISTICS),
+    ("analysis/statistics.py", "cubes / (6 *", "cubes / (3 *", STATISTICS),
+    ("analysis/statistics.py", "levels * (last + 2) - 1", "levels * last", STATISTICS),
+    ("analysis/statistics.py", "- (n - 1) * statistic", "- n * statistic", STATISTICS),
+    ("analysis/findings.py", "max(1, len(readings))", "max(1, len(contrasts))", FINDINGS),
+    ("analysis/findings.py", "< self.low or low > self.high", "< self.low", FINDINGS),
+    (
+        "analysis/findings.py",
+        "-small <= low and high <= small",
+        "-small < low < high < small",
+        FINDINGS,
+    ),
+    ("analysis/findings.py", "first = min(findings", "first = max(findings", FINDINGS),
+    ("analysis/findings.py", "np.clip(ends, *contrast.possible)", "np.array(ends)", FINDINGS),
+    # Files.
+    ("files/archives.py", " {array.shape}\\n", "\\n", ARCHIVES),
+    ("files/archives.py", "if size > most:", "if size > 2 * most:", ARCHIVES),
+    ("files/archives.py", "if version != self.version:", "if version < 0:", ARCHIVES),
+    ("files/__init__.py", 'with open(place, "wb")', 'with open(target, "wb")', FILES),
+    ("files/__init__.py", "st_mtime > _ABANDONED", "st_mtime >= 0", FILES),
+    ("files/__init__.py", "None if v != v else v", "v", FILES),
+    ("files/results.py", "name == may_lack and not", "not", RESULTS),
+    ("files/results.py", "or checksum_of(path) != checksum", "", RESULTS),
+    ("files/results.py", "if replace or not (", "if replace and not (", RESULTS),
+    ("files/results.py", "max([started, *times]) - started", "0", RESULTS),
+    ("studies/blocks.py", "== digest", '!= ""', "tests/studies/test_blocks.py"),
+    # Recorder and viewer.
+    ("viewer/recorder.py", "actions + 16 *", "actions + 8 *", RECORDING),
+    ("viewer/recorder.py", "headings + 8 * carrying", "headings + 8 * ~carrying", RECORDING),
+    ("viewer/recorder.py", "*rates, *counts, clock)", "*rates, *counts, tick)", RECORDING),
+    ("viewer/recorder.py", "colony.delivered[self.world] + totals", "0 * totals", SESSION),
+    ("viewer/recorder.py", "np.full_like(self._table, np.nan)", "self._table.copy()", SESSION),
+    ("viewer/recorder.py", "[new] = False", "[new] = True", RECORDING),
+    ("viewer/recorder.py", "ants[place], len(weights) - 1", "1, len(weights) - 1", RECORDING),
+    ("viewer/frames.py", '"u2" if size < 2**16', '"u2" if size < 2**17', RECORDING),
+    ("viewer/progress.py", "self._before = self.ticks", "self._before = 0", SESSION),
+    # Server.
+    ("live/server.py", "self.unseen >= _MOST_UNSEEN", "self.unseen < 0", SERVER),
+    ("live/server.py", "hmac.compare_digest(first.encode(), self.token.encode())", "True", SERVER),
+    ("live/server.py", "len(host) == 1 and host[0] in hosts", "len(host) == 1", SERVER),
+    ("live/server.py", "self._runs and bool(self._pages)", "self._runs", SERVER),
+    ("live/server.py", "self._joined >= _MOST_PAGES", "self._joined > _MOST_PAGES", SERVER),
+    ("live/server.py", "self._replays and what in _CHANGES", "self._replays and False", SERVER),
+    ("live/server.py", "in_a_row or before.same(session)", "in_a_row", SERVER),
+    # Worlds and the grid.
+    (
+        "worlds/open_world.py",
+        "3 * ranges // 4",
+        "2 * ranges // 3",
+        "tests/worlds/test_open_world.py",
+    ),
+    ("worlds/open_world.py", "rocks[clearing] = False", "pass", "tests/worlds/test_open_world.py"),
+    (
+        "worlds/double_bridge.py",
+        "_corridor(long - ahead, ahead + aside",
+        "_corridor(long - ahead, ahead",
+        "tests/worlds/test_double_bridge.py",
+    ),
+    (
+        "worlds/validation.py",
+        '(2 if name == "trails" else 0)',
+        "2",
+        "tests/worlds/test_world_validation.py",
+    ),
+    ("worlds/starts.py", "np.lexsort((words, distance))", "np.argsort(words)", "tests/worlds"),
+    ("worlds/geometry.py", "[[1, 1, 0], [1", "[[0, 1, 1], [1", "tests/worlds"),
+    ("grid/hexgrid.py", "difference > -y", "difference >= -y", "tests/grid"),
+    # Settings.
+    ("settings.py", "value > rule.above", "value >= rule.above", SETTINGS),
+    ("settings.py", "elif value != one.default:", "elif False:", SETTINGS),
+    ("settings.py", "if math.isfinite(value) else None", "", SETTINGS),
+    ("settings.py", "made[one.name] = one.default", "pass", SETTINGS),
+    ("settings.py", 'branch[part] = {"": inner}', "branch[part] = {}", SETTINGS),
+]
+
+
+def main(words: list[str]) -> int:
+    """Try the mutations whose file or tests contain one of the words; 0 if all were noticed."""
+    chosen = [one for one in MUTATIONS if not words or any(w in one[0] + one[3] for w in words)]
+    found: dict[str, int] = {}
+    with tempfile.TemporaryDirectory() as name:
+        place = Path(name, "copy")
+        ignored = shutil.ignore_patterns(".git", "__pycache__", ".*_cache")
+        shutil.copytree(ROOT, place, ignore=ignored)
+        for path, old, new, tests in chosen:
+            start = time.monotonic()
+            outcome = tried(place, place / "taichi_ants" / path, old, new, tests)
+            found[outcome] = found.get(outcome, 0) + 1
+            seconds = time.monotonic() - start
+            print(f"{outcome:11}  {seconds:4.0f} s  {path}: {old} -> {new}", flush=True)
+    print(", ".join(f"{n} {outcome}" for outcome, n in found.items()))
+    return 0 if set(found) == {"noticed"} else 1
+
+
+def tried(place: Path, file: Path, old: str, new: str, tests: str) -> str:
+    """The outcome of one mutation of a file in a copy of the project at `place`."""
+    text = file.read_text()
+    if text.count(old) != 1:
+        return "stale"
+    # Byte code is told apart by size and second, so that of a mutation could be used again.
+    environment = {**os.environ, "PYTHONPATH": str(place), "PYTHONDONTWRITEBYTECODE": "1"}
+    command = [sys.executable, "-m", "pytest", "-x", "-n0", "-p", "no:cacheprovider", tests]
+    file.write_text(text.replace(old, new))
+    try:
+        done = subprocess.run(
+            command, cwd=place, env=environment, capture_output=True, text=True, timeout=TIMEOUT
+        )
+    except subprocess.TimeoutExpired:
+        return "noticed"
+    finally:
+        file.write_text(text)
+    if done.returncode > 1:  # of which pytest itself is the cause, as a file that is missing
+        raise SystemExit(f"{' '.join(command)} failed:\n{done.stdout}{done.stderr}")
+    return "noticed" if done.returncode else "NOT NOTICED"
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
