@@ -205,8 +205,12 @@ def smallest(array: np.ndarray) -> np.ndarray:
     return array.astype(np.promote_types(np.min_scalar_type(low), np.min_scalar_type(high)))
 
 
-def check_writable_folder(path: PathLike) -> Path:
+def check_writable_folder(path: PathLike, chosen: PathLike | None = None) -> Path:
     """Make a folder if it is missing, check that files can be written to it, and return its path.
+
+    Args:
+        path: The folder.
+        chosen: The folder that the message names instead: the one above it that a user chose.
 
     Raises:
         AntsError: The folder cannot be created or written to.
@@ -217,7 +221,8 @@ def check_writable_folder(path: PathLike) -> Path:
         _try_to_write(folder)
     except (OSError, ValueError) as error:
         raise AntsError(
-            f"cannot write to the folder {named(path)}: {_reason(error)}; choose another folder."
+            f"cannot write to the folder {named(chosen or path)}: {_reason(error)}; choose another "
+            "folder."
         ) from error
     return folder
 

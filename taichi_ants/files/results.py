@@ -101,10 +101,8 @@ class ResultFolder:
             # Without a manifest, nobody knows the settings of the blocks.
             if replace or not (self._unfinished / MANIFEST).exists():
                 self._clear()
-            files.check_writable_folder(self.path)
-            with files.writing(self.path):
-                for folder in (self._blocks, self._ready):
-                    folder.mkdir(parents=True, exist_ok=True)
+            for folder in (self._blocks, self._ready):  # in which a kill may leave a file
+                files.check_writable_folder(folder, self.path)
             self.seconds_before = self._seconds_so_far()
             with tempfile.TemporaryDirectory(dir=self._ready) as name:
                 ready = Path(name)

@@ -92,7 +92,7 @@ def test_mistakes_end_in_a_sentence_and_nothing_else(
 @pytest.mark.slow
 def test_fixed_rules_prints_a_row_for_each_world_and_task(kernels: Path, tmp_path: Path) -> None:
     study = [
-        *("world_kind,rules,way,ants,seed,deliveries,greedy", "paper,queueing,joint,3,0,50,60"),
+        *("world_kind,rules,regime,ants,seed,deliveries,greedy", "paper,queueing,joint,3,0,50,60"),
         *("paper,queueing,joint,3,1,70,80", "paper,queueing,alone,3,1,9,9"),
     ]
     (tmp_path / "seeds.csv").write_text("\n".join(study), "utf-8")
