@@ -121,7 +121,7 @@ def test_worlds(arguments, named, place, capsys):
 @pytest.mark.parametrize(
     ("out", "named"),
     [
-        ("file", ["'file'", "file exists"]),
+        ("file", ["'file'", "not a directory"]),
         ("file/below/it", ["'file/below/it'"]),
         ("/proc/results", ["'/proc/results'"]),
         ("x" * 300, ["too long"]),
