@@ -234,7 +234,7 @@ def tried(place: Path, file: Path, old: str, new: str, tests: str) -> str:
     text = file.read_text()
     if text.count(old) != 1:
         return "stale"
-    # Byte code is told apart by size and second, so that of a mutation could be used again.
+    # Python compares cached byte code by size and time in seconds, so it could reuse a mutation's.
     environment = {**os.environ, "PYTHONPATH": str(place), "PYTHONDONTWRITEBYTECODE": "1"}
     command = [sys.executable, "-m", "pytest", "-x", "-n0", "-p", "no:cacheprovider", tests]
     file.write_text(text.replace(old, new))

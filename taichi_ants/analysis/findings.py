@@ -131,7 +131,7 @@ class Contrast:
 
 @dataclass(frozen=True)
 class Finding:
-    """What became of a contrast: verdict, estimate over seeds, and interval at `level`.
+    """The result of a contrast: verdict, estimate over seeds, and interval at `level`.
 
     Numbers are nan where they are not tested, ends of the interval also for one seed. `by_mean` is
     what the mean says of a contrast that rests on the IQM.

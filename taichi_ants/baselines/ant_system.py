@@ -10,7 +10,7 @@ are taken out of its walk, and what remains is its *tour*. The pheromone tau lie
 from a cell to a neighbour. Of the arcs that leave its cell an ant takes one with a probability
 proportional to tau^alpha; it goes straight back only out of a dead end (as in Dorigo and Stuetzle,
 Ant Colony Optimization, 2004, section 1.3). Then all tau lose the share rho, and tours of length L
-add 1 / L to each of their arcs. There is no heuristic eta, because nobody knows where the food is.
+add 1 / L to each of their arcs. There is no heuristic eta: no ant knows the food's place.
 """
 
 from __future__ import annotations

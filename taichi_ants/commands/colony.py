@@ -57,7 +57,10 @@ QUICK = {
     "rollouts": 2,
 }
 # Settings of learning that the study chooses.
-PLANNED = ("training.epsilon_decay", "training.min_epsilon")
+PLANNED = (
+    *("training.epsilon_decay", "training.min_epsilon", "training.initial_q"),
+    *("training.learning_rate_decay", "training.min_learning_rate"),
+)
 WIDTH = 79  # of the report, in columns
 COUNT: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
 SEEDS, CONDITIONS = "seeds.csv", "conditions.csv"
@@ -107,7 +110,7 @@ def _check_live(
         error("--frame-interval is of an animation, name one with --render, or leave it out")
 
 
-def _add_study(parser: argparse.ArgumentParser) -> None:
+def _add_study(parser: Parser) -> None:
     add = parser.add_argument
     world_kinds: dict[str, Any] = {"nargs": "+", "choices": WORLD_KINDS, "metavar": "NAME"}
     add("--world-kinds", **world_kinds, default=WORLD_KINDS, help="kinds of world")
@@ -121,12 +124,13 @@ def _add_study(parser: argparse.ArgumentParser) -> None:
     add("--ticks", **counts, default=1000, help="of an episode")
     add("--rollouts", **counts, default=4, help="evaluation episodes")
     add("--quick", action="store_true", help="fewer seeds, sizes and ticks, no other worlds")
-    add_settings(parser, _learning(0.3), but=PLANNED)
+    parser.open_settings, parser.own_settings = ("training",), PLANNED
+    add_settings(parser, _learning(0.3))
     add_common(parser)
     add_results(parser, "colony")
 
 
-def _add_live(parser: argparse.ArgumentParser) -> None:
+def _add_live(parser: Parser) -> None:
     add = parser.add_argument
     add("--ants", **COUNT, default=80, help="how many start")
     add("--ticks", type=whole_number(1, 10_000_000), default=1000, metavar="N", help="how long")
@@ -151,6 +155,7 @@ def _add_live(parser: argparse.ArgumentParser) -> None:
     figure = "foods delivered per tick over time, of all colonies together (.png and .csv)"
     add("--figure", metavar="FILE.png", help=figure)
     add_common(parser)
+    parser.open_settings = ("world", "task", "training")
     add_settings(parser, _living(Task()))
     add_settings(parser, _learning(0.1))
 

@@ -85,8 +85,8 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add_common(parser)
     add("--quick", action="store_true", help=f"at most {QUICK_SEEDS} seeds, no animations")
     add_results(parser, "compare")
-    parser.open_settings = ("world", "training")
-    add_settings(parser, Task(), but=_FIXED)
+    parser.open_settings, parser.own_settings = ("world", "training"), _FIXED
+    add_settings(parser, Task())
     settings = parser.parse_args(arguments)
     if settings.quick:
         settings.seeds = min(settings.seeds, QUICK_SEEDS)

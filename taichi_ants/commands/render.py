@@ -115,6 +115,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
             if kind[0] in where:
                 one.add_argument(flag, **{"help": words, **reading})
         one.set_defaults(kind=kind, **_DEFAULTS[kind])
+        one.open_settings = ("world", "task", "training")
         add_settings(one, TASK)
         add_settings(one, TRAINING)
     settings, given = parser.parse_given(arguments)

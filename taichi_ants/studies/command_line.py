@@ -47,11 +47,8 @@ class Parser(argparse.ArgumentParser):
     None under `python -OO`.
     """
 
-    open_settings: tuple[str, ...] = (
-        "world",
-        "task",
-        "training",
-    )  # of which any --world.NAME is taken
+    open_settings: tuple[str, ...] = ()  # such as "world", of which any --world.NAME is taken
+    own_settings: Container[str] = ()  # full names of settings that the command determines itself
     program: str | None = None  # what --help calls it; None: the name of the script
 
     def __init__(self, about: str | None = None, **settings: Any) -> None:
@@ -77,9 +74,11 @@ class Parser(argparse.ArgumentParser):
 
     def _add_setting(self, flag: str) -> None:
         """Take an option such as --world.piles, which is checked where it is used."""
-        part = flag[2:].partition(".")[0]
-        if "." in flag and part in self.open_settings and flag not in self._option_string_actions:
-            path = flag[2:].replace("-", "_")
+        path = flag[2:].replace("-", "_")
+        if path in self.own_settings:
+            self.error(f"{flag} is chosen by this command, leave it out")
+        part, dot, _ = path.partition(".")
+        if dot and part in self.open_settings and flag not in self._option_string_actions:
             self.add_argument(flag, dest=path, type=_literal, nargs="*", action=_OneOrList)
 
     def error(self, message: str) -> NoReturn:
@@ -132,19 +131,19 @@ WORLDS = (
 )
 
 
-def add_settings(parser: argparse.ArgumentParser, base: Settings, but: Container[str] = ()) -> None:
+def add_settings(parser: Parser, base: Settings) -> None:
     """Add an option for each setting of a class, named as in sweep files; `base` has the defaults.
 
-    `but` are full names of settings that the command determines itself.
+    Those of `parser.own_settings` are left out.
     """
     parser.usage = "%(prog)s [options]"  # there are too many to list them twice
     group = parser.add_argument_group(f"{base.path} settings")
     for one in declared(type(base)):
         value = getattr(base, one.name)
-        if one.path not in but and (one.has_names or not one.is_group):
+        if one.path not in parser.own_settings and (one.has_names or not one.is_group):
             group.add_argument(_flag(one.path), **_reading(one, value))
         if one.is_group:
-            add_settings(parser, value, but)
+            add_settings(parser, value)
 
 
 def _flag(path: str) -> str:

@@ -230,6 +230,9 @@ def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
         ([], "study|live"),
         (["play"], "invalid choice: 'play'"),
         (["--ants", 2], "invalid choice: '2'"),
+        (["study", "--task.life.births"], "unrecognized arguments: --task.life.births"),
+        (["study", "--world.piles", 2], "unrecognized arguments: --world.piles 2"),
+        (["study", "--training.initial-q", 2], "--training.initial-q is chosen by this command"),
         (["live", "--quick"], "unrecognized arguments: --quick"),
         (["study", "--save", "x"], "unrecognized arguments: --save x"),
         (

@@ -17,7 +17,7 @@ from taichi_ants.worlds.world import World
 
 
 class Baseline(NamedTuple):
-    """What a policy brings in an episode, a row of baselines.csv.
+    """Return, steps and deliveries of a policy in an episode: a row of baselines.csv.
 
     `discount` is the one for which it is optimal; means are None if unknown; `note` says how they
     were computed, or why they are not known.

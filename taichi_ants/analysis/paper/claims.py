@@ -44,7 +44,7 @@ class Claim:
         return "interquartile mean" if self.quantity.uses_iqm else "mean"
 
 
-# What arguments of quantities are called in the file, besides measures.
+# Names in the file for arguments of quantities, besides measures.
 _NAMED: dict[str, Any] = {
     **{one.label: one for one in VARIANTS},
     "at table 2": quantities.AT_TABLE_2,

@@ -84,7 +84,7 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Baseline] = ()) 
 
 
 def return_against_deliveries(comparison: Comparison, baselines: Sequence[Baseline] = ()) -> Figure:
-    """Who earns reward by delivering, and what the others do instead: a mark for each run."""
+    """Draw the behaviour and the return of each final policy: a mark for each run."""
     settings = comparison.delivery_settings
     returns = comparison.measures["return_last50"]
     deliveries = comparison.measures["deliveries_last50"]

@@ -211,7 +211,7 @@ class Interventions:
         world[WorldRow.FIRST_VACANT] = np.argmin(taken) if not taken.all() else len(taken)
 
     def set_ants(self, n: int) -> None:
-        """Let n ants live now, and n start each later episode; AntsError if there is no room.
+        """Set the number of ants, now and at the start of later episodes; AntsError if no room.
 
         New ones stand on the free cells where ants of a World start, see `World.start`; those of
         the highest numbers are removed.
