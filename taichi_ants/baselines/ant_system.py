@@ -21,8 +21,7 @@ from typing import Annotated, Literal, get_args
 import numpy as np
 
 from taichi_ants import runtime
-from taichi_ants.baselines.open_cells import open_cells, shortest_way
-from taichi_ants.checks import checked_world
+from taichi_ants.baselines.open_cells import open_cells
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_TOUR
 from taichi_ants.grid.randomness import stream_state
@@ -89,25 +88,24 @@ def search(
         AntsError: An argument is not allowed, or no food can be reached.
     """
     rho = EVAPORATION[method] if evaporation is None else evaporation
-    _, neighbours, is_food, start = open_cells(checked_world(world, learns=True))
+    _, neighbours, is_food, start, shortest = open_cells(world)
     n, n_ants = len(neighbours), colonies * ants
     if n * n_ants > _MAX_ENTRIES:
         raise AntsError(
             f"{colonies} colonies of {ants} ants in a world of {n} open cells need arrays of "
             f"{n * n_ants} entries; at most {_MAX_ENTRIES} are allowed, so choose fewer."
         )
-    shortest = shortest_way(neighbours, is_food, start)
     numbers = np.arange(colonies)[:, None] * 2**32 + np.arange(ants)
     states = stream_state(seed, STREAM_TOUR, numbers).reshape(-1)
 
     runtime.start(threads)
-    # Taichi is imported once it is configured.
-    from taichi_ants.baselines.tour_kernels import lay, walk
+    from taichi_ants.baselines.kernels import lay, walk  # imports Taichi
 
     tau = np.ones((colonies, N_HEADINGS * n))
     place, tours = np.zeros((2, n_ants, n), np.int32)
     lengths = np.zeros(n_ants, np.int32)
-    bounds = _Bounds(method, rho, ants, _ways(neighbours), colonies)
+    ways = max(2.0, float((neighbours >= 0).sum(axis=1).mean()) - 1)  # on from a cell, in the mean
+    so_far = np.zeros(colonies)  # the shortest tours, 0 for none
     best, lost = np.zeros((2, colonies, iterations), np.int32)
     mean = np.full((colonies, iterations), np.nan)
     with runtime.quiet():
@@ -119,49 +117,33 @@ def search(
             by_colony = lengths.reshape(colonies, ants)
             lost[:, i] = (by_colony == 0).sum(axis=1)
             has = lost[:, i] < ants
-            best[:, i] = np.where(has, np.where(by_colony, by_colony, n).min(axis=1), 0)
+            now = np.where(has, np.where(by_colony, by_colony, n).min(axis=1), 0)
+            best[:, i] = now
             mean[has, i] = by_colony[has].sum(axis=1) / (ants - lost[has, i])
-            deposits, lowest, highest = bounds.after(by_colony, best[:, i], tau)
+            first = (so_far == 0) & has
+            so_far = np.where(first | (has & (now < so_far)), now, so_far)
+            start_tau, lowest, highest = _limits(method, rho, ants, ways, so_far)
+            tau[first] = start_tau[first, None]
+            deposits = np.where(by_colony > 0, 1 / np.maximum(by_colony, 1), 0)
+            if method == "max_min":
+                winner = by_colony == now[:, None]
+                deposits[~(winner & (winner.cumsum(axis=1) == 1))] = 0  # of equals the first
             lay(tau, rho, tours, lengths, deposits.reshape(-1), lowest, highest)
     return Search(shortest, best, mean, lost)
 
 
-class _Bounds:
-    """What tells the methods apart: who deposits, the first tau, and its bounds."""
+def _limits(
+    method: str, rho: float, ants: int, ways: float, shortest: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The first tau of colonies whose `shortest` tours so far are these, and the bounds of tau.
 
-    def __init__(self, method: str, rho: float, ants: int, ways: float, colonies: int) -> None:
-        self._max_min, self._rho, self._ants, self._ways = method == "max_min", rho, ants, ways
-        self._best = np.zeros(colonies)  # the shortest tour so far, 0 for none
-
-    def after(
-        self, lengths: np.ndarray, best: np.ndarray, tau: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """What each ant deposits (colonies, ants), and the bounds of tau (colonies,).
-
-        Where a colony has found food for the first time, `tau` is set to what ants would keep up if
-        they all went that way. Until then it is equal everywhere. `lengths` of tours are 0 for
-        none.
-        """
-        first = (self._best == 0) & (best > 0)
-        shorter = first | ((best > 0) & (best < self._best))
-        self._best[shorter] = best[shorter]
-        has = self._best > 0
-        length = np.where(has, self._best, 1)
-        deposits = np.where(lengths > 0, 1 / np.maximum(lengths, 1), 0)
-        if not self._max_min:
-            tau[first] = self._ants / length[first, None]
-            nothing = np.zeros(len(length))
-            return deposits, nothing, nothing + np.inf
-        winner = lengths == best[:, None]
-        winner &= winner.cumsum(axis=1) == 1  # of equals the first
-        highest = 1 / (self._rho * length)
-        tau[first] = highest[first, None]
-        right = P_BEST ** (1 / length)  # the probability to go right at one cell
-        lowest = np.minimum(highest * (1 - right) / ((self._ways - 1) * right), highest)
-        # Where no food was found yet, all tau stay 1.
-        return np.where(winner, deposits, 0), np.where(has, lowest, 1), np.where(has, highest, 1)
-
-
-def _ways(neighbours: np.ndarray) -> float:
-    """How many ways on an ant has from a cell in the mean, at least 2."""
-    return max(2.0, float((neighbours >= 0).sum(axis=1).mean()) - 1)
+    The first is what ants would keep up if all went that way. Until food is found, tau is 1.
+    """
+    found = shortest > 0
+    length = np.where(found, shortest, 1.0)
+    if method == "ant_system":
+        return ants / length, np.zeros(len(length)), np.full(len(length), np.inf)
+    highest = 1 / (rho * length)
+    right = P_BEST ** (1 / length)  # the probability to go right at one cell
+    lowest = np.minimum(highest * (1 - right) / ((ways - 1) * right), highest)
+    return highest, np.where(found, lowest, 1), np.where(found, highest, 1)

@@ -85,8 +85,7 @@ def choices(
     checked_whole("`opens`", opens, 0, ants)
     states = stream_state(seed, STREAM_BRIDGE, np.arange(colonies))
     runtime.start(threads)
-    # Taichi is imported once it is configured.
-    from taichi_ants.baselines.goss_kernel import cross
+    from taichi_ants.baselines.kernels import cross  # imports Taichi
 
     took = np.zeros((colonies, ants), np.uint8)
     with runtime.quiet():

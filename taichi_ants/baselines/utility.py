@@ -24,8 +24,7 @@ from typing import Annotated
 import numpy as np
 
 from taichi_ants import runtime
-from taichi_ants.baselines.open_cells import open_cells, shortest_way
-from taichi_ants.checks import checked_world
+from taichi_ants.baselines.open_cells import open_cells
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_FORAGER
 from taichi_ants.grid.randomness import stream_state
@@ -60,10 +59,7 @@ class Foraging:
 
     @property
     def found(self) -> np.ndarray:
-        """int64 (colonies,): after how many ticks the path found is first a shortest; 0 if never.
-
-        It is looked at after every 10 ticks.
-        """
+        """int64 (colonies,): the tick at which a walk is first a shortest one; 0 if none is."""
         return EVERY * _first(self.lengths == self.shortest)
 
 
@@ -97,19 +93,17 @@ def forage(
     Raises:
         AntsError: An argument is not allowed, or no food can be reached.
     """
-    cells, neighbours, is_food, nest = open_cells(checked_world(world, learns=True))
+    cells, neighbours, is_food, nest, steps = open_cells(world)
     if colonies * max(2 * world.grid.size, ticks, ants) > _MAX_ENTRIES:
         raise AntsError(
             f"{colonies} colonies of {ants} ants for {ticks} ticks in a world of {len(cells)} open "
             "cells need too much memory; choose fewer."
         )
-    shortest = 2 * shortest_way(neighbours, is_food, nest)
     numbers = np.arange(colonies)[:, None] * 2**32 + np.arange(ants)
     states = stream_state(seed, STREAM_FORAGER, numbers)
 
     runtime.start(threads)
-    # Taichi is imported once it is configured.
-    from taichi_ants.baselines.utility_kernels import live, measure
+    from taichi_ants.baselines.kernels import live, measure  # imports Taichi
 
     goals = np.stack([np.arange(len(cells)) == nest, is_food == 1]).astype(np.int32)
     settings = capacity, discount, 1 - evaporation, exploration, momentum
@@ -130,10 +124,9 @@ def forage(
                 measure(neighbours, goals, nest, utilities, first // EVERY, lengths)
     spread = np.zeros((colonies, 2, world.grid.size))
     spread[..., cells] = utilities
-    return Foraging(shortest, deliveries, lengths, spread)
+    return Foraging(2 * steps, deliveries, lengths, spread)
 
 
 def _first(hits: np.ndarray) -> np.ndarray:
-    """The first column that is true, from 1; 0 if none is."""
-    # A column of False before it, so that no hits and no columns give 0.
+    """The first column that is true, from 1; 0 if none is, or there are no columns."""
     return np.pad(hits, ((0, 0), (1, 0))).argmax(axis=1)
