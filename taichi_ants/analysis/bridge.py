@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -59,7 +59,6 @@ DESIGNS = tuple(
         + [replace(Design(), **{name: one}) for name, some in PANELS.items() for one in some]
     )
 )
-
 # Those whose colonies are also followed where the short branch opens late.
 LATE_DESIGNS = (Design(), *OTHERS, Design(evaporation="none"))
 
@@ -74,7 +73,7 @@ def length(bridge: str, ticks: int) -> int:
 
 def late_shares(crossed: np.ndarray) -> np.ndarray:
     """The share by the short branch in the second half, float64 (loads, seeds), nan where none."""
-    return _shares(crossed[len(crossed) // 2 :].sum(axis=0, keepdims=True))[0]
+    return _shares(crossed[len(crossed) // 2 :].sum(axis=0))
 
 
 def rows(found: Crossings, seeds: Sequence[int], ticks: int) -> list[dict[str, Any]]:
@@ -86,13 +85,13 @@ def rows(found: Crossings, seeds: Sequence[int], ticks: int) -> list[dict[str, A
             "seed": seed,
             "load": load,
             "from_tick": w * length(bridge, ticks) // WINDOWS,
-            "short": int(crossed[w, number_of_load, 0, s]),
-            "long": int(crossed[w, number_of_load, 1, s]),
+            "short": int(crossed[w, k, 0, s]),
+            "long": int(crossed[w, k, 1, s]),
         }
         for design, bridges in found.items()
         for bridge, crossed in bridges.items()
         for s, seed in enumerate(seeds)
-        for number_of_load, load in enumerate(LOADS)
+        for k, load in enumerate(LOADS)
         for w in range(WINDOWS)
     ]
 
@@ -104,13 +103,17 @@ def report(found: Crossings, ticks: int) -> str:
     for design, bridges in found.items():
         row = [*map(str, asdict(design).values())]
         for bridge, crossed in bridges.items():
-            if bridge == LATE:
-                late += [[*row, load, *cells] for load, cells in _since_opening(crossed)]
-            else:
+            if bridge != LATE:
                 lines.append([*row, bridge, *map(_cell, late_shares(crossed))])
-    n = next(iter(found[Design()].values())).shape[-1]
+                continue
+            for k, load in enumerate(LOADS):
+                *first, last = _shares(crossed)[WINDOWS // 2 :, k]
+                means = [number(_percent(values)[0], 0) for values in first]
+                colonies = f"{np.count_nonzero(last > 0.5)} of {np.isfinite(last).sum()}"
+                late.append([*row, load, *means, _cell(last), colonies])
+    means_of = _means(found)
     shares = Table(
-        f"Who crosses by the short branch, second half: {_means(n)}",
+        f"Who crosses by the short branch, second half: {means_of}",
         [*headers, "branches", *(f"{load}, %" for load in LOADS)],
         lines,
         text_columns=len(headers) + 1,
@@ -120,63 +123,62 @@ def report(found: Crossings, ticks: int) -> str:
         f"Who crosses by the short branch that opens after {ticks} ticks, by ticks since then",
         [*headers, "%", *(f"{a} to\n{b}" for a, b in pairwise(edges)), "colonies\nabove 50 %"],
         late,
-        [f"{sentence(_means(n))}. Colonies: by the last column of ticks."],
+        [f"{sentence(means_of)}. Colonies: by the last column of ticks."],
         text_columns=len(headers) + 1,
     )
     return plain_text([shares, since], 120)
 
 
-def _since_opening(crossed: np.ndarray) -> Iterator[tuple[str, list[str]]]:
-    """Yield for each load the shares since the opening, and how many colonies prefer it."""
-    for k, load in enumerate(LOADS):
-        shares = _shares(crossed)[WINDOWS // 2 :, k]
-        *first, last = shares
-        there = last[np.isfinite(last)]
-        means = [number(100 * _centre(values)[0], 0) for values in first]
-        yield load, [*means, _cell(last), f"{np.count_nonzero(there > 0.5)} of {len(there)}"]
-
-
 def _cell(values: np.ndarray) -> str:
-    """A share of all seeds in percent, with its interval if they are enough for one."""
-    mean, low, high = _centre(values)
-    between = "" if np.isnan(low) else f" {interval(100 * low, 100 * high, 0)}"
-    return f"{number(100 * mean, 0)}{between}"
+    mean, low, high = _percent(values)
+    return number(mean, 0) + ("" if np.isnan(low) else f" {interval(low, high, 0)}")
 
 
-def _means(seeds: int) -> str:
+def _means(found: Crossings) -> str:
+    seeds = next(iter(found[Design()].values())).shape[-1]
     if seeds < LEAST_SEEDS:
-        return (
-            f"means over {count(seeds, 'seed')}, too few for intervals (take {LEAST_SEEDS} or more)"
-        )
+        few = f"too few for intervals (take {LEAST_SEEDS} or more)"
+        return f"means over {count(seeds, 'seed')}, {few}"
     return f"means over {seeds} seeds with 95 % intervals"
 
 
 def draw(path: Path, found: Crossings, ticks: int) -> None:
     """Draw the shares over time on three bridges, and what else moves them."""
+    titles = {
+        SHORT_RIGHT: "Short branch to the right",
+        SHORT_LEFT: "Short branch to the left",
+        EQUAL: "Equal branches: the right one",
+    }
     with style.styled():
         figure = style.new_figure(5.6)
         above, below = figure.subplots(2, len(PANELS), sharey=True)
-        titles = {
-            SHORT_RIGHT: "Short branch to the right",
-            SHORT_LEFT: "Short branch to the left",
-            EQUAL: "Equal branches: the right one",
-        }
         for axes, (bridge, title) in zip(above, titles.items(), strict=True):
-            _draw_time(axes, found, bridge, ticks)
+            # The food of equal branches is never aside.
+            ahead = {} if bridge == EQUAL else {", food ahead": found[Design(aside=0)][bridge]}
+            _draw_shares(axes, {"": found[Design()][bridge], **ahead}, ticks)
             axes.set(title=title, xlabel="tick")
-        for axes, name in zip(below, PANELS, strict=True):
-            _draw_panel(axes, found, name)
-        for axes in (above[0], below[0]):
-            axes.set(ylabel="% by the short branch", ylim=(0, 103))
-        seeds = found[Design()][SHORT_RIGHT].shape[-1]
+        for axes, (name, values) in zip(below, PANELS.items(), strict=True):
+            mirrored = np.array([_of_both_sides(found, name, value) for value in values])
+            _draw_lines(axes, {load: (values, mirrored[:, k]) for k, load in enumerate(LOADS)})
+            axes.set(title=name.capitalize())
+            if name != "evaporation":
+                axes.set_xticks(values)
         caption = (
-            f"{sentence(_means(seeds))}. Above: {Design().ants} ants.\n"
+            f"{sentence(_means(found))}. Above: {Design().ants} ants.\n"
             "Below, food aside: one setting varies; second half of the time, mean of both mirror "
             "images.\nEvaporation: none, 1 a tick (linear), or a half-life in ticks."
         )
+        for axes in (above[0], below[0]):
+            axes.set(ylabel="% by the short branch", ylim=(0, 103))
         title = "Who crosses a double bridge by the short branch"
         style.frame(figure, title, caption, style.legend_entries(above))
     style.save(figure, path)
+
+
+def _of_both_sides(found: Crossings, name: str, value: Any) -> np.ndarray:
+    """The late shares where one setting is varied, the mean of both mirror images."""
+    bridges = found[replace(Design(), **{name: value})]
+    return np.mean([late_shares(bridges[one]) for one in (SHORT_RIGHT, SHORT_LEFT)], axis=0)
 
 
 def draw_late(path: Path, found: Crossings, ticks: int) -> None:
@@ -196,7 +198,7 @@ def draw_late(path: Path, found: Crossings, ticks: int) -> None:
             axes.set(title=title, xlabel="tick", xticks=[0, ticks, 2 * ticks])
         several[0].set(ylabel="% by the short branch", ylim=(0, 103))
         caption = (
-            f"{sentence(_means(found[Design()][LATE].shape[-1]))}; {Design().ants} ants that have "
+            f"{sentence(_means(found))}; {Design().ants} ants that have "
             "learned with both branches open, and learn no more.\nIn the model of Goss and others "
             "no colony goes over to a short branch that opens late."
         )
@@ -205,55 +207,37 @@ def draw_late(path: Path, found: Crossings, ticks: int) -> None:
     style.save(figure, path)
 
 
-def _draw_time(axes: Axes, found: Crossings, bridge: str, ticks: int) -> None:
-    shown = {"": Design(), ", food ahead": Design(aside=0)}
-    if bridge == EQUAL:  # its food is never aside
-        del shown[", food ahead"]
-    _draw_shares(axes, {words: found[one][bridge] for words, one in shown.items()}, ticks)
-
-
 def _draw_shares(axes: Axes, crossed: Mapping[str, np.ndarray], ticks: int) -> None:
-    """Lines of the shares over time, by what is added to the names of the loads."""
+    """Draw shares over time, by the words that are added to the names of the loads."""
     middle = [(w + 0.5) * ticks / WINDOWS for w in range(WINDOWS)]
-    lines = {}
-    for words, counts in crossed.items():
-        shares = _shares(counts)
-        for k, load in enumerate(LOADS):
-            points = [(t, *_percent(_centre(shares[w, k]))) for w, t in enumerate(middle)]
-            lines[f"{load}{words}"] = points
-    axes.axhline(50, color=style.GREY, linewidth=0.7, linestyle="dashed")
-    draw_lines(axes, lines)
+    lines = {
+        f"{load}{words}": (middle, _shares(counts)[:, k])
+        for words, counts in crossed.items()
+        for k, load in enumerate(LOADS)
+    }
+    _draw_lines(axes, lines)
     axes.set(xlim=(0, ticks), xticks=np.linspace(0, ticks, 4))
 
 
-def _draw_panel(axes: Axes, found: Crossings, name: str) -> None:
-    lines: dict[str, list[tuple[Any, ...]]] = {load: [] for load in LOADS}
-    for value in PANELS[name]:
-        bridges = found[replace(Design(), **{name: value})]
-        both = np.mean([late_shares(bridges[one]) for one in (SHORT_RIGHT, SHORT_LEFT)], axis=0)
-        for k, load in enumerate(LOADS):
-            lines[load].append((value, *_percent(_centre(both[k]))))
+def _draw_lines(axes: Axes, lines: Mapping[str, tuple[Sequence[Any], np.ndarray]]) -> None:
+    """Draw shares (places, seeds) at their places, by label."""
     axes.axhline(50, color=style.GREY, linewidth=0.7, linestyle="dashed")
-    draw_lines(axes, lines)
-    axes.set(title=name.capitalize())
-    if name != "evaporation":
-        axes.set_xticks(PANELS[name])
+    points = {
+        label: [(place, *_percent(values)) for place, values in zip(places, shares, strict=True)]
+        for label, (places, shares) in lines.items()
+    }
+    draw_lines(axes, points)
 
 
 def _shares(crossed: np.ndarray) -> np.ndarray:
-    """The share by the short branch, float64 (windows, loads, seeds), nan where nobody crossed."""
-    total = crossed.sum(axis=2)
-    return np.where(total > 0, crossed[:, :, 0] / np.maximum(total, 1), np.nan)
+    """The share by the short branch, float64 (..., seeds), nan where nobody crossed."""
+    total = crossed.sum(axis=-2)
+    return np.where(total > 0, crossed[..., 0, :] / np.maximum(total, 1), np.nan)
 
 
-def _centre(values: np.ndarray) -> tuple[float, float, float]:
-    """Return the mean over seeds in which ants crossed, and its interval; nan for too few seeds."""
-    there = values[np.isfinite(values)]
-    if len(there) < LEAST_SEEDS:
-        return float(there.mean()) if there.size else np.nan, np.nan, np.nan
-    low, high = bootstrap_interval(there[None])
-    return float(there.mean()), float(low[0]), float(high[0])
-
-
-def _percent(numbers: tuple[float, ...]) -> tuple[float, ...]:
-    return tuple(100 * one for one in numbers)
+def _percent(shares: np.ndarray) -> tuple[float, float, float]:
+    """The mean over seeds in which ants crossed, with its interval; nan for too few seeds."""
+    there = shares[np.isfinite(shares)]
+    low, high = bootstrap_interval(there[None]) if len(there) >= LEAST_SEEDS else ([np.nan],) * 2
+    mean = there.mean() if there.size else np.nan
+    return 100 * float(mean), 100 * float(low[0]), 100 * float(high[0])

@@ -75,12 +75,11 @@ def do_bridge(settings: argparse.Namespace, study: Study, blocks: Path, ready: P
     from taichi_ants.studies.bridge import followed
 
     ticks, found = settings.evaluation_ticks, {}
+    where = {"threads": settings.threads, "arch": settings.arch}
     with progress_bar("bridge") as progress:
-        where = settings.threads, settings.arch
-        outcomes = study.run(blocks, *where, lambda share: progress(0.6 * share))
+        outcomes = study.run(blocks, **where, progress=lambda share: progress(0.6 * share))
         for number, (design, one) in enumerate(zip(analysis.DESIGNS, study.points, strict=True)):
-            tables = outcomes[one]["q_values"]
-            path = blocks / f"followed-{number:06d}.npz"
+            path, tables = blocks / f"followed-{number:06d}.npz", outcomes[one]["q_values"]
             found[design] = followed(path, design, one, study.seeds, tables, ticks, where)
             progress(0.6 + 0.4 * (number + 1) / len(analysis.DESIGNS))
     rows = analysis.rows(found, study.seeds, ticks)

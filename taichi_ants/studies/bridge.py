@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,7 +25,7 @@ from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.blocks import kept
 from taichi_ants.studies.colony_study import scheduled
-from taichi_ants.studies.runner import EVALUATION_SEEDS, ColonyPoint, settings_of
+from taichi_ants.studies.runner import ColonyPoint, settings_of
 from taichi_ants.task import Life, Task, foraging, queueing
 from taichi_ants.task.constants import EMPTY, OBSTACLE
 from taichi_ants.worlds import double_bridge
@@ -58,17 +58,11 @@ def bridges(design: Design) -> dict[str, dict[str, Any]]:
     """
     unequal: dict[str, Any] = {"short": 23, "long": 36, "aside": design.aside}
     equal = {"short": 23, "long": 23}
-    found = {
-        SHORT_RIGHT: unequal,
-        SHORT_LEFT: {**unequal, "mirrored": True},
-        EQUAL: equal,
-        EQUAL_ASIDE: {**equal, "aside": design.aside},
-        LATE: unequal,
-    }
-    if not design.aside:
-        del found[EQUAL_ASIDE]
-    if design not in LATE_DESIGNS:
-        del found[LATE]
+    found = {SHORT_RIGHT: unequal, SHORT_LEFT: {**unequal, "mirrored": True}, EQUAL: equal}
+    if design.aside:
+        found[EQUAL_ASIDE] = {**equal, "aside": design.aside}
+    if design in LATE_DESIGNS:
+        found[LATE] = unequal
     return found
 
 
@@ -78,16 +72,10 @@ def point(design: Design, episodes: int, ticks: int) -> ColonyPoint:
     The short branch lies to the right in about half of the episodes and to the left in the others,
     so that no colony can learn on which side it is.
     """
-    places = bridges(design)
-    pool = tuple(double_bridge(**places[name]) for name in (SHORT_RIGHT, SHORT_LEFT))
-    learner = TrainingConfig("sarsa", 0.1, 0.9, epsilon=0.3, epsilon_decay=1.0)
-    training = scheduled(learner, episodes)
-    return ColonyPoint(
-        *(pool[0], task(design), training, pool, design.ants),
-        episodes=episodes,
-        ticks=ticks,
-        rollouts=1,
-    )
+    pool = tuple(double_bridge(**bridges(design)[name]) for name in (SHORT_RIGHT, SHORT_LEFT))
+    training = scheduled(TrainingConfig("sarsa", 0.1, 0.9, 0.3, 1.0), episodes)
+    several = pool[0], task(design), training, pool, design.ants
+    return ColonyPoint(*several, episodes=episodes, ticks=ticks, rollouts=1)
 
 
 def followed(
@@ -97,45 +85,29 @@ def followed(
     seeds: Sequence[int],
     q_values: np.ndarray,
     ticks: int,
-    where: tuple[int | None, str | None],
+    where: Mapping[str, Any],
 ) -> dict[str, np.ndarray]:
-    """Return what `crossings` counts on each bridge while nobody learns; a file keeps it.
+    """Return what `crossings` counts on each bridge while nobody learns; the file `path` keeps it.
 
     Args:
-        path: Of the file (.npz); if it is there, nothing is left to do.
+        path: Of an .npz file; if it is there, nothing is left to do.
         design, learned: The design, and the point that gave the tables.
-        seeds: Of the training.
-        q_values: The tables of these seeds, float32 (seeds, n_states, 5).
+        seeds, q_values: Of the training, and its tables, float32 (seeds, n_states, 5).
         ticks: Length of the episode on each bridge, and its half on `LATE`.
-        where: Threads and arch, as of a `Colony`.
+        where: Threads and arch of colonies.
     """
-    from taichi_ants.engines.colony.colony import Colony
-
-    least = learned.training.least_epsilon
-    calm = replace(learned.training, epsilon=least, epsilon_decay=1.0)
-
-    def count(bridge: dict[str, Any], some: slice, n: int, opens: int = 0) -> np.ndarray:
-        colony = Colony(
-            *(double_bridge(**bridge), learned.task, calm),
-            [seed + EVALUATION_SEEDS for seed in seeds[some]],
-            ants=design.ants,
-            sharing="frozen",
-            q_values=q_values[some],
-            threads=where[0],
-            arch=where[1],
-            schedule="by_world",
-        )
-        return crossings(colony, bridge, n, opens)
 
     def counted() -> dict[str, np.ndarray]:
-        found, each = {}, [slice(s, s + 1) for s in range(len(seeds))]
+        found = {}
         for name, bridge in bridges(design).items():
-            n = length(name, ticks)
-            if name == LATE:  # interventions act on colonies of one world
-                late = [count(bridge, one, n, ticks) for one in each]
-                found[name] = np.concatenate(late, axis=-1)
-            else:
-                found[name] = count(bridge, slice(None), n)
+            late, parts, world = name == LATE, [], double_bridge(**bridge)
+            # Interventions act on colonies of one world.
+            each = [slice(s, s + 1) for s in range(len(seeds))] if late else [slice(None)]
+            for some in each:
+                given = world, seeds[some], q_values[some], False
+                colony = learned.colony(*given, schedule="by_world", **where)
+                parts.append(crossings(colony, bridge, length(name, ticks), ticks if late else 0))
+            found[name] = np.concatenate(parts, axis=-1)
         return found
 
     about = {**settings_of([learned], seeds), "design": asdict(design), "ticks": ticks}
@@ -161,8 +133,7 @@ def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0
     zone, n_worlds = _zones(bridge), len(colony.seeds)
     world = np.repeat(np.arange(n_worlds), colony.capacity)
     counts = np.zeros((WINDOWS, len(LOADS), 2, n_worlds), np.int64)
-    room = np.full(len(world), _QUEEN_ROOM)
-    branch = np.full(len(world), _SHORT)
+    room, branch = np.full(len(world), _QUEEN_ROOM), np.full(len(world), _SHORT)
     colony.begin_episode(ticks)
     if opens:
         short, interventions = colony.grid.index(branch_cells(**bridge)[0]), Interventions(colony)
@@ -174,13 +145,10 @@ def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0
         until = opens if colony.ticks < opens else ticks
         colony.tick(min(_LOOK_EVERY, until - colony.ticks))
         now = zone[colony.cells.ravel()]
-        carries = colony.carrying.ravel()
-        inside = now <= _FOOD_ROOM
-        crossed = inside & (now != room)
-        useful = crossed & (carries == (now == _QUEEN_ROOM))
-        np.add.at(
-            counts[window], (carries[useful].astype(int), branch[useful] - _SHORT, world[useful]), 1
-        )
+        carries, inside = colony.carrying.ravel(), now <= _FOOD_ROOM
+        useful = inside & (now != room) & (carries == (now == _QUEEN_ROOM))
+        where = carries[useful].astype(int), branch[useful] - _SHORT, world[useful]
+        np.add.at(counts[window], where, 1)
         room = np.where(inside, now, room)
         branch = np.where(inside, branch, now)
     return counts

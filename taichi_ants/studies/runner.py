@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import hashlib
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -27,6 +27,9 @@ from taichi_ants.studies.blocks import Outcome, kept
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EPISODE_STEPS, EPISODES, MAX_STEPS, N_ACTIONS, ROW
 from taichi_ants.worlds.world import World
+
+if TYPE_CHECKING:
+    from taichi_ants.engines.colony.colony import Colony
 
 # Seeds of a colony's evaluation are those of the training plus this, so that no random number
 # serves both.
@@ -210,6 +213,24 @@ class ColonyPoint:
         draws = [stream.integers(len(self.pool), size=self.episodes) for stream in streams]
         return [[self.pool[n] for n in of_episode] for of_episode in np.transpose(draws)]
 
+    def colony(
+        self, world: Any, seeds: Sequence[int], q_values: Any, learns: bool, **options: Any
+    ) -> Colony:
+        """The colony of some seeds, where epsilon is at its minimum if nobody `learns`.
+
+        The world or worlds, a table and further arguments are those of `Colony`.
+        """
+        from taichi_ants.engines.colony.colony import Colony
+
+        training = self.training
+        if not learns:
+            training = replace(training, epsilon=training.least_epsilon, epsilon_decay=1.0)
+            seeds = [seed + EVALUATION_SEEDS for seed in seeds]
+        sharing = self.sharing if learns else "frozen"
+        options |= {"ants": self.ants, "capacity": self.capacity, "start": self.start}
+        options |= {"sharing": sharing, "q_values": q_values}
+        return Colony(world, self.task, training, seeds, **options)
+
     @staticmethod
     def do(
         points: Sequence[ColonyPoint],
@@ -219,28 +240,17 @@ class ColonyPoint:
         where: Mapping[str, Any],
     ) -> Outcome:
         """The outcome of a point: arrays (1, seeds, ...); `learned` are the tables of `after`."""
-        from taichi_ants.engines.colony.colony import Colony
-
         (point,) = points
-        options = {"ants": point.ants, "capacity": point.capacity, "start": point.start, **where}
         share = point.episodes / (point.episodes + point.rollouts)
         tables: Any = learned
         if point.episodes:
             places = point.places(seeds)
-            learning = Colony(
-                *(places[0] if places else point.world, point.task, point.training, seeds),
-                **options,
-                sharing=point.sharing,
-                q_values=learned,
+            learning = point.colony(
+                places[0] if places else point.world, seeds, learned, True, **where
             )
             learning.run(point.episodes, point.ticks, _part(progress, 0.0, share), places)
             tables = learning.q_values
-        least = point.training.least_epsilon
-        calm = replace(point.training, epsilon=least, epsilon_decay=1.0)
-        others = [seed + EVALUATION_SEEDS for seed in seeds]
-        colony = Colony(
-            *(point.world, point.task, calm, others), **options, sharing="frozen", q_values=tables
-        )
+        colony = point.colony(point.world, seeds, tables, False, **where)
         episodes = colony.run(point.rollouts, point.ticks, _part(progress, share, 1 - share))
         outcome = {name: files.smallest(getattr(episodes, name).T) for name in _COLONY_ARRAYS}
         if point.episodes and point.sharing == "shared":
@@ -309,12 +319,8 @@ class Study(Generic[PointKind]):
         progress: Progress = lambda share: None,
     ) -> dict[PointKind, Outcome]:
         """Do the blocks that the folder lacks; return all outcomes. Arguments as of `in_blocks`."""
-        order = self.in_order
-        parts: dict[PointKind, list[Outcome]] = {point: [] for point in order}
-        for block in self.in_blocks(folder, threads, arch, progress):
-            for place, point in enumerate(order[block.points]):
-                parts[point].append({name: one[place] for name, one in block.outcome.items()})
-        return {point: _joined(several) for point, several in parts.items()}
+        order, done = self.in_order, self.in_blocks(folder, threads, arch, progress)
+        return {order[place]: outcome for place, outcome in self._joined(done, range(len(order)))}
 
     def reduced(
         self,
@@ -335,12 +341,10 @@ class Study(Generic[PointKind]):
             for name, array in reduce(order[some], self.seeds[at], outcome).items():
                 shape = len(order), len(self.seeds)
                 found.setdefault(name, np.empty(shape, array.dtype))[some, at] = array
-        if order != self.points:  # some points occur twice, or in another order
-            place = {point: number for number, point in enumerate(order)}
-            rows = [place[point] for point in self.points]
-            for name, array in found.items():
-                found[name] = array[rows]
-        return found
+        if order == self.points:
+            return found
+        place = {point: number for number, point in enumerate(order)}  # some may occur twice
+        return {name: array[[place[one] for one in self.points]] for name, array in found.items()}
 
     def in_blocks(
         self,
@@ -359,37 +363,29 @@ class Study(Generic[PointKind]):
         Raises:
             AntsError: The disk has no room for all of it, or an argument is not allowed.
         """
-        files.check_room(folder, self._bytes(folder))
         order, pieces = self.in_order, list(self.blocks())
-        weights = [sum(p.weight for p in order[some]) * len(self.seeds[at]) for some, at in pieces]
-        begun, total = 0.0, sum(weights)
+        # Points of a block are alike.
+        works = [(order[some.start], len(order[some]) * len(self.seeds[at])) for some, at in pieces]
+        missing = [work for n, work in enumerate(works) if not _path(folder, n).exists()]
+        files.check_room(folder, sum(one.bytes_of_a_run * runs for one, runs in missing))
+        begun, total = 0.0, sum(one.weight * runs for one, runs in works)
         # What others go on from is kept, in as many pieces as these points have blocks.
         befores = {point.after for point in order}
         tables: dict[Any, list[np.ndarray]] = {}
         progress(0.0)
-        for number, ((some, at), weight) in enumerate(zip(pieces, weights, strict=True)):
+        for number, ((some, at), (first, runs)) in enumerate(zip(pieces, works, strict=True)):
             points, seeds = tuple(one.of_seeds(at) for one in order[some]), self.seeds[at]
-            after = points[0].after
-            learned = np.concatenate(tables[after])[at] if after else None
-            part = _part(progress, begun / total, weight / total)
+            learned = np.concatenate(tables[first.after])[at] if first.after else None
+            share = first.weight * runs / total
+            part = _part(progress, begun, share)
             where = {"threads": threads, "arch": arch}
-            do: Any = partial(points[0].do, points, seeds, learned, part, where)
-            about = settings_of(points, seeds)
-            outcome = kept(_path(folder, number), about, do)
-            if order[some.start] in befores:
-                tables.setdefault(order[some.start], []).append(outcome["q_values"][0])
-            begun += weight
-            progress(begun / total)
+            do: Any = partial(first.do, points, seeds, learned, part, where)
+            outcome = kept(_path(folder, number), settings_of(points, seeds), do)
+            if first in befores:
+                tables.setdefault(first, []).append(outcome["q_values"][0])
+            begun += share
+            progress(begun)
             yield Block(some, at, outcome)
-
-    def _bytes(self, folder: Path) -> int:
-        """About how many bytes the blocks have at most that the folder does not hold yet."""
-        order = self.in_order
-        return sum(
-            len(order[some]) * len(self.seeds[at]) * order[some][0].bytes_of_a_run
-            for number, (some, at) in enumerate(self.blocks())
-            if not _path(folder, number).exists()
-        )
 
     def read(self, folder: Path, points: Iterable[int]) -> Iterator[tuple[int, Outcome]]:
         """Yield points, by their places in order, with their outcomes, from finished blocks.
@@ -399,20 +395,26 @@ class Study(Generic[PointKind]):
         Raises:
             AntsError: A block cannot be read any more.
         """
-        wanted = sorted(set(points))
-        parts: dict[int, list[Outcome]] = {place: [] for place in wanted}
-        for number, (some, at) in enumerate(self.blocks()):
-            inside = [place for place in wanted if some.start <= place < some.stop]
-            block = blocks.read(_path(folder, number)) if inside else {}
-            for place in inside:
-                parts[place].append({n: array[place - some.start] for n, array in block.items()})
+        wanted = set(points)
+        pieces = (
+            Block(some, at, blocks.read(_path(folder, number)))
+            for number, (some, at) in enumerate(self.blocks())
+            if not wanted.isdisjoint(range(some.start, some.stop))
+        )
+        return self._joined(pieces, wanted)
+
+    def _joined(
+        self, pieces: Iterable[Block], wanted: Container[int]
+    ) -> Iterator[tuple[int, Outcome]]:
+        """Yield the wanted points as `read` does, each when the block of its last seeds came."""
+        parts: dict[int, list[Outcome]] = {}
+        for some, at, outcome in pieces:
+            for place in filter(wanted.__contains__, range(some.start, some.stop)):
+                of_point = {name: array[place - some.start] for name, array in outcome.items()}
+                parts.setdefault(place, []).append(of_point)
                 if at.stop == len(self.seeds):
-                    yield place, _joined(parts.pop(place))
-
-
-def _joined(parts: Sequence[Outcome]) -> Outcome:
-    """Concatenate the parts of a point's outcome over the seeds."""
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+                    several = parts.pop(place)
+                    yield place, {n: np.concatenate([one[n] for one in several]) for n in of_point}
 
 
 class Block(NamedTuple):
