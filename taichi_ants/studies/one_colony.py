@@ -1,23 +1,93 @@
-"""One colony that lives for a while: with progress, saved, drawn, stopped between two ticks."""
+"""One colony that lives for a while: saved, drawn, stopped between two ticks, told over time."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
-from itertools import chain
+from collections.abc import Callable, Iterator, Sequence
+from itertools import chain, pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from taichi_ants import files
-from taichi_ants.analysis.colony import over_time
-from taichi_ants.analysis.colony.over_time import Totals
+from taichi_ants.analysis import style
 from taichi_ants.errors import AntsError, count
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from taichi_ants.engines.colony.colony import Colony
 
 FRAMES_PER_SECOND = 12.0
+_MOST_SPANS = 60  # of a figure
 _PIECE_SECONDS = 0.2
+
+
+class Totals(NamedTuple):
+    """What has happened until a tick: foods delivered, moves tried, and those of them blocked."""
+
+    tick: int
+    deliveries: int
+    moves: int
+    blocked: int
+
+    @classmethod
+    def of(cls, colony: Colony) -> Totals:
+        """What all worlds together have done in this episode."""
+        now = colony.outcome()
+        counts = now.deliveries, now.moves, now.blocked
+        return cls(colony.ticks, *(int(one.sum()) for one in counts))
+
+
+class Span(NamedTuple):
+    """A row of the numbers of a figure: the span of time between two totals."""
+
+    from_tick: int
+    to_tick: int
+    foods_per_tick: float
+    blocked: float
+
+
+def spans(totals: Sequence[Totals]) -> list[Span]:
+    """Return what happened between each two totals; `blocked` is a share of the moves."""
+    found = []
+    for one, next_ in pairwise(totals):
+        ticks, deliveries, moves, blocked = (b - a for a, b in zip(one, next_, strict=True))
+        found.append(Span(one.tick, next_.tick, deliveries / ticks, blocked / max(1, moves)))
+    return found
+
+
+def save_figure(rows: Sequence[Span], who: str, path: files.PathLike) -> None:
+    """Write the figure (.png), and its rows beside it (.csv); the title says whose."""
+    files.check_writable_folder(Path(path).parent)
+    numbers = [one._asdict() for one in rows]
+    files.write_csv(Path(path).with_suffix(".csv"), numbers, Span._fields)
+    style.save(draw(rows, who), Path(path))
+
+
+def draw(rows: Sequence[Span], who: str) -> Figure:
+    """Foods per tick above, the share of blocked moves below."""
+    edges = [rows[0].from_tick, *(row.to_tick for row in rows)] if rows else [0]
+    with style.styled():
+        figure = style.new_figure(3.6)
+        foods, blocked = figure.subplots(2, 1, sharex=True, height_ratios=(4, 1))
+        for axis, values, colour in (
+            (foods, [row.foods_per_tick for row in rows], style.BLUE),
+            (blocked, [100 * row.blocked for row in rows], style.GREY),
+        ):
+            axis.stairs(values, edges, fill=True, color=colour, alpha=0.15)
+            axis.stairs(values, edges, baseline=None, color=colour, lw=1.5)
+            axis.yaxis.set_major_formatter("{x:,g}")
+        foods.set_ylim(bottom=0)
+        foods.set_ylabel("Foods per tick")
+        blocked.set_ylim(0, 100)
+        blocked.set_ylabel("Blocked, %")
+        blocked.set_xlabel("Tick")
+        if rows:
+            blocked.set_xlim(edges[0], edges[-1])
+        longest = max((row.to_tick - row.from_tick for row in rows), default=0)
+        caption = f"Means over {longest:g} ticks. Blocked: share of the moves that fail."
+        style.frame(figure, f"{who}: foods delivered", caption, {})
+    return figure
 
 
 def check_places(save: str | None, render: str | None, figure: str | None = None) -> None:
@@ -29,7 +99,7 @@ def check_places(save: str | None, render: str | None, figure: str | None = None
     elif render is not None:
         check_animation(render, FRAMES_PER_SECOND)
     if figure is not None:
-        files.check_writable_file(over_time.numbers_beside(check_picture(figure)))
+        files.check_writable_file(Path(check_picture(figure)).with_suffix(".csv"))
     if save is not None:
         files.check_writable_file(save)
 
@@ -54,13 +124,11 @@ def live(
 
     strongest = colony.task.pheromone.level
     animated = render is not None and not is_picture(render)
-    frame_interval = frame_interval if animated else 0
-    least = frame_interval or 1  # a span is a whole number of pictures
-    span = -(-ticks // (least * over_time.MOST_SPANS)) * least if figure else ticks
-    passing = _pieces(colony, ticks, progress, stopped, frame_interval, span)
-    totals = [_so_far(colony)]
-    if figure:
-        passing = _noted(passing, colony, span, totals)
+    interval = frame_interval if animated else ticks
+    least = frame_interval if animated else 1  # a span is a whole number of pictures
+    span = -(-ticks // (least * _MOST_SPANS)) * least if figure else ticks
+    totals = [Totals.of(colony)]
+    passing = _pieces(colony, ticks, progress, stopped, interval, span, totals)
     try:
         if render and animated:
             shown = (one for _ in chain([0], passing) for one in colony_snapshots(colony))
@@ -70,10 +138,8 @@ def live(
         if render and not animated:
             save_picture(render, next(frames(colony_snapshots(colony), strongest=strongest)))
         if figure:
-            if totals[-1].tick < colony.ticks:  # stopped within a span, or the last one is shorter
-                totals.append(_so_far(colony))
             who = _who(colony.ants * len(colony.seeds), colony)
-            over_time.save(over_time.rates(totals), who, figure)
+            save_figure(spans(totals), who, figure)
     except (AntsError, OSError):
         # Pictures are drawn between ticks, so this one is whole, and may have taken hours.
         _save(colony, save)
@@ -93,18 +159,19 @@ def _pieces(
     ticks: int,
     progress: Callable[[float], None],
     stopped: Callable[[], bool],
-    frame_interval: int,
+    interval: int,
     span: int,
+    totals: list[Totals],
 ) -> Iterator[int]:
     """Move a colony on by short pieces, after which it can be stopped.
 
-    Yields after each piece, or every `frame_interval` ticks if above 0; in any case after every
-    `span` ticks and at the end.
+    Yields after every `interval` ticks and at the end; adds to the `totals` after every `span`
+    ticks and at the end.
     """
     begun, piece, passed, ends = colony.ticks, 1, 0, stopped()
     while not ends:
-        began, left = time.perf_counter(), min(ticks - passed, span - passed % span)
-        now = min(piece, left, frame_interval - passed % frame_interval if frame_interval else left)
+        began = time.perf_counter()
+        now = min(piece, ticks - passed, span - passed % span, interval - passed % interval)
         colony.tick(now)
         took, passed = time.perf_counter() - began, colony.ticks - begun
         if took > _PIECE_SECONDS:
@@ -112,27 +179,11 @@ def _pieces(
         elif now == piece:
             piece *= 2
         ends = passed == ticks or stopped()
-        if ends or not frame_interval or passed % frame_interval == 0 or passed % span == 0:
+        if ends or passed % span == 0:
+            totals.append(Totals.of(colony))
+        if ends or passed % interval == 0:
             yield colony.ticks
         progress(passed / ticks)
-
-
-def _noted(
-    passing: Iterator[int], colony: Colony, span: int, totals: list[Totals]
-) -> Iterator[int]:
-    """Let time pass, and note what has happened after every `span` ticks."""
-    begun = colony.ticks
-    for tick in passing:
-        if (tick - begun) % span == 0:
-            totals.append(_so_far(colony))
-        yield tick
-
-
-def _so_far(colony: Colony) -> Totals:
-    """What all colonies together have done in this episode."""
-    now = colony.outcome()
-    counts = now.deliveries, now.moves, now.blocked
-    return Totals(colony.ticks, *(int(count.sum()) for count in counts))
 
 
 def summary(colony: Colony, ticks: int, seconds: float) -> str:

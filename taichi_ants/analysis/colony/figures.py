@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 from taichi_ants.analysis import style
@@ -27,43 +28,7 @@ def draw_all(rows: Rows) -> dict[str, Figure]:
     return {name: figure for name, figure in drawn.items() if figure is not None}
 
 
-def rules(rows: Rows) -> Figure | None:
-    """What the largest colony delivers under each of the rules."""
-    designs = [Design(rules) for rules in study.RULES]
-    return _dots(rows, designs, "What each rule adds")
-
-
-def training(rows: Rows) -> Figure | None:
-    """What the largest colony delivers after training with so many ants."""
-    designs = [
-        Design(rules, regime)
-        for rules in (study.PAPER, study.ABC)
-        for regime in (study.ALONE, study.FEW, study.SOME, study.JOINT)
-    ]
-    return _dots(rows, designs, "With how many ants to train")
-
-
-def elsewhere(rows: Rows) -> Figure | None:
-    """What ants deliver in other worlds than those of their training."""
-    designs = [Design(rules, study.ABROAD) for rules in (study.PAPER, study.ABC, study.QUEUES)]
-    return _dots(rows, designs, "Trained in open worlds, in others")
-
-
-def scaling(rows: Rows) -> Figure | None:
-    """Deliveries against the number of ants."""
-    designs = [Design(rules) for rules in (study.PAPER, study.A, study.BC, study.ABC, study.QUEUES)]
-    return _lines(rows, designs, ("deliveries", "per_ant"), "More ants: what a colony delivers")
-
-
-FIGURES: dict[str, Callable[[Rows], Figure | None]] = {
-    "rules": rules,
-    "scaling": scaling,
-    "training": training,
-    "elsewhere": elsewhere,
-}
-
-
-def _dots(rows: Rows, designs: Sequence[Design], title: str) -> Figure | None:
+def _dots(title: str, designs: Sequence[Design], rows: Rows) -> Figure | None:
     """Deliveries of the largest colonies, a line per design, a panel per kind of world."""
     panels: dict[str, dict[Design, ConditionRow]] = {}
     for row in sorted(rows, key=lambda row: row.condition.ants):
@@ -114,7 +79,7 @@ def _dot(axis: Axes, place: int, row: ConditionRow) -> None:
 
 
 def _lines(
-    rows: Rows, designs: Sequence[Design], measures: Sequence[str], title: str
+    title: str, designs: Sequence[Design], measures: Sequence[str], rows: Rows
 ) -> Figure | None:
     """Measures against the number of ants, a column of panels for each kind of world."""
     world_kinds = [
@@ -129,10 +94,12 @@ def _lines(
         for line_of_axes, measure in zip(axes, measures, strict=True):
             line_of_axes[0].set_ylabel(textwrap.fill(sentence(study.MEASURES[measure]), 30))
             for axis, world_kind in zip(line_of_axes, world_kinds, strict=True):
-                of_world_kind = [row for row in rows if row.condition.world_kind == world_kind]
-                draw_lines(
-                    axis, {one.words: _points(of_world_kind, one, measure) for one in designs}
-                )
+                points: dict[str, list[tuple[float, ...]]] = {one.words: [] for one in designs}
+                for row in rows:
+                    if row.condition.world_kind == world_kind and row.design in designs:
+                        point = row.condition.ants, *row.estimates[measure][:3]
+                        points[row.design.words].append(point)
+                draw_lines(axis, points)
         for column, world_kind in zip(axes.T, world_kinds, strict=True):
             column[0].set_title(sentence(study.WORLD_KINDS[world_kind]), fontsize=9)
             column[-1].set_xlabel("Ants")
@@ -147,8 +114,24 @@ def _spread(rows: Rows) -> str:
     return f"{means}. Exploration rate {study.EVALUATION_EPSILON:g}."
 
 
-def _points(rows: Rows, design: Design, measure: str) -> list[tuple[float, ...]]:
-    """The number of ants, the mean and the ends of its interval, of each condition of a design."""
-    return [
-        (row.condition.ants, *row.estimates[measure][:3]) for row in rows if row.design == design
-    ]
+def _each(rules: Iterable[str], *regimes: str) -> list[Design]:
+    return [Design(one, regime) for one in rules for regime in regimes]
+
+
+_LEARNED = study.ALONE, study.FEW, study.SOME, study.JOINT
+_RISING = study.PAPER, study.A, study.BC, study.ABC, study.QUEUES
+_MEASURES = "deliveries", "per_ant"
+FIGURES: dict[str, Callable[[Rows], Figure | None]] = {
+    "rules": partial(_dots, "What each rule adds", _each(study.RULES, study.JOINT)),
+    "scaling": partial(
+        _lines, "More ants: what a colony delivers", _each(_RISING, study.JOINT), _MEASURES
+    ),
+    "training": partial(
+        _dots, "With how many ants to train", _each((study.PAPER, study.ABC), *_LEARNED)
+    ),
+    "elsewhere": partial(
+        _dots,
+        "Trained in open worlds, in others",
+        _each((study.PAPER, study.ABC, study.QUEUES), study.ABROAD),
+    ),
+}

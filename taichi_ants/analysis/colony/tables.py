@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -47,16 +47,6 @@ from taichi_ants.analysis.tables import (
 from taichi_ants.errors import count
 
 
-def rows_of_seeds(measured: Measured, seeds: Sequence[int]) -> list[dict[str, Any]]:
-    """The rows of seeds.csv: all measures of each seed under each condition."""
-    return list(seed_rows([one._asdict() for one in measured], seeds, _stacked(measured)))
-
-
-def _stacked(measured: Measured) -> dict[str, np.ndarray]:
-    """The measures as arrays (conditions, seeds)."""
-    return {name: np.stack([one[name] for one in measured.values()]) for name in OF_STUDY}
-
-
 class ConditionRow(NamedTuple):
     """A condition over all seeds, a row of conditions.csv.
 
@@ -74,34 +64,41 @@ class ConditionRow(NamedTuple):
         """Its rules and the way to its policy."""
         return Design(self.condition.rules, self.condition.regime)
 
+    @property
+    def delivered(self) -> float:
+        """The mean deliveries."""
+        return self.estimates["deliveries"].mean
+
     def columns(self) -> dict[str, Any]:
         """Return the columns of conditions.csv."""
-        return {
-            **self.condition._asdict(),
-            "seeds": self.seeds,
-            **centre_columns(self.estimates),
-            **{
-                f"{name}_{end}": value
-                for name, ends in self.ranges.items()
-                for end, value in zip(("min", "max"), ends, strict=True)
-            },
+        ends = {
+            f"{name}_{end}": value
+            for name, pair in self.ranges.items()
+            for end, value in zip(("min", "max"), pair, strict=True)
         }
+        estimates = centre_columns(self.estimates)
+        return {**self.condition._asdict(), "seeds": self.seeds, **estimates, **ends}
+
+
+def rows_of_seeds(measured: Measured, seeds: Sequence[int]) -> list[dict[str, Any]]:
+    """The rows of seeds.csv: all measures of each seed under each condition."""
+    return list(seed_rows([one._asdict() for one in measured], seeds, _stacked(measured)))
+
+
+def _stacked(measured: Measured) -> dict[str, np.ndarray]:
+    """The measures as arrays (conditions, seeds)."""
+    return {name: np.stack([one[name] for one in measured.values()]) for name in OF_STUDY}
 
 
 def condition_rows(measured: Measured) -> list[ConditionRow]:
     """Return each condition over its seeds, with 95 % intervals."""
-    seeds = len(next(iter(measured.values()))["deliveries"])
-    return [
-        ConditionRow(
-            condition,
-            seeds,
-            estimates,
-            {n: (float(one[n].min()), float(one[n].max())) for n in ("deliveries", "bound")},
-        )
-        for (condition, one), estimates in zip(
-            measured.items(), centres_of(_stacked(measured)), strict=True
-        )
-    ]
+    rows = []
+    for (condition, one), estimates in zip(
+        measured.items(), centres_of(_stacked(measured)), strict=True
+    ):
+        ranges = {n: (float(one[n].min()), float(one[n].max())) for n in ("deliveries", "bound")}
+        rows.append(ConditionRow(condition, len(one["deliveries"]), estimates, ranges))
+    return rows
 
 
 def difference_rows(judged: Judged) -> list[dict[str, Any]]:
@@ -109,14 +106,9 @@ def difference_rows(judged: Judged) -> list[dict[str, Any]]:
     return [
         {
             "world_kind": world_kind,
-            "question": series.question,
-            "statement": series.statement,
-            "measure": series.measure,
-            "ants": ants,
-            "against": against,
-            "mean": finding.effect,
-            "low": finding.low,
-            "high": finding.high,
+            **{name: getattr(series, name) for name in ("question", "statement", "measure")},
+            **{"ants": ants, "against": against},
+            **{"mean": finding.effect, "low": finding.low, "high": finding.high},
             "verdict": finding.verdict.value,
         }
         for (world_kind, series), findings in judged.items()
@@ -129,25 +121,22 @@ def means(rows: Sequence[ConditionRow]) -> list[Table]:
 
     The last is of the policies of open worlds in others, with intervals and the worst seed.
     """
-    tables, seeds = [], f"{_basis(rows)}: {MEASURES['deliveries']}"
+    seeds = f"{_basis(rows)}: {MEASURES['deliveries']}"
+    trained = [one for one in rows if one.condition.regime != ABROAD]
+    abroad = [one for one in rows if one.condition.regime == ABROAD]
+    tables = []
     for world_kind in WORLD_KINDS:
-        here = [
-            one
-            for one in rows
-            if one.condition.world_kind == world_kind and one.design.regime != ABROAD
-        ]
-        sizes = sorted({one.condition.ants for one in here})
-        lines: dict[Design, dict[int, ConditionRow]] = {}
-        for one in here:
-            lines.setdefault(one.design, {})[one.condition.ants] = one
+        by_design: dict[Design, dict[int, ConditionRow]] = {}
+        for one in trained:
+            if one.condition.world_kind == world_kind:
+                by_design.setdefault(one.design, {})[one.condition.ants] = one
+        sizes = sorted({n for by_size in by_design.values() for n in by_size})
         cells = []
-        for design, by_size in lines.items():
-            delivered = (
-                by_size[n].estimates["deliveries"].mean if n in by_size else None for n in sizes
-            )
-            largest = list(by_size.values())[-1].estimates
-            share, bound = (largest[name].mean for name in ("of_bound", "bound"))
-            cells.append([design.words, *map(figure, delivered), percent(share), figure(bound)])
+        for design, by_size in by_design.items():
+            delivered = (figure(by_size[n].delivered if n in by_size else None) for n in sizes)
+            *_, largest = by_size.values()
+            share, bound = (largest.estimates[name].mean for name in ("of_bound", "bound"))
+            cells.append([design.words, *delivered, percent(share), figure(bound)])
         if cells:
             headers = ("ants", *map(str, sizes), "share of\nbound", "mean\nbound")
             note = (
@@ -156,13 +145,14 @@ def means(rows: Sequence[ConditionRow]) -> list[Table]:
             )
             title = f"{sentence(WORLD_KINDS[world_kind])}, {seeds}"
             tables.append(Table(title, headers, cells, [note]))
-    abroad = [one for one in rows if one.design.regime == ABROAD]
     if abroad:
-        rules = list(dict.fromkeys(one.condition.rules for one in abroad))
-        there: dict[str, dict[str, str]] = {}
+        by_world: dict[str, dict[str, str]] = {}
         for one in abroad:
-            there.setdefault(one.condition.world_kind, {})[one.condition.rules] = _spread(one)
-        cells = [[WORLDS[a], *(by[name] for name in rules)] for a, by in there.items()]
+            mean, low, high, *_ = one.estimates["deliveries"]
+            cell = f"{figure(mean)} {interval(low, high, 0)}, {figure(one.ranges['deliveries'][0])}"
+            by_world.setdefault(one.condition.world_kind, {})[one.condition.rules] = cell
+        rules = list(dict.fromkeys(one.condition.rules for one in abroad))
+        cells = [[WORLDS[a], *(by[name] for name in rules)] for a, by in by_world.items()]
         headers = ("world", *(RULES[name] for name in rules))
         title = f"{sentence(REGIMES[ABROAD])}, {count(abroad[0].condition.ants, 'ant')}, {seeds}"
         note = "Mean, its 95 % interval, and the worst seed."
@@ -175,71 +165,50 @@ def _basis(rows: Sequence[ConditionRow]) -> str:
     return f"{seeds_in_words(rows[0].seeds)}, exploration rate {EVALUATION_EPSILON:g}"
 
 
-def _spread(row: ConditionRow) -> str:
-    """A mean with its interval, and the worst seed."""
-    mean, low, high, *_ = row.estimates["deliveries"]
-    return f"{figure(mean)} {interval(low, high, 0)}, {figure(row.ranges['deliveries'][0])}"
-
-
 def glance(rows: Sequence[ConditionRow]) -> Table:
     """Return what the largest colonies deliver: designs down, kinds of world across."""
-    largest = max((one.condition.ants for one in rows if one.design.regime != ABROAD), default=0)
-    shown = {
-        (one.condition.world_kind, one.design): one
-        for one in rows
-        if one.condition.ants == largest and one.condition.world_kind in WORLD_KINDS
-    }
-    designs = [Design(PAPER, ALONE), *(Design(rules) for rules in RULES), Design(ABC, ALONE)]
-    world_kinds = [
-        world_kind for world_kind in WORLD_KINDS if any(place == world_kind for place, _ in shown)
-    ]
-    most = max((one.estimates["deliveries"].mean for one in shown.values()), default=0)
+    largest = max((one.condition.ants for one in rows if one.condition.regime != ABROAD), default=0)
+    shown: dict[str, dict[Design, ConditionRow]] = {name: {} for name in WORLD_KINDS}
+    for one in rows:
+        if one.condition.ants == largest and one.condition.world_kind in shown:
+            shown[one.condition.world_kind][one.design] = one
+    shown = {world_kind: by_design for world_kind, by_design in shown.items() if by_design}
+    most = max((one.delivered for by in shown.values() for one in by.values()), default=0)
     digits = 0 if most >= 100 else 1
+
+    def cell(row: ConditionRow | None) -> str:
+        """Deliveries with and without exploration, and the share of the bounds."""
+        if row is None:
+            return MISSING
+        with_, without = (number(row.estimates[n].mean, digits) for n in ("deliveries", "greedy"))
+        return f"{with_} ({without}), {percent(row.estimates['of_bound'].mean)}"
+
+    designs = [Design(PAPER, ALONE), *(Design(rules) for rules in RULES), Design(ABC, ALONE)]
     cells = [
-        [
-            sentence(one.words),
-            *(_delivered(shown.get((world_kind, one)), digits) for world_kind in world_kinds),
-        ]
+        [sentence(one.words), *(cell(by_design.get(one)) for by_design in shown.values())]
         for one in designs
-        if any((world_kind, one) in shown for world_kind in world_kinds)
+        if any(one in by_design for by_design in shown.values())
     ]
     if cells:  # most is possible where ants with food have right of way
-        bounds = [
-            max(
-                (one for (place, _), one in shown.items() if place == world_kind),
-                key=lambda one: one.estimates["bound"].mean,
-            )
-            for world_kind in world_kinds
-        ]
-        cells.append(["Mean bound, right of way [range]", *map(_bounds, bounds)])
-    headers = ("", *_headers(world_kinds))
+        line = []
+        for by_design in shown.values():
+            best = max(by_design.values(), key=lambda one: one.estimates["bound"].mean)
+            low, high = best.ranges["bound"]
+            range_ = "" if low == high else f" {interval(low, high, 0)}"
+            line.append(figure(best.estimates["bound"].mean) + range_)
+        cells.append(["Mean bound, right of way [range]", *line])
     title = f"{sentence(MEASURES['deliveries'])} of {count(largest, 'ant')}"
     note = f"{_basis(rows)}; in brackets: 0. %: of each world's own bound."
-    return Table(title, headers, cells, [note] if cells else [])
+    return Table(title, ("", *_headers(shown)), cells, [note] if cells else [])
 
 
-def _headers(world_kinds: Sequence[str]) -> list[str]:
+def _headers(world_kinds: Iterable[str]) -> list[str]:
     return [sentence(WORLD_KINDS[one]).replace(" (", "\n(") for one in world_kinds]
-
-
-def _delivered(row: ConditionRow | None, digits: int) -> str:
-    """Deliveries with and without exploration, and the share of the bounds."""
-    if row is None:
-        return MISSING
-    with_, without = (number(row.estimates[name].mean, digits) for name in ("deliveries", "greedy"))
-    return f"{with_} ({without}), {percent(row.estimates['of_bound'].mean)}"
-
-
-def _bounds(row: ConditionRow) -> str:
-    """The mean of the worlds' bounds, with their range where they differ."""
-    low, high = row.ranges["bound"]
-    range_ = "" if low == high else f" {interval(low, high, 0)}"
-    return figure(row.estimates["bound"].mean) + range_
 
 
 def headlines(rows: Sequence[ConditionRow], judged: Judged) -> Table:
     """Return the main findings on the largest colonies: statements down, kinds of world across."""
-    by_condition = {one.condition: one.estimates for one in rows}
+    by_condition = {one.condition: one for one in rows}
     world_kinds = [
         one for one in WORLD_KINDS if any(world_kind == one and s.main for world_kind, s in judged)
     ]
@@ -249,12 +218,9 @@ def headlines(rows: Sequence[ConditionRow], judged: Judged) -> Table:
         for world_kind in world_kinds:
             n = max((ants for ants, _ in judged.get((world_kind, series), {})), default=1)
             if n > 1:
-                means = (
-                    figure(by_condition[Condition(world_kind, *design, n)][series.measure].mean)
-                    for design in (series.first, series.second)
-                )
+                first, second = _compared(by_condition, world_kind, series, (n, n))
                 verdict = judged[world_kind, series][n, n].verdict.value
-                line.append(f"{verdict}\n{n}: {' against '.join(means)}")
+                line.append(f"{verdict}\n{n}: {figure(first)} against {figure(second)}")
         if len(line) == len(world_kinds) > 0:
             cells.append([sentence(series.statement), *line])
     headers = ("Statement", *_headers(world_kinds))
@@ -265,19 +231,23 @@ def headlines(rows: Sequence[ConditionRow], judged: Judged) -> Table:
     return Table("", headers, cells, [note] if cells else [], text_columns=len(headers))
 
 
+def _compared(
+    by_condition: Mapping[Condition, ConditionRow], world_kind: str, series: Series, sizes: Sizes
+) -> tuple[float, float]:
+    """The two means whose difference a series is about."""
+    first, second = (
+        by_condition[Condition(world_kind, *design, n)].estimates[series.measure].mean
+        for design, n in zip((series.first, series.second), sizes, strict=True)
+    )
+    return first, second
+
+
 def on_one_screen(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
     """Return deliveries at a glance, the main findings, and how many statements hold."""
     seen = glance(rows)
-    tables = [seen] if seen.rows else means(rows)
     world_kinds = {one.condition.world_kind for one in rows}
     conditions = f"{count(len(rows), 'condition')} in {count(len(world_kinds), 'kind')} of world"
-    sizes = f"{conditions}, {seeds_in_words(rows[0].seeds)}."
-    return [sizes, *tables, headlines(rows, judged), tallies(judged)]
-
-
-def tallies(judged: Judged) -> str:
-    """How many statements hold of the largest colonies, a line for each question."""
-    lines = []
+    lines = ["Statements about the largest colonies"]
     for question in QUESTIONS:
         verdicts = Counter(
             of_largest(findings).verdict.value
@@ -287,12 +257,20 @@ def tallies(judged: Judged) -> str:
         if verdicts:
             words = ", ".join(f"{n} {verdict}" for verdict, n in verdicts.most_common())
             lines.append(f"  {question} {words}")
-    return "\n".join(["Statements about the largest colonies", *lines])
+    return [
+        f"{conditions}, {seeds_in_words(rows[0].seeds)}.",
+        *([seen] if seen.rows else means(rows)),
+        headlines(rows, judged),
+        "\n".join(lines),
+    ]
 
 
 def of_largest(findings: Mapping[Sizes, Finding]) -> Finding:
     """What is found of the largest colony; compared with several, the strongest objection."""
-    n = max(ants for ants, _ in findings)
+    return _of_size(findings, max(ants for ants, _ in findings))
+
+
+def _of_size(findings: Mapping[Sizes, Finding], n: int) -> Finding:
     return weakest([one for (ants, _), one in findings.items() if ants == n])
 
 
@@ -303,13 +281,13 @@ _HEADERS = ("World", "Statement", *(f"{sentence(one)}\nwith" for one in _SHOWN),
 def found(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
     """Return the findings: a table per question, a line per series and kind of world."""
     blocks: list[Block] = []
-    estimates = {one.condition: one.estimates for one in rows}
+    by_condition = {one.condition: one for one in rows}
     for question in QUESTIONS:
         lines, units, shown = [], [], ""
         for (world_kind, series), findings in judged.items():
             if series.question == question:
                 world = "" if world_kind == shown else sentence(WORLDS[world_kind])
-                verdicts = _verdicts(estimates, world_kind, series, findings)
+                verdicts = _verdicts(by_condition, world_kind, series, findings)
                 lines.append([world, sentence(series.statement), *verdicts])
                 units.append(MEASURES[series.measure])
                 shown = world_kind
@@ -326,30 +304,25 @@ def found(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
 
 
 def _verdicts(
-    estimates: Mapping[Condition, Mapping[str, Estimator]],
+    by_condition: Mapping[Condition, ConditionRow],
     world_kind: str,
     series: Series,
     findings: Mapping[Sizes, Finding],
 ) -> list[str]:
     """With how many ants a statement holds, and the two means that differ most."""
     by_verdict: dict[Verdict, list[int]] = {verdict: [] for verdict in Verdict}
-    for n in sorted({n for n, _ in findings}):
-        of_all = weakest([one for (ants, _), one in findings.items() if ants == n])
-        by_verdict[of_all.verdict].append(n)
+    for n in {n for n, _ in findings}:
+        by_verdict[_of_size(findings, n).verdict].append(n)
     by_verdict[Verdict.UNDECIDED] += by_verdict[Verdict.EQUIVALENT]
     cells = [", ".join(map(str, sorted(by_verdict[one]))) or MISSING for one in _SHOWN]
-
-    def both(n: int, other: int) -> tuple[float, float]:
-        first = estimates[Condition(world_kind, *series.first, n)][series.measure]
-        second = estimates[Condition(world_kind, *series.second, other)][series.measure]
-        return first.mean, second.mean
+    means = {sizes: _compared(by_condition, world_kind, series, sizes) for sizes in findings}
 
     def distance(sizes: Sizes) -> float:
-        one, other = both(*sizes)
+        one, other = means[sizes]
         return abs(one - other) / (abs(one) + abs(other) or 1.0)
 
     n, less = max(findings, key=distance)
-    one, other = both(n, less)
+    one, other = means[n, less]
     example = f"{n}: {figure(one)} against {figure(other)}"
     example += "" if less == n else f" with {less}"
     example += f" ({100 * (one / other - 1):+.0f} %)" if min(one, other) > 0 else ""

@@ -49,14 +49,14 @@ def dots(axis: Axes) -> dict[int, float]:
 
 
 @pytest.mark.parametrize(
-    ("draw", "designs"),
+    ("name", "designs"),
     [
-        (figures.rules, [Design(rules) for rules in RULES]),
-        (figures.elsewhere, [Design(rules, ABROAD) for rules in (PAPER, ABC, QUEUES)]),
+        ("rules", [Design(rules) for rules in RULES]),
+        ("elsewhere", [Design(rules, ABROAD) for rules in (PAPER, ABC, QUEUES)]),
     ],
 )
-def test_a_line_shows_the_largest_colony_of_a_design(rows, draw, designs) -> None:
-    figure = draw(rows)
+def test_a_line_shows_the_largest_colony_of_a_design(rows, name, designs) -> None:
+    figure = figures.FIGURES[name](rows)
     for axis, world_kind in zip(figure.axes, WORLD_KINDS, strict=True):
         means = dots(axis)
         labels = [text.get_text() for text in figure.axes[0].get_yticklabels()]
@@ -82,7 +82,7 @@ def test_a_line_shows_the_largest_colony_of_a_design(rows, draw, designs) -> Non
 
 
 def test_deliveries_against_the_number_of_ants(rows) -> None:
-    axes = np.array(figures.scaling(rows).axes).reshape(2, 2)
+    axes = np.array(figures.FIGURES["scaling"](rows).axes).reshape(2, 2)
     for row, measure in zip(axes, ("deliveries", "per_ant"), strict=True):
         for axis, world_kind in zip(row, WORLD_KINDS, strict=True):
             (line,) = [line for line in axis.lines if line.get_label() == Design(ABC).words]

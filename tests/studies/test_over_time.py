@@ -7,18 +7,15 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from taichi_ants.analysis.colony.over_time import Totals, draw, rates, save
+from taichi_ants.studies.one_colony import Span, Totals, draw, save_figure, spans
 
 TOTALS = [Totals(5, 10, 100, 50), Totals(7, 14, 300, 100), Totals(8, 14, 300, 100)]
-ROWS = [
-    {"from_tick": 5, "to_tick": 7, "foods_per_tick": 2.0, "blocked": 0.25},
-    {"from_tick": 7, "to_tick": 8, "foods_per_tick": 0.0, "blocked": 0.0},
-]
+ROWS = [Span(5, 7, 2.0, 0.25), Span(7, 8, 0.0, 0.0)]
 
 
 def test_rates_are_means_over_spans_even_where_nobody_moves() -> None:
-    assert rates(TOTALS) == ROWS
-    assert rates(TOTALS[:1]) == []
+    assert spans(TOTALS) == ROWS
+    assert spans(TOTALS[:1]) == []
 
 
 def test_the_figure_shows_its_rows() -> None:
@@ -32,8 +29,8 @@ def test_the_figure_shows_its_rows() -> None:
 
 def test_both_files_are_written_even_of_no_time_at_all(tmp_path: Path) -> None:
     tmp_path /= "new"
-    save(ROWS, "3 ants", tmp_path / "a.b.png")
-    save([], "3 ants", tmp_path / "none.png")
+    save_figure(ROWS, "3 ants", tmp_path / "a.b.png")
+    save_figure([], "3 ants", tmp_path / "none.png")
     lines = (tmp_path / "a.b.csv").read_text("utf-8").splitlines()
     assert lines == ["from_tick,to_tick,foods_per_tick,blocked", "5,7,2.0,0.25", "7,8,0.0,0.0"]
     for name in ("a.b.png", "none.png"):
