@@ -117,18 +117,13 @@ def report(
     return plain_text([Table(title, headers, lines, text_columns=len(headers))], _TERMINAL)
 
 
-def draw(
-    path: Path, settings: Sequence[Settings], values: np.ndarray, words: str, title: str
-) -> None:
+def draw(path: Path, settings: Sequence[Settings], values: np.ndarray, words: str) -> None:
     """Draw a measure against the first setting that varies, a line for each value of the others.
 
-    Args:
-        path: Where to write the .png.
-        settings, values: What varies, of P points, and the measure, float64 (P, S).
-        words, title: What it is, and one line.
+    Of P points: what varies, and the measure, float64 (P, S), of which `words` say what it is.
 
     Raises:
-        AntsError: The file cannot be written.
+        AntsError: The file (.png) cannot be written.
     """
     names = columns_of(settings)
     others = [name for name in names[1:] if len({str(one.get(name)) for one in settings}) > 1]
@@ -144,7 +139,7 @@ def draw(
         draw_lines(axes, lines)
         axes.set(xlabel=names[0], ylabel=words)
         caption = ", ".join([sentence(_spread(values.shape[1])), *alike])
-        style.frame(figure, title, f"{caption}.", style.legend_entries([axes]))
+        style.frame(figure, sentence(words), f"{caption}.", style.legend_entries([axes]))
     style.save(figure, path)
 
 

@@ -21,7 +21,7 @@ def drawn(monkeypatch):
 
     def axes(places):
         settings = [{"a.x": place, "a.y": line} for place in places for line in range(8)]
-        sweeps.draw(Path("none.png"), settings, VALUES, "words", "Title")
+        sweeps.draw(Path("none.png"), settings, VALUES, "words")
         return figures[0].axes[0]
 
     return axes

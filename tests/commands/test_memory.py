@@ -16,7 +16,7 @@ import pytest
 from command_lines import assert_one_sentence, call, command, contents, environment, load
 
 from taichi_ants.studies import runner
-from taichi_ants.studies.sweep_file import read_sweep
+from taichi_ants.studies.sweep import read_sweep
 
 SWEEP = """
 kind = "runs"
@@ -50,9 +50,8 @@ def sweep_of(seeds, folder):
     """A sweep of 6 points, all of which is measured, but nothing drawn or written."""
     file = folder / f"{seeds}.toml"
     file.write_text(SWEEP.replace("SEEDS", str(seeds)))
-    command = load("sweep")
-    asked = read_sweep(file, {kind: command.measures(kind) for kind in ("runs", "colony")})
-    return lambda blocks: command.measured(asked, blocks, None, None)
+    asked = read_sweep(file)
+    return lambda blocks: asked.measured(blocks, None, None, lambda share: None)
 
 
 def comparison_of(seeds, folder):

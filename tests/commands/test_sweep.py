@@ -16,13 +16,12 @@ from command_lines import (
     call,
     contents,
     environment,
-    load,
 )
 
 from taichi_ants import Colony, Life, Pheromone, Rewards, Task, TrainingConfig, train, worlds
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.studies.runner import EVALUATION_SEEDS
-from taichi_ants.studies.sweep_file import read_sweep
+from taichi_ants.studies.sweep import read_sweep
 from taichi_ants.task import observations
 from taichi_ants.worlds import registry
 
@@ -77,9 +76,6 @@ epsilon_decay = 0.9
 [vary]
 task.pheromone.half_life = [5, 10, 20]
 """
-
-
-NAMES = {kind: load("sweep").measures(kind) for kind in ("runs", "colony")}
 
 
 @pytest.fixture
@@ -276,7 +272,7 @@ def test_a_file_that_is_missing_is_named(capsys):
 
 def settings_of(text, tmp_path):
     (tmp_path / "a.toml").write_text(text)
-    return read_sweep(tmp_path / "a.toml", NAMES).settings
+    return read_sweep(tmp_path / "a.toml").settings
 
 
 def test_several_grids_are_joined(tmp_path):
@@ -351,10 +347,10 @@ def test_what_findings_say(shift, margin, word, tmp_path):
         .replace("[0.1, 0.5, 1.0]", "0.1")
         .replace("[7, 2, 5]", "20")
     )
-    asked = read_sweep(tmp_path / "a.toml", NAMES)
+    asked = read_sweep(tmp_path / "a.toml")
     noise = np.random.default_rng(0).normal(size=(2, 20))
     noise -= noise.mean(axis=1, keepdims=True)
-    found = load("sweep").findings(asked, noise + [[shift], [0.0]])
+    found = asked.findings(noise + [[shift], [0.0]])
     assert [(p, one["finding"]) for p, one in found.items()] == [(0, word)]
 
 
@@ -375,7 +371,7 @@ def test_a_preset_of_ones_own_and_its_settings_can_be_named(tmp_path, monkeypatc
     worlds.register("line", line)
     text = RUNS.replace("[vary]", '[world]\npreset = "line"\n[vary]\nworld.length = [4, 6]')
     (tmp_path / "a.toml").write_text(text)
-    points = read_sweep(tmp_path / "a.toml", NAMES).study.points
+    points = read_sweep(tmp_path / "a.toml").study.points
     assert {point.world for point in points} == {line(0, 4), line(0, 6)}
 
 
@@ -383,14 +379,14 @@ def test_traffic_has_names_and_learners_first_values(tmp_path):
     grid = '[vary]\ntask.traffic = ["blocking", "following"]\ntraining.initial_q = [0, 10]\n'
     more = "learning_rate = 0.1\nepsilon = 0.3\n"
     (tmp_path / "a.toml").write_text(RUNS[: RUNS.index("[vary]")] + more + grid)
-    points = read_sweep(tmp_path / "a.toml", NAMES).study.points
+    points = read_sweep(tmp_path / "a.toml").study.points
     found = [(point.task.traffic.follow, point.training.initial_q) for point in points]
     assert found == [(False, 0), (False, 10), (True, 0), (True, 10)]
 
 
 @pytest.mark.parametrize("name", ["crowds", "learning_rates", "observations", "trails"])
 def test_the_examples_can_be_read(name):
-    assert len(read_sweep(EXPERIMENTS / "sweeps" / f"{name}.toml", NAMES).settings) > 4
+    assert len(read_sweep(EXPERIMENTS / "sweeps" / f"{name}.toml").settings) > 4
 
 
 def test_help_is_quick_and_needs_no_taichi(tmp_path):
@@ -422,7 +418,7 @@ def test_the_script_of_observations_takes_the_options_of_a_sweep(tmp_path):
 
 
 def test_what_observations_gain_is_asked_of_all_of_them():
-    asked = read_sweep(EXPERIMENTS / "sweeps" / "observations.toml", NAMES)
+    asked = read_sweep(EXPERIMENTS / "sweeps" / "observations.toml")
     for grid in asked.grids:
         seen = {one["task.observation"] for one in asked.settings[grid]}
         assert seen == set(observations.names())

@@ -28,7 +28,7 @@ from taichi_ants.live.session import Session
 from taichi_ants.live.setup import Setup
 from taichi_ants.offline.dataset import COLUMNS
 from taichi_ants.studies.blocks import kept
-from taichi_ants.studies.sweep_file import read_sweep
+from taichi_ants.studies.sweep import read_sweep
 from taichi_ants.worlds import World
 
 WORLD = World((3, 3, 3), (0, 0, 0), foods=[(2, 0, 0)])
@@ -170,8 +170,4 @@ def _finished(folder: Path) -> dict[str, Any]:
 
 
 def _sweep(path: Path) -> Any:
-    return read_sweep(path, {"runs": {"greedy_return": _Measure}, "colony": {}}).study
-
-
-class _Measure:
-    episodes = 1
+    return read_sweep(path).study

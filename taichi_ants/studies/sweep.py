@@ -1,4 +1,4 @@
-"""Sweeps as TOML files: fixed settings, those that vary, seeds and measures."""
+"""Sweeps as TOML files: fixed settings, those that vary, seeds and measures; and their results."""
 
 from __future__ import annotations
 
@@ -6,24 +6,53 @@ import difflib
 import itertools
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from taichi_ants import checks, files, learners, worlds
+from taichi_ants.analysis import sweeps
+from taichi_ants.analysis.colony import study as of_colonies
+from taichi_ants.analysis.findings import Contrast, above, judge
+from taichi_ants.analysis.paper import measures as of_runs
 from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, shown
+from taichi_ants.files.results import REPORT
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.settings import all_of, declared, flat, nested
-from taichi_ants.studies.runner import ColonyPoint, Point, RunPoint, Study
+from taichi_ants.studies.runner import ColonyPoint, Outcome, Point, Progress, RunPoint, Study
 from taichi_ants.task import Task
 
 KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
+FIGURES, RUNS, SUMMARY, FINDINGS = "figures", "runs.csv", "summary.csv", "findings.csv"
 _OF_FILE = ("kind", "seeds", "measures", "margin", "against", "vary")
 _PARTS = ("world", "task", "training", "after", "pool")  # of a point; not settings themselves
 _OF_LEARNERS = [one.name for one in declared(TrainingConfig)]
+_WORDS = {"supported": "more", "contradicted": "less", "equivalent": "equal"}
 
 Settings = dict[str, Any]  # by their full names, as "task.pheromone.half_life"
+
+
+class Measure(NamedTuple):
+    """A number of a point and seed: its words, the episodes that it needs, and if it has an IQM."""
+
+    words: str
+    episodes: int = 0
+    uses_iqm: bool = False
+
+
+MEASURES = {
+    "runs": {
+        # The comparison takes all episodes if there are fewer than the last 50, a sweep does not.
+        name: Measure(
+            one.words, of_runs.WINDOW if name.endswith("_last50") else one.episodes, one.uses_iqm
+        )
+        for name, one in of_runs.MEASURES.items()
+    },
+    "colony": {name: Measure(words) for name, words in of_colonies.MEASURES.items()},
+}
 
 
 @dataclass(frozen=True)
@@ -47,9 +76,71 @@ class Sweep:
     against: tuple[str, Any] | None
     margin: float
 
+    def facts(self) -> dict[str, Any]:
+        """Return all that determines the results."""
+        own = {"measures": self.measures, "against": self.against, "margin": self.margin}
+        return {**self.study.settings(), **own, "vary": self.settings}
 
-def read_sweep(path: Path, measures: Mapping[str, Mapping[str, Any]]) -> Sweep:
-    """Read a sweep; `measures` are all measures by kind and name, with the `episodes` they need.
+    def measured(
+        self, blocks: Path, threads: int | None, arch: str | None, progress: Progress
+    ) -> dict[str, np.ndarray]:
+        """Return each measure of each point and seed, float64 (points, seeds)."""
+
+        def reduce(points: Sequence[Any], seeds: Sequence[int], outcome: Outcome) -> Outcome:
+            if self.kind == "runs":
+                return of_runs.measures_of_runs(outcome, self.measures)
+            (point,) = points
+            arrays = {key: array[0] for key, array in outcome.items()}
+            found = of_colonies.measures_of(arrays, point.ants, point.ticks)
+            return {name: found[name][None] for name in self.measures}
+
+        return self.study.reduced(blocks, reduce, threads, arch, progress)
+
+    def findings(self, values: np.ndarray) -> dict[int, dict[str, Any]]:
+        """Return by point how it differs from the one that is the same except for `against`.
+
+        Intervals of the first measure, float64 (points, seeds), hold at once within a [vary].
+        """
+        if self.against is None:
+            return {}
+        (name, value), found = self.against, {}
+        for some in self.grids:
+            rows, own = self.settings[some], values[some]
+            others = [{**row, name: value} for row in rows]
+            pairs = [(p, rows.index(other)) for p, other in enumerate(others) if other in rows]
+            pairs = [(p, other) for p, other in pairs if p != other]
+            several = [Contrast("", own[p] - own[other], above(self.margin)) for p, other in pairs]
+            for (p, _), one in zip(pairs, judge(several), strict=True):
+                said = _WORDS.get(one.verdict.value, "undecided")
+                numbers = {"difference": one.effect, "low": one.low, "high": one.high}
+                found[some.start + p] = {**rows[p], "finding": said, **numbers}
+        return found
+
+    def write(self, values: dict[str, np.ndarray], folder: Path, draws: bool) -> None:
+        """Write all results that follow from what was `measured`."""
+        first, columns = self.measures[0], sweeps.columns_of(self.settings)
+        of_seeds = sweeps.seed_rows(self.settings, self.study.seeds, values)
+        files.write_csv(folder / RUNS, of_seeds, [*columns, "seed", *values])
+        with_iqm = [name for name in values if MEASURES[self.kind][name].uses_iqm]
+        rows = sweeps.summary_rows(self.settings, values, with_iqm)
+        files.write_csv(folder / SUMMARY, rows, sweeps.columns_of(rows))
+        found = self.findings(values[first])
+        if self.against:
+            more = ("finding", "difference", "low", "high")
+            files.write_csv(folder / FINDINGS, found.values(), [*columns, *more])
+        notes = [found.get(p, {}).get("finding", "") for p in range(len(self.settings))]
+        report = sweeps.report(self.settings, values, self.against, notes)
+        files.write_text(folder / REPORT, report)
+        if draws:
+            files.check_writable_folder(folder / FIGURES)
+            words = MEASURES[self.kind][first].words
+            for number, some in enumerate(self.grids, start=1):
+                path = folder / FIGURES / f"{first}{f'-{number}' * (len(self.grids) > 1)}.png"
+                sweeps.draw(path, self.settings[some], values[first][some], words)
+
+
+def read_sweep(path: Path) -> Sweep:
+    """Read a sweep.
 
     Raises:
         AntsError: The file cannot be read, or asks for something that cannot be.
@@ -60,21 +151,21 @@ def read_sweep(path: Path, measures: Mapping[str, Mapping[str, Any]]) -> Sweep:
     except (ValueError, RecursionError) as error:
         raise AntsError(f"{str(path)!r} is no TOML: {error}; mend the file.") from error
     try:
-        return _sweep(file, measures)
+        return _sweep(file)
     except AntsError as error:
         raise AntsError(f"in {str(path)!r}, {error}") from error
 
 
-def _sweep(file: Settings, measures: Mapping[str, Mapping[str, Any]]) -> Sweep:
+def _sweep(file: Settings) -> Sweep:
     kind: Any = file.get("kind")
     if kind is None:
         raise AntsError(f"kind is missing; write one of {', '.join(KINDS)}.")
     check_one_of("kind", kind, tuple(KINDS))
-    wanted = _listed(file.get("measures", []))
+    wanted, measures = _listed(file.get("measures", [])), MEASURES[kind]
     if not wanted:
-        raise AntsError(f"measures is missing; name one or more of {', '.join(measures[kind])}.")
+        raise AntsError(f"measures is missing; name one or more of {', '.join(measures)}.")
     for name in wanted:
-        check_one_of("measures", name, tuple(measures[kind]))
+        check_one_of("measures", name, tuple(measures))
     _check_once("measures", wanted)
     fixed = flat({name: value for name, value in file.items() if name not in _OF_FILE})
     grids = [_grid(grid, fixed) for grid in _listed(file.get("vary", []))]
@@ -82,26 +173,31 @@ def _sweep(file: Settings, measures: Mapping[str, Mapping[str, Any]]) -> Sweep:
         raise AntsError("[vary] is missing; name in it what varies, with lists of values.")
     seeds = file.get("seeds", 10)
     if not isinstance(seeds, list):
-        checked_whole("seeds", seeds, 1, 100_000, ", or a list of seeds")
-        seeds = range(seeds)
-    checked = checks.checked_seeds(seeds)
-    built: dict[str, Any] = {}
-    rows = tuple(itertools.chain(*grids))
-    points: tuple[Any, ...] = tuple(_point(kind, {**fixed, **row}, checked, built) for row in rows)
+        seeds = range(checked_whole("seeds", seeds, 1, 100_000, ", or a list of seeds"))
+    seeds = checks.checked_seeds(seeds)
+    rows, built = tuple(itertools.chain(*grids)), dict[str, Any]()
+    points = tuple(_point(kind, {**fixed, **row}, seeds, built) for row in rows)
     for name in wanted:
-        least = measures[kind][name].episodes
+        least = measures[name].episodes
         if any(point.episodes < least for point in points):
             raise AntsError(f"{name} needs {least} episodes; give more, or measure something else.")
     margin = file.get("margin", 0)
     if type(margin) not in (int, float) or not 0 <= margin < math.inf:
         raise AntsError(f"margin is {shown(margin)}; it must be a number of at least 0.")
-    against = _against(file["against"], rows) if "against" in file else None
-    if "margin" in file and not against:
+    against = None
+    if "against" in file:
+        given = file["against"]
+        pairs = list(flat(given).items()) if isinstance(given, dict) else []
+        if len(pairs) != 1 or not any(pairs[0] in row.items() for row in rows):
+            raise AntsError(
+                f"against is {shown(given)}; give one setting, and a value of it in [vary]."
+            )
+        (against,) = pairs
+    elif "margin" in file:
         raise AntsError("margin is given without against; give both, or none.")
-    study = Study(points, checked)
     ends = list(itertools.accumulate(map(len, grids), initial=0))
     parts = tuple(map(slice, ends, ends[1:]))
-    return Sweep(kind, study, rows, parts, tuple(wanted), against, margin)
+    return Sweep(kind, Study(points, seeds), rows, parts, tuple(wanted), against, margin)
 
 
 def _listed(value: Any) -> list:
@@ -137,17 +233,8 @@ def _grid(grid: Any, fixed: Settings) -> list[Settings]:
     return [dict(zip(values, row, strict=True)) for row in itertools.product(*values.values())]
 
 
-def _against(given: Any, rows: Iterable[Settings]) -> tuple[str, Any]:
-    pairs = list(flat(given).items()) if isinstance(given, dict) else []
-    if len(pairs) != 1 or not any(pairs[0] in row.items() for row in rows):
-        raise AntsError(
-            f"against is {shown(given)}; give one setting, and a value of it in [vary]."
-        )
-    return pairs[0]
-
-
 def _point(kind: str, settings: Settings, seeds: tuple[int, ...], built: dict[str, Any]) -> Point:
-    """The point of some settings; a world stands in `built` once it was built."""
+    """The point of some settings; worlds that were `built` are used again."""
     learner = settings.get("training.learner")
     more = declared(learners.get(str(learner)).hyperparameters) if learner else ()
     known = [
