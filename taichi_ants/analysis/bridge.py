@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from taichi_ants import files
 from taichi_ants.analysis import style
 from taichi_ants.analysis.findings import LEAST_SEEDS
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.analysis.sweeps import draw_lines
 from taichi_ants.analysis.tables import Table, interval, number, plain_text, sentence
 from taichi_ants.errors import count
+from taichi_ants.files.results import REPORT
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -94,6 +96,19 @@ def rows(found: Crossings, seeds: Sequence[int], ticks: int) -> list[dict[str, A
         for k, load in enumerate(LOADS)
         for w in range(WINDOWS)
     ]
+
+
+def write_results(
+    folder: Path, found: Crossings, seeds: Sequence[int], ticks: int, draws: bool
+) -> None:
+    """Write counts, report and figures; colonies were followed for so many `ticks`."""
+    table = rows(found, seeds, ticks)
+    files.write_csv(folder / "shares.csv", table, list(table[0]))
+    files.write_text(folder / REPORT, report(found, ticks))
+    if draws:
+        figures = files.check_writable_folder(folder / "figures")
+        draw(figures / "bridge.png", found, ticks)
+        draw_late(figures / "late.png", found, ticks)
 
 
 def report(found: Crossings, ticks: int) -> str:

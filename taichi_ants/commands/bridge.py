@@ -9,9 +9,8 @@ go to a folder. See docs/bridge.md.
 from __future__ import annotations
 
 import argparse
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from taichi_ants.studies.command_line import (
     AGAIN,
@@ -25,11 +24,7 @@ from taichi_ants.studies.command_line import (
     with_folder,
 )
 
-if TYPE_CHECKING:
-    from taichi_ants.studies.runner import Study
-
 QUICK = {"seeds": 4, "episodes": 20, "ticks": 500, "evaluation_ticks": 1000}
-SHARES, FIGURE, LATE_FIGURE = "shares.csv", "figures/bridge.png", "figures/late.png"
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -54,41 +49,28 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 
 def bridge(settings: argparse.Namespace) -> None:
     """Do the study, or show the finished one."""
-    from taichi_ants.analysis.bridge import DESIGNS
-    from taichi_ants.studies.bridge import point
+    from taichi_ants.analysis.bridge import DESIGNS, write_results
+    from taichi_ants.studies.bridge import followed, point
     from taichi_ants.studies.result_folder import work_or_show
     from taichi_ants.studies.runner import Study
 
     load_plugin(settings.plugin)
     seeds = tuple(range(settings.seed, settings.seed + settings.seeds))
-    points = tuple(point(design, settings.episodes, settings.ticks) for design in DESIGNS)
-    study = Study(points, seeds)
-    facts = {**study.settings(), "evaluation_ticks": settings.evaluation_ticks}
-    work_or_show(settings, facts, partial(do_bridge, settings, study))
+    points = {design: point(design, settings.episodes, settings.ticks) for design in DESIGNS}
+    study = Study(tuple(points.values()), seeds)
+    ticks, where = settings.evaluation_ticks, {"threads": settings.threads, "arch": settings.arch}
 
+    def work(blocks: Path, ready: Path) -> None:
+        found = {}
+        with progress_bar("bridge") as progress:
+            outcomes = study.run(blocks, **where, progress=lambda share: progress(0.6 * share))
+            for number, (design, one) in enumerate(points.items()):
+                path, tables = blocks / f"followed-{number:06d}.npz", outcomes[one]["q_values"]
+                found[design] = followed(path, design, one, seeds, tables, ticks, where)
+                progress(0.6 + 0.4 * (number + 1) / len(points))
+        write_results(ready, found, seeds, ticks, draws=not settings.no_figures)
 
-def do_bridge(settings: argparse.Namespace, study: Study, blocks: Path, ready: Path) -> None:
-    """Do what is not done yet, and write all results."""
-    from taichi_ants import files
-    from taichi_ants.analysis import bridge as analysis
-    from taichi_ants.files.results import REPORT
-    from taichi_ants.studies.bridge import followed
-
-    ticks, found = settings.evaluation_ticks, {}
-    where = {"threads": settings.threads, "arch": settings.arch}
-    with progress_bar("bridge") as progress:
-        outcomes = study.run(blocks, **where, progress=lambda share: progress(0.6 * share))
-        for number, (design, one) in enumerate(zip(analysis.DESIGNS, study.points, strict=True)):
-            path, tables = blocks / f"followed-{number:06d}.npz", outcomes[one]["q_values"]
-            found[design] = followed(path, design, one, study.seeds, tables, ticks, where)
-            progress(0.6 + 0.4 * (number + 1) / len(analysis.DESIGNS))
-    rows = analysis.rows(found, study.seeds, ticks)
-    files.write_csv(ready / SHARES, rows, list(rows[0]))
-    files.write_text(ready / REPORT, analysis.report(found, ticks))
-    if not settings.no_figures:
-        files.check_writable_folder((ready / FIGURE).parent)
-        analysis.draw(ready / FIGURE, found, ticks)
-        analysis.draw_late(ready / LATE_FIGURE, found, ticks)
+    work_or_show(settings, {**study.settings(), "evaluation_ticks": ticks}, work)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -61,10 +61,7 @@ PLANNED = (
     *("training.epsilon_decay", "training.min_epsilon", "training.initial_q"),
     *("training.learning_rate_decay", "training.min_learning_rate"),
 )
-WIDTH = 79  # of the report, in columns
 COUNT: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
-SEEDS, CONDITIONS = "seeds.csv", "conditions.csv"
-FIGURES, POLICIES = "figures", "policies"
 _FILES = ("save", "render", "figure")
 _OF_RESUMED = ("resume", "ticks", "frame_interval", "plugin", "threads", "arch", *_FILES)
 
@@ -177,60 +174,23 @@ def training_config(settings: argparse.Namespace, epsilon: float) -> TrainingCon
 
 def study(settings: argparse.Namespace) -> None:
     """Run the study, or show the finished one."""
-    from taichi_ants.studies.colony_study import plan, study_of
+    from taichi_ants.studies.colony_study import plan, study_of, write_results
     from taichi_ants.studies.result_folder import work_or_show
 
     seeds = tuple(range(settings.seed, settings.seed + settings.seeds))
-    conditions = plan(
-        settings.world_kinds,
-        settings.sizes,
-        seeds,
-        training_config(settings, 0.3),
-        settings.episodes,
-        settings.ticks,
-        settings.rollouts,
-    )
+    lengths = settings.episodes, settings.ticks, settings.rollouts
+    training = training_config(settings, 0.3)
+    conditions = plan(settings.world_kinds, settings.sizes, seeds, training, *lengths)
     asked = study_of(conditions, seeds)
+
+    def work(blocks: Path, ready: Path) -> Results:
+        with progress_bar("study") as progress:
+            outcomes = asked.run(blocks, settings.threads, settings.arch, progress)
+        return write_results(conditions, seeds, outcomes, ready, draws=not settings.no_figures)
+
     words = {name: getattr(settings, name) for name in ("world_kinds", "sizes")}
-    facts = {**words, **asked.settings()}
-    work = partial(do_study, settings, conditions, asked)
     page = partial(make_page, settings, conditions, asked)
-    work_or_show(settings, facts, work, tuple(words), page)
-
-
-def do_study(
-    settings: argparse.Namespace, conditions: Plan, asked: Study, blocks: Path, ready: Path
-) -> Results:
-    """Do what is not done yet, and write all results."""
-    from taichi_ants import files, save_policy
-    from taichi_ants.analysis import style
-    from taichi_ants.analysis.colony import tables
-    from taichi_ants.analysis.colony.figures import draw_all
-    from taichi_ants.analysis.colony.tables import Results
-    from taichi_ants.analysis.tables import markdown, plain_text
-    from taichi_ants.files.results import REPORT
-    from taichi_ants.studies.colony_study import measured, median_policies
-
-    with progress_bar("study") as progress:
-        outcomes = asked.run(blocks, settings.threads, settings.arch, progress)
-    values = measured(conditions, outcomes, asked.seeds)
-    results = Results.of(values)
-    for name, table in (
-        (SEEDS, tables.rows_of_seeds(values, asked.seeds)),
-        (CONDITIONS, [one.columns() for one in results.rows]),
-        ("differences.csv", tables.difference_rows(results.judged)),
-    ):
-        files.write_csv(ready / name, table, list(table[0]))
-    findings = tables.found(*results)
-    files.write_text(ready / "findings.md", markdown(findings))
-    screen = tables.on_one_screen(*results)
-    files.write_text(ready / REPORT, plain_text(screen, WIDTH))
-    policies = files.check_writable_folder(ready / POLICIES)
-    for name, q, facts, seen in median_policies(conditions, asked.seeds, values, outcomes):
-        save_policy(policies / f"{name}.npz", q, facts, seen)
-    if not settings.no_figures:
-        style.save_all(draw_all(results.rows), ready / FIGURES)
-    return results
+    work_or_show(settings, {**words, **asked.settings()}, work, tuple(words), page)
 
 
 def make_page(
@@ -250,6 +210,7 @@ def make_page(
     from taichi_ants.report.colony import colony_page
     from taichi_ants.report.page import made_facts, setting_facts
     from taichi_ants.report.players import at_work
+    from taichi_ants.studies.colony_study import POLICIES, SEEDS
 
     results = results or Results.read(files.read_csv(folder / SEEDS))
     shown = not settings.no_figures

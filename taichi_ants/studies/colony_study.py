@@ -6,23 +6,33 @@ worlds one in `WORLDS` there and one in `_place` here.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from taichi_ants import learners, worlds
+from taichi_ants import files, learners, worlds
+from taichi_ants.analysis import style
 from taichi_ants.analysis.bounds.limits import limits_of
-from taichi_ants.analysis.colony import study
+from taichi_ants.analysis.colony import study, tables
+from taichi_ants.analysis.colony.figures import draw_all
 from taichi_ants.analysis.colony.study import Condition, Measured, measures_of
+from taichi_ants.analysis.colony.tables import Results
+from taichi_ants.analysis.tables import markdown, plain_text
 from taichi_ants.errors import AntsError, check_one_of
+from taichi_ants.files.results import REPORT
 from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.learners.policies import save_policy
 from taichi_ants.studies.runner import ColonyPoint, Outcome, Study
 from taichi_ants.task import Life, Pheromone, Task, foraging, paper, queueing
 from taichi_ants.worlds.world import World
 
+SEEDS, CONDITIONS = "seeds.csv", "conditions.csv"
+FIGURES, POLICIES = "figures", "policies"
+_WIDTH = 79  # of the report, in columns
 _SILENT, _LIVELY = Pheromone(deposit="none"), Life(regrowth=0)
 # Trails fall in training too, and food grows back at once.
 TASKS: dict[str, Task] = {
@@ -76,21 +86,15 @@ def plan(
             f"they learn together; choose one of {', '.join(able)}."
         )
     training = scheduled(replace(training, min_epsilon=study.EVALUATION_EPSILON), episodes)
-    places = {
-        world_kind: worlds.paper()
-        if world_kind == "paper"
-        else tuple(place(world_kind, seed) for seed in seeds)
-        for world_kind in dict.fromkeys([*world_kinds, OPEN])
-    }
-    pools = {world_kind: _pool(world_kind) for world_kind in places}
+    kinds = dict.fromkeys([*world_kinds, OPEN])
+    places = {world_kind: _drawn(world_kind, seeds) or worlds.paper() for world_kind in kinds}
+    others = range(FIRST_OF_POOL, FIRST_OF_POOL + POOL)
+    pools = {one: _drawn(one, others) for one in kinds if one in study.WORLD_KINDS}
+    lengths: Any = {"episodes": episodes, "ticks": ticks, "rollouts": rollouts}
 
     def trained(world_kind: str, rules: str, ants: int) -> ColonyPoint:
-        return ColonyPoint(
-            *(places[world_kind], TASKS[rules], training, pools[world_kind], ants),
-            episodes=episodes,
-            ticks=ticks,
-            rollouts=rollouts,
-        )
+        places_of = places[world_kind], TASKS[rules], training, pools[world_kind]
+        return ColonyPoint(*places_of, ants, **lengths)
 
     conditions: Plan = {}
     for world_kind in world_kinds:
@@ -137,11 +141,9 @@ def place(world_kind: str, seed: int) -> World:
     return worlds.open_world(seed, ranges, rock_share=0.3 if world_kind == "rocks" else 0.15)
 
 
-def _pool(world_kind: str) -> tuple[World, ...] | None:
-    """Worlds for training, other ones than for evaluation; the paper's is the only one."""
-    if world_kind not in study.WORLD_KINDS or world_kind == "paper":
-        return None
-    return tuple(place(world_kind, FIRST_OF_POOL + n) for n in range(POOL))
+def _drawn(world_kind: str, seeds: Iterable[int]) -> tuple[World, ...] | None:
+    """Worlds of a kind; None for the paper's, of which there is only one."""
+    return None if world_kind == "paper" else tuple(place(world_kind, seed) for seed in seeds)
 
 
 def scheduled(training: TrainingConfig, episodes: int) -> TrainingConfig:
@@ -176,13 +178,13 @@ def measured(
     """Return all measures of all conditions, from the outcomes of their points."""
     bounds, found = bounds_of(conditions, len(seeds)), {}
     for condition, point in conditions.items():
-        found[condition], without = (
+        of_point, without = (
             measures_of(outcomes[one], one.ants, one.ticks) for one in (point, greedy(point))
         )
-        bound, deliveries = bounds[condition], found[condition]["deliveries"]
-        possible = np.where(bound > 0, bound, np.nan)
-        besides = {"greedy": without["deliveries"], "bound": bound}
-        found[condition] |= {**besides, "of_bound": deliveries / possible}
+        bound = bounds[condition]
+        share = of_point["deliveries"] / np.where(bound > 0, bound, np.nan)
+        besides = {"greedy": without["deliveries"], "bound": bound, "of_bound": share}
+        found[condition] = {**of_point, **besides}
     return found
 
 
@@ -191,8 +193,8 @@ def bounds_of(conditions: Plan, seeds: int) -> dict[Condition, np.ndarray]:
 
     They are nan where food moves or takes time to grow back: the limits do not hold there.
     """
+    limits: dict[Any, list] = {}
     found = {}
-    limits = {}
     for condition, point in conditions.items():
         places = point.world if isinstance(point.world, tuple) else (point.world,)
         key = point.world, point.task.traffic, point.task.turns_at_queen
@@ -202,6 +204,32 @@ def bounds_of(conditions: Plan, seeds: int) -> dict[Condition, np.ndarray]:
         most = [one.deliveries(point.ants) if known else np.nan for one in limits[key]]
         found[condition] = np.broadcast_to(np.array(most), seeds)
     return found
+
+
+def write_results(
+    conditions: Plan,
+    seeds: Sequence[int],
+    outcomes: Mapping[Any, Outcome],
+    folder: Path,
+    draws: bool,
+) -> Results:
+    """Write all results that follow from the outcomes of the points, and return them."""
+    values = measured(conditions, outcomes, seeds)
+    results = Results.of(values)
+    for name, table in (
+        (SEEDS, tables.rows_of_seeds(values, seeds)),
+        (CONDITIONS, [one.columns() for one in results.rows]),
+        ("differences.csv", tables.difference_rows(results.judged)),
+    ):
+        files.write_csv(folder / name, table, list(table[0]))
+    files.write_text(folder / "findings.md", markdown(tables.found(*results)))
+    files.write_text(folder / REPORT, plain_text(tables.on_one_screen(*results), _WIDTH))
+    policies = files.check_writable_folder(folder / POLICIES)
+    for name, q_values, facts, seen in median_policies(conditions, seeds, values, outcomes):
+        save_policy(policies / f"{name}.npz", q_values, facts, seen)
+    if draws:
+        style.save_all(draw_all(results.rows), folder / FIGURES)
+    return results
 
 
 def median_policies(

@@ -33,6 +33,7 @@ from taichi_ants.commands import colony as command
 from taichi_ants.learners import registry
 from taichi_ants.learners.policies import save_policy
 from taichi_ants.studies import colony_study
+from taichi_ants.studies.runner import Study
 from taichi_ants.task import Traffic, foraging, paper, queueing
 
 SEEDS, EPISODES, TICKS, ROLLOUTS = (3, 4), 4, 80, 2
@@ -200,11 +201,11 @@ def test_quick_has_a_folder_of_its_own():
 def test_other_arenas_are_the_only_difference_and_their_order_is_none(
     capsys, tmp_path, monkeypatch
 ):
-    def stop(settings, conditions, asked, blocks, ready):
+    def stop(study, blocks, *more):
         (blocks / "0.npz").touch()
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(command, "do_study", stop)
+    monkeypatch.setattr(Study, "run", stop)
     monkeypatch.chdir(tmp_path)
     small = ["study", "--out", "out", "--seeds", 1, "--sizes", 2, "--world-kinds"]
     for world_kinds in (["paper", "small"], ["small", "paper", "small"]):
