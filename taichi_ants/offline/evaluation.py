@@ -6,7 +6,7 @@ value of a policy is its expected discounted return from where the episodes of t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -90,16 +90,16 @@ def importance_sampling(
     longest = int(np.diff(begins).max())
     weights, estimates = np.empty(len(data)), np.empty(len(times))
     sums = np.empty((3, len(times), longest + 1))
-    outcomes = []
-    for policy in policies:
+
+    def estimated(policy: np.ndarray) -> tuple[np.ndarray, float]:
         weigh(weights, begins, policy[data.state, data.action] / data.behaviour_probability)
         sums[:] = 0.0
         add_up(*sums, estimates, begins, data.reward, weights, times, int(weighted), discount)
         whole = weights[begins[1:] - 1]
         squares = np.square(whole).sum()
-        size = whole.sum() ** 2 / squares if squares > 0 else 0.0
-        outcomes.append((*_interval(estimates, level), size))
-    return _values(outcomes, shape)
+        return estimates, whole.sum() ** 2 / squares if squares > 0 else 0.0
+
+    return _values(map(estimated, policies), shape, level)
 
 
 @checked_arguments
@@ -124,18 +124,24 @@ def model_based(
     times = _times(data, resamples)
     model, first = EmpiricalModel.resampled(data, times), data.state[data.begins[:-1]]
     starts = times / times.sum(axis=1, keepdims=True, dtype=np.int64)  # of each episode
-    outcomes = []
-    for policy in policies:
+
+    def estimated(policy: np.ndarray) -> tuple[np.ndarray, float]:
         q = model.solve(discount, model.rewards, initial_q, policy, threads=threads)
         values = (policy[first] * q[:, first]).sum(axis=-1)
-        outcomes.append((*_interval((starts * values).sum(axis=1), level), np.nan))
-    return _values(outcomes, shape)
+        return (starts * values).sum(axis=1), np.nan
+
+    return _values(map(estimated, policies), shape, level)
 
 
-def _values(outcomes: Sequence[tuple[float, ...]], shape: tuple[int, ...]) -> PolicyValues:
-    """From the four numbers of each policy."""
-    value, low, high, size = (np.reshape(column, shape) for column in np.array(outcomes).T)
-    return PolicyValues(value, low, high, size)
+def _values(
+    of_policies: Iterable[tuple[np.ndarray, float]], shape: tuple[int, ...], level: float
+) -> PolicyValues:
+    """From estimates, of the data and of each resample, and sample size of each policy."""
+    tail, rows = (1.0 - level) / 2.0, []
+    for (value, *resampled), size in of_policies:
+        ends = np.quantile(resampled, (tail, 1.0 - tail)) if resampled else (np.nan, np.nan)
+        rows.append((value, *ends, size))
+    return PolicyValues(*(np.reshape(column, shape) for column in np.array(rows).T))
 
 
 def _policies(data: Dataset, q_values: np.ndarray, epsilon: float) -> tuple[np.ndarray, tuple]:
@@ -151,12 +157,3 @@ def _times(data: Dataset, resamples: int) -> np.ndarray:
     n = len(data.begins) - 1
     once = np.ones((1, n), np.uint8)
     return np.concatenate([once, resampling_counts(n, resamples)]) if resamples else once
-
-
-def _interval(estimates: np.ndarray, level: float) -> tuple[float, float, float]:
-    """The first estimate, and the percentile interval of the others."""
-    if len(estimates) == 1:
-        return estimates[0], np.nan, np.nan
-    tail = (1.0 - level) / 2.0
-    low, high = np.quantile(estimates[1:], (tail, 1.0 - tail))
-    return estimates[0], low, high

@@ -73,9 +73,9 @@ def fitted_q_iteration(
     Pairs that the data lack keep `initial_q`. Arguments and errors are those of
     `batch_q_learning`, but the discount must be at most 0.9999.
     """
-    model = EmpiricalModel.of(data, _groups(data, by_run))
-    q = model.solve(discount, model.rewards, initial_q, threads=threads).astype(np.float32)
-    return q if by_run else q[0]
+    model = EmpiricalModel.of(data, by_run)
+    q = model.solve(discount, model.rewards, initial_q, threads=threads)
+    return (q if by_run else q[0]).astype(np.float32)
 
 
 @checked_arguments
@@ -96,12 +96,12 @@ def pessimistic_q_iteration(
     Args:
         penalty: From 0 to 1e9, in rewards; the others, and errors, as of `fitted_q_iteration`.
     """
-    model = EmpiricalModel.of(data, _groups(data, by_run))
+    model = EmpiricalModel.of(data, by_run)
     worst = data.task.rewards.by_event()[Event.ENTERED_EMPTY :].min()
     lowest = worst / (1.0 - discount)
     rewards = model.rewards - penalty / np.sqrt(model.counts)
-    q = model.solve(discount, rewards, lowest, lowest=lowest, threads=threads).astype(np.float32)
-    return q if by_run else q[0]
+    q = model.solve(discount, rewards, lowest, lowest=lowest, threads=threads)
+    return (q if by_run else q[0]).astype(np.float32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,9 +131,9 @@ class EmpiricalModel:
     probabilities: np.ndarray
 
     @classmethod
-    def of(cls, data: Dataset, groups: np.ndarray) -> EmpiricalModel:
-        """Of each group of rows; (groups + 1,) their beginnings. AntsError if there are no data."""
-        expect("data", data, Dataset)
+    def of(cls, data: Dataset, by_run: bool) -> EmpiricalModel:
+        """Of each run a group, or of all of them one."""
+        groups = _groups(data, by_run)
         group = np.repeat(np.arange(len(groups) - 1), np.diff(groups))
         pair = (group * data.task.n_states + data.state) * N_ACTIONS + data.action
         return cls._counted(data, len(groups) - 1, *_tally(data, pair)[:4])
@@ -164,7 +164,7 @@ class EmpiricalModel:
         rewards: np.ndarray,
     ) -> EmpiricalModel:
         """From counts and sums of rewards by pair, that of group g moved by g tables, and state."""
-        n_states = data.task.n_states
+        n_states, size = data.task.n_states, data.task.n_states * N_ACTIONS
         pairs, first = np.unique(pair, return_index=True)
         total = np.add.reduceat(counts, first)
         goes_on = successor < n_states
@@ -172,10 +172,8 @@ class EmpiricalModel:
         return cls(
             n_states=n_states,
             largest=float(np.abs(data.task.rewards.by_event()).max()),
-            groups=np.searchsorted(pairs // (n_states * N_ACTIONS), np.arange(n_groups + 1)).astype(
-                np.int32
-            ),
-            pairs=(pairs % (n_states * N_ACTIONS)).astype(np.int32),
+            groups=np.searchsorted(pairs // size, np.arange(n_groups + 1)).astype(np.int32),
+            pairs=(pairs % size).astype(np.int32),
             counts=total.astype(np.int64),
             rewards=np.add.reduceat(rewards, first) / total,
             begins=np.append(0, np.cumsum(np.add.reduceat(goes_on, first))).astype(np.int32),
@@ -205,13 +203,12 @@ class EmpiricalModel:
         runtime.start(threads)
         from taichi_ants.offline.kernels import iterate  # imports Taichi
 
-        flat = q.reshape(-1), values.reshape(-1), np.ascontiguousarray(greedy).reshape(-1)
+        tables = q.reshape(-1), values.reshape(-1), np.ascontiguousarray(greedy).reshape(-1)
         # An array of length 0 cannot be an argument.
-        successors, probabilities = np.append(self.successors, np.int32(0)), self.probabilities
-        model = (self.groups, self.pairs, rewards, self.begins, successors)
-        numbers = (discount, lowest, tolerance(self.largest, discount, initial_q))
-        probabilities = np.append(probabilities, 0.0)
-        iterate(*flat, int(policy is None), *model, probabilities, self.n_states, *numbers)
+        after = np.append(self.successors, np.int32(0)), np.append(self.probabilities, 0.0)
+        numbers = self.n_states, discount, lowest, tolerance(self.largest, discount, initial_q)
+        model = self.groups, self.pairs, rewards, self.begins, *after
+        iterate(*tables, int(policy is None), *model, *numbers)
         return q
 
 

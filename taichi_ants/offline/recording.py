@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -55,13 +55,10 @@ def record(
     Raises:
         AntsError: An argument is not allowed; the message names it.
     """
-    learns = isinstance(behaviour, TrainingConfig)
-    checks.checked_world(world, learns=learns)
+    checks.checked_world(world, learns=isinstance(behaviour, TrainingConfig))
     task, numbers = checks.checked_runs_task(task), checks.checked_seeds(seeds)
-    episodes, epsilon = (
-        checked_whole("episodes", episodes),
-        checks.checked_share("epsilon", epsilon),
-    )
+    episodes = checked_whole("episodes", episodes)
+    epsilon = checks.checked_share("epsilon", epsilon)
     max_steps = checks.checked_max_steps(max_steps, task)
     runtime.start(threads, arch)
     facts: dict[str, Any]
@@ -87,13 +84,15 @@ def record(
     pieces = []
     for columns, chances, run in record_steps(world, task, max_steps, runs, episodes, progress):
         piece = {name: columns[there] for name, there in _FROM_TRACE.items()}
-        piece |= {"run": run, "behaviour_probability": chances, "agent": np.zeros_like(run)}
-        pieces.append({name: piece[name].astype(dtype) for name, dtype in _GIVEN.items()})
+        more = {"run": run, "behaviour_probability": chances, "agent": np.zeros_like(run)}
+        pieces.append(_typed({**piece, **more}))
     return _dataset(pieces, world=world, task=task, seeds=numbers, behaviour=facts)
 
 
-# What recorders give; where episodes end follows from it.
-_GIVEN = {name: dtype for name, dtype in COLUMNS.items() if name != "truncated"}
+def _typed(piece: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The columns that recorders give, in their types; where episodes end follows from them."""
+    given = {name: dtype for name, dtype in COLUMNS.items() if name != "truncated"}
+    return {name: piece[name].astype(dtype) for name, dtype in given.items()}
 
 
 def record_colony(
@@ -124,8 +123,7 @@ def record_colony(
         for tick in range(ticks):
             before, tables = tables, colony.q_values
             piece = _tick(colony, tables, before)
-            piece["episode"] = np.full(len(piece["run"]), episode)
-            pieces.append({name: piece[name].astype(dtype) for name, dtype in _GIVEN.items()})
+            pieces.append(_typed({**piece, "episode": np.full(len(piece["run"]), episode)}))
             if progress is not None:
                 progress((episode + (tick + 1) / ticks) / episodes)
             if not len(piece["run"]) and tick + 1 < ticks:  # all have died
@@ -170,13 +168,12 @@ def _tick(colony: Colony, tables: np.ndarray, before: np.ndarray) -> dict[str, n
     }
 
 
-def _dataset(pieces: Iterable[dict[str, np.ndarray]], **known: Any) -> Dataset:
+def _dataset(pieces: list[dict[str, np.ndarray]], **known: Any) -> Dataset:
     """The data set of rows, those of an ant in order; it finds out where episodes end."""
-    several = list(pieces)
     rows: dict[str, Any] = {
-        name: np.concatenate([piece[name] for piece in several]) for name in _GIVEN
+        name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]
     }
-    several.clear()
+    pieces.clear()
     key = rows["run"].astype(np.int64)
     for name in ("episode", "agent"):
         key = key * (int(rows[name].max(initial=0)) + 1) + rows[name]
